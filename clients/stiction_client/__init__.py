@@ -1,0 +1,1 @@
+"""Client of the Stiction friction service: what a grasp planner installs."""

@@ -1,0 +1,1 @@
+"""The database of materials: tables, repositories, blob store."""

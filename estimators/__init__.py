@@ -1,0 +1,6 @@
+"""Friction samples to friction models (samples → friction_model → material)."""
+
+from estimators.errors import EstimatorError, InvalidSamples, TooFewSamples
+from estimators.friction_model import Cost, Domain, FrictionModel
+
+__all__ = ["Cost", "Domain", "EstimatorError", "FrictionModel", "InvalidSamples", "TooFewSamples"]

@@ -1,0 +1,84 @@
+"""The fitted stochastic linear friction model (stage 6: friction_model)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+from estimators.errors import InvalidSamples
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Domain:
+    """Range of the data behind a model: tangential velocity, m/s, and normal force of an element, N."""
+
+    tangential_velocity: tuple[float, float]
+    normal_force: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """What a fit cost: ``seconds``, and the Monte-Carlo error it left, in posterior standard deviations (0: exact)."""
+
+    seconds: float
+    monte_carlo_error: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrictionModel:
+    """Friction ``μ = β₀ + β₁ v + β₂ f_n + ε`` (paper, eq. 40) as fitted, with its uncertainty.
+
+    ``coefficients`` [3]: β₀ [-], β₁ [s/m], β₂ [1/N]; ``covariance`` [3, 3] of them; ``scale``: standard deviation σ
+    of ε [-]; ``n`` samples of elements of ``element_area`` m²; ``degrees_of_freedom`` of the Student-t distribution
+    that the coefficients and a new μ follow; ``identifiable`` [3] bool; ``draws`` [k, 4] of (β, σ) or None.
+    """
+
+    method: str
+    coefficients: FloatArray
+    covariance: FloatArray
+    scale: float
+    n: int
+    degrees_of_freedom: float
+    domain: Domain
+    identifiable: NDArray[np.bool_]
+    element_area: float
+    cost: Cost
+    diagnostics: Mapping[str, float | str] = field(default_factory=dict)
+    draws: FloatArray | None = None
+
+    @property
+    def standard_errors(self) -> FloatArray:
+        """Standard errors of the coefficients, [3]."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def interval(self, level: float = 0.95) -> FloatArray:
+        """Central interval of each coefficient at ``level``: [3, 2]."""
+        _check_probability("level", level)
+        half = special.stdtrit(self.degrees_of_freedom, 0.5 * (1.0 + level)) * self.standard_errors
+        return np.stack([self.coefficients - half, self.coefficients + half], axis=1)
+
+    def predict(
+        self, tangential_velocity: ArrayLike, normal_force: ArrayLike, quantile: float | None = None
+    ) -> FloatArray:
+        """Friction coefficient expected at v (m/s) and f_n (N an element), or a quantile of a new observation of it.
+
+        The quantile includes the scatter ε and the uncertainty of the coefficients (Student-t predictive
+        distribution). Shapes broadcast. Raises ``InvalidSamples`` for a quantile outside (0, 1).
+        """
+        v, f_n = np.broadcast_arrays(np.asarray(tangential_velocity, float), np.asarray(normal_force, float))
+        x = np.stack([np.ones_like(v), v, f_n], axis=-1)
+        mean = x @ self.coefficients
+        if quantile is None:
+            return mean
+        _check_probability("quantile", quantile)
+        spread = np.sqrt(self.scale**2 + np.einsum("...i,ij,...j->...", x, self.covariance, x))
+        return mean + special.stdtrit(self.degrees_of_freedom, quantile) * spread
+
+
+def _check_probability(name: str, value: float) -> None:
+    if not 0.0 < value < 1.0:
+        raise InvalidSamples(name, value, "above 0 and below 1")

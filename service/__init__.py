@@ -1,0 +1,1 @@
+"""The web service: routes, use cases, jobs, file formats and the `stiction` command line."""

@@ -1,0 +1,1 @@
+"""Contact mechanics with known truth: closed-form references and the contact simulator."""

@@ -1,0 +1,66 @@
+"""Local slip: what a detector says of one frame and of a whole log (stage 4: slip_state)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipcore.frames import BoolArray, FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SlipState:
+    """A detector's answer for one frame.
+
+    ``contact``, ``slip`` [n, m] bool; ``probability`` of slip [n, m]; ``stick_ratio``: stick area over contact area
+    (paper, eq. 37 corrected), NaN without contact; ``velocity`` [n, m, 2] m/s, tangential velocity of the surface
+    relative to the object, NaN where it is unobservable; ``macro_slip``: no element in contact sticks.
+    """
+
+    time: float
+    contact: BoolArray
+    slip: BoolArray
+    probability: FloatArray
+    stick_ratio: float
+    velocity: FloatArray
+    macro_slip: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EventList:
+    """Events of one kind: ``element`` [k] (row-major index on the lattice) and ``time`` [k] s, in order of time."""
+
+    element: NDArray[np.int64]
+    time: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.element)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SlipEvents:
+    """Changes of state: slip ``onset`` and ``end``, contact ``touch`` and ``release``."""
+
+    onset: EventList
+    end: EventList
+    touch: EventList
+    release: EventList
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SlipHistory:
+    """A detector's answer for a whole log: the fields of ``SlipState`` with a leading axis [t].
+
+    ``noise``: estimated standard deviation of one marker coordinate, m (NaN where it could not be estimated).
+    """
+
+    time: FloatArray
+    contact: BoolArray
+    slip: BoolArray
+    probability: FloatArray
+    stick_ratio: FloatArray
+    velocity: FloatArray
+    macro_slip: BoolArray
+    events: SlipEvents
+    noise: float
+    method: str
