@@ -1,0 +1,78 @@
+"""The shape of the house: which package may import which, and who owns each."""
+
+import ast
+import importlib.metadata
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+CLIENT = "clients/stiction_client"
+
+ALLOWED = {
+    "slipcore": {"slipcore", "numpy", "scipy", "numba"},
+    "estimators": {"estimators", "slipcore", "numpy", "scipy", "numba", "statsmodels", "emcee", "pandas"},
+    "db": {"db", "migrations", "sqlalchemy", "alembic"},
+    "migrations": {"migrations", "db", "sqlalchemy", "alembic"},
+    CLIENT: {"stiction_client", "httpx", "numpy", "scipy"},
+}
+
+
+def imported_modules(path: Path) -> set[str]:
+    """Every module that a file imports, lazily or not, with its dotted name."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative imports hide where a name comes from"
+            names.add(node.module or "")
+            names.update(f"{node.module}.{alias.name}" for alias in node.names)
+    return names
+
+
+def third_party(path: Path) -> set[str]:
+    return {name.split(".")[0] for name in imported_modules(path)} - set(sys.stdlib_module_names)
+
+
+@pytest.mark.parametrize("package", ALLOWED)
+def test_imports_run_one_way(package: str) -> None:
+    files = sorted((ROOT / package).rglob("*.py"))
+    assert files
+    for path in files:
+        extra = third_party(path) - ALLOWED[package]
+        assert not extra, f"{path.relative_to(ROOT)} imports {sorted(extra)}"
+
+
+def test_estimators_know_only_the_samples_of_slipcore() -> None:
+    for path in sorted((ROOT / "estimators").rglob("*.py")):
+        modules = {name for name in imported_modules(path) if name.split(".")[0] == "slipcore"}
+        assert all(name.startswith("slipcore.samples") for name in modules), path
+
+
+def test_nothing_but_the_service_knows_a_web_framework() -> None:
+    for package in ("slipcore", "estimators", "db", "migrations"):
+        for path in (ROOT / package).rglob("*.py"):
+            assert not third_party(path) & {"fastapi", "starlette", "pydantic", "uvicorn"}, path
+
+
+def test_nothing_shipped_imports_benchmarks_or_tests() -> None:
+    for package in (*ALLOWED, "service"):
+        for path in (ROOT / package).rglob("*.py"):
+            assert not third_party(path) & {"benchmarks", "tests"}, path
+
+
+@pytest.mark.parametrize("package", ["slipcore", "estimators", "db", "migrations", "service", "stiction_client"])
+def test_each_import_package_has_one_owner(package: str) -> None:
+    owners = importlib.metadata.packages_distributions().get(package, [])
+    expected = "stiction-client" if package == "stiction_client" else "stiction"
+    assert set(owners) == {expected}
+
+
+def test_no_file_names_a_package_registry_or_this_machine() -> None:
+    tracked = [p for p in ROOT.glob("*") if p.is_file() and p.suffix in {".toml", ".txt", ".md"}] + [ROOT / "Makefile"]
+    for path in tracked:
+        text = path.read_text(encoding="utf-8")
+        assert "--index-url" not in text, path
+        assert "://pypi" not in text, path
