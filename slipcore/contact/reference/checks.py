@@ -1,0 +1,28 @@
+"""The one range check that all closed forms share."""
+
+import math
+
+from slipcore.errors import InvalidInput
+
+
+def check_range(
+    name: str,
+    value: float,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    at_most: float | None = None,
+    unit: str = "",
+) -> float:
+    """Give ``value`` back; raises ``InvalidInput`` that names it where it isn't finite or lies outside the bounds."""
+    inside = (
+        math.isfinite(value)
+        and (above is None or value > above)
+        and (at_least is None or value >= at_least)
+        and (at_most is None or value <= at_most)
+    )
+    if not inside:
+        bounds = (("above", above), ("at least", at_least), ("at most", at_most))
+        allowed = " and ".join(f"{word} {bound:.12g}" for word, bound in bounds if bound is not None)
+        raise InvalidInput(name, f"{value:.12g} {unit}".strip(), f"{allowed} {unit}".strip())
+    return value
