@@ -1,0 +1,84 @@
+"""A zip of .npy members, read in memory within bounds; nothing is ever extracted to disk."""
+
+import lzma
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from service.formats.npy import MAX_ARRAY_BYTES, read_array
+from slipcore.errors import InvalidInput
+
+MAX_DIRECTORY_BYTES = 64 * 1024
+"""Bytes of the zip's own table of contents: about 1,000 members, where a log has 20."""
+
+_DAMAGE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, NotImplementedError, RuntimeError, ValueError)
+_END_OF_DIRECTORY, _ZIP64_LOCATOR, _END_BYTES, _LOCATOR_BYTES = b"PK\x05\x06", b"PK\x06\x07", 22, 20
+_ENCRYPTED = 0x1
+
+
+@contextmanager
+def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
+    """Open a zip whose members are few, plainly named and bounded in size. Raises ``InvalidInput``."""
+    _check_directory(path)
+    try:
+        archive = zipfile.ZipFile(path)
+    except _DAMAGE as error:
+        raise _damaged(error) from error
+    with archive:
+        _check_members(archive)
+        yield archive
+
+
+def read_member(archive: zipfile.ZipFile, member: str, name: str) -> NDArray[Any]:
+    """Read one .npy member as an array; errors call it ``name``."""
+    try:
+        with archive.open(member) as stream:
+            return read_array(stream, name, archive.getinfo(member).file_size)
+    except InvalidInput:
+        raise
+    except _DAMAGE as error:
+        raise _damaged(error) from error
+
+
+def _check_directory(path: Path) -> None:
+    """Bound the table of contents before ``zipfile`` turns each of its entries into an object."""
+    with path.open("rb") as stream:
+        length = stream.seek(0, 2)
+        stream.seek(max(0, length - _END_BYTES - _LOCATOR_BYTES - 2**16))  # a comment may follow, of up to 2¹⁶ bytes
+        tail = stream.read()
+    end = tail.rfind(_END_OF_DIRECTORY)
+    if end < 0 or len(tail) < end + _END_BYTES:
+        raise InvalidInput("file", f"not a complete zip ({length} bytes, no table of contents)", "a complete zip")
+    size = int.from_bytes(tail[end + 12 : end + 16], "little")
+    zip64 = tail[max(0, end - _LOCATOR_BYTES) : end].startswith(_ZIP64_LOCATOR)
+    if zip64 or size > MAX_DIRECTORY_BYTES:
+        value = "in the zip64 layout" if zip64 else f"{size} bytes"
+        raise InvalidInput("table of contents", value, f"at most {MAX_DIRECTORY_BYTES} bytes, no zip64")
+
+
+def _check_members(archive: zipfile.ZipFile) -> None:
+    entries = archive.infolist()
+    names = [entry.filename for entry in entries]
+    for entry in entries:
+        parts = entry.filename.rstrip("/").split("/")
+        if "\\" in entry.orig_filename or any(part in {"", ".", ".."} or ":" in part for part in parts):
+            raise InvalidInput("member name", repr(entry.orig_filename), "a plain relative path")
+        if entry.flag_bits & _ENCRYPTED:
+            raise InvalidInput(entry.filename, "encrypted", "a zip without a password")
+        if entry.compress_type not in {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}:
+            raise InvalidInput(entry.filename, f"compressed by method {entry.compress_type}", "stored or deflated")
+    if len(set(names)) != len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InvalidInput(twice, "in the zip twice", "each member once")
+    total = sum(entry.file_size for entry in entries)
+    if total > MAX_ARRAY_BYTES:
+        raise InvalidInput("file", f"{total} bytes unpacked", f"at most {MAX_ARRAY_BYTES} bytes unpacked")
+
+
+def _damaged(error: Exception) -> InvalidInput:
+    return InvalidInput("file", f"a truncated or damaged zip ({error})", "a complete zip")
