@@ -1,0 +1,35 @@
+"""The exceptions of db: one small tree. All survive pickling, since workers live in other processes."""
+
+
+class DatabaseError(Exception):
+    """Whatever the stores refuse or cannot do."""
+
+
+class NotFound(DatabaseError, LookupError):
+    """No ``kind`` of this ``name`` is stored."""
+
+    def __init__(self, kind: str, name: str) -> None:
+        self.kind, self.name = kind, name
+        super().__init__(kind, name)
+
+    def __str__(self) -> str:
+        return f"no {self.kind} {self.name!r} is stored"
+
+
+class AlreadyExists(DatabaseError):
+    """A ``kind`` of this ``name`` is stored already."""
+
+    def __init__(self, kind: str, name: str) -> None:
+        self.kind, self.name = kind, name
+        super().__init__(kind, name)
+
+    def __str__(self) -> str:
+        return f"{self.kind} {self.name!r} is stored already"
+
+
+class StorageUnavailable(DatabaseError):
+    """The database or the blob folder cannot be used now: locked, full, gone. Worth another try later."""
+
+
+class SchemaMismatch(DatabaseError):
+    """The database's tables are not those of this version of the code."""

@@ -1,0 +1,89 @@
+"""Migrations of the database: upgrade, downgrade, current, check. Needs no file but the installed packages."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from alembic import command
+from alembic.autogenerate import compare_metadata
+from alembic.config import Config
+from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import Connection
+
+import migrations
+from db.database import Database
+from db.errors import SchemaMismatch
+from db.tables import Base
+
+
+def upgrade(database: Database, revision: str = "head") -> None:
+    """Bring the database up to ``revision``; a new one gets all its tables."""
+    with _migrating(database) as config:
+        command.upgrade(config, revision)
+
+
+def downgrade(database: Database, revision: str) -> None:
+    """Bring the database down to ``revision``; ``base`` removes every table with its data."""
+    with _migrating(database) as config:
+        command.downgrade(config, revision)
+
+
+def current(database: Database) -> str | None:
+    """The database's revision; None for an empty one."""
+    with database.engine.connect() as connection:
+        return MigrationContext.configure(connection).get_current_revision()
+
+
+def head() -> str | None:
+    """The newest revision that this version of the code knows."""
+    return ScriptDirectory.from_config(_config()).get_current_head()
+
+
+def check(database: Database) -> None:
+    """Make sure that the database is at the newest revision and its tables are those of the code.
+
+    Raises ``SchemaMismatch`` that says what differs.
+    """
+    found, wanted = current(database), head()
+    if found != wanted:
+        raise SchemaMismatch(f"database revision is {found}; allowed: {wanted} (run `stiction db upgrade`)")
+    with database.engine.connect() as connection:
+        context = MigrationContext.configure(connection, opts={"compare_type": True})
+        differences = compare_metadata(context, Base.metadata)
+    if differences:
+        raise SchemaMismatch("tables differ from the code's: " + "; ".join(map(str, differences)))
+
+
+def _config() -> Config:
+    config = Config()
+    folder = Path(migrations.__file__).parent
+    config.set_main_option("script_location", str(folder).replace("%", "%%"))  # % interpolates in this format
+    config.set_main_option("path_separator", "os")
+    return config
+
+
+@contextmanager
+def _migrating(database: Database) -> Iterator[Config]:
+    config = _config()
+    with database.engine.connect() as connection, _foreign_keys_off(database, connection):
+        config.attributes["connection"] = connection
+        yield config
+
+
+@contextmanager
+def _foreign_keys_off(database: Database, connection: Connection) -> Iterator[None]:
+    """Let SQLite alter a table by copy and drop, which with foreign keys on would delete the rows that refer to it."""
+    if not database.is_sqlite:
+        yield
+        return
+    sqlite = connection.connection.cursor()  # below SQLAlchemy: inside a transaction this pragma does nothing
+    sqlite.execute("PRAGMA foreign_keys = OFF")
+    try:
+        yield
+        broken = sqlite.execute("PRAGMA foreign_key_check").fetchall()
+        if broken:
+            raise SchemaMismatch(f"foreign keys are broken in {sorted({str(row[0]) for row in broken})}")
+    finally:
+        sqlite.execute("PRAGMA foreign_keys = ON")
+        sqlite.close()

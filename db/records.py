@@ -1,0 +1,141 @@
+"""What the repositories hand out and take in: plain frozen records, independent of any session."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Literal
+
+JobKind = Literal["ingest", "fit"]
+JobStatus = Literal["queued", "running", "done", "failed", "refused"]
+
+
+@dataclass(frozen=True, slots=True)
+class NewModel:
+    """A fitted friction model about to be stored; coefficients β₀ [-], β₁ [s/m], β₂ [1/N], ranges in m/s and N."""
+
+    method: str
+    coefficients: tuple[float, ...]
+    covariance: tuple[tuple[float, ...], ...]
+    scale: float
+    n: int
+    degrees_of_freedom: float
+    tangential_velocity: tuple[float, float]
+    normal_force: tuple[float, float]
+    identifiable: tuple[bool, ...]
+    element_area: float
+    diagnostics: Mapping[str, float | str | None]
+    cost_seconds: float
+    monte_carlo_error: float
+
+
+@dataclass(frozen=True, slots=True)
+class StoredModel:
+    """One version of a material's friction model."""
+
+    material: str
+    version: int
+    current: bool
+    created_at: datetime
+    model: NewModel
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """A material with the number of its grasp logs and its current models, one a method."""
+
+    id: int
+    name: str
+    description: str
+    created_at: datetime
+    grasp_logs: int
+    models: tuple[StoredModel, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A durable job: an ``ingest`` of a grasp log or a ``fit`` of a material.
+
+    ``deaths`` counts the worker processes that died under it; ``seconds`` is the time of each stage that is done.
+    """
+
+    id: str
+    kind: JobKind
+    status: JobStatus
+    stage: str | None
+    reason: str | None
+    seconds: Mapping[str, float]
+    grasp_log_id: str | None
+    material: str | None
+    method: str
+    seed: int
+    deaths: int
+    model_version: int | None
+    created_at: datetime
+    finished_at: datetime | None
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """What a detector said of a log, in numbers; the histories are in the blob of hash ``history_blob``.
+
+    ``noise`` m; ``seconds`` that the detection took; ``onsets`` … ``releases`` count events.
+    """
+
+    method: str
+    noise: float | None
+    stick_ratio_min: float | None
+    contact_frames: int
+    macro_slip_frames: int
+    onsets: int
+    ends: int
+    touches: int
+    releases: int
+    seconds: float
+    history_blob: str
+
+
+@dataclass(frozen=True, slots=True)
+class SampleSummary:
+    """The friction samples of one log, in numbers; the samples are in the blob of hash ``samples_blob``."""
+
+    count: int
+    element_area: float
+    friction_coefficient_mean: float | None
+    tangential_velocity: tuple[float, float] | None
+    normal_force: tuple[float, float] | None
+    samples_blob: str
+
+
+@dataclass(frozen=True, slots=True)
+class NewGraspLog:
+    """A grasp log about to be stored: its content's ``sha256`` and size, and what the reader found in it."""
+
+    sha256: str
+    bytes: int
+    format: str
+    detector: str
+    material_id: int | None
+    sensor: str
+    frames: int
+    duration: float
+    grid: tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class StoredGraspLog:
+    """A grasp log with its ingest job and, once there, what detection and sampling found."""
+
+    id: str
+    sha256: str
+    bytes: int
+    format: str
+    detector: str
+    material: str | None
+    sensor: str
+    frames: int
+    duration: float
+    grid: tuple[int, int]
+    created_at: datetime
+    job: Job
+    detection: Detection | None
+    samples: SampleSummary | None

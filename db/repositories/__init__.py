@@ -1,0 +1,1 @@
+"""All queries: functions that take a session and plain values, and return plain records."""

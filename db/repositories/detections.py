@@ -1,0 +1,68 @@
+"""Queries on what was found in a log: detection and samples, stored together."""
+
+from dataclasses import asdict, fields
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from db.records import Detection, SampleSummary
+from db.tables import DetectionRow, GraspLogRow, SampleSummaryRow
+
+
+def add(session: Session, log_id: str, detection: Detection, samples: SampleSummary) -> None:
+    """Store what was found in a log."""
+    velocity, force = samples.tangential_velocity or (None, None), samples.normal_force or (None, None)
+    session.add(DetectionRow(grasp_log_id=log_id, **asdict(detection)))
+    session.add(
+        SampleSummaryRow(
+            grasp_log_id=log_id,
+            count=samples.count,
+            element_area=samples.element_area,
+            friction_coefficient_mean=samples.friction_coefficient_mean,
+            tangential_velocity_min=velocity[0],
+            tangential_velocity_max=velocity[1],
+            normal_force_min=force[0],
+            normal_force_max=force[1],
+            samples_blob=samples.samples_blob,
+        )
+    )
+    session.flush()
+
+
+def sample_blobs(session: Session, material_id: int) -> dict[str, str]:
+    """Blobs of samples of a material, by content hash of the log, oldest first; logs without samples left out.
+
+    A log that went through several detectors is one grasp still: its newest samples count.
+    """
+    query = (
+        select(GraspLogRow.sha256, SampleSummaryRow.samples_blob)
+        .join(SampleSummaryRow)
+        .where(GraspLogRow.material_id == material_id, SampleSummaryRow.count > 0)
+        .order_by(SampleSummaryRow.created_at, GraspLogRow.id)
+    )
+    return dict(session.execute(query).all())
+
+
+def detection_record(row: DetectionRow | None) -> Detection | None:
+    """The row as a plain record."""
+    if row is None:
+        return None
+    return Detection(**{entry.name: getattr(row, entry.name) for entry in fields(Detection)})
+
+
+def samples_record(row: SampleSummaryRow | None) -> SampleSummary | None:
+    """The row as a plain record."""
+    if row is None:
+        return None
+    return SampleSummary(
+        count=row.count,
+        element_area=row.element_area,
+        friction_coefficient_mean=row.friction_coefficient_mean,
+        tangential_velocity=_range(row.tangential_velocity_min, row.tangential_velocity_max),
+        normal_force=_range(row.normal_force_min, row.normal_force_max),
+        samples_blob=row.samples_blob,
+    )
+
+
+def _range(low: float | None, high: float | None) -> tuple[float, float] | None:
+    return None if low is None or high is None else (low, high)

@@ -1,0 +1,89 @@
+"""Queries on friction models: versions only grow, and one a material and method is current."""
+
+from collections.abc import Sequence
+from dataclasses import fields
+
+from sqlalchemy import Select, func, select, update
+from sqlalchemy.orm import Session
+
+from db.records import NewModel, StoredModel
+from db.tables import FrictionModelRow, MaterialRow
+
+_PLAIN = tuple(entry.name for entry in fields(NewModel) if entry.name not in {"tangential_velocity", "normal_force"})
+
+
+def add(session: Session, material_id: int, job_id: str, model: NewModel) -> int:
+    """Store a model as the next version and make it the current one; returns the version."""
+    lock(session, material_id)
+    of_this_kind = (FrictionModelRow.material_id == material_id, FrictionModelRow.method == model.method)
+    newest = session.scalar(select(func.max(FrictionModelRow.version)).where(*of_this_kind))
+    version = (newest or 0) + 1
+    session.execute(update(FrictionModelRow).where(*of_this_kind, FrictionModelRow.current).values(current=False))
+    session.add(_row(material_id, job_id, version, model))
+    session.flush()
+    return version
+
+
+def lock(session: Session, material_id: int) -> None:
+    """Make other writers of this material's models wait for this transaction (SQLite has one writer anyway)."""
+    session.execute(select(MaterialRow.id).where(MaterialRow.id == material_id).with_for_update())
+
+
+def current(session: Session, material: str, method: str) -> StoredModel | None:
+    """The current model of a material by a method, if there is one."""
+    query = _models().where(MaterialRow.name == material, FrictionModelRow.method == method, FrictionModelRow.current)
+    found = session.execute(query).one_or_none()
+    return None if found is None else _record(found[0], found[1])
+
+
+def all_current(session: Session, material_ids: Sequence[int] | None) -> list[StoredModel]:
+    """Current models of some materials, or of all."""
+    query = _models().where(FrictionModelRow.current).order_by(FrictionModelRow.method)
+    if material_ids is not None:
+        query = query.where(FrictionModelRow.material_id.in_(material_ids))
+    return [_record(row, material) for row, material in session.execute(query)]
+
+
+def versions(session: Session, material_id: int, method: str | None) -> list[StoredModel]:
+    """Every version of a material's models, newest first."""
+    query = _models().where(FrictionModelRow.material_id == material_id).order_by(FrictionModelRow.id.desc())
+    if method is not None:
+        query = query.where(FrictionModelRow.method == method)
+    return [_record(row, material) for row, material in session.execute(query)]
+
+
+def _models() -> Select[FrictionModelRow, str]:
+    return select(FrictionModelRow, MaterialRow.name).join(MaterialRow)
+
+
+def _row(material_id: int, job_id: str, version: int, model: NewModel) -> FrictionModelRow:
+    return FrictionModelRow(
+        material_id=material_id,
+        job_id=job_id,
+        version=version,
+        current=True,
+        tangential_velocity_min=model.tangential_velocity[0],
+        tangential_velocity_max=model.tangential_velocity[1],
+        normal_force_min=model.normal_force[0],
+        normal_force_max=model.normal_force[1],
+        **{name: getattr(model, name) for name in _PLAIN},
+    )
+
+
+def _record(row: FrictionModelRow, material: str) -> StoredModel:
+    model = NewModel(
+        method=row.method,
+        coefficients=tuple(row.coefficients),
+        covariance=tuple(tuple(line) for line in row.covariance),
+        scale=row.scale,
+        n=row.n,
+        degrees_of_freedom=row.degrees_of_freedom,
+        tangential_velocity=(row.tangential_velocity_min, row.tangential_velocity_max),
+        normal_force=(row.normal_force_min, row.normal_force_max),
+        identifiable=tuple(row.identifiable),
+        element_area=row.element_area,
+        diagnostics=row.diagnostics,
+        cost_seconds=row.cost_seconds,
+        monte_carlo_error=row.monte_carlo_error,
+    )
+    return StoredModel(material, row.version, row.current, row.created_at, model)

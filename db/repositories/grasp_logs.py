@@ -1,0 +1,89 @@
+"""Queries on grasp logs, with their sensors."""
+
+import uuid
+
+from sqlalchemy import select
+from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session
+
+from db.errors import AlreadyExists, NotFound
+from db.records import NewGraspLog, StoredGraspLog
+from db.repositories import detections, jobs
+from db.tables import DetectionRow, GraspLogRow, JobRow, MaterialRow, SampleSummaryRow, SensorRow
+
+
+def add(session: Session, log: NewGraspLog) -> str:
+    """Store a new log and return its id; raises ``AlreadyExists`` for the same content, material and detector."""
+    row = GraspLogRow(
+        id=uuid.uuid4().hex,
+        sha256=log.sha256,
+        bytes=log.bytes,
+        format=log.format,
+        detector=log.detector,
+        material_id=log.material_id,
+        sensor_id=_sensor_id(session, log.sensor),
+        frames=log.frames,
+        duration=log.duration,
+        grid_rows=log.grid[0],
+        grid_columns=log.grid[1],
+    )
+    try:
+        with session.begin_nested():
+            session.add(row)
+    except IntegrityError as error:
+        raise AlreadyExists("grasp log", log.sha256) from error
+    return row.id
+
+
+def find_id(session: Session, sha256: str, material_id: int | None, detector: str) -> str | None:
+    """The log of this content, material and detector, if it is stored."""
+    same_material = GraspLogRow.material_id.is_(None) if material_id is None else GraspLogRow.material_id == material_id
+    query = select(GraspLogRow.id).where(GraspLogRow.sha256 == sha256, same_material, GraspLogRow.detector == detector)
+    return session.scalar(query)
+
+
+def get(session: Session, log_id: str) -> StoredGraspLog:
+    """One log with its job, detection and samples, in one query; raises ``NotFound``."""
+    query = (
+        select(GraspLogRow, JobRow, SensorRow.name, MaterialRow.name, DetectionRow, SampleSummaryRow)
+        .join(SensorRow)
+        .join(JobRow, JobRow.grasp_log_id == GraspLogRow.id)
+        .outerjoin(MaterialRow, MaterialRow.id == GraspLogRow.material_id)
+        .outerjoin(DetectionRow, DetectionRow.grasp_log_id == GraspLogRow.id)
+        .outerjoin(SampleSummaryRow, SampleSummaryRow.grasp_log_id == GraspLogRow.id)
+        .where(GraspLogRow.id == log_id)
+    )
+    found = session.execute(query).one_or_none()
+    if found is None:
+        raise NotFound("grasp log", log_id)
+    row, job, sensor, material, detection, samples = found
+    return StoredGraspLog(
+        id=row.id,
+        sha256=row.sha256,
+        bytes=row.bytes,
+        format=row.format,
+        detector=row.detector,
+        material=material,
+        sensor=sensor,
+        frames=row.frames,
+        duration=row.duration,
+        grid=(row.grid_rows, row.grid_columns),
+        created_at=row.created_at,
+        job=jobs.record(job, material),
+        detection=detections.detection_record(detection),
+        samples=detections.samples_record(samples),
+    )
+
+
+def _sensor_id(session: Session, name: str) -> int:
+    query = select(SensorRow.id).where(SensorRow.name == name)
+    found = session.scalar(query)
+    if found is not None:
+        return found
+    try:
+        with session.begin_nested():
+            row = SensorRow(name=name)
+            session.add(row)
+    except IntegrityError:  # another writer was faster
+        return session.execute(query).scalar_one()
+    return row.id

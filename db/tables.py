@@ -1,0 +1,232 @@
+"""The tables, and the rules that the database itself keeps."""
+
+from datetime import UTC, datetime
+from typing import Any, ClassVar, get_args
+
+from sqlalchemy import (
+    JSON,
+    BigInteger,
+    CheckConstraint,
+    DateTime,
+    Dialect,
+    ForeignKey,
+    Index,
+    MetaData,
+    String,
+    TypeDecorator,
+    UniqueConstraint,
+    text,
+)
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+from db.records import JobKind, JobStatus
+
+CONSTRAINT_NAMES = {
+    "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+    "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+    "ck": "ck_%(table_name)s_%(constraint_name)s",
+    "fk": "fk_%(table_name)s_%(column_0_name)s_%(referred_table_name)s",
+    "pk": "pk_%(table_name)s",
+}
+
+
+class UtcDateTime(TypeDecorator[datetime]):
+    """A moment in UTC; SQLite keeps no zone, so it is put back on reading."""
+
+    impl = DateTime(timezone=True)
+    cache_ok = True
+
+    def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002
+        """Refuse a moment without zone, since nobody could tell which one it is."""
+        if value is not None and value.tzinfo is None:
+            raise ValueError(f"datetime is {value} without time zone; allowed: one with a zone")
+        return None if value is None else value.astimezone(UTC)
+
+    def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002
+        """Give the moment back with its zone."""
+        if value is None:
+            return None
+        return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
+
+
+def now() -> datetime:
+    """The present moment, in UTC."""
+    return datetime.now(UTC)
+
+
+def _one_of(column: str, values: tuple[str, ...]) -> CheckConstraint:
+    listed = ", ".join(f"'{value}'" for value in values)
+    return CheckConstraint(f"{column} IN ({listed})", name=column)
+
+
+class Base(DeclarativeBase):
+    """Root of the tables; no relationships, so that every query stands where it is made."""
+
+    metadata = MetaData(naming_convention=CONSTRAINT_NAMES)
+    type_annotation_map: ClassVar[dict[Any, Any]] = {
+        datetime: UtcDateTime(),
+        dict[str, Any]: JSON(),
+        list[Any]: JSON(),
+    }
+
+
+class MaterialRow(Base):
+    """A material whose friction is identified."""
+
+    __tablename__ = "materials"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    name: Mapped[str] = mapped_column(String(100), unique=True)
+    description: Mapped[str]
+    created_at: Mapped[datetime] = mapped_column(default=now)
+
+
+class SensorRow(Base):
+    """A tactile sensor that logs come from."""
+
+    __tablename__ = "sensors"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    name: Mapped[str] = mapped_column(String(200), unique=True)
+    created_at: Mapped[datetime] = mapped_column(default=now)
+
+
+class GraspLogRow(Base):
+    """A grasp log; its bytes are the blob of hash ``sha256``. The same content, material and detector is one log."""
+
+    __tablename__ = "grasp_logs"
+    __table_args__ = (
+        UniqueConstraint("sha256", "material_id", "detector"),
+        # NULLs are distinct to a unique constraint, so logs without material need their own rule
+        Index(
+            "uq_grasp_logs_without_material",
+            "sha256",
+            "detector",
+            unique=True,
+            sqlite_where=text("material_id IS NULL"),
+            postgresql_where=text("material_id IS NULL"),
+        ),
+        CheckConstraint("bytes > 0", name="bytes"),
+        CheckConstraint("frames > 1", name="frames"),
+        CheckConstraint("duration > 0", name="duration"),
+    )
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    sha256: Mapped[str] = mapped_column(String(64))
+    bytes: Mapped[int] = mapped_column(BigInteger)
+    format: Mapped[str] = mapped_column(String(50))
+    detector: Mapped[str] = mapped_column(String(50))
+    material_id: Mapped[int | None] = mapped_column(ForeignKey("materials.id"), index=True)
+    sensor_id: Mapped[int] = mapped_column(ForeignKey("sensors.id"), index=True)
+    frames: Mapped[int]
+    duration: Mapped[float]
+    grid_rows: Mapped[int]
+    grid_columns: Mapped[int]
+    created_at: Mapped[datetime] = mapped_column(default=now)
+
+
+class JobRow(Base):
+    """A durable job. A grasp log has exactly one, its ingest."""
+
+    __tablename__ = "jobs"
+    __table_args__ = (
+        _one_of("kind", get_args(JobKind)),
+        _one_of("status", get_args(JobStatus)),
+        CheckConstraint("(kind = 'ingest') = (grasp_log_id IS NOT NULL)", name="ingest_has_log"),
+        CheckConstraint("kind = 'ingest' OR material_id IS NOT NULL", name="fit_has_material"),
+        CheckConstraint("(status IN ('queued', 'running')) = (finished_at IS NULL)", name="finished_at"),
+        CheckConstraint("status NOT IN ('failed', 'refused') OR reason IS NOT NULL", name="reason"),
+    )
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    kind: Mapped[str] = mapped_column(String(10))
+    status: Mapped[str] = mapped_column(String(10), index=True)
+    stage: Mapped[str | None] = mapped_column(String(30))
+    reason: Mapped[str | None]
+    seconds: Mapped[dict[str, Any]]
+    grasp_log_id: Mapped[str | None] = mapped_column(ForeignKey("grasp_logs.id"), unique=True)
+    material_id: Mapped[int | None] = mapped_column(ForeignKey("materials.id"), index=True)
+    method: Mapped[str] = mapped_column(String(30))
+    seed: Mapped[int] = mapped_column(BigInteger)
+    deaths: Mapped[int] = mapped_column(default=0)
+    model_version: Mapped[int | None]
+    created_at: Mapped[datetime] = mapped_column(default=now)
+    finished_at: Mapped[datetime | None]
+
+
+class DetectionRow(Base):
+    """What the detector said of a log."""
+
+    __tablename__ = "detections"
+
+    grasp_log_id: Mapped[str] = mapped_column(ForeignKey("grasp_logs.id"), primary_key=True)
+    method: Mapped[str] = mapped_column(String(50))
+    noise: Mapped[float | None]
+    stick_ratio_min: Mapped[float | None]
+    contact_frames: Mapped[int]
+    macro_slip_frames: Mapped[int]
+    onsets: Mapped[int]
+    ends: Mapped[int]
+    touches: Mapped[int]
+    releases: Mapped[int]
+    seconds: Mapped[float]
+    history_blob: Mapped[str] = mapped_column(String(64), index=True)
+    created_at: Mapped[datetime] = mapped_column(default=now)
+
+
+class SampleSummaryRow(Base):
+    """The friction samples of a log, in numbers, with the hash of the blob that holds them."""
+
+    __tablename__ = "sample_summaries"
+    __table_args__ = (CheckConstraint("count >= 0", name="count"),)
+
+    grasp_log_id: Mapped[str] = mapped_column(ForeignKey("grasp_logs.id"), primary_key=True)
+    count: Mapped[int]
+    element_area: Mapped[float]
+    friction_coefficient_mean: Mapped[float | None]
+    tangential_velocity_min: Mapped[float | None]
+    tangential_velocity_max: Mapped[float | None]
+    normal_force_min: Mapped[float | None]
+    normal_force_max: Mapped[float | None]
+    samples_blob: Mapped[str] = mapped_column(String(64), index=True)
+    created_at: Mapped[datetime] = mapped_column(default=now)
+
+
+class FrictionModelRow(Base):
+    """One version of a material's friction model; exactly one a material and method is current."""
+
+    __tablename__ = "friction_models"
+    __table_args__ = (
+        UniqueConstraint("material_id", "method", "version"),
+        Index(
+            "uq_friction_models_current",
+            "material_id",
+            "method",
+            unique=True,
+            sqlite_where=text("current"),
+            postgresql_where=text("current"),
+        ),
+        CheckConstraint("version > 0", name="version"),
+    )
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    material_id: Mapped[int] = mapped_column(ForeignKey("materials.id"))
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id"), unique=True)
+    method: Mapped[str] = mapped_column(String(30))
+    version: Mapped[int]
+    current: Mapped[bool]
+    coefficients: Mapped[list[Any]]
+    covariance: Mapped[list[Any]]
+    scale: Mapped[float]
+    n: Mapped[int]
+    degrees_of_freedom: Mapped[float]
+    tangential_velocity_min: Mapped[float]
+    tangential_velocity_max: Mapped[float]
+    normal_force_min: Mapped[float]
+    normal_force_max: Mapped[float]
+    identifiable: Mapped[list[Any]]
+    element_area: Mapped[float]
+    diagnostics: Mapped[dict[str, Any]]
+    cost_seconds: Mapped[float]
+    monte_carlo_error: Mapped[float]
+    created_at: Mapped[datetime] = mapped_column(default=now)

@@ -1,0 +1,53 @@
+from collections.abc import Callable
+
+import pytest
+
+from db.database import Database
+from db.records import NewModel
+from db.repositories import friction_models, jobs, materials
+
+
+@pytest.fixture
+def material(database: Database) -> int:
+    with database.write() as session:
+        return materials.create(session, "paper", "").id
+
+
+def store(database: Database, material: int, model: NewModel) -> int:
+    with database.write() as session:
+        job = jobs.add(session, "fit", model.method, material_id=material)
+        return friction_models.add(session, material, job, model)
+
+
+def test_a_model_comes_back_to_the_last_bit(
+    database: Database, material: int, new_model: Callable[..., NewModel]
+) -> None:
+    store(database, material, new_model())
+    with database.read() as session:
+        found = friction_models.current(session, "paper", "ols")
+    assert found is not None
+    assert found.model == new_model()
+    assert (found.material, found.version, found.current) == ("paper", 1, True)
+
+
+def test_versions_count_up_for_each_method_and_the_newest_is_current(
+    database: Database, material: int, new_model: Callable[..., NewModel]
+) -> None:
+    made = [store(database, material, new_model(method)) for method in ("ols", "ols", "bayes", "ols")]
+    assert made == [1, 2, 1, 3]
+    with database.read() as session:
+        every = friction_models.versions(session, material, None)
+        only = friction_models.versions(session, material, "ols")
+    assert [(entry.model.method, entry.version, entry.current) for entry in every] == [
+        ("ols", 3, True),
+        ("bayes", 1, True),
+        ("ols", 2, False),
+        ("ols", 1, False),
+    ]
+    assert [entry.version for entry in only] == [3, 2, 1]
+
+
+def test_there_may_be_no_current_model(database: Database, material: int) -> None:
+    with database.read() as session:
+        assert friction_models.current(session, "paper", "ols") is None
+        assert friction_models.versions(session, material, None) == []

@@ -1,0 +1,120 @@
+from collections.abc import Callable
+
+import pytest
+from sqlalchemy import func, select
+
+from db.database import Database
+from db.errors import AlreadyExists, NotFound
+from db.records import Detection, NewGraspLog, SampleSummary
+from db.repositories import blobs, detections, grasp_logs, jobs, materials
+from db.tables import SensorRow
+
+
+def add(database: Database, log: NewGraspLog) -> str:
+    with database.write() as session:
+        log_id = grasp_logs.add(session, log)
+        jobs.add(session, "ingest", "ols", material_id=log.material_id, grasp_log_id=log_id)
+    return log_id
+
+
+def test_a_log_comes_back_with_its_job(database: Database, new_log: Callable[..., NewGraspLog]) -> None:
+    log = new_log()
+    log_id = add(database, log)
+    with database.read() as session:
+        found = grasp_logs.get(session, log_id)
+    assert (found.sha256, found.bytes, found.format, found.detector) == (log.sha256, 10, "npz", "strain_rate")
+    assert (found.sensor, found.frames, found.duration, found.grid) == ("sensor", 250, 8.3, (20, 20))
+    assert (found.material, found.detection, found.samples) == (None, None, None)
+    assert (found.job.kind, found.job.status, found.job.grasp_log_id) == ("ingest", "queued", log_id)
+
+
+def test_a_log_comes_back_with_what_was_found_in_one_query(
+    database: Database,
+    new_log: Callable[..., NewGraspLog],
+    detection: Detection,
+    samples: SampleSummary,
+    statements: list[str],
+) -> None:
+    with database.write() as session:
+        material = materials.create(session, "paper", "").id
+    log_id = add(database, new_log(material))
+    with database.write() as session:
+        detections.add(session, log_id, detection, samples)
+    statements.clear()
+    with database.read() as session:
+        found = grasp_logs.get(session, log_id)
+    assert (found.material, found.detection, found.samples) == ("paper", detection, samples)
+    assert found.job.material == "paper"
+    assert len(statements) == 1
+
+
+def test_no_samples_have_no_range(
+    database: Database, new_log: Callable[..., NewGraspLog], detection: Detection
+) -> None:
+    log_id = add(database, new_log())
+    none = SampleSummary(0, 1e-6, None, None, None, "f" * 64)
+    with database.write() as session:
+        detections.add(session, log_id, detection, none)
+        assert grasp_logs.get(session, log_id).samples == none
+
+
+@pytest.mark.parametrize("with_material", [True, False])
+def test_the_same_content_material_and_detector_is_one_log(
+    database: Database, new_log: Callable[..., NewGraspLog], with_material: bool
+) -> None:
+    with database.write() as session:
+        material, other = (materials.create(session, name, "").id for name in ("paper", "steel"))
+    key = material if with_material else None
+    log = new_log(key, sha256="a" * 64)
+    log_id = add(database, log)
+    with pytest.raises(AlreadyExists, match="grasp log"):
+        add(database, log)
+    different = [
+        add(database, new_log(other, sha256="a" * 64)),
+        add(database, new_log(key, sha256="b" * 64)),
+        add(database, new_log(key, sha256="a" * 64, detector="other")),
+    ]
+    with database.read() as session:
+        assert grasp_logs.find_id(session, "a" * 64, key, "strain_rate") == log_id
+        assert grasp_logs.find_id(session, "c" * 64, key, "strain_rate") is None
+        assert session.scalar(select(func.count()).select_from(SensorRow)) == 1
+    assert len({log_id, *different}) == 4
+
+
+def test_an_unknown_log_is_named(database: Database) -> None:
+    with database.read() as session, pytest.raises(NotFound, match="no grasp log 'x' is stored"):
+        grasp_logs.get(session, "x")
+
+
+def test_samples_of_a_material_are_one_part_a_grasp(
+    database: Database, new_log: Callable[..., NewGraspLog], detection: Detection
+) -> None:
+    with database.write() as session:
+        paper, steel = (materials.create(session, name, "").id for name in ("paper", "steel"))
+    stored = [
+        (new_log(paper, sha256="a" * 64), 5, "1" * 64),
+        (new_log(paper, sha256="b" * 64), 5, "2" * 64),
+        (new_log(paper, sha256="a" * 64, detector="other"), 5, "3" * 64),
+        (new_log(paper, sha256="c" * 64), 0, "4" * 64),
+        (new_log(steel, sha256="d" * 64), 5, "5" * 64),
+        (new_log(None, sha256="e" * 64), 5, "6" * 64),
+    ]
+    for log, count, blob in stored:
+        log_id = add(database, log)
+        with database.write() as session:
+            detections.add(session, log_id, detection, SampleSummary(count, 1e-6, None, None, None, blob))
+    with database.read() as session:
+        assert detections.sample_blobs(session, paper) == {"a" * 64: "3" * 64, "b" * 64: "2" * 64}
+
+
+def test_the_blobs_that_rows_refer_to_are_known(
+    database: Database, new_log: Callable[..., NewGraspLog], detection: Detection, samples: SampleSummary
+) -> None:
+    log = new_log()
+    log_id = add(database, log)
+    with database.write() as session:
+        detections.add(session, log_id, detection, samples)
+    used = {log.sha256, detection.history_blob, samples.samples_blob}
+    with database.read() as session:
+        assert blobs.referenced(session, [*used, "0" * 64]) == used
+        assert blobs.referenced(session, []) == set()

@@ -1,0 +1,117 @@
+from collections.abc import Callable
+
+import pytest
+from alembic.script import ScriptDirectory
+from sqlalchemy import inspect, text
+
+from db import migrate
+from db.database import Database
+from db.errors import SchemaMismatch
+from db.records import Detection, NewGraspLog, NewModel, SampleSummary
+from db.repositories import detections, friction_models, grasp_logs, jobs, materials
+from db.tables import Base
+
+REVISIONS = [entry.revision for entry in ScriptDirectory.from_config(migrate._config()).walk_revisions()][::-1]
+
+
+def fill(database: Database, log: NewGraspLog, detection: Detection, samples: SampleSummary, model: NewModel) -> None:
+    """A row in every table."""
+    with database.write() as session:
+        material = materials.create(session, "paper", "")
+        log_id = grasp_logs.add(session, log)
+        job = jobs.add(session, "ingest", "ols", material_id=material.id, grasp_log_id=log_id)
+        detections.add(session, log_id, detection, samples)
+        friction_models.add(session, material.id, job, model)
+
+
+def tables(database: Database) -> set[str]:
+    return set(inspect(database.engine).get_table_names()) - {"alembic_version"}
+
+
+def test_models_and_migrations_agree(database: Database) -> None:
+    assert migrate.check(database) is None
+    assert tables(database) == set(Base.metadata.tables)
+
+
+def test_models_and_migrations_agree_on_check_constraints(database: Database, tmp_path: object) -> None:
+    """Alembic does not compare these."""
+    made = Database(f"sqlite:///{tmp_path}/made.sqlite3")
+    Base.metadata.create_all(made.engine)
+    for table in Base.metadata.tables:
+        assert sorted(map(str, inspect(database.engine).get_check_constraints(table))) == sorted(
+            map(str, inspect(made.engine).get_check_constraints(table))
+        )
+    made.close()
+
+
+def test_revisions_stand_in_one_line() -> None:
+    assert REVISIONS[-1] == migrate.head()
+    assert len(ScriptDirectory.from_config(migrate._config()).get_heads()) == 1
+
+
+@pytest.mark.parametrize("revision", REVISIONS)
+def test_every_migration_goes_up_and_down_and_up(empty_database: Database, revision: str) -> None:
+    migrate.upgrade(empty_database, revision)
+    there = tables(empty_database)
+    migrate.downgrade(empty_database, "-1")
+    assert tables(empty_database) != there
+    migrate.upgrade(empty_database, revision)
+    assert migrate.current(empty_database) == revision
+    assert tables(empty_database) == there
+
+
+def test_migrations_go_down_and_up_with_data_in_every_table(
+    database: Database,
+    new_log: Callable[..., NewGraspLog],
+    detection: Detection,
+    samples: SampleSummary,
+    new_model: Callable[..., NewModel],
+) -> None:
+    fill(database, new_log(material_id=1), detection, samples, new_model())
+    with database.read() as session:
+        counts = {name: session.execute(text(f"SELECT count(*) FROM {name}")).scalar() for name in tables(database)}
+    assert set(counts.values()) == {1}
+    for _ in REVISIONS:
+        migrate.downgrade(database, "-1")
+    assert tables(database) == set()
+    migrate.upgrade(database)
+    fill(database, new_log(material_id=1), detection, samples, new_model())
+    migrate.check(database)
+
+
+def test_upgrading_again_changes_nothing(database: Database) -> None:
+    with database.write() as session:
+        materials.create(session, "paper", "")
+    migrate.upgrade(database)
+    with database.read() as session:
+        assert [material.name for material in materials.list_all(session)] == ["paper"]
+
+
+def test_foreign_keys_are_on_again_after_a_migration(database: Database) -> None:
+    with database.read() as session:
+        assert session.execute(text("PRAGMA foreign_keys")).scalar() == 1
+
+
+def test_an_old_database_is_named(empty_database: Database) -> None:
+    assert migrate.current(empty_database) is None
+    with pytest.raises(SchemaMismatch, match="revision is None; allowed: "):
+        migrate.check(empty_database)
+
+
+def test_a_table_that_someone_changed_is_named(database: Database) -> None:
+    with database.write() as session:
+        session.execute(text("ALTER TABLE materials ADD COLUMN colour TEXT"))
+    with pytest.raises(SchemaMismatch, match="colour"):
+        migrate.check(database)
+
+
+def test_a_migration_that_breaks_references_is_named(database: Database) -> None:
+    row = "'1', 'fit', 'queued', '{}', 99, 'ols', 0, 0, '2026-01-01'"
+    columns = "id, kind, status, seconds, material_id, method, seed, deaths, created_at"
+
+    def broken_migration() -> None:
+        with migrate._migrating(database) as config:
+            config.attributes["connection"].exec_driver_sql(f"INSERT INTO jobs ({columns}) VALUES ({row})")
+
+    with pytest.raises(SchemaMismatch, match="jobs"):
+        broken_migration()
