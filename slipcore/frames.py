@@ -1,9 +1,9 @@
 """Grasp logs: tactile frames over time, as they enter slipcore (stage 1: frames)."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, fields
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,17 +22,23 @@ class Frame(NamedTuple):
     displacement: FloatArray
     force: FloatArray | None
     object_pose: FloatArray | None
+    normal: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class FrictionLaw:
     """Stochastic linear friction ``μ = β₀ + β₁ v + β₂ f_n + ε`` (paper, eq. 40).
 
-    ``coefficients``: (β₀ [-], β₁ [s/m], β₂ [1/N]); ``scale``: standard deviation of ε [-].
+    ``coefficients``: (β₀ [-], β₁ [s/m], β₂ [1/N]); ``scale``: standard deviation of ε [-]. Raises ``InvalidInput``.
     """
 
     coefficients: tuple[float, float, float]
     scale: float = 0.0
+
+    def __post_init__(self) -> None:
+        _array("coefficients", self.coefficients, (3,))
+        if not 0.0 <= self.scale < np.inf:
+            raise InvalidInput("scale", self.scale, "at least 0 and finite")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,12 +98,17 @@ class GraspLog:
         for name, array in arrays.items():
             _set(self, name, array)
         _set(self, "element_area", check_element_area(self.element_area))
-        _set(self, "metadata", MappingProxyType({str(k): str(v) for k, v in self.metadata.items()}))
-        _check_magnitude("displacement", self.displacement, LIMITS.displacement, "m")
+        _set(self, "metadata", _metadata(self.metadata))
+        _set(self, "truth", _truth(self.truth, field_shape[:3]))
+        _check_magnitude("displacement", self.displacement, _largest_displacement(position), "m (is it in m?)")
         _check_magnitude("force", self.force, LIMITS.force, "N per element")
         _check_pose(self.object_pose)
         _check_normal(self.normal)
-        _check_truth(self.truth, field_shape[:3])
+
+    def __reduce__(self) -> tuple[Callable[..., "GraspLog"], tuple[dict[str, Any]]]:
+        """Pickle by value, so that a log can go to a worker process (a read-only mapping can't be pickled)."""
+        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        return _rebuild, (values | {"metadata": dict(self.metadata)},)
 
     @property
     def grid(self) -> tuple[int, int]:
@@ -115,6 +126,7 @@ class GraspLog:
                 self.displacement[k],
                 None if self.force is None else self.force[k],
                 None if self.object_pose is None else self.object_pose[k],
+                None if self.normal is None else self.normal[k],
             )
 
 
@@ -123,18 +135,19 @@ def check_position(position: ArrayLike) -> FloatArray:
     checked = _array("position", position, (None, None, 3))
     _check_magnitude("position", checked, LIMITS.position, "m")
     if checked[..., 0].size > 1:
-        extent = float(np.ptp(checked[..., :2], axis=(0, 1)).max())
+        extent = _extent(checked)
         low, high = LIMITS.extent
         if not low <= extent <= high:
             raise InvalidInput("position", f"{extent:.3g} m across", f"{low:g} to {high:g} m across (is it in m?)")
+        _check_neighbours_apart(checked)
     return checked
 
 
 def check_element_area(area: float) -> float:
     """Area of one micro-element in m², refused where absurd."""
     low, high = LIMITS.element_area
-    value = float(area)
-    if not low <= value <= high:  # also refuses NaN
+    value = float(_array("element_area", area, ()))
+    if not low <= value <= high:
         raise InvalidInput("element_area", f"{value:.3g} m²", f"{low:g} to {high:g} m²")
     return value
 
@@ -146,15 +159,36 @@ def check_frame(name: str, value: ArrayLike, shape: tuple[int | None, ...], limi
     return checked
 
 
+def check_pose(pose: ArrayLike) -> FloatArray:
+    """One frame's object pose [3], x m, y m and yaw rad, with the checks that a whole log gets."""
+    checked = _array("object_pose", pose, (3,))
+    _check_pose(checked[None])
+    return checked
+
+
+def check_normal(normal: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
+    """One frame's outward unit normals, with the checks that a whole log gets."""
+    checked = _array("normal", normal, shape)
+    _check_normal(checked)
+    return checked
+
+
+def _rebuild(values: dict[str, Any]) -> GraspLog:
+    return GraspLog(**values)
+
+
 def _set(record: object, name: str, value: object) -> None:
     object.__setattr__(record, name, value)  # the record is frozen; this is its own constructor
 
 
 def _array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> FloatArray:
     try:
-        array = np.array(value, dtype=np.float64, order="C")
-    except (TypeError, ValueError) as error:
-        raise InvalidInput(name, f"not numeric ({error})", "an array of real numbers") from error
+        given = np.asarray(value)
+    except ValueError as error:  # rows of different lengths
+        raise InvalidInput(name, f"not an array ({error})", "an array of real numbers") from error
+    if given.dtype.kind not in "iuf":  # text, dates and complex numbers would convert, and mean something else
+        raise InvalidInput(name, f"of dtype {given.dtype}", "an array of real numbers")
+    array = np.array(given, dtype=np.float64, order="C")
     wanted = "[" + ", ".join("any" if size is None else str(size) for size in shape) + "]"
     matches = array.ndim == len(shape) and all(
         size is None or size == got for size, got in zip(shape, array.shape, strict=True)
@@ -174,6 +208,29 @@ def _array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> FloatA
 
 def _optional(name: str, value: ArrayLike | None, shape: tuple[int | None, ...]) -> FloatArray | None:
     return None if value is None else _array(name, value, shape)
+
+
+def _metadata(metadata: Mapping[str, str]) -> Mapping[str, str]:
+    if not isinstance(metadata, Mapping):
+        raise InvalidInput("metadata", f"a {type(metadata).__name__}", "a mapping of strings")
+    return MappingProxyType({str(key): str(value) for key, value in metadata.items()})
+
+
+def _extent(position: FloatArray) -> float:
+    return float(np.ptp(position[..., :2], axis=(0, 1)).max())
+
+
+def _largest_displacement(position: FloatArray) -> float:
+    """No marker moves further than the sensor is wide; this finds millimetres where the fixed limit would not."""
+    return min(LIMITS.displacement, _extent(position) or LIMITS.displacement)  # a single marker has no extent
+
+
+def _check_neighbours_apart(position: FloatArray) -> None:
+    for axis in (0, 1):
+        spacing = np.linalg.norm(np.diff(position, axis=axis), axis=-1)
+        if spacing.size and spacing.min() == 0.0:
+            first = [int(i) for i in np.unravel_index(int(spacing.argmin()), spacing.shape)]
+            raise InvalidInput("position", f"the same at {first} and its next along axis {axis}", "markers apart")
 
 
 def _check_time(time: FloatArray) -> None:
@@ -213,16 +270,32 @@ def _check_normal(normal: FloatArray | None) -> None:
         raise InvalidInput("normal", f"z component {normal[..., 2].min():.3g}", "outward, z component above 0")
 
 
-def _check_truth(truth: GroundTruth | None, shape: tuple[int, ...]) -> None:
+def _truth(truth: GroundTruth | None, shape: tuple[int, ...]) -> GroundTruth | None:
     if truth is None:
-        return
-    expected = {
-        "contact": shape,
-        "slip_kinematic": shape,
-        "slip_contact_factor": shape,
-        "stick_ratio": shape[:1],
-    }
-    for name, wanted in expected.items():
-        got = np.shape(getattr(truth, name))
-        if got != wanted:
-            raise InvalidInput(f"truth.{name}", f"of shape {list(got)}", f"shape {list(wanted)}")
+        return None
+    return GroundTruth(
+        contact=_mask("truth.contact", truth.contact, shape),
+        slip_kinematic=_mask("truth.slip_kinematic", truth.slip_kinematic, shape),
+        slip_contact_factor=_mask("truth.slip_contact_factor", truth.slip_contact_factor, shape),
+        stick_ratio=_stick_ratio(truth.stick_ratio, shape[0]),
+        friction=truth.friction,
+    )
+
+
+def _mask(name: str, value: ArrayLike, shape: tuple[int, ...]) -> BoolArray:
+    mask = np.array(value)
+    if mask.dtype != np.bool_ or mask.shape != shape:
+        raise InvalidInput(name, f"{mask.dtype} of shape {list(mask.shape)}", f"bool of shape {list(shape)}")
+    mask.flags.writeable = False
+    return mask
+
+
+def _stick_ratio(value: ArrayLike, frames: int) -> FloatArray:
+    ratio = np.array(value, dtype=np.float64)
+    if ratio.shape != (frames,):
+        raise InvalidInput("truth.stick_ratio", f"of shape {list(ratio.shape)}", f"shape [{frames}]")
+    outside = ratio[~np.isnan(ratio) & ~((ratio >= 0.0) & (ratio <= 1.0))]
+    if outside.size:
+        raise InvalidInput("truth.stick_ratio", outside[0], "0 to 1, NaN without contact")
+    ratio.flags.writeable = False
+    return ratio

@@ -83,7 +83,7 @@ def test_a_missing_member_is_named(log: GraspLog, zip_of: ZipOf, name: str) -> N
         ("metadata", np.array("{"), "metadata is not JSON"),
         ("truth_friction", np.zeros(3), r"truth_friction is of shape \[3\]"),
         ("truth_contact", np.ones((5, 3, 4)), "truth_contact is of dtype float64; allowed: bool"),
-        ("truth_contact", np.ones((5, 3, 3), bool), r"truth.contact is of shape \[5, 3, 3\]"),
+        ("truth_contact", np.ones((5, 3, 3), bool), r"truth.contact is bool of shape \[5, 3, 3\]"),
         ("time", np.array([{}, {}]), "time is of dtype object"),
         ("time", np.zeros(5, [("a", "f8")]), "an array of numbers, booleans or text, without objects"),
     ],
