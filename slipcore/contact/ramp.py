@@ -65,7 +65,7 @@ def tangential_ramp(
     ``tangential_force`` is the final F_T as a fraction of the sliding force μF_N, 0 to 1 (at 1 the contact has just
     begun to slide). ``marker_noise`` m and ``force_noise`` N are standard deviations per component; the truth and the
     object's pose stay exact. Points lie on a centred square lattice of ``points``² at ``pitch`` m; the force of an
-    element is the traction at its point times pitch². Units SI; other arguments and defaults: ``contact.defaults.Ramp``.
+    element is the traction at its point times pitch². SI; other arguments and defaults: ``contact.defaults.Ramp``.
     Coulomb friction with constant μ, sensor a half-space without normal–tangential coupling. Raises ``InvalidInput``.
     """
     check_range("friction", friction, above=0.0)

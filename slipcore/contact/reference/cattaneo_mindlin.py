@@ -163,9 +163,10 @@ class CattaneoMindlin:
     def _far_axial(self, r: FloatArray) -> FloatArray:
         mean, half = self._angles(r)
         step = 2.0 * np.cos(mean) * sin_minus_x_cos(half) + 2.0 * mean * np.sin(mean) * np.sin(half)
-        return np.pi / 4.0 * r * r * step
+        axial: FloatArray = np.pi / 4.0 * r * r * step
+        return axial
 
     def _far_deviator(self, r: FloatArray) -> FloatArray:
         mean, half = self._angles(r)
-        step = 2.0 * x_minus_sin(2.0 * half) + 4.0 * np.sin(2.0 * half) * np.sin(mean) ** 2
+        step: FloatArray = 2.0 * x_minus_sin(2.0 * half) + 4.0 * np.sin(2.0 * half) * np.sin(mean) ** 2
         return np.pi / 16.0 * step
