@@ -1,6 +1,16 @@
 """Friction samples to friction models (samples → friction_model → material)."""
 
-from estimators.errors import EstimatorError, InvalidSamples, TooFewSamples
+from estimators.errors import EstimatorError, InvalidSamples, NotConverged, TooFewSamples
+from estimators.fitting import fit
 from estimators.friction_model import Cost, Domain, FrictionModel
 
-__all__ = ["Cost", "Domain", "EstimatorError", "FrictionModel", "InvalidSamples", "TooFewSamples"]
+__all__ = [
+    "Cost",
+    "Domain",
+    "EstimatorError",
+    "FrictionModel",
+    "InvalidSamples",
+    "NotConverged",
+    "TooFewSamples",
+    "fit",
+]

@@ -53,7 +53,7 @@ class FrictionModel:
     @property
     def standard_errors(self) -> FloatArray:
         """Standard errors of the coefficients, [3]."""
-        return np.sqrt(np.diag(self.covariance))
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     def interval(self, level: float = 0.95) -> FloatArray:
         """Central interval of each coefficient at ``level``: [3, 2]."""
@@ -76,7 +76,30 @@ class FrictionModel:
             return mean
         _check_probability("quantile", quantile)
         spread = np.sqrt(self.scale**2 + np.einsum("...i,ij,...j->...", x, self.covariance, x))
-        return mean + special.stdtrit(self.degrees_of_freedom, quantile) * spread
+        return np.asarray(mean + special.stdtrit(self.degrees_of_freedom, quantile) * spread)
+
+    def within_domain(self, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> NDArray[np.bool_]:
+        """Whether v and f_n lie in the range of the data; shapes broadcast."""
+        inside = [
+            (low <= np.asarray(value, float)) & (np.asarray(value, float) <= high)
+            for value, (low, high) in (
+                (tangential_velocity, self.domain.tangential_velocity),
+                (normal_force, self.domain.normal_force),
+            )
+        ]
+        return np.asarray(inside[0] & inside[1])
+
+    def warning(self, tangential_velocity: float, normal_force: float) -> str:
+        """What to beware of in a prediction at v and f_n: how far outside the data it lies, or "" inside."""
+        asked = (
+            ("tangential_velocity", tangential_velocity, self.domain.tangential_velocity, "m/s"),
+            ("normal_force", normal_force, self.domain.normal_force, "N"),
+        )
+        return "; ".join(
+            f"{name} {value:.4g} {unit} lies outside the data ({low:.4g} to {high:.4g} {unit})"
+            for name, value, (low, high), unit in asked
+            if not low <= value <= high
+        )
 
 
 def _check_probability(name: str, value: float) -> None:

@@ -1,0 +1,82 @@
+"""Every default of estimators, with unit, source and valid range."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """What matters to a grasp: the spans over which a slope is of consequence, and the size of the quantities."""
+
+    tangential_velocity: float = 5e-3
+    """m/s, > 0; incipient slip of a fingertip runs at 0.1 to 10 mm/s."""
+    pressure: float = 5e4
+    """Pa, > 0; a fingertip of 1 to 2 cm² that carries 5 to 10 N."""
+    friction: float = 0.5
+    """-, > 0; between polished metal (0.1) and rubber on dry paper (1)."""
+    scatter: float = 0.05
+    """-, > 0; standard deviation of friction between elements, a tenth of the friction itself."""
+
+    def spans(self, element_area: float) -> NDArray[np.float64]:
+        """Spans [2] of v (m/s) and of an element's f_n (N), from the area of the element in m²."""
+        return np.array([self.tangential_velocity, self.pressure * element_area])
+
+
+@dataclass(frozen=True, slots=True)
+class Identifiability:
+    """When a coefficient counts as known."""
+
+    effect: float = 0.1
+    """-, 0 to 1; largest half-width of its 95 % interval, as a change of μ over the span, in parts of the mean μ."""
+    collinear: float = 1e-10
+    """-, 1e-14 to 1e-6; smallest singular value of the equilibrated regressors that still counts as a direction."""
+    ill_conditioned: float = 1e3
+    """-, ≥ 1; scaled condition number from which the factor is computed again in extended precision."""
+
+
+@dataclass(frozen=True, slots=True)
+class Prior:
+    """Weak conjugate prior: β | σ² ~ N((μ₀, 0, 0), σ² V₀), σ² ~ IG(ν₀/2, ν₀ s₀²/2).
+
+    V₀ is such that at σ = s₀ the standard deviation of β₀ is ``width``, and that of each slope changes μ by ``width``
+    over its reference span: the prior weighs as much as (s₀/width)² = 1/400 of one sample.
+    """
+
+    width: float = 1.0
+    """-, > 0; no known pair of dry surfaces lies outside 0.5 ± 2."""
+    degrees_of_freedom: float = 0.1
+    """ν₀, > 0; the prior's say in σ weighs as much as a tenth of one sample."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sampling:
+    """How a posterior is sampled, and when the sampling stops."""
+
+    walkers: int = 512
+    """≥ 16, even; wide enough that NumPy's overhead a step is shared."""
+    block: int = 72
+    """Steps between two looks at the chain; ≥ 50 τ for the independence proposal, whose τ is about 1.2."""
+    chain_lengths: float = 50.0
+    """Steps in units of the integrated autocorrelation time, from which that time is believed (emcee's rule)."""
+    accuracy: float = 0.015
+    """Posterior standard deviations; Monte-Carlo error of mean, 5 % and 95 % quantile at which sampling stops."""
+    max_steps: int = 20_000
+    """Steps after which a chain that does not converge is given up."""
+    min_acceptance: float = 0.3
+    """Acceptance of the independence proposal below which differential evolution takes over (house trials)."""
+    proposal_degrees_of_freedom: float = 10.0
+    """Of the multivariate Student-t proposal: tails heavier than the posterior's, at an acceptance of 0.88."""
+    max_split_rhat: float = 1.01
+    """Vehtari et al. (2021), Bayesian Analysis 16:667."""
+    kept_draws: int = 4000
+    """Draws that a model keeps."""
+
+
+REFERENCE = Reference()
+IDENTIFIABILITY = Identifiability()
+PRIOR = Prior()
+SAMPLING = Sampling()
+MIN_SAMPLES = 4
+"""Three coefficients and a scatter need four samples."""

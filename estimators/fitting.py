@@ -1,0 +1,43 @@
+"""The one entrance: samples in, friction model out."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from estimators import ols
+from estimators.errors import InvalidSamples
+from estimators.friction_model import FrictionModel
+from estimators.observations import observe
+
+if TYPE_CHECKING:
+    from slipcore.samples import FrictionSamples
+
+METHODS = ("ols", "bayes")
+
+
+def fit(
+    samples: "FrictionSamples | Sequence[FrictionSamples]",
+    method: str = "ols",
+    accuracy: float | None = None,
+    seconds: float | None = None,
+    seed: int = 0,
+) -> FrictionModel:
+    """Fit ``μ = β₀ + β₁ v + β₂ f_n + ε`` to the samples of one grasp, or of several given as a sequence.
+
+    ``method``: "ols" (weighted least squares, cluster-robust) or "bayes" (emcee). A sampled method stops once the
+    Monte-Carlo error of its means and 5/95 % quantiles is under ``accuracy`` posterior standard deviations, or after
+    ``seconds``; ``seed`` makes it repeatable.
+
+    Raises ``TooFewSamples`` where no slip or hardly any was seen, ``InvalidSamples`` naming what cannot be used, and
+    ``NotConverged``, which carries its model, where a chain cannot be trusted.
+    """
+    if method not in METHODS:
+        raise InvalidSamples("method", method, ", ".join(METHODS))
+    for name, value in (("accuracy", accuracy), ("seconds", seconds)):
+        if value is not None and not value > 0.0:
+            raise InvalidSamples(name, value, "above 0")
+    observations = observe(samples)
+    if method == "ols":
+        return ols.fit(observations)
+    from estimators import bayes  # emcee takes a second
+
+    return bayes.fit(observations, accuracy=accuracy, seconds=seconds, seed=seed)

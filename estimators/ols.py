@@ -1,0 +1,125 @@
+"""Ordinary (weighted) least squares with errors that hold when samples of one grasp or element move together."""
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.cluster_errors import cluster_sums, jackknife
+from estimators.defaults import REFERENCE
+from estimators.friction_model import Cost, Domain, FrictionModel
+from estimators.identifiability import effects, identifiable
+from estimators.least_squares import LinearFit, factorise, solve
+from estimators.observations import IntArray, Observations
+
+FloatArray = NDArray[np.float64]
+
+STATSMODELS_LIMIT = 20_000
+"""Samples up to which statsmodels adds its classical, HC3 and CR1 errors for comparison; it takes seconds beyond."""
+
+
+def fit(observations: Observations) -> FrictionModel:
+    """Least squares of μ on (1, v, f_n), weighted; the covariance is the cluster jackknife with t on G − 1 degrees.
+
+    Clusters are grasps where there are two or more, else elements, else stretches of time. The noise of μ = f_t/f_n
+    grows as 1/f_n: the jackknife is valid under it, the classical errors in the diagnostics are not.
+    """
+    begin = time.perf_counter()
+    factor = factorise(observations.columns(), observations.weight)
+    linear = solve(factor, REFERENCE.spans(observations.element_area))
+    degrees = observations.effective_n - 1.0 - linear.rank
+    scale = float(linear.residual_norm / np.sqrt(degrees))
+    design, residual = _orthonormal(observations, linear)
+    shared = jackknife(*cluster_sums(design, residual, observations.cluster), scale)
+    covariance = in_coefficients(linear, shared)
+    degrees = min(degrees, float(observations.clusters - 1))
+    effect = effects(covariance, degrees, observations)
+    diagnostics = describe(observations, linear) | {
+        "r_squared": r_squared(factor.triangle, linear.residual_norm),
+        **by_coefficient("effect", effect),
+        **by_coefficient("standard_error_cluster", np.sqrt(np.diag(covariance))),
+        **by_coefficient("standard_error_classical", np.sqrt(np.diag(classical(linear, scale)))),
+    }
+    if len(observations) <= STATSMODELS_LIMIT:
+        diagnostics |= _statsmodels_errors(design, residual, observations.cluster, linear)
+    return FrictionModel(
+        method="ols",
+        coefficients=linear.coefficients.astype(float),
+        covariance=covariance,
+        scale=scale,
+        n=len(observations),
+        degrees_of_freedom=degrees,
+        domain=domain(observations),
+        identifiable=identifiable(effect),
+        element_area=observations.element_area,
+        cost=Cost(time.perf_counter() - begin),
+        diagnostics=diagnostics,
+    )
+
+
+def domain(observations: Observations) -> Domain:
+    """Range of v and f_n in the samples."""
+    v, f_n = observations.tangential_velocity, observations.normal_force
+    return Domain((float(v.min()), float(v.max())), (float(f_n.min()), float(f_n.max())))
+
+
+def in_coefficients(linear: LinearFit, covariance: FloatArray) -> FloatArray:
+    """Covariance [3, 3] of the coefficients from one in the orthonormal design, plus the prior's part."""
+    root = linear.root.astype(float)
+    return np.asarray(root @ covariance @ root.T + linear.prior_covariance)
+
+
+def classical(linear: LinearFit, scale: float) -> FloatArray:
+    """Covariance [3, 3] if all errors were independent and alike."""
+    return in_coefficients(linear, scale**2 * np.eye(linear.rank + 1))
+
+
+def r_squared(triangle: NDArray[np.floating], residual_norm: float) -> float:
+    """Part of the weighted variance of μ that the plane explains; 0 where μ does not vary."""
+    total = float(np.sqrt(np.sum(np.square(triangle[:, -1]))))
+    return 1.0 - (residual_norm / total) ** 2 if total > 0.0 else 0.0
+
+
+def describe(observations: Observations, linear: LinearFit) -> dict[str, float | str]:
+    """What every method says of its data."""
+    return {
+        "effective_n": observations.effective_n,
+        "clusters": float(observations.clusters),
+        "cluster_kind": observations.cluster_kind,
+        "condition_number": linear.condition,
+        "rank": float(linear.rank + 1),
+        "variance_inflation_tangential_velocity": float(linear.inflation[0]),
+        "variance_inflation_normal_force": float(linear.inflation[1]),
+    }
+
+
+def by_coefficient(name: str, values: FloatArray) -> dict[str, float | str]:
+    """One diagnostic a coefficient, under names that JSON can carry."""
+    return {f"{name}_beta{k}": float(value) for k, value in enumerate(values)}
+
+
+def _orthonormal(observations: Observations, linear: LinearFit) -> tuple[FloatArray, FloatArray]:
+    """Orthonormal design Q [n, r] and residuals [n], both times √w."""
+    root = np.sqrt(observations.weight)
+    mean, basis = linear.mean.astype(float), linear.basis.astype(float)
+    regressors = np.stack([observations.tangential_velocity - mean[0], observations.normal_force - mean[1]])
+    design = np.empty((len(root), 1 + linear.rank), order="F")
+    design[:, 0] = root / np.sqrt(observations.effective_n)
+    design[:, 1:] = (root * (basis.T @ regressors)).T
+    slopes = linear.coefficients[1:].astype(float)
+    at_mean = float(linear.coefficients[0] + linear.mean @ linear.coefficients[1:])
+    return design, root * (observations.friction - at_mean - slopes @ regressors)
+
+
+def _statsmodels_errors(
+    design: FloatArray, residual: FloatArray, cluster: IntArray, linear: LinearFit
+) -> dict[str, float | str]:
+    """HC3 and CR1 errors by statsmodels, on the orthonormal design, where nothing can fail silently."""
+    from statsmodels.regression.linear_model import OLS  # takes more than a second
+
+    results = OLS(residual, design).fit()
+    clustered = results.get_robustcov_results("cluster", groups=cluster)
+    return {
+        **by_coefficient("standard_error_hc3", np.sqrt(np.diag(in_coefficients(linear, results.cov_HC3)))),
+        **by_coefficient("standard_error_cr1", np.sqrt(np.diag(in_coefficients(linear, clustered.cov_params())))),
+    }

@@ -1,0 +1,196 @@
+"""emcee where the posterior is nearly known: independence proposals, and a chain that says how wrong it still is."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from estimators.defaults import SAMPLING
+from estimators.errors import InvalidSamples
+
+FloatArray = NDArray[np.float64]
+LogProbability = Callable[[FloatArray], FloatArray]
+
+TAILS = (0.05, 0.95)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chain:
+    """Draws of an ensemble after burn-in, [steps, walkers, d], and how far they can be trusted.
+
+    ``autocorrelation_time`` [d] in steps; ``effective_sample_size`` [d]; ``monte_carlo_error``: the largest over the
+    parameters of the standard error of mean, 5 % and 95 % quantile, in posterior standard deviations;
+    ``split_rhat``: the largest, or NaN where walkers are not independent chains; ``trouble``: why the chain cannot be
+    trusted, or ""; ``stopped``: "accuracy", "seconds" or "steps".
+    """
+
+    draws: FloatArray
+    autocorrelation_time: FloatArray
+    effective_sample_size: FloatArray
+    monte_carlo_error: float
+    acceptance: float
+    split_rhat: float
+    move: str
+    trouble: str
+    stopped: str
+
+    def flat(self) -> FloatArray:
+        """All draws, [steps · walkers, d]."""
+        return self.draws.reshape(-1, self.draws.shape[-1])
+
+
+def sample(
+    log_probability: LogProbability,
+    dimension: int,
+    accuracy: float | None = None,
+    seconds: float | None = None,
+    seed: int = 0,
+) -> Chain:
+    """Sample a density that is close to N(0, I) until its Monte-Carlo error is under ``accuracy`` (or time is up).
+
+    An independence proposal from a multivariate Student-t makes every walker a chain of its own; where the target is
+    too far from N(0, I) for it, differential evolution takes over. ``log_probability`` takes [k, d].
+    """
+    deadline = np.inf if seconds is None else time.perf_counter() + seconds
+    goal = SAMPLING.accuracy if accuracy is None else accuracy
+    chain = _run(log_probability, dimension, _independence(dimension), "independence", goal, deadline, seed)
+    if chain.acceptance >= SAMPLING.min_acceptance:
+        return chain
+    from emcee.moves import DEMove
+
+    return _run(log_probability, dimension, DEMove(), "differential evolution", goal, deadline, seed)
+
+
+def autocorrelation_time(series: FloatArray) -> FloatArray:
+    """Integrated autocorrelation time [d] of chains [steps, walkers, d], averaged over walkers (Sokal; as emcee's)."""
+    steps = len(series)
+    spectrum = fft.rfft(series - series.mean(axis=(0, 1)), n=2 * steps, axis=0)
+    power = np.mean(spectrum.real**2 + spectrum.imag**2, axis=1)
+    covariance = fft.irfft(power, axis=0)[:steps]
+    correlation = covariance / np.maximum(covariance[0], np.finfo(float).tiny)
+    times = 2.0 * np.cumsum(correlation, axis=0) - 1.0
+    beyond = np.arange(steps)[:, None] >= 5.0 * times
+    window = np.where(beyond.any(axis=0), np.argmax(beyond, axis=0), steps - 1)
+    return np.maximum(times[window, np.arange(times.shape[1])], 1.0 / steps)
+
+
+def split_rhat(draws: FloatArray) -> float:
+    """Largest split-R̂ over the parameters of independent chains [steps, chains, d] (Gelman et al., BDA3, §11.4)."""
+    half = len(draws) // 2
+    split = np.concatenate([draws[:half], draws[half : 2 * half]], axis=1)
+    within = split.var(axis=0, ddof=1).mean(axis=0)
+    between = split.mean(axis=0).var(axis=0, ddof=1)
+    return float(np.sqrt((half - 1) / half + between / within).max())
+
+
+def monte_carlo_error(draws: FloatArray, times: FloatArray) -> float:
+    """Largest standard error of mean and tail quantiles, in posterior standard deviations.
+
+    A quantile's error is half the distance between the quantiles one standard error of its rank to either side, with
+    the autocorrelation time of its own indicator (Vehtari et al. 2021, §4.3).
+    """
+    flat = draws.reshape(-1, draws.shape[-1])
+    spread = flat.std(axis=0)
+    worst = np.sqrt(times / len(flat)).max()
+    for tail in TAILS:
+        level = np.quantile(flat, tail, axis=0)
+        step = np.sqrt(tail * (1.0 - tail) * autocorrelation_time((draws <= level).astype(float)) / len(flat))
+        for k, rank in enumerate(step):
+            low, high = np.quantile(flat[:, k], [max(tail - rank, 0.0), min(tail + rank, 1.0)])
+            worst = max(worst, 0.5 * (high - low) / spread[k])
+    return float(worst)
+
+
+def _run(
+    log_probability: LogProbability, dimension: int, move: object, name: str, goal: float, deadline: float, seed: int
+) -> Chain:
+    import emcee  # takes a second to load
+
+    random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed)))
+    sampler = emcee.EnsembleSampler(SAMPLING.walkers, dimension, log_probability, moves=move, vectorize=True)
+    sampler.random_state = random.get_state()
+    start = _start(log_probability, random, dimension)
+    state = emcee.State(start, log_prob=log_probability(start))
+    begin, steps = time.perf_counter(), SAMPLING.block
+    while True:
+        state = sampler.run_mcmc(state, steps, skip_initial_state_check=True)
+        chain = _judge(sampler.get_chain(), float(sampler.acceptance_fraction.mean()), name)
+        now, done = time.perf_counter(), sampler.iteration
+        if _hopeless(chain) or (not chain.trouble and chain.monte_carlo_error <= goal):
+            return chain
+        affordable = min((deadline - now) * done / (now - begin), float(SAMPLING.max_steps - done))
+        if affordable < 1.0:
+            return replace(chain, stopped="steps" if done >= SAMPLING.max_steps else "seconds")
+        steps = int(min(max(_missing(chain, goal), SAMPLING.block), 4 * done, affordable))
+
+
+def _start(log_probability: LogProbability, random: np.random.RandomState, dimension: int) -> FloatArray:
+    """Walkers [w, d] near the posterior already: proposals resampled by their importance."""
+    candidates = _student(random, 8 * SAMPLING.walkers, dimension)
+    log_weight = log_probability(candidates) - _log_student(candidates)
+    if not np.isfinite(log_weight.max()):
+        raise InvalidSamples("mean friction", "0 or less with near certainty", "above 0 over the range of the data")
+    weight = np.exp(log_weight - log_weight.max())
+    return np.asarray(candidates[random.choice(len(weight), SAMPLING.walkers, p=weight / weight.sum())])
+
+
+def _hopeless(chain: Chain) -> bool:
+    return chain.move == "independence" and chain.acceptance < SAMPLING.min_acceptance
+
+
+def _missing(chain: Chain, goal: float) -> float:
+    """Steps that the chain still lacks, with a tenth to spare, so that it seldom has to be looked at again."""
+    length = len(chain.draws)
+    accurate = length * (chain.monte_carlo_error / goal) ** 2
+    return 1.1 * max(accurate, SAMPLING.chain_lengths * float(chain.autocorrelation_time.max())) - length
+
+
+def _judge(draws: FloatArray, acceptance: float, move: str) -> Chain:
+    """Drop the burn-in of five autocorrelation times and tell what the rest is worth."""
+    burn_in = min(int(np.ceil(5.0 * autocorrelation_time(draws).max())), len(draws) // 2)
+    kept = draws[burn_in:]
+    times = autocorrelation_time(kept)
+    rhat = split_rhat(kept) if move == "independence" else np.nan
+    return Chain(
+        draws=kept,
+        autocorrelation_time=times,
+        effective_sample_size=kept.shape[0] * kept.shape[1] / np.maximum(times, 1.0),
+        monte_carlo_error=monte_carlo_error(kept, times),
+        acceptance=acceptance,
+        split_rhat=rhat,
+        move=move,
+        trouble=_trouble(len(kept), float(times.max()), rhat),
+        stopped="accuracy",
+    )
+
+
+def _trouble(steps: int, time_steps: float, rhat: float) -> str:
+    if steps < SAMPLING.chain_lengths * time_steps:
+        return f"{steps} steps at an autocorrelation time of {time_steps:.1f}; {SAMPLING.chain_lengths:g} times needed"
+    if rhat > SAMPLING.max_split_rhat:
+        return f"split R-hat {rhat:.3f}; at most {SAMPLING.max_split_rhat:g} allowed"
+    return ""
+
+
+def _independence(dimension: int) -> object:
+    from emcee.moves import MHMove
+
+    def propose(coordinates: FloatArray, random: np.random.RandomState) -> tuple[FloatArray, FloatArray]:
+        proposed = _student(random, len(coordinates), dimension)
+        return proposed, _log_student(coordinates) - _log_student(proposed)
+
+    return MHMove(propose)
+
+
+def _student(random: np.random.RandomState, count: int, dimension: int) -> FloatArray:
+    degrees = SAMPLING.proposal_degrees_of_freedom
+    radius = np.sqrt(degrees / random.chisquare(degrees, (count, 1)))
+    return np.asarray(random.standard_normal((count, dimension)) * radius)
+
+
+def _log_student(x: FloatArray) -> FloatArray:
+    degrees = SAMPLING.proposal_degrees_of_freedom
+    return np.asarray(-0.5 * (degrees + x.shape[1]) * np.log1p(np.einsum("ki,ki->k", x, x) / degrees))
