@@ -10,8 +10,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stiction_client.errors import InvalidArgument
+
 FORMAT, VERSION = "stiction-grasp-log", 1
 CONTENT_TYPE = "application/vnd.stiction.grasp-log+npz"
+RECORDING_TYPE = "application/vnd.tac3d+zip"
 EPOCH = (1980, 1, 1, 0, 0, 0)
 """The earliest time a zip can hold; a real clock would make two copies of one log differ."""
 
@@ -79,9 +82,15 @@ def write(log: GraspLogLike, path: Path | str) -> Path:
 
 
 def pack_folder(folder: Path | str) -> bytes:
-    """A recording folder (one .npy a field) as a zip, the same bytes for the same recording."""
+    """A recording folder (one .npy a field) as a zip, the same bytes for the same recording.
+
+    Raises ``InvalidArgument`` where the folder holds no .npy file.
+    """
     source = Path(folder).resolve()
-    return _zip({f"{source.name}/{path.name}": path.read_bytes() for path in sorted(source.glob("*.npy"))})
+    paths = sorted(source.glob("*.npy"))
+    if not paths:
+        raise InvalidArgument("folder", f"{source.name!r} without .npy files", "a recording, one .npy a field")
+    return _zip({f"{source.name}/{path.name}": path.read_bytes() for path in paths})
 
 
 def _members(log: GraspLogLike) -> dict[str, NDArray[Any]]:

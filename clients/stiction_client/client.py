@@ -1,0 +1,257 @@
+"""The two clients, one waiting and one awaiting: they carry out what ``flows`` describes."""
+
+import asyncio
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import httpx
+
+from stiction_client import flows
+from stiction_client.container import GraspLogLike
+from stiction_client.errors import ConnectionFailed
+from stiction_client.flows import Answer, Ended, Flow, Pause, Request, T
+from stiction_client.model import FrictionModel
+from stiction_client.records import FrictionAnswer, GraspLogReceipt, Job, Material
+
+TIMEOUT = 30.0
+"""s for one request; an upload at the service's size limit takes a second on a local network."""
+
+CONNECT_TIMEOUT = 5.0
+"""s; a host that doesn't answer by then isn't there."""
+
+JOB_TIMEOUT = 300.0
+"""s; a fit of 200,000 samples takes seconds, a queue before it may take minutes."""
+
+
+class FrictionClient:
+    """A Stiction service over one kept-open connection; use it as a context manager, or ``close`` it.
+
+    ``key`` is sent as ``Authorization: Bearer``; ``timeout`` s holds for one request; ``transport`` replaces the
+    network, as in tests. Requests that do no harm twice are tried three times where the connection breaks.
+
+    Every call raises ``ConnectionFailed``, ``ProblemError`` (the service refused) or ``UnexpectedAnswer``.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        key: str | None = None,
+        transport: httpx.BaseTransport | None = None,
+        *,
+        timeout: float = TIMEOUT,
+    ) -> None:
+        self._http = httpx.Client(**_options(url, key, timeout), transport=transport)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._http.close()
+
+    def upload(
+        self,
+        log: GraspLogLike | Path | str,
+        material: str | None = None,
+        sensor: str | None = None,
+        detector: str | None = None,
+    ) -> GraspLogReceipt:
+        """Upload a grasp log: a record, a file, or a Tac3D recording folder.
+
+        With ``material`` the service refits that material once the slip is detected; follow with ``wait``. The same
+        content twice is one log. ``sensor`` and ``detector`` default to what the log and the service say.
+        """
+        return self._run(flows.upload(log, material, sensor, detector))
+
+    def grasp_log(self, id: str) -> GraspLogReceipt:  # noqa: A002 - the API's own name
+        """A grasp log by its id, with what was detected."""
+        return self._run(flows.grasp_log(id))
+
+    def create_material(self, name: str, description: str = "") -> Material:
+        """Create a material; ``ProblemError`` of type "/problems/material-exists" where it is there."""
+        return self._run(flows.create_material(name, description))
+
+    def ensure_material(self, name: str, description: str = "") -> Material:
+        """The material of this name, created where it isn't there (its description then stays as it was)."""
+        return self._run(flows.ensure_material(name, description))
+
+    def material(self, name: str) -> Material:
+        """A material with its current models."""
+        return self._run(flows.material(name))
+
+    def materials(self) -> list[Material]:
+        """All materials."""
+        return self._run(flows.materials())
+
+    def model(self, name: str, method: str = "ols") -> FrictionModel:
+        """The current model of a material, to be kept and evaluated here; raises ``NoModel`` where there is none."""
+        return self._run(flows.model(name, method))
+
+    def friction(
+        self, name: str, v: float, fn: float, quantile: float | None = None, method: str | None = None
+    ) -> FrictionAnswer:
+        """Friction at velocity ``v`` m/s and ``fn`` N an element: the mean, or a quantile of a new observation."""
+        return self._run(flows.friction(name, v, fn, quantile, method))
+
+    def fit(self, name: str, method: str = "ols", seed: int = 0) -> Job:
+        """Fit a material over all its grasp logs; follow with ``wait``."""
+        return self._run(flows.fit(name, method, seed))
+
+    def job(self, id: str) -> Job:  # noqa: A002 - the API's own name
+        """A job as it stands."""
+        return self._run(flows.job(id))
+
+    def wait(self, job: Job | GraspLogReceipt | str, timeout: float = JOB_TIMEOUT) -> Job:
+        """Wait until a job has ended and return it, whatever its end; ``JobTimedOut`` after ``timeout`` s.
+
+        A refusal is an answer (the data do not allow a fit), so it isn't raised: read ``status`` and ``reason``, or
+        call ``raise_for_status()`` on the result.
+        """
+        return self._run(flows.wait(_job_id(job), timeout))
+
+    def _run(self, flow: Flow[T]) -> T:
+        answer: Answer = None
+        while not isinstance(step := flows.advance(flow, answer), Ended):
+            answer = self._carry_out(step)
+        return step.result
+
+    def _carry_out(self, step: Request | Pause) -> Answer:
+        if isinstance(step, Pause):
+            time.sleep(step.seconds)
+            return None
+        try:
+            return self._http.send(_http_request(self._http, step))
+        except httpx.RequestError as error:
+            return _broken(step, error)
+
+
+class AsyncFrictionClient:
+    """``FrictionClient`` for asyncio: the same calls with the same meaning, awaited."""
+
+    def __init__(
+        self,
+        url: str,
+        key: str | None = None,
+        transport: httpx.AsyncBaseTransport | None = None,
+        *,
+        timeout: float = TIMEOUT,
+    ) -> None:
+        self._http = httpx.AsyncClient(**_options(url, key, timeout), transport=transport)
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    async def close(self) -> None:
+        """Close the connection."""
+        await self._http.aclose()
+
+    async def upload(
+        self,
+        log: GraspLogLike | Path | str,
+        material: str | None = None,
+        sensor: str | None = None,
+        detector: str | None = None,
+    ) -> GraspLogReceipt:
+        """As ``FrictionClient.upload``."""
+        return await self._run(flows.upload(log, material, sensor, detector))
+
+    async def grasp_log(self, id: str) -> GraspLogReceipt:  # noqa: A002 - the API's own name
+        """As ``FrictionClient.grasp_log``."""
+        return await self._run(flows.grasp_log(id))
+
+    async def create_material(self, name: str, description: str = "") -> Material:
+        """As ``FrictionClient.create_material``."""
+        return await self._run(flows.create_material(name, description))
+
+    async def ensure_material(self, name: str, description: str = "") -> Material:
+        """As ``FrictionClient.ensure_material``."""
+        return await self._run(flows.ensure_material(name, description))
+
+    async def material(self, name: str) -> Material:
+        """As ``FrictionClient.material``."""
+        return await self._run(flows.material(name))
+
+    async def materials(self) -> list[Material]:
+        """As ``FrictionClient.materials``."""
+        return await self._run(flows.materials())
+
+    async def model(self, name: str, method: str = "ols") -> FrictionModel:
+        """As ``FrictionClient.model``."""
+        return await self._run(flows.model(name, method))
+
+    async def friction(
+        self, name: str, v: float, fn: float, quantile: float | None = None, method: str | None = None
+    ) -> FrictionAnswer:
+        """As ``FrictionClient.friction``."""
+        return await self._run(flows.friction(name, v, fn, quantile, method))
+
+    async def fit(self, name: str, method: str = "ols", seed: int = 0) -> Job:
+        """As ``FrictionClient.fit``."""
+        return await self._run(flows.fit(name, method, seed))
+
+    async def job(self, id: str) -> Job:  # noqa: A002 - the API's own name
+        """As ``FrictionClient.job``."""
+        return await self._run(flows.job(id))
+
+    async def wait(self, job: Job | GraspLogReceipt | str, timeout: float = JOB_TIMEOUT) -> Job:
+        """As ``FrictionClient.wait``."""
+        return await self._run(flows.wait(_job_id(job), timeout))
+
+    async def _run(self, flow: Flow[T]) -> T:
+        answer: Answer = None
+        while not isinstance(step := flows.advance(flow, answer), Ended):
+            answer = await self._carry_out(step)
+        return step.result
+
+    async def _carry_out(self, step: Request | Pause) -> Answer:
+        if isinstance(step, Pause):
+            await asyncio.sleep(step.seconds)
+            return None
+        try:
+            return await self._http.send(_http_request(self._http, step))
+        except httpx.RequestError as error:
+            return _broken(step, error)
+
+
+def _options(url: str, key: str | None, timeout: float) -> dict[str, Any]:
+    return {
+        "base_url": url,
+        "headers": {"Authorization": f"Bearer {key}"} if key else {},
+        "timeout": httpx.Timeout(timeout, connect=min(timeout, CONNECT_TIMEOUT)),
+    }
+
+
+def _http_request(http: httpx.Client | httpx.AsyncClient, request: Request) -> httpx.Request:
+    headers = {"Content-Type": request.content_type} if request.content_type else {}
+    return http.build_request(
+        request.method,
+        request.path,
+        params=dict(request.params),
+        json=request.json,
+        content=request.content,
+        headers=headers,
+    )
+
+
+def _broken(request: Request, error: httpx.RequestError) -> ConnectionFailed:
+    failure = ConnectionFailed(f"{request.method} {request.path}: {type(error).__name__}: {error}")
+    failure.__cause__ = error
+    return failure
+
+
+def _job_id(job: Job | GraspLogReceipt | str) -> str:
+    if isinstance(job, GraspLogReceipt):
+        return job.job.id
+    return job.id if isinstance(job, Job) else job

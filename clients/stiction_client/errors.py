@@ -1,0 +1,95 @@
+"""The exceptions of the client: one small tree."""
+
+
+class StictionError(Exception):
+    """Whatever this package refuses to do, or could not."""
+
+
+class InvalidArgument(StictionError, ValueError):
+    """An argument that cannot be used: ``name`` of the thing, its ``value`` as text, what is ``allowed``."""
+
+    def __init__(self, name: str, value: object, allowed: str) -> None:
+        self.name, self.value, self.allowed = name, str(value), allowed
+        super().__init__(name, self.value, allowed)  # all three, so that the error survives pickling
+
+    def __str__(self) -> str:
+        return f"{self.name} is {self.value}; allowed: {self.allowed}"
+
+
+class ConnectionFailed(StictionError):
+    """The service could not be reached, or the connection broke or timed out."""
+
+
+class ProblemError(StictionError):
+    """The service refused a request (RFC 9457 problem).
+
+    ``type`` is stable and made for programs, such as "/problems/unknown-material"; ``status`` is the HTTP status;
+    ``detail`` is for people; ``name``, ``value`` and ``allowed`` tell which input was wrong, where one was.
+    """
+
+    def __init__(
+        self,
+        type: str,  # noqa: A002 - the name that RFC 9457 gives it
+        status: int,
+        detail: str,
+        name: str | None = None,
+        value: str | None = None,
+        allowed: str | None = None,
+    ) -> None:
+        self.type, self.status, self.detail = type, status, detail
+        self.name, self.value, self.allowed = name, value, allowed
+        super().__init__(type, status, detail, name, value, allowed)
+
+    def __str__(self) -> str:
+        return f"{self.detail} ({self.status}, {self.type})"
+
+
+class UnexpectedAnswer(StictionError):
+    """The answer is not one that a Stiction service gives: a wrong address, a proxy, or another version."""
+
+
+class NoModel(StictionError):
+    """The material has no fitted model of this method yet."""
+
+
+class JobError(StictionError):
+    """A job that did not end well: ``job_id`` and its ``reason``."""
+
+    def __init__(self, job_id: str, reason: str) -> None:
+        self.job_id, self.reason = job_id, reason
+        super().__init__(job_id, reason)
+
+    def __str__(self) -> str:
+        return f"job {self.job_id}: {self.reason}"
+
+
+class JobRefused(JobError):
+    """The data do not allow what was asked (no contact, no slip, too few samples); the log is kept."""
+
+
+class JobFailed(JobError):
+    """The service broke while it worked on the job."""
+
+
+class JobTimedOut(JobError):
+    """The job had not ended when waiting did; it goes on in the service."""
+
+
+class NoFeasibleForce(StictionError):
+    """No normal force holds the load with the slip probability asked for.
+
+    ``largest_load``: N, the most that can be held so (0 where nothing can), at ``normal_force`` N.
+    """
+
+    def __init__(self, tangential_load: float, largest_load: float, normal_force: float, reason: str) -> None:
+        self.tangential_load, self.largest_load = tangential_load, largest_load
+        self.normal_force, self.reason = normal_force, reason
+        super().__init__(tangential_load, largest_load, normal_force, reason)
+
+    def __str__(self) -> str:
+        most = (
+            f"the largest load held so is {self.largest_load:.6g} N, at a normal force of {self.normal_force:.6g} N"
+            if self.largest_load > 0.0
+            else "no load is held so at any force"
+        )
+        return f"no normal force holds {self.tangential_load:.6g} N ({self.reason}); {most}"

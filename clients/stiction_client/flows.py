@@ -1,0 +1,233 @@
+"""What each call says to the service and makes of its answers, without any I/O.
+
+A flow is a generator: it yields a ``Request`` or a ``Pause``, is sent the ``Answer``, and returns the result. The
+clients only carry requests out, one waiting, the other awaiting, so nothing is written twice.
+"""
+
+import time
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass, field
+from json import JSONDecodeError
+from pathlib import Path
+from typing import Any, Generic, NoReturn, TypeVar
+from urllib.parse import quote
+
+import httpx
+
+from stiction_client import container
+from stiction_client.container import GraspLogLike
+from stiction_client.errors import (
+    ConnectionFailed,
+    InvalidArgument,
+    JobTimedOut,
+    NoModel,
+    ProblemError,
+    UnexpectedAnswer,
+)
+from stiction_client.model import FrictionModel
+from stiction_client.records import FrictionAnswer, GraspLogReceipt, Job, Material
+
+ATTEMPTS = 3
+"""Times that an idempotent request is tried before a broken connection is an error."""
+
+RETRY_PAUSE = 0.2
+"""s before the second attempt; doubled for each one after."""
+
+FIRST_POLL, POLL_GROWTH, LONGEST_POLL = 0.05, 1.5, 2.0
+"""s, -, s: how often a job is asked for, denser at first because most jobs end within a second."""
+
+MATERIAL_EXISTS = "/problems/material-exists"
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One HTTP request; ``idempotent``: sent twice it does no more than once, so it may be tried again."""
+
+    method: str
+    path: str
+    idempotent: bool
+    params: Mapping[str, str | float] = field(default_factory=dict)
+    json: Mapping[str, Any] | None = None
+    content: bytes | None = None
+    content_type: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Pause:
+    """Wait this many seconds."""
+
+    seconds: float
+
+
+T = TypeVar("T")
+Flow = Generator[Request | Pause, httpx.Response | None, T]
+Answer = httpx.Response | ConnectionFailed | None
+"""What a client got for a step: a response or a broken connection for a request, nothing for a pause."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ended(Generic[T]):
+    """A flow is through."""
+
+    result: T
+
+
+def advance(flow: Flow[T], answer: Answer) -> Request | Pause | Ended[T]:
+    """Tell a flow what came of its last step (None at the start) and get its next one."""
+    try:
+        return flow.throw(answer) if isinstance(answer, ConnectionFailed) else flow.send(answer)
+    except StopIteration as end:
+        return Ended(end.value)
+
+
+def upload(
+    log: GraspLogLike | Path | str, material: str | None, sensor: str | None, detector: str | None
+) -> Flow[GraspLogReceipt]:
+    """Upload a log; the service knows logs by content, so that a repetition is no second log."""
+    content, content_type = _body(log)
+    params = _given(material=material, sensor=sensor, detector=detector)
+    request = Request("POST", "/v1/grasp-logs", True, params, content=content, content_type=content_type)
+    return _record(GraspLogReceipt.from_json, (yield from _ask(request)))
+
+
+def grasp_log(log_id: str) -> Flow[GraspLogReceipt]:
+    """Ask for a log."""
+    return _record(GraspLogReceipt.from_json, (yield from _get(f"/v1/grasp-logs/{_part(log_id)}")))
+
+
+def create_material(name: str, description: str) -> Flow[Material]:
+    """Create a material."""
+    body = {"name": name, "description": description}
+    return _record(Material.from_json, (yield from _ask(Request("POST", "/v1/materials", False, json=body))))
+
+
+def ensure_material(name: str, description: str) -> Flow[Material]:
+    """Create a material unless it is there, whoever else does so at the same time."""
+    try:
+        return (yield from create_material(name, description))
+    except ProblemError as problem:
+        if problem.type != MATERIAL_EXISTS:
+            raise
+    return (yield from material(name))
+
+
+def material(name: str) -> Flow[Material]:
+    """Ask for a material."""
+    return _record(Material.from_json, (yield from _get(f"/v1/materials/{_part(name)}")))
+
+
+def materials() -> Flow[list[Material]]:
+    """Ask for all materials."""
+    answer = yield from _get("/v1/materials")
+    return _record(lambda record: [Material.from_json(item) for item in record["items"]], answer)
+
+
+def model(name: str, method: str) -> Flow[FrictionModel]:
+    """Ask for a material's current model of one method."""
+    models = (yield from material(name)).models
+    if method not in models:
+        known = ", ".join(sorted(models)) or "none"
+        raise NoModel(f"material {name!r} has no fitted model of method {method!r}; fitted: {known}")
+    return models[method]
+
+
+def friction(
+    name: str, tangential_velocity: float, normal_force: float, quantile: float | None, method: str | None
+) -> Flow[FrictionAnswer]:
+    """Look friction up."""
+    params = _given(v=tangential_velocity, fn=normal_force, quantile=quantile, method=method)
+    answer = yield from _get(f"/v1/materials/{_part(name)}/friction", params)
+    return _record(FrictionAnswer.from_json, answer)
+
+
+def fit(name: str, method: str, seed: int) -> Flow[Job]:
+    """Ask for a fit; not repeated of itself, since each one makes a model version."""
+    request = Request("POST", f"/v1/materials/{_part(name)}/fits", False, json={"method": method, "seed": seed})
+    return _record(Job.from_json, (yield from _ask(request)))
+
+
+def job(job_id: str) -> Flow[Job]:
+    """Ask for a job."""
+    return _record(Job.from_json, (yield from _get(f"/v1/jobs/{_part(job_id)}")))
+
+
+def wait(job_id: str, timeout: float) -> Flow[Job]:
+    """Ask for a job until it has ended."""
+    deadline = time.monotonic() + timeout
+    pause = FIRST_POLL
+    while not (current := (yield from job(job_id))).ended:
+        left = deadline - time.monotonic()
+        if left <= 0.0:
+            raise JobTimedOut(job_id, f"still {current.status} after {timeout:g} s")
+        yield Pause(min(pause, left))
+        pause = min(pause * POLL_GROWTH, LONGEST_POLL)
+    return current
+
+
+def _get(path: str, params: Mapping[str, str | float] | None = None) -> Flow[Any]:
+    return (yield from _ask(Request("GET", path, True, params or {})))
+
+
+def _ask(request: Request) -> Flow[Any]:
+    """Send a request, again where that is harmless, and return the JSON of a good answer."""
+    attempts = ATTEMPTS if request.idempotent else 1
+    for attempt in range(attempts):
+        try:
+            response = yield request
+            break
+        except ConnectionFailed:
+            if attempt == attempts - 1:
+                raise
+        yield Pause(RETRY_PAUSE * 2**attempt)
+    assert response is not None  # what a driver sends for a request
+    return _content(response)
+
+
+def _content(response: httpx.Response) -> Any:
+    if not response.is_success:
+        _refuse(response)
+    try:
+        return response.json()
+    except (JSONDecodeError, UnicodeDecodeError) as error:
+        raise UnexpectedAnswer(f"{_summary(response)}, which is not JSON") from error
+
+
+def _refuse(response: httpx.Response) -> NoReturn:
+    try:
+        problem = response.json()
+        kind, detail = str(problem["type"]), str(problem.get("detail") or problem.get("title", ""))
+    except (JSONDecodeError, UnicodeDecodeError, KeyError, TypeError, AttributeError) as error:
+        raise UnexpectedAnswer(f"{_summary(response)}, which is no problem+json") from error
+    named = {name: None if problem.get(name) is None else str(problem[name]) for name in ("name", "value", "allowed")}
+    raise ProblemError(kind, response.status_code, detail, **named)
+
+
+def _record(read: Callable[[Any], T], record: Any) -> T:
+    try:
+        return read(record)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise UnexpectedAnswer(f"the service's answer lacks or garbles {error}") from error
+
+
+def _summary(response: httpx.Response) -> str:
+    return f"{response.request.url} answered {response.status_code} with {response.text[:80]!r}"
+
+
+def _body(log: GraspLogLike | Path | str) -> tuple[bytes, str]:
+    if not isinstance(log, str | Path):
+        return container.encode(log), container.CONTENT_TYPE
+    path = Path(log)
+    if path.is_dir():
+        return container.pack_folder(path), container.RECORDING_TYPE
+    return path.read_bytes(), "application/octet-stream"
+
+
+def _given(**params: str | float | None) -> dict[str, str | float]:
+    return {name: value for name, value in params.items() if value is not None}
+
+
+def _part(text: str) -> str:
+    """One segment of a path; a name of dots or nothing would lead to another route."""
+    if not text.strip("."):
+        raise InvalidArgument("name", repr(text), "a letter or digit, then letters, digits, space, '.', '_' or '-'")
+    return quote(text, safe="")

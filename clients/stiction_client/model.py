@@ -1,0 +1,136 @@
+"""The fitted friction model as the planner's side sees it; evaluated here, without the network."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+from stiction_client.errors import InvalidArgument
+
+FloatArray = NDArray[np.float64]
+
+VELOCITY_SLACK = 0.1
+"""Part of the observed range of velocities. A sample needs slip, so v = 0 is never observed: a gap below the slowest
+sample of less than this part of the range is no extrapolation worth a warning."""
+
+
+@dataclass(frozen=True, slots=True)
+class Domain:
+    """Range of the data behind a model: tangential velocity, m/s, and normal force of an element, N."""
+
+    tangential_velocity: tuple[float, float]
+    normal_force: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """What a fit cost: ``seconds``, and the Monte-Carlo error it left, in posterior standard deviations (0: exact)."""
+
+    seconds: float
+    monte_carlo_error: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrictionModel:
+    """Friction ``μ = β₀ + β₁ v + β₂ f_n + ε`` of one material as fitted, with its uncertainty.
+
+    ``coefficients`` [3]: β₀ [-], β₁ [s/m], β₂ [1/N]; ``covariance`` [3, 3] of them; ``scale``: standard deviation of
+    ε [-]; ``n`` samples of elements of ``element_area`` m²; ``degrees_of_freedom`` of the Student-t distribution that
+    the coefficients and a new μ follow; ``identifiable`` [3] bool.
+    """
+
+    material: str
+    method: str
+    version: int
+    coefficients: FloatArray
+    covariance: FloatArray
+    scale: float
+    n: int
+    degrees_of_freedom: float
+    domain: Domain
+    identifiable: NDArray[np.bool_]
+    element_area: float
+    cost: Cost
+    current: bool = True
+    diagnostics: Mapping[str, float | str | None] = field(default_factory=dict)
+    created_at: str = ""
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "FrictionModel":
+        """The model in the service's answer; a ``degrees_of_freedom`` of null means a normal distribution."""
+        domain, cost = record["domain"], record["cost"]
+        freedom = record["degrees_of_freedom"]
+        return cls(
+            material=record["material"],
+            method=record["method"],
+            version=record["version"],
+            coefficients=np.array(record["coefficients"], dtype=np.float64).reshape(3),
+            covariance=np.array(record["covariance"], dtype=np.float64).reshape(3, 3),
+            scale=float(record["scale"]),
+            n=int(record["n"]),
+            degrees_of_freedom=math.inf if freedom is None else float(freedom),
+            domain=Domain(_pair(domain["tangential_velocity"]), _pair(domain["normal_force"])),
+            identifiable=np.array(record["identifiable"], dtype=np.bool_).reshape(3),
+            element_area=float(record["element_area"]),
+            cost=Cost(float(cost["seconds"]), float(cost["monte_carlo_error"])),
+            current=bool(record["current"]),
+            diagnostics=dict(record["diagnostics"]),
+            created_at=record["created_at"],
+        )
+
+    @property
+    def standard_errors(self) -> FloatArray:
+        """Standard errors of the coefficients, [3]."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    def interval(self, level: float = 0.95) -> FloatArray:
+        """Central interval of each coefficient at ``level``: [3, 2]."""
+        check_probability("level", level)
+        half = special.stdtrit(self.degrees_of_freedom, 0.5 * (1.0 + level)) * self.standard_errors
+        return np.stack([self.coefficients - half, self.coefficients + half], axis=1)
+
+    def predict(
+        self, tangential_velocity: ArrayLike, normal_force: ArrayLike, quantile: float | None = None
+    ) -> FloatArray:
+        """Friction coefficient expected at v (m/s) and f_n (N an element), or a quantile of a new observation of it.
+
+        The quantile includes the scatter ε and the uncertainty of the coefficients (Student-t predictive
+        distribution). Shapes broadcast. Raises ``InvalidArgument`` for a quantile outside (0, 1).
+        """
+        v, f_n = np.broadcast_arrays(np.asarray(tangential_velocity, float), np.asarray(normal_force, float))
+        x = np.stack([np.ones_like(v), v, f_n], axis=-1)
+        mean = x @ self.coefficients
+        if quantile is None:
+            return mean
+        check_probability("quantile", quantile)
+        spread = np.sqrt(self.scale**2 + np.einsum("...i,ij,...j->...", x, self.covariance, x))
+        return np.asarray(mean + special.stdtrit(self.degrees_of_freedom, quantile) * spread)
+
+    def extrapolation(self, tangential_velocity: float, normal_force: float) -> str | None:
+        """Which of v (m/s) and f_n (N an element) lies outside the data behind the model; None where neither does."""
+        slow, fast = self.domain.tangential_velocity
+        weak, strong = self.domain.normal_force
+        slack = VELOCITY_SLACK * (fast - slow)
+        remarks = []
+        if not slow - slack <= tangential_velocity <= fast + slack:
+            remarks.append(f"velocity extrapolated: {tangential_velocity:.4g} m/s, observed {slow:.4g} to {fast:.4g}")
+        if not weak <= normal_force <= strong:
+            remarks.append(
+                f"normal force extrapolated: {normal_force:.4g} N an element, observed {weak:.4g} to {strong:.4g}"
+            )
+        return "; ".join(remarks) or None
+
+
+def check_probability(name: str, value: float) -> None:
+    """Refuse what is not a probability strictly between 0 and 1."""
+    if not 0.0 < value < 1.0:
+        raise InvalidArgument(name, value, "above 0 and below 1")
+
+
+def _pair(values: Any) -> tuple[float, float]:
+    low, high = values
+    return float(low), float(high)

@@ -1,0 +1,146 @@
+"""What the service answers, as small frozen records."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from stiction_client.errors import JobFailed, JobRefused
+from stiction_client.model import FrictionModel
+
+ENDED = frozenset({"done", "failed", "refused"})
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """A material and its current models, one a method."""
+
+    name: str
+    description: str
+    created_at: str
+    grasp_logs: int
+    models: Mapping[str, FrictionModel] = field(default_factory=dict)
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "Material":
+        """The material in the service's answer."""
+        models = {method: FrictionModel.from_json(model) for method, model in record["models"].items()}
+        return cls(record["name"], record["description"], record["created_at"], int(record["grasp_logs"]), models)
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """Work that the service does after it has answered.
+
+    ``status``: queued, running, done, refused (the data do not allow it; ``reason`` says why) or failed (the
+    service's own fault); ``seconds`` of each stage; ``grasp_log``, ``material`` and ``model_version`` it is about.
+    """
+
+    id: str
+    kind: str
+    status: str
+    stage: str | None
+    reason: str | None
+    seconds: dict[str, float]
+    grasp_log: str | None
+    material: str | None
+    model_version: int | None
+    created_at: str
+    finished_at: str | None
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "Job":
+        """The job in the service's answer."""
+        return cls(**_values(cls, record))
+
+    @property
+    def ended(self) -> bool:
+        """Whether the service has stopped working on it, with whatever result."""
+        return self.status in ENDED
+
+    def raise_for_status(self) -> "Job":
+        """Return the job; raises ``JobRefused`` or ``JobFailed`` where it ended so."""
+        if self.status == "refused":
+            raise JobRefused(self.id, self.reason or "refused")
+        if self.status == "failed":
+            raise JobFailed(self.id, self.reason or "failed")
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """What was seen in a grasp log: events of each kind, friction samples, frames, smallest stick ratio."""
+
+    method: str
+    noise: float | None
+    stick_ratio_min: float | None
+    contact_frames: int
+    macro_slip_frames: int
+    events: dict[str, int]
+    samples: int
+    seconds: float
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "Detection":
+        """The detection in the service's answer."""
+        return cls(**_values(cls, record))
+
+
+@dataclass(frozen=True, slots=True)
+class GraspLogReceipt:
+    """A grasp log as the service keeps it, with the job that works on it and, once there, the detection."""
+
+    id: str
+    sha256: str
+    bytes: int
+    format: str
+    material: str | None
+    sensor: str
+    frames: int
+    duration: float
+    grid: tuple[int, int]
+    created_at: str
+    job: Job
+    detection: Detection | None
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "GraspLogReceipt":
+        """The grasp log in the service's answer."""
+        values = _values(cls, record)
+        rows, columns = values["grid"]
+        detection = values["detection"]
+        return cls(
+            **values
+            | {
+                "grid": (rows, columns),
+                "job": Job.from_json(values["job"]),
+                "detection": None if detection is None else Detection.from_json(detection),
+            }
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionAnswer:
+    """Friction of a material at one velocity (m/s) and normal force of an element (N).
+
+    ``friction_coefficient`` is the quantile asked for, or the mean; ``warning`` says what was extrapolated.
+    """
+
+    material: str
+    method: str
+    version: int
+    tangential_velocity: float
+    normal_force: float
+    quantile: float | None
+    friction_coefficient: float
+    mean: float
+    within_domain: bool
+    warning: str | None
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "FrictionAnswer":
+        """The lookup in the service's answer."""
+        return cls(**_values(cls, record))
+
+
+def _values(kind: type[Any], record: Mapping[str, Any]) -> dict[str, Any]:
+    return {entry.name: record[entry.name] for entry in fields(kind)}  # what a newer service adds is passed over

@@ -1,0 +1,302 @@
+import inspect
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+
+import stiction_client
+from stiction_client import (
+    AsyncFrictionClient,
+    ConnectionFailed,
+    FrictionClient,
+    InvalidArgument,
+    JobFailed,
+    JobRefused,
+    JobTimedOut,
+    NoModel,
+    ProblemError,
+    UnexpectedAnswer,
+    container,
+)
+
+Ask = Callable[..., Any]
+Service = Callable[..., Any]
+
+
+def problem(status: int = 404, **fields: Any) -> httpx.Response:
+    body = {"type": "/problems/unknown-material", "title": "No such material", "status": status, "detail": "no 'x'"}
+    return httpx.Response(status, json=body | fields, headers={"Content-Type": "application/problem+json"})
+
+
+def public_methods(kind: type) -> dict[str, inspect.Signature]:
+    return {
+        name: inspect.signature(member)
+        for name, member in inspect.getmembers(kind, inspect.isfunction)
+        if not name.startswith("_")
+    }
+
+
+def test_both_clients_offer_the_same_calls() -> None:
+    assert public_methods(FrictionClient) == public_methods(AsyncFrictionClient)
+
+
+def test_everything_public_is_there() -> None:
+    for name in stiction_client.__all__:
+        assert hasattr(stiction_client, name)
+
+
+def test_a_material_comes_with_its_models(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
+    server = service(answers.material)
+    material = ask(server, "material", "paper 80.g")
+    assert str(server.requests[0].url) == "http://stiction/v1/materials/paper%2080.g"
+    assert (material.name, material.grasp_logs) == ("paper", 12)
+    assert material.models["ols"].version == 3
+
+
+def test_all_materials_are_listed(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
+    materials = ask(service({"items": [answers.material, answers.material]}), "materials")
+    assert [material.name for material in materials] == ["paper", "paper"]
+
+
+def test_a_model_is_read_as_the_service_gave_it(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
+    model = ask(service(answers.material), "model", "paper")
+    np.testing.assert_array_equal(model.coefficients, answers.model["coefficients"])
+    np.testing.assert_array_equal(model.covariance, answers.model["covariance"])
+    np.testing.assert_array_equal(model.identifiable, [True, True, False])
+    assert (model.scale, model.n, model.degrees_of_freedom, model.element_area) == (0.021, 5120, 11.0, 1e-6)
+    assert model.domain.normal_force == (0.002, 0.11)
+    assert model.cost.seconds == 0.012
+
+
+def test_no_degrees_of_freedom_means_a_normal_distribution(
+    ask: Ask, service: Service, answers: SimpleNamespace
+) -> None:
+    answers.material["models"]["ols"]["degrees_of_freedom"] = None
+    assert ask(service(answers.material), "model", "paper").degrees_of_freedom == np.inf
+
+
+def test_a_material_without_the_model_says_which_it_has(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
+    with pytest.raises(NoModel, match="'paper' has no fitted model of method 'bayes'; fitted: ols"):
+        ask(service(answers.material), "model", "paper", method="bayes")
+
+
+def test_friction_is_looked_up_with_what_was_given(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
+    server = service(answers.friction)
+    answer = ask(server, "friction", "paper", 0.0, 0.05, quantile=0.05)
+    assert dict(server.requests[0].url.params) == {"v": "0.0", "fn": "0.05", "quantile": "0.05"}
+    assert (answer.friction_coefficient, answer.mean, answer.within_domain) == (0.36, 0.39, True)
+    ask(server, "friction", "paper", 1e-3, 0.05, method="bayes")
+    assert dict(server.requests[1].url.params) == {"v": "0.001", "fn": "0.05", "method": "bayes"}
+
+
+def test_a_material_is_created(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
+    server = service(httpx.Response(201, json=answers.material))
+    assert ask(server, "create_material", "paper", description="80 g/m²").description == "80 g/m²"
+    assert server.requests[0].read() == '{"name":"paper","description":"80 g/m²"}'.encode()
+
+
+def test_ensuring_a_material_that_exists_returns_it(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
+    server = service(problem(409, type="/problems/material-exists"), answers.material)
+    assert ask(server, "ensure_material", "paper").grasp_logs == 12
+    assert [request.method for request in server.requests] == ["POST", "GET"]
+
+
+def test_ensuring_a_material_passes_other_refusals_on(ask: Ask, service: Service) -> None:
+    with pytest.raises(ProblemError, match="invalid-request"):
+        ask(service(problem(422, type="/problems/invalid-request")), "ensure_material", "/")
+
+
+def test_a_log_record_is_uploaded_as_its_container(
+    ask: Ask, service: Service, answers: SimpleNamespace, log: Any
+) -> None:
+    server = service(httpx.Response(202, json=answers.grasp_log))
+    receipt = ask(server, "upload", log, material="paper", detector="strain_rate")
+    request = server.requests[0]
+    assert request.headers["Content-Type"] == "application/vnd.stiction.grasp-log+npz"
+    assert dict(request.url.params) == {"material": "paper", "detector": "strain_rate"}
+    assert request.read() == container.encode(log)
+    assert (receipt.id, receipt.grid, receipt.job.id, receipt.detection.samples) == ("g1", (20, 20), "j1", 1932)
+
+
+def test_a_file_is_uploaded_as_it_is(ask: Ask, service: Service, answers: SimpleNamespace, tmp_path: Path) -> None:
+    path = tmp_path / "log.npz"
+    path.write_bytes(b"content")
+    answers.grasp_log["detection"] = None
+    server = service(answers.grasp_log)
+    assert ask(server, "upload", path).detection is None
+    assert server.requests[0].headers["Content-Type"] == "application/octet-stream"
+    assert server.requests[0].read() == b"content"
+    assert not server.requests[0].url.params
+
+
+def test_a_recording_folder_is_uploaded_zipped(
+    ask: Ask, service: Service, answers: SimpleNamespace, tmp_path: Path
+) -> None:
+    np.save(tmp_path / "index.npy", np.arange(3))
+    server = service(answers.grasp_log)
+    ask(server, "upload", str(tmp_path), sensor="left")
+    assert server.requests[0].headers["Content-Type"] == "application/vnd.tac3d+zip"
+    assert server.requests[0].read() == container.pack_folder(tmp_path)
+
+
+def test_a_folder_without_fields_is_refused_here(ask: Ask, service: Service, tmp_path: Path) -> None:
+    with pytest.raises(InvalidArgument, match=r"without \.npy files"):
+        ask(service({}), "upload", tmp_path)
+
+
+def test_a_grasp_log_is_asked_for(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
+    server = service(answers.grasp_log)
+    assert ask(server, "grasp_log", "g1").detection.events["onset"] == 181
+    assert server.requests[0].url.path == "/v1/grasp-logs/g1"
+
+
+def test_a_fit_is_asked_for(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
+    server = service(httpx.Response(202, json=answers.job | {"status": "queued"}))
+    job = ask(server, "fit", "paper", method="bayes", seed=7)
+    assert not job.ended
+    assert server.requests[0].read() == b'{"method":"bayes","seed":7}'
+
+
+@pytest.mark.usefixtures("quick")
+def test_waiting_asks_until_the_job_has_ended(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
+    running = answers.job | {"status": "running"}
+    server = service(answers.job | {"status": "queued"}, running, running, answers.job)
+    assert ask(server, "wait", "j1").status == "done"
+    assert [request.url.path for request in server.requests] == ["/v1/jobs/j1"] * 4
+
+
+@pytest.mark.parametrize("of", [stiction_client.Job, stiction_client.GraspLogReceipt])
+def test_one_waits_for_a_job_or_for_an_upload(
+    ask: Ask, service: Service, answers: SimpleNamespace, of: type[Any]
+) -> None:
+    record = answers.job if of is stiction_client.Job else answers.grasp_log
+    assert ask(service(answers.job), "wait", of.from_json(record)).status == "done"
+
+
+@pytest.mark.usefixtures("quick")
+def test_waiting_ends_with_its_timeout(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
+    with pytest.raises(JobTimedOut, match=r"job j1: still running after 0\.01 s") as caught:
+        ask(service(answers.job | {"status": "running"}), "wait", "j1", timeout=0.01)
+    assert caught.value.job_id == "j1"
+
+
+def test_polls_get_rarer_up_to_a_bound(answers: SimpleNamespace) -> None:
+    flow = stiction_client.flows.wait("j1", 1e6)
+    running = httpx.Response(200, json=answers.job | {"status": "running"})
+    steps = [stiction_client.flows.advance(flow, None)]
+    for _ in range(30):
+        steps.append(stiction_client.flows.advance(flow, running))
+        steps.append(stiction_client.flows.advance(flow, None))
+    pauses = [step.seconds for step in steps if isinstance(step, stiction_client.flows.Pause)]
+    assert pauses[0] == 0.05
+    assert pauses == sorted(pauses)
+    assert pauses[-1] == 2.0
+
+
+def test_the_end_of_a_job_is_an_answer_that_can_be_raised(answers: SimpleNamespace) -> None:
+    done = stiction_client.Job.from_json(answers.job)
+    assert done.raise_for_status() is done
+    with pytest.raises(JobRefused, match="job j1: no slip"):
+        stiction_client.Job.from_json(answers.job | {"status": "refused", "reason": "no slip"}).raise_for_status()
+    with pytest.raises(JobFailed, match="job j1: failed"):
+        stiction_client.Job.from_json(answers.job | {"status": "failed"}).raise_for_status()
+
+
+def test_the_key_is_sent_as_a_bearer_token(ask: Ask, service: Service) -> None:
+    server = service({"items": []})
+    ask(server, "materials", key="secret")
+    ask(server, "materials")
+    assert server.requests[0].headers["Authorization"] == "Bearer secret"
+    assert "Authorization" not in server.requests[1].headers
+
+
+def test_a_refusal_carries_all_that_the_service_said(ask: Ask, service: Service) -> None:
+    refusal = problem(
+        422, type="/problems/invalid-request", detail="quantile is 2", name="quantile", value="2", allowed="<1"
+    )
+    with pytest.raises(ProblemError) as caught:
+        ask(service(refusal), "friction", "paper", 0.0, 0.1, quantile=2.0)
+    error = caught.value
+    assert (error.type, error.status, error.detail) == ("/problems/invalid-request", 422, "quantile is 2")
+    assert (error.name, error.value, error.allowed) == ("quantile", "2", "<1")
+    assert str(error) == "quantile is 2 (422, /problems/invalid-request)"
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        httpx.Response(502, html="<h1>Bad gateway</h1>"),
+        httpx.Response(404, json={"detail": "Not Found"}),
+        httpx.Response(500, json=["no"]),
+        httpx.Response(200, text="hello"),
+        httpx.Response(200, content=b"\xff\xfe\x00"),
+        httpx.Response(301, headers={"Location": "http://elsewhere/"}),
+        {"name": "paper"},
+        {"items": [{"name": "paper"}]},
+        [],
+    ],
+)
+def test_an_answer_that_is_not_the_services_is_said_to_be_so(ask: Ask, service: Service, answer: Any) -> None:
+    with pytest.raises(UnexpectedAnswer):
+        ask(service(answer), "materials")
+
+
+@pytest.mark.usefixtures("quick")
+def test_harmless_requests_are_tried_again_when_the_connection_breaks(
+    ask: Ask, service: Service, answers: SimpleNamespace, log: Any
+) -> None:
+    broken = httpx.ReadError("reset")
+    server = service(broken, broken, answers.material)
+    assert ask(server, "material", "paper").name == "paper"
+    server = service(httpx.ConnectTimeout("slow"), answers.grasp_log)
+    assert ask(server, "upload", log).id == "g1"
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_connection_that_stays_broken_is_an_error(ask: Ask, service: Service) -> None:
+    server = service(httpx.ConnectError("refused"))
+    with pytest.raises(ConnectionFailed, match="GET /v1/materials: ConnectError: refused") as caught:
+        ask(server, "materials")
+    assert len(server.requests) == 3
+    assert isinstance(caught.value.__cause__, httpx.ConnectError)
+
+
+@pytest.mark.parametrize(("method", "argument"), [("create_material", "paper"), ("fit", "paper")])
+def test_what_would_happen_twice_is_sent_once(ask: Ask, service: Service, method: str, argument: str) -> None:
+    server = service(httpx.ReadTimeout("slow"))
+    with pytest.raises(ConnectionFailed):
+        ask(server, method, argument)
+    assert len(server.requests) == 1
+
+
+@pytest.mark.usefixtures("quick")
+def test_refusals_are_not_tried_again(ask: Ask, service: Service) -> None:
+    server = service(problem(503, type="/problems/storage-unavailable"))
+    with pytest.raises(ProblemError):
+        ask(server, "materials")
+    assert len(server.requests) == 1
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", "..."])
+def test_a_name_that_leads_to_another_route_is_refused_here(ask: Ask, service: Service, name: str) -> None:
+    server = service({})
+    with pytest.raises(InvalidArgument, match="name is"):
+        ask(server, "material", name)
+    assert not server.requests
+
+
+@pytest.mark.parametrize("name", ["a/b", "a?b", "a#b", "ä", "a%2fb"])
+def test_a_name_stays_one_segment_of_the_path(ask: Ask, service: Service, answers: SimpleNamespace, name: str) -> None:
+    server = service(answers.material)
+    ask(server, "material", name)
+    assert server.requests[0].url.raw_path.count(b"/") == 3
+    assert server.requests[0].url.path == f"/v1/materials/{name}"
+    assert not server.requests[0].url.query
+
+
+def test_what_a_newer_service_adds_is_passed_over(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
+    assert ask(service(answers.job | {"priority": 3}), "job", "j1").id == "j1"
