@@ -3,6 +3,7 @@
 from estimators.errors import EstimatorError, InvalidSamples, NotConverged, TooFewSamples
 from estimators.fitting import fit
 from estimators.friction_model import Cost, Domain, FrictionModel
+from estimators.moments import Moments
 
 __all__ = [
     "Cost",
@@ -10,6 +11,7 @@ __all__ = [
     "EstimatorError",
     "FrictionModel",
     "InvalidSamples",
+    "Moments",
     "NotConverged",
     "TooFewSamples",
     "fit",

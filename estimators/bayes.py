@@ -8,19 +8,19 @@ from numpy.typing import NDArray
 from estimators import ols
 from estimators.defaults import PRIOR, REFERENCE, SAMPLING
 from estimators.errors import NotConverged
+from estimators.evidence import Evidence
 from estimators.friction_model import Cost, FrictionModel
 from estimators.identifiability import effects, identifiable
-from estimators.least_squares import factorise, solve
+from estimators.least_squares import solve
 from estimators.likelihoods.gaussian import gaussian
 from estimators.likelihoods.posterior import Posterior
-from estimators.observations import Observations
 from estimators.sampling import Chain, sample
 
 FloatArray = NDArray[np.float64]
 
 
 def fit(
-    observations: Observations, accuracy: float | None = None, seconds: float | None = None, seed: int = 0
+    evidence: Evidence, accuracy: float | None = None, seconds: float | None = None, seed: int = 0
 ) -> FrictionModel:
     """Posterior of (β, σ) by emcee, whitened by the exact posterior and started from it.
 
@@ -29,23 +29,22 @@ def fit(
     ``diagnostics["stopped"]`` and in ``cost.monte_carlo_error``.
     """
     begin = time.perf_counter()
-    factor = factorise(observations.columns(), observations.weight)
-    posterior = gaussian(factor, observations.effective_n, ols.domain(observations), observations.element_area)
+    posterior = gaussian(evidence.factor, evidence.domain, evidence.element_area)
     chain = sample(posterior.log_probability, len(posterior.names), accuracy, seconds, seed)
     summary = posterior.summarise(chain.flat())
-    linear = solve(factor, REFERENCE.spans(observations.element_area))
-    effect = effects(summary.covariance, summary.degrees_of_freedom, observations)
-    diagnostics = ols.describe(observations, linear) | ols.by_coefficient("effect", effect)
+    linear = solve(evidence.factor, REFERENCE.spans(evidence.element_area))
+    effect = effects(summary.covariance, summary.degrees_of_freedom, evidence)
+    diagnostics = ols.describe(evidence, linear) | ols.by_coefficient("effect", effect)
     model = FrictionModel(
         method="bayes",
         coefficients=summary.coefficients,
         covariance=summary.covariance,
         scale=summary.scale,
-        n=len(observations),
+        n=evidence.n,
         degrees_of_freedom=summary.degrees_of_freedom,
-        domain=ols.domain(observations),
+        domain=evidence.domain,
         identifiable=identifiable(effect),
-        element_area=observations.element_area,
+        element_area=evidence.element_area,
         cost=Cost(time.perf_counter() - begin, chain.monte_carlo_error),
         diagnostics=diagnostics | _convergence(chain, posterior) | _priors(),
         draws=_thinned(chain, posterior),

@@ -5,23 +5,26 @@ from typing import TYPE_CHECKING
 
 from estimators import ols
 from estimators.errors import InvalidSamples
+from estimators.evidence import gather
 from estimators.friction_model import FrictionModel
-from estimators.observations import observe
 
 if TYPE_CHECKING:
+    from estimators.moments import Moments
     from slipcore.samples import FrictionSamples
 
 METHODS = ("ols", "bayes")
 
 
 def fit(
-    samples: "FrictionSamples | Sequence[FrictionSamples]",
+    samples: "FrictionSamples | Moments | Sequence[FrictionSamples] | Sequence[Moments]",
     method: str = "ols",
     accuracy: float | None = None,
     seconds: float | None = None,
     seed: int = 0,
 ) -> FrictionModel:
     """Fit ``μ = β₀ + β₁ v + β₂ f_n + ε`` to the samples of one grasp, or of several given as a sequence.
+
+    Moments may stand for the samples where the method needs no more.
 
     ``method``: "ols" (weighted least squares, cluster-robust) or "bayes" (emcee). A sampled method stops once the
     Monte-Carlo error of its means and 5/95 % quantiles is under ``accuracy`` posterior standard deviations, or after
@@ -35,9 +38,9 @@ def fit(
     for name, value in (("accuracy", accuracy), ("seconds", seconds)):
         if value is not None and not value > 0.0:
             raise InvalidSamples(name, value, "above 0")
-    observations = observe(samples)
+    evidence = gather(samples)
     if method == "ols":
-        return ols.fit(observations)
+        return ols.fit(evidence)
     from estimators import bayes  # emcee takes a second
 
-    return bayes.fit(observations, accuracy=accuracy, seconds=seconds, seed=seed)
+    return bayes.fit(evidence, accuracy=accuracy, seconds=seconds, seed=seed)

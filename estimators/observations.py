@@ -64,13 +64,11 @@ def observe(samples: "FrictionSamples | Sequence[FrictionSamples]") -> Observati
     all zero and elements of different size; ``TooFewSamples`` where fewer than four effective samples are left.
     """
     parts = _parts(samples)
-    area = _element_area(parts)
+    area = check_element_areas([part.element_area for part in parts])
     count = sum(map(len, parts))
     if count == 0:
         raise TooFewSamples("samples", "none (no slip was seen)", f"at least {MIN_SAMPLES}")
-    values = {name: np.concatenate([getattr(part, name) for part in parts]).astype(float) for name in _LOWEST}
-    for name, lowest in _LOWEST.items():
-        _check_column(name, values[name], lowest)
+    values = check_columns(parts)
     weight = _relative_weight(values.pop("weight"))
     used = weight > 0.0
     _check_count(weight, int(used.sum()))
@@ -102,18 +100,27 @@ def _parts(samples: "FrictionSamples | Sequence[FrictionSamples]") -> "list[Fric
     return [part for part in parts if len(part)] or parts[:1]
 
 
-def _element_area(parts: "list[FrictionSamples]") -> float:
-    areas = np.array([part.element_area for part in parts], dtype=float)
-    if not (np.isfinite(areas).all() and (areas > 0.0).all()):
-        raise InvalidSamples("element_area", areas.tolist(), "above 0 m²")
-    if np.ptp(areas) > 1e-6 * areas[0]:  # sensors of one kind differ by the rounding of their files only
-        raise InvalidSamples(
-            "element_area", sorted(set(areas.tolist())), "one area for all samples (f_n scales with it)"
-        )
-    return float(areas[0])
+def check_columns(parts: "Sequence[FrictionSamples]") -> dict[str, FloatArray]:
+    """The numeric columns of all parts joined, refused where not finite or below what they can be."""
+    values = {name: np.concatenate([getattr(part, name) for part in parts]).astype(float) for name in _LOWEST}
+    for name, lowest in _LOWEST.items():
+        _check_column(name, values[name], lowest)
+    return values
+
+
+def check_element_areas(areas: Sequence[float]) -> float:
+    """The one area of all elements, m²; sensors of one kind differ by the rounding of their files only."""
+    values = np.array(areas, dtype=float)
+    if not (np.isfinite(values).all() and (values > 0.0).all()):
+        raise InvalidSamples("element_area", values.tolist(), "above 0 m²")
+    if np.ptp(values) > 1e-6 * values[0]:
+        raise InvalidSamples("element_area", sorted(set(values.tolist())), "one area for all (f_n scales with it)")
+    return float(values[0])
 
 
 def _check_column(name: str, values: FloatArray, lowest: float) -> None:
+    if len(values) == 0:
+        return
     bad = ~np.isfinite(values)
     if bad.any():
         raise InvalidSamples(name, f"{values[bad][0]} at sample {int(np.argmax(bad))}", "finite numbers")

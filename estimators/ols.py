@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 
 from estimators.cluster_errors import cluster_sums, jackknife
 from estimators.defaults import REFERENCE
-from estimators.friction_model import Cost, Domain, FrictionModel
+from estimators.evidence import Evidence
+from estimators.friction_model import Cost, FrictionModel
 from estimators.identifiability import effects, identifiable
-from estimators.least_squares import LinearFit, factorise, solve
+from estimators.least_squares import LinearFit, solve
 from estimators.observations import IntArray, Observations
 
 FloatArray = NDArray[np.float64]
@@ -18,49 +19,40 @@ STATSMODELS_LIMIT = 20_000
 """Samples up to which statsmodels adds its classical, HC3 and CR1 errors for comparison; it takes seconds beyond."""
 
 
-def fit(observations: Observations) -> FrictionModel:
+def fit(evidence: Evidence) -> FrictionModel:
     """Least squares of μ on (1, v, f_n), weighted; the covariance is the cluster jackknife with t on G − 1 degrees.
 
-    Clusters are grasps where there are two or more, else elements, else stretches of time. The noise of μ = f_t/f_n
-    grows as 1/f_n: the jackknife is valid under it, the classical errors in the diagnostics are not.
+    Clusters are grasps where there are two or more, else elements, else stretches of time; the moments of a single
+    grasp know of none, and errors are then taken to be independent. The noise of μ = f_t/f_n grows as 1/f_n: the
+    jackknife is valid under it, the classical errors in the diagnostics are not.
     """
     begin = time.perf_counter()
-    factor = factorise(observations.columns(), observations.weight)
-    linear = solve(factor, REFERENCE.spans(observations.element_area))
-    degrees = observations.effective_n - 1.0 - linear.rank
+    linear = solve(evidence.factor, REFERENCE.spans(evidence.element_area))
+    degrees = evidence.effective_n - 1.0 - linear.rank
     scale = float(linear.residual_norm / np.sqrt(degrees))
-    design, residual = _orthonormal(observations, linear)
-    shared = jackknife(*cluster_sums(design, residual, observations.cluster), scale)
-    covariance = in_coefficients(linear, shared)
-    degrees = min(degrees, float(observations.clusters - 1))
-    effect = effects(covariance, degrees, observations)
-    diagnostics = describe(observations, linear) | {
-        "r_squared": r_squared(factor.triangle, linear.residual_norm),
+    covariance, errors = _honest_covariance(evidence, linear, scale)
+    if evidence.clusters > 1:
+        degrees = min(degrees, float(evidence.clusters - 1))
+    effect = effects(covariance, degrees, evidence)
+    diagnostics = describe(evidence, linear) | {
+        "r_squared": r_squared(evidence.factor.triangle, linear.residual_norm),
         **by_coefficient("effect", effect),
-        **by_coefficient("standard_error_cluster", np.sqrt(np.diag(covariance))),
         **by_coefficient("standard_error_classical", np.sqrt(np.diag(classical(linear, scale)))),
+        **errors,
     }
-    if len(observations) <= STATSMODELS_LIMIT:
-        diagnostics |= _statsmodels_errors(design, residual, observations.cluster, linear)
     return FrictionModel(
         method="ols",
         coefficients=linear.coefficients.astype(float),
         covariance=covariance,
         scale=scale,
-        n=len(observations),
+        n=evidence.n,
         degrees_of_freedom=degrees,
-        domain=domain(observations),
+        domain=evidence.domain,
         identifiable=identifiable(effect),
-        element_area=observations.element_area,
+        element_area=evidence.element_area,
         cost=Cost(time.perf_counter() - begin),
         diagnostics=diagnostics,
     )
-
-
-def domain(observations: Observations) -> Domain:
-    """Range of v and f_n in the samples."""
-    v, f_n = observations.tangential_velocity, observations.normal_force
-    return Domain((float(v.min()), float(v.max())), (float(f_n.min()), float(f_n.max())))
 
 
 def in_coefficients(linear: LinearFit, covariance: FloatArray) -> FloatArray:
@@ -80,12 +72,12 @@ def r_squared(triangle: NDArray[np.floating], residual_norm: float) -> float:
     return 1.0 - (residual_norm / total) ** 2 if total > 0.0 else 0.0
 
 
-def describe(observations: Observations, linear: LinearFit) -> dict[str, float | str]:
+def describe(evidence: Evidence, linear: LinearFit) -> dict[str, float | str]:
     """What every method says of its data."""
     return {
-        "effective_n": observations.effective_n,
-        "clusters": float(observations.clusters),
-        "cluster_kind": observations.cluster_kind,
+        "effective_n": evidence.effective_n,
+        "clusters": float(evidence.clusters),
+        "cluster_kind": evidence.cluster_kind,
         "condition_number": linear.condition,
         "rank": float(linear.rank + 1),
         "variance_inflation_tangential_velocity": float(linear.inflation[0]),
@@ -98,7 +90,26 @@ def by_coefficient(name: str, values: FloatArray) -> dict[str, float | str]:
     return {f"{name}_beta{k}": float(value) for k, value in enumerate(values)}
 
 
-def _orthonormal(observations: Observations, linear: LinearFit) -> tuple[FloatArray, FloatArray]:
+def _honest_covariance(
+    evidence: Evidence, linear: LinearFit, scale: float
+) -> tuple[FloatArray, dict[str, float | str]]:
+    """Covariance [3, 3] by the cluster jackknife where there are clusters, and what statsmodels says beside it."""
+    observations = evidence.observations
+    if evidence.clusters < 2:
+        return classical(linear, scale), {}
+    if observations is None:
+        design, residual, cluster = _of_blocks(evidence, linear)
+    else:
+        design, residual = _of_samples(observations, linear)
+        cluster = observations.cluster
+    covariance = in_coefficients(linear, jackknife(*cluster_sums(design, residual, cluster), scale))
+    errors = by_coefficient("standard_error_cluster", np.sqrt(np.diag(covariance)))
+    if observations is not None and len(observations) <= STATSMODELS_LIMIT:
+        errors |= _statsmodels_errors(design, residual, cluster, linear)
+    return covariance, errors
+
+
+def _of_samples(observations: Observations, linear: LinearFit) -> tuple[FloatArray, FloatArray]:
     """Orthonormal design Q [n, r] and residuals [n], both times √w."""
     root = np.sqrt(observations.weight)
     mean, basis = linear.mean.astype(float), linear.basis.astype(float)
@@ -111,11 +122,21 @@ def _orthonormal(observations: Observations, linear: LinearFit) -> tuple[FloatAr
     return design, root * (observations.friction - at_mean - slopes @ regressors)
 
 
+def _of_blocks(evidence: Evidence, linear: LinearFit) -> tuple[FloatArray, FloatArray, IntArray]:
+    """The same from moments: four rows a grasp that have the sums of squares and products of all its samples."""
+    rows = evidence.centred_rows()
+    basis = linear.basis.astype(float)
+    design = np.concatenate([rows[..., :1] / np.sqrt(evidence.effective_n), rows[..., 1:3] @ basis], axis=-1)
+    residual = rows[..., 3] - rows[..., 1:3] @ linear.coefficients[1:].astype(float)
+    cluster = np.repeat(np.arange(len(rows)), rows.shape[1])
+    return design.reshape(len(cluster), -1), residual.reshape(-1), cluster
+
+
 def _statsmodels_errors(
     design: FloatArray, residual: FloatArray, cluster: IntArray, linear: LinearFit
 ) -> dict[str, float | str]:
     """HC3 and CR1 errors by statsmodels, on the orthonormal design, where nothing can fail silently."""
-    from statsmodels.regression.linear_model import OLS  # takes more than a second
+    from statsmodels.regression.linear_model import OLS  # takes more than a second to load
 
     results = OLS(residual, design).fit()
     clustered = results.get_robustcov_results("cluster", groups=cluster)

@@ -60,11 +60,11 @@ class Gaussian:
         return Summary(self.exact.mean + root @ z.mean(axis=0), covariance, scale, self.exact.degrees_of_freedom)
 
 
-def gaussian(factor: Factor, effective_n: float, domain: Domain, element_area: float) -> Gaussian:
-    """Posterior from a factor of (v, f_n, μ) whose weight counts samples."""
+def gaussian(factor: Factor, domain: Domain, element_area: float) -> Gaussian:
+    """Posterior from a factor of (v, f_n, μ) whose weight is the effective number of samples."""
     triangle, prior = whole_triangle(factor), prior_rows(element_area)
     rows = np.concatenate([prior, triangle.astype(float)])
-    return Gaussian(posterior(triangle, effective_n, prior), rows, effective_n, corners(domain))
+    return Gaussian(posterior(triangle, factor.weight, prior), rows, factor.weight, corners(domain))
 
 
 def corners(domain: Domain) -> FloatArray:
