@@ -14,14 +14,15 @@ from stiction_client.model import FloatArray, FrictionModel
 SLIP_PROBABILITY = 1e-3
 """Default bound: one slip in a thousand grasps that bear the full load."""
 
-LARGEST_SLIP_PROBABILITY = 0.5
-"""Above it the quantile would be more optimistic than the mean, and the capacity no longer have a single peak."""
+SLIP_PROBABILITIES = (1e-12, 0.5)
+"""What may be asked for. Below, no data tell, and the quantile of Student's t is no longer computed reliably; above,
+the quantile would be more optimistic than the mean, and the capacity no longer have a single peak."""
 
 LARGEST_FORCE = 1e12
 """N an element; a capacity that still grows there has no maximum."""
 
-_SMALLEST_BRACKET = 1e-12
-"""N an element; where the search for a bracket starts."""
+_SMALLEST_BRACKET, _SMALLEST_FORCE = 1e-12, 1e-30
+"""N an element; where the search for a bracket starts, and below what a force counts as 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +109,8 @@ class _Capacity:
 
     @classmethod
     def of(cls, model: FrictionModel, tangential_velocity: float, slip_probability: float) -> "_Capacity":
-        t = min(float(special.stdtrit(model.degrees_of_freedom, slip_probability)), 0.0)
-        if not (np.isfinite(model.coefficients).all() and np.isfinite(model.covariance).all() and math.isfinite(t)):
+        t = float(special.stdtrit(model.degrees_of_freedom, slip_probability))
+        if not np.isfinite([*model.coefficients, *model.covariance.flat, model.scale, t]).all():
             raise InvalidArgument("model", "not finite at this slip probability", "finite coefficients and quantile")
         variance, axes = np.linalg.eigh(model.covariance)
         factor = axes * np.sqrt(np.maximum(variance, 0.0))
@@ -117,7 +118,7 @@ class _Capacity:
         return cls(
             a=float(constant @ model.coefficients),
             c=float(slope @ model.coefficients),
-            t=t,
+            t=min(t, 0.0),  # at ½ it is 0 but for rounding
             scale=model.scale,
             p=constant @ factor,
             r=slope @ factor,
@@ -176,7 +177,7 @@ def _last_positive(function: Callable[[float], float], start: float, limit: floa
         if above >= end:
             return end
         below, above = above, min(4.0 * above, end)
-    return float(brentq(function, below, above, xtol=5e-324, rtol=4.0 * np.finfo(float).eps, maxiter=1000))
+    return float(brentq(function, below, above, xtol=_SMALLEST_FORCE, rtol=4.0 * np.finfo(float).eps, maxiter=1000))
 
 
 def _check_arguments(
@@ -188,8 +189,9 @@ def _check_arguments(
 ) -> None:
     if not 0.0 <= tangential_load < math.inf:
         raise InvalidArgument("tangential_load", tangential_load, "a magnitude in N, at least 0 and finite")
-    if not 0.0 < slip_probability <= LARGEST_SLIP_PROBABILITY:
-        raise InvalidArgument("slip_probability", slip_probability, f"above 0, at most {LARGEST_SLIP_PROBABILITY:g}")
+    rarest, most_frequent = SLIP_PROBABILITIES
+    if not rarest <= slip_probability <= most_frequent:
+        raise InvalidArgument("slip_probability", slip_probability, f"{rarest:g} to {most_frequent:g}")
     if not 0.0 < contact_area < math.inf:
         raise InvalidArgument("contact_area", contact_area, "m², above 0 and finite")
     if not 0.0 <= tangential_velocity < math.inf:

@@ -1,0 +1,113 @@
+import re
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from stiction_client import (
+    FrictionModel,
+    InvalidArgument,
+    conservative_friction,
+    drake_friction,
+    friction_cone,
+    mujoco_friction,
+    mujoco_geom,
+)
+
+Make = Callable[..., FrictionModel]
+
+
+def test_every_export_stands_on_the_conservative_quantile(make_model: Make) -> None:
+    model = make_model()
+    expected = float(model.predict(0.0, 0.1, 0.05))
+    assert expected < float(model.predict(0.0, 0.1))
+    assert conservative_friction(model, 0.1) == expected
+    assert mujoco_friction(model, 0.1)[0] == expected
+    assert drake_friction(model, 0.1).static_friction == expected
+    assert np.hypot(*friction_cone(model, 0.1)[0, :2]) == pytest.approx(expected, rel=1e-15)
+
+
+def test_a_smaller_quantile_promises_less(make_model: Make) -> None:
+    assert conservative_friction(make_model(), 0.1, 1e-3) < conservative_friction(make_model(), 0.1, 0.05)
+
+
+@pytest.mark.parametrize("quantile", [0.0, 0.51, 1.0, np.nan])
+@pytest.mark.parametrize("export", [conservative_friction, mujoco_friction, mujoco_geom, drake_friction, friction_cone])
+def test_a_quantile_that_is_not_conservative_is_refused(
+    make_model: Make, export: Callable[..., Any], quantile: float
+) -> None:
+    with pytest.raises(InvalidArgument, match=r"quantile is .*; allowed: above 0, at most 0\.5"):
+        export(make_model(), 0.1, quantile)
+
+
+@pytest.mark.parametrize("export", [conservative_friction, mujoco_friction, mujoco_geom, drake_friction, friction_cone])
+def test_a_model_too_uncertain_to_promise_friction_is_not_exported(
+    make_model: Make, export: Callable[..., Any]
+) -> None:
+    with pytest.raises(InvalidArgument, match=r"friction coefficient at quantile 0\.05 is -.*; allowed: above 0"):
+        export(make_model(scale=1.0), 0.1)
+
+
+def test_torsional_friction_is_that_of_a_hertzian_contact(make_model: Make) -> None:
+    """Integrate μ p r over p ∝ √(1 − (r/a)²): the moment over μ F_N a."""
+    r = (np.arange(200_000) + 0.5) / 200_000
+    pressure = np.sqrt(1.0 - r**2)
+    moment = (pressure * r * r).sum() / (pressure * r).sum()
+    sliding, torsional, rolling = mujoco_friction(make_model(), 0.1, contact_radius=4e-3)
+    assert torsional == pytest.approx(moment * sliding * 4e-3, rel=1e-6)  # midpoint rule with an edge of √
+    assert rolling == 0.0
+    assert mujoco_friction(make_model(), 0.1)[1] == 0.0
+
+
+def test_the_mujoco_geom_is_xml_that_wins_over_the_object(make_model: Make) -> None:
+    point = ElementTree.fromstring(f"<geom {mujoco_geom(make_model(), 0.1)}/>").attrib
+    assert [float(value) for value in point["friction"].split()] == pytest.approx(
+        mujoco_friction(make_model(), 0.1), rel=1e-8
+    )
+    assert (point["condim"], point["priority"]) == ("3", "1")
+    assert 'condim="4"' in mujoco_geom(make_model(), 0.1, contact_radius=4e-3)
+
+
+@pytest.mark.parametrize("radius", [-1e-3, np.nan, np.inf])
+def test_a_contact_radius_that_cannot_be_is_refused(make_model: Make, radius: float) -> None:
+    with pytest.raises(InvalidArgument, match="contact_radius"):
+        mujoco_friction(make_model(), 0.1, contact_radius=radius)
+
+
+def test_drake_gets_friction_at_rest_and_while_sliding(make_model: Make) -> None:
+    model = make_model()
+    friction = drake_friction(model, 0.1, sliding_velocity=0.003)
+    assert friction.dynamic_friction == float(model.predict(0.003, 0.1, 0.05)) < friction.static_friction
+    assert drake_friction(model, 0.1).dynamic_friction == float(model.predict(0.004, 0.1, 0.05))
+
+
+def test_drake_never_gets_more_dynamic_than_static_friction(make_model: Make) -> None:
+    friction = drake_friction(make_model((0.4, 20.0, 0.0)), 0.1)
+    assert friction.dynamic_friction == friction.static_friction
+
+
+def test_the_drake_element_is_xml_with_both_values(make_model: Make) -> None:
+    friction = drake_friction(make_model(), 0.1)
+    text = re.sub("drake:", "", friction.to_sdf())
+    element = ElementTree.fromstring(text)
+    assert float(element.findtext("mu_static") or "") == pytest.approx(friction.static_friction, rel=1e-8)
+    assert float(element.findtext("mu_dynamic") or "") == pytest.approx(friction.dynamic_friction, rel=1e-8)
+
+
+@pytest.mark.parametrize("edges", [3, 4, 8, 64])
+def test_the_linearised_cone_lies_inside_the_true_one_and_fills_it(make_model: Make, edges: int) -> None:
+    friction = conservative_friction(make_model(), 0.1)
+    cone = friction_cone(make_model(), 0.1, edges=edges)
+    assert cone.shape == (edges, 3)
+    forces = np.random.default_rng(4).exponential(size=(20_000, edges)) @ cone
+    ratio = np.linalg.norm(forces[:, :2], axis=1) / forces[:, 2]
+    assert (ratio <= friction * (1.0 + 1e-14)).all()
+    middle = np.linalg.norm((cone + np.roll(cone, 1, axis=0))[:, :2], axis=1) / 2.0
+    np.testing.assert_allclose(middle, friction * np.cos(np.pi / edges), rtol=1e-13, atol=0)  # the documented loss
+
+
+def test_a_cone_needs_three_edges(make_model: Make) -> None:
+    with pytest.raises(InvalidArgument, match="edges is 2; allowed: at least 3"):
+        friction_cone(make_model(), 0.1, edges=2)

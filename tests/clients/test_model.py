@@ -1,0 +1,54 @@
+from collections.abc import Callable
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+import estimators
+from stiction_client import FrictionModel, InvalidArgument
+
+Make = Callable[..., FrictionModel]
+
+
+def on_the_service(model: FrictionModel) -> estimators.FrictionModel:
+    shared = {field.name for field in fields(estimators.FrictionModel)} & {
+        field.name for field in fields(FrictionModel)
+    }
+    return estimators.FrictionModel(**{name: getattr(model, name) for name in shared})
+
+
+@pytest.mark.parametrize("degrees_of_freedom", [1.0, 2.5, 11.0, 1e6, np.inf])
+@pytest.mark.parametrize("quantile", [None, 1e-9, 1e-3, 0.05, 0.5, 0.95])
+def test_client_and_estimators_predict_the_same(
+    make_model: Make, degrees_of_freedom: float, quantile: float | None
+) -> None:
+    model = make_model(degrees_of_freedom=degrees_of_freedom)
+    v, f_n = np.linspace(0.0, 0.01, 7)[:, None], np.linspace(0.0, 1.0, 5)
+    expected = on_the_service(model).predict(v, f_n, quantile)
+    np.testing.assert_allclose(model.predict(v, f_n, quantile), expected, rtol=1e-12, atol=0)
+    assert expected.shape == (7, 5)
+
+
+@pytest.mark.parametrize("level", [0.5, 0.95, 0.999])
+def test_client_and_estimators_give_the_same_intervals(make_model: Make, level: float) -> None:
+    model = make_model()
+    np.testing.assert_allclose(model.interval(level), on_the_service(model).interval(level), rtol=1e-12, atol=0)
+    np.testing.assert_allclose(model.standard_errors, np.sqrt([2e-5, 1e-2, 4e-3]), rtol=1e-15, atol=0)
+
+
+@pytest.mark.parametrize("quantile", [0.0, 1.0, -0.1, 2.0, np.nan])
+def test_a_quantile_outside_its_range_is_refused(make_model: Make, quantile: float) -> None:
+    with pytest.raises(InvalidArgument, match=r"quantile is .*; allowed: above 0 and below 1"):
+        make_model().predict(0.0, 0.1, quantile)
+    with pytest.raises(InvalidArgument, match="level is"):
+        make_model().interval(quantile)
+
+
+def test_leaving_the_data_is_named(make_model: Make) -> None:
+    model = make_model()
+    assert model.extrapolation(1e-3, 0.1) is None
+    assert model.extrapolation(0.0, 0.1) is None  # below the slowest sample, but by less than a tenth of the range
+    assert model.extrapolation(0.005, 0.1) == "velocity extrapolated: 0.005 m/s, observed 1e-05 to 0.004"
+    both = model.extrapolation(0.005, 0.5)
+    assert both is not None
+    assert both.endswith("; normal force extrapolated: 0.5 N an element, observed 0.002 to 0.3")

@@ -1,0 +1,283 @@
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import strategies as st
+
+from stiction_client import FrictionModel, InvalidArgument, NoFeasibleForce, required_normal_force
+
+Make = Callable[..., FrictionModel]
+
+AREA = 6e-5
+ELEMENTS = 60.0
+"""AREA over the models' element area."""
+
+ZERO = np.zeros((3, 3))
+
+
+def capacity(model: FrictionModel, force: Any, probability: float, velocity: float = 0.0) -> Any:
+    """Load that a contact of AREA holds under ``force`` N, straight from the model's own quantile."""
+    elements = AREA / model.element_area
+    force = np.asarray(force, float)
+    return force * model.predict(velocity, force / elements, probability)
+
+
+@st.composite
+def models(draw: st.DrawFn) -> FrictionModel:
+    """Models of any slope and correlation, on which the capacity may rise, peak, or never get above zero."""
+    make = draw(st.just(_make))
+    factor = np.array(draw(st.lists(st.floats(-1.0, 1.0), min_size=9, max_size=9))).reshape(3, 3)
+    factor *= np.array([0.1, 1.0, 0.5])[:, None] * draw(st.sampled_from([0.0, 1e-3, 0.1, 1.0]))
+    return make(
+        coefficients=(
+            draw(st.floats(-0.1, 1.5)),
+            draw(st.floats(-5.0, 5.0)),
+            draw(st.one_of(st.just(0.0), st.floats(-2.0, 0.5))),
+        ),
+        covariance=factor @ factor.T,
+        scale=draw(st.sampled_from([0.0, 1e-3, 0.02, 0.2])),
+        degrees_of_freedom=draw(st.sampled_from([1.0, 3.0, 11.0, 1e4, np.inf])),
+    )
+
+
+def _make(**parts: Any) -> FrictionModel:
+    from stiction_client import Cost, Domain
+
+    return FrictionModel(
+        material="x",
+        method="ols",
+        version=1,
+        coefficients=np.array(parts["coefficients"]),
+        covariance=np.array(parts["covariance"]),
+        scale=parts["scale"],
+        n=10,
+        degrees_of_freedom=parts["degrees_of_freedom"],
+        domain=Domain((0.0, 1.0), (0.0, 1.0)),
+        identifiable=np.ones(3, bool),
+        element_area=1e-6,
+        cost=Cost(0.0),
+    )
+
+
+loads = st.floats(1e-3, 30.0)
+probabilities = st.sampled_from([1e-6, 1e-3, 0.01, 0.1, 0.5])
+velocities = st.sampled_from([0.0, 1e-3, 0.1])
+limits = st.one_of(st.none(), st.floats(0.1, 500.0))
+search = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+
+
+def solve(model: FrictionModel, load: float, probability: float, **options: Any) -> float:
+    """The required force, infinite where there is none."""
+    try:
+        return required_normal_force(model, load, probability, contact_area=AREA, **options).normal_force
+    except NoFeasibleForce:
+        return np.inf
+
+
+def test_coulomb_friction_without_uncertainty_is_load_over_friction(make_model: Make) -> None:
+    model = make_model((0.4, 0.0, 0.0), ZERO, scale=0.0)
+    answer = required_normal_force(model, 3.0, contact_area=AREA)
+    assert answer.normal_force == pytest.approx(7.5, rel=1e-14)
+    assert answer.friction_coefficient == 0.4
+    assert answer.feasible_interval[1] == answer.margin == answer.largest_load == np.inf
+    assert answer.element_force == pytest.approx(7.5 / ELEMENTS, rel=1e-14)
+
+
+def test_friction_that_falls_with_force_gives_the_smaller_root_of_the_parabola(make_model: Make) -> None:
+    model = make_model((0.5, 0.0, -1.0), ZERO, scale=0.0)  # F (0.5 - F/60) = load: F = 15 ∓ √(225 - 60 load)
+    answer = required_normal_force(model, 3.0, contact_area=AREA)
+    root = np.sqrt(225.0 - 180.0)
+    assert answer.normal_force == pytest.approx(15.0 - root, rel=1e-13)
+    assert answer.feasible_interval == pytest.approx((15.0 - root, 15.0 + root), rel=1e-13)
+    assert answer.margin == pytest.approx(2.0 * root, rel=1e-13)
+    assert answer.largest_load == pytest.approx(3.75, rel=1e-14)
+
+
+def test_scatter_and_velocity_enter_the_quantile(make_model: Make) -> None:
+    model = make_model((0.5, -10.0, 0.0), ZERO, scale=0.05, degrees_of_freedom=np.inf)
+    answer = required_normal_force(model, 1.0, 0.05, contact_area=AREA, tangential_velocity=0.01)
+    assert answer.normal_force == pytest.approx(1.0 / (0.5 - 0.1 - 1.6448536269514722 * 0.05), rel=1e-12)
+
+
+def test_a_load_above_the_peak_is_refused_with_the_most_that_can_be_held(make_model: Make) -> None:
+    model = make_model((0.5, 0.0, -1.0), ZERO, scale=0.0)
+    with pytest.raises(NoFeasibleForce) as caught:
+        required_normal_force(model, 3.8, contact_area=AREA)
+    assert caught.value.largest_load == pytest.approx(3.75, rel=1e-14)
+    assert caught.value.normal_force == pytest.approx(15.0, rel=1e-6)  # a flat peak is known to half the digits
+    assert "no normal force holds 3.8 N" in str(caught.value)
+    assert "3.75 N, at a normal force of 15 N" in str(caught.value)
+    copied = pickle.loads(pickle.dumps(caught.value))
+    assert (copied.largest_load, str(copied)) == (caught.value.largest_load, str(caught.value))
+
+
+def test_the_peak_itself_is_still_held(make_model: Make) -> None:
+    model = make_model((0.5, 0.0, -1.0), ZERO, scale=0.0)
+    answer = required_normal_force(model, 3.75 * (1.0 - 1e-15), contact_area=AREA)
+    assert answer.normal_force == pytest.approx(15.0, rel=1e-6)
+    assert answer.margin == pytest.approx(0.0, abs=1e-5)
+
+
+def test_a_limit_on_the_force_bounds_answer_and_interval(make_model: Make) -> None:
+    model = make_model((0.5, 0.0, -1.0), ZERO, scale=0.0)
+    answer = required_normal_force(model, 3.0, contact_area=AREA, normal_force_limit=10.0)
+    assert answer.feasible_interval[1] == pytest.approx(10.0, rel=1e-15)
+    assert answer.largest_load == pytest.approx(10.0 * (0.5 - 1.0 / 6.0), rel=1e-14)
+    with pytest.raises(NoFeasibleForce, match=r"normal force up to 5 N\); the largest load held so is 2.08333 N"):
+        required_normal_force(model, 3.0, contact_area=AREA, normal_force_limit=5.0)
+
+
+def test_friction_too_uncertain_to_promise_any_is_refused(make_model: Make) -> None:
+    model = make_model((0.3, 0.0, 0.0), np.diag([0.04, 0.0, 0.0]), degrees_of_freedom=3.0)
+    with pytest.raises(NoFeasibleForce, match="no load is held so at any force") as caught:
+        required_normal_force(model, 0.1, 1e-3, contact_area=AREA)
+    assert (caught.value.largest_load, caught.value.normal_force) == (0.0, 0.0)
+
+
+def test_an_unsure_slope_makes_great_forces_useless(make_model: Make) -> None:
+    sure = make_model((0.5, 0.0, 0.0), ZERO)
+    unsure = make_model((0.5, 0.0, 0.0), np.diag([0.0, 0.0, 0.04]))
+    assert required_normal_force(sure, 2.0, contact_area=AREA).largest_load == np.inf
+    assert required_normal_force(unsure, 2.0, contact_area=AREA).largest_load < 10.0
+
+
+def test_friction_that_only_great_forces_bring_is_found(make_model: Make) -> None:
+    """An uncertain intercept that the slope's error undoes: q < 0 at small forces, > 0 beyond."""
+    sd, correlation = np.array([0.2, 0.0, 0.5]), -0.999
+    covariance = np.outer(sd, sd) * np.array([[1.0, 0.0, correlation], [0.0, 1.0, 0.0], [correlation, 0.0, 1.0]])
+    model = make_model((0.4, 0.0, 0.0), covariance, scale=0.01)
+    assert capacity(model, 0.1, 1e-3) < 0.0
+    answer = required_normal_force(model, 3.0, contact_area=AREA)
+    force = np.linspace(0.0, 200.0, 2_000_001)
+    holds = force[capacity(model, force, 1e-3) >= 3.0]
+    assert answer.normal_force == pytest.approx(holds[0], abs=1e-4)
+    assert answer.feasible_interval[1] == pytest.approx(holds[-1], abs=1e-4)
+
+
+def test_no_load_needs_no_force(make_model: Make) -> None:
+    answer = required_normal_force(make_model(), 0.0, contact_area=AREA)
+    assert answer.normal_force == 0.0
+    assert answer.feasible_interval[1] > 0.0
+    hopeless = make_model((-0.1, 0.0, 0.0), ZERO)
+    assert required_normal_force(hopeless, 0.0, contact_area=AREA).feasible_interval == (0.0, 0.0)
+
+
+def test_leaving_the_model_s_data_is_warned_of(make_model: Make) -> None:
+    model = make_model()
+    inside = required_normal_force(model, 1.0, contact_area=AREA)
+    assert inside.within_domain
+    assert inside.warning is None
+    outside = required_normal_force(model, 1e-3, contact_area=AREA)
+    assert not outside.within_domain
+    assert outside.warning is not None
+    assert outside.warning.startswith("normal force extrapolated: 5")
+    fast = required_normal_force(model, 1.0, contact_area=AREA, tangential_velocity=0.02)
+    assert fast.warning is not None
+    assert fast.warning.startswith("velocity extrapolated")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"tangential_load": -1.0}, "tangential_load is -1.0; allowed: a magnitude in N"),
+        ({"tangential_load": np.nan}, "tangential_load is nan"),
+        ({"tangential_load": np.inf}, "tangential_load is inf"),
+        ({"slip_probability": 0.0}, "slip_probability is 0.0; allowed: 1e-12 to 0.5"),
+        ({"slip_probability": 1.0}, "slip_probability is 1.0"),
+        ({"slip_probability": 0.6}, "slip_probability is 0.6"),
+        ({"slip_probability": np.nan}, "slip_probability is nan"),
+        ({"slip_probability": 1e-13}, "slip_probability is 1e-13"),
+        ({"degrees_of_freedom": np.nan}, "model is not finite at this slip probability"),
+        ({"contact_area": 0.0}, "contact_area is 0.0"),
+        ({"contact_area": np.inf}, "contact_area is inf"),
+        ({"tangential_velocity": -1e-3}, "tangential_velocity is -0.001"),
+        ({"tangential_velocity": np.nan}, "tangential_velocity is nan"),
+        ({"normal_force_limit": 0.0}, "normal_force_limit is 0.0"),
+        ({"normal_force_limit": np.nan}, "normal_force_limit is nan"),
+        ({"coefficients": (np.nan, 0.0, 0.0)}, "model is not finite"),
+        ({"covariance": np.full((3, 3), np.inf)}, "model is not finite"),
+    ],
+)
+def test_arguments_that_cannot_be_are_refused(make_model: Make, changes: dict[str, Any], message: str) -> None:
+    parts = {
+        name: changes.pop(name) for name in ("coefficients", "covariance", "degrees_of_freedom") if name in changes
+    }
+    arguments = {"tangential_load": 1.0, "contact_area": AREA} | changes
+    with pytest.raises(InvalidArgument, match=message):
+        required_normal_force(make_model(**parts), **arguments)
+
+
+@search
+@given(model=models(), load=loads, probability=probabilities, velocity=velocities, limit=limits)
+def test_the_answer_holds_and_brute_force_finds_no_smaller_one(
+    model: FrictionModel, load: float, probability: float, velocity: float, limit: float | None
+) -> None:
+    force = np.concatenate([np.geomspace(1e-6, 1.0, 2001), np.geomspace(1.0, limit or 1e6, 20001)])
+    force = force[force <= (limit or np.inf)]
+    holds = force[capacity(model, force, probability, velocity) >= load * (1.0 + 1e-9)]
+    answer = solve(model, load, probability, tangential_velocity=velocity, normal_force_limit=limit)
+    if holds.size:
+        assert answer <= holds[0] * (1.0 + 1e-9)
+    if np.isfinite(answer):
+        assert capacity(model, answer, probability, velocity) >= load * (1.0 - 1e-9)
+        assert answer <= (limit or np.inf) * (1.0 + 1e-15)
+        below = force[force < answer * (1.0 - 1e-9)]
+        assert (capacity(model, below, probability, velocity) <= load * (1.0 + 1e-9)).all()
+
+
+@search
+@given(model=models(), load=loads, probability=probabilities, place=st.floats(0.0, 1.0))
+def test_every_force_in_the_interval_holds(model: FrictionModel, load: float, probability: float, place: float) -> None:
+    try:
+        low, high = required_normal_force(model, load, probability, contact_area=AREA).feasible_interval
+    except NoFeasibleForce:
+        assume(False)
+    top = high if np.isfinite(high) else 100.0 * low
+    force = low * (top / low) ** place
+    assert capacity(model, force, probability) >= load * (1.0 - 1e-9)
+    if np.isfinite(high):
+        assert capacity(model, 1.001 * high, probability) < load
+
+
+@search
+@given(model=models(), load=loads, more=st.floats(1.0, 5.0), probability=probabilities, limit=limits)
+def test_more_load_never_needs_less_force(
+    model: FrictionModel, load: float, more: float, probability: float, limit: float | None
+) -> None:
+    less = solve(model, load, probability, normal_force_limit=limit)
+    assert solve(model, load * more, probability, normal_force_limit=limit) >= less * (1.0 - 1e-12)
+
+
+@search
+@given(model=models(), load=loads, probability=st.floats(1e-9, 0.5), factor=st.floats(1e-3, 1.0))
+def test_a_smaller_slip_probability_never_needs_less_force(
+    model: FrictionModel, load: float, probability: float, factor: float
+) -> None:
+    assert solve(model, load, probability * factor) >= solve(model, load, probability) * (1.0 - 1e-12)
+
+
+@pytest.mark.parametrize("probability", [0.2, 0.01])
+@pytest.mark.parametrize("degrees_of_freedom", [5.0, 40.0])
+def test_as_many_contacts_slip_as_were_allowed(make_model: Make, probability: float, degrees_of_freedom: float) -> None:
+    """Draw coefficients and scatter from the posterior that the Student-t prediction stands for (400,000 draws)."""
+    model = make_model(degrees_of_freedom=degrees_of_freedom)
+    answer = required_normal_force(model, 2.0, probability, contact_area=AREA, tangential_velocity=2e-3)
+    generator, draws = np.random.default_rng(17), 400_000
+    stretch = np.sqrt(degrees_of_freedom / generator.chisquare(degrees_of_freedom, draws))
+    scatter = stretch * model.scale * generator.normal(size=draws)
+    errors = stretch[:, None] * generator.multivariate_normal(np.zeros(3), model.covariance, draws)
+    x = np.array([1.0, 2e-3, answer.element_force])
+    slips = (((model.coefficients + errors) @ x + scatter) * answer.normal_force < 2.0).mean()
+    assert abs(slips - probability) < 4.0 * np.sqrt(probability * (1.0 - probability) / draws)
+
+
+def test_a_nearly_singular_covariance_gives_no_invalid_root(make_model: Make) -> None:
+    """Perfectly correlated, σ = 0: xᵀΣx is 0 at one force, where rounding makes the plain formula's root invalid."""
+    direction = np.array([0.1, 0.0, -1.0])
+    model = make_model((0.5, 0.0, -0.5), np.outer(direction, direction), scale=0.0)
+    answer = required_normal_force(model, 2.0, contact_area=AREA)
+    assert answer.friction_coefficient * answer.normal_force == pytest.approx(2.0, rel=1e-12)
+    assert np.isfinite(answer.feasible_interval[1])
