@@ -11,14 +11,17 @@ JobStatus = Literal["queued", "running", "done", "failed", "refused"]
 
 @dataclass(frozen=True, slots=True)
 class NewModel:
-    """A fitted friction model about to be stored; coefficients β₀ [-], β₁ [s/m], β₂ [1/N], ranges in m/s and N."""
+    """A fitted friction model about to be stored; coefficients β₀ [-], β₁ [s/m], β₂ [1/N], ranges in m/s and N.
+
+    ``degrees_of_freedom`` is None where there are infinitely many.
+    """
 
     method: str
     coefficients: tuple[float, ...]
     covariance: tuple[tuple[float, ...], ...]
     scale: float
     n: int
-    degrees_of_freedom: float
+    degrees_of_freedom: float | None
     tangential_velocity: tuple[float, float]
     normal_force: tuple[float, float]
     identifiable: tuple[bool, ...]
@@ -96,9 +99,13 @@ class Detection:
 
 @dataclass(frozen=True, slots=True)
 class SampleSummary:
-    """The friction samples of one log, in numbers; the samples are in the blob of hash ``samples_blob``."""
+    """The friction samples of one log, in numbers; the samples are in the blob of hash ``samples_blob``.
+
+    ``none_because`` says why there are none, where there are none.
+    """
 
     count: int
+    none_because: str | None
     element_area: float
     friction_coefficient_mean: float | None
     tangential_velocity: tuple[float, float] | None

@@ -178,10 +178,14 @@ class SampleSummaryRow(Base):
     """The friction samples of a log, in numbers, with the hash of the blob that holds them."""
 
     __tablename__ = "sample_summaries"
-    __table_args__ = (CheckConstraint("count >= 0", name="count"),)
+    __table_args__ = (
+        CheckConstraint("count >= 0", name="count"),
+        CheckConstraint("(count = 0) = (none_because IS NOT NULL)", name="none_because"),
+    )
 
     grasp_log_id: Mapped[str] = mapped_column(ForeignKey("grasp_logs.id"), primary_key=True)
     count: Mapped[int]
+    none_because: Mapped[str | None]
     element_area: Mapped[float]
     friction_coefficient_mean: Mapped[float | None]
     tangential_velocity_min: Mapped[float | None]
@@ -219,7 +223,7 @@ class FrictionModelRow(Base):
     covariance: Mapped[list[Any]]
     scale: Mapped[float]
     n: Mapped[int]
-    degrees_of_freedom: Mapped[float]
+    degrees_of_freedom: Mapped[float | None]
     tangential_velocity_min: Mapped[float]
     tangential_velocity_max: Mapped[float]
     normal_force_min: Mapped[float]

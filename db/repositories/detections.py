@@ -17,6 +17,7 @@ def add(session: Session, log_id: str, detection: Detection, samples: SampleSumm
         SampleSummaryRow(
             grasp_log_id=log_id,
             count=samples.count,
+            none_because=samples.none_because,
             element_area=samples.element_area,
             friction_coefficient_mean=samples.friction_coefficient_mean,
             tangential_velocity_min=velocity[0],
@@ -56,6 +57,7 @@ def samples_record(row: SampleSummaryRow | None) -> SampleSummary | None:
         return None
     return SampleSummary(
         count=row.count,
+        none_because=row.none_because,
         element_area=row.element_area,
         friction_coefficient_mean=row.friction_coefficient_mean,
         tangential_velocity=_range(row.tangential_velocity_min, row.tangential_velocity_max),

@@ -35,11 +35,14 @@ def add(session: Session, log: NewGraspLog) -> str:
     return row.id
 
 
-def find_id(session: Session, sha256: str, material_id: int | None, detector: str) -> str | None:
-    """The log of this content, material and detector, if it is stored."""
+def find_id(session: Session, sha256: str, material_id: int | None, detector: str) -> str:
+    """The log of this content, material and detector; raises ``NotFound``."""
     same_material = GraspLogRow.material_id.is_(None) if material_id is None else GraspLogRow.material_id == material_id
     query = select(GraspLogRow.id).where(GraspLogRow.sha256 == sha256, same_material, GraspLogRow.detector == detector)
-    return session.scalar(query)
+    found = session.scalar(query)
+    if found is None:
+        raise NotFound("grasp log", sha256)
+    return found
 
 
 def get(session: Session, log_id: str) -> StoredGraspLog:

@@ -151,6 +151,7 @@ def create_sample_summaries() -> None:
         "sample_summaries",
         sa.Column("grasp_log_id", sa.String(32), nullable=False),
         sa.Column("count", sa.Integer, nullable=False),
+        sa.Column("none_because", sa.String),
         sa.Column("element_area", sa.Double, nullable=False),
         sa.Column("friction_coefficient_mean", sa.Double),
         sa.Column("tangential_velocity_min", sa.Double),
@@ -160,6 +161,7 @@ def create_sample_summaries() -> None:
         sa.Column("samples_blob", sa.String(64), nullable=False),
         created_at(),
         sa.CheckConstraint("count >= 0", name=op.f("ck_sample_summaries_count")),
+        sa.CheckConstraint("(count = 0) = (none_because IS NOT NULL)", name=op.f("ck_sample_summaries_none_because")),
         sa.ForeignKeyConstraint(
             ["grasp_log_id"], ["grasp_logs.id"], name="fk_sample_summaries_grasp_log_id_grasp_logs"
         ),
@@ -181,7 +183,7 @@ def create_friction_models() -> None:
         sa.Column("covariance", sa.JSON, nullable=False),
         sa.Column("scale", sa.Double, nullable=False),
         sa.Column("n", sa.Integer, nullable=False),
-        sa.Column("degrees_of_freedom", sa.Double, nullable=False),
+        sa.Column("degrees_of_freedom", sa.Double),
         sa.Column("tangential_velocity_min", sa.Double, nullable=False),
         sa.Column("tangential_velocity_max", sa.Double, nullable=False),
         sa.Column("normal_force_min", sa.Double, nullable=False),

@@ -65,7 +65,7 @@ def detection() -> Detection:
 
 @pytest.fixture
 def samples() -> SampleSummary:
-    return SampleSummary(120, 1e-6, 0.41, (0.0, 0.01), (0.01, 0.09), HASH.format(1002))
+    return SampleSummary(120, None, 1e-6, 0.41, (0.0, 0.01), (0.01, 0.09), HASH.format(1002))
 
 
 @pytest.fixture

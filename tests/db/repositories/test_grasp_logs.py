@@ -52,7 +52,7 @@ def test_no_samples_have_no_range(
     database: Database, new_log: Callable[..., NewGraspLog], detection: Detection
 ) -> None:
     log_id = add(database, new_log())
-    none = SampleSummary(0, 1e-6, None, None, None, "f" * 64)
+    none = SampleSummary(0, "no slip", 1e-6, None, None, None, "f" * 64)
     with database.write() as session:
         detections.add(session, log_id, detection, none)
         assert grasp_logs.get(session, log_id).samples == none
@@ -76,7 +76,8 @@ def test_the_same_content_material_and_detector_is_one_log(
     ]
     with database.read() as session:
         assert grasp_logs.find_id(session, "a" * 64, key, "strain_rate") == log_id
-        assert grasp_logs.find_id(session, "c" * 64, key, "strain_rate") is None
+        with pytest.raises(NotFound, match="no grasp log 'cc"):
+            grasp_logs.find_id(session, "c" * 64, key, "strain_rate")
         assert session.scalar(select(func.count()).select_from(SensorRow)) == 1
     assert len({log_id, *different}) == 4
 
@@ -101,8 +102,9 @@ def test_samples_of_a_material_are_one_part_a_grasp(
     ]
     for log, count, blob in stored:
         log_id = add(database, log)
+        none_because = None if count else "no slip"
         with database.write() as session:
-            detections.add(session, log_id, detection, SampleSummary(count, 1e-6, None, None, None, blob))
+            detections.add(session, log_id, detection, SampleSummary(count, none_because, 1e-6, None, None, None, blob))
     with database.read() as session:
         assert detections.sample_blobs(session, paper) == {"a" * 64: "3" * 64, "b" * 64: "2" * 64}
 

@@ -1,0 +1,29 @@
+"""What a request has to work with."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import Depends, Request
+
+from db.blobs import BlobStore
+from db.database import Database
+from service.jobs import JobPool
+from service.settings import Settings
+
+
+@dataclass(frozen=True, slots=True)
+class Context:
+    """The open stores and the running jobs of one application."""
+
+    settings: Settings
+    database: Database
+    blobs: BlobStore
+    jobs: JobPool
+
+
+async def _context(request: Request) -> Context:
+    context: Context = request.app.state.context
+    return context
+
+
+Given = Annotated[Context, Depends(_context)]

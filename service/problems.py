@@ -1,0 +1,170 @@
+"""Errors as RFC 9457 problem details: one stable type a kind of problem (docs/problems.md)."""
+
+import logging
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from starlette.exceptions import HTTPException
+from starlette.routing import Match, Router
+
+from db.errors import NotFound, StorageUnavailable
+
+logger = logging.getLogger(__name__)
+
+MEDIA_TYPE = "application/problem+json"
+LONGEST_VALUE = 200
+"""Characters of an offending value that an answer repeats."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProblemType:
+    """A kind of problem: the last part of its URI, its title and its status."""
+
+    name: str
+    title: str
+    status: int
+
+    @property
+    def uri(self) -> str:
+        """What stands in ``type``: it never changes."""
+        return f"/problems/{self.name}"
+
+
+BAD_REQUEST = ProblemType("bad-request", "The request cannot be understood", 400)
+UPLOAD_INTERRUPTED = ProblemType("upload-interrupted", "The upload broke off", 400)
+UNKNOWN_ROUTE = ProblemType("unknown-route", "No such route", 404)
+UNKNOWN_MATERIAL = ProblemType("unknown-material", "No such material", 404)
+UNKNOWN_GRASP_LOG = ProblemType("unknown-grasp-log", "No such grasp log", 404)
+UNKNOWN_JOB = ProblemType("unknown-job", "No such job", 404)
+METHOD_NOT_ALLOWED = ProblemType("method-not-allowed", "The route does not take this method", 405)
+MATERIAL_EXISTS = ProblemType("material-exists", "The material exists already", 409)
+NO_MODEL = ProblemType("no-model", "The material has no fitted model yet", 409)
+NOT_READY = ProblemType("not-ready", "The job has not got there", 409)
+UPLOAD_TOO_LARGE = ProblemType("upload-too-large", "The body is too large", 413)
+UNSUPPORTED_FORMAT = ProblemType("unsupported-format", "The format is not supported", 415)
+INVALID_GRASP_LOG = ProblemType("invalid-grasp-log", "The grasp log is not valid", 422)
+INVALID_REQUEST = ProblemType("invalid-request", "A value in the request is not allowed", 422)
+INTERNAL_ERROR = ProblemType("internal-error", "The service failed", 500)
+STORAGE_UNAVAILABLE = ProblemType("storage-unavailable", "Database or blob folder cannot be used now", 503)
+
+PROBLEM_TYPES = {entry.name: entry for entry in list(globals().values()) if isinstance(entry, ProblemType)}
+
+_UNKNOWN = {"material": UNKNOWN_MATERIAL, "grasp log": UNKNOWN_GRASP_LOG, "job": UNKNOWN_JOB}
+_BY_STATUS = {404: UNKNOWN_ROUTE, 405: METHOD_NOT_ALLOWED, 413: UPLOAD_TOO_LARGE}
+
+
+class Problem(Exception):
+    """An answer other than the one that was asked for.
+
+    ``name``, ``value`` and ``allowed`` say what was wrong, where one thing was.
+    """
+
+    def __init__(
+        self,
+        kind: ProblemType,
+        detail: str,
+        *,
+        name: str | None = None,
+        value: object = None,
+        allowed: str | None = None,
+    ) -> None:
+        super().__init__(detail)
+        self.kind, self.detail = kind, detail
+        self.name, self.value, self.allowed = name, None if value is None else str(value), allowed
+
+    @classmethod
+    def wrong_value(cls, kind: ProblemType, name: str, value: object, allowed: str) -> "Problem":
+        """One named thing has a value that is not allowed."""
+        shown = str(value)[:LONGEST_VALUE]
+        return cls(kind, f"{name} is {shown}; allowed: {allowed}", name=name, value=shown, allowed=allowed)
+
+
+def install(app: FastAPI) -> None:
+    """Let every error of the application be answered as problem details."""
+    app.add_exception_handler(Problem, _on_problem)
+    app.add_exception_handler(NotFound, _on_not_found)
+    app.add_exception_handler(StorageUnavailable, _on_storage_unavailable)
+    app.add_exception_handler(RequestValidationError, _on_invalid_request)
+    app.add_exception_handler(HTTPException, _on_http_exception)
+    app.add_exception_handler(Exception, _on_unexpected)
+
+
+def answer(request: Request, problem: Problem, headers: dict[str, str] | None = None, **more: object) -> JSONResponse:
+    """The problem as a response."""
+    content: dict[str, Any] = {
+        "type": problem.kind.uri,
+        "title": problem.kind.title,
+        "status": problem.kind.status,
+        "detail": problem.detail,
+        "instance": request.url.path,
+    }
+    if problem.name is not None:
+        content |= {"name": problem.name, "value": problem.value, "allowed": problem.allowed}
+    return JSONResponse(content | more, problem.kind.status, headers, MEDIA_TYPE)
+
+
+async def _on_problem(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, Problem)
+    return answer(request, error)
+
+
+async def _on_not_found(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, NotFound)
+    kind = _UNKNOWN.get(error.kind, INTERNAL_ERROR)
+    if kind is INTERNAL_ERROR:
+        logger.error("%s is referred to but missing", error.kind, exc_info=error)
+    return answer(request, Problem.wrong_value(kind, error.kind, error.name, f"the name of a stored {error.kind}"))
+
+
+async def _on_storage_unavailable(request: Request, error: Exception) -> JSONResponse:
+    logger.error("storage unavailable", exc_info=error)
+    return answer(request, Problem(STORAGE_UNAVAILABLE, str(error)), {"Retry-After": "1"})
+
+
+async def _on_invalid_request(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, RequestValidationError)
+    wrong = [_wrong_value(entry) for entry in error.errors()]
+    listed = [{"name": each.name, "value": each.value, "allowed": each.allowed} for each in wrong]
+    return answer(request, wrong[0], errors=listed)
+
+
+def _wrong_value(entry: dict[str, Any]) -> Problem:
+    if entry["type"] == "json_invalid":
+        return Problem.wrong_value(INVALID_REQUEST, "body", f"not JSON ({entry['ctx']['error']})", "a JSON object")
+    name = ".".join(str(part) for part in entry["loc"][1:]) or str(entry["loc"][0])
+    if entry["type"] == "missing":
+        return Problem.wrong_value(INVALID_REQUEST, name, "missing", "a value")
+    allowed = entry["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
+    return Problem.wrong_value(INVALID_REQUEST, name, entry["input"], allowed)
+
+
+async def _on_http_exception(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, HTTPException)
+    kind = _BY_STATUS.get(error.status_code) or ProblemType(
+        BAD_REQUEST.name, HTTPStatus(error.status_code).phrase, error.status_code
+    )
+    headers = dict(error.headers or {})
+    if kind is METHOD_NOT_ALLOWED:
+        headers["Allow"] = ", ".join(_allowed_methods(request))
+    return answer(request, Problem(kind, f"{request.method} {request.url.path}: {error.detail}"), headers)
+
+
+def _allowed_methods(request: Request) -> list[str]:
+    """Methods that some route takes for this path: the framework names only those of the first route."""
+    router: Router = request.app.router
+    scopes = {method: {**request.scope, "method": method} for method in ("DELETE", "GET", "PATCH", "POST", "PUT")}
+    taken = {
+        method
+        for method, scope in scopes.items()
+        if any(route.matches(scope)[0] is Match.FULL for route in router.routes)
+    }
+    return sorted(taken | {"HEAD"} if "GET" in taken else taken)
+
+
+async def _on_unexpected(request: Request, error: Exception) -> JSONResponse:
+    logger.error("unexpected error", exc_info=error)
+    return answer(request, Problem(INTERNAL_ERROR, "an unexpected error; the server's log has it"))

@@ -1,0 +1,57 @@
+"""What the routes share: how their errors are described, and what a JSON body may be."""
+
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+from starlette.exceptions import HTTPException
+from starlette.types import Message, Receive
+
+from service.problems import UNSUPPORTED_FORMAT, Problem, ProblemType
+from service.schemas import ProblemOut
+
+MAX_JSON_BYTES = 64 * 1024
+"""Bytes of a JSON body; the longest description is 10,000 characters."""
+
+
+def problems(*kinds: ProblemType) -> dict[int | str, dict[str, Any]]:
+    """Description of the problems that a route may answer with, by status."""
+    described: dict[int | str, dict[str, Any]] = {}
+    for status in sorted({kind.status for kind in kinds}):
+        of_status = [kind for kind in kinds if kind.status == status]
+        text = "; ".join(f"{kind.title} (`{kind.uri}`)" for kind in of_status)
+        described[status] = {"description": text, "model": ProblemOut}
+    return described
+
+
+class JsonRoute(APIRoute):
+    """A route whose body, if it takes one, is JSON of bounded size: the framework reads all of it into memory."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """The handler with the checks before it."""
+        handle = super().get_route_handler()
+        if self.body_field is None:
+            return handle
+
+        async def handle_json(request: Request) -> Response:
+            given = request.headers.get("content-type", "")
+            if given.partition(";")[0].strip().lower() != "application/json":
+                raise Problem.wrong_value(UNSUPPORTED_FORMAT, "content type", given or "missing", "application/json")
+            return await handle(Request(request.scope, _limited(request.receive)))
+
+        return handle_json
+
+
+def _limited(receive: Receive) -> Receive:
+    received = 0
+
+    async def receive_some() -> Message:
+        nonlocal received
+        message = await receive()
+        received += len(message.get("body", b""))
+        if received > MAX_JSON_BYTES:
+            raise HTTPException(413, f"the body has more than {MAX_JSON_BYTES} bytes")
+        return message
+
+    return receive_some

@@ -1,0 +1,142 @@
+"""Grasp logs and what was found in them."""
+
+from typing import Annotated, Any, TypeVar
+
+from fastapi import APIRouter, Query, Request, Response
+
+from db.records import StoredGraspLog
+from db.repositories import grasp_logs
+from service import formats
+from service.context import Context, Given
+from service.problems import (
+    INVALID_GRASP_LOG,
+    INVALID_REQUEST,
+    NOT_READY,
+    STORAGE_UNAVAILABLE,
+    UNKNOWN_GRASP_LOG,
+    UNKNOWN_MATERIAL,
+    UNSUPPORTED_FORMAT,
+    UPLOAD_INTERRUPTED,
+    UPLOAD_TOO_LARGE,
+    Problem,
+)
+from service.routes.common import problems
+from service.schemas import EventsOfOneKind, EventsOut, GraspLogOut, SamplesOut, StickRatioOut
+from service.stored_results import EVENT_KINDS, SAMPLE_ARRAYS, decode_history, decode_samples, finite_or_none
+from service.use_cases.upload import Wish, upload
+from slipcore.defaults import DEFAULT_METHOD
+from slipcore.methods import METHODS
+
+router = APIRouter(prefix="/v1/grasp-logs", tags=["grasp logs"])
+
+Found = TypeVar("Found")
+
+_BINARY = {"schema": {"type": "string", "format": "binary"}}
+_BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "description": "The file itself, as it is (docs/formats.md)",
+        "content": dict.fromkeys((*formats.CONTENT_TYPES, *formats.UNSPECIFIC_TYPES), _BINARY),
+    }
+}
+_ALREADY_THERE: dict[int | str, dict[str, Any]] = {
+    200: {"model": GraspLogOut, "description": "The same content, material and detector is stored already"}
+}
+_FOUND = problems(UNKNOWN_GRASP_LOG, INVALID_REQUEST, STORAGE_UNAVAILABLE)
+_RESULTS = problems(UNKNOWN_GRASP_LOG, NOT_READY, INVALID_REQUEST, STORAGE_UNAVAILABLE)
+
+
+@router.post(
+    "",
+    summary="Upload a grasp log",
+    status_code=202,
+    openapi_extra=_BODY,
+    responses=_ALREADY_THERE
+    | problems(
+        UPLOAD_INTERRUPTED,
+        UNKNOWN_MATERIAL,
+        UPLOAD_TOO_LARGE,
+        UNSUPPORTED_FORMAT,
+        INVALID_GRASP_LOG,
+        INVALID_REQUEST,
+        STORAGE_UNAVAILABLE,
+    ),
+)
+async def create_grasp_log(
+    context: Given,
+    request: Request,
+    response: Response,
+    material: Annotated[
+        str | None, Query(description="What was held; without it slip is only detected", examples=["paper"])
+    ] = None,
+    sensor: Annotated[str | None, Query(description="In place of the sensor that the log names")] = None,
+    detector: Annotated[
+        str, Query(description="Method of detection", json_schema_extra={"enum": list(METHODS)})
+    ] = DEFAULT_METHOD,
+) -> GraspLogOut:
+    """Stored once it is answered; slip, samples and, with a material, its refit follow in the job.
+
+    The body is streamed to disk, up to the largest size that is set.
+    """
+    length = request.headers.get("content-length", "")
+    wish = Wish(
+        material,
+        sensor,
+        detector,
+        request.headers.get("content-type"),
+        int(length) if length.isdecimal() else None,
+    )
+    accepted = await upload(context, request.stream(), wish)
+    response.status_code = 202 if accepted.is_new else 200
+    response.headers["Location"] = f"/v1/grasp-logs/{accepted.log.id}"
+    return GraspLogOut.of(accepted.log)
+
+
+@router.get("/{id}", summary="Look at a grasp log", responses=_FOUND)
+def read_grasp_log(context: Given, id: str) -> GraspLogOut:  # noqa: A002  (the path's own name)
+    """With its job and, once there, what was found in it."""
+    return GraspLogOut.of(_find(context, id))
+
+
+@router.get("/{id}/stick-ratio", summary="Look at the stick ratio over time", responses=_RESULTS)
+def read_stick_ratio(context: Given, id: str) -> StickRatioOut:  # noqa: A002
+    """One value a frame."""
+    log = _find(context, id)
+    history = decode_history(context.blobs.path(_ready(log.detection, log).history_blob))
+    return StickRatioOut(
+        time=history.time.tolist(), stick_ratio=[finite_or_none(value) for value in history.stick_ratio.tolist()]
+    )
+
+
+@router.get("/{id}/events", summary="Look at slip and contact events", responses=_RESULTS)
+def read_events(context: Given, id: str) -> EventsOut:  # noqa: A002
+    """Of each element."""
+    log = _find(context, id)
+    events = decode_history(context.blobs.path(_ready(log.detection, log).history_blob)).events
+    of_kind = {kind: getattr(events, kind) for kind in EVENT_KINDS}
+    return EventsOut(
+        **{
+            kind: EventsOfOneKind(element=found.element.tolist(), time=found.time.tolist())
+            for kind, found in of_kind.items()
+        }
+    )
+
+
+@router.get("/{id}/samples", summary="Look at the friction samples", responses=_RESULTS)
+def read_samples(context: Given, id: str) -> SamplesOut:  # noqa: A002
+    """One entry an element and frame; empty where no slip gave one."""
+    log = _find(context, id)
+    samples = decode_samples(context.blobs.path(_ready(log.samples, log).samples_blob))
+    arrays = {name: getattr(samples, name).tolist() for name in SAMPLE_ARRAYS}
+    return SamplesOut(**arrays, element_area=samples.element_area)
+
+
+def _find(context: Context, log_id: str) -> StoredGraspLog:
+    with context.database.read() as session:
+        return grasp_logs.get(session, log_id)
+
+
+def _ready(found: Found | None, log: StoredGraspLog) -> Found:
+    if found is None:
+        raise Problem(NOT_READY, f"job {log.job.id} is {log.job.status}; its results are not there")
+    return found

@@ -1,0 +1,18 @@
+"""Jobs."""
+
+from fastapi import APIRouter
+
+from db.repositories import jobs
+from service.context import Given
+from service.problems import INVALID_REQUEST, STORAGE_UNAVAILABLE, UNKNOWN_JOB
+from service.routes.common import problems
+from service.schemas import JobOut
+
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+
+
+@router.get("/{id}", summary="Look at a job", responses=problems(UNKNOWN_JOB, INVALID_REQUEST, STORAGE_UNAVAILABLE))
+def read_job(context: Given, id: str) -> JobOut:  # noqa: A002  (the path's own name)
+    """How far it is, what each stage took, and why it ended as it did."""
+    with context.database.read() as session:
+        return JobOut.of(jobs.get(session, id))

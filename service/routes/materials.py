@@ -1,0 +1,121 @@
+"""Materials, their models and their friction."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from db.errors import AlreadyExists
+from db.repositories import friction_models, materials
+from service.context import Given
+from service.problems import (
+    INVALID_REQUEST,
+    MATERIAL_EXISTS,
+    NO_MODEL,
+    STORAGE_UNAVAILABLE,
+    UNKNOWN_MATERIAL,
+    UNSUPPORTED_FORMAT,
+    UPLOAD_TOO_LARGE,
+    Problem,
+)
+from service.routes.common import JsonRoute, problems
+from service.schemas import (
+    FitMethod,
+    FrictionModelOut,
+    FrictionModelsOut,
+    FrictionOut,
+    JobOut,
+    MaterialOut,
+    MaterialsOut,
+    NewFit,
+    NewMaterial,
+)
+from service.use_cases.fit import request_fit
+from service.use_cases.look_up import Question, look_up
+
+router = APIRouter(prefix="/v1/materials", tags=["materials"], route_class=JsonRoute)
+
+Finite = Query(allow_inf_nan=False, ge=0.0)
+
+
+@router.post(
+    "",
+    summary="Make a material known",
+    status_code=201,
+    responses=problems(MATERIAL_EXISTS, UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+def create_material(context: Given, new: NewMaterial, response: Response) -> MaterialOut:
+    """Logs can be uploaded for it from then on."""
+    try:
+        with context.database.write() as session:
+            made = materials.create(session, new.name, new.description)
+    except AlreadyExists as error:
+        raise Problem.wrong_value(MATERIAL_EXISTS, "name", new.name, "a name that no material has yet") from error
+    response.headers["Location"] = f"/v1/materials/{new.name.replace(' ', '%20')}"
+    return MaterialOut.of(made)
+
+
+@router.get("", summary="List all materials", responses=problems(STORAGE_UNAVAILABLE))
+def list_materials(context: Given) -> MaterialsOut:
+    """By name, each with its current models."""
+    with context.database.read() as session:
+        return MaterialsOut(items=[MaterialOut.of(found) for found in materials.list_all(session)])
+
+
+@router.get(
+    "/{name}",
+    summary="Look at one material",
+    responses=problems(UNKNOWN_MATERIAL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+def read_material(context: Given, name: str) -> MaterialOut:
+    """With the current model of each method."""
+    with context.database.read() as session:
+        return MaterialOut.of(materials.get(session, name))
+
+
+@router.get(
+    "/{name}/friction",
+    summary="Look up the friction coefficient",
+    responses=problems(UNKNOWN_MATERIAL, NO_MODEL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+def read_friction(
+    context: Given,
+    name: str,
+    fn: Annotated[float, Finite, Query(description="Normal force on an element, N", examples=[0.05])],
+    v: Annotated[float, Finite, Query(description="Tangential velocity, m/s", examples=[0.0])] = 0.0,
+    quantile: Annotated[
+        float | None, Query(gt=0.0, lt=1.0, description="Of a new observation of μ; the mean without", examples=[0.05])
+    ] = None,
+    method: Annotated[FitMethod, Query(description="Whose current model answers")] = "ols",
+) -> FrictionOut:
+    """At a tangential velocity and a normal force: the mean, or a quantile that a cautious planner asks for.
+
+    A quantile includes the scatter of μ and the uncertainty of the model.
+    """
+    return look_up(context, name, method, Question(v, fn, quantile))
+
+
+@router.post(
+    "/{name}/fits",
+    summary="Fit a material's model",
+    status_code=202,
+    responses=problems(UNKNOWN_MATERIAL, UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+def create_fit(context: Given, name: str, wish: NewFit, response: Response) -> JobOut:
+    """Over the samples of all its logs. Answers at once; the job at `Location` tells how it went."""
+    job = request_fit(context, name, wish.method, wish.seed)
+    response.headers["Location"] = f"/v1/jobs/{job.id}"
+    return JobOut.of(job)
+
+
+@router.get(
+    "/{name}/fits",
+    summary="List all versions of a material's models",
+    responses=problems(UNKNOWN_MATERIAL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+def list_fits(
+    context: Given, name: str, method: Annotated[FitMethod | None, Query(description="Only those of it")] = None
+) -> FrictionModelsOut:
+    """Newest first."""
+    with context.database.read() as session:
+        found = friction_models.versions(session, materials.find_id(session, name), method)
+    return FrictionModelsOut(items=[FrictionModelOut.of(stored) for stored in found])

@@ -1,0 +1,467 @@
+"""What goes over the wire: the shapes of requests and answers, with examples."""
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic.config import JsonDict
+
+from db.records import Job, JobKind, JobStatus, Material, StoredGraspLog, StoredModel
+
+NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}$"
+FitMethod = Literal["ols", "bayes"]
+
+_MOMENT = "2026-11-21T08:41:00.123456Z"
+_MODEL: JsonDict = {
+    "material": "paper",
+    "method": "ols",
+    "version": 3,
+    "current": True,
+    "coefficients": [0.41, -0.8, -0.35],
+    "covariance": [[1.0e-5, 0.0, 0.0], [0.0, 1.0e-2, 0.0], [0.0, 0.0, 4.0e-3]],
+    "scale": 0.021,
+    "n": 5120,
+    "degrees_of_freedom": 11.0,
+    "domain": {"tangential_velocity": [0.0, 0.004], "normal_force": [0.002, 0.11]},
+    "identifiable": [True, True, False],
+    "element_area": 1.0e-6,
+    "diagnostics": {"r_squared": 0.31, "cluster_kind": "grasp"},
+    "cost": {"seconds": 0.012, "monte_carlo_error": 0.0},
+    "created_at": _MOMENT,
+}
+_JOB: JsonDict = {
+    "id": "0f8fad5bd9cb469fa16570867728950e",
+    "kind": "ingest",
+    "status": "done",
+    "stage": None,
+    "reason": None,
+    "seconds": {"frames": 0.01, "slip_state": 0.06, "samples": 0.01, "friction_model": 0.02, "material": 0.01},
+    "grasp_log": "7c9e6679742540de944be07fc1f90ae7",
+    "material": "paper",
+    "model_version": 3,
+    "created_at": _MOMENT,
+    "finished_at": _MOMENT,
+}
+_DETECTION: JsonDict = {
+    "method": "strain_rate",
+    "noise": 1.1e-6,
+    "stick_ratio_min": 0.12,
+    "contact_frames": 240,
+    "macro_slip_frames": 0,
+    "events": {"onset": 181, "end": 40, "touch": 203, "release": 0},
+    "samples": 1932,
+    "seconds": 0.06,
+}
+
+
+class NewMaterial(BaseModel):
+    """A material to be made known."""
+
+    model_config = ConfigDict(
+        extra="forbid", json_schema_extra={"examples": [{"name": "paper", "description": "80 g/m²"}]}
+    )
+
+    name: Annotated[str, Field(pattern=NAME_PATTERN, description="1 to 100 letters, digits, spaces and `._-`.")]
+    description: Annotated[str, Field(max_length=10_000)] = ""
+
+
+class NewFit(BaseModel):
+    """A fit that is asked for."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"method": "bayes", "seed": 0}]})
+
+    method: Annotated[FitMethod, Field(description="Least squares, or Bayesian by sampling.")] = "ols"
+    seed: Annotated[int, Field(ge=0, lt=2**32, description="Of the sampler: the same seed gives the same fit.")] = 0
+
+
+class DomainOut(BaseModel):
+    """Range of the samples behind a model."""
+
+    tangential_velocity: Annotated[tuple[float, float], Field(description="m/s")]
+    normal_force: Annotated[tuple[float, float], Field(description="N on an element")]
+
+
+class CostOut(BaseModel):
+    """What a fit cost."""
+
+    seconds: float
+    monte_carlo_error: Annotated[float, Field(description="In posterior standard deviations; 0 for an exact method.")]
+
+
+class FrictionModelOut(BaseModel):
+    """One version of a material's model μ = β₀ + β₁ v + β₂ f_n + ε."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_MODEL]})
+
+    material: str
+    method: str
+    version: int
+    current: bool
+    coefficients: Annotated[list[float], Field(description="β₀ [-], β₁ [s/m], β₂ [1/N]")]
+    covariance: Annotated[list[list[float]], Field(description="Of the coefficients, 3×3")]
+    scale: Annotated[float, Field(description="σ, standard deviation of ε [-]")]
+    n: Annotated[int, Field(description="Samples behind the model")]
+    degrees_of_freedom: Annotated[float | None, Field(description="Of the Student-t distribution; null: normal")]
+    domain: DomainOut
+    identifiable: Annotated[list[bool], Field(description="Whether the data tell β₀, β₁, β₂")]
+    element_area: Annotated[float, Field(description="m²")]
+    diagnostics: dict[str, float | str | None]
+    cost: CostOut
+    created_at: datetime
+
+    @classmethod
+    def of(cls, stored: StoredModel) -> "FrictionModelOut":
+        """The stored model as an answer."""
+        model = stored.model
+        return cls(
+            material=stored.material,
+            method=model.method,
+            version=stored.version,
+            current=stored.current,
+            coefficients=list(model.coefficients),
+            covariance=[list(line) for line in model.covariance],
+            scale=model.scale,
+            n=model.n,
+            degrees_of_freedom=model.degrees_of_freedom,
+            domain=DomainOut(tangential_velocity=model.tangential_velocity, normal_force=model.normal_force),
+            identifiable=list(model.identifiable),
+            element_area=model.element_area,
+            diagnostics=dict(model.diagnostics),
+            cost=CostOut(seconds=model.cost_seconds, monte_carlo_error=model.monte_carlo_error),
+            created_at=stored.created_at,
+        )
+
+
+class FrictionModelsOut(BaseModel):
+    """Versions of a material's models, newest first."""
+
+    items: list[FrictionModelOut]
+
+
+class MaterialOut(BaseModel):
+    """A material with its current models."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "name": "paper",
+                    "description": "80 g/m²",
+                    "created_at": _MOMENT,
+                    "grasp_logs": 12,
+                    "models": {"ols": _MODEL},
+                }
+            ]
+        }
+    )
+
+    name: str
+    description: str
+    created_at: datetime
+    grasp_logs: Annotated[int, Field(description="How many logs of it are stored")]
+    models: Annotated[dict[str, FrictionModelOut], Field(description="The current model of each method")]
+
+    @classmethod
+    def of(cls, material: Material) -> "MaterialOut":
+        """The stored material as an answer."""
+        return cls(
+            name=material.name,
+            description=material.description,
+            created_at=material.created_at,
+            grasp_logs=material.grasp_logs,
+            models={stored.model.method: FrictionModelOut.of(stored) for stored in material.models},
+        )
+
+
+class MaterialsOut(BaseModel):
+    """All materials, by name."""
+
+    items: list[MaterialOut]
+
+
+class FrictionOut(BaseModel):
+    """Friction coefficient of a material at a tangential velocity and an element's normal force."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "material": "paper",
+                    "method": "ols",
+                    "version": 3,
+                    "tangential_velocity": 0.0,
+                    "normal_force": 0.05,
+                    "quantile": 0.05,
+                    "friction_coefficient": 0.36,
+                    "mean": 0.39,
+                    "within_domain": True,
+                    "warning": None,
+                }
+            ]
+        }
+    )
+
+    material: str
+    method: str
+    version: int
+    tangential_velocity: Annotated[float, Field(description="m/s")]
+    normal_force: Annotated[float, Field(description="N on an element")]
+    quantile: float | None
+    friction_coefficient: Annotated[float, Field(description="The quantile that was asked for; without one, the mean")]
+    mean: float
+    within_domain: Annotated[bool, Field(description="Whether the model's samples reach there")]
+    warning: str | None
+
+
+class EventCounts(BaseModel):
+    """How many events of each kind a log has."""
+
+    onset: int
+    end: int
+    touch: int
+    release: int
+
+
+class DetectionOut(BaseModel):
+    """What the detector found in a log."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_DETECTION]})
+
+    method: str
+    noise: Annotated[float | None, Field(description="Estimated noise of a marker coordinate, m")]
+    stick_ratio_min: Annotated[float | None, Field(description="Least stick area over contact area; null: no contact")]
+    contact_frames: int
+    macro_slip_frames: Annotated[int, Field(description="Frames in which no element in contact sticks")]
+    events: EventCounts
+    samples: Annotated[int, Field(description="Number of friction samples")]
+    seconds: Annotated[float, Field(description="What the detection took")]
+
+
+class JobOut(BaseModel):
+    """A job; `refused`: the data do not allow it, `failed`: the service could not do it, `reason` says why."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [_JOB]})
+
+    id: str
+    kind: JobKind
+    status: JobStatus
+    stage: Annotated[str | None, Field(description="The stage it is in, or in which it ended")]
+    reason: str | None
+    seconds: Annotated[dict[str, float], Field(description="Of each stage that is done")]
+    grasp_log: str | None
+    material: str | None
+    model_version: Annotated[int | None, Field(description="The version of the model that it stored")]
+    created_at: datetime
+    finished_at: datetime | None
+
+    @classmethod
+    def of(cls, job: Job) -> "JobOut":
+        """The stored job as an answer."""
+        return cls(
+            id=job.id,
+            kind=job.kind,
+            status=job.status,
+            stage=job.stage,
+            reason=job.reason,
+            seconds=dict(job.seconds),
+            grasp_log=job.grasp_log_id,
+            material=job.material,
+            model_version=job.model_version,
+            created_at=job.created_at,
+            finished_at=job.finished_at,
+        )
+
+
+class GraspLogOut(BaseModel):
+    """A stored grasp log, its ingest job and, once there, what was found in it."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "id": "7c9e6679742540de944be07fc1f90ae7",
+                    "sha256": "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08",
+                    "bytes": 4806144,
+                    "format": "npz",
+                    "material": "paper",
+                    "sensor": "AD2-0065L",
+                    "frames": 250,
+                    "duration": 8.3,
+                    "grid": [20, 20],
+                    "created_at": _MOMENT,
+                    "job": _JOB,
+                    "detection": _DETECTION,
+                }
+            ]
+        }
+    )
+
+    id: str
+    sha256: Annotated[str, Field(description="Of the uploaded bytes")]
+    bytes: int
+    format: str
+    material: str | None
+    sensor: str
+    frames: int
+    duration: Annotated[float, Field(description="s")]
+    grid: Annotated[tuple[int, int], Field(description="Markers along the two axes")]
+    created_at: datetime
+    job: JobOut
+    detection: DetectionOut | None
+
+    @classmethod
+    def of(cls, log: StoredGraspLog) -> "GraspLogOut":
+        """The stored log as an answer."""
+        return cls(
+            id=log.id,
+            sha256=log.sha256,
+            bytes=log.bytes,
+            format=log.format,
+            material=log.material,
+            sensor=log.sensor,
+            frames=log.frames,
+            duration=log.duration,
+            grid=log.grid,
+            created_at=log.created_at,
+            job=JobOut.of(log.job),
+            detection=_detection_out(log),
+        )
+
+
+def _detection_out(log: StoredGraspLog) -> DetectionOut | None:
+    found = log.detection
+    if found is None or log.samples is None:
+        return None
+    return DetectionOut(
+        method=found.method,
+        noise=found.noise,
+        stick_ratio_min=found.stick_ratio_min,
+        contact_frames=found.contact_frames,
+        macro_slip_frames=found.macro_slip_frames,
+        events=EventCounts(onset=found.onsets, end=found.ends, touch=found.touches, release=found.releases),
+        samples=log.samples.count,
+        seconds=found.seconds,
+    )
+
+
+class StickRatioOut(BaseModel):
+    """Stick area over contact area, over time."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"time": [0.0, 0.033, 0.067], "stick_ratio": [None, 1.0, 0.93]}]}
+    )
+
+    time: Annotated[list[float], Field(description="s")]
+    stick_ratio: Annotated[list[float | None], Field(description="null without contact")]
+
+
+class EventsOfOneKind(BaseModel):
+    """Events in order of time."""
+
+    element: Annotated[list[int], Field(description="Row-major index on the lattice")]
+    time: Annotated[list[float], Field(description="s")]
+
+
+class EventsOut(BaseModel):
+    """Slip onset and end, contact touch and release."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "onset": {"element": [189, 190], "time": [2.1, 2.133]},
+                    "end": {"element": [], "time": []},
+                    "touch": {"element": [189, 190], "time": [0.5, 0.5]},
+                    "release": {"element": [], "time": []},
+                }
+            ]
+        }
+    )
+
+    onset: EventsOfOneKind
+    end: EventsOfOneKind
+    touch: EventsOfOneKind
+    release: EventsOfOneKind
+
+
+class SamplesOut(BaseModel):
+    """Friction samples of a log, one entry an element and frame."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "friction_coefficient": [0.41],
+                    "tangential_velocity": [0.0012],
+                    "normal_force": [0.05],
+                    "tangential_force": [0.0205],
+                    "time": [2.133],
+                    "element": [190],
+                    "weight": [0.97],
+                    "element_area": 1.0e-6,
+                }
+            ]
+        }
+    )
+
+    friction_coefficient: list[float]
+    tangential_velocity: Annotated[list[float], Field(description="m/s")]
+    normal_force: Annotated[list[float], Field(description="N on the element")]
+    tangential_force: Annotated[list[float], Field(description="N on the element")]
+    time: Annotated[list[float], Field(description="s")]
+    element: Annotated[list[int], Field(description="Row-major index on the lattice")]
+    weight: Annotated[list[float], Field(description="Probability that the element did slip")]
+    element_area: Annotated[float, Field(description="m²")]
+
+
+class HealthOut(BaseModel):
+    """The process lives."""
+
+    status: Literal["ok"] = "ok"
+
+
+class ReadyOut(BaseModel):
+    """The service can take work."""
+
+    status: Literal["ready"] = "ready"
+    database: Literal["ok"] = "ok"
+    blobs: Literal["ok"] = "ok"
+
+
+class WrongValue(BaseModel):
+    """One of several things that were wrong."""
+
+    name: str
+    value: str | None
+    allowed: str | None
+
+
+class ProblemOut(BaseModel):
+    """Problem details, RFC 9457."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "type": "/problems/invalid-request",
+                    "title": "A value in the request is not allowed",
+                    "status": 422,
+                    "detail": "quantile is 1.5; allowed: less than 1",
+                    "instance": "/v1/materials/paper/friction",
+                    "name": "quantile",
+                    "value": "1.5",
+                    "allowed": "less than 1",
+                }
+            ]
+        }
+    )
+
+    type: Annotated[str, Field(description="Stable; docs/problems.md has them all")]
+    title: str
+    status: int
+    detail: str
+    instance: str
+    name: Annotated[str | None, Field(description="What was wrong")] = None
+    value: str | None = None
+    allowed: str | None = None
+    errors: list[WrongValue] | None = None

@@ -1,0 +1,57 @@
+"""Settings of the service, each from an environment variable of the same name with the prefix ``STICTION_``."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, field_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+MIB = 2**20
+
+
+class Settings(BaseSettings):
+    """Everything that can be set, with its valid range (docs/settings.md)."""
+
+    model_config = SettingsConfigDict(env_prefix="STICTION_", frozen=True, extra="forbid")
+
+    data_folder: Path = Field(
+        default=Path("stiction-data"),
+        description="Folder of the raw uploads, of results and of the SQLite file. One server owns it at a time.",
+    )
+    database_url: str | None = Field(
+        default=None,
+        description="SQLAlchemy URL of the database; by default the SQLite file `stiction.sqlite3` in the data folder.",
+    )
+    migrate_at_start: bool = Field(
+        default=True,
+        description="Bring the database to this version's schema at start; otherwise an old one stops the start.",
+    )
+    host: str = Field(default="127.0.0.1", description="Address to listen on.")
+    port: Annotated[int, Field(ge=0, le=65535)] = Field(
+        default=8000, description="Port to listen on; 0 takes a free one."
+    )
+    max_upload_bytes: Annotated[int, Field(ge=1, le=2**40)] = Field(
+        default=256 * MIB, description="Largest grasp log that is accepted, in bytes."
+    )
+    workers: Annotated[int, Field(ge=1, le=64)] = Field(
+        default=1, description="Worker processes that detect and fit; the server process itself never does."
+    )
+    job_attempts: Annotated[int, Field(ge=1, le=10)] = Field(
+        default=3, description="How often a job may lose its worker process before it has failed."
+    )
+    shutdown_seconds: Annotated[float, Field(ge=0.0, le=600.0)] = Field(
+        default=10.0,
+        description="How long a stopping server waits for running jobs, in s; the next start takes up the rest.",
+    )
+
+    @field_validator("database_url")
+    @classmethod
+    def _shared_by_processes(cls, url: str | None) -> str | None:
+        if url is not None and (":memory:" in url or url in {"sqlite://", "sqlite:///"}):
+            raise ValueError("a database in memory is not seen by the worker processes; allowed: a file or a server")
+        return url
+
+    @property
+    def resolved_database_url(self) -> str:
+        """The database's URL: the one that was set, or that of the SQLite file in the data folder."""
+        return self.database_url or f"sqlite:///{self.data_folder.resolve() / 'stiction.sqlite3'}"

@@ -1,0 +1,147 @@
+"""Results of the numerics in the form in which they are stored, and back."""
+
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from db.records import Detection, NewModel, SampleSummary
+from estimators.friction_model import Cost, Domain, FrictionModel
+from slipcore.frames import FloatArray
+from slipcore.samples import FrictionSamples
+from slipcore.slip_state import EventList, SlipEvents, SlipHistory
+
+EVENT_KINDS = ("onset", "end", "touch", "release")
+SAMPLE_ARRAYS = tuple(entry.name for entry in fields(FrictionSamples) if entry.name != "element_area")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StoredHistory:
+    """What is kept of a slip history: ``time`` [t] s, ``stick_ratio`` [t] (NaN without contact) and the events."""
+
+    time: FloatArray
+    stick_ratio: FloatArray
+    events: SlipEvents
+
+
+def encode_history(history: SlipHistory) -> bytes:
+    """A history as bytes, the same for the same history."""
+    events = [getattr(history.events, kind) for kind in EVENT_KINDS]
+    return _pack([history.time, history.stick_ratio, *(part for each in events for part in (each.element, each.time))])
+
+
+def decode_history(path: Path) -> StoredHistory:
+    """The history in a blob."""
+    time, stick_ratio, *parts = _unpack(path, 2 + 2 * len(EVENT_KINDS))
+    events = [EventList(*pair) for pair in zip(parts[0::2], parts[1::2], strict=True)]
+    return StoredHistory(time, stick_ratio, SlipEvents(*events))
+
+
+def encode_samples(samples: FrictionSamples) -> bytes:
+    """Samples as bytes, the same for the same samples."""
+    return _pack([*(getattr(samples, name) for name in SAMPLE_ARRAYS), np.array(samples.element_area)])
+
+
+def decode_samples(path: Path) -> FrictionSamples:
+    """The samples in a blob."""
+    *arrays, element_area = _unpack(path, len(SAMPLE_ARRAYS) + 1)
+    return FrictionSamples(**dict(zip(SAMPLE_ARRAYS, arrays, strict=True)), element_area=float(element_area))
+
+
+def summarise_history(history: SlipHistory, seconds: float, blob: str) -> Detection:
+    """A history in numbers."""
+    in_contact = ~np.isnan(history.stick_ratio)
+    events = history.events
+    return Detection(
+        method=history.method,
+        noise=finite_or_none(history.noise),
+        stick_ratio_min=float(history.stick_ratio[in_contact].min()) if in_contact.any() else None,
+        contact_frames=int(in_contact.sum()),
+        macro_slip_frames=int(history.macro_slip.sum()),
+        onsets=len(events.onset),
+        ends=len(events.end),
+        touches=len(events.touch),
+        releases=len(events.release),
+        seconds=seconds,
+        history_blob=blob,
+    )
+
+
+def summarise_samples(samples: FrictionSamples, none_because: str | None, blob: str) -> SampleSummary:
+    """Samples in numbers."""
+    return SampleSummary(
+        count=len(samples),
+        none_because=none_because,
+        element_area=samples.element_area,
+        friction_coefficient_mean=float(samples.friction_coefficient.mean()) if len(samples) else None,
+        tangential_velocity=_range(samples.tangential_velocity),
+        normal_force=_range(samples.normal_force),
+        samples_blob=blob,
+    )
+
+
+def to_new_model(model: FrictionModel) -> NewModel:
+    """A fitted model as it is stored."""
+    return NewModel(
+        method=model.method,
+        coefficients=tuple(model.coefficients.tolist()),
+        covariance=tuple(tuple(line) for line in model.covariance.tolist()),
+        scale=float(model.scale),
+        n=int(model.n),
+        degrees_of_freedom=finite_or_none(model.degrees_of_freedom),
+        tangential_velocity=model.domain.tangential_velocity,
+        normal_force=model.domain.normal_force,
+        identifiable=tuple(model.identifiable.tolist()),
+        element_area=float(model.element_area),
+        diagnostics={name: _plain(value) for name, value in model.diagnostics.items()},
+        cost_seconds=float(model.cost.seconds),
+        monte_carlo_error=float(model.cost.monte_carlo_error),
+    )
+
+
+def to_friction_model(stored: NewModel) -> FrictionModel:
+    """A stored model as one that predicts; its draws are not kept."""
+    degrees = stored.degrees_of_freedom
+    return FrictionModel(
+        method=stored.method,
+        coefficients=np.array(stored.coefficients),
+        covariance=np.array(stored.covariance),
+        scale=stored.scale,
+        n=stored.n,
+        degrees_of_freedom=math.inf if degrees is None else degrees,
+        domain=Domain(stored.tangential_velocity, stored.normal_force),
+        identifiable=np.array(stored.identifiable),
+        element_area=stored.element_area,
+        cost=Cost(stored.cost_seconds, stored.monte_carlo_error),
+    )
+
+
+def finite_or_none(value: float) -> float | None:
+    """The value, or None where JSON and SQL have no word for it."""
+    return float(value) if math.isfinite(value) else None
+
+
+def _plain(value: float | str) -> float | str | None:
+    return value if isinstance(value, str) else finite_or_none(value)
+
+
+def _range(values: FloatArray) -> tuple[float, float] | None:
+    return (float(values.min()), float(values.max())) if len(values) else None
+
+
+def _pack(arrays: Sequence[NDArray[Any]]) -> bytes:
+    """Arrays one after the other in the .npy format; unlike a zip, it holds no moment of writing."""
+    buffer = io.BytesIO()
+    for array in arrays:
+        np.save(buffer, array, allow_pickle=False)
+    return buffer.getvalue()
+
+
+def _unpack(path: Path, count: int) -> list[NDArray[Any]]:
+    with path.open("rb") as stream:
+        return [np.load(stream, allow_pickle=False) for _ in range(count)]

@@ -1,0 +1,75 @@
+"""What runs in a worker process: module-level functions that take plain values."""
+
+import logging
+import multiprocessing
+import os
+import signal
+import threading
+from dataclasses import dataclass
+from functools import cache
+from multiprocessing.connection import wait
+from pathlib import Path
+
+from db.blobs import BlobStore
+from db.database import Database
+from db.errors import StorageUnavailable
+from db.repositories import jobs
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a worker finds its work: URL of the database and folder of the blobs."""
+
+    database_url: str
+    data_folder: Path
+
+
+def start() -> None:
+    """Prepare the process: it ends when the server tells it to or is gone, not by a Ctrl-C meant for the server."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def warm_up() -> int:
+    """Import and try all that a first job would wait for; returns the process's id."""
+    import estimators
+    import slipcore
+    from service import pipeline
+    from slipcore.contact import ramp
+
+    try:
+        log = ramp.tangential_ramp(points=8, pitch=1.5e-3)
+        estimators.fit(slipcore.collect_samples(log, slipcore.detect_slip(log)), method="ols")
+    except Exception:
+        logger.exception("the %s is not warmed up; its first job will be slow", pipeline.__name__)
+    return os.getpid()
+
+
+def run_job(place: Place, job_id: str) -> None:
+    """Do a job and leave its end in the database; raises ``StorageUnavailable``, for then nobody can write there."""
+    from service import pipeline  # imports the numerics, which the server process does without
+
+    database, blobs = _stores(place)
+    try:
+        pipeline.run_job(database, blobs, job_id)
+    except StorageUnavailable:
+        raise
+    except Exception as error:
+        logger.exception("job %s failed", job_id)
+        with database.write() as session:
+            jobs.finish(session, job_id, "failed", reason=f"{type(error).__name__}: {error}")
+
+
+@cache
+def _stores(place: Place) -> tuple[Database, BlobStore]:
+    return Database(place.database_url), BlobStore(place.data_folder)
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)  # a worker that waits for work would otherwise wait for ever

@@ -1,0 +1,145 @@
+import io
+import itertools
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+import uvicorn
+
+from db import migrate
+from db.blobs import BlobStore
+from db.database import Database
+from service.app import create_app
+from service.settings import Settings
+from slipcore import GraspLog
+from slipcore.contact.ramp import RampSchedule, tangential_ramp
+from stiction_client.container import encode
+
+NPZ = "application/vnd.stiction.grasp-log+npz"
+SHORT = RampSchedule(rest=0.2, press=0.5, settle=0.3, shear=1.5, hold=0.2)
+
+Members = dict[str, Any]
+
+
+@contextmanager
+def serve(settings: Settings) -> Iterator[httpx.Client]:
+    """A real server on a free loopback port, in a thread of this process (its workers are processes)."""
+    config = uvicorn.Config(create_app(settings), port=0, log_level="warning", ws="none")
+    server = uvicorn.Server(config)
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    while not server.started:
+        assert thread.is_alive(), "the server did not start"
+        time.sleep(0.005)
+    port = server.servers[0].sockets[0].getsockname()[1]
+    with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60.0) as client:
+        yield client
+    server.should_exit = True
+    thread.join()
+
+
+@pytest.fixture(scope="session")
+def serving() -> Callable[[Settings], AbstractContextManager[httpx.Client]]:
+    return serve
+
+
+@pytest.fixture(scope="session")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
+    """A client of one server that all tests share: each makes materials of its own."""
+    folder = tmp_path_factory.mktemp("served")
+    with serve(Settings(data_folder=folder, max_upload_bytes=2 * 2**20)) as client:
+        client.headers["x-data-folder"] = str(folder)
+        yield client
+
+
+_numbers = itertools.count(1)
+
+
+@pytest.fixture
+def material(client: httpx.Client) -> str:
+    name = f"material {next(_numbers)}"
+    client.post("/v1/materials", json={"name": name}).raise_for_status()
+    return name
+
+
+@pytest.fixture(scope="session")
+def ramp() -> GraspLog:
+    """Pressed, then sheared: 82 frames of 8×8 markers, μ = 0.4."""
+    return tangential_ramp(points=8, pitch=1.5e-3, schedule=SHORT, marker_noise=1e-7, force_noise=1e-6, seed=1)
+
+
+@pytest.fixture(scope="session")
+def content(ramp: GraspLog) -> bytes:
+    return encode(ramp)
+
+
+@pytest.fixture(scope="session")
+def members(content: bytes) -> Members:
+    """The members of the ramp's container; replace some and ``repack``."""
+    with np.load(io.BytesIO(content)) as archive:
+        return dict(archive)
+
+
+@pytest.fixture(scope="session")
+def repack() -> Callable[[Members], bytes]:
+    def pack(members: Members) -> bytes:
+        buffer = io.BytesIO()
+        np.savez(buffer, **members)
+        return buffer.getvalue()
+
+    return pack
+
+
+@pytest.fixture(scope="session")
+def upload() -> Callable[..., httpx.Response]:
+    def send(client: httpx.Client, content: bytes, content_type: str = NPZ, **query: str) -> httpx.Response:
+        return client.post("/v1/grasp-logs", params=query, content=content, headers={"content-type": content_type})
+
+    return send
+
+
+@pytest.fixture(scope="session")
+def wait() -> Callable[[httpx.Client, str], Members]:
+    def until_finished(client: httpx.Client, job_id: str) -> Members:
+        deadline = time.monotonic() + 60.0
+        while time.monotonic() < deadline:
+            job: Members = client.get(f"/v1/jobs/{job_id}").raise_for_status().json()
+            if job["finished_at"] is not None:
+                return job
+            time.sleep(0.01)
+        raise AssertionError(f"job {job_id} does not end: {job}")
+
+    return until_finished
+
+
+@pytest.fixture(scope="session")
+def fitted(
+    client: httpx.Client, content: bytes, upload: Callable[..., httpx.Response], wait: Callable[..., Members]
+) -> Members:
+    """A log of the material "fitted" that went all the way."""
+    client.post("/v1/materials", json={"name": "fitted"}).raise_for_status()
+    accepted = upload(client, content, material="fitted")
+    assert accepted.status_code == httpx.codes.ACCEPTED, accepted.text
+    job = wait(client, accepted.json()["job"]["id"])
+    assert job["status"] == "done", job
+    log: Members = client.get(accepted.headers["location"]).json()
+    return log
+
+
+@pytest.fixture
+def database(tmp_path: Path) -> Iterator[Database]:
+    database = Database(f"sqlite:///{tmp_path / 'stiction.sqlite3'}")
+    migrate.upgrade(database)
+    yield database
+    database.close()
+
+
+@pytest.fixture
+def blobs(tmp_path: Path) -> BlobStore:
+    return BlobStore(tmp_path)

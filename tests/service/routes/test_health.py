@@ -1,0 +1,27 @@
+import shutil
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+import httpx
+
+from service.settings import Settings
+
+
+def test_the_process_lives_and_takes_work(client: httpx.Client) -> None:
+    assert client.get("/healthz").json() == {"status": "ok"}
+    assert client.get("/readyz").json() == {"status": "ready", "database": "ok", "blobs": "ok"}
+
+
+def test_readiness_names_what_is_missing(
+    serving: Callable[[Settings], AbstractContextManager[httpx.Client]], tmp_path: Path
+) -> None:
+    with serving(Settings(data_folder=tmp_path, shutdown_seconds=0)) as client:
+        assert client.get("/readyz").status_code == httpx.codes.OK
+        shutil.rmtree(tmp_path / "spool")
+        response = client.get("/readyz")
+        assert client.get("/healthz").status_code == httpx.codes.OK
+    assert response.status_code == httpx.codes.SERVICE_UNAVAILABLE
+    assert response.headers["retry-after"] == "1"
+    assert response.json()["type"] == "/problems/storage-unavailable"
+    assert "blob folder" in response.json()["detail"]

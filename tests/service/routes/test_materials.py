@@ -1,0 +1,185 @@
+from collections.abc import Callable
+from typing import Any
+
+import httpx
+import pytest
+
+Wait = Callable[[httpx.Client, str], dict[str, Any]]
+
+
+def test_a_new_material_is_there_from_then_on(client: httpx.Client) -> None:
+    made = client.post("/v1/materials", json={"name": "card board", "description": "brown"})
+    assert made.status_code == httpx.codes.CREATED
+    assert made.headers["location"] == "/v1/materials/card%20board"
+    assert client.get(made.headers["location"]).json() == made.json()
+    assert made.json() | {"created_at": None} == {
+        "name": "card board",
+        "description": "brown",
+        "created_at": None,
+        "grasp_logs": 0,
+        "models": {},
+    }
+    assert made.json() in client.get("/v1/materials").json()["items"]
+
+
+def test_a_second_material_of_that_name_is_refused(client: httpx.Client, material: str) -> None:
+    response = client.post("/v1/materials", json={"name": material})
+    assert response.status_code == httpx.codes.CONFLICT
+    assert response.json()["type"] == "/problems/material-exists"
+    assert response.json()["value"] == material
+
+
+@pytest.mark.parametrize(
+    ("body", "name"),
+    [
+        ({"name": ""}, "name"),
+        ({"name": " paper"}, "name"),
+        ({"name": "a/b"}, "name"),
+        ({"name": "ü"}, "name"),
+        ({"name": "paper\n"}, "name"),
+        ({"name": "x" * 101}, "name"),
+        ({"name": 5}, "name"),
+        ({}, "name"),
+        ({"name": "ok", "description": "x" * 10_001}, "description"),
+        ({"name": "ok", "colour": "red"}, "colour"),
+    ],
+)
+def test_a_material_that_cannot_be_is_refused_by_name(client: httpx.Client, body: object, name: str) -> None:
+    response = client.post("/v1/materials", json=body)
+    assert response.status_code == httpx.codes.UNPROCESSABLE_ENTITY
+    problem = response.json()
+    assert (problem["type"], problem["name"]) == ("/problems/invalid-request", name)
+    assert problem["allowed"]
+    assert problem["detail"] == f"{name} is {problem['value']}; allowed: {problem['allowed']}"
+
+
+def test_every_wrong_value_is_listed(client: httpx.Client) -> None:
+    problem = client.post("/v1/materials", json={"name": "", "description": 1}).json()
+    assert [entry["name"] for entry in problem["errors"]] == ["name", "description"]
+
+
+@pytest.mark.parametrize(
+    ("content", "content_type", "status", "kind"),
+    [
+        (b'{"name": ', "application/json", 422, "invalid-request"),
+        (b'["paper"]', "application/json", 422, "invalid-request"),
+        (b"\xff\xfe", "application/json", 422, "invalid-request"),
+        (b"name=paper", "application/x-www-form-urlencoded", 415, "unsupported-format"),
+        (b'{"name": "paper"}', "text/plain", 415, "unsupported-format"),
+        (b'{"name": "' + b"x" * 70_000 + b'"}', "application/json", 413, "upload-too-large"),
+    ],
+)
+def test_a_body_that_is_no_material_is_refused(
+    client: httpx.Client, content: bytes, content_type: str, status: int, kind: str
+) -> None:
+    response = client.post("/v1/materials", content=content, headers={"content-type": content_type})
+    assert response.headers["content-type"] == "application/problem+json"
+    assert (response.status_code, response.json()["type"]) == (status, f"/problems/{kind}")
+
+
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [("GET", ""), ("GET", "/friction?fn=0.05"), ("GET", "/fits"), ("POST", "/fits")],
+)
+def test_an_unknown_material_is_named(client: httpx.Client, method: str, path: str) -> None:
+    response = client.request(method, f"/v1/materials/felt{path}", json={} if method == "POST" else None)
+    assert response.status_code == httpx.codes.NOT_FOUND
+    problem = response.json()
+    assert (problem["type"], problem["name"], problem["value"]) == ("/problems/unknown-material", "material", "felt")
+
+
+def test_a_material_without_a_model_says_so(client: httpx.Client, material: str) -> None:
+    response = client.get(f"/v1/materials/{material}/friction", params={"fn": 0.05})
+    assert response.status_code == httpx.codes.CONFLICT
+    assert response.json()["type"] == "/problems/no-model"
+    assert client.get(f"/v1/materials/{material}/fits").json() == {"items": []}
+
+
+@pytest.mark.usefixtures("fitted")
+def test_the_friction_of_a_fitted_material_is_its_truth(client: httpx.Client) -> None:
+    mean = client.get("/v1/materials/fitted/friction", params={"fn": 0.1}).json()
+    assert mean["friction_coefficient"] == mean["mean"] == pytest.approx(0.4, abs=0.004)
+    assert (mean["material"], mean["method"], mean["version"]) == ("fitted", "ols", 1)
+    assert (mean["tangential_velocity"], mean["normal_force"], mean["quantile"]) == (0.0, 0.1, None)
+    assert (mean["within_domain"], mean["warning"]) == (True, None)
+
+
+@pytest.mark.usefixtures("fitted")
+def test_a_low_quantile_lies_below_the_mean_and_a_high_one_above(client: httpx.Client) -> None:
+    answers = [
+        client.get("/v1/materials/fitted/friction", params={"v": 1e-4, "fn": 0.1, "quantile": quantile}).json()
+        for quantile in (0.05, 0.5, 0.95)
+    ]
+    low, middle, high = (answer["friction_coefficient"] for answer in answers)
+    assert low < middle < high
+    assert middle == pytest.approx(answers[0]["mean"], rel=1e-12)
+
+
+@pytest.mark.usefixtures("fitted")
+@pytest.mark.parametrize(
+    ("query", "word"),
+    [({"fn": 50.0}, "normal force is 50 N, outside"), ({"fn": 0.1, "v": 3.0}, "tangential velocity is 3 m/s, outside")],
+)
+def test_a_question_outside_the_samples_is_answered_with_a_warning(
+    client: httpx.Client, query: dict[str, float], word: str
+) -> None:
+    answer = client.get("/v1/materials/fitted/friction", params=query).json()
+    assert answer["within_domain"] is False
+    assert word in answer["warning"]
+
+
+@pytest.mark.usefixtures("fitted")
+@pytest.mark.parametrize(
+    ("query", "name"),
+    [
+        ({"fn": 0.1, "quantile": 0.0}, "quantile"),
+        ({"fn": 0.1, "quantile": 1.0}, "quantile"),
+        ({"fn": 0.1, "quantile": 1.5}, "quantile"),
+        ({"fn": 0.1, "quantile": "nan"}, "quantile"),
+        ({"fn": 0.1, "v": -1e-3}, "v"),
+        ({"fn": 0.1, "v": "inf"}, "v"),
+        ({"fn": "nan"}, "fn"),
+        ({"fn": "much"}, "fn"),
+        ({}, "fn"),
+        ({"fn": 0.1, "method": "guess"}, "method"),
+    ],
+)
+def test_a_question_that_cannot_be_is_refused_by_name(client: httpx.Client, query: dict[str, Any], name: str) -> None:
+    response = client.get("/v1/materials/fitted/friction", params=query)
+    assert response.status_code == httpx.codes.UNPROCESSABLE_ENTITY
+    problem = response.json()
+    assert (problem["type"], problem["name"]) == ("/problems/invalid-request", name)
+    assert problem["value"] == str(float(query[name]) if name == "quantile" else query.get(name, "missing"))
+    assert problem["allowed"]
+
+
+def test_a_fit_on_request_is_a_new_current_version(client: httpx.Client, fitted: dict[str, Any], wait: Wait) -> None:
+    before = client.get("/v1/materials/fitted/fits", params={"method": "bayes"}).json()["items"]
+    asked = client.post("/v1/materials/fitted/fits", json={"method": "bayes", "seed": 3})
+    assert asked.status_code == httpx.codes.ACCEPTED
+    job = asked.json()
+    assert asked.headers["location"] == f"/v1/jobs/{job['id']}"
+    assert (job["kind"], job["material"], job["grasp_log"]) == ("fit", "fitted", None)
+    done = wait(client, job["id"])
+    assert (done["status"], done["model_version"]) == ("done", len(before) + 1)
+    models = client.get("/v1/materials/fitted/fits").json()["items"]
+    assert [model["method"] for model in models if model["current"]] == ["bayes", "ols"]
+    bayes = client.get("/v1/materials/fitted").json()["models"]["bayes"]
+    assert bayes == models[0]
+    assert bayes["coefficients"][0] == pytest.approx(0.4, abs=0.004)
+    assert bayes["n"] == fitted["detection"]["samples"]
+
+
+def test_a_fit_without_samples_is_refused_with_the_reason(client: httpx.Client, material: str, wait: Wait) -> None:
+    job = wait(client, client.post(f"/v1/materials/{material}/fits", json={}).json()["id"])
+    assert (job["status"], job["stage"], job["model_version"]) == ("refused", "friction_model", None)
+    assert job["reason"] == "no grasp log of this material has friction samples yet"
+
+
+def test_head_is_get_without_the_body(client: httpx.Client, material: str) -> None:
+    for path in ("/v1/materials", f"/v1/materials/{material}", "/v1/materials/felt"):
+        get, head = client.get(path), client.head(path)
+        assert head.status_code == get.status_code
+        assert head.content == b""
+        assert head.headers["content-length"] == get.headers["content-length"] == str(len(get.content))
+        assert head.headers["content-type"] == get.headers["content-type"]

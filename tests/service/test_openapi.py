@@ -1,0 +1,62 @@
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service import schemas
+from service.app import create_app
+from service.settings import Settings
+
+DESCRIPTION = create_app(Settings()).openapi()
+OPERATIONS = {
+    f"{method.upper()} {path}": operation
+    for path, operations in DESCRIPTION["paths"].items()
+    for method, operation in operations.items()
+}
+
+
+def test_each_route_is_documented_for_people_and_nothing_else_is() -> None:
+    page = (Path(__file__).parents[2] / "docs/api.md").read_text()
+    assert set(re.findall(r"`((?:GET|POST) /[^`?]+)`", page)) == set(OPERATIONS)
+
+
+def test_operations_have_names_of_their_own() -> None:
+    names = [operation["operationId"] for operation in OPERATIONS.values()]
+    assert len(set(names)) == len(names) == 14
+
+
+@pytest.mark.parametrize("operation", OPERATIONS.values(), ids=OPERATIONS)
+def test_each_route_is_described_with_its_errors(operation: dict[str, Any]) -> None:
+    assert operation["summary"]
+    assert operation["description"]
+    for status, response in operation["responses"].items():
+        media_type = "application/json" if int(status) < 400 else "application/problem+json"
+        assert list(response["content"]) == [media_type]
+        if int(status) >= 400:
+            assert response["content"][media_type]["schema"] == {"$ref": "#/components/schemas/ProblemOut"}
+            assert "/problems/" in response["description"]
+
+
+@pytest.mark.parametrize("operation", OPERATIONS.values(), ids=OPERATIONS)
+def test_each_parameter_is_described(operation: dict[str, Any]) -> None:
+    for parameter in operation.get("parameters", []):
+        assert parameter["in"] == "path" or parameter["description"], parameter["name"]
+
+
+EXAMPLES = [
+    (getattr(schemas, name), example)
+    for name in DESCRIPTION["components"]["schemas"]
+    for example in getattr(schemas, name).model_json_schema().get("examples", [])
+]
+
+
+@pytest.mark.parametrize(("schema", "example"), EXAMPLES, ids=lambda value: getattr(value, "__name__", ""))
+def test_each_example_is_valid(schema: type[schemas.BaseModel], example: dict[str, Any]) -> None:
+    assert schema.model_validate(example).model_dump(mode="json", exclude_unset=True) == example
+
+
+def test_what_goes_over_the_wire_has_an_example() -> None:
+    without = {"FrictionModelsOut", "MaterialsOut", "DomainOut", "CostOut", "EventCounts", "EventsOfOneKind"}
+    without |= {"HealthOut", "ReadyOut", "WrongValue"}
+    assert {schema.__name__ for schema, _ in EXAMPLES} == set(DESCRIPTION["components"]["schemas"]) - without

@@ -1,0 +1,52 @@
+import re
+from pathlib import Path
+
+import pytest
+from pydantic import ValidationError
+
+from service.settings import Settings
+
+DOCUMENTED = dict(
+    re.findall(r"^\| `STICTION_(\w+)` \| (.+?) \|", (Path(__file__).parents[2] / "docs/settings.md").read_text(), re.M)
+)
+
+
+def test_each_setting_is_documented_and_nothing_else_is() -> None:
+    assert sorted(DOCUMENTED) == sorted(name.upper() for name in Settings.model_fields)
+
+
+@pytest.mark.parametrize("name", Settings.model_fields)
+def test_the_documented_default_is_the_default(name: str) -> None:
+    default = Settings.model_fields[name].default
+    shown = DOCUMENTED[name.upper()].replace("`", "")
+    expected = "SQLite file" if default is None else str(default).lower() if isinstance(default, bool) else str(default)
+    assert shown.startswith(expected.removesuffix(".0"))
+
+
+def test_a_setting_comes_from_the_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("STICTION_DATA_FOLDER", str(tmp_path))
+    monkeypatch.setenv("STICTION_WORKERS", "3")
+    settings = Settings()
+    assert settings.workers == 3
+    assert settings.resolved_database_url == f"sqlite:///{tmp_path / 'stiction.sqlite3'}"
+    assert Settings(database_url="postgresql://db/stiction").resolved_database_url == "postgresql://db/stiction"
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("port", 65536),
+        ("port", -1),
+        ("max_upload_bytes", 0),
+        ("workers", 0),
+        ("workers", 65),
+        ("job_attempts", 0),
+        ("shutdown_seconds", -1.0),
+        ("database_url", "sqlite://"),
+        ("database_url", "sqlite:///:memory:"),
+        ("data_foldre", "typo"),
+    ],
+)
+def test_a_value_outside_its_range_is_refused_by_name(name: str, value: object) -> None:
+    with pytest.raises(ValidationError, match=name):
+        Settings.model_validate({name: value})
