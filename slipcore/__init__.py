@@ -1,11 +1,18 @@
 """Tactile frames to friction samples: numerics only (frames → strain → events → slip_state → samples)."""
 
+from slipcore.defaults import Option, SampleOptions, StrainRateLiteralOptions, StrainRateOptions, describe_options
+from slipcore.detector import DetectorState, SlipDetector, collect_history, detect_slip
+from slipcore.element_forces import ElementForces, contact_factor, element_forces, stick_ratio
 from slipcore.errors import InvalidInput, NoForces, SlipcoreError
 from slipcore.frames import Frame, FrictionLaw, GraspLog, GroundTruth
-from slipcore.samples import FrictionSamples
+from slipcore.methods import METHODS
+from slipcore.samples import FrictionSamples, collect_samples
 from slipcore.slip_state import EventList, SlipEvents, SlipHistory, SlipState
 
 __all__ = [
+    "METHODS",
+    "DetectorState",
+    "ElementForces",
     "EventList",
     "Frame",
     "FrictionLaw",
@@ -14,8 +21,20 @@ __all__ = [
     "GroundTruth",
     "InvalidInput",
     "NoForces",
+    "Option",
+    "SampleOptions",
+    "SlipDetector",
     "SlipEvents",
     "SlipHistory",
     "SlipState",
     "SlipcoreError",
+    "StrainRateLiteralOptions",
+    "StrainRateOptions",
+    "collect_history",
+    "collect_samples",
+    "contact_factor",
+    "describe_options",
+    "detect_slip",
+    "element_forces",
+    "stick_ratio",
 ]

@@ -1,6 +1,11 @@
 """Every default of slipcore, with unit, source and valid range."""
 
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Annotated, NamedTuple, TypeVar, get_type_hints
+
+from slipcore.errors import InvalidInput
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +30,145 @@ class Limits:
     """rad, cumulative."""
     normal_length: float = 1e-3
     """Largest deviation of a unit normal's length from 1; float32 and rounding in files stay below."""
+    coincidence: float = 1e-6
+    """Rows and columns of markers that enclose less than this angle, rad, are in one line."""
+    inclination: float = 10.0
+    """Largest factor 1/(ẑ·n): a face steeper than 84° is not measured by markers seen along z."""
 
 
 LIMITS = Limits()
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseDefaults:
+    """The online estimate of measurement noise."""
+
+    memory: int = 31
+    """Frames whose estimates are kept; about a second at 30 fps, so that a burst of motion is outvoted."""
+    least_series: int = 4
+    """Series that must have changed for a frame to tell anything."""
+    deviation_to_sigma: float = 1.4826022185056018
+    """1/Φ⁻¹(¾): median absolute deviation of a normal distribution to its standard deviation."""
+
+
+NOISE = NoiseDefaults()
+
+
+class Option(NamedTuple):
+    """What an option means: valid range (both ends allowed), unit, and where its default comes from."""
+
+    low: float
+    high: float
+    unit: str
+    source: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """Named options, each annotated with what it means."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactOptions(Options):
+    """How any method tells which elements touch: from forces where there are any, from the pressed shape otherwise."""
+
+    contact_pressure: Annotated[float, Option(0.0, 1e6, "Pa", "well under the ~100 kPa of a fingertip's grasp")] = 500.0
+    """Least normal force over element area."""
+    contact_force_share: Annotated[
+        float, Option(0.0, 0.9, "-", "reconstructed forces ring with 2 % of their peak outside the contact")
+    ] = 0.05
+    """Least share of the frame's largest normal force."""
+    contact_depth: Annotated[float, Option(0.0, 0.05, "m", "above the drift of a sensor at rest")] = 3e-5
+    """Least indentation, without forces."""
+    contact_depth_share: Annotated[
+        float, Option(0.0, 0.99, "-", "½ on a half-space (Hertz), less on a bonded gel; 0.2 to 0.3 agrees with forces")
+    ] = 0.3
+    """Least share of the frame's deepest indentation, without forces."""
+    contact_noise: Annotated[float, Option(0.0, 100.0, "standard deviations", "one false touch in 10⁶ frames")] = 5.0
+    """Least multiple of the estimated noise of force or indentation."""
+    release_share: Annotated[float, Option(0.0, 1.0, "-", "hysteresis against flicker at the edge")] = 0.7
+    """An element in contact is released under this share of what it takes to touch."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StrainRateOptions(ContactOptions):
+    """Method ``strain_rate``: extreme events of the signed strain rate, in physical time."""
+
+    smoothing_time: Annotated[float, Option(0.0, 10.0, "s", "three frames at 30 fps; slip fronts last longer")] = 0.1
+    """Least time constant of the low-pass on the strain rate; 0 takes the rate of the last interval alone."""
+    longest_smoothing_time: Annotated[float, Option(0.0, 100.0, "s", "a grasp's load changes within a second")] = 1.0
+    """Greatest time constant: noise lengthens it until the rate is known to ``rate_floor``."""
+    memory_time: Annotated[float, Option(1e-3, 1e3, "s", "closed-form ramps of 1.5 to 6 s")] = 10.0
+    """Time constant of the running mean and deviation; a short one learns from the slip that it should find."""
+    threshold: Annotated[float, Option(0.5, 100.0, "standard deviations", "3 σ")] = 3.0
+    """How far an extreme event lies from the running mean."""
+    influence: Annotated[float, Option(0.0, 1.0, "-", "closed-form ramps; hardly matters")] = 0.3
+    """Weight with which an extreme value is learnt from."""
+    rate_floor: Annotated[float, Option(1e-9, 1e3, "1/s", "1 % strain in 2 s is no slip front")] = 5e-3
+    """Least standard deviation of the strain rate; estimated marker noise raises it."""
+    growth_rate: Annotated[float, Option(0.0, 1e3, "1/s", "excludes slow growth by normal contact")] = 0.3
+    """Least rate over strain of a slip onset: the paper's "0.1 × strain / Δt", at no particular frame rate."""
+    settling_time: Annotated[float, Option(0.0, 10.0, "s", "the transient of a touch dissipates in 30 ms")] = 0.1
+    """After a touch, strain changes count as pressing for so long."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StrainRateLiteralOptions(ContactOptions):
+    """Method ``strain_rate_literal``: as printed in the paper, for comparison; its lag is counted in frames."""
+
+    lag: Annotated[int, Option(2, 1000, "frames", "did best at 30 fps")] = 10
+    """Frames in the running mean and standard deviation."""
+    threshold: Annotated[float, Option(0.5, 100.0, "standard deviations", "van Brakel's example")] = 3.5
+    """How far an extreme event lies from the running mean."""
+    influence: Annotated[float, Option(0.0, 1.0, "-", "van Brakel's example")] = 0.5
+    """Weight with which an extreme value is learnt from."""
+    rate_floor: Annotated[float, Option(1e-9, 1e3, "1/s", "rounding only; the paper has no floor")] = 1e-9
+    """Least standard deviation of the strain rate."""
+    growth_share: Annotated[float, Option(0.0, 10.0, "-", "paper, section II-D")] = 0.1
+    """A positive event must exceed this share of the strain, per frame."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SampleOptions(Options):
+    """Which slipping elements give a friction sample."""
+
+    least_velocity: Annotated[float, Option(0.0, 1.0, "m/s", "creep of a gel at rest")] = 1e-5
+    """Least tangential velocity: slower points are most likely stuck and would drag μ down."""
+    velocity_to_noise: Annotated[float, Option(0.0, 100.0, "-", "3 σ of one velocity component")] = 3.0
+    """Least tangential velocity over its noise, √2 σ_marker over the interval."""
+    least_force_share: Annotated[float, Option(0.0, 0.99, "-", "the rim, where forces are least certain")] = 0.1
+    """Least normal force as a share of the frame's largest."""
+    force_to_noise: Annotated[float, Option(0.0, 1e3, "-", "bias of 1/f_n is (σ/f_n)²: 0.25 %")] = 20.0
+    """Least normal force over its noise: μ = f_t/f_n is heavy-tailed and biased below."""
+    force_noise: Annotated[float, Option(0.0, 1e3, "N", "NaN: estimated from the log")] = math.nan
+    """Standard deviation of an element's normal force."""
+    least_weight: Annotated[float, Option(0.0, 1.0, "-", "more likely slip than not")] = 0.5
+    """Least probability of slip."""
+
+
+DEFAULT_METHOD = "strain_rate"
+
+Kind = TypeVar("Kind", bound=Options)
+
+
+def describe_options(kind: type[Options]) -> dict[str, Option]:
+    """Unit, valid range and source of every option of a method or of sampling, by name."""
+    hints = get_type_hints(kind, include_extras=True)
+    return {entry.name: hints[entry.name].__metadata__[0] for entry in fields(kind)}
+
+
+def choose_options(kind: type[Kind], given: Mapping[str, float]) -> Kind:
+    """Defaults with the ``given`` options in their place.
+
+    Raises ``InvalidInput`` naming an option that does not exist, is not a number or lies outside its range.
+    """
+    known = describe_options(kind)
+    for name, value in given.items():
+        if name not in known:
+            raise InvalidInput("option", name, ", ".join(sorted(known)))
+        low, high, unit, _ = known[name]
+        whole = isinstance(kind.__dataclass_fields__[name].default, int)
+        number = isinstance(value, int if whole else (int, float)) and not isinstance(value, bool)
+        if not number or not low <= value <= high:
+            raise InvalidInput(name, value, f"{'a whole number, ' if whole else ''}{low:g} to {high:g} {unit}")
+    return kind(**given)

@@ -2,12 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slipcore.errors import InvalidInput
-from slipcore.frames import FloatArray
+from slipcore.defaults import SampleOptions, choose_options
+from slipcore.element_forces import ElementForces, element_forces
+from slipcore.errors import InvalidInput, NoForces
+from slipcore.frames import BoolArray, FloatArray, GraspLog
+from slipcore.noise import estimate_noise
+from slipcore.slip_state import SlipHistory
+from slipcore.strain import Lattice, surface_normal
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,3 +54,84 @@ class FrictionSamples:
             entry.name: np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(cls)[:-1]
         }
         return cls(**joined, element_area=areas[0])
+
+
+def collect_samples(log: GraspLog, history: SlipHistory, **options: float) -> FrictionSamples:
+    """Observe friction where ``history`` says that elements of ``log`` slip: f_t/f_n, velocity and forces.
+
+    Only at compressed elements in contact, of observable velocity above what noise alone makes (a stuck point's
+    f_t/f_n is below the friction coefficient) and of normal force well above its noise. The tangential force is freed
+    of what noise adds to a magnitude. A log without (observable) slip gives no samples, of length 0.
+    ``options``: see ``defaults.SampleOptions``.
+    Raises ``NoForces`` for a log without forces, ``InvalidInput`` for a history of another log and for bad options.
+    """
+    chosen = choose_options(SampleOptions, options)
+    if log.force is None:
+        raise NoForces("friction samples need the force on each element, and the log has none")
+    _check_same(log, history)
+    normal = surface_normal(Lattice.at_rest(log.position), log.displacement) if log.normal is None else log.normal
+    forces = element_forces(log.force, normal)
+    noise = _force_noise(log, forces, chosen)
+    speed = np.sqrt(np.einsum("...k,...k->...", history.velocity, history.velocity))
+    keep = (
+        history.slip
+        & history.contact
+        & (history.probability >= chosen.least_weight)
+        & _fast_enough(log, history, speed, chosen)
+        & _pressed_enough(forces, noise.normal, chosen)
+    )
+    frame, element = np.nonzero(keep.reshape(len(log), -1))
+    f_n, f_t = forces.normal[keep], _without_noise(forces.tangential[keep], noise.tangential)
+    return FrictionSamples(
+        friction_coefficient=f_t / f_n,
+        tangential_velocity=speed[keep],
+        normal_force=f_n,
+        tangential_force=f_t,
+        time=log.time[frame],
+        element=element.astype(np.int64),
+        weight=history.probability[keep],
+        element_area=log.element_area,
+    )
+
+
+def _check_same(log: GraspLog, history: SlipHistory) -> None:
+    expected = (len(log), *log.grid)
+    if history.contact.shape != expected:
+        raise InvalidInput("history", f"of shape {list(history.contact.shape)}", f"the log's own, {list(expected)}")
+    if not np.array_equal(history.time, log.time):
+        raise InvalidInput("history", "at other times than the log", "the log's own")
+
+
+def _fast_enough(log: GraspLog, history: SlipHistory, speed: FloatArray, options: SampleOptions) -> BoolArray:
+    interval = np.diff(log.time, prepend=-np.inf)[:, None, None]
+    noise = np.sqrt(2.0) * np.nan_to_num(history.noise) / interval
+    fast: BoolArray = speed > np.maximum(options.least_velocity, options.velocity_to_noise * noise)
+    return fast
+
+
+class _ForceNoise(NamedTuple):
+    """Standard deviation of an element's normal force and of one tangential component, N."""
+
+    normal: float
+    tangential: float
+
+
+def _force_noise(log: GraspLog, forces: ElementForces, options: SampleOptions) -> _ForceNoise:
+    if not np.isnan(options.force_noise):
+        return _ForceNoise(options.force_noise, options.force_noise)
+    assert log.force is not None
+    plane = log.force[..., :2].reshape(len(log), -1, 2).swapaxes(1, 2)
+    normal = estimate_noise(log.time, forces.pressing.reshape(len(log), 1, -1))
+    return _ForceNoise(float(np.nan_to_num(normal)), float(np.nan_to_num(estimate_noise(log.time, plane))))
+
+
+def _without_noise(tangential: FloatArray, noise: float) -> FloatArray:
+    """Noise across a small force only ever lengthens it, by σ²/(2 f_t) on average: 3 % at f_t = 4 σ."""
+    return np.sqrt(np.maximum(tangential**2 - noise**2, 0.0))
+
+
+def _pressed_enough(forces: ElementForces, noise: float, options: SampleOptions) -> BoolArray:
+    peak = forces.pressing.max(axis=(1, 2))
+    least = np.maximum(options.force_to_noise * noise, options.least_force_share * peak)
+    enough: BoolArray = forces.pressing > np.maximum(least, 0.0)[:, None, None]
+    return enough

@@ -64,3 +64,23 @@ class SlipHistory:
     events: SlipEvents
     noise: float
     method: str
+
+
+def slip_events(time: FloatArray, contact: BoolArray, slip: BoolArray) -> SlipEvents:
+    """The changes of state in ``contact`` and ``slip`` [t, n, m] at times [t] s.
+
+    A release ends slip without an ``end``: what let go did not stick again. The first frame changes nothing.
+    """
+    was, now = contact[:-1], contact[1:]
+    slipped, slips = slip[:-1], slip[1:]
+    return SlipEvents(
+        onset=_event_list(time, slips & ~slipped),
+        end=_event_list(time, slipped & ~slips & now),
+        touch=_event_list(time, now & ~was),
+        release=_event_list(time, was & ~now),
+    )
+
+
+def _event_list(time: FloatArray, changed: BoolArray) -> EventList:
+    frame, row, column = np.nonzero(changed)
+    return EventList(row * changed.shape[2] + column, time[frame + 1])

@@ -1,0 +1,51 @@
+"""What a detection method is given, and what it answers."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, NamedTuple, TypeVar
+
+from slipcore.defaults import ContactOptions
+from slipcore.element_forces import ElementForces
+from slipcore.frames import BoolArray, FloatArray
+from slipcore.strain import Lattice
+
+State = TypeVar("State")
+Options = TypeVar("Options", bound=ContactOptions)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Observation:
+    """One frame as every method sees it, with what is common to all of them already worked out.
+
+    ``time`` s; ``interval`` s since the frame before; ``displacement`` [n, m, 3] m; ``normal`` [n, m, 3] outward;
+    ``forces`` split at the surface, or None; ``contact`` and ``touched`` (in contact now, not before) [n, m];
+    ``object_pose`` [3] or None; ``noise`` of a marker coordinate, m, NaN while unknown.
+    """
+
+    time: float
+    interval: float
+    displacement: FloatArray
+    normal: FloatArray
+    forces: ElementForces | None
+    contact: BoolArray
+    touched: BoolArray
+    object_pose: FloatArray | None
+    noise: float
+
+
+class Decision(NamedTuple):
+    """Slip of each element [n, m] and its probability [n, m]; outside the contact it is not looked at."""
+
+    slip: BoolArray
+    probability: FloatArray
+
+
+class Method(NamedTuple, Generic[State, Options]):
+    """A detection method: its options, and pure functions on an immutable state of its own choosing.
+
+    ``init`` takes the first frame, on which every element sticks; ``step`` takes each later one.
+    """
+
+    options: type[Options]
+    init: Callable[[Lattice, Observation, Options], State]
+    step: Callable[[State, Lattice, Observation, Options], tuple[State, Decision]]

@@ -1,0 +1,80 @@
+"""Planar rigid motion between frames, and the velocity of the surface relative to the object."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from slipcore.frames import BoolArray, FloatArray
+
+
+class RigidMotion(NamedTuple):
+    """A finite motion in the plane: turn by ``rotation`` rad about ``start`` and carry it by ``translation`` m.
+
+    ``start`` and ``translation`` are (x, y) in m. All NaN where the motion is unobservable.
+    """
+
+    start: tuple[float, float]
+    translation: tuple[float, float]
+    rotation: float
+
+    def displacement(self, points: FloatArray) -> FloatArray:
+        """How far the motion carries points [..., 2] m: [..., 2] m; exact for finite rotation.
+
+        cos φ − 1 is taken as −2 sin²(φ/2), so that a tiny motion of far points keeps its digits.
+        """
+        sine, versine = math.sin(self.rotation), 2.0 * math.sin(0.5 * self.rotation) ** 2
+        arm = points - np.array(self.start)
+        turn = np.array([[-versine, -sine], [sine, -versine]])
+        moved: FloatArray = arm @ turn.T + np.array(self.translation)
+        return moved
+
+    @property
+    def observable(self) -> bool:
+        """Whether the motion is known."""
+        return math.isfinite(self.rotation)
+
+
+UNOBSERVABLE = RigidMotion((math.nan, math.nan), (math.nan, math.nan), math.nan)
+
+
+def fit_rigid_motion(points: FloatArray, moved: FloatArray, weight: FloatArray | None = None) -> RigidMotion:
+    """The rigid motion that best explains displacements ``moved`` [k, 2] m of ``points`` [k, 2] m.
+
+    Weighted least squares in closed form (planar Procrustes problem), exact for finite rotation. ``weight`` [k] ≥ 0.
+    Fewer than two distinct points of positive weight leave it ``UNOBSERVABLE``.
+    """
+    w = np.ones(len(points)) if weight is None else weight
+    total = w.sum()
+    if not total > 0.0:
+        return UNOBSERVABLE
+    start, translation = (w @ points) / total, (w @ moved) / total
+    arm, turn = points - start, moved - translation
+    spread = float(w @ (arm * arm).sum(axis=1))
+    if not spread > (np.finfo(float).eps * np.abs(points).max()) ** 2 * total:
+        return UNOBSERVABLE
+    sine = float(w @ (arm[:, 0] * turn[:, 1] - arm[:, 1] * turn[:, 0]))
+    cosine = spread + float(w @ (arm * turn).sum(axis=1))
+    return RigidMotion(
+        (float(start[0]), float(start[1])), (float(translation[0]), float(translation[1])), math.atan2(sine, cosine)
+    )
+
+
+def pose_motion(before: FloatArray, after: FloatArray) -> RigidMotion:
+    """The rigid motion between two object poses (x m, y m, yaw rad)."""
+    x, y, yaw = (float(value) for value in before)
+    return RigidMotion((x, y), (float(after[0]) - x, float(after[1]) - y), float(after[2]) - yaw)
+
+
+def relative_velocity(
+    points: FloatArray, moved: FloatArray, observed: BoolArray, motion: RigidMotion, interval: float
+) -> FloatArray:
+    """Tangential velocity of surface elements relative to an object in rigid motion: [n, m, 2] m/s.
+
+    ``points`` [n, m, 2] m where the elements stood, ``moved`` [n, m, 2] m their displacement in ``interval`` s.
+    NaN where not ``observed`` [n, m], and everywhere when the motion is unobservable.
+    """
+    velocity = np.full(points.shape, np.nan)
+    if motion.observable:
+        velocity[observed] = (moved[observed] - motion.displacement(points[observed])) / interval
+    return velocity

@@ -1,0 +1,30 @@
+from dataclasses import fields
+
+import pytest
+
+from slipcore import METHODS, InvalidInput, SampleOptions, describe_options
+from slipcore.defaults import Options, choose_options
+
+KINDS = [SampleOptions, *(method.options for method in METHODS.values())]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_option_has_a_unit_a_source_and_a_default_in_its_range(kind: type[Options]) -> None:
+    described = describe_options(kind)
+    assert described
+    for entry in fields(kind):
+        option = described[entry.name]
+        assert option.unit
+        assert option.source
+        assert option.low < option.high
+        assert entry.name == "force_noise" or option.low <= entry.default <= option.high
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_ends_of_the_range_are_allowed_and_what_lies_beyond_is_refused(kind: type[Options]) -> None:
+    for name, option in describe_options(kind).items():
+        whole = isinstance(getattr(kind(), name), int)
+        for value in (option.low, option.high):
+            assert getattr(choose_options(kind, {name: int(value) if whole else value}), name) == value
+        with pytest.raises(InvalidInput, match=name):
+            choose_options(kind, {name: int(option.high) + 1 if whole else option.high * 1.001})

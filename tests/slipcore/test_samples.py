@@ -1,0 +1,150 @@
+from collections.abc import Callable
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from slipcore import FrictionSamples, GraspLog, InvalidInput, NoForces, SlipHistory, collect_samples, detect_slip
+from slipcore.contact import RampSchedule, tangential_ramp
+
+Scene = Callable[..., GraspLog]
+
+
+@pytest.fixture(scope="module")
+def ramp() -> tuple[GraspLog, SlipHistory]:
+    log = tangential_ramp(marker_noise=1e-6, force_noise=2e-3, seed=20)
+    return log, detect_slip(log)
+
+
+@pytest.mark.parametrize("known_motion", [True, False])
+@pytest.mark.parametrize("friction", [0.2, 0.4, 0.6, 0.8])
+def test_friction_of_a_ramp_is_found_within_two_percent_from_detected_slip(friction: float, known_motion: bool) -> None:
+    log = tangential_ramp(friction=friction, marker_noise=1e-6, force_noise=2e-3, seed=21)
+    log = log if known_motion else replace(log, object_pose=None)
+    samples = collect_samples(log, detect_slip(log))
+    assert len(samples) > 300
+    found = np.average(samples.friction_coefficient, weights=samples.weight)
+    assert found == pytest.approx(friction, rel=0.02)
+
+
+def test_friction_of_a_ramp_without_noise_is_exact() -> None:
+    log = tangential_ramp(friction=0.5)
+    samples = collect_samples(log, detect_slip(log))
+    assert len(samples) > 1000
+    # What slips by 10 µm/s is at the Coulomb limit; the median leaves out the frame in which the front passes.
+    # A smooth force looks like 0.1 µN of noise, which is taken off.
+    np.testing.assert_allclose(np.median(samples.friction_coefficient), 0.5, rtol=1e-6)
+    assert samples.friction_coefficient.max() <= 0.5 * (1.0 + 1e-9)
+
+
+def check_samples(samples: FrictionSamples, log: GraspLog, history: SlipHistory) -> None:
+    for entry in fields(samples)[:-1]:
+        values = getattr(samples, entry.name)
+        assert values.shape == (len(samples),)
+        assert values.dtype == (np.int64 if entry.name == "element" else np.float64)
+        assert np.isfinite(values).all()
+    assert (samples.normal_force > 0.0).all()
+    assert (samples.tangential_force >= 0.0).all()
+    assert (samples.tangential_velocity > 0.0).all()
+    assert ((samples.weight > 0.0) & (samples.weight <= 1.0)).all()
+    np.testing.assert_array_equal(samples.friction_coefficient, samples.tangential_force / samples.normal_force)
+    assert (np.diff(samples.time) >= 0.0).all()
+    frame = np.searchsorted(log.time, samples.time)
+    row, column = np.divmod(samples.element, log.grid[1])
+    assert history.slip[frame, row, column].all()
+    assert samples.element_area == log.element_area
+
+
+def test_samples_keep_their_invariants_on_a_ramp(ramp: tuple[GraspLog, SlipHistory]) -> None:
+    samples = collect_samples(*ramp)
+    assert len(samples) > 1000
+    check_samples(samples, *ramp)
+
+
+def test_samples_keep_their_invariants_on_real_recordings(recording: GraspLog) -> None:
+    history = detect_slip(recording)
+    check_samples(collect_samples(recording, history), recording, history)
+
+
+def test_samples_lie_above_the_velocity_and_force_that_noise_makes(ramp: tuple[GraspLog, SlipHistory]) -> None:
+    samples = collect_samples(*ramp)
+    interval = 1 / 30
+    assert samples.tangential_velocity.min() > 2.8 * np.sqrt(2.0) * 1e-6 / interval
+    assert samples.normal_force.min() > 19 * 2e-3
+
+
+def test_a_given_force_noise_takes_the_place_of_the_estimate(ramp: tuple[GraspLog, SlipHistory]) -> None:
+    assert collect_samples(*ramp, force_noise=5e-3).normal_force.min() > 20 * 5e-3
+
+
+def test_without_noise_in_mind_slow_points_drag_the_friction_down(ramp: tuple[GraspLog, SlipHistory]) -> None:
+    log, history = ramp
+    everywhere = replace(history, slip=history.contact, probability=history.contact.astype(float))
+    careless = collect_samples(log, everywhere, velocity_to_noise=0.0, least_velocity=0.0, least_force_share=0.0)
+    careful = collect_samples(log, everywhere)
+    assert careless.friction_coefficient.mean() < 0.3
+    assert careful.friction_coefficient.mean() > 0.36
+
+
+def test_noise_does_not_lengthen_small_tangential_forces() -> None:
+    log = tangential_ramp(friction=0.2, force_noise=2e-3, seed=22)
+    history = detect_slip(log)
+    corrected = collect_samples(log, history)
+    plain = collect_samples(log, history, force_noise=1e-9, force_to_noise=0.0)
+    small = plain.normal_force < 0.06
+    assert plain.friction_coefficient[small].mean() > 0.2 * 1.015
+    small = corrected.normal_force < 0.06
+    assert corrected.friction_coefficient[small].mean() == pytest.approx(0.2, rel=0.015)
+
+
+def test_no_slip_gives_an_empty_set_of_samples() -> None:
+    schedule = RampSchedule(rest=0.2, press=0.5, settle=0.3, shear=0.0, hold=0.5)
+    log = tangential_ramp(tangential_force=0.0, schedule=schedule)
+    samples = collect_samples(log, detect_slip(log))
+    assert len(samples) == 0
+    check_samples(samples, log, detect_slip(log))
+
+
+def test_unobservable_velocity_gives_no_sample() -> None:
+    log = tangential_ramp()
+    history = detect_slip(log)
+    blind = replace(history, velocity=np.full_like(history.velocity, np.nan))
+    assert len(collect_samples(log, blind)) == 0
+
+
+def test_the_probability_of_slip_is_the_weight_and_unlikely_slip_is_left_out(
+    ramp: tuple[GraspLog, SlipHistory],
+) -> None:
+    log, history = ramp
+    likely = replace(history, probability=0.7 * history.slip)
+    np.testing.assert_allclose(collect_samples(log, likely).weight, 0.7, rtol=1e-15)
+    assert len(collect_samples(log, likely, least_weight=0.8)) == 0
+
+
+def test_a_log_without_forces_is_refused() -> None:
+    log = replace(tangential_ramp(), force=None)
+    with pytest.raises(NoForces, match="force"):
+        collect_samples(log, detect_slip(log))
+
+
+def test_a_history_of_another_log_is_refused(ramp: tuple[GraspLog, SlipHistory], short_ramp: GraspLog) -> None:
+    log, history = ramp
+    with pytest.raises(InvalidInput, match="history is of shape"):
+        collect_samples(short_ramp, history)
+    with pytest.raises(InvalidInput, match="history is at other times"):
+        collect_samples(log, replace(history, time=history.time + 1.0))
+
+
+def test_an_unknown_option_is_refused(ramp: tuple[GraspLog, SlipHistory]) -> None:
+    with pytest.raises(InvalidInput, match=r"option is least_speed; allowed: .*least_velocity"):
+        collect_samples(*ramp, least_speed=1.0)
+
+
+def test_samples_of_one_area_are_joined_and_others_refused(ramp: tuple[GraspLog, SlipHistory]) -> None:
+    samples = collect_samples(*ramp)
+    both = FrictionSamples.concatenate([samples, samples])
+    assert len(both) == 2 * len(samples)
+    with pytest.raises(InvalidInput, match="element_area"):
+        FrictionSamples.concatenate([samples, replace(samples, element_area=1.0)])
+    with pytest.raises(InvalidInput, match="weight is of shape"):
+        replace(samples, weight=samples.weight[1:])
