@@ -13,10 +13,6 @@ from stiction_client.errors import InvalidArgument
 
 FloatArray = NDArray[np.float64]
 
-VELOCITY_SLACK = 0.1
-"""Part of the observed range of velocities. A sample needs slip, so v = 0 is never observed: a gap below the slowest
-sample of less than this part of the range is no extrapolation worth a warning."""
-
 
 @dataclass(frozen=True, slots=True)
 class Domain:
@@ -111,17 +107,19 @@ class FrictionModel:
         return np.asarray(mean + special.stdtrit(self.degrees_of_freedom, quantile) * spread)
 
     def extrapolation(self, tangential_velocity: float, normal_force: float) -> str | None:
-        """Which of v (m/s) and f_n (N an element) lies outside the data behind the model; None where neither does."""
-        slow, fast = self.domain.tangential_velocity
-        weak, strong = self.domain.normal_force
-        slack = VELOCITY_SLACK * (fast - slow)
-        remarks = []
-        if not slow - slack <= tangential_velocity <= fast + slack:
-            remarks.append(f"velocity extrapolated: {tangential_velocity:.4g} m/s, observed {slow:.4g} to {fast:.4g}")
-        if not weak <= normal_force <= strong:
-            remarks.append(
-                f"normal force extrapolated: {normal_force:.4g} N an element, observed {weak:.4g} to {strong:.4g}"
-            )
+        """Which of v (m/s) and f_n (N an element) lies outside the data behind the model; None where neither does.
+
+        Slower than the data is not outside: slip is never observed at rest, and a grasp that holds is the limit v → 0.
+        """
+        asked = (
+            ("tangential velocity", tangential_velocity, (0.0, self.domain.tangential_velocity[1]), "m/s"),
+            ("normal force", normal_force, self.domain.normal_force, "N an element"),
+        )
+        remarks = [
+            f"{name} extrapolated to {value:.4g} {unit}, observed {low:.4g} to {high:.4g}"
+            for name, value, (low, high), unit in asked
+            if not low <= value <= high
+        ]
         return "; ".join(remarks) or None
 
 

@@ -19,7 +19,7 @@ OPTIONAL = ("3D_Forces", "3D_Normals")
 MILLIMETRE = 1e-3
 
 REST_TOLERANCE = 1e-4
-"""m; a tenth of the marker pitch. In the recordings that ship with the sensor the rest shape wanders by 0.7 µm."""
+"""m; a tenth of the marker pitch. In the recordings that ship with the sensor's software it is 0.7 µm at most."""
 
 Fields = Mapping[str, NDArray[Any]]
 

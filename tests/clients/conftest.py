@@ -1,6 +1,8 @@
 import asyncio
 import json
-from collections.abc import Callable
+import threading
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -8,8 +10,13 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
+import uvicorn
 
 import stiction_client.flows
+from service.app import create_app
+from service.settings import Settings
+from slipcore import GraspLog
+from slipcore.contact.ramp import RampSchedule, tangential_ramp
 from stiction_client import AsyncFrictionClient, Cost, Domain, FrictionClient, FrictionModel
 
 MODEL = {
@@ -214,3 +221,25 @@ def log() -> PlainLog:
         metadata={"b": "2", "a": "1"},
         truth=truth,
     )
+
+
+@pytest.fixture(scope="session")
+def grasp() -> GraspLog:
+    """Pressed, then sheared with μ = 0.4: 82 frames of 8×8 markers."""
+    schedule = RampSchedule(rest=0.2, press=0.5, settle=0.3, shear=1.5, hold=0.2)
+    return tangential_ramp(points=8, pitch=1.5e-3, schedule=schedule, marker_noise=1e-7, force_noise=1e-6, seed=1)
+
+
+@pytest.fixture(scope="session")
+def service_url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Address of a real service on a free loopback port, in a thread (its workers are processes)."""
+    app = create_app(Settings(data_folder=tmp_path_factory.mktemp("served")))
+    server = uvicorn.Server(uvicorn.Config(app, port=0, log_level="warning", ws="none"))
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    while not server.started:
+        assert thread.is_alive(), "the server did not start"
+        time.sleep(0.005)
+    yield f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+    server.should_exit = True
+    thread.join()

@@ -47,8 +47,8 @@ def test_a_quantile_outside_its_range_is_refused(make_model: Make, quantile: flo
 def test_leaving_the_data_is_named(make_model: Make) -> None:
     model = make_model()
     assert model.extrapolation(1e-3, 0.1) is None
-    assert model.extrapolation(0.0, 0.1) is None  # below the slowest sample, but by less than a tenth of the range
-    assert model.extrapolation(0.005, 0.1) == "velocity extrapolated: 0.005 m/s, observed 1e-05 to 0.004"
+    assert model.extrapolation(0.0, 0.1) is None  # slower than any sample: the limit that a grasp which holds is
+    assert model.extrapolation(0.005, 0.1) == "tangential velocity extrapolated to 0.005 m/s, observed 0 to 0.004"
     both = model.extrapolation(0.005, 0.5)
     assert both is not None
-    assert both.endswith("; normal force extrapolated: 0.5 N an element, observed 0.002 to 0.3")
+    assert both.endswith("; normal force extrapolated to 0.5 N an element, observed 0.002 to 0.3")

@@ -25,6 +25,11 @@ def capacity(model: FrictionModel, force: Any, probability: float, velocity: flo
     return force * model.predict(velocity, force / elements, probability)
 
 
+def rounding(model: FrictionModel, force: Any) -> Any:
+    """What ``capacity`` may be off by: where the quantile nears 0 it is the difference of numbers of this size."""
+    return 1e-13 * np.abs(force * (model.predict(0.0, np.asarray(force) / ELEMENTS) + 1.0))
+
+
 @st.composite
 def models(draw: st.DrawFn) -> FrictionModel:
     """Models of any slope and correlation, on which the capacity may rise, peak, or never get above zero."""
@@ -66,7 +71,7 @@ loads = st.floats(1e-3, 30.0)
 probabilities = st.sampled_from([1e-6, 1e-3, 0.01, 0.1, 0.5])
 velocities = st.sampled_from([0.0, 1e-3, 0.1])
 limits = st.one_of(st.none(), st.floats(0.1, 500.0))
-search = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+search = settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 
 def solve(model: FrictionModel, load: float, probability: float, **options: Any) -> float:
@@ -173,10 +178,10 @@ def test_leaving_the_model_s_data_is_warned_of(make_model: Make) -> None:
     outside = required_normal_force(model, 1e-3, contact_area=AREA)
     assert not outside.within_domain
     assert outside.warning is not None
-    assert outside.warning.startswith("normal force extrapolated: 5")
+    assert outside.warning.startswith("normal force extrapolated to 5")
     fast = required_normal_force(model, 1.0, contact_area=AREA, tangential_velocity=0.02)
     assert fast.warning is not None
-    assert fast.warning.startswith("velocity extrapolated")
+    assert fast.warning.startswith("tangential velocity extrapolated")
 
 
 @pytest.mark.parametrize(
@@ -222,10 +227,10 @@ def test_the_answer_holds_and_brute_force_finds_no_smaller_one(
     if holds.size:
         assert answer <= holds[0] * (1.0 + 1e-9)
     if np.isfinite(answer):
-        assert capacity(model, answer, probability, velocity) >= load * (1.0 - 1e-9)
+        assert capacity(model, answer, probability, velocity) >= load * (1.0 - 1e-9) - rounding(model, answer)
         assert answer <= (limit or np.inf) * (1.0 + 1e-15)
         below = force[force < answer * (1.0 - 1e-9)]
-        assert (capacity(model, below, probability, velocity) <= load * (1.0 + 1e-9)).all()
+        assert (capacity(model, below, probability, velocity) <= load * (1.0 + 1e-9) + rounding(model, below)).all()
 
 
 @search
@@ -237,7 +242,7 @@ def test_every_force_in_the_interval_holds(model: FrictionModel, load: float, pr
         assume(False)
     top = high if np.isfinite(high) else 100.0 * low
     force = low * (top / low) ** place
-    assert capacity(model, force, probability) >= load * (1.0 - 1e-9)
+    assert capacity(model, force, probability) >= load * (1.0 - 1e-9) - rounding(model, force)
     if np.isfinite(high):
         assert capacity(model, 1.001 * high, probability) < load
 

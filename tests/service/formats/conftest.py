@@ -68,17 +68,18 @@ def log() -> GraspLog:
 
 @pytest.fixture
 def recording_fields() -> dict[str, np.ndarray]:
-    """A synthetic Tac3D recording in its own units: mm, N, one .npy a field; the first two frames are gated."""
+    """A synthetic Tac3D recording in its own units: mm, N, one .npy a field; only frames 3 and 4 are in contact."""
     generator = np.random.default_rng(5)
     frames, side = 6, 4
     y, x = np.meshgrid(-np.arange(side, dtype=float), -np.arange(side, dtype=float), indexing="ij")
     rest = np.stack([x, y, 10.0 - 0.05 * (x**2 + y**2)], axis=-1).reshape(-1, 3)
     displacement = generator.normal(scale=0.1, size=(frames, side * side, 3))
-    displacement[:2] = 0.0
+    gated = [0, 1, 2, 5]
+    displacement[gated] = 0.0
     force = generator.normal(scale=0.05, size=displacement.shape)
-    force[:2] = 0.0
+    force[gated] = 0.0
     noise = np.zeros_like(displacement)
-    noise[:2] = generator.normal(scale=0.02, size=noise[:2].shape)
+    noise[gated] = generator.normal(scale=0.02, size=noise[gated].shape)
     normal = np.zeros_like(displacement)
     normal[..., 2] = 1.0
     return {

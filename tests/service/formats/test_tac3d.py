@@ -34,7 +34,7 @@ def test_the_rest_shape_comes_from_frames_in_contact_only(recording_fields: Fiel
     y, x = -np.mgrid[:4, :4] * 1e-3
     rest = np.stack([x, y, 10e-3 - 50.0 * (x**2 + y**2)], axis=-1)
     np.testing.assert_allclose(log.position, rest, rtol=0, atol=1e-15)  # gated frames carry 20 µm of noise
-    assert log.metadata["gated_frames"] == "2"
+    assert log.metadata["gated_frames"] == "4"
 
 
 def test_a_recording_without_any_contact_takes_the_median_shape(recording_fields: Fields, folder_of: FolderOf) -> None:
