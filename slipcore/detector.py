@@ -30,7 +30,7 @@ from slipcore.methods.interface import Decision, Observation
 from slipcore.noise import NOTHING_SEEN, NoiseState, step_noise
 from slipcore.rigid_motion import fit_rigid_motion, pose_motion, relative_velocity
 from slipcore.slip_state import SlipHistory, SlipState, slip_events
-from slipcore.strain import Lattice, surface_normal
+from slipcore.strain import Lattice, lattice_steps, surface_normal
 from slipcore.touch import contact_from_force, contact_from_shape
 
 
@@ -75,7 +75,8 @@ def init(position: ArrayLike, element_area: float, method: str = DEFAULT_METHOD,
 def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
     """Take one valid frame, later than the last; on the first, every element in contact sticks."""
     setup, memory = state.setup, state.memory
-    normal = surface_normal(setup.lattice, frame.displacement) if frame.normal is None else frame.normal
+    steps = lattice_steps(frame.displacement)
+    normal = surface_normal(setup.lattice, steps) if frame.normal is None else frame.normal
     forces = None if frame.force is None else element_forces(frame.force, normal)
     pressing = _pressing(frame, forces)
     marker_noise = step_noise(state.marker_noise, frame.time, frame.displacement[..., :2].reshape(-1, 2).T)
@@ -86,6 +87,7 @@ def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
         frame.time,
         math.inf if memory is None else frame.time - memory.frame.time,
         frame.displacement,
+        steps,
         normal,
         forces,
         contact,

@@ -30,9 +30,9 @@ def element_forces(force: FloatArray, normal: FloatArray) -> ElementForces:
 
     f_n = |f·n| and f_t = |f − (f·n) n| (paper, eq. 38–39 as magnitudes).
     """
-    along = np.einsum("...k,...k->...", force, normal)
+    along = np.vecdot(force, normal)
     rest = force - along[..., None] * normal
-    return ElementForces(np.abs(along), np.sqrt(np.einsum("...k,...k->...", rest, rest)), along < 0.0)
+    return ElementForces(np.abs(along), np.sqrt(np.vecdot(rest, rest)), along < 0.0)
 
 
 def contact_factor(tangential_force: ArrayLike, normal_force: ArrayLike, friction_coefficient: ArrayLike) -> FloatArray:

@@ -38,7 +38,8 @@ def step_noise(state: NoiseState, time: float, series: FloatArray) -> NoiseState
     (t0, first), (t1, middle) = state.before
     share = (t1 - t0) / (time - t0)
     residual = middle - ((1.0 - share) * first + share * series)
-    residual = residual[:, residual.any(axis=0)]  # a sensor that repeats a value, or is at rest behind a dead zone
+    if not residual.all():  # a sensor that repeats a value, or is at rest behind a dead zone
+        residual = residual[:, residual.any(axis=0)]
     if residual.shape[1] < NOISE.least_series:
         return NoiseState(kept, state.recent, state.sigma)
     gain = math.sqrt(1.0 + (1.0 - share) ** 2 + share**2)

@@ -74,7 +74,8 @@ def relative_velocity(
     ``points`` [n, m, 2] m where the elements stood, ``moved`` [n, m, 2] m their displacement in ``interval`` s.
     NaN where not ``observed`` [n, m], and everywhere when the motion is unobservable.
     """
-    velocity = np.full(points.shape, np.nan)
-    if motion.observable:
-        velocity[observed] = (moved[observed] - motion.displacement(points[observed])) / interval
+    if not motion.observable:
+        return np.full(points.shape, np.nan)
+    velocity = (moved - motion.displacement(points)) / interval
+    velocity[~observed] = np.nan
     return velocity

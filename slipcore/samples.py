@@ -13,7 +13,7 @@ from slipcore.errors import InvalidInput, NoForces
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.noise import estimate_noise
 from slipcore.slip_state import SlipHistory
-from slipcore.strain import Lattice, surface_normal
+from slipcore.strain import Lattice, lattice_steps, surface_normal
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,10 +69,9 @@ def collect_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
     if log.force is None:
         raise NoForces("friction samples need the force on each element, and the log has none")
     _check_same(log, history)
-    normal = surface_normal(Lattice.at_rest(log.position), log.displacement) if log.normal is None else log.normal
-    forces = element_forces(log.force, normal)
+    forces = element_forces(log.force, _normals(log))
     noise = _force_noise(log, forces, chosen)
-    speed = np.sqrt(np.einsum("...k,...k->...", history.velocity, history.velocity))
+    speed = np.sqrt(np.vecdot(history.velocity, history.velocity))
     keep = (
         history.slip
         & history.contact
@@ -92,6 +91,13 @@ def collect_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
         weight=history.probability[keep],
         element_area=log.element_area,
     )
+
+
+def _normals(log: GraspLog) -> FloatArray:
+    if log.normal is not None:
+        return log.normal
+    lattice = Lattice.at_rest(log.position)
+    return np.stack([surface_normal(lattice, lattice_steps(u)) for u in log.displacement])
 
 
 def _check_same(log: GraspLog, history: SlipHistory) -> None:

@@ -1,6 +1,7 @@
 """Surface strain from marker displacement on a lattice (stage 2: strain).
 
-Components stand in front and the lattice behind: a strain is ``[3, n, m]`` in the order xx, yy, xy.
+Components stand in front and the lattice behind: a strain is ``[3, n, m]`` in the order xx, yy, xy. What is taken from
+a displacement starts with its ``lattice_steps`` [2, 3, n, m], worked out once a frame.
 """
 
 from dataclasses import dataclass
@@ -18,11 +19,12 @@ from slipcore.frames import FloatArray, check_position
 class Lattice:
     """The markers at rest and how their rows and columns lie in the sensor's plane.
 
-    ``position`` [n, m, 3] m; ``inverse_jacobian`` [2, 2, n, m] 1/m, d(row, column)/d(x, y) of the index steps that
-    ``lattice_differences`` takes; ``orientation`` +1 or −1: the handedness of (row, column) in (x, y).
+    ``position`` [n, m, 3] m and its ``steps`` [2, 3, n, m] m; ``inverse_jacobian`` [2, 2, n, m] 1/m of these steps in
+    the plane; ``orientation`` +1 or −1: the handedness of (row, column) in (x, y).
     """
 
     position: FloatArray
+    steps: FloatArray
     inverse_jacobian: FloatArray
     orientation: float
 
@@ -35,13 +37,13 @@ class Lattice:
         rest = check_position(position)
         if min(rest.shape[:2]) < 2:
             raise InvalidInput("position", f"{rest.shape[0]} × {rest.shape[1]} markers", "at least 2 × 2 markers")
-        plane = rest[..., :2].transpose(2, 0, 1)
-        (x_i, y_i), (x_j, y_j) = lattice_differences(plane)
+        steps = lattice_steps(rest)
+        (x_i, y_i, _), (x_j, y_j, _) = steps
         determinant = x_i * y_j - x_j * y_i
         orientation = _orientation(determinant, x_i**2 + y_i**2 + x_j**2 + y_j**2)
         inverse = np.array([[y_j, -x_j], [-y_i, x_i]]) / determinant
-        inverse.flags.writeable = False
-        return cls(rest, inverse, orientation)
+        steps.flags.writeable = inverse.flags.writeable = False
+        return cls(rest, steps, inverse, orientation)
 
     @property
     def strain_noise(self) -> FloatArray:
@@ -60,39 +62,38 @@ def _neighbours(size: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return np.minimum(index + 1, size - 1), np.maximum(index - 1, 0)
 
 
-def lattice_differences(field: FloatArray) -> FloatArray:
-    """Differences of a field [..., n, m] along rows and columns: [2, ..., n, m].
+def lattice_steps(field: FloatArray) -> FloatArray:
+    """Differences of a field [n, m, 3] along rows and along columns: [2, 3, n, m].
 
     Central, (i+1) − (i−1), inside and one-sided at the edges, as the numerators and denominators of the paper's
     eq. 27 (with its y row corrected): the step's length cancels in the quotient.
     """
-    result = np.empty((2, *field.shape))
-    for along, axis in enumerate((-2, -1)):
-        ahead, behind = _neighbours(field.shape[axis])
-        np.subtract(field.take(ahead, axis), field.take(behind, axis), out=result[along])
-    return result
+    components = np.ascontiguousarray(field.transpose(2, 0, 1))
+    steps = np.empty((2, *components.shape))
+    for along, axis in enumerate((1, 2)):
+        ahead, behind = _neighbours(components.shape[axis])
+        np.subtract(components.take(ahead, axis), components.take(behind, axis), out=steps[along])
+    return steps
 
 
-def displacement_gradient(lattice: Lattice, displacement: FloatArray) -> FloatArray:
-    """Gradient ∂u_a/∂x_b of displacement [n, m, 2 or 3]: [2, 2, n, m], a before b.
+def displacement_gradient(lattice: Lattice, steps: FloatArray) -> FloatArray:
+    """Gradient ∂u_a/∂x_b, [2, 2, n, m] with a before b, of a displacement with the given ``lattice_steps``.
 
     The paper's eq. 27 generalised with the Jacobian of the rest positions; exact for affine fields on any lattice.
     """
-    steps = lattice_differences(displacement[..., :2].transpose(2, 0, 1))
-    gradient: FloatArray = np.einsum("db...,da...->ab...", lattice.inverse_jacobian, steps)
+    rows, columns = lattice.inverse_jacobian
+    gradient: FloatArray = steps[0, :2, None] * rows + steps[1, :2, None] * columns
     return gradient
 
 
 def green_lagrange(gradient: FloatArray) -> FloatArray:
     """Green–Lagrange strain ½(G + Gᵀ + GᵀG) of a gradient [2, 2, ...]: [3, ...] as xx, yy, xy (paper, eq. 28–30)."""
     (ux_x, ux_y), (uy_x, uy_y) = gradient
-    return np.stack(
-        [
-            ux_x + 0.5 * (ux_x * ux_x + uy_x * uy_x),
-            uy_y + 0.5 * (ux_y * ux_y + uy_y * uy_y),
-            0.5 * (ux_y + uy_x + ux_x * ux_y + uy_x * uy_y),
-        ]
-    )
+    strain = np.empty((3, *ux_x.shape))
+    strain[0] = ux_x + 0.5 * (ux_x * ux_x + uy_x * uy_x)
+    strain[1] = uy_y + 0.5 * (ux_y * ux_y + uy_y * uy_y)
+    strain[2] = 0.5 * (ux_y + uy_x + ux_x * ux_y + uy_x * uy_y)
+    return strain
 
 
 def principal_strains(strain: FloatArray) -> FloatArray:
@@ -110,15 +111,20 @@ def principal_strains(strain: FloatArray) -> FloatArray:
     return np.stack([np.maximum(larger, other), np.minimum(larger, other)])
 
 
-def surface_normal(lattice: Lattice, displacement: FloatArray) -> FloatArray:
-    """Outward unit normal of the surface under displacement [..., n, m, 3]: the same shape (paper, eq. 32)."""
-    rows, columns = lattice_differences(np.moveaxis(lattice.position + displacement, -1, 0))
-    (x_i, y_i, z_i), (x_j, y_j, z_j) = rows, columns
-    normal = np.stack([y_i * z_j - z_i * y_j, z_i * x_j - x_i * z_j, x_i * y_j - y_i * x_j])
-    length = lattice.orientation * np.sqrt(np.einsum("k...,k...->...", normal, normal))
-    length[length == 0.0] = np.inf  # markers that lie in one line have no normal; zero marks it
-    normal /= length
-    return np.moveaxis(normal, 0, -1)
+def surface_normal(lattice: Lattice, steps: FloatArray) -> FloatArray:
+    """Outward unit normal [n, m, 3] of the surface displaced with the given ``lattice_steps`` (paper, eq. 32).
+
+    Zero where markers have come to lie in one line.
+    """
+    (x_i, y_i, z_i), (x_j, y_j, z_j) = lattice.steps + steps
+    normal = np.empty((*x_i.shape, 3))
+    normal[..., 0] = y_i * z_j - z_i * y_j
+    normal[..., 1] = z_i * x_j - x_i * z_j
+    normal[..., 2] = x_i * y_j - y_i * x_j
+    length = np.sqrt(np.vecdot(normal, normal))
+    length[length == 0.0] = np.inf
+    normal *= (lattice.orientation / length)[..., None]
+    return normal
 
 
 def inclination_factor(normal: FloatArray) -> FloatArray:
@@ -130,10 +136,9 @@ def inclination_factor(normal: FloatArray) -> FloatArray:
     return factor
 
 
-def surface_strain(lattice: Lattice, displacement: FloatArray, normal: FloatArray) -> FloatArray:
+def surface_strain(lattice: Lattice, steps: FloatArray, normal: FloatArray) -> FloatArray:
     """Green–Lagrange strain corrected for inclination: [3, n, m] (paper, eq. 27–33)."""
-    strain = green_lagrange(displacement_gradient(lattice, displacement))
-    return strain * inclination_factor(normal)
+    return green_lagrange(displacement_gradient(lattice, steps)) * inclination_factor(normal)
 
 
 def frobenius(strain: FloatArray) -> FloatArray:

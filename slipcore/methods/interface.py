@@ -17,7 +17,8 @@ Options = TypeVar("Options", bound=ContactOptions)
 class Observation:
     """One frame as every method sees it, with what is common to all of them already worked out.
 
-    ``time`` s; ``interval`` s since the frame before; ``displacement`` [n, m, 3] m; ``normal`` [n, m, 3] outward;
+    ``time`` s; ``interval`` s since the frame before; ``displacement`` [n, m, 3] m and its ``steps`` along the lattice
+    [2, 3, n, m] m; ``normal`` [n, m, 3] outward;
     ``forces`` split at the surface, or None; ``contact`` and ``touched`` (in contact now, not before) [n, m];
     ``object_pose`` [3] or None; ``noise`` of a marker coordinate, m, NaN while unknown.
     """
@@ -25,6 +26,7 @@ class Observation:
     time: float
     interval: float
     displacement: FloatArray
+    steps: FloatArray
     normal: FloatArray
     forces: ElementForces | None
     contact: BoolArray

@@ -26,7 +26,7 @@ class StrainRateState:
 def init(lattice: Lattice, seen: Observation, _: StrainRateOptions) -> StrainRateState:
     """Start at rest."""
     shape = seen.contact.shape
-    strain = surface_strain(lattice, seen.displacement, seen.normal)
+    strain = surface_strain(lattice, seen.steps, seen.normal)
     return StrainRateState(strain, np.zeros((3, *shape)), init_score(shape), np.zeros(shape), np.zeros(shape, bool))
 
 
@@ -34,7 +34,7 @@ def step(
     state: StrainRateState, lattice: Lattice, seen: Observation, options: StrainRateOptions
 ) -> tuple[StrainRateState, Decision]:
     """A positive extreme of the signed rate begins slip, a negative one ends it; in between the state holds."""
-    strain = surface_strain(lattice, seen.displacement, seen.normal)
+    strain = surface_strain(lattice, seen.steps, seen.normal)
     if math.isnan(seen.noise):  # a rate that may be noise alone would live on in the low-pass
         return replace(state, strain=strain), Decision(state.slip, state.slip.astype(float))
     strain_noise = seen.noise * lattice.strain_noise

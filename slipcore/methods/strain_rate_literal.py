@@ -48,7 +48,7 @@ def step(
 
 
 def _strains(lattice: Lattice, seen: Observation) -> FloatArray:
-    strain = green_lagrange(displacement_gradient(lattice, seen.displacement))
+    strain = green_lagrange(displacement_gradient(lattice, seen.steps))
     return principal_strains(strain) * inclination_factor(seen.normal)
 
 

@@ -11,7 +11,7 @@ from slipcore.strain import (
     frobenius,
     green_lagrange,
     inclination_factor,
-    lattice_differences,
+    lattice_steps,
     literal_rate,
     principal_strains,
     signed_rate,
@@ -34,13 +34,17 @@ def affine(lattice: Lattice, gradient: np.ndarray) -> np.ndarray:
     return displacement
 
 
+def gradient_of(lattice: Lattice, displacement: np.ndarray) -> np.ndarray:
+    return displacement_gradient(lattice, lattice_steps(displacement))
+
+
 def strain_of(lattice: Lattice, gradient: np.ndarray) -> np.ndarray:
-    return green_lagrange(displacement_gradient(lattice, affine(lattice, gradient)))
+    return green_lagrange(gradient_of(lattice, affine(lattice, gradient)))
 
 
 def test_gradient_of_an_affine_field_is_exact_on_any_lattice(lattice: Lattice) -> None:
     gradient = np.array([[0.03, -0.2], [0.11, 0.05]])
-    found = displacement_gradient(lattice, affine(lattice, gradient))
+    found = gradient_of(lattice, affine(lattice, gradient))
     expected = np.broadcast_to(gradient[:, :, None, None], found.shape)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)  # rounding of mm-sized positions
 
@@ -49,7 +53,7 @@ def test_on_a_regular_lattice_the_gradient_is_the_papers_central_difference() ->
     i, j = np.meshgrid(np.arange(5.0), np.arange(4.0), indexing="ij")
     lattice = Lattice.at_rest(1e-3 * np.stack([i, j, 0 * i], axis=-1))
     u = 1e-5 * np.stack([i**2 + i * j, np.sin(i) - j**3, 0 * i], axis=-1)
-    gradient = displacement_gradient(lattice, u)
+    gradient = gradient_of(lattice, u)
     for k in (0, 1):
         along_x = (u[2:, :, k] - u[:-2, :, k]) / 2e-3
         along_y = (u[:, 2:, k] - u[:, :-2, k]) / 2e-3
@@ -66,7 +70,7 @@ def test_gradient_of_a_smooth_field_converges_with_second_order_inside() -> None
         u = np.zeros_like(curved)
         u[..., 0] = 1e-4 * np.sin(300.0 * curved[..., 0]) * np.cos(200.0 * curved[..., 1])
         exact = 0.03 * np.cos(300.0 * curved[..., 0]) * np.cos(200.0 * curved[..., 1])
-        found = displacement_gradient(Lattice.at_rest(curved), u)[0, 0]
+        found = gradient_of(Lattice.at_rest(curved), u)[0, 0]
         return float(np.abs(found - exact)[1:-1, 1:-1].max())
 
     assert np.log2(error(21) / error(41)) > 1.9
@@ -100,10 +104,13 @@ def test_strain_does_not_see_a_rotation_after_it() -> None:
     np.testing.assert_allclose(turned, plain, rtol=0, atol=1e-12)
 
 
-def test_differences_are_central_inside_and_one_sided_at_the_edges() -> None:
-    field = np.array([[0.0, 1.0, 4.0, 9.0]] * 2)
-    np.testing.assert_array_equal(lattice_differences(field)[1, 0], [1.0, 4.0, 8.0, 5.0])
-    np.testing.assert_array_equal(lattice_differences(field)[0], 0.0)
+def test_steps_are_central_inside_and_one_sided_at_the_edges() -> None:
+    field = np.zeros((2, 4, 3))
+    field[..., 1] = [0.0, 1.0, 4.0, 9.0]
+    steps = lattice_steps(field)
+    np.testing.assert_array_equal(steps[1, 1], [[1.0, 4.0, 8.0, 5.0]] * 2)
+    np.testing.assert_array_equal(steps[0], 0.0)
+    np.testing.assert_array_equal(steps[1, [0, 2]], 0.0)
 
 
 def exact_principal(xx: float, yy: float, xy: float) -> tuple[mpmath.mpf, mpmath.mpf]:
@@ -173,24 +180,24 @@ def test_surface_normal_of_a_tilted_plane_is_its_closed_form(lattice: Lattice) -
     displacement = np.zeros_like(flat.position)
     displacement[..., 2] = 0.3 * flat.position[..., 0] - 0.2 * flat.position[..., 1]
     expected = np.array([-0.3, 0.2, 1.0]) / np.sqrt(0.09 + 0.04 + 1.0)
-    normal = surface_normal(flat, displacement)
+    normal = surface_normal(flat, lattice_steps(displacement))
     np.testing.assert_allclose(normal, np.broadcast_to(expected, normal.shape), rtol=0, atol=1e-12)
 
 
-def test_surface_normal_points_outwards_on_a_dome_and_broadcasts_over_frames() -> None:
+def test_surface_normal_points_outwards_on_a_dome() -> None:
     x, y = np.meshgrid(np.linspace(-5e-3, 5e-3, 41), np.linspace(-5e-3, 5e-3, 41))
     radius = 15e-3
     dome = np.stack([x, y, np.sqrt(radius**2 - x**2 - y**2)], axis=-1)
-    normal = surface_normal(Lattice.at_rest(dome), np.zeros((2, *dome.shape)))
-    np.testing.assert_allclose(normal[1, 1:-1, 1:-1], (dome / radius)[1:-1, 1:-1], rtol=0, atol=2e-4)  # O(pitch²)
+    normal = surface_normal(Lattice.at_rest(dome), np.zeros((2, 3, 41, 41)))
+    np.testing.assert_allclose(normal[1:-1, 1:-1], (dome / radius)[1:-1, 1:-1], rtol=0, atol=2e-4)  # O(pitch²)
 
 
 def test_strain_on_an_inclined_face_is_divided_by_the_normals_z() -> None:
     lattice = plane_lattice()
     displacement = affine(lattice, 0.1 * np.eye(2))
     normal = np.broadcast_to([0.6, 0.0, 0.8], displacement.shape)
-    plain = green_lagrange(displacement_gradient(lattice, displacement))
-    np.testing.assert_allclose(surface_strain(lattice, displacement, normal), plain / 0.8, rtol=1e-14)
+    plain = green_lagrange(gradient_of(lattice, displacement))
+    np.testing.assert_allclose(surface_strain(lattice, lattice_steps(displacement), normal), plain / 0.8, rtol=1e-14)
 
 
 def test_inclination_is_bounded_on_a_vertical_face() -> None:
@@ -201,7 +208,7 @@ def test_inclination_is_bounded_on_a_vertical_face() -> None:
 def test_strain_noise_is_what_random_displacements_show(lattice: Lattice) -> None:
     rng, sigma = np.random.default_rng(5), 1e-7
     noise = sigma * rng.standard_normal((4000, *lattice.position.shape))
-    strain = np.stack([green_lagrange(displacement_gradient(lattice, u)) for u in noise])
+    strain = np.stack([green_lagrange(gradient_of(lattice, u)) for u in noise])
     found = np.sqrt((frobenius(strain.transpose(1, 0, 2, 3)) ** 2).mean(axis=0))
     corner = np.zeros(found.shape, bool)
     corner[np.ix_([0, -1], [0, -1])] = True

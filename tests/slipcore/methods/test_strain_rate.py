@@ -7,7 +7,7 @@ import pytest
 from slipcore import GraspLog, StrainRateOptions, detect_slip
 from slipcore.methods.interface import Observation
 from slipcore.methods.strain_rate import StrainRateState, _noise_gain, init, step
-from slipcore.strain import Lattice
+from slipcore.strain import Lattice, lattice_steps
 
 INTERVAL = 1 / 30
 OPTIONS = StrainRateOptions()
@@ -25,7 +25,16 @@ def seen(stretch: float, touched: bool = False, contact: bool = True, interval: 
     everywhere = np.ones((5, 5), bool)
     normal = np.broadcast_to([0.0, 0.0, 1.0], displacement.shape)
     return Observation(
-        0.0, interval, displacement, normal, None, contact & everywhere, touched & everywhere, None, noise=1e-9
+        time=0.0,
+        interval=interval,
+        displacement=displacement,
+        steps=lattice_steps(displacement),
+        normal=normal,
+        forces=None,
+        contact=contact & everywhere,
+        touched=touched & everywhere,
+        object_pose=None,
+        noise=1e-9,
     )
 
 

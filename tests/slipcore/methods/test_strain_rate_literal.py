@@ -1,14 +1,22 @@
 import numpy as np
 
 from slipcore import GraspLog, detect_slip
-from slipcore.strain import Lattice, displacement_gradient, green_lagrange, literal_rate, principal_strains
+from slipcore.strain import (
+    Lattice,
+    displacement_gradient,
+    green_lagrange,
+    lattice_steps,
+    literal_rate,
+    principal_strains,
+)
 
 
 def as_printed(log: GraspLog, element: tuple[int, int], lag: int, threshold: float, influence: float) -> list[bool]:
     """The paper's section II-D for one element, written out with lists."""
     lattice, flat = Lattice.at_rest(log.position), log.displacement
     strains = [
-        principal_strains(green_lagrange(displacement_gradient(lattice, u)))[(slice(None), *element)] for u in flat
+        principal_strains(green_lagrange(displacement_gradient(lattice, lattice_steps(u))))[(slice(None), *element)]
+        for u in flat
     ]
     filtered, slips, slip = [], [False], False
     for k in range(1, len(log)):
