@@ -1,0 +1,167 @@
+"""Nearest tractions that Coulomb's law and the load allow: {|q_i| ≤ R_i} ∩ {Σq = F, Σ(x × q) = M}.
+
+The dual has three unknowns only, a rigid motion λ: q_i is the nearest point of disk i to w_i + B_i λ, with B_i λ = (λ₁
+− y_i λ₃, λ₂ + x_i λ₃), and λ minimises the convex φ(λ) = Σ h_i(w_i + B_i λ) − λ·target, whose gradient is the
+imbalance. Newton's steps on φ are shortened where its slope along them changes sign. They are never judged by the size
+of the imbalance, which near full sliding hardly falls until the very end.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from slipcore.frames import BoolArray, FloatArray
+
+TIGHT = 2e-14
+"""Imbalance, as a share of the sum of the radii, that rounding allows to reach."""
+
+FLAT = 1e7
+"""Dual, as a multiple of the largest wish and radius, beyond which φ is flat to rounding: the load is at its limit."""
+
+LONGEST = 1e6
+"""Steps a search may grow to: φ is then as good as linear along it."""
+
+
+class Projection(NamedTuple):
+    """``traction`` [2, n]; ``motion`` [3] (the dual λ, zero where the load is not given); ``imbalance`` [3]."""
+
+    traction: FloatArray
+    motion: FloatArray
+    imbalance: FloatArray
+    iterations: int
+    feasible: bool
+
+
+def project(
+    wish: FloatArray,
+    radius: FloatArray,
+    arm: FloatArray,
+    target: FloatArray,
+    given: BoolArray,
+    start: FloatArray | None = None,
+    max_iterations: int = 60,
+) -> Projection:
+    """Project ``wish`` [2, n] on the disks of ``radius`` [n] and on the resultants ``target`` [3] that are ``given``
+    [3].
+
+    ``arm`` [2, n]: x and y of the cells; ``start``: a guess of the dual, from a projection nearby. ``feasible`` is
+    False where no tractions within the disks have that resultant.
+    """
+    first = np.zeros(3) if start is None else np.where(given, start, 0.0)
+    traction = np.empty_like(wish)
+    motion, imbalance, iterations, feasible = _dual_newton(
+        wish, radius, arm, target, given, first, traction, TIGHT * radius.sum(), max_iterations
+    )
+    return Projection(traction, motion, imbalance, iterations, feasible)
+
+
+@njit(cache=True)
+def _dual_newton(wish, radius, arm, target, given, motion, traction, tight, max_iterations):  # type: ignore[no-untyped-def]
+    gradient, hessian = np.empty(3), np.empty((3, 3))
+    trial_gradient, trial_hessian = np.empty(3), np.empty((3, 3))
+    feasible, reach = True, radius.max() + np.abs(wish).max()
+    _evaluate(wish, radius, arm, target, given, motion, traction, gradient, hessian)
+    iteration = 0
+    for iteration in range(max_iterations):  # noqa: B007
+        if np.abs(gradient).max() <= tight:
+            break
+        if np.abs(motion).max() > FLAT * reach or _is_certificate(radius, arm, target, motion):
+            feasible = False
+            break
+        step = -_solve(hessian, gradient, given)
+        # Where all disks are left on one side φ is straight and Newton's step has no length of its own.
+        step *= min(1.0, 2.0 * (reach + np.abs(motion).max()) / max(np.abs(step).max(), 1e-300))
+        motion = _search(
+            wish, radius, arm, target, given, motion, step, gradient, tight, traction, trial_gradient, trial_hessian
+        )
+        gradient[:], hessian[:] = trial_gradient, trial_hessian
+    return motion, gradient, iteration, feasible
+
+
+@njit(cache=True)
+def _search(wish, radius, arm, target, given, motion, step, gradient, tight, traction, trial_gradient, trial_hessian):  # type: ignore[no-untyped-def]
+    """Move along ``step`` to where the slope of φ has at most half its first size, by bracketing and false position."""
+    first = gradient @ step
+    low, low_slope, high, high_slope, length = 0.0, first, np.inf, np.inf, 1.0
+    trial = motion + step
+    for _ in range(60):
+        trial = motion + length * step
+        _evaluate(wish, radius, arm, target, given, trial, traction, trial_gradient, trial_hessian)
+        slope = trial_gradient @ step
+        if abs(slope) <= 0.5 * abs(first) or np.abs(trial_gradient).max() <= tight:
+            break
+        if slope < 0.0:
+            low, low_slope = length, slope
+        else:
+            high, high_slope = length, slope
+        if high == np.inf and length >= LONGEST:
+            break
+        if high == np.inf:
+            length *= 4.0
+        else:
+            share = low_slope / (low_slope - high_slope)
+            length = low + min(max(share, 0.1), 0.9) * (high - low)
+    return trial
+
+
+@njit(cache=True)
+def _evaluate(wish, radius, arm, target, given, motion, traction, gradient, hessian):  # type: ignore[no-untyped-def]
+    """Tractions for a dual ``motion``, the gradient of φ (the imbalance) and its Hessian."""
+    gx, gy, gm = -target[0], -target[1], -target[2]
+    hxx = hxy = hyy = hxm = hym = hmm = 0.0
+    for i in range(radius.size):
+        limit = radius[i]
+        if limit <= 0.0:
+            traction[0, i] = traction[1, i] = 0.0
+            continue
+        x, y = arm[0, i], arm[1, i]
+        qx = wish[0, i] + motion[0] - y * motion[2]
+        qy = wish[1, i] + motion[1] + x * motion[2]
+        size = np.sqrt(qx * qx + qy * qy)
+        jxx, jxy, jyy = 1.0, 0.0, 1.0
+        if size > limit:
+            share = limit / size
+            nx, ny = qx / size, qy / size
+            qx, qy = limit * nx, limit * ny
+            jxx, jxy, jyy = share * ny * ny, -share * nx * ny, share * nx * nx
+        traction[0, i], traction[1, i] = qx, qy
+        gx += qx
+        gy += qy
+        gm += x * qy - y * qx
+        hxx += jxx
+        hxy += jxy
+        hyy += jyy
+        hxm += x * jxy - y * jxx
+        hym += x * jyy - y * jxy
+        hmm += x * x * jyy - 2.0 * x * y * jxy + y * y * jxx
+    gradient[0], gradient[1], gradient[2] = gx * given[0], gy * given[1], gm * given[2]
+    hessian[0, 0], hessian[0, 1], hessian[0, 2] = hxx, hxy, hxm
+    hessian[1, 0], hessian[1, 1], hessian[1, 2] = hxy, hyy, hym
+    hessian[2, 0], hessian[2, 1], hessian[2, 2] = hxm, hym, hmm
+
+
+@njit(cache=True)
+def _solve(hessian, gradient, given):  # type: ignore[no-untyped-def]
+    """Newton's step in the directions whose load is given (Cholesky), with a ridge where φ is flat."""
+    lower, step = np.zeros((3, 3)), np.zeros(3)
+    for i in range(3):
+        for j in range(i):
+            lower[i, j] = (hessian[i, j] * given[i] * given[j] - (lower[i, :j] * lower[j, :j]).sum()) / lower[j, j]
+        diagonal = hessian[i, i] if given[i] else 1.0
+        pivot = diagonal - (lower[i, :i] ** 2).sum()
+        lower[i, i] = np.sqrt(max(pivot, 1e-13 * diagonal, 1e-300))
+    for i in range(3):
+        step[i] = (gradient[i] * given[i] - (lower[i, :i] * step[:i]).sum()) / lower[i, i]
+    for i in range(2, -1, -1):
+        step[i] = (step[i] - (lower[i + 1 :, i] * step[i + 1 :]).sum()) / lower[i, i]
+    return step
+
+
+@njit(cache=True)
+def _is_certificate(radius, arm, target, motion):  # type: ignore[no-untyped-def]
+    """Whether the load does more work on this motion than friction everywhere could take up."""
+    work, taken = target @ motion, 0.0
+    for i in range(radius.size):
+        taken += radius[i] * np.hypot(motion[0] - arm[1, i] * motion[2], motion[1] + arm[0, i] * motion[2])
+    return work > taken * (1.0 + 1e-12)
