@@ -1,0 +1,257 @@
+"""Contact through a sequence of load steps: press, shear, twist, reverse, release.
+
+``start`` gives the state of bodies apart, ``step`` the next state and what happened on the way.
+"""
+
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from slipcore.contact.creep import creep_compliance, creep_recalled, creep_step
+from slipcore.contact.fields import rigid_displacement
+from slipcore.contact.grid import Grid
+from slipcore.contact.kernels import Scaled
+from slipcore.contact.operator import Count, Operators
+from slipcore.contact.problem import Problem, StepLoad
+from slipcore.contact.step_equations import StepEquations, StepSolution
+from slipcore.frames import BoolArray, FloatArray
+
+AT_LIMIT = 1e-3
+"""A cell whose traction is within this share of its limit is at it (contact factor, paper eq. 36)."""
+MOVED = 1e-3
+"""A cell that slips more than this share of the object's motion in the step moves against it."""
+LEAST_SHARE = 1e-3
+"""Tolerances follow a step's increment down to this share of the contact's capacity, where rounding comes near."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class State:
+    """What the next step depends on; fields on the whole grid.
+
+    ``pressure`` [ny, nx], ``traction`` [2, ny, nx] Pa and its last ``change``; ``displacement`` [2, ny, nx] m of the
+    finger against the object's own surface; ``elastic`` [3, ny, nx] m, the finger's displacement without creep;
+    ``creep`` m, one [3, ny, nx] a branch; ``pose`` [3] of the object (m, m, rad); ``load``: the last; ``drive`` [3]:
+    how it differed from the one before.
+    """
+
+    pressure: FloatArray
+    traction: FloatArray
+    change: FloatArray
+    displacement: FloatArray
+    elastic: FloatArray
+    creep: tuple[FloatArray, ...]
+    pose: FloatArray
+    load: StepLoad
+    drive: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StepResult:
+    """What happened in one step; fields on the whole grid [ny, nx], z into the finger.
+
+    ``displacement`` [3, ny, nx] m of the finger's surface; ``force`` [3, ny, nx] N on each cell by the object;
+    ``slip`` [2, ny, nx] m of the finger against the object within this step, zero outside contact; ``contact``,
+    ``at_limit`` (contact factor) and ``moved`` (kinematic slip); ``pose`` [3] and ``approach`` of the object;
+    ``sliding``: nothing sticks; ``residual`` of the natural map (share of the largest limit), ``normal_residual``
+    (share of the indentation), ``imbalance`` (share of μF_N); ``iterations`` (Newton steps), ``applications`` of
+    operators and ``seconds`` it took.
+    """
+
+    displacement: FloatArray
+    force: FloatArray
+    slip: FloatArray
+    contact: BoolArray
+    at_limit: BoolArray
+    moved: BoolArray
+    pose: FloatArray
+    approach: float
+    sliding: bool
+    residual: float
+    normal_residual: float
+    imbalance: float
+    iterations: int
+    applications: Count
+    seconds: float
+
+    @property
+    def stick_ratio(self) -> float:
+        """Stick area over contact area by contact factor (paper, eq. 37 corrected); NaN without contact."""
+        touching = int(self.contact.sum())
+        return float((self.contact & ~self.at_limit).sum()) / touching if touching else float("nan")
+
+
+class QuasiStatic:
+    """A contact problem on a grid. Steps change nothing but the kept operators.
+
+    ``tolerance`` on tractions is relative to what the step can change, so that slip rates hold too;
+    ``normal_tolerance`` on the gap is relative to the indentation.
+    """
+
+    def __init__(self, problem: Problem, grid: Grid, tolerance: float = 1e-5, normal_tolerance: float = 1e-7) -> None:
+        self.problem, self.grid = problem, grid
+        self.tolerance, self.normal_tolerance = tolerance, normal_tolerance
+        self.height, self.friction = problem.height(grid), problem.static_friction(grid)
+        self.count = Count()
+        self.finger = Operators(problem.finger, self.count)
+        self._relaxed: dict[float, Operators] = {}
+
+    def start(self) -> State:
+        """Bodies apart."""
+        zero = np.zeros((3, *self.grid.shape))
+        creep = tuple(zero for _ in self.problem.creep)
+        return State(zero[0], zero[:2], zero[:2], zero[:2], zero, creep, np.zeros(3), StepLoad(0.0), np.zeros(3))
+
+    def run(self, loads: Iterable[StepLoad]) -> Iterator[StepResult]:
+        """Results of loads one after the other, from bodies apart."""
+        state = self.start()
+        for load in loads:
+            state, result = self.step(state, load)
+            yield result
+
+    def step(self, state: State, load: StepLoad) -> tuple[State, StepResult]:
+        """The next state and what happened; raises ``InfeasibleLoad``, ``NotConverged`` and ``InvalidInput``."""
+        began, counted = time.perf_counter(), replace(self.count)
+        recalled = creep_recalled(self.problem.creep, state.creep, state.elastic, load.duration)
+        drive = _drive(state.load, load)
+        equations = StepEquations(
+            self.problem,
+            self.grid,
+            self._operators(load.duration),
+            self.height if recalled is None else self.height + recalled[2],
+            self.friction,
+            -state.displacement if recalled is None else recalled[:2] - state.displacement,
+            load,
+            self.tolerance * self._share(state, load, drive),
+            self.normal_tolerance,
+        )
+        solution = equations.solve(state.pressure, state.traction + _foresight(state.drive, drive) * state.change)
+        after = self._advance(equations, state, load, drive, solution, recalled)
+        result = self._result(equations, state, after, solution)
+        seconds = time.perf_counter() - began
+        return after, replace(result, applications=self.count.since(counted), seconds=seconds)
+
+    def _operators(self, duration: float) -> Operators:
+        """Compliance of both bodies together within a step of this duration."""
+        softening = creep_compliance(self.problem.creep, duration)
+        if softening not in self._relaxed:
+            finger = self.problem.finger
+            if softening != 1.0:
+                finger = tuple(Scaled(body, softening) for body in finger)
+            self._relaxed[softening] = Operators((*finger, *self.problem.obstacle), self.count)
+        return self._relaxed[softening]
+
+    def _share(self, state: State, load: StepLoad, drive: FloatArray) -> float:
+        """How much of the contact's capacity the step can change: what its tolerance is measured by."""
+        before, now = state.load.normal_force, load.normal_force
+        if before is None or now is None or now == 0.0 or not all(load.given):
+            return max(LEAST_SHARE, 0.01)
+        capacity = float(self.friction.max()) * now
+        shear = float(np.hypot(drive[0], drive[1])) + abs(drive[2]) / _lever(state.pressure, self.grid)
+        return float(np.clip(max(abs(now - before) / now, shear / max(capacity, 1e-300)), LEAST_SHARE, 1.0))
+
+    def _advance(
+        self,
+        equations: StepEquations,
+        state: State,
+        load: StepLoad,
+        drive: FloatArray,
+        solution: StepSolution,
+        recalled: FloatArray | None,
+    ) -> State:
+        """The state at the end of the step."""
+        traction, pose = np.zeros_like(state.traction), state.pose.copy()
+        if solution.tangential is not None:
+            traction[:, *solution.box] = solution.tangential.traction
+            pose += solution.tangential.motion
+        pressure = solution.normal.pressure
+        elastic = self._displacement(self.finger, pressure, traction, self._normal_known(solution))
+        if equations.operators.bodies == self.finger.bodies:
+            displacement = elastic[:2]
+        else:
+            displacement = self._displacement(equations.operators, pressure, traction, solution.normal.displacement)[:2]
+        creep = creep_step(self.problem.creep, state.creep, state.elastic, elastic, load.duration)
+        if recalled is not None:
+            displacement = displacement + recalled[:2]
+        return State(pressure, traction, traction - state.traction, displacement, elastic, creep, pose, load, drive)
+
+    def _normal_known(self, solution: StepSolution) -> FloatArray | None:
+        """The finger's normal displacement where the normal solver has it already: no other body, no creep."""
+        alone = not self.problem.obstacle and not self.problem.creep
+        return solution.normal.displacement if alone else None
+
+    def _displacement(
+        self, operators: Operators, pressure: FloatArray, traction: FloatArray, known: FloatArray | None
+    ) -> FloatArray:
+        """Displacement [3, ny, nx] m on the whole grid by pressure and traction; ``known``: its normal part by
+        pressure.
+        """
+        operator = operators.on(self.grid)
+        whole = np.zeros((3, *self.grid.shape))
+        if pressure.any():
+            whole[2] = operator.normal(pressure) if known is None else known
+            if traction.any():
+                whole[:2] = operator.tangential(traction)
+            if self.problem.coupled:
+                whole[2] += operator.normal_by_traction(traction)
+                whole[:2] += operator.tangential_by_pressure(pressure)
+        return whole
+
+    def _result(self, equations: StepEquations, state: State, after: State, solution: StepSolution) -> StepResult:
+        normal, tangential, box = solution.normal, solution.tangential, solution.box
+        contact = normal.pressure > 0.0
+        slip, at_limit, moved = np.zeros_like(after.traction), np.zeros_like(contact), np.zeros_like(contact)
+        if tangential is not None:
+            touching = contact[box]
+            slip[:, *box] = np.where(touching, tangential.slip, 0.0)
+            at_limit[box] = touching & (np.hypot(*tangential.traction) >= (1.0 - AT_LIMIT) * solution.limit)
+            moved[box] = np.hypot(*slip[:, *box]) > self._noticeable(equations, solution, after.pose - state.pose)
+        creep = sum(after.creep, start=np.zeros_like(after.elastic))
+        return StepResult(
+            displacement=after.elastic + creep,
+            force=np.stack((*after.traction, after.pressure)) * self.grid.cell_area,
+            slip=slip,
+            contact=contact,
+            at_limit=at_limit,
+            moved=moved,
+            pose=after.pose,
+            approach=normal.approach,
+            sliding=tangential is not None and tangential.sliding,
+            residual=0.0 if tangential is None else tangential.residual,
+            normal_residual=normal.residual,
+            imbalance=0.0 if tangential is None else tangential.imbalance,
+            iterations=solution.iterations,
+            applications=Count(),
+            seconds=0.0,
+        )
+
+    def _noticeable(self, equations: StepEquations, solution: StepSolution, motion: FloatArray) -> float:
+        """Slip m above which a cell moves against the object: a share of the object's motion, and more than solver
+        noise.
+        """
+        part = self.grid.part(solution.box)
+        carried = float(np.hypot(*rigid_displacement(np.stack(part.points()), motion)).max())
+        kernel = equations.operators.on(part).kernel("xx")
+        compliance = 0.0 if kernel is None else float(kernel[0, 0])
+        return max(MOVED * carried, 10.0 * equations.tolerance * float(solution.limit.max()) * compliance)
+
+
+def _drive(before: StepLoad, load: StepLoad) -> FloatArray:
+    """By how much the step changes what drives the object: load where that is given, otherwise motion [3]."""
+    return np.where(load.given, load.tangential - before.tangential, load.motion)
+
+
+def _foresight(before: FloatArray, drive: FloatArray) -> float:
+    """How far the last step's change of traction goes on in this one: along the same drive, never backward."""
+    size = float((before**2).sum())
+    return min(max(float((before * drive).sum()) / size, 0.0), 2.0) if size > 0.0 else 0.0
+
+
+def _lever(pressure: FloatArray, grid: Grid) -> float:
+    """Half the extent of the contact, m; the grid's where there is none yet."""
+    x, y = grid.points()
+    touching = pressure > 0.0
+    if not touching.any():
+        touching = np.ones_like(touching)
+    return 0.5 * max(float(np.ptp(x[touching])), float(np.ptp(y[touching])), min(grid.pitch))

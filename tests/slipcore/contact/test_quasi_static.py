@@ -1,0 +1,149 @@
+"""Histories of load against closed forms and against scenes of an independent solver."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from slipcore.contact.errors import InfeasibleLoad
+from slipcore.contact.grid import Grid
+from slipcore.contact.kernels import HalfSpace
+from slipcore.contact.problem import MaxwellBranch, Problem, StepLoad
+from slipcore.contact.quasi_static import QuasiStatic
+from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
+from slipcore.contact.reference.mindlin_deresiewicz import MindlinDeresiewicz
+
+SCENES = Path("../shared/data/contact")
+FRICTION, RADIUS, FORCE, YOUNG = 0.4, 15e-3, 10.0, 1e6
+SLIDING = FRICTION * FORCE
+
+
+def sphere_on(poisson: float, **more) -> Problem:
+    heights = (lambda x, y: (x**2 + y**2) / (2.0 * RADIUS),)
+    return Problem((HalfSpace.from_young(YOUNG, poisson),), FRICTION, heights=heights, **more)
+
+
+def shear(normal: float, along_x: float, moment: float = 0.0, duration: float = 1.0) -> StepLoad:
+    return StepLoad(normal, tangential=np.array([along_x, 0.0, moment]), duration=duration)
+
+
+def test_press_shear_reverse_and_release_follow_mindlin_and_deresiewicz(sphere) -> None:
+    case = sphere(64)
+    solver = QuasiStatic(sphere_on(0.0), case.grid)
+    exact = MindlinDeresiewicz(case.hertz, FRICTION)
+    r = np.hypot(*case.grid.points())
+    largest = np.sqrt((exact.load(FORCE, 3.5).traction(r) ** 2).sum())
+    state, _ = solver.step(solver.start(), shear(FORCE, 0.0))
+    for force in (1.0, 2.0, 3.0, 3.5, 2.0, 0.0, -2.0, -3.5, 0.0, 2.5):
+        state, result = solver.step(state, shear(FORCE, force))
+        exact = exact.load(FORCE, force)
+        assert np.sqrt(((state.traction[0] - exact.traction(r)) ** 2).sum()) <= 0.02 * largest
+        assert result.pose[0] == pytest.approx(exact.rigid_displacement, abs=2e-4 * abs(solver.height).max())
+        assert result.imbalance <= 1e-10
+    state, result = solver.step(state, shear(0.0, 0.0))
+    assert not result.contact.any()
+    assert not result.displacement.any()
+    assert np.isnan(result.stick_ratio)
+
+
+def test_raising_the_normal_force_freezes_the_traction_of_an_uncoupled_half_space() -> None:
+    solver = QuasiStatic(sphere_on(0.49), Grid.square(48, 14e-3))
+    state, _ = solver.step(solver.start(), shear(5.0, 0.0))
+    state, before = solver.step(state, shear(5.0, 1.6))
+    state, after = solver.step(state, shear(10.0, 1.6))
+    np.testing.assert_allclose(after.force[:2], before.force[:2], rtol=0.0, atol=1e-4 * before.force[0].max())
+    assert not after.moved.any()
+    assert after.stick_ratio == 1.0
+
+
+def test_a_stop_stops_slip_and_a_reversal_sticks_everywhere_at_once() -> None:
+    solver = QuasiStatic(sphere_on(0.3), Grid.square(48, 11e-3))
+    state, _ = solver.step(solver.start(), shear(FORCE, 0.0))
+    for force in (1.0, 2.0, 3.0):
+        state, loading = solver.step(state, shear(FORCE, force))
+    assert loading.moved.any()
+    state, hold = solver.step(state, shear(FORCE, 3.0))
+    assert not hold.moved.any()
+    assert hold.at_limit.any()  # contact factor and motion are two truths
+    _, back = solver.step(state, shear(FORCE, 2.9))
+    assert back.moved.sum() < 0.05 * back.contact.sum()
+
+
+def test_stick_ratio_is_that_of_cattaneo_and_mindlin(sphere) -> None:
+    case = sphere(64)
+    solver = QuasiStatic(sphere_on(0.0), case.grid)
+    state, _ = solver.step(solver.start(), shear(FORCE, 0.0))
+    for share in (0.2, 0.5, 0.8):
+        state, result = solver.step(state, shear(FORCE, share * SLIDING))
+        exact = CattaneoMindlin(case.hertz, FRICTION, share * SLIDING)
+        assert result.stick_ratio == pytest.approx(exact.stick_ratio, abs=0.01)
+
+
+def test_infeasible_loads_are_refused_and_the_state_before_stays_good() -> None:
+    solver = QuasiStatic(sphere_on(0.3), Grid.square(32, 11e-3))
+    state, _ = solver.step(solver.start(), shear(FORCE, 0.0))
+    with pytest.raises(InfeasibleLoad):
+        solver.step(state, shear(FORCE, 1.5 * SLIDING))
+    assert solver.step(state, shear(FORCE, 0.5 * SLIDING))[1].imbalance <= 1e-10
+
+
+def test_creep_reaches_the_relaxed_solution_and_starts_from_the_glassy_one() -> None:
+    grid, branch = Grid.square(48, 14e-3), MaxwellBranch(strength=0.8, time=1.0)
+    glassy = QuasiStatic(sphere_on(0.5), grid)
+    relaxed = QuasiStatic(
+        Problem((HalfSpace.from_young(YOUNG / 1.8, 0.5),), FRICTION, heights=sphere_on(0.5).heights), grid
+    )
+    creeping = QuasiStatic(sphere_on(0.5, creep=(branch,)), grid)
+    state, first = creeping.step(creeping.start(), shear(FORCE, 0.0, duration=1e-9))
+    expected = glassy.step(glassy.start(), shear(FORCE, 0.0))[1]
+    np.testing.assert_allclose(first.displacement, expected.displacement, rtol=0.0, atol=1e-6 * first.approach)
+    for _ in range(30):
+        state, last = creeping.step(state, shear(FORCE, 0.0, duration=1.0))
+    expected = relaxed.step(relaxed.start(), shear(FORCE, 0.0))[1]
+    np.testing.assert_allclose(last.displacement, expected.displacement, rtol=0.0, atol=1e-6 * last.approach)
+
+
+def test_coupling_presses_the_surface_sideways_and_balances() -> None:
+    solver = QuasiStatic(sphere_on(0.2, coupled=True), Grid.square(40, 11e-3))
+    state, result = solver.step(solver.start(), shear(FORCE, 0.0))
+    assert np.abs(result.force[:2]).max() > 0.02 * FRICTION * result.force[2].max()
+    np.testing.assert_allclose(result.force[:2].sum(axis=(1, 2)), 0.0, atol=1e-10 * FORCE)
+    np.testing.assert_allclose(result.force[0], -result.force[0, :, ::-1], rtol=0.0, atol=1e-3 * result.force[0].max())
+    _, sheared = solver.step(state, shear(FORCE, 2.0))
+    assert sheared.force[0].sum() == pytest.approx(2.0, rel=1e-10)
+
+
+def test_velocity_dependent_friction_meets_its_own_law() -> None:
+    solver = QuasiStatic(sphere_on(0.3, velocity_laws=(lambda v: 2.0 * v,)), Grid.square(32, 11e-3), tolerance=1e-7)
+    state, _ = solver.step(solver.start(), shear(FORCE, 0.0))
+    load = StepLoad(FORCE, motion=np.array([2e-3, 0.0, 0.0]), given=(False, False, False), duration=0.1)
+    _, result = solver.step(state, load)
+    sliding = result.moved & result.contact
+    ratio = np.hypot(*result.force[:2])[sliding] / result.force[2][sliding]
+    velocity = np.hypot(*result.slip)[sliding] / 0.1
+    np.testing.assert_allclose(ratio, FRICTION + 2.0 * velocity, rtol=1e-5)
+
+
+def read_scene(name: str):
+    if not SCENES.exists():
+        pytest.skip("reference scenes of the independent solver are not here")
+    return np.load(SCENES / f"{name}.npz")
+
+
+@pytest.mark.parametrize("name", ["cond1", "cond4"])
+def test_scenes_of_an_independent_solver_are_met(name: str) -> None:
+    scene = read_scene(name)
+    grid = Grid.square(64, 16e-3)
+    solver = QuasiStatic(sphere_on(float(scene["nu"])), grid)
+    loads = [shear(n, t, 1e-3 * m) for n, t, m in zip(scene["F_N"], scene["F_T"], scene["M"], strict=True)]
+    rows = [int(np.argmin(abs(grid.y - 1e-3 * y))) for y in scene["y"]]
+    columns = [int(np.argmin(abs(grid.x - 1e-3 * x))) for x in scene["x"]]
+    points = np.ix_(rows, columns)
+    for k, result in enumerate(solver.run(loads)):
+        expected = 1e-3 * np.moveaxis(scene["u"][k], -1, 0)
+        atol = 1e-5 * np.abs(scene["u"]).max() * 1e-3  # single precision in the file
+        np.testing.assert_allclose(result.displacement[:, *points], expected, rtol=0.0, atol=atol)
+        np.testing.assert_array_equal(result.contact[points], scene["contact"][k])
+        np.testing.assert_array_equal(result.at_limit[points], scene["slip_contact_factor"][k])
+        np.testing.assert_array_equal(result.moved[points], scene["slip_kinematic"][k])
+        assert result.stick_ratio == pytest.approx(scene["stick_ratio"][k], abs=1e-3, nan_ok=True)
