@@ -1,68 +1,85 @@
 """Bayesian fit by emcee: the posterior of a likelihood, sampled until its Monte-Carlo error is small enough."""
 
 import time
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from estimators import ols
-from estimators.defaults import PRIOR, REFERENCE, SAMPLING
-from estimators.errors import NotConverged
+from estimators.conjugate import exact_posterior, sensitivity
+from estimators.defaults import SAMPLING
+from estimators.errors import InvalidSamples, NotConverged
 from estimators.evidence import Evidence
-from estimators.friction_model import Cost, FrictionModel
-from estimators.identifiability import effects, identifiable
-from estimators.least_squares import solve
+from estimators.friction_model import FrictionModel
 from estimators.likelihoods.gaussian import gaussian
+from estimators.likelihoods.grasp_effects import grasp_effects
 from estimators.likelihoods.posterior import Posterior
+from estimators.reporting import Diagnostics, report
 from estimators.sampling import Chain, sample
 
-FloatArray = NDArray[np.float64]
+
+class Likelihood(NamedTuple):
+    """How a posterior is made from evidence, and the accuracy it is sampled to unless told otherwise."""
+
+    posterior: Callable[[Evidence], Posterior]
+    accuracy: float
+
+
+LIKELIHOODS = {
+    "gaussian": Likelihood(gaussian, SAMPLING.accuracy),
+    "grasp_effects": Likelihood(grasp_effects, SAMPLING.accuracy),
+}
+
+
+def default_likelihood(evidence: Evidence) -> str:
+    """A random intercept per cluster wherever there are clusters, else independent errors."""
+    return "grasp_effects" if 1 < evidence.clusters < evidence.n else "gaussian"
 
 
 def fit(
-    evidence: Evidence, accuracy: float | None = None, seconds: float | None = None, seed: int = 0
+    evidence: Evidence,
+    likelihood: str | None = None,
+    accuracy: float | None = None,
+    seconds: float | None = None,
+    seed: int = 0,
 ) -> FrictionModel:
-    """Posterior of (β, σ) by emcee, whitened by the exact posterior and started from it.
+    """Posterior of (β, σ, …) by emcee, whitened by its exact or Laplace approximation and started from it.
 
     Raises ``NotConverged``, which carries the model, where the chain is shorter than 50 autocorrelation times or its
     walkers disagree. A chain that is sound but was stopped by ``seconds`` before ``accuracy`` says so in
     ``diagnostics["stopped"]`` and in ``cost.monte_carlo_error``.
     """
     begin = time.perf_counter()
-    posterior = gaussian(evidence.factor, evidence.domain, evidence.element_area)
-    chain = sample(posterior.log_probability, len(posterior.names), accuracy, seconds, seed)
+    name = default_likelihood(evidence) if likelihood is None else likelihood
+    if name not in LIKELIHOODS:
+        raise InvalidSamples("likelihood", name, ", ".join(LIKELIHOODS))
+    goal = LIKELIHOODS[name].accuracy if accuracy is None else accuracy
+    posterior = LIKELIHOODS[name].posterior(evidence)
+    left = None if seconds is None else max(seconds - (time.perf_counter() - begin), 0.0)
+    chain = sample(posterior.log_probability, len(posterior.sampled), goal, left, seed)
     summary = posterior.summarise(chain.flat())
-    linear = solve(evidence.factor, REFERENCE.spans(evidence.element_area))
-    effect = effects(summary.covariance, summary.degrees_of_freedom, evidence)
-    diagnostics = ols.describe(evidence, linear) | ols.by_coefficient("effect", effect)
-    model = FrictionModel(
-        method="bayes",
-        coefficients=summary.coefficients,
-        covariance=summary.covariance,
-        scale=summary.scale,
-        n=evidence.n,
-        degrees_of_freedom=summary.degrees_of_freedom,
-        domain=evidence.domain,
-        identifiable=identifiable(effect),
-        element_area=evidence.element_area,
-        cost=Cost(time.perf_counter() - begin, chain.monte_carlo_error),
-        diagnostics=diagnostics | _convergence(chain, posterior) | _priors(),
-        draws=_thinned(chain, posterior),
+    diagnostics: Diagnostics = {"likelihood": name, "prior": posterior.prior, "draws": ", ".join(posterior.names)}
+    diagnostics |= _convergence(chain, posterior) | sensitivity(evidence, exact_posterior(evidence))
+    model = report(
+        evidence,
+        "bayes",
+        summary.coefficients,
+        summary.covariance,
+        summary.scale,
+        summary.degrees_of_freedom,
+        begin,
+        diagnostics,
+        monte_carlo_error=chain.monte_carlo_error,
+        draws=summary.draws,
+        scatter_degrees_of_freedom=summary.scatter_degrees_of_freedom,
     )
     if chain.trouble:
         raise NotConverged(chain.trouble, model)
     return model
 
 
-def _thinned(chain: Chain, posterior: Posterior) -> FloatArray:
-    """Draws evenly over the chain, at most ``kept_draws`` of them, in natural parameters."""
-    flat = chain.flat()
-    return posterior.natural(flat[:: -(-len(flat) // SAMPLING.kept_draws)])
-
-
-def _convergence(chain: Chain, posterior: Posterior) -> dict[str, float | str]:
-    diagnostics: dict[str, float | str] = {
-        "likelihood": "gaussian",
+def _convergence(chain: Chain, posterior: Posterior) -> Diagnostics:
+    diagnostics: Diagnostics = {
         "move": chain.move,
         "stopped": chain.stopped,
         "acceptance": chain.acceptance,
@@ -71,19 +88,7 @@ def _convergence(chain: Chain, posterior: Posterior) -> dict[str, float | str]:
     }
     if np.isfinite(chain.split_rhat):
         diagnostics["split_rhat"] = chain.split_rhat
-    for name, tau, size in zip(posterior.names, chain.autocorrelation_time, chain.effective_sample_size, strict=True):
+    for name, tau, size in zip(posterior.sampled, chain.autocorrelation_time, chain.effective_sample_size, strict=True):
         diagnostics[f"autocorrelation_time_{name}"] = float(tau)
         diagnostics[f"effective_sample_size_{name}"] = float(size)
     return diagnostics
-
-
-def _priors() -> dict[str, float | str]:
-    span = REFERENCE.tangential_velocity
-    return {
-        "prior": (
-            f"beta | sigma ~ N(({REFERENCE.friction:g}, 0, 0), sigma^2 V0), at sigma = {REFERENCE.scatter:g} of sd "
-            f"{PRIOR.width:g} in beta0 and in each slope times its span ({span:g} m/s, {REFERENCE.pressure:g} Pa times "
-            f"the element area); sigma^2 ~ IG({PRIOR.degrees_of_freedom / 2:g}, "
-            f"{PRIOR.degrees_of_freedom / 2 * REFERENCE.scatter**2:g}); mean friction above 0 over the data's domain"
-        )
-    }

@@ -1,13 +1,18 @@
 """The exact answer: normal-inverse-gamma posterior of the Gaussian model, with a Student-t prediction."""
 
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
 from estimators.defaults import PRIOR, REFERENCE
-from estimators.least_squares import Factor, RealArray, triangular_inverse, upper_triangle
+from estimators.evidence import Evidence
+from estimators.friction_model import FrictionModel
+from estimators.least_squares import RealArray, triangular_inverse, upper_triangle, whole_triangle
+from estimators.priors import conjugate_prior, prior_rows
+from estimators.reporting import Diagnostics, by_coefficient, report
 
 FloatArray = NDArray[np.float64]
 
@@ -42,24 +47,6 @@ class NormalInverseGamma:
         return np.column_stack([self.mean + sigma[:, None] * (normal @ self.root.T), sigma])
 
 
-def prior_rows(element_area: float) -> FloatArray:
-    """The prior of β as rows [3, 4] of a least-squares problem in (1, v, f_n | μ), each with error σ."""
-    precision = REFERENCE.scatter / PRIOR.width * np.concatenate([[1.0], REFERENCE.spans(element_area)])
-    rows = np.zeros((3, 4))
-    rows[:, :3] = np.diag(precision)
-    rows[0, 3] = precision[0] * REFERENCE.friction
-    return rows
-
-
-def whole_triangle(factor: Factor, scale: float = 1.0) -> RealArray:
-    """Triangle [k + 1, k + 1] of (1, columns) from the one about the mean; ``scale`` multiplies the weights."""
-    size = len(factor.mean) + 1
-    whole = np.zeros((size, size), dtype=np.longdouble)
-    whole[0] = np.sqrt(np.longdouble(factor.weight)) * np.concatenate([[1.0], factor.mean])
-    whole[1:, 1:] = factor.triangle
-    return np.asarray(whole * np.sqrt(np.longdouble(scale)))
-
-
 def posterior(triangle: RealArray, effective_n: float, prior: FloatArray) -> NormalInverseGamma:
     """Exact posterior from the data's triangle [4, 4] in (1, v, f_n | μ) and the prior's rows [3, 4]."""
     updated = upper_triangle(np.concatenate([prior.astype(np.longdouble), triangle]))
@@ -68,3 +55,40 @@ def posterior(triangle: RealArray, effective_n: float, prior: FloatArray) -> Nor
     degrees = PRIOR.degrees_of_freedom + effective_n
     square = PRIOR.degrees_of_freedom * REFERENCE.scatter**2 + float(updated[-1, -1]) ** 2
     return NormalInverseGamma(mean, root.astype(float), degrees, float(np.sqrt(square / degrees)))
+
+
+def exact_posterior(evidence: Evidence, width: float = PRIOR.width) -> NormalInverseGamma:
+    """Exact posterior of the evidence, with a prior of the given width."""
+    rows = prior_rows(evidence.element_area, replace(PRIOR, width=width))
+    return posterior(whole_triangle(evidence.factor), evidence.effective_n, rows)
+
+
+def fit(evidence: Evidence) -> FrictionModel:
+    """Exact posterior; it takes the errors as independent and Gaussian, clusters or not."""
+    begin = time.perf_counter()
+    exact = exact_posterior(evidence)
+    diagnostics: Diagnostics = {"assumes": "independent Gaussian errors", "prior": conjugate_prior()}
+    return report(
+        evidence,
+        "conjugate",
+        exact.mean,
+        exact.covariance,
+        exact.scale,
+        exact.degrees_of_freedom,
+        begin,
+        diagnostics | sensitivity(evidence, exact),
+        scatter_degrees_of_freedom=exact.degrees_of_freedom,
+    )
+
+
+def sensitivity(evidence: Evidence, exact: NormalInverseGamma) -> Diagnostics:
+    """How much the prior says: posterior width over prior width, and the shift of β under a prior twice as wide.
+
+    The shift is in posterior standard deviations; a coefficient that moves by more than a few hundredths is the
+    prior's as much as the data's.
+    """
+    wide = exact_posterior(evidence, width=2.0 * PRIOR.width)
+    spread = np.sqrt(np.diag(exact.covariance))
+    prior = exact.scale / np.diag(prior_rows(evidence.element_area)[:, :3])
+    shift = np.abs(wide.mean - exact.mean) / spread
+    return by_coefficient("posterior_to_prior", spread / prior) | by_coefficient("prior_sensitivity", shift)

@@ -48,21 +48,25 @@ class Prior:
     """-, > 0; no known pair of dry surfaces lies outside 0.5 ± 2."""
     degrees_of_freedom: float = 0.1
     """ν₀, > 0; the prior's say in σ weighs as much as a tenth of one sample."""
+    effect_degrees_of_freedom: float = 4.0
+    """> 0; of the half-Student-t prior of the scatter between clusters: weak, yet with a mean and a variance."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sampling:
     """How a posterior is sampled, and when the sampling stops."""
 
-    walkers: int = 512
-    """≥ 16, even; wide enough that NumPy's overhead a step is shared."""
-    block: int = 72
+    walkers: tuple[int, int] = (32, 480)
+    """Fewest and most, even: as many as bring the accuracy within one block, so that the overhead a step is shared."""
+    block: int = 80
     """Steps between two looks at the chain; ≥ 50 τ for the independence proposal, whose τ is about 1.2."""
     chain_lengths: float = 50.0
     """Steps in units of the integrated autocorrelation time, from which that time is believed (emcee's rule)."""
     accuracy: float = 0.015
     """Posterior standard deviations; Monte-Carlo error of mean, 5 % and 95 % quantile at which sampling stops."""
-    max_steps: int = 20_000
+    accuracy_per_sample: float = 0.05
+    """The same where each step of each walker reads all samples: an effective sample size of 2,000."""
+    max_steps: int = 6000
     """Steps after which a chain that does not converge is given up."""
     min_acceptance: float = 0.3
     """Acceptance of the independence proposal below which differential evolution takes over (house trials)."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from estimators.defaults import MIN_SAMPLES
 from estimators.errors import InvalidSamples, TooFewSamples
 from estimators.friction_model import Domain
-from estimators.least_squares import Factor, factorise
+from estimators.least_squares import Factor, factorise, upper_triangle
 from estimators.moments import Moments
 from estimators.observations import Observations, observe
 
@@ -57,11 +57,29 @@ class Evidence:
             row[1:, 1:] = part.triangle
         return rows
 
+    def cluster_means(self) -> "ClusterMeans":
+        """Weight and mean of each cluster, and the spread within clusters."""
+        if self.observations is None:
+            return _means_of_blocks(self)
+        return _means_of_samples(self.observations)
+
     def raw(self, method: str) -> Observations:
         """The samples; raises ``InvalidSamples`` where there are moments only."""
         if self.observations is None:
             raise InvalidSamples("samples", "moments only", f'the samples themselves, which "{method}" needs')
         return self.observations
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClusterMeans:
+    """``weight`` [g] and ``mean`` [g, 3] of (v, f_n, μ) in each cluster, and the spread about those means.
+
+    ``within`` [3, 4]: rows in (1, v, f_n | μ) with all the sums of squares and products about the clusters' means.
+    """
+
+    weight: FloatArray
+    mean: FloatArray
+    within: FloatArray
 
 
 def gather(samples: "FrictionSamples | Moments | Sequence[FrictionSamples] | Sequence[Moments]") -> Evidence:
@@ -111,3 +129,24 @@ def relative(factor: Factor, whole: Moments) -> Factor:
     """A factor with its weights in units that make those of ``whole`` sum to their effective number."""
     unit = whole.factor.weight / whole.weight_square
     return Factor(factor.weight * unit, factor.mean, factor.triangle * np.sqrt(unit))
+
+
+def _means_of_samples(observations: Observations) -> ClusterMeans:
+    columns, cluster = observations.columns(), observations.cluster
+    weight = np.bincount(cluster, observations.weight).astype(float)
+    sums = [np.bincount(cluster, observations.weight * column) for column in columns.T]
+    mean = np.stack(sums, axis=1) / weight[:, None]
+    inside = factorise(columns - mean[cluster], observations.weight, intercept=False)
+    return ClusterMeans(weight, mean, _without_constant(inside.triangle))
+
+
+def _means_of_blocks(evidence: Evidence) -> ClusterMeans:
+    whole = evidence.blocks[0].merge(*evidence.blocks[1:])
+    parts = [relative(block.factor, whole) for block in evidence.blocks]
+    inside = upper_triangle(np.concatenate([part.triangle for part in parts]))
+    weight, mean = np.array([part.weight for part in parts]), np.array([part.mean for part in parts], dtype=float)
+    return ClusterMeans(weight, mean, _without_constant(inside))
+
+
+def _without_constant(triangle: NDArray[np.floating]) -> FloatArray:
+    return np.column_stack([np.zeros(len(triangle)), triangle.astype(float)])

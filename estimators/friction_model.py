@@ -34,7 +34,8 @@ class FrictionModel:
 
     ``coefficients`` [3]: β₀ [-], β₁ [s/m], β₂ [1/N]; ``covariance`` [3, 3] of them; ``scale``: standard deviation σ
     of ε [-]; ``n`` samples of elements of ``element_area`` m²; ``degrees_of_freedom`` of the Student-t distribution
-    that the coefficients and a new μ follow; ``identifiable`` [3] bool; ``draws`` [k, 4] of (β, σ) or None.
+    that the coefficients follow; ``identifiable`` [3] bool; ``draws`` [k, ≥ 4] of (β, σ, …) or None;
+    ``scatter_degrees_of_freedom`` of the Student-t distribution that ε/σ follows, n − 3 where None.
     """
 
     method: str
@@ -49,6 +50,7 @@ class FrictionModel:
     cost: Cost
     diagnostics: Mapping[str, float | str] = field(default_factory=dict)
     draws: FloatArray | None = None
+    scatter_degrees_of_freedom: float | None = None
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -56,8 +58,10 @@ class FrictionModel:
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
     def interval(self, level: float = 0.95) -> FloatArray:
-        """Central interval of each coefficient at ``level``: [3, 2]."""
+        """Central interval of each coefficient at ``level``: [3, 2]; from the draws where there are any."""
         _check_probability("level", level)
+        if self.draws is not None:
+            return np.asarray(np.quantile(self.draws[:, :3], [0.5 * (1.0 - level), 0.5 * (1.0 + level)], axis=0).T)
         half = special.stdtrit(self.degrees_of_freedom, 0.5 * (1.0 + level)) * self.standard_errors
         return np.stack([self.coefficients - half, self.coefficients + half], axis=1)
 
@@ -66,8 +70,10 @@ class FrictionModel:
     ) -> FloatArray:
         """Friction coefficient expected at v (m/s) and f_n (N an element), or a quantile of a new observation of it.
 
-        The quantile includes the scatter ε and the uncertainty of the coefficients (Student-t predictive
-        distribution). Shapes broadcast. Raises ``InvalidSamples`` for a quantile outside (0, 1).
+        The quantile includes the scatter ε and the uncertainty of the coefficients, whose distances from the mean add
+        as root of squares (Graybill & Wang 1980): exact where both have the same degrees of freedom, and not too narrow
+        in the tails where the coefficients, shared by few grasps, have less. Shapes broadcast. Raises
+        ``InvalidSamples`` for a quantile outside (0, 1).
         """
         v, f_n = np.broadcast_arrays(np.asarray(tangential_velocity, float), np.asarray(normal_force, float))
         x = np.stack([np.ones_like(v), v, f_n], axis=-1)
@@ -75,8 +81,11 @@ class FrictionModel:
         if quantile is None:
             return mean
         _check_probability("quantile", quantile)
-        spread = np.sqrt(self.scale**2 + np.einsum("...i,ij,...j->...", x, self.covariance, x))
-        return np.asarray(mean + special.stdtrit(self.degrees_of_freedom, quantile) * spread)
+        error = np.sqrt(np.maximum(np.einsum("...i,ij,...j->...", x, self.covariance, x), 0.0))
+        freedom = self.n - 3.0 if self.scatter_degrees_of_freedom is None else self.scatter_degrees_of_freedom
+        scatter = special.stdtrit(freedom, quantile) * self.scale
+        distance = np.hypot(scatter, special.stdtrit(self.degrees_of_freedom, quantile) * error)
+        return np.asarray(mean + np.sign(quantile - 0.5) * distance)
 
     def within_domain(self, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> NDArray[np.bool_]:
         """Whether v and f_n lie in the range of the data; shapes broadcast."""

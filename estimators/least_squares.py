@@ -81,6 +81,15 @@ def merge(factors: Iterable[Factor]) -> Factor:
     return Factor(float(total), mean, upper_triangle(rows))
 
 
+def whole_triangle(factor: Factor) -> RealArray:
+    """Triangle [k + 1, k + 1] of (1, columns) from the one about the mean."""
+    size = len(factor.mean) + 1
+    whole = np.zeros((size, size), dtype=np.longdouble)
+    whole[0] = np.sqrt(np.longdouble(factor.weight)) * np.concatenate([[1.0], factor.mean])
+    whole[1:, 1:] = factor.triangle
+    return np.asarray(whole)
+
+
 def solve(factor: Factor, spans: FloatArray | None = None, scale: float = 1.0) -> LinearFit:
     """Least squares of the last column on the others and, where the factor has a weight, an intercept.
 

@@ -82,7 +82,7 @@ class Moments:
         return self.merge(Moments(factor, weight**2, 1, Domain((v, v), (f_n, f_n)), self.element_area))
 
     def forget(self, factor: float) -> "Moments":
-        """Moments with every weight multiplied by ``factor`` in (0, 1]; done at each sample it forgets exponentially."""
+        """Moments with every weight multiplied by ``factor`` in (0, 1]: exponential, if done at each sample."""
         if not 0.0 < factor <= 1.0:
             raise InvalidSamples("factor", factor, "above 0 and at most 1")
         kept = self.factor

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from estimators.cluster_errors import cluster_sums, jackknife
 from estimators.defaults import REFERENCE
 from estimators.evidence import Evidence
-from estimators.friction_model import Cost, FrictionModel
-from estimators.identifiability import effects, identifiable
+from estimators.friction_model import FrictionModel
 from estimators.least_squares import LinearFit, solve
 from estimators.observations import IntArray, Observations
+from estimators.reporting import Diagnostics, by_coefficient, report
 
 FloatArray = NDArray[np.float64]
 
@@ -28,30 +28,25 @@ def fit(evidence: Evidence) -> FrictionModel:
     """
     begin = time.perf_counter()
     linear = solve(evidence.factor, REFERENCE.spans(evidence.element_area))
-    degrees = evidence.effective_n - 1.0 - linear.rank
-    scale = float(linear.residual_norm / np.sqrt(degrees))
+    residual_degrees = evidence.effective_n - 1.0 - linear.rank
+    scale = float(linear.residual_norm / np.sqrt(residual_degrees))
     covariance, errors = _honest_covariance(evidence, linear, scale)
-    if evidence.clusters > 1:
-        degrees = min(degrees, float(evidence.clusters - 1))
-    effect = effects(covariance, degrees, evidence)
-    diagnostics = describe(evidence, linear) | {
+    degrees = residual_degrees if evidence.clusters < 2 else min(residual_degrees, float(evidence.clusters - 1))
+    diagnostics = errors | {
         "r_squared": r_squared(evidence.factor.triangle, linear.residual_norm),
-        **by_coefficient("effect", effect),
         **by_coefficient("standard_error_classical", np.sqrt(np.diag(classical(linear, scale)))),
-        **errors,
     }
-    return FrictionModel(
-        method="ols",
-        coefficients=linear.coefficients.astype(float),
-        covariance=covariance,
-        scale=scale,
-        n=evidence.n,
-        degrees_of_freedom=degrees,
-        domain=evidence.domain,
-        identifiable=identifiable(effect),
-        element_area=evidence.element_area,
-        cost=Cost(time.perf_counter() - begin),
-        diagnostics=diagnostics,
+    return report(
+        evidence,
+        "ols",
+        linear.coefficients,
+        covariance,
+        scale,
+        degrees,
+        begin,
+        diagnostics,
+        linear,
+        scatter_degrees_of_freedom=residual_degrees,
     )
 
 
@@ -72,27 +67,7 @@ def r_squared(triangle: NDArray[np.floating], residual_norm: float) -> float:
     return 1.0 - (residual_norm / total) ** 2 if total > 0.0 else 0.0
 
 
-def describe(evidence: Evidence, linear: LinearFit) -> dict[str, float | str]:
-    """What every method says of its data."""
-    return {
-        "effective_n": evidence.effective_n,
-        "clusters": float(evidence.clusters),
-        "cluster_kind": evidence.cluster_kind,
-        "condition_number": linear.condition,
-        "rank": float(linear.rank + 1),
-        "variance_inflation_tangential_velocity": float(linear.inflation[0]),
-        "variance_inflation_normal_force": float(linear.inflation[1]),
-    }
-
-
-def by_coefficient(name: str, values: FloatArray) -> dict[str, float | str]:
-    """One diagnostic a coefficient, under names that JSON can carry."""
-    return {f"{name}_beta{k}": float(value) for k, value in enumerate(values)}
-
-
-def _honest_covariance(
-    evidence: Evidence, linear: LinearFit, scale: float
-) -> tuple[FloatArray, dict[str, float | str]]:
+def _honest_covariance(evidence: Evidence, linear: LinearFit, scale: float) -> tuple[FloatArray, Diagnostics]:
     """Covariance [3, 3] by the cluster jackknife where there are clusters, and what statsmodels says beside it."""
     observations = evidence.observations
     if evidence.clusters < 2:
@@ -132,9 +107,7 @@ def _of_blocks(evidence: Evidence, linear: LinearFit) -> tuple[FloatArray, Float
     return design.reshape(len(cluster), -1), residual.reshape(-1), cluster
 
 
-def _statsmodels_errors(
-    design: FloatArray, residual: FloatArray, cluster: IntArray, linear: LinearFit
-) -> dict[str, float | str]:
+def _statsmodels_errors(design: FloatArray, residual: FloatArray, cluster: IntArray, linear: LinearFit) -> Diagnostics:
     """HC3 and CR1 errors by statsmodels, on the orthonormal design, where nothing can fail silently."""
     from statsmodels.regression.linear_model import OLS  # takes more than a second to load
 

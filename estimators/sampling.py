@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from estimators.defaults import SAMPLING
 from estimators.errors import InvalidSamples
@@ -65,16 +64,24 @@ def sample(
 
 
 def autocorrelation_time(series: FloatArray) -> FloatArray:
-    """Integrated autocorrelation time [d] of chains [steps, walkers, d], averaged over walkers (Sokal; as emcee's)."""
+    """Integrated autocorrelation time [d] of chains [steps, walkers, d], averaged over walkers (Sokal; as emcee's).
+
+    Lag by lag until the window is five times the time: a good proposal needs a handful of lags, where a Fourier
+    transform would cost more than the chain. Of long chains as many walkers are read as hold 2¹⁷ draws.
+    """
     steps = len(series)
-    spectrum = fft.rfft(series - series.mean(axis=(0, 1)), n=2 * steps, axis=0)
-    power = np.mean(spectrum.real**2 + spectrum.imag**2, axis=1)
-    covariance = fft.irfft(power, axis=0)[:steps]
-    correlation = covariance / np.maximum(covariance[0], np.finfo(float).tiny)
-    times = 2.0 * np.cumsum(correlation, axis=0) - 1.0
-    beyond = np.arange(steps)[:, None] >= 5.0 * times
-    window = np.where(beyond.any(axis=0), np.argmax(beyond, axis=0), steps - 1)
-    return np.maximum(times[window, np.arange(times.shape[1])], 1.0 / steps)
+    centred = (series - series.mean(axis=(0, 1)))[:, : max(16, 2**17 // steps)]
+    variance = np.einsum("swd,swd->d", centred, centred)
+    variance[variance == 0.0] = 1.0
+    times = np.ones_like(variance)
+    growing = np.ones(len(variance), dtype=bool)
+    for lag in range(1, steps):
+        growing &= lag < 5.0 * times
+        if not growing.any():
+            break
+        covariance = np.einsum("swd,swd->d", centred[lag:], centred[:-lag])
+        times = np.where(growing, times + 2.0 * covariance / variance, times)
+    return np.asarray(np.maximum(times, 1.0 / steps))
 
 
 def split_rhat(draws: FloatArray) -> float:
@@ -92,28 +99,31 @@ def monte_carlo_error(draws: FloatArray, times: FloatArray) -> float:
     A quantile's error is half the distance between the quantiles one standard error of its rank to either side, with
     the autocorrelation time of its own indicator (Vehtari et al. 2021, §4.3).
     """
-    flat = draws.reshape(-1, draws.shape[-1])
-    spread = flat.std(axis=0)
-    worst = np.sqrt(times / len(flat)).max()
+    ranked = np.sort(draws.reshape(-1, draws.shape[-1]), axis=0)
+    count, last = len(ranked), len(ranked) - 1
+    errors = [np.sqrt(times / count) * ranked.std(axis=0)]
     for tail in TAILS:
-        level = np.quantile(flat, tail, axis=0)
-        step = np.sqrt(tail * (1.0 - tail) * autocorrelation_time((draws <= level).astype(float)) / len(flat))
-        for k, rank in enumerate(step):
-            low, high = np.quantile(flat[:, k], [max(tail - rank, 0.0), min(tail + rank, 1.0)])
-            worst = max(worst, 0.5 * (high - low) / spread[k])
-    return float(worst)
+        below = (draws <= ranked[int(tail * last)]).astype(float)
+        step = np.sqrt(tail * (1.0 - tail) * autocorrelation_time(below) / count)
+        rows = np.clip([tail - step, tail + step], 0.0, 1.0) * last
+        low, high = np.take_along_axis(ranked, np.rint(rows).astype(int), axis=0)
+        errors.append(0.5 * (high - low))
+    return float((np.array(errors) / ranked.std(axis=0)).max())
 
 
 def _run(
     log_probability: LogProbability, dimension: int, move: object, name: str, goal: float, deadline: float, seed: int
 ) -> Chain:
-    import emcee  # takes a second to load
+    from emcee import State  # takes a second to load
+
+    from estimators.ensemble import VectorisedSampler
 
     random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed)))
-    sampler = emcee.EnsembleSampler(SAMPLING.walkers, dimension, log_probability, moves=move, vectorize=True)
+    walkers = _walkers(goal)
+    sampler = VectorisedSampler(walkers, dimension, log_probability, moves=move, vectorize=True)
     sampler.random_state = random.get_state()
-    start = _start(log_probability, random, dimension)
-    state = emcee.State(start, log_prob=log_probability(start))
+    start = _start(log_probability, random, walkers, dimension)
+    state = State(start, log_prob=log_probability(start))
     begin, steps = time.perf_counter(), SAMPLING.block
     while True:
         state = sampler.run_mcmc(state, steps, skip_initial_state_check=True)
@@ -127,14 +137,21 @@ def _run(
         steps = int(min(max(_missing(chain, goal), SAMPLING.block), 4 * done, affordable))
 
 
-def _start(log_probability: LogProbability, random: np.random.RandomState, dimension: int) -> FloatArray:
+def _walkers(goal: float) -> int:
+    """Even number of walkers whose first block should do: the 5 % quantile's error is 2.1/√ESS, τ about 1.3."""
+    fewest, most = SAMPLING.walkers
+    draws = 1.3 * 1.3 * (2.1 / goal) ** 2
+    return 2 * int(np.clip(np.ceil(draws / SAMPLING.block / 2.0), fewest // 2, most // 2))
+
+
+def _start(log_probability: LogProbability, random: np.random.RandomState, walkers: int, dimension: int) -> FloatArray:
     """Walkers [w, d] near the posterior already: proposals resampled by their importance."""
-    candidates = _student(random, 8 * SAMPLING.walkers, dimension)
+    candidates = _student(random, 8 * walkers, dimension)
     log_weight = log_probability(candidates) - _log_student(candidates)
     if not np.isfinite(log_weight.max()):
         raise InvalidSamples("mean friction", "0 or less with near certainty", "above 0 over the range of the data")
     weight = np.exp(log_weight - log_weight.max())
-    return np.asarray(candidates[random.choice(len(weight), SAMPLING.walkers, p=weight / weight.sum())])
+    return np.asarray(candidates[random.choice(len(weight), walkers, p=weight / weight.sum())])
 
 
 def _hopeless(chain: Chain) -> bool:

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.conjugate import NormalInverseGamma, posterior, prior_rows, whole_triangle
-from estimators.defaults import PRIOR, REFERENCE
-from estimators.friction_model import Domain
-from estimators.least_squares import Factor
-from estimators.likelihoods.posterior import Summary
+from estimators.conjugate import NormalInverseGamma, exact_posterior
+from estimators.defaults import PRIOR, REFERENCE, SAMPLING
+from estimators.evidence import Evidence
+from estimators.least_squares import whole_triangle
+from estimators.likelihoods.posterior import Summary, Whitening, bounded_exp, corners, supported
+from estimators.priors import positive_friction, prior_rows
 
 FloatArray = NDArray[np.float64]
 
@@ -25,48 +26,53 @@ class Gaussian:
     """
 
     exact: NormalInverseGamma
+    log_sigma: Whitening
     rows: FloatArray
     effective_n: float
     corners: FloatArray
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """β₀, β₁, β₂, σ."""
-        return NAMES
-
-    def natural(self, whitened: FloatArray) -> FloatArray:
-        """(β, σ), [k, 4]."""
-        centre, spread = self.exact.log_scale()
-        sigma = np.exp(np.clip(centre + spread * whitened[:, 3], -300.0, 300.0))
-        beta = self.exact.mean + sigma[:, None] * (whitened[:, :3] @ self.exact.root.T)
-        return np.column_stack([beta, sigma])
+    sampled: tuple[str, ...] = NAMES
+    names: tuple[str, ...] = NAMES
+    prior: str = positive_friction()
 
     def log_probability(self, whitened: FloatArray) -> FloatArray:
         """Log posterior density [k]; the change of variables takes away what σ³ in β's prior adds."""
-        parameters = self.natural(whitened)
-        beta, sigma = parameters[:, :3], parameters[:, 3]
+        beta, sigma = self._natural(whitened)
         misfit = beta @ self.rows[:, :3].T - self.rows[:, 3]
         square = np.einsum("ki,ki->k", misfit, misfit) + PRIOR.degrees_of_freedom * REFERENCE.scatter**2
         log = -(self.effective_n + PRIOR.degrees_of_freedom) * np.log(sigma) - 0.5 * square / sigma**2
-        return np.where((beta @ self.corners.T > 0.0).all(axis=1), log, -np.inf)
+        return supported(log, beta, self.corners)
 
     def summarise(self, whitened: FloatArray) -> Summary:
         """Student-t of β from the draws: in z, which is independent of σ, its moments exist for any ν."""
-        sigma = self.natural(whitened)[:, 3]
+        _, sigma = self._natural(whitened)
         scale = float(1.0 / np.sqrt(np.mean(sigma**-2.0)))
         root = scale * self.exact.root
         z = whitened[:, :3]
-        covariance = root @ np.cov(z.T) @ root.T
-        return Summary(self.exact.mean + root @ z.mean(axis=0), covariance, scale, self.exact.degrees_of_freedom)
+        kept = np.column_stack(self._natural(whitened[:: -(-len(whitened) // SAMPLING.kept_draws)]))
+        return Summary(
+            coefficients=self.exact.mean + root @ z.mean(axis=0),
+            covariance=root @ np.cov(z.T) @ root.T,
+            scale=scale,
+            degrees_of_freedom=self.exact.degrees_of_freedom,
+            draws=kept,
+            scatter_degrees_of_freedom=self.exact.degrees_of_freedom,
+        )
+
+    def _natural(self, whitened: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """β [k, 3] and σ [k]."""
+        sigma = bounded_exp(self.log_sigma(whitened[:, 3:]))[:, 0]
+        return self.exact.mean + sigma[:, None] * (whitened[:, :3] @ self.exact.root.T), sigma
 
 
-def gaussian(factor: Factor, domain: Domain, element_area: float) -> Gaussian:
-    """Posterior from a factor of (v, f_n, μ) whose weight is the effective number of samples."""
-    triangle, prior = whole_triangle(factor), prior_rows(element_area)
-    rows = np.concatenate([prior, triangle.astype(float)])
-    return Gaussian(posterior(triangle, factor.weight, prior), rows, factor.weight, corners(domain))
-
-
-def corners(domain: Domain) -> FloatArray:
-    """The four corners (1, v, f_n) of the data's domain, [4, 3]."""
-    return np.array([[1.0, v, f_n] for v in domain.tangential_velocity for f_n in domain.normal_force])
+def gaussian(evidence: Evidence) -> Gaussian:
+    """Posterior from the factor alone."""
+    triangle, prior = whole_triangle(evidence.factor), prior_rows(evidence.element_area)
+    exact = exact_posterior(evidence)
+    centre, spread = exact.log_scale()
+    return Gaussian(
+        exact=exact,
+        log_sigma=Whitening(np.array([centre]), np.array([[spread]])),
+        rows=np.concatenate([prior, triangle.astype(float)]),
+        effective_n=evidence.effective_n,
+        corners=corners(evidence.domain),
+    )

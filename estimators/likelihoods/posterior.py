@@ -6,35 +6,82 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.friction_model import Domain
+
 FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Summary:
-    """What a friction model needs of a posterior: see ``FrictionModel``."""
+    """What a friction model needs of a posterior: see ``FrictionModel``; ``draws`` [k, names] in natural parameters."""
 
     coefficients: FloatArray
     covariance: FloatArray
     scale: float
     degrees_of_freedom: float
+    draws: FloatArray
+    scatter_degrees_of_freedom: float
 
 
 class Posterior(Protocol):
     """A posterior in whitened coordinates, in which it is close to N(0, I)."""
 
     @property
+    def sampled(self) -> tuple[str, ...]:
+        """Names of the sampled coordinates."""
+        ...
+
+    @property
     def names(self) -> tuple[str, ...]:
-        """Names of the natural parameters; β₀, β₁, β₂ and σ come first."""
+        """Names of the natural parameters: β₀, β₁, β₂ and σ come first."""
+        ...
+
+    @property
+    def prior(self) -> str:
+        """The prior in words and numbers."""
         ...
 
     def log_probability(self, whitened: FloatArray) -> FloatArray:
         """Log posterior density [k] in whitened coordinates [k, d], up to a constant; -inf outside the support."""
         ...
 
-    def natural(self, whitened: FloatArray) -> FloatArray:
-        """Natural parameters [k, d] of whitened ones."""
+    def summarise(self, whitened: FloatArray) -> Summary:
+        """What draws [k, d] in whitened coordinates amount to."""
         ...
 
-    def summarise(self, whitened: FloatArray) -> Summary:
-        """Mean, covariance and scale from draws [k, d] in whitened coordinates."""
-        ...
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Whitening:
+    """Affine map w → centre + root w that makes a density close to N(0, I)."""
+
+    centre: FloatArray
+    root: FloatArray
+
+    def __call__(self, whitened: FloatArray) -> FloatArray:
+        """Coordinates [k, d] of whitened ones [k, d]."""
+        return np.asarray(self.centre + whitened @ self.root.T)
+
+
+def scatter(variance: FloatArray) -> tuple[float, float]:
+    """Scale s and degrees of freedom ν of the scaled-inverse-χ² with the draws' mean and spread of 1/σ².
+
+    A new observation with that variance is then s times a Student-t on ν degrees of freedom.
+    """
+    precision = 1.0 / variance
+    mean = float(precision.mean())
+    return float(1.0 / np.sqrt(mean)), float(2.0 * mean**2 / max(precision.var(), 1e-12 * mean**2))
+
+
+def corners(domain: Domain) -> FloatArray:
+    """The four corners (1, v, f_n) of the data's domain, [4, 3]."""
+    return np.array([[1.0, v, f_n] for v in domain.tangential_velocity for f_n in domain.normal_force])
+
+
+def supported(log_density: FloatArray, beta: FloatArray, at: FloatArray) -> FloatArray:
+    """The log density with -inf where the mean friction at one of the points ``at`` [m, 3] is not above 0."""
+    return np.where((beta @ at.T > 0.0).all(axis=1), log_density, -np.inf)
+
+
+def bounded_exp(x: FloatArray) -> FloatArray:
+    """Exponential that neither overflows nor reaches zero: far tails of a proposal are only rejected."""
+    return np.asarray(np.exp(np.clip(x, -200.0, 200.0)))

@@ -58,6 +58,6 @@ def test_a_target_far_from_the_proposal_falls_back_to_differential_evolution() -
 
 def test_more_accuracy_takes_more_steps_and_is_reached() -> None:
     rough, fine = (sampling.sample(lambda x: -0.5 * np.sum(x**2, axis=1), 2, accuracy=a) for a in (0.05, 0.007))
-    assert len(fine.draws) > 2 * len(rough.draws)
+    assert len(fine.flat()) > 4 * len(rough.flat())
     assert fine.monte_carlo_error <= 0.007
     assert abs(fine.flat().mean()) < 5 * 0.007

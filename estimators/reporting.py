@@ -1,0 +1,67 @@
+"""What every method says of its data and its answer, in one form."""
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.defaults import REFERENCE
+from estimators.evidence import Evidence
+from estimators.friction_model import Cost, FrictionModel
+from estimators.identifiability import effects, identifiable
+from estimators.least_squares import LinearFit, solve
+
+FloatArray = NDArray[np.float64]
+Diagnostics = dict[str, float | str]
+
+
+def by_coefficient(name: str, values: FloatArray) -> Diagnostics:
+    """One diagnostic a coefficient, under names that JSON can carry."""
+    return {f"{name}_beta{k}": float(value) for k, value in enumerate(values)}
+
+
+def describe(evidence: Evidence, linear: LinearFit | None = None) -> Diagnostics:
+    """The data: how many, in how many clusters, and how well they spread over v and f_n."""
+    linear = solve(evidence.factor, REFERENCE.spans(evidence.element_area)) if linear is None else linear
+    return {
+        "effective_n": evidence.effective_n,
+        "clusters": float(evidence.clusters),
+        "cluster_kind": evidence.cluster_kind,
+        "condition_number": linear.condition,
+        "rank": float(linear.rank + 1),
+        "variance_inflation_tangential_velocity": float(linear.inflation[0]),
+        "variance_inflation_normal_force": float(linear.inflation[1]),
+    }
+
+
+def report(
+    evidence: Evidence,
+    method: str,
+    coefficients: NDArray[np.floating],
+    covariance: FloatArray,
+    scale: float,
+    degrees_of_freedom: float,
+    begin: float,
+    diagnostics: Diagnostics,
+    linear: LinearFit | None = None,
+    monte_carlo_error: float = 0.0,
+    draws: FloatArray | None = None,
+    scatter_degrees_of_freedom: float | None = None,
+) -> FrictionModel:
+    """The friction model, with what its uncertainty does to friction; ``begin``: when the fit began."""
+    effect = effects(covariance, degrees_of_freedom, evidence)
+    return FrictionModel(
+        method=method,
+        coefficients=np.asarray(coefficients, dtype=float),
+        covariance=covariance,
+        scale=scale,
+        n=evidence.n,
+        degrees_of_freedom=degrees_of_freedom,
+        domain=evidence.domain,
+        identifiable=identifiable(effect),
+        element_area=evidence.element_area,
+        diagnostics=describe(evidence, linear) | by_coefficient("effect", effect) | diagnostics,
+        cost=Cost(time.perf_counter() - begin, monte_carlo_error),
+        draws=draws,
+        scatter_degrees_of_freedom=scatter_degrees_of_freedom,
+    )
