@@ -7,7 +7,10 @@ import pytest
 
 from slipcore import METHODS, GraspLog, InvalidInput, SlipDetector, SlipHistory, collect_history, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
+from slipcore.defaults import ContactOptions
 from slipcore.detector import DetectorState, init, step
+from slipcore.methods.interface import Decision, Method, Observation
+from slipcore.strain import Lattice
 
 Score = Callable[[GraspLog, SlipHistory], float]
 Same = Callable[[SlipHistory, SlipHistory], None]
@@ -243,6 +246,18 @@ def test_with_every_element_in_contact_and_none_moving_all_stick(method: str) ->
     np.testing.assert_array_equal(history.stick_ratio, 1.0)
     np.testing.assert_array_equal(history.velocity[1:], 0.0)
     assert np.isnan(history.noise)
+
+
+def test_no_method_can_make_slip_of_a_fresh_touch_or_out_of_contact(monkeypatch: pytest.MonkeyPatch) -> None:
+    def everything_slips(state: None, _: Lattice, seen: Observation, __: ContactOptions) -> tuple[None, Decision]:
+        return state, Decision(np.ones(seen.contact.shape, bool), np.ones(seen.contact.shape))
+
+    reckless = Method(ContactOptions, lambda *_: None, everything_slips)
+    monkeypatch.setitem(METHODS, "reckless", reckless)
+    log = tangential_ramp(points=8, schedule=RampSchedule(0.1, 0.3, 0.0, 0.0, 0.1))
+    history = detect_slip(log, "reckless")
+    check_invariants(log, history)
+    assert history.macro_slip[-1]
 
 
 def test_a_pull_is_not_a_contact() -> None:

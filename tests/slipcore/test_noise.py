@@ -19,6 +19,14 @@ def test_noise_is_found_under_motion_and_uneven_frames(sigma: float, uneven: boo
     assert estimate_noise(time, values) == pytest.approx(sigma, rel=0.05)
 
 
+def test_steady_motion_through_uneven_frames_is_no_noise() -> None:
+    rng = np.random.default_rng(12)
+    time = np.cumsum(rng.choice([1, 2, 5], 90)) / 60.0
+    speed = 5e-3 * np.linspace(-1.0, 1.0, 400)
+    values = time[:, None, None] * speed + 1e-6 * rng.standard_normal((90, 2, 400))
+    assert estimate_noise(time, values) == pytest.approx(1e-6, rel=0.05)
+
+
 def test_a_burst_of_motion_and_a_minority_that_moves_do_not_count() -> None:
     rng = np.random.default_rng(10)
     values = 1e-6 * rng.standard_normal((60, 2, 400))

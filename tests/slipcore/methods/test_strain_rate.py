@@ -86,6 +86,14 @@ def test_strain_while_a_touch_settles_is_pressing() -> None:
     assert not state.score.variance.any()
 
 
+def test_each_touch_begins_with_a_score_that_knows_nothing() -> None:
+    state, _ = play([*ONSET, 0.01, 0.04])
+    assert state.score.variance.all()
+    state, _ = play([*ONSET, 0.01, 0.04], contact=False)
+    assert not state.score.variance.any()
+    assert not state.score.mean.any()
+
+
 def test_growth_slow_against_the_strain_is_not_slip() -> None:
     crawling = [0.5 + 0.05 * INTERVAL * k for k in range(60)]  # 0.05/s on 50 % strain
     _, slips = play(crawling)

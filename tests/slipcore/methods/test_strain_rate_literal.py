@@ -49,5 +49,20 @@ def test_the_literal_method_is_the_papers_text_for_each_element(short_ramp: Gras
     assert history.slip.any()
 
 
+def test_growth_below_a_tenth_of_the_strain_a_frame_is_not_slip() -> None:
+    def slips(stretch: float) -> bool:
+        i, j = np.meshgrid(np.arange(4.0), np.arange(4.0), indexing="ij")
+        position = 1e-3 * np.stack([i, j, 0 * i], axis=-1)
+        strain = np.r_[0.2 * np.ones(20), stretch * np.ones(5)]
+        displacement = strain[:, None, None, None] * position * [1.0, 0.0, 0.0]
+        force = np.broadcast_to([0.0, 0.0, -0.1], displacement.shape)
+        log = GraspLog(np.arange(25) / 30.0, position, displacement, 1e-6, force)
+        return bool(detect_slip(log, "strain_rate_literal").slip.any())
+
+    # Green–Lagrange strain of a stretch s: s + s²/2; from 0.22 it grows by 10 % of its new value to 0.2444.
+    assert not slips(0.220)
+    assert slips(0.224)
+
+
 def test_the_window_must_fill_before_any_event(short_ramp: GraspLog) -> None:
     assert not detect_slip(short_ramp, "strain_rate_literal", lag=1000).slip.any()
