@@ -61,7 +61,7 @@ def test_traction_is_continuous_below_the_limit_and_carries_the_moment(ratio: fl
     assert (case.traction(stuck) < FRICTION * CONTACT.pressure(stuck)).all()
     assert case.traction(0.0) == 0.0
     assert case.traction(1.1 * a) == 0.0
-    nodes, weights = np.polynomial.legendre.leggauss(400)
+    nodes, weights = np.polynomial.legendre.leggauss(96)
     angle = 0.25 * np.pi * (nodes + 1)
     moment = 0.0
     for low, high in ((0.0, c), (c, a)):  # r runs as the sine, which takes away both roots
@@ -69,7 +69,7 @@ def test_traction_is_continuous_below_the_limit_and_carries_the_moment(ratio: fl
         theta = start + span * angle / (0.5 * np.pi)
         r = high * np.sin(theta)
         moment += float((case.traction(r) * 2 * np.pi * r**2 * high * np.cos(theta) * weights).sum() * 0.5 * span)
-    assert moment == pytest.approx(ratio * LIMIT, rel=1e-9)
+    assert moment == pytest.approx(ratio * LIMIT, rel=1e-8)
 
 
 @pytest.mark.parametrize(("ratio", "radius"), [(0.3, 0.5), (0.9, 0.2), (0.999999, 0.005)])
