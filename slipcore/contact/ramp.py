@@ -83,8 +83,19 @@ def tangential_ramp(
         sheared = CattaneoMindlin(hertz, friction, float(tangential[k]) * tangential_force * sliding_force)
         return _fields(sheared, position, pitch**2)
 
-    fields = [frame(k) for k in range(len(time))]
-    rng = np.random.default_rng(seed)
+    noise = (marker_noise, force_noise, np.random.default_rng(seed))
+    return _log(time, position, pitch, [frame(k) for k in range(len(time))], friction, noise)
+
+
+def _log(
+    time: FloatArray,
+    position: FloatArray,
+    pitch: float,
+    fields: list[_Fields],
+    friction: float,
+    noise: tuple[float, float, np.random.Generator],
+) -> GraspLog:
+    marker_noise, force_noise, rng = noise
     displacement = np.stack([f.displacement for f in fields])
     force = np.stack([f.force for f in fields])
     return GraspLog(
@@ -93,7 +104,6 @@ def tangential_ramp(
         displacement=displacement + marker_noise * rng.standard_normal(displacement.shape),
         element_area=pitch**2,
         force=force + force_noise * rng.standard_normal(force.shape),
-        normal=np.broadcast_to([0.0, 0.0, 1.0], force.shape),  # linear theory: loads act on the undeformed plane
         object_pose=np.stack([f.pose for f in fields]),
         sensor="half-space",
         metadata={"tier": "closed form", "source": "Hertz, Cattaneo–Mindlin"},

@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -9,6 +10,7 @@ from slipcore.errors import InvalidInput
 
 Integrals = Callable[[float, float, float], dict[str, float]]
 FRICTION, FORCE, RADIUS = 0.4, 10.0, 15e-3
+CONDITION_1 = Path(__file__).parents[4].parent / "shared/data/contact/cond1.npz"
 
 
 def sheared(ratio: float, poisson_ratio: float = 0.3) -> CattaneoMindlin:
@@ -193,3 +195,22 @@ def test_a_tangential_force_beyond_sliding_is_refused_by_name(force: float) -> N
 def test_no_friction_is_refused_by_name() -> None:
     with pytest.raises(InvalidInput, match="friction"):
         CattaneoMindlin(HertzContact(RADIUS, FORCE, half_space(1e6, 0.3)), 0.0, 0.0)
+
+
+@pytest.mark.skipif(not CONDITION_1.exists(), reason="reference scenes are not on this machine")
+@pytest.mark.parametrize("step", [12, 30, 50, 58])
+def test_fields_of_an_independent_solution_of_the_paper_s_first_condition(step: int) -> None:
+    with np.load(CONDITION_1) as scene:
+        x, y = np.meshgrid(scene["x"] * 1e-3, scene["y"] * 1e-3)
+        expected, force, stick_ratio = (
+            scene["u"][step] * 1e-3,
+            float(scene["F_T"][step]),
+            float(scene["stick_ratio"][step]),
+        )
+        contact = HertzContact(RADIUS, float(scene["F_N"][step]), half_space(1e6, float(scene["nu"])))
+    case = CattaneoMindlin(contact, FRICTION, force)
+    # ν is 0.49: the true slip turns a little from the load, which the closed form leaves out
+    np.testing.assert_allclose(case.displacement(x, y), expected[..., :2], atol=0.03 * np.abs(expected[..., :2]).max())
+    normal = contact.normal_displacement(np.hypot(x, y))
+    np.testing.assert_allclose(normal, expected[..., 2], atol=1e-3 * np.abs(expected[..., 2]).max())
+    assert case.stick_ratio == pytest.approx(stick_ratio, abs=0.01)
