@@ -13,7 +13,7 @@ JobStatus = Literal["queued", "running", "done", "failed", "refused"]
 class NewModel:
     """A fitted friction model about to be stored; coefficients β₀ [-], β₁ [s/m], β₂ [1/N], ranges in m/s and N.
 
-    ``degrees_of_freedom`` is None where there are infinitely many.
+    ``degrees_of_freedom`` of the coefficients and ``scatter_degrees_of_freedom`` of ε are None where infinite.
     """
 
     method: str
@@ -22,6 +22,7 @@ class NewModel:
     scale: float
     n: int
     degrees_of_freedom: float | None
+    scatter_degrees_of_freedom: float | None
     tangential_velocity: tuple[float, float]
     normal_force: tuple[float, float]
     identifiable: tuple[bool, ...]

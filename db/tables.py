@@ -224,6 +224,7 @@ class FrictionModelRow(Base):
     scale: Mapped[float]
     n: Mapped[int]
     degrees_of_freedom: Mapped[float | None]
+    scatter_degrees_of_freedom: Mapped[float | None]
     tangential_velocity_min: Mapped[float]
     tangential_velocity_max: Mapped[float]
     normal_force_min: Mapped[float]

@@ -34,8 +34,8 @@ class FrictionModel:
 
     ``coefficients`` [3]: β₀ [-], β₁ [s/m], β₂ [1/N]; ``covariance`` [3, 3] of them; ``scale``: standard deviation σ
     of ε [-]; ``n`` samples of elements of ``element_area`` m²; ``degrees_of_freedom`` of the Student-t distribution
-    that the coefficients follow; ``identifiable`` [3] bool; ``draws`` [k, ≥ 4] of (β, σ, …) or None;
-    ``scatter_degrees_of_freedom`` of the Student-t distribution that ε/σ follows, n − 3 where None.
+    that the coefficients follow and ``scatter_degrees_of_freedom`` of that which ε/σ follows; ``identifiable`` [3]
+    bool; ``draws`` [k, ≥ 4] of (β, σ, …) or None.
     """
 
     method: str
@@ -44,13 +44,13 @@ class FrictionModel:
     scale: float
     n: int
     degrees_of_freedom: float
+    scatter_degrees_of_freedom: float
     domain: Domain
     identifiable: NDArray[np.bool_]
     element_area: float
     cost: Cost
     diagnostics: Mapping[str, float | str] = field(default_factory=dict)
     draws: FloatArray | None = None
-    scatter_degrees_of_freedom: float | None = None
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -82,8 +82,7 @@ class FrictionModel:
             return mean
         _check_probability("quantile", quantile)
         error = np.sqrt(np.maximum(np.einsum("...i,ij,...j->...", x, self.covariance, x), 0.0))
-        freedom = self.n - 3.0 if self.scatter_degrees_of_freedom is None else self.scatter_degrees_of_freedom
-        scatter = special.stdtrit(freedom, quantile) * self.scale
+        scatter = special.stdtrit(self.scatter_degrees_of_freedom, quantile) * self.scale
         distance = np.hypot(scatter, special.stdtrit(self.degrees_of_freedom, quantile) * error)
         return np.asarray(mean + np.sign(quantile - 0.5) * distance)
 

@@ -46,7 +46,8 @@ def report(
     linear: LinearFit | None = None,
     monte_carlo_error: float = 0.0,
     draws: FloatArray | None = None,
-    scatter_degrees_of_freedom: float | None = None,
+    *,
+    scatter_degrees_of_freedom: float,
 ) -> FrictionModel:
     """The friction model, with what its uncertainty does to friction; ``begin``: when the fit began."""
     effect = effects(covariance, degrees_of_freedom, evidence)

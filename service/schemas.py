@@ -22,6 +22,7 @@ _MODEL: JsonDict = {
     "scale": 0.021,
     "n": 5120,
     "degrees_of_freedom": 11.0,
+    "scatter_degrees_of_freedom": 5117.0,
     "domain": {"tangential_velocity": [0.0, 0.004], "normal_force": [0.002, 0.11]},
     "identifiable": [True, True, False],
     "element_area": 1.0e-6,
@@ -101,7 +102,8 @@ class FrictionModelOut(BaseModel):
     covariance: Annotated[list[list[float]], Field(description="Of the coefficients, 3×3")]
     scale: Annotated[float, Field(description="σ, standard deviation of ε [-]")]
     n: Annotated[int, Field(description="Samples behind the model")]
-    degrees_of_freedom: Annotated[float | None, Field(description="Of the Student-t distribution; null: normal")]
+    degrees_of_freedom: Annotated[float | None, Field(description="Of the coefficients' Student-t; null: normal")]
+    scatter_degrees_of_freedom: Annotated[float | None, Field(description="Of the scatter's Student-t; null: normal")]
     domain: DomainOut
     identifiable: Annotated[list[bool], Field(description="Whether the data tell β₀, β₁, β₂")]
     element_area: Annotated[float, Field(description="m²")]
@@ -123,6 +125,7 @@ class FrictionModelOut(BaseModel):
             scale=model.scale,
             n=model.n,
             degrees_of_freedom=model.degrees_of_freedom,
+            scatter_degrees_of_freedom=model.scatter_degrees_of_freedom,
             domain=DomainOut(tangential_velocity=model.tangential_velocity, normal_force=model.normal_force),
             identifiable=list(model.identifiable),
             element_area=model.element_area,

@@ -94,6 +94,7 @@ def to_new_model(model: FrictionModel) -> NewModel:
         scale=float(model.scale),
         n=int(model.n),
         degrees_of_freedom=finite_or_none(model.degrees_of_freedom),
+        scatter_degrees_of_freedom=finite_or_none(model.scatter_degrees_of_freedom),
         tangential_velocity=model.domain.tangential_velocity,
         normal_force=model.domain.normal_force,
         identifiable=tuple(model.identifiable.tolist()),
@@ -106,19 +107,23 @@ def to_new_model(model: FrictionModel) -> NewModel:
 
 def to_friction_model(stored: NewModel) -> FrictionModel:
     """A stored model as one that predicts; its draws are not kept."""
-    degrees = stored.degrees_of_freedom
     return FrictionModel(
         method=stored.method,
         coefficients=np.array(stored.coefficients),
         covariance=np.array(stored.covariance),
         scale=stored.scale,
         n=stored.n,
-        degrees_of_freedom=math.inf if degrees is None else degrees,
+        degrees_of_freedom=_or_infinite(stored.degrees_of_freedom),
+        scatter_degrees_of_freedom=_or_infinite(stored.scatter_degrees_of_freedom),
         domain=Domain(stored.tangential_velocity, stored.normal_force),
         identifiable=np.array(stored.identifiable),
         element_area=stored.element_area,
         cost=Cost(stored.cost_seconds, stored.monte_carlo_error),
     )
+
+
+def _or_infinite(degrees_of_freedom: float | None) -> float:
+    return math.inf if degrees_of_freedom is None else degrees_of_freedom
 
 
 def finite_or_none(value: float) -> float | None:

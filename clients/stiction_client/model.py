@@ -36,7 +36,7 @@ class FrictionModel:
 
     ``coefficients`` [3]: β₀ [-], β₁ [s/m], β₂ [1/N]; ``covariance`` [3, 3] of them; ``scale``: standard deviation of
     ε [-]; ``n`` samples of elements of ``element_area`` m²; ``degrees_of_freedom`` of the Student-t distribution that
-    the coefficients and a new μ follow; ``identifiable`` [3] bool.
+    the coefficients follow, ``scatter_degrees_of_freedom`` of that which ε/σ follows; ``identifiable`` [3] bool.
     """
 
     material: str
@@ -47,6 +47,7 @@ class FrictionModel:
     scale: float
     n: int
     degrees_of_freedom: float
+    scatter_degrees_of_freedom: float
     domain: Domain
     identifiable: NDArray[np.bool_]
     element_area: float
@@ -57,9 +58,8 @@ class FrictionModel:
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "FrictionModel":
-        """The model in the service's answer; a ``degrees_of_freedom`` of null means a normal distribution."""
+        """The model in the service's answer; degrees of freedom of null mean a normal distribution."""
         domain, cost = record["domain"], record["cost"]
-        freedom = record["degrees_of_freedom"]
         return cls(
             material=record["material"],
             method=record["method"],
@@ -68,7 +68,8 @@ class FrictionModel:
             covariance=np.array(record["covariance"], dtype=np.float64).reshape(3, 3),
             scale=float(record["scale"]),
             n=int(record["n"]),
-            degrees_of_freedom=math.inf if freedom is None else float(freedom),
+            degrees_of_freedom=_freedom(record["degrees_of_freedom"]),
+            scatter_degrees_of_freedom=_freedom(record["scatter_degrees_of_freedom"]),
             domain=Domain(_pair(domain["tangential_velocity"]), _pair(domain["normal_force"])),
             identifiable=np.array(record["identifiable"], dtype=np.bool_).reshape(3),
             element_area=float(record["element_area"]),
@@ -94,8 +95,9 @@ class FrictionModel:
     ) -> FloatArray:
         """Friction coefficient expected at v (m/s) and f_n (N an element), or a quantile of a new observation of it.
 
-        The quantile includes the scatter ε and the uncertainty of the coefficients (Student-t predictive
-        distribution). Shapes broadcast. Raises ``InvalidArgument`` for a quantile outside (0, 1).
+        The quantile includes the scatter ε and the uncertainty of the coefficients, whose distances from the mean add
+        as root of squares (Graybill & Wang 1980), as in the service. Shapes broadcast. Raises ``InvalidArgument`` for
+        a quantile outside (0, 1).
         """
         v, f_n = np.broadcast_arrays(np.asarray(tangential_velocity, float), np.asarray(normal_force, float))
         x = np.stack([np.ones_like(v), v, f_n], axis=-1)
@@ -103,8 +105,10 @@ class FrictionModel:
         if quantile is None:
             return mean
         check_probability("quantile", quantile)
-        spread = np.sqrt(self.scale**2 + np.einsum("...i,ij,...j->...", x, self.covariance, x))
-        return np.asarray(mean + special.stdtrit(self.degrees_of_freedom, quantile) * spread)
+        error = np.sqrt(np.maximum(np.einsum("...i,ij,...j->...", x, self.covariance, x), 0.0))
+        scatter = special.stdtrit(self.scatter_degrees_of_freedom, quantile) * self.scale
+        distance = np.hypot(scatter, special.stdtrit(self.degrees_of_freedom, quantile) * error)
+        return np.asarray(mean + np.sign(quantile - 0.5) * distance)
 
     def extrapolation(self, tangential_velocity: float, normal_force: float) -> str | None:
         """Which of v (m/s) and f_n (N an element) lies outside the data behind the model; None where neither does.
@@ -127,6 +131,10 @@ def check_probability(name: str, value: float) -> None:
     """Refuse what is not a probability strictly between 0 and 1."""
     if not 0.0 < value < 1.0:
         raise InvalidArgument(name, value, "above 0 and below 1")
+
+
+def _freedom(value: float | None) -> float:
+    return math.inf if value is None else float(value)
 
 
 def _pair(values: Any) -> tuple[float, float]:

@@ -95,22 +95,24 @@ def required_normal_force(
 class _Capacity:
     """Tangential force f·q(f) that one element holds under the normal force f, N.
 
-    q(f) = a + c·f + t·√(σ² + |p + f·r|²) is the conservative quantile of μ; with t ≤ 0 it is concave, so that
-    f·q(f) is log-concave where it is positive: it has one peak, and the forces that hold a load are one interval.
-    With Σ = L·Lᵀ, p = Lᵀ(1, v, 0) and r = Lᵀ(0, 0, 1): a sum of squares can't turn negative by rounding, as xᵀΣx can.
+    q(f) = a + c·f − √(s² + |p + f·r|²) is the conservative quantile of μ (``FrictionModel.predict``). It is concave, so
+    that f·q(f) is log-concave where it is positive: it has one peak, and the forces that hold a load are one interval.
+    With Σ = L·Lᵀ and Student's quantiles t: s = t·σ, p = t·Lᵀ(1, v, 0) and r = t·Lᵀ(0, 0, 1). A sum of squares can't
+    turn negative by rounding, as xᵀΣx can.
     """
 
     a: float
     c: float
-    t: float
-    scale: float
+    s: float
     p: FloatArray
     r: FloatArray
 
     @classmethod
     def of(cls, model: FrictionModel, tangential_velocity: float, slip_probability: float) -> "_Capacity":
-        t = float(special.stdtrit(model.degrees_of_freedom, slip_probability))
-        if not np.isfinite([*model.coefficients, *model.covariance.flat, model.scale, t]).all():
+        scatter, error = special.stdtrit(
+            [model.scatter_degrees_of_freedom, model.degrees_of_freedom], slip_probability
+        )
+        if not np.isfinite([*model.coefficients, *model.covariance.flat, model.scale, scatter, error]).all():
             raise InvalidArgument("model", "not finite at this slip probability", "finite coefficients and quantile")
         variance, axes = np.linalg.eigh(model.covariance)
         factor = axes * np.sqrt(np.maximum(variance, 0.0))
@@ -118,10 +120,9 @@ class _Capacity:
         return cls(
             a=float(constant @ model.coefficients),
             c=float(slope @ model.coefficients),
-            t=min(t, 0.0),  # at ½ it is 0 but for rounding
-            scale=model.scale,
-            p=constant @ factor,
-            r=slope @ factor,
+            s=scatter * model.scale,
+            p=error * constant @ factor,
+            r=error * slope @ factor,
         )
 
     def __call__(self, force: float) -> float:
@@ -129,7 +130,7 @@ class _Capacity:
 
     def friction(self, force: float) -> float:
         """Conservative quantile of μ."""
-        return self.a + self.c * force + self.t * self._spread(force)
+        return self.a + self.c * force - self._spread(force)
 
     def best_force(self, limit: float) -> float:
         """Normal force that holds most, at most ``limit``; 0 where none holds anything."""
@@ -156,12 +157,12 @@ class _Capacity:
         return force
 
     def _spread(self, force: float) -> float:
-        return math.hypot(self.scale, *(self.p + force * self.r))
+        return math.hypot(self.s, *(self.p + force * self.r))
 
     def _friction_slope(self, force: float) -> float:
         spread = self._spread(force)
         inclination = float((self.p + force * self.r) @ self.r) / spread if spread > 0.0 else 0.0
-        return self.c + self.t * inclination
+        return self.c - inclination
 
 
 def _last_positive(function: Callable[[float], float], start: float, limit: float) -> float:

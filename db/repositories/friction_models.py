@@ -78,6 +78,7 @@ def _record(row: FrictionModelRow, material: str) -> StoredModel:
         scale=row.scale,
         n=row.n,
         degrees_of_freedom=row.degrees_of_freedom,
+        scatter_degrees_of_freedom=row.scatter_degrees_of_freedom,
         tangential_velocity=(row.tangential_velocity_min, row.tangential_velocity_max),
         normal_force=(row.normal_force_min, row.normal_force_max),
         identifiable=tuple(row.identifiable),

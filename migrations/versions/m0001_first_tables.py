@@ -184,6 +184,7 @@ def create_friction_models() -> None:
         sa.Column("scale", sa.Double, nullable=False),
         sa.Column("n", sa.Integer, nullable=False),
         sa.Column("degrees_of_freedom", sa.Double),
+        sa.Column("scatter_degrees_of_freedom", sa.Double),
         sa.Column("tangential_velocity_min", sa.Double, nullable=False),
         sa.Column("tangential_velocity_max", sa.Double, nullable=False),
         sa.Column("normal_force_min", sa.Double, nullable=False),

@@ -29,6 +29,7 @@ MODEL = {
     "scale": 0.021,
     "n": 5120,
     "degrees_of_freedom": 11.0,
+    "scatter_degrees_of_freedom": 5117.0,
     "domain": {"tangential_velocity": [0.0, 0.004], "normal_force": [0.002, 0.11]},
     "identifiable": [True, True, False],
     "element_area": 1.0e-6,
@@ -161,6 +162,7 @@ def make_model() -> Callable[..., FrictionModel]:
         covariance: Any = ((2e-5, 1e-4, -8e-5), (1e-4, 1e-2, -3e-4), (-8e-5, -3e-4, 4e-3)),
         scale: float = 0.021,
         degrees_of_freedom: float = 11.0,
+        scatter_degrees_of_freedom: float = 5117.0,
         element_area: float = 1e-6,
         normal_force_domain: tuple[float, float] = (0.002, 0.3),
     ) -> FrictionModel:
@@ -173,6 +175,7 @@ def make_model() -> Callable[..., FrictionModel]:
             scale=scale,
             n=5120,
             degrees_of_freedom=degrees_of_freedom,
+            scatter_degrees_of_freedom=scatter_degrees_of_freedom,
             domain=Domain((1e-5, 0.004), normal_force_domain),
             identifiable=np.ones(3, bool),
             element_area=element_area,

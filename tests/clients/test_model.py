@@ -22,7 +22,7 @@ def on_the_service(model: FrictionModel) -> estimators.FrictionModel:
 def test_client_and_estimators_predict_the_same(
     make_model: Make, degrees_of_freedom: float, quantile: float | None
 ) -> None:
-    model = make_model(degrees_of_freedom=degrees_of_freedom)
+    model = make_model(degrees_of_freedom=degrees_of_freedom, scatter_degrees_of_freedom=25.0)
     v, f_n = np.linspace(0.0, 0.01, 7)[:, None], np.linspace(0.0, 1.0, 5)
     expected = on_the_service(model).predict(v, f_n, quantile)
     np.testing.assert_allclose(model.predict(v, f_n, quantile), expected, rtol=1e-12, atol=0)

@@ -45,6 +45,7 @@ def models(draw: st.DrawFn) -> FrictionModel:
         covariance=factor @ factor.T,
         scale=draw(st.sampled_from([0.0, 1e-3, 0.02, 0.2])),
         degrees_of_freedom=draw(st.sampled_from([1.0, 3.0, 11.0, 1e4, np.inf])),
+        scatter_degrees_of_freedom=draw(st.sampled_from([1.0, 11.0, np.inf])),
     )
 
 
@@ -60,6 +61,7 @@ def _make(**parts: Any) -> FrictionModel:
         scale=parts["scale"],
         n=10,
         degrees_of_freedom=parts["degrees_of_freedom"],
+        scatter_degrees_of_freedom=parts["scatter_degrees_of_freedom"],
         domain=Domain((0.0, 1.0), (0.0, 1.0)),
         identifiable=np.ones(3, bool),
         element_area=1e-6,
@@ -102,7 +104,7 @@ def test_friction_that_falls_with_force_gives_the_smaller_root_of_the_parabola(m
 
 
 def test_scatter_and_velocity_enter_the_quantile(make_model: Make) -> None:
-    model = make_model((0.5, -10.0, 0.0), ZERO, scale=0.05, degrees_of_freedom=np.inf)
+    model = make_model((0.5, -10.0, 0.0), ZERO, scale=0.05, scatter_degrees_of_freedom=np.inf)
     answer = required_normal_force(model, 1.0, 0.05, contact_area=AREA, tangential_velocity=0.01)
     assert answer.normal_force == pytest.approx(1.0 / (0.5 - 0.1 - 1.6448536269514722 * 0.05), rel=1e-12)
 
@@ -178,7 +180,7 @@ def test_leaving_the_model_s_data_is_warned_of(make_model: Make) -> None:
     outside = required_normal_force(model, 1e-3, contact_area=AREA)
     assert not outside.within_domain
     assert outside.warning is not None
-    assert outside.warning.startswith("normal force extrapolated to 5")
+    assert outside.warning.startswith("normal force extrapolated to")
     fast = required_normal_force(model, 1.0, contact_area=AREA, tangential_velocity=0.02)
     assert fast.warning is not None
     assert fast.warning.startswith("tangential velocity extrapolated")
@@ -268,7 +270,7 @@ def test_a_smaller_slip_probability_never_needs_less_force(
 @pytest.mark.parametrize("degrees_of_freedom", [5.0, 40.0])
 def test_as_many_contacts_slip_as_were_allowed(make_model: Make, probability: float, degrees_of_freedom: float) -> None:
     """Draw coefficients and scatter from the posterior that the Student-t prediction stands for (400,000 draws)."""
-    model = make_model(degrees_of_freedom=degrees_of_freedom)
+    model = make_model(degrees_of_freedom=degrees_of_freedom, scatter_degrees_of_freedom=degrees_of_freedom)
     answer = required_normal_force(model, 2.0, probability, contact_area=AREA, tangential_velocity=2e-3)
     generator, draws = np.random.default_rng(17), 400_000
     stretch = np.sqrt(degrees_of_freedom / generator.chisquare(degrees_of_freedom, draws))
@@ -277,6 +279,21 @@ def test_as_many_contacts_slip_as_were_allowed(make_model: Make, probability: fl
     x = np.array([1.0, 2e-3, answer.element_force])
     slips = (((model.coefficients + errors) @ x + scatter) * answer.normal_force < 2.0).mean()
     assert abs(slips - probability) < 4.0 * np.sqrt(probability * (1.0 - probability) / draws)
+
+
+@pytest.mark.parametrize("probability", [0.01, 1e-3])
+def test_no_more_contacts_slip_than_were_allowed_after_few_grasps(make_model: Make, probability: float) -> None:
+    """Coefficients from four grasps, scatter from thousands of samples: two independent estimates (400,000 draws)."""
+    model = make_model(degrees_of_freedom=3.0, scatter_degrees_of_freedom=np.inf)
+    answer = required_normal_force(model, 2.0, probability, contact_area=AREA, tangential_velocity=2e-3)
+    generator, draws = np.random.default_rng(18), 400_000
+    stretch = np.sqrt(3.0 / generator.chisquare(3.0, draws))
+    errors = stretch[:, None] * generator.multivariate_normal(np.zeros(3), model.covariance, draws)
+    x = np.array([1.0, 2e-3, answer.element_force])
+    friction = (model.coefficients + errors) @ x + model.scale * generator.normal(size=draws)
+    slips = (friction * answer.normal_force < 2.0).mean()
+    noise = 4.0 * np.sqrt(probability / draws)
+    assert 0.5 * probability < slips < 1.05 * probability + noise  # 5 %: how far the root of squares may fall short
 
 
 def test_a_nearly_singular_covariance_gives_no_invalid_root(make_model: Make) -> None:

@@ -46,6 +46,7 @@ def new_model() -> Callable[..., NewModel]:
             scale=0.02,
             n=1000,
             degrees_of_freedom=997.0,
+            scatter_degrees_of_freedom=None,
             tangential_velocity=(0.0, 0.01),
             normal_force=(0.01, 0.09),
             identifiable=(True, True, False),
