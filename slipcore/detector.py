@@ -141,13 +141,13 @@ def _velocity(lattice: Lattice, memory: Memory | None, seen: Observation, slip: 
     if memory is None:
         return np.full((*slip.shape, 2), np.nan)
     before, observed = memory.answer, seen.contact & memory.answer.contact
-    points = (lattice.position + memory.frame.displacement)[..., :2]
-    moved = (seen.displacement - memory.frame.displacement)[..., :2]
+    start = memory.frame.displacement[..., :2]
+    points, moved = lattice.position[..., :2] + start, seen.displacement[..., :2] - start
     if seen.object_pose is not None and memory.frame.object_pose is not None:
         motion = pose_motion(memory.frame.object_pose, seen.object_pose)
     else:
         sticking = observed & ~slip & ~before.slip
-        motion = fit_rigid_motion(points[sticking], moved[sticking])
+        motion = fit_rigid_motion(points.reshape(-1, 2), moved.reshape(-1, 2), sticking.ravel().astype(float))
     return relative_velocity(points, moved, observed, motion, seen.interval)
 
 

@@ -24,9 +24,10 @@ class RigidMotion(NamedTuple):
         cos φ − 1 is taken as −2 sin²(φ/2), so that a tiny motion of far points keeps its digits.
         """
         sine, versine = math.sin(self.rotation), 2.0 * math.sin(0.5 * self.rotation) ** 2
-        arm = points - np.array(self.start)
-        turn = np.array([[-versine, -sine], [sine, -versine]])
-        moved: FloatArray = arm @ turn.T + np.array(self.translation)
+        x, y = points[..., 0] - self.start[0], points[..., 1] - self.start[1]
+        moved = np.empty_like(points)
+        moved[..., 0] = self.translation[0] - versine * x - sine * y
+        moved[..., 1] = self.translation[1] + sine * x - versine * y
         return moved
 
     @property
@@ -48,16 +49,15 @@ def fit_rigid_motion(points: FloatArray, moved: FloatArray, weight: FloatArray |
     total = w.sum()
     if not total > 0.0:
         return UNOBSERVABLE
-    start, translation = (w @ points) / total, (w @ moved) / total
-    arm, turn = points - start, moved - translation
-    spread = float(w @ (arm * arm).sum(axis=1))
+    (x, y), (u, v) = points.T, moved.T
+    start = float(w @ x / total), float(w @ y / total)
+    translation = float(w @ u / total), float(w @ v / total)
+    x, y, u, v = x - start[0], y - start[1], u - translation[0], v - translation[1]
+    spread = float(w @ (x * x + y * y))
     if not spread > (np.finfo(float).eps * np.abs(points).max()) ** 2 * total:
         return UNOBSERVABLE
-    sine = float(w @ (arm[:, 0] * turn[:, 1] - arm[:, 1] * turn[:, 0]))
-    cosine = spread + float(w @ (arm * turn).sum(axis=1))
-    return RigidMotion(
-        (float(start[0]), float(start[1])), (float(translation[0]), float(translation[1])), math.atan2(sine, cosine)
-    )
+    rotation = math.atan2(float(w @ (x * v - y * u)), spread + float(w @ (x * u + y * v)))
+    return RigidMotion(start, translation, rotation)
 
 
 def pose_motion(before: FloatArray, after: FloatArray) -> RigidMotion:
