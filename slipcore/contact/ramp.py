@@ -104,6 +104,7 @@ def _log(
         displacement=displacement + marker_noise * rng.standard_normal(displacement.shape),
         element_area=pitch**2,
         force=force + force_noise * rng.standard_normal(force.shape),
+        normal=np.broadcast_to([0.0, 0.0, 1.0], force.shape),  # linear theory: loads act on the undeformed plane
         object_pose=np.stack([f.pose for f in fields]),
         sensor="half-space",
         metadata={"tier": "closed form", "source": "Hertz, Cattaneo–Mindlin"},
