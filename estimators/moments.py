@@ -10,7 +10,7 @@ import numpy as np
 from estimators.errors import InvalidSamples
 from estimators.friction_model import Domain, FrictionModel
 from estimators.least_squares import Factor, factorise, merge
-from estimators.observations import check_columns, check_element_areas
+from estimators.observations import check_columns, common_element_area
 
 if TYPE_CHECKING:
     from slipcore.samples import FrictionSamples
@@ -36,7 +36,7 @@ class Moments:
     @classmethod
     def from_samples(cls, samples: "FrictionSamples") -> "Moments":
         """Moments of one grasp's samples, none of them allowed; raises ``InvalidSamples`` as ``fit`` does."""
-        area = check_element_areas([samples.element_area])
+        area = common_element_area([samples.element_area])
         columns = check_columns([samples])
         used = columns["weight"] > 0.0
         if not used.any():
@@ -59,10 +59,20 @@ class Moments:
         """Effective number of samples (Σw)²/Σw² (Kish); 0 where there are none."""
         return self.factor.weight**2 / self.weight_square if self.weight_square > 0.0 else 0.0
 
+    def at_element_area(self, element_area: float) -> "Moments":
+        """The same pressures on elements of another area, m²: the column of f_n scales, exactly but for rounding."""
+        if element_area == self.element_area:
+            return self
+        scale = np.array([1.0, element_area / self.element_area, 1.0])
+        factor = Factor(self.factor.weight, self.factor.mean * scale, self.factor.triangle * scale)
+        low, high = self.domain.normal_force
+        domain = Domain(self.domain.tangential_velocity, (low * scale[1], high * scale[1]))
+        return replace(self, factor=factor, domain=domain, element_area=element_area)
+
     def merge(self, *others: "Moments") -> "Moments":
         """Moments of all samples behind these; any order and any grouping agree to rounding."""
-        parts = (self, *others)
-        area = check_element_areas([part.element_area for part in parts])
+        area = common_element_area([part.element_area for part in (self, *others)])
+        parts = [part.at_element_area(area) for part in (self, *others)]
         return Moments(
             merge(part.factor for part in parts),
             sum(part.weight_square for part in parts),

@@ -1,7 +1,7 @@
 """Checked samples as the estimators read them: columns, relative weights and the cluster of each sample."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,19 +52,33 @@ class Observations:
         """Number of clusters."""
         return int(self.cluster.max()) + 1
 
+    def take(self, rows: NDArray[np.bool_], weight: FloatArray) -> "Observations":
+        """Some of the samples, with other weights [rows.sum()]; clusters left empty keep their code."""
+        return replace(
+            self,
+            friction=self.friction[rows],
+            tangential_velocity=self.tangential_velocity[rows],
+            normal_force=self.normal_force[rows],
+            tangential_force=self.tangential_force[rows],
+            weight=weight,
+            grasp=self.grasp[rows],
+            cluster=self.cluster[rows],
+        )
+
     def columns(self) -> FloatArray:
         """Regressors and response (v, f_n, μ), [k, 3]."""
         return np.stack([self.tangential_velocity, self.normal_force, self.friction]).T
 
 
 def observe(samples: "FrictionSamples | Sequence[FrictionSamples]") -> Observations:
-    """Check and join the samples of one or more grasps.
+    """Check and join the samples of one or more grasps, with forces as on elements of the smallest area among them.
 
     Raises ``InvalidSamples`` for numbers that are not finite, negative forces, velocities or weights, weights that are
-    all zero and elements of different size; ``TooFewSamples`` where fewer than four effective samples are left.
+    all zero; ``TooFewSamples`` where fewer than four effective samples are left.
     """
     parts = _parts(samples)
-    area = check_element_areas([part.element_area for part in parts])
+    area = common_element_area([part.element_area for part in parts])
+    parts = [part.at_element_area(area) for part in parts]
     count = sum(map(len, parts))
     if count == 0:
         raise TooFewSamples("samples", "none (no slip was seen)", f"at least {MIN_SAMPLES}")
@@ -108,14 +122,12 @@ def check_columns(parts: "Sequence[FrictionSamples]") -> dict[str, FloatArray]:
     return values
 
 
-def check_element_areas(areas: Sequence[float]) -> float:
-    """The one area of all elements, m²; sensors of one kind differ by the rounding of their files only."""
+def common_element_area(areas: Sequence[float]) -> float:
+    """The area, m², that all forces are brought to: the smallest, so that no order or grouping matters."""
     values = np.array(areas, dtype=float)
     if not (np.isfinite(values).all() and (values > 0.0).all()):
         raise InvalidSamples("element_area", values.tolist(), "above 0 m²")
-    if np.ptp(values) > 1e-6 * values[0]:
-        raise InvalidSamples("element_area", sorted(set(values.tolist())), "one area for all (f_n scales with it)")
-    return float(values[0])
+    return float(values.min())
 
 
 def _check_column(name: str, values: FloatArray, lowest: float) -> None:

@@ -1,7 +1,7 @@
 """Friction samples at slipping points (stage 5: samples)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -44,16 +44,27 @@ class FrictionSamples:
     def __len__(self) -> int:
         return len(self.friction_coefficient)
 
+    def at_element_area(self, element_area: float) -> "FrictionSamples":
+        """The same pressures on elements of another area, m²: forces scale with it, friction and velocity do not."""
+        factor = element_area / self.element_area
+        return replace(
+            self,
+            normal_force=self.normal_force * factor,
+            tangential_force=self.tangential_force * factor,
+            element_area=element_area,
+        )
+
     @classmethod
     def concatenate(cls, parts: Sequence["FrictionSamples"]) -> "FrictionSamples":
-        """Join samples of elements of one size; raises ``InvalidInput`` where the element areas differ."""
-        areas = sorted({part.element_area for part in parts})
-        if len(areas) != 1:
-            raise InvalidInput("element_area", areas, "one element area for all parts")
+        """Join samples, as of elements of the smallest area among them; raises ``InvalidInput`` for no parts."""
+        if not parts:
+            raise InvalidInput("parts", "none", "at least one")
+        area = min(part.element_area for part in parts)
+        alike = [part.at_element_area(area) for part in parts]
         joined = {
-            entry.name: np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(cls)[:-1]
+            entry.name: np.concatenate([getattr(part, entry.name) for part in alike]) for entry in fields(cls)[:-1]
         }
-        return cls(**joined, element_area=areas[0])
+        return cls(**joined, element_area=area)
 
 
 def collect_samples(log: GraspLog, history: SlipHistory, **options: float) -> FrictionSamples:

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -37,7 +38,7 @@ def sum_below(q: float, error: float, freedom: float) -> float:
 
     middle = q / error
     edges = [-np.inf, middle - 10.0 / error, middle, middle + 10.0 / error, np.inf]
-    return sum(integrate.quad(integrand, a, b, epsabs=1e-13)[0] for a, b in zip(edges, edges[1:], strict=False))
+    return sum(integrate.quad(integrand, a, b, epsabs=1e-13)[0] for a, b in pairwise(edges))
 
 
 def test_mean_is_the_plane() -> None:

@@ -148,12 +148,20 @@ def test_moments_of_nothing_are_neutral_and_not_fitted(samples: Make) -> None:
         nothing.fit()
 
 
+def test_moments_of_other_element_areas_merge_as_their_samples_would(samples: Make) -> None:
+    first, second = samples(60), samples(80, seed=1)
+    other = second.at_element_area(3.0 * second.element_area)
+    merged = Moments.from_samples(other).merge(Moments.from_samples(first))
+    together = Moments.from_samples(FrictionSamples.concatenate([first, other]))
+    assert merged.element_area == first.element_area
+    np.testing.assert_allclose(merged.fit().coefficients, together.fit().coefficients, rtol=1e-11)  # rounding of QR
+    np.testing.assert_allclose(merged.domain.normal_force, together.domain.normal_force, rtol=1e-15)
+
+
 def test_what_moments_cannot_do_is_refused_by_name(samples: Make) -> None:
     moments = Moments.from_samples(samples(50))
     with pytest.raises(estimators.InvalidSamples, match="mixture"):
         estimators.fit([moments, samples(50)])
-    with pytest.raises(estimators.InvalidSamples, match="element_area"):
-        moments.merge(replace(moments, element_area=2e-6))
     for bad in ((np.nan, 0.05, 0.4), (1e-3, -0.05, 0.4), (1e-3, 0.05, np.inf)):
         with pytest.raises(estimators.InvalidSamples):
             moments.add(*bad)

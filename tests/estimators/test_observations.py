@@ -89,9 +89,18 @@ def test_one_sample_that_outweighs_all_others_is_too_few(samples: Make) -> None:
         estimators.fit(samples(50, weight=weight))
 
 
-def test_elements_of_different_area_are_refused(samples: Make) -> None:
+def test_sensors_of_different_element_area_are_pooled_at_the_same_pressure(samples: Make) -> None:
+    first, second = samples(200), samples(200, seed=1)
+    alike = estimators.fit([first, second])
+    mixed = estimators.fit([first, second.at_element_area(2.0 * second.element_area)])
+    assert mixed.element_area == first.element_area
+    np.testing.assert_array_equal(mixed.coefficients, alike.coefficients)  # a factor of 2 is exact
+
+
+@pytest.mark.parametrize("area", [0.0, -1e-6, np.nan, np.inf])
+def test_an_element_area_that_is_none_is_refused(samples: Make, area: float) -> None:
     with pytest.raises(estimators.InvalidSamples, match="element_area"):
-        estimators.fit([samples(20), replace(samples(20), element_area=2e-6)])
+        estimators.fit([samples(20), replace(samples(20), element_area=area)])
 
 
 def test_clusters_are_grasps_else_elements_else_stretches_of_time(samples: Make) -> None:

@@ -140,11 +140,15 @@ def test_an_unknown_option_is_refused(ramp: tuple[GraspLog, SlipHistory]) -> Non
         collect_samples(*ramp, least_speed=1.0)
 
 
-def test_samples_of_one_area_are_joined_and_others_refused(ramp: tuple[GraspLog, SlipHistory]) -> None:
+def test_samples_join_as_the_same_pressures_on_the_smallest_elements(ramp: tuple[GraspLog, SlipHistory]) -> None:
     samples = collect_samples(*ramp)
-    both = FrictionSamples.concatenate([samples, samples])
-    assert len(both) == 2 * len(samples)
-    with pytest.raises(InvalidInput, match="element_area"):
-        FrictionSamples.concatenate([samples, replace(samples, element_area=1.0)])
+    area = samples.element_area
+    both = FrictionSamples.concatenate([samples, samples.at_element_area(2.0 * area)])
+    assert both.element_area == area
+    for name in ("normal_force", "tangential_force", "friction_coefficient", "element"):
+        np.testing.assert_array_equal(getattr(both, name), np.tile(getattr(samples, name), 2))  # a factor of 2 is exact
+    np.testing.assert_array_equal(samples.at_element_area(2.0 * area).normal_force, 2.0 * samples.normal_force)
+    with pytest.raises(InvalidInput, match="parts is none"):
+        FrictionSamples.concatenate([])
     with pytest.raises(InvalidInput, match="weight is of shape"):
         replace(samples, weight=samples.weight[1:])
