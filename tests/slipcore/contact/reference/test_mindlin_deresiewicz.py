@@ -170,6 +170,26 @@ def test_loads_beyond_the_limit_are_refused_by_name(fresh: MindlinDeresiewicz) -
         fresh.load(-1.0, 0.0)
 
 
+@pytest.mark.parametrize("size", [1e-6, 1e3])
+def test_the_size_of_the_forces_does_not_matter(fresh: MindlinDeresiewicz, size: float) -> None:
+    def end(state: MindlinDeresiewicz, unit: float) -> MindlinDeresiewicz:
+        return state.load(FORCE * unit, 0.7 * LIMIT * unit).load(1.2 * FORCE * unit, -0.3 * LIMIT * unit)
+
+    scaled, plain = end(MindlinDeresiewicz(pressed(FORCE * size), FRICTION), size), end(fresh, 1.0)
+    length = np.cbrt(size)  # Hertz: lengths grow with the third root of the force, approaches with its square
+    assert scaled.stick_radius == pytest.approx(length * plain.stick_radius, rel=1e-12)
+    assert scaled.rigid_displacement == pytest.approx(length**2 * plain.rigid_displacement, rel=1e-11)
+    first = CattaneoMindlin(pressed(FORCE * size), FRICTION, 0.7 * LIMIT * size)
+    assert first.stick_ratio == pytest.approx(0.3 ** (2 / 3), rel=1e-12)
+
+
+def test_sliding_on_while_the_normal_force_rises_stays_at_the_limit(fresh: MindlinDeresiewicz) -> None:
+    state = fresh.load(FORCE, LIMIT).load(1.7 * FORCE, FRICTION * 1.7 * FORCE)
+    r = np.linspace(0.0, 6e-3, 40)
+    np.testing.assert_allclose(state.traction(r), FRICTION * pressed(1.7 * FORCE).pressure(r), rtol=1e-9, atol=1e-6)
+    assert state.stick_radius >= pressed().contact_radius * (1 - 1e-9)  # only what is new may slip
+
+
 def test_contact_can_be_lost_and_regained(fresh: MindlinDeresiewicz) -> None:
     lost = fresh.load(FORCE, 0.5 * LIMIT).load(0.0, 0.0)
     assert lost.tangential_force == 0.0
