@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from estimators import conjugate, ols
+from estimators import conjugate, ols, robust
 from estimators.errors import InvalidSamples
 from estimators.evidence import gather
 from estimators.friction_model import FrictionModel
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from estimators.moments import Moments
     from slipcore.samples import FrictionSamples
 
-METHODS = ("ols", "conjugate", "bayes")
+METHODS = ("ols", "robust", "conjugate", "bayes")
 
 
 def fit(
@@ -22,16 +22,17 @@ def fit(
     seconds: float | None = None,
     seed: int = 0,
     likelihood: str | None = None,
+    loss: str = "tukey",
 ) -> FrictionModel:
     """Fit ``μ = β₀ + β₁ v + β₂ f_n + ε`` to the samples of one grasp, or of several given as a sequence.
 
     Moments may stand for the samples where the method needs no more.
 
-    ``method``: "ols" (weighted least squares, cluster-robust), "conjugate" (exact posterior for independent Gaussian
-    errors) or "bayes" (emcee), whose ``likelihood`` is "gaussian" or "grasp_effects", the default wherever samples
-    come in clusters. A sampled method stops once the
-    Monte-Carlo error of its means and 5/95 % quantiles is under ``accuracy`` posterior standard deviations, or after
-    ``seconds``; ``seed`` makes it repeatable.
+    ``method``: "ols" (weighted least squares, cluster-robust), "robust" (M-estimate with the ``loss`` "tukey" or
+    "huber", cluster-robust), "conjugate" (exact posterior for independent Gaussian errors) or "bayes" (emcee), whose
+    ``likelihood`` is "gaussian" or "grasp_effects", the default wherever samples come in clusters. A sampled method
+    stops once the Monte-Carlo error of its means and 5/95 % quantiles is under ``accuracy`` posterior standard
+    deviations, or after ``seconds``; ``seed`` makes it repeatable.
 
     Raises ``TooFewSamples`` where no slip or hardly any was seen, ``InvalidSamples`` naming what cannot be used, and
     ``NotConverged``, which carries its model, where a chain cannot be trusted.
@@ -44,6 +45,8 @@ def fit(
     evidence = gather(samples)
     if method == "ols":
         return ols.fit(evidence)
+    if method == "robust":
+        return robust.fit(evidence, loss, seed)
     if method == "conjugate":
         return conjugate.fit(evidence)
     from estimators import bayes  # emcee takes a second to load

@@ -10,7 +10,8 @@ from estimators.defaults import REFERENCE
 from estimators.evidence import Evidence
 from estimators.friction_model import FrictionModel
 from estimators.least_squares import LinearFit, solve
-from estimators.observations import IntArray, Observations
+from estimators.observations import IntArray
+from estimators.orthonormal import in_coefficients, orthonormal
 from estimators.reporting import Diagnostics, by_coefficient, report
 
 FloatArray = NDArray[np.float64]
@@ -50,12 +51,6 @@ def fit(evidence: Evidence) -> FrictionModel:
     )
 
 
-def in_coefficients(linear: LinearFit, covariance: FloatArray) -> FloatArray:
-    """Covariance [3, 3] of the coefficients from one in the orthonormal design, plus the prior's part."""
-    root = linear.root.astype(float)
-    return np.asarray(root @ covariance @ root.T + linear.prior_covariance)
-
-
 def classical(linear: LinearFit, scale: float) -> FloatArray:
     """Covariance [3, 3] if all errors were independent and alike."""
     return in_coefficients(linear, scale**2 * np.eye(linear.rank + 1))
@@ -75,26 +70,13 @@ def _honest_covariance(evidence: Evidence, linear: LinearFit, scale: float) -> t
     if observations is None:
         design, residual, cluster = _of_blocks(evidence, linear)
     else:
-        design, residual = _of_samples(observations, linear)
+        design, residual = orthonormal(observations, linear)
         cluster = observations.cluster
     covariance = in_coefficients(linear, jackknife(*cluster_sums(design, residual, cluster), scale))
     errors = by_coefficient("standard_error_cluster", np.sqrt(np.diag(covariance)))
     if observations is not None and len(observations) <= STATSMODELS_LIMIT:
         errors |= _statsmodels_errors(design, residual, cluster, linear)
     return covariance, errors
-
-
-def _of_samples(observations: Observations, linear: LinearFit) -> tuple[FloatArray, FloatArray]:
-    """Orthonormal design Q [n, r] and residuals [n], both times √w."""
-    root = np.sqrt(observations.weight)
-    mean, basis = linear.mean.astype(float), linear.basis.astype(float)
-    regressors = np.stack([observations.tangential_velocity - mean[0], observations.normal_force - mean[1]])
-    design = np.empty((len(root), 1 + linear.rank), order="F")
-    design[:, 0] = root / np.sqrt(observations.effective_n)
-    design[:, 1:] = (root * (basis.T @ regressors)).T
-    slopes = linear.coefficients[1:].astype(float)
-    at_mean = float(linear.coefficients[0] + linear.mean @ linear.coefficients[1:])
-    return design, root * (observations.friction - at_mean - slopes @ regressors)
 
 
 def _of_blocks(evidence: Evidence, linear: LinearFit) -> tuple[FloatArray, FloatArray, IntArray]:

@@ -1,0 +1,177 @@
+"""Robust regression: a high-breakdown start, then Huber's or Tukey's M-estimate with cluster-robust errors."""
+
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.cluster_errors import cluster_sums, jackknife
+from estimators.defaults import REFERENCE
+from estimators.errors import InvalidSamples, NotConverged
+from estimators.evidence import Evidence
+from estimators.friction_model import FrictionModel
+from estimators.least_squares import factorise, solve, triangular_inverse, upper_triangle
+from estimators.observations import Observations
+from estimators.orthonormal import in_coefficients, orthonormal
+from estimators.reporting import by_coefficient, report
+
+FloatArray = NDArray[np.float64]
+
+SUBSETS = 500
+"""Elemental fits tried: with 45 % outliers, the chance that none of them is clean is below 1e-39."""
+SUBSET_SAMPLES = 2000
+"""Samples that the elemental fits are compared on."""
+CONCENTRATIONS = 20
+"""Concentration steps of the best elemental fits; each lowers the trimmed sum of squares."""
+ITERATIONS = 200
+NORMAL_MAD = 0.674489750196082
+"""Median of |ε|/σ for normal ε."""
+
+
+class Loss(NamedTuple):
+    """An M-estimator: ``weight`` ψ(u)/u and ``slope`` ψ'(u); tuned to 95 % efficiency at normal errors."""
+
+    weight: Callable[[FloatArray], FloatArray]
+    slope: Callable[[FloatArray], FloatArray]
+
+
+LOSSES = {
+    "huber": Loss(
+        lambda u: 1.345 / np.maximum(np.abs(u), 1.345),
+        lambda u: (np.abs(u) <= 1.345).astype(float),
+    ),
+    "tukey": Loss(
+        lambda u: np.square(np.maximum(1.0 - np.square(u / 4.685), 0.0)),
+        lambda u: np.where(np.abs(u) < 4.685, (1.0 - (u / 4.685) ** 2) * (1.0 - 5.0 * (u / 4.685) ** 2), 0.0),
+    ),
+}
+
+
+class Plane(NamedTuple):
+    """Coefficients [r] in the orthonormal design, and the robust scale of the residuals about them."""
+
+    coefficients: FloatArray
+    scale: float
+
+
+def fit(evidence: Evidence, loss: str = "tukey", seed: int = 0) -> FrictionModel:
+    """MM-estimate (Yohai, 1987): least trimmed squares from random elemental fits, then an M-step with its scale fixed.
+
+    It breaks down at half of the samples; a tenth of outliers hardly moves it. The errors are the cluster jackknife of
+    the weighted fit, times what the loss adds. Raises ``NotConverged`` where the M-step does not settle.
+    """
+    if loss not in LOSSES:
+        raise InvalidSamples("loss", loss, ", ".join(LOSSES))
+    begin = time.perf_counter()
+    observations = evidence.raw("robust")
+    linear = solve(evidence.factor, REFERENCE.spans(evidence.element_area))
+    design, _ = orthonormal(observations, linear)
+    root = np.sqrt(observations.weight)
+    response = observations.friction - np.median(observations.friction)  # not least squares' residual: it may be 1e12
+    start = high_breakdown(design / root[:, None], response, np.random.default_rng(seed))
+    plane, weight, settled = _m_step(design, root * response, root, start, LOSSES[loss])
+    model = _model(evidence, observations, weight, plane, LOSSES[loss], loss, begin)
+    if not settled:
+        raise NotConverged(f"the {loss} estimate still moves after {ITERATIONS} iterations", model)
+    return model
+
+
+def high_breakdown(design: FloatArray, response: FloatArray, rng: np.random.Generator) -> Plane:
+    """Plane that half of the samples lie closest to (least trimmed squares; Rousseeuw & Van Driessen, 2006).
+
+    ``design`` [n, r] and ``response`` [n]. Elemental fits are compared on at most ``SUBSET_SAMPLES`` samples by their
+    median residual; the best of the five best is improved on all.
+    """
+    count, size = design.shape
+    rows = rng.integers(0, count, (SUBSETS, size))
+    regular = np.linalg.cond(design[rows]) < 1e8
+    elemental = np.linalg.solve(design[rows[regular]], response[rows[regular], None])[..., 0]
+    elemental = np.vstack([elemental, _least_squares(design, response)])  # should no subset be regular
+    shown = rng.choice(count, min(count, SUBSET_SAMPLES), replace=False)
+    median = np.median(np.abs(response[shown] - elemental @ design[shown].T), axis=1)
+    best = elemental[np.argsort(median)[:5]]
+    planes = [_concentrate(design[shown], response[shown], coefficients) for coefficients in best]
+    return _concentrate(design, response, min(planes, key=lambda plane: plane.scale).coefficients)
+
+
+def _concentrate(design: FloatArray, response: FloatArray, coefficients: FloatArray) -> Plane:
+    """Refit to the closer half until it stays the same."""
+    half = (len(response) + design.shape[1] + 1) // 2
+    for _ in range(CONCENTRATIONS):
+        closest = np.argpartition(np.abs(response - design @ coefficients), half - 1)[:half]
+        moved = _least_squares(design[closest], response[closest])
+        if np.allclose(moved, coefficients, rtol=1e-10, atol=0.0):
+            break
+        coefficients = moved
+    distance = np.sort(np.abs(response - design @ coefficients))
+    return Plane(coefficients, float(distance[half - 1] / NORMAL_MAD))
+
+
+def _least_squares(design: FloatArray, response: FloatArray) -> FloatArray:
+    triangle = upper_triangle(np.column_stack([design, response]))
+    return np.asarray(triangular_inverse(triangle[:-1, :-1]) @ triangle[:-1, -1], dtype=float)
+
+
+def _m_step(
+    design: FloatArray, residual: FloatArray, root: FloatArray, start: Plane, loss: Loss
+) -> tuple[Plane, FloatArray, bool]:
+    """Iteratively reweighted least squares from the start, its scale kept; the weights [n], and whether it settled."""
+    coefficients = start.coefficients
+    scale = max(start.scale, 1e-12 * float(np.median(np.abs(residual / root))), np.finfo(float).tiny)
+    for _ in range(ITERATIONS):
+        weight = loss.weight((residual - design @ coefficients) / root / scale)
+        half = np.sqrt(weight)
+        moved = _least_squares(design * half[:, None], residual * half)
+        step = float(np.linalg.norm(moved - coefficients))
+        coefficients = moved
+        rounding = 8.0 * np.finfo(float).eps * float(np.linalg.norm(moved))
+        if step <= max(1e-8 * scale * np.sqrt(len(coefficients)), rounding):
+            return Plane(coefficients, scale), weight, True
+    return Plane(coefficients, scale), weight, False
+
+
+def normal_square(loss: Loss) -> float:
+    """Mean of u² under the loss's weights at standard normal u: what makes a weighted variance consistent."""
+    u = np.linspace(-8.0, 8.0, 4001)
+    weight = loss.weight(u) * np.exp(-0.5 * u**2)
+    return float(weight @ u**2 / weight.sum())
+
+
+def _model(
+    evidence: Evidence,
+    observations: Observations,
+    weight: FloatArray,
+    plane: Plane,
+    loss: Loss,
+    name: str,
+    begin: float,
+) -> FrictionModel:
+    """The M-estimate as the weighted least squares that it is, whose sandwich wants ψ' in place of ψ(u)/u."""
+    used = weight > 0.0
+    kept = observations.take(used, observations.weight[used] * weight[used])
+    spans = REFERENCE.spans(evidence.element_area)
+    linear = solve(factorise(kept.columns(), kept.weight), spans)
+    design, residual = orthonormal(kept, linear)
+    u = residual / np.sqrt(kept.weight) / plane.scale
+    base = observations.weight[used]
+    correction = float(base @ weight[used] / max(base @ loss.slope(u), 0.2 * (base @ weight[used])))
+    scale = plane.scale * float(np.sqrt(np.average(u**2, weights=kept.weight) / normal_square(loss)))
+    covariance = jackknife(*cluster_sums(design, residual, kept.cluster), scale) * correction**2
+    degrees = evidence.effective_n - 1.0 - linear.rank
+    return report(
+        evidence,
+        "robust",
+        linear.coefficients,
+        in_coefficients(linear, covariance),
+        scale,
+        min(degrees, max(evidence.clusters - 1.0, 1.0)),
+        begin,
+        {
+            "loss": name,
+            "downweighted": float(np.average(weight < 0.5, weights=observations.weight)),
+            **by_coefficient("standard_error_cluster", np.sqrt(np.diag(in_coefficients(linear, covariance)))),
+        },
+        scatter_degrees_of_freedom=degrees,
+    )
