@@ -110,7 +110,6 @@ class _Lane:
 
     def __init__(self) -> None:
         self._executor: Executor | None = None
-        self._pid: int | None = None
 
     async def hire(self) -> None:
         """Start a worker process and warm it up, in place of the one before."""
@@ -118,7 +117,7 @@ class _Lane:
             await self.close()
             self._executor = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), worker.start)
             try:
-                self._pid = await asyncio.get_running_loop().run_in_executor(self._executor, worker.warm_up)
+                await asyncio.get_running_loop().run_in_executor(self._executor, worker.warm_up)
             except BrokenProcessPool:
                 logger.exception("a worker process did not start")
                 await asyncio.sleep(RETRY_SECONDS)
@@ -130,10 +129,9 @@ class _Lane:
         await asyncio.get_running_loop().run_in_executor(self._executor, worker.run_job, place, job_id)
 
     def kill(self) -> None:
-        """End the worker process at once."""
-        for process in multiprocessing.active_children():
-            if process.pid == self._pid:
-                process.kill()
+        """End the worker process at once (what ``ProcessPoolExecutor.kill_workers`` does from Python 3.14 on)."""
+        for process in dict(getattr(self._executor, "_processes", None) or {}).values():
+            process.kill()
 
     async def close(self) -> None:
         """Let the worker process go once it has nothing to do."""

@@ -33,8 +33,8 @@ def start() -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
-def warm_up() -> int:
-    """Import and try all that a first job would wait for; returns the process's id."""
+def warm_up() -> None:
+    """Import and try all that a first job would wait for."""
     import estimators
     import slipcore
     from service import pipeline
@@ -45,7 +45,6 @@ def warm_up() -> int:
         estimators.fit(slipcore.collect_samples(log, slipcore.detect_slip(log)), method="ols")
     except Exception:
         logger.exception("the %s is not warmed up; its first job will be slow", pipeline.__name__)
-    return os.getpid()
 
 
 def run_job(place: Place, job_id: str) -> None:

@@ -1,0 +1,104 @@
+import hashlib
+from collections.abc import Callable
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+
+from slipcore import GraspLog, collect_samples, detect_slip
+
+Upload = Callable[..., httpx.Response]
+Wait = Callable[[httpx.Client, str], dict[str, Any]]
+
+
+def test_an_uploaded_log_is_described(
+    client: httpx.Client, fitted: dict[str, Any], content: bytes, ramp: GraspLog
+) -> None:
+    assert fitted["sha256"] == hashlib.sha256(content).hexdigest()
+    assert (fitted["bytes"], fitted["format"], fitted["material"]) == (len(content), "npz", "fitted")
+    assert (fitted["sensor"], fitted["frames"], fitted["grid"]) == (ramp.sensor, len(ramp), [8, 8])
+    assert fitted["duration"] == ramp.time[-1] - ramp.time[0]
+    assert client.get("/v1/materials/fitted").json()["grasp_logs"] == 1
+
+
+def test_what_was_found_is_what_the_numerics_find(client: httpx.Client, fitted: dict[str, Any], ramp: GraspLog) -> None:
+    history = detect_slip(ramp)
+    samples = collect_samples(ramp, history)
+    found = fitted["detection"]
+    assert (found["method"], found["samples"]) == ("strain_rate", len(samples))
+    assert found["noise"] == history.noise
+    assert found["stick_ratio_min"] == np.nanmin(history.stick_ratio)
+    assert found["contact_frames"] == int(history.contact.any(axis=(1, 2)).sum())
+    assert found["events"] == {kind: len(getattr(history.events, kind)) for kind in found["events"]}
+    stored = client.get(f"/v1/grasp-logs/{fitted['id']}/samples").json()
+    for name, values in stored.items():
+        np.testing.assert_array_equal(values, getattr(samples, name))
+    events = client.get(f"/v1/grasp-logs/{fitted['id']}/events").json()
+    for kind, listed in events.items():
+        np.testing.assert_array_equal(listed["element"], getattr(history.events, kind).element)
+        np.testing.assert_array_equal(listed["time"], getattr(history.events, kind).time)
+
+
+def test_the_stick_ratio_is_null_without_contact(client: httpx.Client, fitted: dict[str, Any], ramp: GraspLog) -> None:
+    answer = client.get(f"/v1/grasp-logs/{fitted['id']}/stick-ratio").json()
+    ratio = detect_slip(ramp).stick_ratio
+    assert answer["time"] == ramp.time.tolist()
+    assert answer["stick_ratio"] == [None if np.isnan(value) else value for value in ratio]
+    assert answer["stick_ratio"][0] is None
+
+
+def test_without_material_slip_is_only_detected(
+    client: httpx.Client, content: bytes, upload: Upload, wait: Wait
+) -> None:
+    accepted = upload(client, content, sensor="left finger")
+    job = wait(client, accepted.json()["job"]["id"])
+    log = client.get(accepted.headers["location"]).json()
+    assert (job["status"], job["material"], job["model_version"]) == ("done", None, None)
+    assert list(job["seconds"]) == ["frames", "slip_state", "samples"]
+    assert (log["material"], log["sensor"]) == (None, "left finger")
+    assert log["detection"]["samples"] > 0
+
+
+def test_the_detector_is_the_uploaders_choice(
+    client: httpx.Client, content: bytes, material: str, upload: Upload, wait: Wait
+) -> None:
+    first = upload(client, content, material=material)
+    other = upload(client, content, material=material, detector="strain_rate_literal")
+    assert (first.status_code, other.status_code) == (202, 202)
+    wait(client, other.json()["job"]["id"])
+    assert client.get(other.headers["location"]).json()["detection"]["method"] == "strain_rate_literal"
+
+
+def test_the_same_upload_twice_is_one_log(
+    client: httpx.Client, content: bytes, material: str, upload: Upload, wait: Wait
+) -> None:
+    first = upload(client, content, material=material)
+    wait(client, first.json()["job"]["id"])
+    second = upload(client, content, material=material)
+    assert (first.status_code, second.status_code) == (202, 200)
+    assert second.headers["location"] == first.headers["location"]
+    assert second.json()["job"]["status"] == "done"
+    assert client.get(f"/v1/materials/{material}").json()["grasp_logs"] == 1
+    assert len(client.get(f"/v1/materials/{material}/fits").json()["items"]) == 1
+
+
+@pytest.mark.parametrize("path", ["", "/stick-ratio", "/events", "/samples"])
+def test_an_unknown_log_is_named(client: httpx.Client, path: str) -> None:
+    response = client.get(f"/v1/grasp-logs/nothing{path}")
+    assert response.status_code == httpx.codes.NOT_FOUND
+    assert response.json()["type"] == "/problems/unknown-grasp-log"
+
+
+def test_results_that_are_not_there_yet_are_not_ready(
+    client: httpx.Client, members: dict[str, Any], repack: Callable[..., bytes], upload: Upload, wait: Wait
+) -> None:
+    """Two logs at once: with one worker the second waits while the first is worked on."""
+    waiting = [upload(client, repack(members | {"sensor": np.str_(name)})) for name in ("a", "b", "c")]
+    answers = [client.get(f"{waiting[-1].headers['location']}/{part}") for part in ("stick-ratio", "events", "samples")]
+    for answer in answers:
+        assert answer.status_code == httpx.codes.CONFLICT
+        assert answer.json()["type"] == "/problems/not-ready"
+    assert client.get(waiting[-1].headers["location"]).json()["detection"] is None
+    for response in waiting:
+        wait(client, response.json()["job"]["id"])

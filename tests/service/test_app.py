@@ -1,0 +1,113 @@
+import asyncio
+import multiprocessing
+import os
+import signal
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, closing
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from sqlalchemy import delete
+
+import estimators
+import slipcore
+from db import migrate
+from db.blobs import BlobStore
+from db.database import Database
+from db.errors import SchemaMismatch
+from db.repositories import jobs
+from db.tables import FrictionModelRow
+from service.app import create_app, running
+from service.folder_lock import FolderInUse
+from service.settings import Settings
+from slipcore.contact.ramp import tangential_ramp
+from stiction_client.container import encode
+
+Serving = Callable[[Settings], AbstractContextManager[httpx.Client]]
+Upload = Callable[..., httpx.Response]
+Wait = Callable[[httpx.Client, str], dict[str, Any]]
+
+
+async def start_and_stop(settings: Settings) -> None:
+    async with running(settings):
+        pass
+
+
+def test_a_folder_in_use_stops_the_start(serving: Serving, tmp_path: Path) -> None:
+    settings = Settings(data_folder=tmp_path, shutdown_seconds=0)
+    with serving(settings), pytest.raises(FolderInUse):
+        asyncio.run(start_and_stop(settings))
+
+
+def test_an_old_schema_stops_the_start_where_it_must_not_be_changed(tmp_path: Path) -> None:
+    with pytest.raises(SchemaMismatch, match="stiction db upgrade"):
+        asyncio.run(start_and_stop(Settings(data_folder=tmp_path, migrate_at_start=False)))
+
+
+def test_a_start_brings_the_schema_up_and_sweeps_what_nothing_refers_to(serving: Serving, tmp_path: Path) -> None:
+    blobs = BlobStore(tmp_path)
+    blobs.put(b"stored, but the server died before its row was")
+    (tmp_path / "spool" / "left").write_bytes(b"half an upload")
+    settings = Settings(data_folder=tmp_path, shutdown_seconds=0)
+    with serving(settings) as client:
+        assert client.get("/readyz").status_code == httpx.codes.OK
+        assert list(blobs.hashes()) == []
+        assert not list((tmp_path / "spool").iterdir())
+    database = Database(settings.resolved_database_url)
+    assert migrate.current(database) == migrate.head()
+    database.close()
+
+
+def test_a_job_whose_worker_is_killed_is_done_by_the_next_one(
+    client: httpx.Client, material: str, upload: Upload, wait: Wait
+) -> None:
+    content = encode(tangential_ramp(points=12, marker_noise=1e-6))
+    wait(client, upload(client, content).json()["job"]["id"])  # the worker is warm
+    job = upload(client, content, material=material).json()["job"]["id"]
+    while client.get(f"/v1/jobs/{job}").json()["stage"] is None:
+        time.sleep(0.001)
+    (process,) = multiprocessing.active_children()
+    assert process.pid is not None
+    os.kill(process.pid, signal.SIGKILL)
+    done = wait(client, job)
+    assert (done["status"], done["model_version"]) == ("done", 1)
+    assert len(client.get(f"/v1/materials/{material}/fits").json()["items"]) == 1
+    url = f"sqlite:///{client.headers['x-data-folder']}/stiction.sqlite3"
+    with closing(Database(url)) as database, database.read() as session:
+        assert jobs.get(session, job).deaths == 1
+
+
+def test_no_numerics_run_in_the_server_process(
+    client: httpx.Client, material: str, content: bytes, upload: Upload, wait: Wait, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def here(*_: object, **__: object) -> None:
+        raise AssertionError("numerics in the server process")
+
+    for module, name in ((slipcore, "detect_slip"), (slipcore, "collect_samples"), (estimators, "fit")):
+        monkeypatch.setattr(module, name, here)
+    assert wait(client, upload(client, content, material=material).json()["job"]["id"])["status"] == "done"
+
+
+def test_a_log_whose_job_failed_gets_another_try_when_it_is_sent_again(
+    client: httpx.Client, material: str, content: bytes, upload: Upload, wait: Wait
+) -> None:
+    first = upload(client, content, material=material).json()
+    assert wait(client, first["job"]["id"])["status"] == "done"
+    database = Database(f"sqlite:///{client.headers['x-data-folder']}/stiction.sqlite3")
+    with database.write() as session:  # as if the job had failed before it stored its model
+        session.execute(delete(FrictionModelRow).where(FrictionModelRow.job_id == first["job"]["id"]))
+        jobs.finish(session, first["job"]["id"], "failed", reason="the worker process died 3 times")
+    database.close()
+    again = upload(client, content, material=material)
+    assert (again.status_code, again.json()["job"]["status"]) == (200, "queued")
+    assert again.json()["id"] == first["id"]
+    assert wait(client, first["job"]["id"])["reason"] is None
+
+
+def test_without_settings_those_of_the_environment_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("STICTION_PORT", "99999")
+    with pytest.raises(ValueError, match="port"):
+        create_app()

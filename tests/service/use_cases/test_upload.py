@@ -1,0 +1,269 @@
+import hashlib
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+
+from slipcore import GraspLog
+from slipcore.contact.ramp import tangential_ramp
+from stiction_client.container import encode
+
+Upload = Callable[..., httpx.Response]
+Wait = Callable[[httpx.Client, str], dict[str, Any]]
+Repack = Callable[[dict[str, Any]], bytes]
+
+NPZ = "application/vnd.stiction.grasp-log+npz"
+
+
+def stored_files(client: httpx.Client) -> set[str]:
+    folder = Path(client.headers["x-data-folder"])
+    return {str(path) for part in ("blobs", "spool") for path in (folder / part).rglob("*") if path.is_file()}
+
+
+def refusal(
+    client: httpx.Client, upload: Upload, content: bytes, status: int, content_type: str = NPZ, **query: str
+) -> dict[str, Any]:
+    """The problem that an upload is answered with; nothing may stay of it."""
+    before = stored_files(client)
+    response = upload(client, content, content_type, **query)
+    assert response.status_code == status, response.text
+    assert response.headers["content-type"] == "application/problem+json"
+    assert stored_files(client) == before
+    problem: dict[str, Any] = response.json()
+    assert problem["detail"] == f"{problem['name']} is {problem['value']}; allowed: {problem['allowed']}"
+    return problem
+
+
+def changed(name: str, index: object, value: float) -> Callable[[dict[str, Any]], dict[str, Any]]:
+    def change(members: dict[str, Any]) -> dict[str, Any]:
+        array = members[name].copy()
+        array[index] = value
+        return members | {name: array}
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "name", "value", "allowed"),
+    [
+        (lambda m: m | {"force": m["force"][:, 1:]}, "force", "[82, 7, 8, 3]", "[82, 8, 8, 3]"),
+        (lambda m: m | {"position": m["position"][0]}, "position", "[8, 3]", "[any, any, 3]"),
+        (changed("displacement", (3, 1, 2, 0), np.nan), "displacement", "nan at index [3, 1, 2, 0]", "finite"),
+        (changed("force", (3, 1, 2, 0), np.inf), "force", "inf", "finite"),
+        (changed("time", 5, 0.0), "time", "at frame 5", "strictly increasing"),
+        (lambda m: {k: v[:1] if k in PER_FRAME else v for k, v in m.items()}, "time", "1 frame", "at least 2"),
+        (lambda m: m | {"position": m["position"] * 1e3}, "position", "5.25", "at most 1 m"),
+        (lambda m: m | {"displacement": m["displacement"] * 1e3}, "displacement", "1.26 m", "at most 0."),
+        (lambda m: m | {"force": m["force"] * 1e6}, "force", "N per element", "at most 10000 N"),
+        (lambda m: m | {"time": m["time"] * 1e-9}, "time", "between frames", "is it in s?"),
+        (lambda m: m | {"element_area": np.float64(1.0)}, "element_area", "1 m²", "to 0.01 m²"),
+        (lambda m: {k: v for k, v in m.items() if k != "time"}, "members", "without time", "time, position"),
+        (lambda m: m | {"sensor": np.str_("x" * 201)}, "sensor", "xxx", "1 to 200 printable characters"),
+        (lambda m: m | {"sensor": np.str_("a\x01b")}, "sensor", "a\\x01b", "1 to 200 printable characters"),
+    ],
+    ids=[
+        "wrong shape of force",
+        "wrong shape of position",
+        "NaN",
+        "infinity",
+        "time runs backwards",
+        "a single frame",
+        "positions in mm",
+        "displacements in mm",
+        "absurd forces",
+        "time in another unit",
+        "absurd element area",
+        "no time",
+        "long sensor name",
+        "unprintable sensor name",
+    ],
+)
+def test_a_log_that_cannot_be_is_refused_by_name(
+    client: httpx.Client, upload: Upload, members: dict[str, Any], repack: Repack,
+    change: Callable[[dict[str, Any]], dict[str, Any]], name: str, value: str, allowed: str,
+) -> None:  # fmt: skip
+    problem = refusal(client, upload, repack(change(members)), 422)
+    assert (problem["type"], problem["name"]) == ("/problems/invalid-grasp-log", name)
+    assert value in problem["value"]
+    assert allowed in problem["allowed"]
+
+
+PER_FRAME = {"time", "displacement", "force", "object_pose", "truth_contact", "truth_slip_kinematic"}
+PER_FRAME |= {"truth_slip_contact_factor", "truth_stick_ratio"}
+
+
+@pytest.mark.parametrize("kept", [0.02, 0.5, 0.999], ids=lambda kept: f"{kept:.1%} of the file")
+def test_a_truncated_file_is_refused(client: httpx.Client, upload: Upload, content: bytes, kept: float) -> None:
+    problem = refusal(client, upload, content[: int(kept * len(content))], 422)
+    assert problem["type"] == "/problems/invalid-grasp-log"
+    assert "complete zip" in problem["allowed"]
+
+
+@pytest.mark.parametrize(
+    ("content", "content_type"),
+    [
+        (b"time,x,y\n0,1,2\n", "application/octet-stream"),
+        (b"", "application/octet-stream"),
+        (b"PK\x03\x04", "text/html"),
+        (b"{}", "application/json"),
+    ],
+)
+def test_what_is_no_log_at_all_is_refused(
+    client: httpx.Client, upload: Upload, content: bytes, content_type: str
+) -> None:
+    problem = refusal(client, upload, content, 415, content_type)
+    assert problem["type"] == "/problems/unsupported-format"
+    assert NPZ in problem["allowed"]
+
+
+def test_an_empty_body_said_to_be_a_log_is_refused(client: httpx.Client, upload: Upload) -> None:
+    assert refusal(client, upload, b"", 422)["type"] == "/problems/invalid-grasp-log"
+
+
+@pytest.mark.parametrize(
+    ("query", "status", "kind", "name"),
+    [
+        ({"material": "felt"}, 404, "unknown-material", "material"),
+        ({"detector": "guess"}, 422, "invalid-request", "detector"),
+        ({"sensor": "x" * 201}, 422, "invalid-grasp-log", "sensor"),
+    ],
+)
+def test_a_wish_that_cannot_be_met_is_refused_by_name(
+    client: httpx.Client, upload: Upload, content: bytes, query: dict[str, str], status: int, kind: str, name: str
+) -> None:
+    problem = refusal(client, upload, content, status, **query)
+    assert (problem["type"], problem["name"]) == (f"/problems/{kind}", name)
+
+
+def test_an_upload_over_the_limit_is_refused_by_its_length(client: httpx.Client, upload: Upload) -> None:
+    problem = refusal(client, upload, bytes(2 * 2**20 + 1), 413)
+    assert (problem["type"], problem["value"]) == ("/problems/upload-too-large", "2097153 bytes or more")
+    assert problem["allowed"] == "at most 2097152 bytes"
+
+
+def test_an_upload_over_the_limit_is_refused_while_it_streams(client: httpx.Client) -> None:
+    sent = 0
+
+    def chunks() -> Iterator[bytes]:
+        nonlocal sent
+        for _ in range(400):
+            sent += 2**16
+            yield bytes(2**16)
+
+    before = stored_files(client)
+    response = client.post("/v1/grasp-logs", content=chunks(), headers={"content-type": NPZ})
+    assert response.request.headers["transfer-encoding"] == "chunked"
+    assert response.status_code == httpx.codes.REQUEST_ENTITY_TOO_LARGE
+    assert response.json()["type"] == "/problems/upload-too-large"
+    assert stored_files(client) == before
+
+
+def test_an_upload_that_breaks_off_leaves_nothing(client: httpx.Client, content: bytes) -> None:
+    before = stored_files(client)
+    with socket.create_connection((client.base_url.host, client.base_url.port or 0)) as connection:
+        head = (
+            f"POST /v1/grasp-logs HTTP/1.1\r\nHost: x\r\nContent-Type: {NPZ}\r\nContent-Length: {len(content)}\r\n\r\n"
+        )
+        connection.sendall(head.encode() + content[: len(content) // 2])
+        wait_until(lambda: len(stored_files(client)) == len(before) + 1)
+    wait_until(lambda: stored_files(client) == before)
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 20.0
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+def still(frames: int = 30) -> dict[str, Any]:
+    """A sensor at rest that measures nothing but noise."""
+    log = tangential_ramp(points=8, pitch=1.5e-3)
+    noise = np.random.default_rng(0).normal(0.0, 1e-7, (frames, 8, 8, 3))
+    return {"time": np.arange(frames) / 30.0, "position": log.position, "displacement": noise, "force": noise * 0.0}
+
+
+@pytest.mark.parametrize("case", ["no contact", "zero forces", "no slip", "no forces"])
+def test_data_that_allow_no_fit_are_kept_and_the_job_is_refused(
+    client: httpx.Client, material: str, upload: Upload, wait: Wait, ramp: GraspLog, members: dict[str, Any],
+    repack: Repack, case: str,
+) -> None:  # fmt: skip
+    pressed_only = encode(tangential_ramp(points=8, pitch=1.5e-3, tangential_force=0.0, marker_noise=1e-7))
+    cases: dict[str, tuple[Callable[[], bytes], str]] = {
+        "no contact": (lambda: repack(members_of(members, still())), "no element was in contact in any of the 30"),
+        "zero forces": (lambda: repack(members | {"force": ramp.force * 0.0}), "no element was in contact"),  # type: ignore[operator]
+        "no slip": (lambda: pressed_only, "no slip gave a friction sample (0 slipping"),
+        "no forces": (lambda: repack({k: v for k, v in members.items() if k != "force"}), "the log has no forces"),
+    }
+    make, reason = cases[case]
+    accepted = upload(client, make(), material=material)
+    assert accepted.status_code == httpx.codes.ACCEPTED, accepted.text
+    job = wait(client, accepted.json()["job"]["id"])
+    assert (job["status"], job["model_version"]) == ("refused", None)
+    assert reason in job["reason"]
+    assert list(job["seconds"]) == ["frames", "slip_state", "samples"]
+    log = client.get(accepted.headers["location"]).json()
+    assert log["detection"]["samples"] == 0
+    assert client.get(f"{accepted.headers['location']}/samples").json()["normal_force"] == []
+    found = client.get(f"/v1/materials/{material}").json()
+    assert (found["grasp_logs"], found["models"]) == (1, {})
+
+
+def members_of(members: dict[str, Any], replaced: dict[str, Any]) -> dict[str, Any]:
+    kept = {name: members[name] for name in ("format", "version", "element_area")}
+    return kept | replaced
+
+
+def test_a_refused_log_leaves_the_materials_model_as_it_was(
+    client: httpx.Client, material: str, upload: Upload, wait: Wait, content: bytes, members: dict[str, Any],
+    repack: Repack,
+) -> None:  # fmt: skip
+    wait(client, upload(client, content, material=material).json()["job"]["id"])
+    before = client.get(f"/v1/materials/{material}").json()["models"]
+    refused = upload(client, repack(members_of(members, still())), material=material)
+    assert wait(client, refused.json()["job"]["id"])["status"] == "refused"
+    assert client.get(f"/v1/materials/{material}").json()["models"] == before
+
+
+def test_identical_uploads_at_once_are_one_log_and_one_blob(
+    client: httpx.Client, material: str, upload: Upload, wait: Wait, members: dict[str, Any], repack: Repack
+) -> None:
+    content = repack(members | {"sensor": np.str_("uploaded by many")})
+    together = threading.Barrier(8)
+
+    def send(_: int) -> httpx.Response:
+        with httpx.Client(base_url=client.base_url, timeout=60.0) as own:
+            together.wait()
+            return upload(own, content, material=material)
+
+    with ThreadPoolExecutor(8) as threads:
+        answers = list(threads.map(send, range(8)))
+    assert sorted(answer.status_code for answer in answers) == [200] * 7 + [202]
+    assert len({answer.headers["location"] for answer in answers}) == 1
+    job = wait(client, answers[0].json()["job"]["id"])
+    assert (job["status"], job["model_version"]) == ("done", 1)
+    assert client.get(f"/v1/materials/{material}").json()["grasp_logs"] == 1
+    sha256 = hashlib.sha256(content).hexdigest()
+    assert len([path for path in stored_files(client) if path.endswith(sha256)]) == 1
+    assert not [path for path in stored_files(client) if "/spool/" in path]
+
+
+def test_different_uploads_at_once_all_count(
+    client: httpx.Client, material: str, upload: Upload, wait: Wait, members: dict[str, Any], repack: Repack
+) -> None:
+    contents = [repack(members | {"sensor": np.str_(f"finger {k}")}) for k in range(5)]
+    with ThreadPoolExecutor(5) as threads:
+        answers = list(threads.map(lambda content: upload(client, content, material=material), contents))
+    jobs = [wait(client, answer.json()["job"]["id"]) for answer in answers]
+    assert [job["status"] for job in jobs] == ["done"] * 5
+    assert sorted(job["model_version"] for job in jobs) == [1, 2, 3, 4, 5]
+    samples = client.get(answers[0].headers["location"]).json()["detection"]["samples"]
+    current = client.get(f"/v1/materials/{material}").json()["models"]["ols"]
+    assert (current["version"], current["n"]) == (5, 5 * samples)
