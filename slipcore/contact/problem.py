@@ -36,7 +36,8 @@ class Problem:
 
     ``finger``, ``obstacle``: compliances, the obstacle rigid if empty; ``heights``: gap between undeformed surfaces;
     ``friction``: Coulomb coefficient, to which ``friction_fields``, ``pressure_laws`` and ``velocity_laws`` add;
-    ``coupled``: whether pressure moves the surface sideways and traction in and out; ``creep``: of the finger.
+    ``spread``: whether pressure moves the surface sideways; ``coupled``: and traction in and out, too; ``creep``: of
+    the finger.
     """
 
     finger: tuple[ElasticBody, ...]
@@ -47,6 +48,7 @@ class Problem:
     pressure_laws: tuple[FrictionLaw, ...] = ()
     velocity_laws: tuple[FrictionLaw, ...] = ()
     coupled: bool = False
+    spread: bool = False
     creep: tuple[MaxwellBranch, ...] = ()
 
     def __post_init__(self) -> None:

@@ -195,6 +195,7 @@ class QuasiStatic:
                 whole[:2] = operator.tangential(traction)
             if self.problem.coupled:
                 whole[2] += operator.normal_by_traction(traction)
+            if self.problem.coupled or self.problem.spread:
                 whole[:2] += operator.tangential_by_pressure(pressure)
         return whole
 

@@ -89,7 +89,7 @@ class StepEquations:
             return StepSolution(normal, None, np.zeros(self.grid.shape), np.s_[:, :], 0)
         box = bounding_box(normal.pressure > 0.0, BOX_MULTIPLE)
         offset = self.offset
-        if self.problem.coupled:
+        if self.problem.coupled or self.problem.spread:
             offset = offset + self.operators.on(self.grid).tangential_by_pressure(normal.pressure)
         return self._slide(normal, box, offset[:, *box], traction[:, *box])
 

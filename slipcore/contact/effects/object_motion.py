@@ -1,0 +1,40 @@
+"""An object that is moved, whatever force that takes."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from slipcore.contact.effects.load_path import repeated
+from slipcore.contact.plan import Channel, History, Plan
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectMotion:
+    """Pose of the object relative to the sensor, piecewise linear between ``time`` s, empty for what is not held.
+
+    ``x``, ``y`` m and ``yaw`` rad, each of the length of ``time`` or empty; the part after the first time is gone
+    through ``cycles`` times. What is not given here moves as its load wants.
+    """
+
+    time: tuple[float, ...]
+    x: tuple[float, ...] = ()
+    y: tuple[float, ...] = ()
+    yaw: tuple[float, ...] = ()
+    cycles: int = 1
+
+    why: ClassVar[str] = "a stage or a robot moves the object; the contact may slide as a whole"
+    cost: ClassVar[str] = "less than a load: no balance to meet"
+
+    @property
+    def absent(self) -> bool:
+        """Whether nothing is held; an object held still is not."""
+        return not (self.x or self.y or self.yaw)
+
+    def extend(self, plan: Plan) -> Plan:
+        """Add a history of each coordinate that is held."""
+        channels: tuple[Channel, ...] = ("motion_x", "motion_y", "yaw")
+        added = [
+            History(channel, *repeated(self.time, path, self.cycles))
+            for channel, path in zip(channels, (self.x, self.y, self.yaw), strict=True)
+            if path
+        ]
+        return replace(plan, histories=(*plan.histories, *added))

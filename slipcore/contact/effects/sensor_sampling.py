@@ -1,0 +1,39 @@
+"""Where and when a sensor looks."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from slipcore.contact.plan import Plan, Sampling
+from slipcore.errors import InvalidInput
+
+
+@dataclass(frozen=True, slots=True)
+class SensorSampling:
+    """``points`` (along x, along y) at ``pitch`` m about the centre, ``frame_rate`` 1/s.
+
+    Displacement is that of the point; force is that on the square of ``pitch`` around it.
+    """
+
+    points: tuple[int, int] = (20, 20)
+    pitch: float = 0.75e-3
+    frame_rate: float = 30.0
+
+    why: ClassVar[str] = "a sensor sees points and frames, not fields: an element mixes stick and slip"
+    cost: ClassVar[str] = "nothing: points are cell centres, elements are sums of cells"
+
+    def __post_init__(self) -> None:
+        if min(self.points) < 2:
+            raise InvalidInput("points of the sensor", self.points, "at least 2 each way")
+        if not (self.pitch > 0.0 and self.frame_rate > 0.0):
+            raise InvalidInput("sensor", self, "pitch above 0 m and frame rate above 0 1/s")
+
+    @property
+    def absent(self) -> bool:
+        """Never: its absence is a log of every cell and step."""
+        return False
+
+    def extend(self, plan: Plan) -> Plan:
+        """Set the sampling; a scene has one sensor."""
+        if plan.sampling is not None:
+            raise InvalidInput("sensor samplings", "two", "one")
+        return replace(plan, sampling=Sampling(self.points, self.pitch, self.frame_rate))
