@@ -37,10 +37,10 @@ def test_pressure_and_traction_carry_the_loads() -> None:
         return 2.0 * float((field(high * np.sin(angle)) * high * np.cos(angle) * half * weights).sum())
 
     a, c = case.half_width, case.stick_half_width
-    assert load(case.pressure, 0.0, a) == pytest.approx(800.0, rel=1e-12)
-    assert load(case.traction, 0.0, c) + load(case.traction, c, a) == pytest.approx(240.0, rel=1e-12)
-    assert case.stick_half_width == pytest.approx(case.half_width * np.sqrt(0.4), rel=1e-14)
-    assert case.peak_pressure == pytest.approx(2 * 800.0 / (np.pi * case.half_width), rel=1e-13)
+    assert load(case.pressure, 0.0, a) == pytest.approx(800.0, rel=1e-12, abs=0.0)
+    assert load(case.traction, 0.0, c) + load(case.traction, c, a) == pytest.approx(240.0, rel=1e-12, abs=0.0)
+    assert case.stick_half_width == pytest.approx(case.half_width * np.sqrt(0.4), rel=1e-14, abs=0.0)
+    assert case.peak_pressure == pytest.approx(2 * 800.0 / (np.pi * case.half_width), rel=1e-13, abs=0.0)
 
 
 @pytest.mark.parametrize("place", [0.2, 0.55, 0.8, 0.95])
@@ -48,7 +48,7 @@ def test_displacements_have_the_slopes_that_the_kernel_gives(place: float) -> No
     case, step = loaded(0.6), 1e-7
     at, slope = strip_slope(place * case.half_width, case, case.pressure)
     dip = np.diff(case.normal_displacement([at - step, at + step]))[0] / (2 * step)
-    assert dip == pytest.approx(slope, rel=1e-4)  # the rule loses order at the roots of the integrand
+    assert dip == pytest.approx(slope, rel=1e-4, abs=0.0)  # the rule loses order at the roots of the integrand
     at, slope = strip_slope(place * case.half_width, case, case.traction)
     gradient = np.diff(case.slip([at - step, at + step]))[0] / (2 * step)
     assert gradient == pytest.approx(slope, rel=1e-3, abs=2e-4 * 0.5 * case.half_width / 10e-3)
@@ -74,9 +74,9 @@ def test_slip_and_traction_keep_their_digits(ratio: float, part: float) -> None:
         slip = -(at * rest - (c**2 * mpmath.acosh(at / c) if c else 0)) / 2 * mpmath.mpf(0.5) / mpmath.mpf(10e-3)
         stuck = mpmath.mpf(RUBBER.contact_modulus) / (2 * mpmath.mpf(10e-3)) * 0.5 * (a - c)
     assert case.slip(x) == pytest.approx(
-        float(slip), rel=1e-12 + 2e-16 / ratio * 10
+        float(slip), rel=1e-12 + 2e-16 / ratio * 10, abs=0.0
     )  # place in the annulus: rounding of x
-    assert case.traction(0.0) == pytest.approx(float(stuck), rel=1e-12)
+    assert case.traction(0.0) == pytest.approx(float(stuck), rel=1e-12, abs=0.0)
 
 
 def test_slip_is_zero_in_stick_and_nan_outside() -> None:
@@ -89,7 +89,7 @@ def test_slip_is_zero_in_stick_and_nan_outside() -> None:
 def test_equal_bodies_are_twice_as_compliant() -> None:
     pair = elastic_pair(RUBBER, RUBBER)
     assert CylinderContact(1e-2, 800.0, pair).half_width == pytest.approx(
-        np.sqrt(2) * CylinderContact(1e-2, 800.0, RUBBER).half_width, rel=1e-14
+        np.sqrt(2) * CylinderContact(1e-2, 800.0, RUBBER).half_width, rel=1e-14, abs=0.0
     )
 
 
