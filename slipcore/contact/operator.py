@@ -3,15 +3,12 @@
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-import scipy.fft
-from numpy.typing import NDArray
 
 from slipcore.contact.grid import Grid
 from slipcore.contact.kernels import Component, ElasticBody
 from slipcore.contact.preconditioner import NormalInverse, TangentialInverse
+from slipcore.contact.transform import Transform, multiply_pair, padded_lengths
 from slipcore.frames import FloatArray
-
-ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(slots=True)
@@ -25,42 +22,6 @@ class Count:
     def since(self, earlier: "Count") -> "Count":
         """What was added to an earlier count."""
         return Count(*(getattr(self, f.name) - getattr(earlier, f.name) for f in fields(self)))
-
-
-class PaddedTransform:
-    """Real FFT of fields [..., ny, nx] padded with zeros, so that a circular convolution does not wrap.
-
-    Rows that hold only padding are skipped on the way in and on the way out, a quarter of the work.
-    """
-
-    __slots__ = ("padded", "shape")
-
-    def __init__(self, shape: tuple[int, int]) -> None:
-        self.shape = shape
-        ny, nx = (int(scipy.fft.next_fast_len(2 * size - 1, real=True)) for size in shape)
-        self.padded = (ny, nx)
-
-    def forward(self, field: FloatArray) -> ComplexArray:
-        """Spectrum [..., Ny, Nx // 2 + 1] of a field."""
-        rows = scipy.fft.rfft(field, self.padded[1], axis=-1)
-        return scipy.fft.fft(rows, self.padded[0], axis=-2, overwrite_x=True)
-
-    def backward(self, spectrum: ComplexArray) -> FloatArray:
-        """The field of a spectrum, which is overwritten."""
-        ny, nx = self.shape
-        rows = scipy.fft.ifft(spectrum, axis=-2, overwrite_x=True)[..., :ny, :]
-        return scipy.fft.irfft(rows, self.padded[1], axis=-1)[..., :nx]
-
-    def symbol(self, quadrant: FloatArray, odd_y: bool = False, odd_x: bool = False) -> FloatArray:
-        """Spectrum of a kernel given in its first quadrant: real, or its imaginary part if odd in one direction."""
-        ny, nx = self.shape
-        whole = np.zeros(self.padded)
-        whole[:ny, :nx] = quadrant
-        whole[self.padded[0] - ny + 1 :, :nx] = (-1.0 if odd_y else 1.0) * quadrant[:0:-1]
-        mirrored = whole[:, nx - 1 : 0 : -1]
-        whole[:, self.padded[1] - nx + 1 :] = -mirrored if odd_x else mirrored
-        spectrum = scipy.fft.rfft2(whole)
-        return np.ascontiguousarray(spectrum.imag if odd_y != odd_x else spectrum.real)
 
 
 class ElasticOperator:
@@ -84,7 +45,7 @@ class ElasticOperator:
     def __init__(self, bodies: tuple[ElasticBody, ...], grid: Grid, count: Count | None = None) -> None:
         self.bodies, self.grid = bodies, replace(grid, centre=(0.0, 0.0))
         self.count = Count() if count is None else count
-        self.transform = PaddedTransform(grid.shape)
+        self.transform = Transform(grid.shape, padded_lengths(grid.shape))
         self._kernels: dict[Component, FloatArray | None] = {}
         self._symbols: dict[Component, FloatArray | None] = {}
         self._coarse: ElasticOperator | None = None
@@ -94,22 +55,17 @@ class ElasticOperator:
     def normal(self, pressure: FloatArray) -> FloatArray:
         """Normal displacement by pressure."""
         self.count.normal += 1
-        spectrum = self.transform.forward(pressure)
+        spectrum = self.transform.forward(pressure[None])
         spectrum *= self._known("nn")
-        return self.transform.backward(spectrum)
+        displacement: FloatArray = self.transform.backward(spectrum)[0]
+        return displacement
 
     def tangential(self, traction: FloatArray) -> FloatArray:
         """Tangential displacement [2, ny, nx] by traction [2, ny, nx]."""
         self.count.tangential += 1
-        force = self.transform.forward(traction)
-        result = np.empty_like(force)
-        np.multiply(self._known("xx"), force[0], out=result[0])
-        np.multiply(self._known("yy"), force[1], out=result[1])
-        cross = self._symbol("xy")
-        if cross is not None:
-            result[0] += cross * force[1]
-            result[1] += cross * force[0]
-        return self.transform.backward(result)
+        spectrum = self.transform.forward(traction)
+        multiply_pair(spectrum, self._known("xx"), self._known("yy"), self._symbol("xy"))
+        return self.transform.backward(spectrum)
 
     def normal_by_traction(self, traction: FloatArray) -> FloatArray:
         """Normal displacement [ny, nx] by traction [2, ny, nx]."""
@@ -118,7 +74,8 @@ class ElasticOperator:
             return np.zeros(self.grid.shape)
         self.count.coupling += 1
         force = self.transform.forward(traction)
-        return self.transform.backward(1j * (along_x * force[0] + along_y * force[1]))
+        lift: FloatArray = self.transform.backward((1j * (along_x * force[0] + along_y * force[1]))[None])[0]
+        return lift
 
     def tangential_by_pressure(self, pressure: FloatArray) -> FloatArray:
         """Tangential displacement [2, ny, nx] by pressure [ny, nx]: the negative of the above's transpose."""
@@ -126,7 +83,7 @@ class ElasticOperator:
         if along_x is None or along_y is None:
             return np.zeros((2, *self.grid.shape))
         self.count.coupling += 1
-        force = -1j * self.transform.forward(pressure)
+        force = -1j * self.transform.forward(pressure[None])[0]
         return self.transform.backward(np.stack((along_x * force, along_y * force)))
 
     @property

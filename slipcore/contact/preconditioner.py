@@ -5,8 +5,8 @@ is. It costs a quarter of an application of the operator, and makes conjugate gr
 """
 
 import numpy as np
-import scipy.fft
 
+from slipcore.contact.transform import Transform, multiply_pair
 from slipcore.frames import FloatArray
 
 
@@ -17,7 +17,7 @@ def circulant_symbol(quadrant: FloatArray, odd: bool = False) -> FloatArray:
     """
     sign = -1.0 if odd else 1.0
     wrapped = _average(_average(quadrant, sign).T, sign).T
-    return np.ascontiguousarray(scipy.fft.rfft2(wrapped).real)
+    return np.ascontiguousarray(np.fft.rfft2(wrapped).real)
 
 
 def _average(kernel: FloatArray, sign: float) -> FloatArray:
@@ -30,43 +30,36 @@ def _average(kernel: FloatArray, sign: float) -> FloatArray:
 class NormalInverse:
     """Approximate pressure [ny, nx] that makes a normal displacement."""
 
-    __slots__ = ("_inverse", "_shape")
+    __slots__ = ("_inverse", "_transform")
 
     def __init__(self, nn: FloatArray) -> None:
-        self._shape = nn.shape
+        self._transform = Transform(nn.shape, nn.shape)
         self._inverse = 1.0 / circulant_symbol(nn)
 
     def __call__(self, displacement: FloatArray) -> FloatArray:
         """Stress for a displacement of the same shape."""
-        spectrum = scipy.fft.rfft2(displacement)
+        spectrum = self._transform.forward(displacement[None])
         spectrum *= self._inverse
-        return scipy.fft.irfft2(spectrum, s=self._shape, overwrite_x=True)
+        stress: FloatArray = self._transform.backward(spectrum)[0]
+        return stress
 
 
 class TangentialInverse:
     """Approximate traction [2, ny, nx] that makes a tangential displacement [2, ny, nx]."""
 
-    __slots__ = ("_inverse", "_shape")
+    __slots__ = ("_inverse", "_transform")
 
     def __init__(self, xx: FloatArray, yy: FloatArray, xy: FloatArray | None) -> None:
-        self._shape = xx.shape
+        self._transform = Transform(xx.shape, xx.shape)
         a, d = circulant_symbol(xx), circulant_symbol(yy)
-        self._inverse: tuple[FloatArray, FloatArray, FloatArray | None]
-        if xy is None:
-            self._inverse = (1.0 / a, 1.0 / d, None)
-        else:
+        self._inverse: tuple[FloatArray, FloatArray, FloatArray | None] = (1.0 / a, 1.0 / d, None)
+        if xy is not None:
             b = circulant_symbol(xy, odd=True)
             determinant = a * d - b * b
             self._inverse = (d / determinant, a / determinant, -b / determinant)
 
     def __call__(self, displacement: FloatArray) -> FloatArray:
         """Stress for a displacement of the same shape."""
-        spectrum = scipy.fft.rfft2(displacement)
-        along_x, along_y, cross = self._inverse
-        result = np.empty_like(spectrum)
-        np.multiply(along_x, spectrum[0], out=result[0])
-        np.multiply(along_y, spectrum[1], out=result[1])
-        if cross is not None:
-            result[0] += cross * spectrum[1]
-            result[1] += cross * spectrum[0]
-        return scipy.fft.irfft2(result, s=self._shape, overwrite_x=True)
+        spectrum = self._transform.forward(displacement)
+        multiply_pair(spectrum, *self._inverse)
+        return self._transform.backward(spectrum)
