@@ -54,6 +54,17 @@ def test_displacements_have_the_slopes_that_the_kernel_gives(place: float) -> No
     assert gradient == pytest.approx(slope, rel=1e-3, abs=2e-4 * 0.5 * case.half_width / 10e-3)
 
 
+@pytest.mark.parametrize("place", [1.2, 2.0, 8.0])
+def test_surface_beside_the_contact_has_the_slope_that_the_kernel_gives(place: float) -> None:
+    case, step = loaded(0.0), 1e-7
+    a, (nodes, weights) = case.half_width, np.polynomial.legendre.leggauss(80)
+    s, width = a * np.sin(0.5 * np.pi * nodes), a * np.cos(0.5 * np.pi * nodes) * 0.5 * np.pi * weights
+    at = place * a
+    slope = -2 / (np.pi * RUBBER.contact_modulus) * float((case.pressure(s) * width / (at - s)).sum())
+    dip = np.diff(case.normal_displacement([at - step, at + step]))[0] / (2 * step)
+    assert dip == pytest.approx(slope, rel=1e-7, abs=0.0)  # rounding of the difference over 2e-7 m
+
+
 def test_surface_follows_the_cylinder_in_contact_and_opens_outside() -> None:
     case = loaded(0.0)
     inside, outside = np.linspace(0, case.half_width, 20), case.half_width * np.array([1.01, 2.0, 10.0])
