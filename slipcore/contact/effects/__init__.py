@@ -3,6 +3,7 @@
 from slipcore.contact.effects.drift import GelDrift
 from slipcore.contact.effects.dropped_frames import DroppedFrames
 from slipcore.contact.effects.elastic_object import ElasticObject
+from slipcore.contact.effects.finite_layer import FiniteLayer
 from slipcore.contact.effects.force_noise import ForceNoise
 from slipcore.contact.effects.friction_patch import FrictionPatch
 from slipcore.contact.effects.load_path import LoadPath
@@ -33,6 +34,7 @@ EFFECTS: dict[str, type[Effect]] = {
         CylinderSurface,
         DroppedFrames,
         ElasticObject,
+        FiniteLayer,
         FlatSurface,
         ForceNoise,
         FrictionPatch,

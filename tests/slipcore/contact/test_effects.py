@@ -12,6 +12,7 @@ from slipcore.contact.effects import (
     CylinderSurface,
     DroppedFrames,
     ElasticObject,
+    FiniteLayer,
     FlatSurface,
     ForceNoise,
     FrictionPatch,
@@ -48,6 +49,7 @@ ZERO: dict[str, Effect | None] = {
     "CylinderSurface": CylinderSurface(0.0),
     "DroppedFrames": DroppedFrames(0.0),
     "ElasticObject": ElasticObject(INFINITE),
+    "FiniteLayer": FiniteLayer(INFINITE),
     "FlatSurface": FlatSurface((INFINITE, INFINITE)),
     "ForceNoise": ForceNoise(0.0),
     "FrictionPatch": FrictionPatch(0.0, (0.0, 0.0), 1e-3),
@@ -72,6 +74,7 @@ STRONG: tuple[Effect, ...] = (
     CylinderSurface(20.0),
     DroppedFrames(0.3),
     ElasticObject(2e6),
+    FiniteLayer(6e-3),
     ForceNoise(1e-3),
     FrictionPatch(-0.1, (1e-3, 0.0), 2e-3),
     GelDrift((1e-6, 0.0, 0.0)),
@@ -127,6 +130,7 @@ def test_order_does_not_matter_to_the_last_bit() -> None:
         (ObjectMotion((0.0, 1.0), x=(0.0, 1e-4)), TangentialLoad((1.0, 0.0))),
         (ObjectMotion((0.0, 1.0), yaw=(0.0, 1e-2)), Torsion(1e-3)),
         (SensorSampling(), SensorSampling((10, 10))),
+        (FiniteLayer(5e-3), FiniteLayer(6e-3)),
     ],
 )
 def test_pairs_that_exclude_each_other_are_refused_in_any_order(pair: tuple[Effect, Effect]) -> None:
@@ -299,6 +303,7 @@ def test_a_dropped_frame_hands_its_slip_on(plain: GraspLog) -> None:
     "make",
     [
         lambda: ElasticObject(0.0),
+        lambda: FiniteLayer(0.0),
         lambda: FlatSurface((0.0, 1.0)),
         lambda: RingSurface(0.0, 1.0),
         lambda: WavySurface(1e-6, 0.0),
