@@ -74,7 +74,8 @@ def required_normal_force(
     capacity = _Capacity.of(model, tangential_velocity, slip_probability)
     best = capacity.best_force(limit)
     if not capacity(best) >= load:
-        reason = f"slip probability {slip_probability:g}, normal force up to {normal_force_limit or math.inf:g} N"
+        limited = "" if normal_force_limit is None else f", normal force up to {normal_force_limit:g} N"
+        reason = f"slip probability {slip_probability:g}{limited}"
         raise NoFeasibleForce(tangential_load, capacity(best) * elements, best * elements, reason)
     low, high = capacity.interval(load, best, limit)
     warning = model.extrapolation(tangential_velocity, low)

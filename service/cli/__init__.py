@@ -1,0 +1,42 @@
+"""The `stiction` command line: one module a group of commands."""
+
+import sys
+from collections.abc import Sequence
+
+import typer
+
+from service.cli import database, local, remote, running
+from service.cli.exit_codes import exit_code
+
+app = typer.Typer(
+    name="stiction",
+    help="Friction identification for robotic grasping: what a held object's micro-slips tell of its friction.",
+    epilog="Exit codes: 0 done, 1 failure, 2 wrong usage, 3 input refused, 4 service unreachable or refusing, "
+    "5 no force holds the load. More: docs/cli.md.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    add_completion=False,
+)
+for command in (
+    running.demo,
+    running.serve,
+    local.detect,
+    local.fit,
+    remote.upload,
+    remote.lookup,
+    remote.plan,
+):
+    app.command()(command)
+app.add_typer(database.app, name="db")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run one command and leave with its documented exit code."""
+    try:
+        app(arguments)
+    except Exception as error:
+        code = exit_code(error)
+        if code is None:
+            raise
+        typer.echo(f"stiction: {error}", err=True)
+        sys.exit(code)

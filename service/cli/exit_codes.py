@@ -1,0 +1,24 @@
+"""Which error ends a command with which exit code."""
+
+INPUT_REFUSED = 3
+SERVICE_REFUSED = 4
+NOT_FEASIBLE = 5
+
+
+def exit_code(error: Exception) -> int | None:
+    """Exit code of an error that a user can act upon; None for one that is ours (a traceback is due)."""
+    from db.errors import DatabaseError
+    from stiction_client.errors import NoFeasibleForce, StictionError
+
+    from estimators.errors import EstimatorError
+    from slipcore.errors import SlipcoreError
+
+    codes: list[tuple[type[Exception], int]] = [
+        (NoFeasibleForce, NOT_FEASIBLE),
+        (StictionError, SERVICE_REFUSED),
+        (DatabaseError, INPUT_REFUSED),
+        (EstimatorError, INPUT_REFUSED),
+        (SlipcoreError, INPUT_REFUSED),
+        (OSError, INPUT_REFUSED),
+    ]
+    return next((code for kind, code in codes if isinstance(error, kind)), None)

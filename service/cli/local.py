@@ -1,0 +1,125 @@
+"""Commands that work on files, without a service: detect, fit."""
+
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from service.cli.output import print_json, print_table
+
+if TYPE_CHECKING:
+    from estimators import FrictionModel
+    from slipcore import GraspLog, SlipHistory
+
+Log = Annotated[
+    Path, typer.Argument(help="A grasp log: Stiction NPZ, a Tac3D recording folder, or that folder zipped.")
+]
+Logs = Annotated[list[Path], typer.Argument(help="Grasp logs of one material, each one grasp.")]
+Method = Annotated[str, typer.Option("--method", help="Slip detector.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
+
+
+def detect(
+    log: Log,
+    method: Method = "strain_rate",
+    json: Json = False,
+    picture: Annotated[Path | None, typer.Option(help="Write a picture of slip over time to this PNG.")] = None,
+) -> None:
+    """Detect local slip in one grasp log and say what was seen."""
+    from service import formats
+    from slipcore import detect_slip
+
+    grasp = formats.read(log)
+    start = perf_counter()
+    history = detect_slip(grasp, method=method)
+    seconds = perf_counter() - start
+    if picture is not None:
+        from service.report.pictures import save, slip_over_time
+
+        save(slip_over_time(grasp, history, log.name), picture)
+    summary = _detection_summary(grasp, history, seconds)
+    if json:
+        print_json(summary | {"time": history.time, "stick_ratio": history.stick_ratio})
+    else:
+        print_table(f"{log.name}: local slip by {method}", ("", ""), list(summary.items()))
+
+
+def fit(
+    logs: Logs,
+    method: Annotated[str, typer.Option("--method", help="Estimator: ols or bayes.")] = "ols",
+    detector: Annotated[str, typer.Option(help="Slip detector.")] = "strain_rate",
+    seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 0,
+    json: Json = False,
+) -> None:
+    """Fit the stochastic linear friction model to the slip seen in one or more grasp logs."""
+    from estimators import fit as fit_model
+    from service import formats
+    from slipcore import collect_samples, detect_slip
+
+    grasps = []
+    for path in logs:
+        grasp = formats.read(path)
+        grasps.append(collect_samples(grasp, detect_slip(grasp, method=detector)))
+    model = fit_model(grasps, method=method, seed=seed)
+    if json:
+        print_json(model_record(model))
+    else:
+        print_model(model, f"{method} fit of {model.n} samples from {len(logs)} grasp(s)")
+
+
+def model_record(model: "FrictionModel") -> dict[str, Any]:
+    """A fitted model as JSON shows it."""
+    return {
+        "method": model.method,
+        "coefficients": model.coefficients,
+        "standard_errors": model.standard_errors,
+        "interval_95": model.interval(0.95),
+        "covariance": model.covariance,
+        "scale": model.scale,
+        "n": model.n,
+        "degrees_of_freedom": model.degrees_of_freedom,
+        "scatter_degrees_of_freedom": model.scatter_degrees_of_freedom,
+        "domain": {
+            "tangential_velocity": model.domain.tangential_velocity,
+            "normal_force": model.domain.normal_force,
+        },
+        "identifiable": model.identifiable,
+        "element_area": model.element_area,
+        "diagnostics": dict(model.diagnostics),
+        "cost": {"seconds": model.cost.seconds, "monte_carlo_error": model.cost.monte_carlo_error},
+    }
+
+
+def print_model(model: "FrictionModel", title: str) -> None:
+    """Print a fitted model as a table: estimate, interval, and whether the data tell the coefficient at all."""
+    names = ("β₀ [-]", "β₁ [s/m]", "β₂ [1/N]")
+    rows: list[tuple[str, str, str, str]] = [
+        (name, f"{value:.5g}", f"{low:.5g} … {high:.5g}", "yes" if known else "no")
+        for name, value, (low, high), known in zip(
+            names, model.coefficients, model.interval(0.95), model.identifiable, strict=True
+        )
+    ]
+    rows.append(("σ [-]", f"{model.scale:.5g}", "", ""))
+    print_table(title, ("", "estimate", "95 % interval", "identifiable"), rows)
+
+
+def _detection_summary(log: "GraspLog", history: "SlipHistory", seconds: float) -> dict[str, Any]:
+    import numpy as np
+
+    in_contact = ~np.isnan(history.stick_ratio)
+    events = history.events
+    return {
+        "method": history.method,
+        "frames": len(log),
+        "duration_s": round(float(log.time[-1] - log.time[0]), 6),
+        "frames in contact": int(in_contact.sum()),
+        "frames in macro slip": int(history.macro_slip.sum()),
+        "smallest stick ratio": float(np.nanmin(history.stick_ratio)) if in_contact.any() else None,
+        "slip onsets": len(events.onset),
+        "slip ends": len(events.end),
+        "touches": len(events.touch),
+        "releases": len(events.release),
+        "marker noise_m": history.noise,
+        "seconds": round(seconds, 6),
+    }

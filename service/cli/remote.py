@@ -1,0 +1,108 @@
+"""Commands that ask a running service: upload, lookup, plan."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from service.cli.output import print_json, print_table
+
+if TYPE_CHECKING:
+    from stiction_client import FrictionModel
+
+Url = Annotated[str, typer.Option("--url", envvar="STICTION_URL", help="Address of the service.")]
+Key = Annotated[str | None, typer.Option("--key", envvar="STICTION_KEY", help="Access key, where the service asks.")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
+MaterialName = Annotated[str, typer.Argument(help="Name of a material.")]
+Method = Annotated[str, typer.Option("--method", help="Which current model: ols or bayes.")]
+Velocity = Annotated[float, typer.Option("--velocity", help="Tangential velocity of the slip, m/s.")]
+
+DEFAULT_URL = "http://127.0.0.1:8000"
+
+
+def upload(
+    logs: Annotated[list[Path], typer.Argument(help="Grasp logs: Stiction NPZ, or a zipped Tac3D folder.")],
+    material: Annotated[
+        str | None, typer.Option(help="Material that was held; without it slip is only detected.")
+    ] = None,
+    create: Annotated[bool, typer.Option("--create", help="Create the material if it isn't there.")] = False,
+    wait: Annotated[bool, typer.Option(help="Wait for detection and fit.")] = True,
+    url: Url = DEFAULT_URL,
+    key: Key = None,
+    json: Json = False,
+) -> None:
+    """Upload grasp logs and wait until their slip is detected and the material's model is fitted."""
+    from stiction_client import FrictionClient
+
+    results = []
+    with FrictionClient(url, key=key) as client:
+        if create and material is not None:
+            client.ensure_material(material)
+        for path in logs:
+            receipt = client.upload(path, material=material)
+            job = client.wait(receipt.job) if wait else receipt.job
+            results.append({"file": path.name, "grasp_log": receipt.id, **asdict(job)})
+    if json:
+        print_json({"uploads": results})
+        return
+    columns = ("file", "grasp_log", "status", "reason", "model_version")
+    print_table("Uploads", columns, [["" if r[c] is None else r[c] for c in columns] for r in results])
+
+
+def lookup(
+    material: MaterialName,
+    velocity: Velocity = 0.0,
+    normal_force: Annotated[float | None, typer.Option(help="Normal force of one element, N.")] = None,
+    quantile: Annotated[float | None, typer.Option(help="A quantile of μ, such as 0.05, in place of its mean.")] = None,
+    method: Method = "ols",
+    url: Url = DEFAULT_URL,
+    key: Key = None,
+    json: Json = False,
+) -> None:
+    """Look a material's friction coefficient up."""
+    from stiction_client import FrictionClient
+
+    with FrictionClient(url, key=key) as client:
+        force = normal_force if normal_force is not None else _middle_force(client.model(material, method=method))
+        answer = asdict(client.friction(material, velocity, force, quantile=quantile, method=method))
+    if json:
+        print_json(answer)
+    else:
+        print_table(f"Friction of {material}", ("", ""), list(answer.items()))
+
+
+def plan(
+    material: MaterialName,
+    load: Annotated[float, typer.Option(help="Tangential load that the finger must hold, N.")],
+    contact_area: Annotated[float, typer.Option(help="Area of the contact, m².")],
+    slip_probability: Annotated[float, typer.Option(help="Largest probability of slip that is accepted.")] = 1e-3,
+    velocity: Velocity = 0.0,
+    limit: Annotated[float | None, typer.Option(help="Largest normal force that the object bears, N.")] = None,
+    method: Method = "ols",
+    url: Url = DEFAULT_URL,
+    key: Key = None,
+    json: Json = False,
+) -> None:
+    """Say how hard to grip so that slip stays improbable, with the model's uncertainty in the answer."""
+    from stiction_client import FrictionClient, required_normal_force
+
+    with FrictionClient(url, key=key) as client:
+        model = client.model(material, method=method)
+    answer = required_normal_force(
+        model,
+        load,
+        slip_probability=slip_probability,
+        contact_area=contact_area,
+        tangential_velocity=velocity,
+        normal_force_limit=limit,
+    )
+    if json:
+        print_json(asdict(answer))
+    else:
+        print_table(f"Grip for {load:g} N on {material}", ("", ""), list(asdict(answer).items()))
+
+
+def _middle_force(model: "FrictionModel") -> float:
+    low, high = model.domain.normal_force
+    return 0.5 * (low + high)

@@ -1,0 +1,1 @@
+"""The main job: the whole path on real input, with a real server."""

@@ -1,0 +1,118 @@
+"""The demo's tables, as text cells."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median
+
+import numpy as np
+from scipy import special
+
+from service.demo.inputs import DemoLog
+from service.report.page import Table
+from slipcore import FrictionLaw
+from stiction_client import FrictionModel, GraspLogReceipt, Job, NoFeasibleForce, RequiredForce
+
+COEFFICIENTS = ("β₀ [-]", "β₁ [s/m]", "β₂ [1/N]")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Upload:
+    """A grasp log that was uploaded, as the service keeps it once its job has ended."""
+
+    log: DemoLog
+    receipt: GraspLogReceipt
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answer:
+    """What the service and the planner said of one material under one method."""
+
+    material: str
+    method: str
+    job: Job
+    model: FrictionModel | None
+    grip: RequiredForce | NoFeasibleForce | None
+
+
+def friction(answers: Iterable[Answer], truths: Mapping[str, FrictionLaw | None]) -> Table:
+    """Coefficients and σ with 95 % intervals, and the truth where known; a refusal with its reason."""
+    columns = ("material", "method", *COEFFICIENTS, "σ [-]", "true β₀", "samples", "fit")
+    rows = []
+    for answer in answers:
+        if answer.model is None:
+            outcome = [f"{answer.job.status}: {answer.job.reason}", *[""] * 6]
+        else:
+            outcome = _fitted(answer.model, truths[answer.material], sum(answer.job.seconds.values()))
+        rows.append([answer.material, answer.method, *outcome])
+    caption = "Friction models: estimate and 95 % interval; † marks what the data do not identify"
+    return Table(caption, columns, rows)
+
+
+def grips(answers: Iterable[Answer]) -> Table:
+    """The planner's answer for each model."""
+    rows = [[answer.material, answer.method, *_grip(answer.grip)] for answer in answers]
+    return Table("Normal force needed", ("material", "method", "normal force", "remark"), rows)
+
+
+def grasps(uploads: Sequence[Upload]) -> Table:
+    """Each uploaded grasp: what was detected, its outcome, and the time from upload to stored fit."""
+    columns = (
+        "grasp", "material", "frames", "duration", "in contact", "least stick ratio", "macro slip", "onsets",
+        "noise", "samples", "outcome", "work",
+    )  # fmt: skip
+    return Table("Grasps uploaded", columns, [_grasp(upload) for upload in uploads])
+
+
+def stages(uploads: Sequence[Upload]) -> Table:
+    """Median time of each stage over all uploads."""
+    spent = [upload.receipt.job.seconds for upload in uploads]
+    names = list(dict.fromkeys(stage for seconds in spent for stage in seconds))
+    rows = [[name, _milliseconds(median(s[name] for s in spent if name in s))] for name in names]
+    return Table("Time per stage (median over the uploads)", ("stage", "time"), rows)
+
+
+def _fitted(model: FrictionModel, truth: FrictionLaw | None, seconds: float) -> list[str]:
+    cells = [
+        f"{value:.4g} ({low:.3g} … {high:.3g})" + ("" if known else " †")
+        for value, (low, high), known in zip(model.coefficients, model.interval(0.95), model.identifiable, strict=True)
+    ]
+    low, high = _scale_interval(model)
+    known = "unknown" if truth is None else f"{truth.coefficients[0]:g}"
+    return [*cells, f"{model.scale:.3g} ({low:.3g} … {high:.3g})", known, str(model.n), _milliseconds(seconds)]
+
+
+def _scale_interval(model: FrictionModel) -> tuple[float, float]:
+    """95 % interval of σ, by the χ² distribution of its estimate."""
+    freedom = model.scatter_degrees_of_freedom
+    if np.isinf(freedom):
+        return model.scale, model.scale
+    high, low = (model.scale * np.sqrt(freedom / special.chdtri(freedom, tail)) for tail in (0.975, 0.025))
+    return float(low), float(high)
+
+
+def _grip(grip: RequiredForce | NoFeasibleForce | None) -> list[str]:
+    if isinstance(grip, RequiredForce):
+        return [f"{grip.normal_force:.3g} N", grip.warning or ""]
+    return ["no model", ""] if grip is None else ["none", str(grip)]
+
+
+def _grasp(upload: Upload) -> list[str]:
+    receipt, seen = upload.receipt, upload.receipt.detection
+    outcome = receipt.job.status if receipt.job.reason is None else f"{receipt.job.status}: {receipt.job.reason}"
+    detected = [""] * 6
+    if seen is not None:
+        detected = [
+            str(seen.contact_frames),
+            "" if seen.stick_ratio_min is None else f"{seen.stick_ratio_min:.2f}",
+            str(seen.macro_slip_frames),
+            str(seen.events["onset"]),
+            "" if seen.noise is None else f"{seen.noise * 1e6:.2f} µm",
+            str(seen.samples),
+        ]
+    work = _milliseconds(sum(receipt.job.seconds.values()))
+    head = [upload.log.name, upload.log.material, str(receipt.frames), f"{receipt.duration:.2f} s"]
+    return [*head, *detected, outcome, work]
+
+
+def _milliseconds(seconds: float) -> str:
+    return f"{seconds * 1e3:.1f} ms"

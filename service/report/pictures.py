@@ -1,0 +1,158 @@
+"""Pictures of what was detected and fitted; each function returns a matplotlib figure."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from estimators import FrictionModel
+from slipcore import FrictionLaw, FrictionSamples, GraspLog, SlipHistory
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+STICK, SLIP, NO_CONTACT, TRUTH = "#2b6cb0", "#dd6b20", "#e8e8e8", "#2f855a"
+SNAPSHOTS = 8
+COEFFICIENTS = ("β₀ [-]", "β₁ [s/m]", "β₂ [1/N]", "σ [-]")
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """Write a figure as PNG, making its folder if need be."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=110, bbox_inches="tight")
+    return path
+
+
+def slip_over_time(log: GraspLog, history: SlipHistory, title: str) -> Figure:
+    """Stick-slip maps at eight moments of contact, above the stick ratio over time (with the truth where known)."""
+    figure = Figure(figsize=(11, 4.8), layout="constrained")
+    figure.suptitle(title)
+    grid = figure.add_gridspec(2, SNAPSHOTS, height_ratios=(1.0, 1.25))
+    frames = _snapshots(history)
+    for column, frame in enumerate(frames):
+        _draw_map(figure.add_subplot(grid[0, column]), log, history, frame)
+    axes = figure.add_subplot(grid[1, :])
+    _draw_stick_ratio(axes, log, history)
+    for frame in frames:
+        axes.axvline(history.time[frame] - history.time[0], color="0.75", linewidth=0.6, zorder=0)
+    return figure
+
+
+def samples_and_model(
+    samples: FrictionSamples, model: FrictionModel, title: str, truth: FrictionLaw | None = None
+) -> Figure:
+    """Friction samples against normal force and against velocity, with the fitted plane and its 90 % band."""
+    figure = Figure(figsize=(10, 4), layout="constrained")
+    figure.suptitle(title)
+    left, right = figure.subplots(1, 2, sharey=True)
+    shown = _thin(len(samples), 4000)
+    force, velocity = samples.normal_force[shown], samples.tangential_velocity[shown]
+    mu, middle = samples.friction_coefficient[shown], (np.median(velocity), np.median(force))
+    left.scatter(force * 1e3, mu, s=4, alpha=0.35, color=STICK, linewidths=0)
+    right.scatter(velocity * 1e3, mu, s=4, alpha=0.35, color=STICK, linewidths=0)
+    over_force = np.linspace(*model.domain.normal_force, 60)
+    over_velocity = np.linspace(*model.domain.tangential_velocity, 60)
+    _draw_band(left, over_force * 1e3, model, np.full(60, middle[0]), over_force, truth)
+    _draw_band(right, over_velocity * 1e3, model, over_velocity, np.full(60, middle[1]), truth)
+    left.set(xlabel=f"normal force of the element [mN]   (line at v = {middle[0] * 1e3:.2g} mm/s)", ylabel="μ [-]")
+    right.set(xlabel=f"tangential velocity [mm/s]   (line at fₙ = {middle[1] * 1e3:.2g} mN)")
+    left.set_ylim(*_vertical_range(mu))
+    _tidy(left)
+    _tidy(right)
+    left.legend(loc="best", fontsize=8)
+    return figure
+
+
+def posterior(model: FrictionModel, title: str, truth: FrictionLaw | None = None) -> Figure:
+    """Marginal posterior of each coefficient and of σ, from the model's draws."""
+    if model.draws is None:
+        raise ValueError(f"draws is None for a {model.method} model; allowed: a model with posterior draws")
+    figure = Figure(figsize=(11, 2.8), layout="constrained")
+    figure.suptitle(title)
+    known = None if truth is None else (*truth.coefficients, truth.scale)
+    for k, (axes, name) in enumerate(zip(figure.subplots(1, 4), COEFFICIENTS, strict=True)):
+        lowest, *bounds, highest = np.quantile(model.draws[:, k], (0.001, 0.025, 0.975, 0.999))
+        axes.hist(model.draws[:, k], bins=50, range=(lowest, highest), color=STICK, alpha=0.75)
+        for bound in bounds:
+            axes.axvline(bound, color="0.3", linestyle=":", linewidth=1)
+        if known is not None and (k < 3 or known[k] > 0.0):
+            axes.axvline(known[k], color=TRUTH, linewidth=1.5, label="truth")
+            axes.legend(fontsize=8)
+        axes.set(xlabel=name, yticks=())
+        axes.locator_params(axis="x", nbins=4)
+        _tidy(axes)
+    return figure
+
+
+def _tidy(axes: Axes) -> None:
+    axes.grid(visible=True, alpha=0.25)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _snapshots(history: SlipHistory) -> "NDArray[np.intp]":
+    touched = np.flatnonzero(history.contact.any(axis=(1, 2)))
+    first, last = (touched[0], touched[-1]) if len(touched) else (0, len(history.time) - 1)
+    return np.unique(np.linspace(first, last, SNAPSHOTS).round().astype(np.intp))
+
+
+def _draw_map(axes: Axes, log: GraspLog, history: SlipHistory, frame: int) -> None:
+    code = np.where(history.contact[frame], 1 + history.slip[frame], 0).ravel()
+    colors = ListedColormap([NO_CONTACT, STICK, SLIP])
+    x, y = (log.position[..., k].ravel() * 1e3 for k in (0, 1))
+    size = 12.0 * (20.0 / max(log.grid)) ** 2
+    axes.scatter(x, y, c=code, s=size, marker="s", cmap=colors, norm=BoundaryNorm([0, 1, 2, 3], 3), linewidths=0)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    axes.set_title(f"{history.time[frame] - history.time[0]:.2f} s", fontsize=8)
+
+
+def _draw_stick_ratio(axes: Axes, log: GraspLog, history: SlipHistory) -> None:
+    since = history.time - history.time[0]
+    axes.plot(since, history.stick_ratio, color=STICK, label=f"detected ({history.method})")
+    if log.truth is not None:
+        axes.plot(since, log.truth.stick_ratio, color=TRUTH, linestyle="--", label="truth")
+    axes.set(xlabel="time [s]", ylabel="stick ratio [-]", ylim=(-0.03, 1.05), xlim=(0.0, since[-1]))
+    line, labels = axes.get_legend_handles_labels()
+    patches = [Patch(color=c, label=n) for c, n in ((STICK, "stick"), (SLIP, "slip"), (NO_CONTACT, "no contact"))]
+    _tidy(axes)
+    axes.legend(
+        [*line, *patches],
+        [*labels, "stick", "slip", "no contact"],
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.18),
+        frameon=False,
+        ncols=5,
+        fontsize=8,
+    )
+
+
+def _draw_band(
+    axes: Axes,
+    abscissa: "NDArray[np.float64]",
+    model: FrictionModel,
+    velocity: "NDArray[np.float64]",
+    force: "NDArray[np.float64]",
+    truth: FrictionLaw | None,
+) -> None:
+    low, high = (model.predict(velocity, force, quantile) for quantile in (0.05, 0.95))
+    axes.fill_between(abscissa, low, high, color=SLIP, alpha=0.2, linewidth=0, label="90 % of new observations")
+    axes.plot(abscissa, model.predict(velocity, force), color=SLIP, label="fitted")
+    if truth is not None:
+        intercept, slope_v, slope_f = truth.coefficients
+        axes.plot(
+            abscissa, intercept + slope_v * velocity + slope_f * force, color=TRUTH, linestyle="--", label="truth"
+        )
+
+
+def _thin(count: int, most: int) -> "NDArray[np.intp]":
+    return np.linspace(0, count - 1, min(count, most)).astype(np.intp)
+
+
+def _vertical_range(mu: "NDArray[np.float64]") -> tuple[float, float]:
+    low, high = np.quantile(mu, (0.005, 0.995))
+    margin = 0.25 * (high - low) + 0.02 * abs(high)
+    return float(low - margin), float(high + margin)

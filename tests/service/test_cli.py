@@ -1,0 +1,139 @@
+"""The command line, as an outsider uses it: real files, a real server, documented exit codes."""
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.cli import app, main
+from service.cli.exit_codes import INPUT_REFUSED, NOT_FEASIBLE, SERVICE_REFUSED
+from service.cli.output import plain
+from service.demo.server import running_server
+from slipcore.contact import tangential_ramp
+from stiction_client import container
+
+Run = Callable[..., tuple[int, str, str]]
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Run:
+    """Run a command: (exit code, standard output, standard error)."""
+
+    def command(*arguments: object) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as ending:
+            main([str(argument) for argument in arguments])
+        out, err = capsys.readouterr()
+        return int(ending.value.code or 0), out, err
+
+    return command
+
+
+@pytest.fixture(scope="module")
+def ramps(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Grasp logs of a material of friction 0.5."""
+    folder = tmp_path_factory.mktemp("ramps")
+    paths = []
+    for seed, force in enumerate((4.0, 6.0, 9.0, 13.0)):
+        log = tangential_ramp(friction=0.5, normal_force=force, marker_noise=1e-6, force_noise=2e-3, seed=seed)
+        paths.append(folder / f"{force:g}.npz")
+        container.write(log, paths[-1])
+    return paths
+
+
+@pytest.fixture(scope="module")
+def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    with running_server(tmp_path_factory.mktemp("service")) as address:
+        yield address
+
+
+def command_names() -> list[str]:
+    names = [c.name or c.callback.__name__ for c in app.registered_commands if c.callback is not None]
+    return [*names, *(str(g.name) for g in app.registered_groups)]
+
+
+@pytest.mark.parametrize("name", command_names())
+def test_every_command_explains_itself_and_is_documented(name: str, run: Run) -> None:
+    code, out, _ = run(name, "--help")
+    assert code == 0
+    assert "Usage" in out
+    assert f"`stiction {name}" in (ROOT / "docs" / "cli.md").read_text(encoding="utf-8")
+
+
+def test_detect_tells_a_program_what_was_seen(run: Run, ramps: list[Path], tmp_path: Path) -> None:
+    picture = tmp_path / "slip.png"
+    code, out, _ = run("detect", ramps[0], "--json", "--picture", picture)
+    seen = json.loads(out)
+    assert code == 0
+    assert seen["slip onsets"] > 0
+    assert len(seen["time"]) == len(seen["stick_ratio"]) == seen["frames"]
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_fit_finds_the_friction_that_the_ramps_were_made_with(run: Run, ramps: list[Path]) -> None:
+    code, out, _ = run("fit", *ramps, "--json")
+    model = json.loads(out)
+    assert code == 0
+    assert model["coefficients"][0] == pytest.approx(0.5, rel=0.02)  # the 2 % that the project promises
+    code, out, _ = run("fit", *ramps)
+    assert code == 0
+    assert "β₁ [s/m]" in out
+
+
+def test_a_file_that_is_no_log_is_refused_by_name(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "noise.npz"
+    path.write_bytes(b"not a log at all")
+    code, out, err = run("detect", path)
+    assert code == INPUT_REFUSED
+    assert not out
+    assert "noise.npz" in err or "allowed" in err
+    assert run("detect", tmp_path / "absent.npz")[0] == INPUT_REFUSED
+
+
+def test_an_unknown_detector_is_refused_with_those_that_exist(run: Run, ramps: list[Path]) -> None:
+    code, _, err = run("detect", ramps[0], "--method", "crystal ball")
+    assert code == INPUT_REFUSED
+    assert "strain_rate" in err
+
+
+def test_a_service_that_is_not_there_has_its_own_exit_code(run: Run) -> None:
+    code, _, err = run("lookup", "paper", "--url", "http://127.0.0.1:9")
+    assert code == SERVICE_REFUSED
+    assert "ConnectError" in err
+
+
+def test_upload_lookup_and_plan_go_through_a_real_service(run: Run, ramps: list[Path], url: str) -> None:
+    code, out, _ = run("upload", *ramps, "--material", "paper", "--create", "--url", url, "--json")
+    assert code == 0
+    assert [item["status"] for item in json.loads(out)["uploads"]] == ["done"] * len(ramps)
+
+    code, out, _ = run("lookup", "paper", "--quantile", 0.05, "--url", url, "--json")
+    answer = json.loads(out)
+    assert code == 0
+    assert answer["friction_coefficient"] < answer["mean"] == pytest.approx(0.5, abs=0.05)
+
+    grip = ("plan", "paper", "--contact-area", 6e-5, "--url", url, "--json")
+    code, out, _ = run(*grip, "--load", 1.0)
+    assert code == 0
+    assert json.loads(out)["normal_force"] > 2.0  # more than load/μ: the planner gets a quantile, not a mean
+    assert run(*grip, "--load", 1e6, "--limit", 50.0)[0] == NOT_FEASIBLE
+
+
+def test_an_unknown_material_is_named(run: Run, url: str) -> None:
+    code, _, err = run("lookup", "unobtainium", "--url", url)
+    assert code == SERVICE_REFUSED
+    assert "unobtainium" in err
+
+
+def test_db_upgrade_makes_a_database_that_check_approves_of(run: Run, tmp_path: Path) -> None:
+    database = f"sqlite:///{tmp_path / 'stiction.sqlite'}"
+    assert run("db", "check", "--database-url", database)[0] != 0
+    assert run("db", "upgrade", "--database-url", database)[0] == 0
+    assert run("db", "check", "--database-url", database)[0] == 0
+
+
+def test_json_holds_no_number_that_json_does_not_know() -> None:
+    record: dict[str, Any] = {"a": float("nan"), "b": [float("inf"), 1.5], "c": {"d": (1, None)}}
+    assert plain(record) == {"a": None, "b": [None, 1.5], "c": {"d": [1, None]}}

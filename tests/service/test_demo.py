@@ -1,0 +1,47 @@
+"""The main job, from the command to the report."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from service.demo.inputs import FRICTION
+
+ROOT = Path(__file__).parents[2]
+RECORDINGS = ROOT / ".cache" / "tac3d" / "PyTac3D" / "example_data"
+
+
+def demo(output: Path, *options: str) -> str:
+    command = [sys.executable, "-m", "service.cli", "demo", "--output", str(output), *options]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout
+
+
+def pictures_of(page: str) -> list[str]:
+    return re.findall(r'<img src="([^"]+)"', page)
+
+
+def test_demo_without_recordings_says_so_and_goes_on(tmp_path: Path) -> None:
+    printed = demo(tmp_path / "out", "--recordings", str(tmp_path / "absent"))
+    assert "left out" in printed
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    for material in FRICTION:
+        assert material in page
+        assert material in printed
+    pictures = pictures_of(page)
+    assert len(pictures) == 3 * len(FRICTION)  # plane, posterior and slip map of each simulated material
+    for name in pictures:
+        assert (tmp_path / "out" / name).read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.skipif(not RECORDINGS.is_dir(), reason="the real Tac3D recordings could not be fetched")
+def test_demo_takes_the_real_recordings_all_the_way(tmp_path: Path) -> None:
+    printed = demo(tmp_path / "out", "--recordings", str(RECORDINGS))
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "left out" not in printed
+    for name in ("example_1/AD2-0065L", "example_2/HDL1-GWH0021", "example_2/HDL1-GWH0022"):
+        assert name in page
+    assert "failed" not in page
