@@ -11,9 +11,12 @@ from estimators.defaults import SAMPLING
 from estimators.errors import InvalidSamples, NotConverged
 from estimators.evidence import Evidence
 from estimators.friction_model import FrictionModel
+from estimators.likelihoods.errors_in_variables import errors_in_variables
 from estimators.likelihoods.gaussian import gaussian
 from estimators.likelihoods.grasp_effects import grasp_effects
+from estimators.likelihoods.outlier import outlier
 from estimators.likelihoods.posterior import Posterior
+from estimators.likelihoods.student_t import student_t
 from estimators.reporting import Diagnostics, report
 from estimators.sampling import Chain, sample
 
@@ -28,6 +31,9 @@ class Likelihood(NamedTuple):
 LIKELIHOODS = {
     "gaussian": Likelihood(gaussian, SAMPLING.accuracy),
     "grasp_effects": Likelihood(grasp_effects, SAMPLING.accuracy),
+    "student_t": Likelihood(student_t, SAMPLING.accuracy_per_sample),
+    "outlier": Likelihood(outlier, SAMPLING.accuracy_per_sample),
+    "errors_in_variables": Likelihood(errors_in_variables, SAMPLING.accuracy_per_sample),
 }
 
 

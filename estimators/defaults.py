@@ -56,9 +56,9 @@ class Prior:
 class Sampling:
     """How a posterior is sampled, and when the sampling stops."""
 
-    walkers: tuple[int, int] = (32, 480)
+    walkers: tuple[int, int] = (20, 440)
     """Fewest and most, even: as many as bring the accuracy within one block, so that the overhead a step is shared."""
-    block: int = 80
+    block: int = 90
     """Steps between two looks at the chain; ≥ 50 τ for the independence proposal, whose τ is about 1.2."""
     chain_lengths: float = 50.0
     """Steps in units of the integrated autocorrelation time, from which that time is believed (emcee's rule)."""
@@ -66,7 +66,7 @@ class Sampling:
     """Posterior standard deviations; Monte-Carlo error of mean, 5 % and 95 % quantile at which sampling stops."""
     accuracy_per_sample: float = 0.05
     """The same where each step of each walker reads all samples: an effective sample size of 2,000."""
-    max_steps: int = 6000
+    max_steps: int = 3000
     """Steps after which a chain that does not converge is given up."""
     min_acceptance: float = 0.3
     """Acceptance of the independence proposal below which differential evolution takes over (house trials)."""

@@ -30,9 +30,10 @@ def fit(
 
     ``method``: "ols" (weighted least squares, cluster-robust), "robust" (M-estimate with the ``loss`` "tukey" or
     "huber", cluster-robust), "conjugate" (exact posterior for independent Gaussian errors) or "bayes" (emcee), whose
-    ``likelihood`` is "gaussian" or "grasp_effects", the default wherever samples come in clusters. A sampled method
-    stops once the Monte-Carlo error of its means and 5/95 % quantiles is under ``accuracy`` posterior standard
-    deviations, or after ``seconds``; ``seed`` makes it repeatable.
+    ``likelihood`` is "grasp_effects" (the default wherever samples come in clusters), "gaussian", "student_t",
+    "outlier" (a part of false slip) or "errors_in_variables" (noise in the forces). A sampled method stops once the
+    Monte-Carlo error of its means and 5/95 % quantiles is under ``accuracy`` posterior standard deviations, or after
+    ``seconds``; ``seed`` makes it repeatable.
 
     Raises ``TooFewSamples`` where no slip or hardly any was seen, ``InvalidSamples`` naming what cannot be used, and
     ``NotConverged``, which carries its model, where a chain cannot be trusted.

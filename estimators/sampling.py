@@ -134,7 +134,7 @@ def _run(
         affordable = min((deadline - now) * done / (now - begin), float(SAMPLING.max_steps - done))
         if affordable < 1.0:
             return replace(chain, stopped="steps" if done >= SAMPLING.max_steps else "seconds")
-        steps = int(min(max(_missing(chain, goal), SAMPLING.block), 4 * done, affordable))
+        steps = int(min(max(_missing(chain, goal), SAMPLING.block / 4), 4 * done, affordable))
 
 
 def _walkers(goal: float) -> int:

@@ -133,5 +133,7 @@ def test_two_grasps_leave_the_scatter_between_them_to_the_prior(samples: Make) -
 
 
 def test_an_unknown_likelihood_is_refused(samples: Make) -> None:
-    with pytest.raises(estimators.InvalidSamples, match="likelihood is cauchy; allowed: gaussian, grasp_effects"):
+    with pytest.raises(
+        estimators.InvalidSamples, match="likelihood is cauchy; allowed: gaussian, grasp_effects, student_t"
+    ):
         estimators.fit(samples(50), method="bayes", likelihood="cauchy")

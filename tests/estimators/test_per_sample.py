@@ -1,0 +1,156 @@
+"""Likelihoods that read every sample: against SciPy's densities, on their own data, and on data without fault."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import integrate, stats
+
+import estimators
+from estimators.evidence import gather
+from estimators.laplace import refine
+from estimators.likelihoods import errors_in_variables, outlier, per_sample, student_t
+from estimators.likelihoods.per_sample import Rows
+from slipcore.samples import FrictionSamples
+
+Make = Callable[..., FrictionSamples]
+
+
+def rows(n: int = 40, seed: int = 0) -> Rows:
+    rng = np.random.default_rng(seed)
+    x = np.stack([np.ones(n), rng.uniform(0, 5e-3, n), rng.uniform(0.02, 0.1, n)])
+    mu = rng.normal(0.36, 0.05, n)
+    return Rows(x, mu, mu * x[2], rng.uniform(0.5, 1.0, n))
+
+
+BETA = np.array([[0.4, 2.0, -0.8], [0.38, 1.0, -0.5]])
+
+
+def test_student_t_is_scipys() -> None:
+    part, natural = rows(), np.array([[0.02, 4.0], [0.05, 30.0]])
+    found = student_t.StudentT().log_likelihood(BETA, natural, part)
+    wanted = [
+        part.weight @ stats.t(nu, beta @ part.regressors, sigma).logpdf(part.friction)
+        for beta, (sigma, nu) in zip(BETA, natural, strict=True)
+    ]
+    constant = 0.5 * np.log(np.pi) * part.weight.sum()  # left out
+    np.testing.assert_allclose(found - constant, wanted, rtol=1e-12)
+
+
+def test_outlier_is_the_mixture_of_two_normals() -> None:
+    part, natural = rows(), np.array([[0.02, 0.1, 0.2, -0.1], [0.05, 0.4, 0.3, 0.05]])
+    found = outlier.Outlier().log_likelihood(BETA, natural, part)
+    wanted = []
+    for beta, (sigma, pi, wide, offset) in zip(BETA, natural, strict=True):
+        mean = beta @ part.regressors
+        near, far = stats.norm(mean, sigma).pdf(part.friction), stats.norm(mean + offset, wide).pdf(part.friction)
+        wanted.append(part.weight @ np.log((1.0 - pi) * near + pi * far))
+    constant = 0.5 * np.log(2.0 * np.pi) * part.weight.sum()  # left out
+    np.testing.assert_allclose(found - constant, wanted, rtol=1e-12)
+
+
+def test_errors_in_variables_has_the_mean_and_variance_of_the_integral_over_the_true_force() -> None:
+    """One sample: f_t given the measured f_n, against quadrature over the true f_n and its noise."""
+    mean, variance, noise, sigma = 0.06, 5e-4, 2e-3, 0.02
+    terms = errors_in_variables.ErrorsInVariables(mean, variance, 1.0, "")
+    measured, v, beta = 0.04, 3e-3, BETA[:1]
+    kept = 1.0 - noise**2 / variance
+    true = stats.norm(mean + kept * (measured - mean), np.sqrt(kept) * noise)
+
+    def plane(f: float) -> float:
+        return float(beta[0] @ [1.0, v, f])
+
+    ends = true.ppf([1e-9, 1.0 - 1e-9])
+    first = integrate.quad(lambda f: true.pdf(f) * f * plane(f), *ends)[0]
+    second = integrate.quad(lambda f: true.pdf(f) * (f**2 * (plane(f) ** 2 + sigma**2) + noise**2), *ends)[0]
+    points = np.linspace(0.01, 0.02, 5)
+    natural = np.array([[sigma, noise]])
+    found = [
+        terms.log_likelihood(
+            beta, natural, Rows(np.array([[1.0], [v], [measured]]), np.ones(1), np.array([t]), np.ones(1))
+        )[0]
+        for t in points
+    ]
+    wanted = stats.norm(first, np.sqrt(second - first**2)).logpdf(points) + 0.5 * np.log(2.0 * np.pi)
+    np.testing.assert_allclose(found, wanted, rtol=1e-3)  # the square of the force's error is left out of its spread
+
+
+def heavy(samples: Make, n: int) -> FrictionSamples:
+    return samples(n, noise=np.random.default_rng(1).standard_t(3.0, n))
+
+
+def false_slip(samples: Make, n: int) -> FrictionSamples:
+    rng = np.random.default_rng(2)
+    data = samples(n)
+    low = data.friction_coefficient - rng.uniform(0.0, 0.3, n)
+    return replace(data, friction_coefficient=np.where(rng.random(n) < 0.15, low, data.friction_coefficient))
+
+
+def noisy_forces(samples: Make, n: int) -> FrictionSamples:
+    rng, data = np.random.default_rng(3), samples(n)
+    f_n, f_t = (f + 4e-3 * rng.standard_normal(n) for f in (data.normal_force, data.tangential_force))
+    return replace(data, normal_force=f_n, tangential_force=f_t, friction_coefficient=f_t / f_n)
+
+
+CASES = {
+    "student_t": (heavy, {3: 0.02, 4: 3.0}),
+    "outlier": (false_slip, {3: 0.02}),
+    "errors_in_variables": (noisy_forces, {3: 0.02, 4: 4e-3}),
+}
+
+
+@pytest.mark.parametrize("likelihood", CASES)
+def test_each_recovers_its_own_truth_where_least_squares_does_not(
+    samples: Make, truth: np.ndarray, likelihood: str
+) -> None:
+    spoil, parameters = CASES[likelihood]
+    data = spoil(samples, 3000)
+    model = estimators.fit(data, method="bayes", likelihood=likelihood)
+    assert np.abs((model.coefficients - truth) / model.standard_errors).max() < 3.5
+    for column, value in parameters.items():
+        draws = model.draws[:, column]
+        assert abs(draws.mean() - value) < 4.0 * draws.std()
+    plain = estimators.Moments.from_samples(data).fit()
+    worst = np.abs((plain.coefficients - truth) / plain.standard_errors).max()
+    assert likelihood == "student_t" or worst > 4.0
+    assert likelihood != "student_t" or model.standard_errors[0] < 0.9 * plain.standard_errors[0]
+
+
+@pytest.mark.parametrize("likelihood", CASES)
+def test_each_gives_the_exact_answer_on_clean_data(samples: Make, likelihood: str) -> None:
+    data = samples(600)
+    model, exact = (
+        estimators.fit(data, method="bayes", likelihood=likelihood),
+        estimators.fit(data, method="conjugate"),
+    )
+    assert model.diagnostics["move"] == "independence"
+    assert np.abs((model.coefficients - exact.coefficients) / exact.standard_errors).max() < 0.6
+    np.testing.assert_allclose(model.standard_errors, exact.standard_errors, rtol=0.25)  # it pays for its caution
+
+
+def test_chunks_and_walkers_do_not_show(samples: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    posterior = student_t.student_t(gather(samples(300)))
+    at = np.random.default_rng(0).standard_normal((7, 5))
+    whole = posterior.log_probability(at)
+    monkeypatch.setattr(per_sample, "CACHED", 448)
+    np.testing.assert_allclose(posterior.log_probability(at), whole, rtol=1e-12)
+    np.testing.assert_allclose(posterior.log_probability(at[3:4]), whole[3:4], rtol=1e-12)
+
+
+def test_outside_the_support_there_is_no_density(samples: Make) -> None:
+    terms = outlier.Outlier()
+    log = terms.log_prior(np.array([[0.0, -0.1, 1.8, -0.1], [0.0, 1.1, 1.8, -0.1], [0.0, 0.4, 1.8, -0.1]]))
+    np.testing.assert_array_equal(np.isfinite(log), [False, False, True])
+    with pytest.raises(estimators.InvalidSamples, match='which "bayes, outlier" needs'):
+        estimators.Moments.from_samples(samples(50)).fit("bayes", likelihood="outlier")
+
+
+def test_refinement_finds_centre_and_spread_of_a_skewed_density() -> None:
+    def log_density(x: np.ndarray) -> np.ndarray:
+        return np.asarray((0.5 * x - np.exp(x))[:, 0])  # log of a gamma variable of shape 1/2
+
+    mode, root = refine(log_density, np.array([np.log(0.5)]), np.array([[1.4]]), np.random.default_rng(0))
+    law = stats.loggamma(0.5)
+    assert abs(mode[0] - law.mean()) < 0.5 * law.std()
+    np.testing.assert_allclose(np.abs(root[0, 0]), law.std(), rtol=0.35)
