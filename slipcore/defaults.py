@@ -84,6 +84,9 @@ class ContactOptions(Options):
         float, Option(0.0, 0.99, "-", "½ on a half-space (Hertz), less on a bonded gel; 0.2 to 0.3 agrees with forces")
     ] = 0.3
     """Least share of the frame's deepest indentation, without forces."""
+    rim_curvature: Annotated[float, Option(0.0, 1.0, "-", "1: not looked at")] = 1.0
+    """Without forces, elements where the indentation is hollow by more than this share of its peak (Laplacian times
+    pitch squared) lie beyond the contact's rim."""
     contact_noise: Annotated[float, Option(0.0, 100.0, "standard deviations", "one false touch in 10⁶ frames")] = 5.0
     """Least multiple of the estimated noise of force or indentation."""
     release_share: Annotated[float, Option(0.0, 1.0, "-", "hysteresis against flicker at the edge")] = 0.7

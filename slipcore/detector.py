@@ -31,7 +31,7 @@ from slipcore.noise import NOTHING_SEEN, NoiseState, step_noise
 from slipcore.rigid_motion import fit_rigid_motion, pose_motion, relative_velocity
 from slipcore.slip_state import SlipHistory, SlipState, slip_events
 from slipcore.strain import Lattice, lattice_steps, surface_normal
-from slipcore.touch import contact_from_force, contact_from_shape
+from slipcore.touch import contact_from_force, contact_from_shape, spatial_noise
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +81,8 @@ def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
     pressing = _pressing(frame, forces)
     marker_noise = step_noise(state.marker_noise, frame.time, frame.displacement[..., :2].reshape(-1, 2).T)
     pressing_noise = step_noise(state.pressing_noise, frame.time, pressing.reshape(1, -1))
-    contact = _contact(setup, pressing, pressing_noise.sigma, memory, has_force=forces is not None)
+    known = pressing_noise.sigma if math.isfinite(pressing_noise.sigma) else spatial_noise(pressing)
+    contact = _contact(setup, pressing, known, memory, has_force=forces is not None)
     touched = contact if memory is None else contact & ~memory.answer.contact
     seen = Observation(
         frame.time,
@@ -94,6 +95,8 @@ def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
         touched,
         frame.object_pose,
         marker_noise.sigma,
+        pressing_noise.sigma,
+        frame.force,
     )
     method_state, decision = _decide(setup, memory, seen)
     answer = _answer(setup, memory, seen, decision)

@@ -1,5 +1,6 @@
 """What a detection method is given, and what it answers."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
@@ -20,7 +21,8 @@ class Observation:
     ``time`` s; ``interval`` s since the frame before; ``displacement`` [n, m, 3] m and its ``steps`` along the lattice
     [2, 3, n, m] m; ``normal`` [n, m, 3] outward;
     ``forces`` split at the surface, or None; ``contact`` and ``touched`` (in contact now, not before) [n, m];
-    ``object_pose`` [3] or None; ``noise`` of a marker coordinate, m, NaN while unknown.
+    ``object_pose`` [3] or None; ``noise`` of a marker coordinate, m, and ``pressing_noise`` of an element's normal
+    force, N (without forces of its indentation, m), NaN while unknown; ``force`` [n, m, 3] N as measured, or None.
     """
 
     time: float
@@ -33,6 +35,8 @@ class Observation:
     touched: BoolArray
     object_pose: FloatArray | None
     noise: float
+    pressing_noise: float = math.nan
+    force: FloatArray | None = None
 
 
 class Decision(NamedTuple):

@@ -1,8 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from slipcore import detect_slip
+from slipcore.contact import tangential_ramp
 from slipcore.defaults import ContactOptions
-from slipcore.touch import contact_from_force, contact_from_shape
+from slipcore.touch import CURVATURE_NOISE, contact_from_force, contact_from_shape, curvature, spatial_noise
 
 OPTIONS = ContactOptions()
 AREA = 1e-6
@@ -29,3 +33,38 @@ def test_the_shape_tells_contact_by_a_share_of_its_depth(depth: float) -> None:
 
 def test_a_sensor_at_rest_touches_nothing() -> None:
     assert not contact_from_shape(np.array([[2e-5, 0.0]]), 1e-6, None, OPTIONS).any()
+
+
+def test_the_noise_of_one_frame_is_told_by_what_seems_to_pull() -> None:
+    pressing = 2e-3 * np.random.default_rng(1).standard_normal((40, 40))
+    pressing[10:30, 10:30] += 0.1  # the contact itself pushes
+    assert spatial_noise(pressing) == pytest.approx(2e-3, rel=0.15)  # 3 standard errors of 600 values
+    assert np.isnan(spatial_noise(np.full((5, 5), 0.1)))
+
+
+def test_a_noisy_first_frame_touches_nothing() -> None:
+    log = tangential_ramp(marker_noise=1e-6, force_noise=2e-3)
+    history = detect_slip(log)
+    assert not history.contact[log.time < 0.4].any()  # the object comes at 0.5 s
+    assert len(history.events.release) < 0.2 * len(history.events.touch)
+
+
+def test_beyond_the_rim_the_shape_is_hollow() -> None:
+    x, y = np.meshgrid(np.arange(-9.0, 10.0), np.arange(-9.0, 10.0))
+    r = np.hypot(x, y) / 5.0
+    outside = np.maximum(r, 1.0)
+    sunk = np.where(
+        r <= 1.0, 1.0 - r**2 / 2.0, ((2.0 - outside**2) * np.arcsin(1.0 / outside) + np.sqrt(outside**2 - 1.0)) / np.pi
+    )  # Hertz: the surface beyond the contact follows it down
+    found = contact_from_shape(
+        1e-3 * sunk, np.nan, None, replace(OPTIONS, contact_depth_share=0.3, rim_curvature=0.008)
+    )
+    assert np.count_nonzero(found ^ (r <= 1.0)) <= 0.15 * np.count_nonzero(r <= 1.0)
+    deeper = contact_from_shape(1e-3 * sunk, np.nan, None, replace(OPTIONS, contact_depth_share=0.3))
+    assert np.count_nonzero(deeper) > 1.5 * np.count_nonzero(r <= 1.0)
+
+
+def test_the_noise_of_the_curvature_is_that_of_its_stencil() -> None:
+    impulse = np.zeros((9, 9))
+    impulse[4, 4] = 1.0
+    assert np.sqrt((curvature(impulse) ** 2).sum()) == pytest.approx(CURVATURE_NOISE, rel=2e-3)
