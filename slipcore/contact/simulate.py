@@ -6,20 +6,40 @@ from dataclasses import replace
 import numpy as np
 
 from slipcore.contact import boundary_elements
+from slipcore.contact.accuracy import simulate_to
 from slipcore.contact.boundary_elements import Fidelity
 from slipcore.contact.plan import Plan
 from slipcore.contact.scene import Scene
+from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 
 
-def simulate(scene: Scene, fidelity: Fidelity | None = None, seed: int = 0) -> GraspLog:
-    """Simulate a scene; ``seed`` draws its random fields and its noise.
+def simulate(
+    scene: Scene,
+    accuracy: float | None = None,
+    seconds: float | None = None,
+    seed: int = 0,
+    fidelity: Fidelity | None = None,
+) -> GraspLog:
+    """Simulate a scene to an ``accuracy``, within ``seconds``, or at a ``fidelity``; with none of them, at the default
+    one.
+
+    ``accuracy`` is the largest of: absolute error of the stick ratio, relative L2 error over time of displacement and
+    of force at the sensor's points, all before observation effects. ``seed`` draws random fields and noise. The
+    metadata tell tier, grid, steps, tolerance, estimated accuracy and seconds.
 
     Raises ``InfeasibleLoad`` where friction cannot carry a load, ``NotConverged`` and ``InvalidInput``.
     """
     plan = scene.plan(seed)
-    log = boundary_elements.run(plan, fidelity)
-    return observe(plan, replace(log, metadata={"scene": scene.name, **log.metadata}))
+    if fidelity is not None and (accuracy is not None or seconds is not None):
+        raise InvalidInput("fidelity", fidelity, "no fidelity beside an accuracy or seconds")
+    if accuracy is None and seconds is None:
+        log, estimated = boundary_elements.run(plan, fidelity), "not asked for"
+    else:
+        found = simulate_to(plan, accuracy, seconds)
+        log, estimated = found.log, f"{found.error.largest:.2g}"
+        log = replace(log, metadata={**log.metadata, "seconds": f"{found.seconds:.3f}"})
+    return observe(plan, replace(log, metadata={"scene": scene.name, **log.metadata, "estimated accuracy": estimated}))
 
 
 def observe(plan: Plan, log: GraspLog) -> GraspLog:

@@ -104,7 +104,7 @@ def identical(a: GraspLog, b: GraspLog) -> None:
 
 @pytest.fixture(scope="module")
 def plain() -> GraspLog:
-    return simulate(scene(LOAD, SENSOR), COARSE)
+    return simulate(scene(LOAD, SENSOR), fidelity=COARSE)
 
 
 def test_every_effect_is_held_to_the_three_properties() -> None:
@@ -115,13 +115,13 @@ def test_every_effect_is_held_to_the_three_properties() -> None:
 def test_zero_strength_equals_absence_to_the_last_bit(name: str, plain: GraspLog) -> None:
     effect = ZERO[name]
     assert effect is not None
-    identical(simulate(scene(effect, LOAD, SENSOR), COARSE), plain)
+    identical(simulate(scene(effect, LOAD, SENSOR), fidelity=COARSE), plain)
 
 
 def test_order_does_not_matter_to_the_last_bit() -> None:
     effects = (*STRONG, LOAD, SENSOR)
-    log = simulate(scene(*effects), COARSE)
-    identical(simulate(scene(*effects[::-1]), COARSE), log)
+    log = simulate(scene(*effects), fidelity=COARSE)
+    identical(simulate(scene(*effects[::-1]), fidelity=COARSE), log)
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_pairs_that_exclude_each_other_are_refused_in_any_order(pair: tuple[Effe
 
 @pytest.mark.parametrize("effect", STRONG, ids=lambda effect: type(effect).__name__)
 def test_each_effect_shows(effect: Effect, plain: GraspLog) -> None:
-    log = simulate(scene(effect, LOAD, SENSOR), COARSE)
+    log = simulate(scene(effect, LOAD, SENSOR), fidelity=COARSE)
     same_time = len(log) == len(plain)
     assert not same_time or not (
         np.array_equal(log.displacement, plain.displacement) and np.array_equal(log.force, plain.force)
@@ -150,7 +150,7 @@ def test_each_effect_shows(effect: Effect, plain: GraspLog) -> None:
 
 @pytest.mark.parametrize("effect", [MarkerNoise(1e-6), ForceNoise(1e-3), GelDrift((1e-6, 0.0, 0.0))], ids=str)
 def test_observation_never_touches_the_mechanics(effect: Effect, plain: GraspLog) -> None:
-    log = simulate(scene(effect, LOAD, SENSOR), COARSE)
+    log = simulate(scene(effect, LOAD, SENSOR), fidelity=COARSE)
     np.testing.assert_array_equal(log.object_pose, plain.object_pose)
     np.testing.assert_array_equal(log.truth.slip_kinematic, plain.truth.slip_kinematic)
     np.testing.assert_array_equal(log.truth.stick_ratio, plain.truth.stick_ratio)
@@ -162,7 +162,7 @@ def test_observation_never_touches_the_mechanics(effect: Effect, plain: GraspLog
 def test_loads_reach_the_finger(plain: GraspLog) -> None:
     total = plain.force.sum(axis=(1, 2))
     np.testing.assert_allclose(total[-1], [2.0, 0.5, -10.0], rtol=1e-9, atol=1e-9)
-    twisted = simulate(scene(Torsion(3e-3), SENSOR), COARSE)
+    twisted = simulate(scene(Torsion(3e-3), SENSOR), fidelity=COARSE)
     x, y = twisted.position[..., 0], twisted.position[..., 1]
     # elements hold no moment of their own: the sum over them misses that within each
     moment = (x * twisted.force[-1, ..., 1] - y * twisted.force[-1, ..., 0]).sum()
@@ -172,40 +172,42 @@ def test_loads_reach_the_finger(plain: GraspLog) -> None:
 
 def test_a_load_path_is_met_at_its_corners_and_repeats() -> None:
     path = LoadPath((1.0, 1.5, 2.0), force_x=(0.0, 2.0, 0.0), cycles=2)
-    log = simulate(Scene("loop", (path, SENSOR), duration=3.0), COARSE)
+    log = simulate(Scene("loop", (path, SENSOR), duration=3.0), fidelity=COARSE)
     along_x = log.force[..., 0].sum(axis=(1, 2))
     np.testing.assert_allclose(along_x, np.interp(log.time, [0, 1, 1.5, 2, 2.5, 3], [0, 0, 2, 0, 2, 0]), atol=1e-9)
 
 
 def test_a_moved_object_is_where_it_was_moved() -> None:
-    log = simulate(scene(ObjectMotion((1.0, 2.0), x=(0.0, 2e-4), yaw=(0.0, 0.01)), SENSOR), COARSE)
+    log = simulate(scene(ObjectMotion((1.0, 2.0), x=(0.0, 2e-4), yaw=(0.0, 0.01)), SENSOR), fidelity=COARSE)
     np.testing.assert_allclose(log.object_pose[-1, [0, 2]], [2e-4, 0.01], rtol=1e-12)
     assert log.force[-1, ..., 0].sum() > 0.0
     assert log.force[-1, ..., 1].sum() == pytest.approx(0.0, abs=1e-9)
 
 
 def test_an_object_as_soft_as_the_finger_doubles_the_compliance() -> None:
-    soft = simulate(Scene("soft", (ElasticObject(1e6, 0.49), LOAD, SENSOR)), COARSE)
-    twice = simulate(Scene("twice", (LOAD, SENSOR), finger=Finger(young_modulus=0.5e6)), COARSE)
+    soft = simulate(Scene("soft", (ElasticObject(1e6, 0.49), LOAD, SENSOR)), fidelity=COARSE)
+    twice = simulate(Scene("twice", (LOAD, SENSOR), finger=Finger(young_modulus=0.5e6)), fidelity=COARSE)
     np.testing.assert_allclose(soft.object_pose, twice.object_pose, rtol=1e-6, atol=1e-12)
     np.testing.assert_allclose(2.0 * soft.displacement, twice.displacement, rtol=0.0, atol=1e-8)
     np.testing.assert_array_equal(soft.truth.slip_contact_factor, twice.truth.slip_contact_factor)
 
 
 def test_a_stiff_object_is_a_rigid_one(plain: GraspLog) -> None:
-    stiff = simulate(scene(ElasticObject(1e15), LOAD, SENSOR), COARSE)
+    stiff = simulate(scene(ElasticObject(1e15), LOAD, SENSOR), fidelity=COARSE)
     np.testing.assert_allclose(stiff.displacement, plain.displacement, rtol=0.0, atol=1e-9)
 
 
 def test_a_sphere_on_the_finger_is_a_more_curved_finger() -> None:
-    on_sphere = simulate(Scene("sphere", (SphereSurface(1.0 / 15e-3), LOAD, SENSOR)), COARSE)
-    curved = simulate(Scene("curved", (LOAD, SENSOR), finger=Finger(radius=7.5e-3)), COARSE)
+    on_sphere = simulate(Scene("sphere", (SphereSurface(1.0 / 15e-3), LOAD, SENSOR)), fidelity=COARSE)
+    curved = simulate(Scene("curved", (LOAD, SENSOR), finger=Finger(radius=7.5e-3)), fidelity=COARSE)
     np.testing.assert_allclose(on_sphere.displacement, curved.displacement, rtol=0.0, atol=1e-9)
 
 
 def test_two_crossed_cylinders_are_a_sphere() -> None:
-    crossed = simulate(Scene("crossed", (CylinderSurface(30.0), CylinderSurface(30.0, np.pi / 2), SENSOR)), COARSE)
-    sphere = simulate(Scene("sphere", (SphereSurface(30.0), SENSOR)), COARSE)
+    crossed = simulate(
+        Scene("crossed", (CylinderSurface(30.0), CylinderSurface(30.0, np.pi / 2), SENSOR)), fidelity=COARSE
+    )
+    sphere = simulate(Scene("sphere", (SphereSurface(30.0), SENSOR)), fidelity=COARSE)
     np.testing.assert_allclose(crossed.displacement, sphere.displacement, rtol=0.0, atol=1e-10)
 
 
@@ -213,18 +215,18 @@ def test_a_measured_map_of_a_sphere_is_a_sphere() -> None:
     at = (np.arange(81) - 40) * 0.25e-3
     x, y = np.meshgrid(at, at)
     heights = tuple(tuple(row) for row in ((x**2 + y**2) * 15.0).tolist())
-    measured = simulate(scene(MeasuredSurface(heights, 0.25e-3), SENSOR), COARSE)
-    sphere = simulate(scene(SphereSurface(30.0), SENSOR), COARSE)
+    measured = simulate(scene(MeasuredSurface(heights, 0.25e-3), SENSOR), fidelity=COARSE)
+    sphere = simulate(scene(SphereSurface(30.0), SENSOR), fidelity=COARSE)
     error = np.abs(measured.displacement - sphere.displacement).max()
     assert error < 0.02 * np.abs(sphere.displacement).max()  # of bilinear interpolation
 
 
 def test_a_ring_leaves_its_middle_free_and_a_face_ends_at_its_edges() -> None:
     flat = Finger(radius=INFINITE)
-    ring = simulate(Scene("ring", (RingSurface(4e-3, 2e-3), SENSOR), finger=flat), COARSE)
+    ring = simulate(Scene("ring", (RingSurface(4e-3, 2e-3), SENSOR), finger=flat), fidelity=COARSE)
     assert not ring.truth.contact[-1, 2:4, 2:4].any()
     assert ring.truth.contact[-1].any()
-    face = simulate(Scene("face", (FlatSurface((4e-3, 6e-3)), SENSOR), finger=flat), COARSE)
+    face = simulate(Scene("face", (FlatSurface((4e-3, 6e-3)), SENSOR), finger=flat), fidelity=COARSE)
     x, y = face.position[..., 0], face.position[..., 1]
     np.testing.assert_array_equal(face.truth.contact[-1], (abs(x) <= 2e-3) & (abs(y) <= 3e-3))
 
@@ -232,7 +234,7 @@ def test_a_ring_leaves_its_middle_free_and_a_face_ends_at_its_edges() -> None:
 def test_friction_changes_with_place_pressure_and_velocity_as_asked() -> None:
     slide = ObjectMotion((1.0, 2.0), x=(0.0, 3e-3))
     law = (FrictionPatch(0.1, (0.0, 0.0), 1.0), PressureFriction(-0.3, 2.25e-6), VelocityFriction(20.0))
-    log = simulate(scene(slide, *law, SENSOR), COARSE)
+    log = simulate(scene(slide, *law, SENSOR), fidelity=COARSE)
     assert log.truth.friction.coefficients == (0.4, 20.0, -0.3)
     tangential, normal = np.hypot(*np.moveaxis(log.force[-1, ..., :2], -1, 0)), -log.force[-1, ..., 2]
     # all slides at about 3 mm/s; an element's friction is the mean of its cells', weighted by pressure
@@ -255,16 +257,16 @@ def test_random_friction_has_its_scale_its_length_and_the_same_field_on_any_grid
 
 
 def test_creep_goes_on_under_a_constant_load() -> None:
-    log = simulate(scene(Viscoelasticity((1.0,), (0.3,)), SENSOR), COARSE)
+    log = simulate(scene(Viscoelasticity((1.0,), (0.3,)), SENSOR), fidelity=COARSE)
     depth = -log.displacement[..., 2].min(axis=(1, 2))
     assert depth[-1] > 1.05 * depth[5]
     assert (np.diff(depth[5:]) > 0.0).all()
 
 
 def test_spread_is_the_coupling_without_its_way_back() -> None:
-    plain = simulate(scene(SENSOR), COARSE)
-    spread = simulate(scene(PressingSpread(), SENSOR), COARSE)
-    coupled = simulate(scene(NormalTangentialCoupling(), SENSOR), COARSE)
+    plain = simulate(scene(SENSOR), fidelity=COARSE)
+    spread = simulate(scene(PressingSpread(), SENSOR), fidelity=COARSE)
+    coupled = simulate(scene(NormalTangentialCoupling(), SENSOR), fidelity=COARSE)
     np.testing.assert_array_equal(spread.force[..., 2], plain.force[..., 2])
     assert np.abs(spread.displacement[-1, ..., :2]).max() > 1e-7
     assert np.abs(coupled.force[-1, ..., 2] - plain.force[-1, ..., 2]).max() > 0.0
@@ -273,24 +275,24 @@ def test_spread_is_the_coupling_without_its_way_back() -> None:
 
 
 def test_noise_has_its_scale_and_its_own_generator(plain: GraspLog) -> None:
-    noisy = simulate(scene(MarkerNoise(2e-6), LOAD, SENSOR), COARSE, seed=1)
+    noisy = simulate(scene(MarkerNoise(2e-6), LOAD, SENSOR), fidelity=COARSE, seed=1)
     noise = noisy.displacement - plain.displacement
     assert noise.std() == pytest.approx(2e-6, rel=4.0 / np.sqrt(2 * noise.size))
-    both = simulate(scene(MarkerNoise(2e-6), ForceNoise(1e-3), LOAD, SENSOR), COARSE, seed=1)
+    both = simulate(scene(MarkerNoise(2e-6), ForceNoise(1e-3), LOAD, SENSOR), fidelity=COARSE, seed=1)
     np.testing.assert_array_equal(both.displacement, noisy.displacement)
-    other = simulate(scene(MarkerNoise(2e-6), LOAD, SENSOR), COARSE, seed=2)
+    other = simulate(scene(MarkerNoise(2e-6), LOAD, SENSOR), fidelity=COARSE, seed=2)
     assert not np.array_equal(other.displacement, noisy.displacement)
 
 
 def test_drift_grows_in_time(plain: GraspLog) -> None:
-    log = simulate(scene(GelDrift((1e-6, -2e-6, 0.0)), LOAD, SENSOR), COARSE)
+    log = simulate(scene(GelDrift((1e-6, -2e-6, 0.0)), LOAD, SENSOR), fidelity=COARSE)
     np.testing.assert_allclose(
         (log.displacement - plain.displacement)[-1, 0, 0], [2e-6, -4e-6, 0.0], rtol=1e-9, atol=1e-18
     )
 
 
 def test_a_dropped_frame_hands_its_slip_on(plain: GraspLog) -> None:
-    log = simulate(scene(DroppedFrames(0.6), LOAD, SENSOR), COARSE, seed=5)
+    log = simulate(scene(DroppedFrames(0.6), LOAD, SENSOR), fidelity=COARSE, seed=5)
     assert 2 <= len(log) < len(plain)
     kept = np.flatnonzero(np.isin(plain.time, log.time))
     for k, (before, now) in enumerate(pairwise(kept), start=1):

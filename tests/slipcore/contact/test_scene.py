@@ -99,7 +99,9 @@ def test_the_contact_is_found_wherever_it_ends() -> None:
 
 
 def test_the_log_is_in_the_frame_of_the_contract() -> None:
-    log = simulate(Scene("s", (TangentialLoad((1.5, 0.0)), SensorSampling((8, 6), 1.5e-3, 10.0))), Fidelity(cells=16))
+    log = simulate(
+        Scene("s", (TangentialLoad((1.5, 0.0)), SensorSampling((8, 6), 1.5e-3, 10.0))), fidelity=Fidelity(cells=16)
+    )
     assert log.grid == (8, 6)
     assert log.element_area == pytest.approx(2.25e-6)
     np.testing.assert_allclose(log.time, np.arange(21) / 10.0, rtol=1e-12)
@@ -114,6 +116,6 @@ def test_the_log_is_in_the_frame_of_the_contract() -> None:
 
 
 def test_without_a_sensor_every_cell_and_step_is_in_the_log() -> None:
-    log = simulate(Scene("bare"), Fidelity(cells=10))
+    log = simulate(Scene("bare"), fidelity=Fidelity(cells=10))
     assert log.grid == (10, 10)
     assert len(log) == 61
