@@ -51,6 +51,7 @@ def run(plan: Plan, fidelity: Fidelity | None = None) -> GraspLog:
         "grid": f"{where.grid.shape[1]} x {where.grid.shape[0]} cells of {where.grid.pitch[0]:.6g} m",
         "steps": str(steps),
         "tolerance": f"{fidelity.tolerance:g}",
+        "applications": str(solver.count.normal + solver.count.tangential + solver.count.coupling),
         "seconds": f"{time.perf_counter() - began:.3f}",
     }
     return grasp_log(plan, where, times, frames, metadata)

@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from slipcore.contact.plan import Effect, Plan, ramp
 from slipcore.contact.problem import HeightField, Problem
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray, FrictionLaw
+
+if TYPE_CHECKING:
+    from slipcore.contact.explain import Explanation
 
 LIBRARY = Path(__file__).parent / "scenes"
 
@@ -117,6 +120,12 @@ class Scene:
     def present(self) -> tuple[Effect, ...]:
         """The effects that have any strength."""
         return tuple(effect for effect in self.effects if not effect.absent)
+
+    def explain(self, seed: int = 0) -> "Explanation":
+        """What each effect is there for, what it costs and what leaving it out would change, by coarse runs."""
+        from slipcore.contact.explain import explain
+
+        return explain(self, seed)
 
 
 Record = TypeVar("Record")

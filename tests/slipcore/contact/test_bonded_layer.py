@@ -108,6 +108,24 @@ def test_pressure_on_a_layer_of_a_metre_is_that_on_a_half_space() -> None:
     np.testing.assert_allclose(thick.pressure, free.pressure, rtol=0.0, atol=1e-4 * free.pressure.max())
 
 
+@pytest.mark.parametrize(("thickness", "rtol"), [(0.1, 2e-4), (0.05, 5e-4), (0.02, 1.5e-3), (0.01, 2e-3)])
+def test_a_base_stiffens_an_incompressible_gel_as_indentation_theory_has_it(thickness: float, rtol: float) -> None:
+    """F/F_Hertz = 1 + 1.133χ + 1.497χ² + 1.469χ³ + 0.755χ⁴, χ = √(Rδ)/h (Garcia & Garcia, Biophys. J. 114 (2018) 2923;
+    the first term as in Dimitriadis et al., Biophys. J. 82 (2002) 2798).
+    """
+    depth = 5e-4
+    radius = np.sqrt(RADIUS * depth)
+    grid = Grid.square(64, 2.6 * radius)
+    x, y = grid.points()
+    force = [
+        solve_normal(Operators(finger), grid, (x**2 + y**2) / (2 * RADIUS), approach=depth).force
+        for finger in (bodies(thickness, 0.5), bodies(thickness, 0.5)[:1])
+    ]
+    chi = radius / thickness
+    series = 1 + 1.133 * chi + 1.497 * chi**2 + 1.469 * chi**3 + 0.755 * chi**4
+    assert force[0] / force[1] == pytest.approx(series, rel=rtol)
+
+
 def test_a_thin_layer_is_a_bed_of_springs() -> None:
     """Johnson, Contact Mechanics, §5.8: p = M (a² − r²) / 2Rh with the confined modulus M."""
     poisson, thickness, radius = 0.2, 1e-4, 3e-3
