@@ -10,7 +10,7 @@ class InfeasibleLoad(InvalidInput):
     def __init__(self, load: FloatArray, factor: float) -> None:
         self.load, self.factor = load, factor
         times = 1.0 / factor if factor > 0.0 else float("inf")
-        value = f"F = ({load[0]:.6g}, {load[1]:.6g}) N, M = {load[2]:.6g} N·m, {times:.9g} times what friction carries"
+        value = f"F = ({load[0]:.6g}, {load[1]:.6g}) N, M = {load[2]:.6g} N·m, {times:.12g} times what friction carries"
         InvalidInput.__init__(self, "tangential load", value, "inside the limit surface (a factor of at most 1)")
 
     def __reduce__(self) -> tuple[type, tuple[FloatArray, float]]:

@@ -12,6 +12,10 @@ from numba import njit
 from slipcore.contact.fields import rigid_displacement
 from slipcore.frames import BoolArray, FloatArray
 
+DESCENTS = 500
+STILL = 1e-12
+"""Share of the fastest motion below which a cell counts as its centre, or its weight would overflow."""
+
 
 class LimitLoad(NamedTuple):
     """``factor`` by which a load may grow until all slides, and the ``motion`` [3] (direction) of that sliding."""
@@ -26,13 +30,20 @@ def limit_load(radius: FloatArray, arm: FloatArray, load: FloatArray, given: Boo
     Where a component's motion is held instead of its load, it takes part in no sliding. The factor is infinite
     without load. Minimises σ(d) subject to load·d = 1 by iteratively reweighted least squares, which only descends.
     """
-    if not (np.abs(load) * given).any():
+    load = np.where(given, load, 0.0)
+    if not load.any():
         return LimitLoad(np.inf, np.zeros(3))
-    free = np.flatnonzero(given)
-    factor, motion = _descend(radius, arm, np.ascontiguousarray(load[free]), free)
-    whole = np.zeros(3)
-    whole[free] = motion
-    return LimitLoad(float(factor), whole)
+    factor, motion = np.inf, load / (load @ load)
+    for _ in range(DESCENTS):
+        taken, matrix = _friction(radius, arm, motion)
+        if taken >= factor * (1.0 - 1e-15):
+            break
+        factor, matrix = taken, matrix * np.outer(given, given)
+        answer = np.linalg.pinv(matrix, rcond=1e-14, hermitian=True) @ load
+        if np.abs(matrix @ answer - load).max() > 1e-6 * np.abs(load).max():
+            return LimitLoad(0.0, motion)  # some motion meets no friction, such as rotation about a single cell
+        motion = answer / (load @ answer)
+    return LimitLoad(factor, motion)
 
 
 def sliding_traction(radius: FloatArray, arm: FloatArray, motion: FloatArray) -> FloatArray:
@@ -45,27 +56,19 @@ def sliding_traction(radius: FloatArray, arm: FloatArray, motion: FloatArray) ->
 
 
 @njit(cache=True)
-def _descend(radius, arm, load, free):  # type: ignore[no-untyped-def]
-    size = free.size
-    motion = load / (load @ load)
-    factor = np.inf
-    row = np.zeros((2, 3))
-    for _ in range(500):
-        taken, matrix = 0.0, np.zeros((size, size))
-        full = np.zeros(3)
-        full[free] = motion
-        for i in range(radius.size):
-            x, y = arm[0, i], arm[1, i]
-            speed = np.hypot(full[0] - y * full[2], full[1] + x * full[2])
-            taken += radius[i] * speed
-            row[0, 0], row[0, 2], row[1, 1], row[1, 2] = 1.0, -y, 1.0, x
-            weight = radius[i] / max(speed, 1e-300)
-            for a in range(size):
-                for b in range(size):
-                    matrix[a, b] += weight * (row[0, free[a]] * row[0, free[b]] + row[1, free[a]] * row[1, free[b]])
-        if taken >= factor * (1.0 - 1e-15):
-            break
-        factor = taken
-        answer = np.linalg.solve(matrix, load)
-        motion = answer / (load @ answer)
-    return factor, motion
+def _friction(radius, arm, motion):  # type: ignore[no-untyped-def]
+    """What friction takes up in a sliding motion, σ, and the matrix A for which motion·A·motion = σ."""
+    taken, matrix = 0.0, np.zeros((3, 3))
+    still = STILL * np.abs(motion).max()
+    for i in range(radius.size):
+        x, y = arm[0, i], arm[1, i]
+        speed = np.hypot(motion[0] - y * motion[2], motion[1] + x * motion[2])
+        taken += radius[i] * speed
+        weight = radius[i] / max(speed, still)
+        matrix[0, 0] += weight
+        matrix[0, 2] -= weight * y
+        matrix[1, 2] += weight * x
+        matrix[2, 2] += weight * (x * x + y * y)
+    matrix[1, 1] = matrix[0, 0]
+    matrix[2, 0], matrix[2, 1] = matrix[0, 2], matrix[1, 2]
+    return taken, matrix

@@ -7,6 +7,7 @@ import numpy as np
 
 from slipcore.contact.grid import Grid
 from slipcore.contact.kernels import ElasticBody
+from slipcore.contact.tangential import Control
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray
 
@@ -64,7 +65,10 @@ class Problem:
         """Friction coefficient [ny, nx] before pressure and velocity change it, never below zero."""
         x, y = grid.points()
         fields = (part(x, y) for part in self.friction_fields)
-        return np.maximum(sum(fields, start=np.full(grid.shape, self.friction)), 0.0)
+        friction = sum(fields, start=np.full(grid.shape, self.friction))
+        if not np.isfinite(friction).all():
+            raise InvalidInput("friction coefficient", "not finite in places", "finite everywhere")
+        return np.maximum(friction, 0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,3 +85,12 @@ class StepLoad:
     motion: FloatArray = field(default_factory=lambda: np.zeros(3))
     given: tuple[bool, bool, bool] = (True, True, True)
     duration: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.duration < np.inf:
+            raise InvalidInput("duration of a step", self.duration, "finite and above 0 s")
+        self.control()  # refuses what is not finite
+
+    def control(self) -> Control:
+        """What drives the object tangentially."""
+        return Control(self.tangential, self.motion, np.array(self.given))

@@ -15,6 +15,7 @@ from slipcore.contact.grid import Grid
 from slipcore.contact.kernels import Scaled
 from slipcore.contact.operator import Count, Operators
 from slipcore.contact.problem import Problem, StepLoad
+from slipcore.contact.resolution import unresolved
 from slipcore.contact.step_equations import StepEquations, StepSolution
 from slipcore.frames import BoolArray, FloatArray
 
@@ -80,6 +81,10 @@ class StepResult:
         """Stick area over contact area by contact factor (paper, eq. 37 corrected); NaN without contact."""
         touching = int(self.contact.sum())
         return float((self.contact & ~self.at_limit).sum()) / touching if touching else float("nan")
+
+    def warnings(self) -> tuple[str, ...]:
+        """What the grid is too coarse or too small for, in this step."""
+        return unresolved(self.contact, self.at_limit, sheared=bool(self.force[:2].any()))
 
 
 class QuasiStatic:
@@ -162,9 +167,8 @@ class QuasiStatic:
     ) -> State:
         """The state at the end of the step."""
         traction, pose = np.zeros_like(state.traction), state.pose.copy()
-        if solution.tangential is not None:
-            traction[:, *solution.box] = solution.tangential.traction
-            pose += solution.tangential.motion
+        traction[:, *solution.box] = solution.tangential.traction
+        pose += solution.tangential.motion
         pressure = solution.normal.pressure
         elastic = self._displacement(self.finger, pressure, traction, self._normal_known(solution))
         if equations.operators.bodies == self.finger.bodies:
@@ -203,11 +207,10 @@ class QuasiStatic:
         normal, tangential, box = solution.normal, solution.tangential, solution.box
         contact = normal.pressure > 0.0
         slip, at_limit, moved = np.zeros_like(after.traction), np.zeros_like(contact), np.zeros_like(contact)
-        if tangential is not None:
-            touching = contact[box]
-            slip[:, *box] = np.where(touching, tangential.slip, 0.0)
-            at_limit[box] = touching & (np.hypot(*tangential.traction) >= (1.0 - AT_LIMIT) * solution.limit)
-            moved[box] = np.hypot(*slip[:, *box]) > self._noticeable(equations, solution, after.pose - state.pose)
+        touching = contact[box]
+        slip[:, *box] = np.where(touching, tangential.slip, 0.0)
+        at_limit[box] = touching & (np.hypot(*tangential.traction) >= (1.0 - AT_LIMIT) * solution.limit)
+        moved[box] = np.hypot(*slip[:, *box]) > self._noticeable(equations, solution, after.pose - state.pose)
         creep = sum(after.creep, start=np.zeros_like(after.elastic))
         return StepResult(
             displacement=after.elastic + creep,
@@ -218,10 +221,10 @@ class QuasiStatic:
             moved=moved,
             pose=after.pose,
             approach=normal.approach,
-            sliding=tangential is not None and tangential.sliding,
-            residual=0.0 if tangential is None else tangential.residual,
+            sliding=tangential.sliding and bool(contact.any()),
+            residual=tangential.residual,
             normal_residual=normal.residual,
-            imbalance=0.0 if tangential is None else tangential.imbalance,
+            imbalance=tangential.imbalance,
             iterations=solution.iterations,
             applications=Count(),
             seconds=0.0,

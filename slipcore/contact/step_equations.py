@@ -10,7 +10,8 @@ from slipcore.contact.grid import Box, Grid, bounding_box
 from slipcore.contact.normal import NormalContact, solve_normal
 from slipcore.contact.operator import Operators
 from slipcore.contact.problem import Problem, StepLoad
-from slipcore.contact.tangential import Control, TangentialContact, solve_tangential
+from slipcore.contact.tangential import TangentialContact, solve_tangential
+from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray
 
 BOX_MULTIPLE = 4
@@ -20,12 +21,12 @@ OUTER_ITERATIONS = 60
 
 
 class StepSolution(NamedTuple):
-    """``normal`` contact on the whole grid; ``tangential`` contact (None without contact) and ``limit`` μp Pa on its
-    ``box``; ``iterations``: Newton steps in all.
+    """``normal`` contact on the whole grid; ``tangential`` contact and ``limit`` μp Pa on its ``box`` (without contact
+    the whole grid); ``iterations``: Newton steps in all.
     """
 
     normal: NormalContact
-    tangential: TangentialContact | None
+    tangential: TangentialContact
     limit: FloatArray
     box: Box
     iterations: int
@@ -57,7 +58,7 @@ class StepEquations:
             return solution
         iterations = solution.iterations
         for _ in range(OUTER_ITERATIONS):
-            if solution.tangential is None:
+            if not solution.normal.pressure.any():
                 return solution
             before, traction = solution.normal.pressure, self._whole(solution)
             lifted = self.height + self.operators.on(self.grid).normal_by_traction(traction)
@@ -70,8 +71,7 @@ class StepEquations:
 
     def _whole(self, solution: StepSolution) -> FloatArray:
         whole = np.zeros((2, *self.grid.shape))
-        if solution.tangential is not None:
-            whole[:, *solution.box] = solution.tangential.traction
+        whole[:, *solution.box] = solution.tangential.traction
         return whole
 
     def _once(self, pressure: FloatArray, traction: FloatArray, height: FloatArray) -> StepSolution:
@@ -85,9 +85,8 @@ class StepEquations:
             self.normal_tolerance,
             pressure,
         )
-        if not normal.pressure.any():
-            return StepSolution(normal, None, np.zeros(self.grid.shape), np.s_[:, :], 0)
-        box = bounding_box(normal.pressure > 0.0, BOX_MULTIPLE)
+        touching = normal.pressure > 0.0
+        box = bounding_box(touching if touching.any() else ~touching, BOX_MULTIPLE)
         offset = self.offset
         if self.problem.coupled or self.problem.spread:
             offset = offset + self.operators.on(self.grid).tangential_by_pressure(normal.pressure)
@@ -98,17 +97,17 @@ class StepEquations:
         pressure, coefficient = normal.pressure[box], self.friction[box]
         for law in self.problem.pressure_laws:
             coefficient = coefficient + law(pressure)
-        limit = np.maximum(coefficient, 0.0) * pressure
+        limit = _coulomb_limit(coefficient, pressure)
         if not self.problem.velocity_laws:
             tangential = self._tangential(box, limit, offset, start)
             return StepSolution(normal, tangential, limit, box, tangential.iterations)
         iterations, velocity = 0, np.zeros_like(pressure)
         for k in range(OUTER_ITERATIONS):
             added = [law(velocity) for law in self.problem.velocity_laws]
-            before, limit = limit, np.maximum(sum(added, start=coefficient), 0.0) * pressure
+            before, limit = limit, _coulomb_limit(sum(added, start=coefficient), pressure)
             tangential = self._tangential(box, limit, offset, start)
             iterations += tangential.iterations
-            change = float(np.abs(limit - before).max() / limit.max())
+            change = float(np.abs(limit - before).max()) / max(float(limit.max()), 1e-300)
             if change <= self.tolerance and k > 0:
                 return StepSolution(normal, tangential, limit, box, iterations)
             start, velocity = tangential.traction, np.hypot(*tangential.slip) / self.load.duration
@@ -116,6 +115,12 @@ class StepEquations:
 
     def _tangential(self, box: Box, limit: FloatArray, offset: FloatArray, start: FloatArray) -> TangentialContact:
         part = self.grid.part(box)
-        control = Control(self.load.tangential, self.load.motion, np.array(self.load.given))
         operator = self.operators.on(part)
-        return solve_tangential(operator, part.points(), limit, offset, control, start, self.tolerance)
+        return solve_tangential(operator, part.points(), limit, offset, self.load.control(), start, self.tolerance)
+
+
+def _coulomb_limit(coefficient: FloatArray, pressure: FloatArray) -> FloatArray:
+    """μp where the coefficient is positive."""
+    if not np.isfinite(coefficient).all():
+        raise InvalidInput("friction coefficient", "not finite at some pressure or velocity", "finite in all contacts")
+    return np.maximum(coefficient, 0.0) * pressure

@@ -22,6 +22,7 @@ from slipcore.contact.limit_surface import limit_load, sliding_traction
 from slipcore.contact.operator import ElasticOperator
 from slipcore.contact.projection import project
 from slipcore.contact.tangent_space import TangentSpace
+from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray
 
 CG_REDUCTION = 0.05
@@ -35,6 +36,8 @@ COARSEST = 24
 COARSE_TOLERANCE = 1e-3
 LIMIT_MARGIN = 1e-12
 """Loads this close to the limit surface (relative) are on it: all slides."""
+BALANCE = 1e-10
+"""Of the summed limits: a load that tractions miss by more is not carried, however small the residual."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,12 +51,18 @@ class Control:
     motion: FloatArray = field(default_factory=lambda: np.zeros(3))
     given: BoolArray = field(default_factory=lambda: np.ones(3, dtype=bool))
 
+    def __post_init__(self) -> None:
+        for name in ("load", "motion", "given"):
+            value = getattr(self, name)
+            if value.shape != (3,) or not np.isfinite(value).all():
+                raise InvalidInput(f"tangential {name}", value, "three finite numbers")
+
 
 class TangentialContact(NamedTuple):
     """``traction`` on the finger and its ``displacement`` Cq [2, ny, nx]; ``slip`` of the finger against the object in
     this step; ``motion`` [3] of the object in this step (m, m, rad); ``residual`` of the natural map as a share of the
     largest limit; ``imbalance`` as a share of the summed limits; ``iterations``: Newton steps; ``sliding``: all cells
-    slide.
+    slide. On the limit surface no motion is too large; the one given is the least with which all slide.
     """
 
     traction: FloatArray
@@ -81,7 +90,8 @@ def solve_tangential(
     ``points``: x and y of the cells [ny, nx] m; ``limit``: μp [ny, nx] Pa, zero outside contact; ``offset``: c above,
     [2, ny, nx] m; ``start``: a guess of the tractions; ``tolerance`` on the residual, relative to the largest limit.
 
-    Raises ``InfeasibleLoad`` outside the limit surface and ``NotConverged`` at ``max_iterations``.
+    Raises ``InfeasibleLoad`` outside the limit surface and ``NotConverged`` at ``max_iterations`` or where the
+    tractions miss the load.
     """
     if not limit.any():
         return _frictionless(offset, control)
@@ -131,7 +141,7 @@ class _Problem:
                 continue
             if residual <= tolerance:
                 result = self._result(traction, displacement, residual, iteration)
-                return self._at_the_limit() if result.sliding and self.given.all() else result
+                return self._at_the_limit(result) if result.sliding and self.given.all() else result
             slip = gradient - rigid_displacement(self.arm, self.dual / self.stiffness)
             trial = nearest if residual > 0.9 * before and iteration % 2 else self._newton(traction, slip)
             traction, displacement = self._search(traction, displacement, slip, trial)
@@ -198,6 +208,9 @@ class _Problem:
         scaled = np.where(self.given, self.dual / self.stiffness, self.control.motion * self.units)
         slip = displacement + self.offset - rigid_displacement(self.arm, np.where(self.given, scaled, 0.0))
         lacking = (self.target - resultants(traction, self.arm)) * self.given
+        imbalance = float(np.abs(lacking).max()) / self.capacity
+        if imbalance > BALANCE:
+            raise NotConverged("balance of the tangential load", imbalance, BALANCE, iterations)
         wish = np.hypot(*(traction - self.stiffness * slip))
         return TangentialContact(
             traction,
@@ -205,17 +218,22 @@ class _Problem:
             slip,
             scaled / self.units,
             residual,
-            float(np.abs(lacking).max()) / self.capacity,
+            imbalance,
             iterations,
             bool((wish > self.limit)[self.limit > 0.0].all()),
         )
 
-    def _at_the_limit(self) -> TangentialContact:
-        """All slides: the load is on the limit surface, or it is refused."""
+    def _at_the_limit(self, balanced: TangentialContact | None = None) -> TangentialContact:
+        """All slides: the load is on the limit surface, or it is refused; ``balanced`` holds where it is inside.
+
+        Cells that slide apart, as lateral slip makes them, add up to less than the limit.
+        """
         radius, arm = self.limit.ravel(), self.arm.reshape(2, -1)
         factor, direction = limit_load(radius, arm, self.target, self.given)
         if factor < 1.0 - LIMIT_MARGIN:
             raise InfeasibleLoad(self.control.load, factor)
+        if balanced is not None and factor > 1.0 + LIMIT_MARGIN:
+            return balanced
         traction = sliding_traction(radius, arm, direction).reshape(self.offset.shape)
         displacement = self.operator.tangential(traction)
         along = rigid_displacement(self.arm, direction)
