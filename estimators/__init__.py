@@ -4,8 +4,11 @@ from estimators.errors import EstimatorError, InvalidSamples, NotConverged, TooF
 from estimators.fitting import fit
 from estimators.friction_model import Cost, Domain, FrictionModel
 from estimators.moments import Moments
+from estimators.online import ChangeDetector
+from estimators.recognition import recognise
 
 __all__ = [
+    "ChangeDetector",
     "Cost",
     "Domain",
     "EstimatorError",
@@ -15,4 +18,5 @@ __all__ = [
     "NotConverged",
     "TooFewSamples",
     "fit",
+    "recognise",
 ]

@@ -22,18 +22,19 @@ from estimators.sampling import Chain, sample
 
 
 class Likelihood(NamedTuple):
-    """How a posterior is made from evidence, and the accuracy it is sampled to unless told otherwise."""
+    """How a posterior is made from evidence, the accuracy it is sampled to by default, and its part of small steps."""
 
     posterior: Callable[[Evidence], Posterior]
     accuracy: float
+    local: float = 0.0
 
 
 LIKELIHOODS = {
     "gaussian": Likelihood(gaussian, SAMPLING.accuracy),
     "grasp_effects": Likelihood(grasp_effects, SAMPLING.accuracy),
-    "student_t": Likelihood(student_t, SAMPLING.accuracy_per_sample),
-    "outlier": Likelihood(outlier, SAMPLING.accuracy_per_sample),
-    "errors_in_variables": Likelihood(errors_in_variables, SAMPLING.accuracy_per_sample),
+    "student_t": Likelihood(student_t, SAMPLING.accuracy_per_sample, SAMPLING.local),
+    "outlier": Likelihood(outlier, SAMPLING.accuracy_per_sample, SAMPLING.local),
+    "errors_in_variables": Likelihood(errors_in_variables, SAMPLING.accuracy_per_sample, SAMPLING.local),
 }
 
 
@@ -62,7 +63,7 @@ def fit(
     goal = LIKELIHOODS[name].accuracy if accuracy is None else accuracy
     posterior = LIKELIHOODS[name].posterior(evidence)
     left = None if seconds is None else max(seconds - (time.perf_counter() - begin), 0.0)
-    chain = sample(posterior.log_probability, len(posterior.sampled), goal, left, seed)
+    chain = sample(posterior.log_probability, len(posterior.sampled), goal, left, seed, LIKELIHOODS[name].local)
     summary = posterior.summarise(chain.flat())
     diagnostics: Diagnostics = {"likelihood": name, "prior": posterior.prior, "draws": ", ".join(posterior.names)}
     diagnostics |= _convergence(chain, posterior) | sensitivity(evidence, exact_posterior(evidence))

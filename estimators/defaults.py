@@ -72,12 +72,42 @@ class Sampling:
     """Acceptance of the independence proposal below which differential evolution takes over (house trials)."""
     proposal_degrees_of_freedom: float = 10.0
     """Of the multivariate Student-t proposal: tails heavier than the posterior's, at an acceptance of 0.88."""
+    local: float = 0.25
+    """0 to 1; part of small steps where the whitening is only Laplace's: they free walkers stuck in a tail."""
     max_split_rhat: float = 1.01
     """Vehtari et al. (2021), Bayesian Analysis 16:667."""
     kept_draws: int = 4000
     """Draws that a model keeps."""
 
 
+@dataclass(frozen=True, slots=True)
+class Recognition:
+    """The population of materials from which one that is not known comes."""
+
+    unknown: float = 0.05
+    """0 to 1; prior probability that a grasp is of none of the known materials."""
+    level: float = 0.25
+    """-, > 0; standard deviation of β₀ between materials."""
+    slope: float = 0.1
+    """-, > 0; standard deviation of each slope between materials, as a change of μ over its reference span."""
+    scatter_freedom: float = 2.0
+    """> 0; degrees of freedom of σ² between materials, about the square of the reference scatter."""
+
+
+@dataclass(frozen=True, slots=True)
+class Automatic:
+    """When the data call for more than least squares."""
+
+    downweighted: float = 0.03
+    """0.011 to 1; part of the samples that Tukey's loss gives less than half weight (normal errors: 0.011)."""
+    bias: float = 0.5
+    """> 0; bias of β₂ by noise in the forces, in its standard errors, from which it is taken out."""
+    significance: float = 3.0
+    """> 0; standard errors by which the noise in the forces must show in the residuals."""
+
+
+AUTOMATIC = Automatic()
+RECOGNITION = Recognition()
 REFERENCE = Reference()
 IDENTIFIABILITY = Identifiability()
 PRIOR = Prior()

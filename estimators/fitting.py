@@ -1,18 +1,19 @@
 """The one entrance: samples in, friction model out."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from estimators import conjugate, ols, robust
 from estimators.errors import InvalidSamples
-from estimators.evidence import gather
+from estimators.evidence import Evidence, gather
 from estimators.friction_model import FrictionModel
 
 if TYPE_CHECKING:
     from estimators.moments import Moments
     from slipcore.samples import FrictionSamples
 
-METHODS = ("ols", "robust", "conjugate", "bayes")
+METHODS = ("ols", "robust", "conjugate", "bayes", "auto")
 
 
 def fit(
@@ -31,9 +32,10 @@ def fit(
     ``method``: "ols" (weighted least squares, cluster-robust), "robust" (M-estimate with the ``loss`` "tukey" or
     "huber", cluster-robust), "conjugate" (exact posterior for independent Gaussian errors) or "bayes" (emcee), whose
     ``likelihood`` is "grasp_effects" (the default wherever samples come in clusters), "gaussian", "student_t",
-    "outlier" (a part of false slip) or "errors_in_variables" (noise in the forces). A sampled method stops once the
-    Monte-Carlo error of its means and 5/95 % quantiles is under ``accuracy`` posterior standard deviations, or after
-    ``seconds``; ``seed`` makes it repeatable.
+    "outlier" (a part of false slip) or "errors_in_variables" (noise in the forces). "auto" takes the one that the data
+    call for; ``diagnostics["chosen_because"]`` says why. A sampled method stops once the Monte-Carlo error of its means
+    and 5/95 % quantiles is under ``accuracy`` posterior standard deviations, or after ``seconds``; ``seed`` makes it
+    repeatable.
 
     Raises ``TooFewSamples`` where no slip or hardly any was seen, ``InvalidSamples`` naming what cannot be used, and
     ``NotConverged``, which carries its model, where a chain cannot be trusted.
@@ -44,6 +46,24 @@ def fit(
         if value is not None and not value > 0.0:
             raise InvalidSamples(name, value, "above 0")
     evidence = gather(samples)
+    if method != "auto":
+        return _fit(evidence, method, accuracy, seconds, seed, likelihood, loss)
+    from estimators.automatic import choose
+
+    choice = choose(evidence)
+    model = _fit(evidence, choice.method, accuracy, seconds, seed, choice.likelihood, loss)
+    return replace(model, diagnostics={**model.diagnostics, "chosen_because": choice.reason})
+
+
+def _fit(
+    evidence: Evidence,
+    method: str,
+    accuracy: float | None,
+    seconds: float | None,
+    seed: int,
+    likelihood: str | None,
+    loss: str,
+) -> FrictionModel:
     if method == "ols":
         return ols.fit(evidence)
     if method == "robust":

@@ -33,7 +33,8 @@ def laplace(log_density: LogDensity, start: FloatArray) -> tuple[FloatArray, Flo
         spread = vectors / np.sqrt(np.maximum(values, 1.0 / 9.0))
         step = spread @ (spread.T @ gradient)
         size = float(np.linalg.norm(spread.T @ gradient))
-        trial = mode + LENGTHS[:, None] * (root @ step)
+        lengths = np.concatenate([LENGTHS, LENGTHS * 4.0 / max(size, 4.0)])  # far away, no more than 4 spreads at once
+        trial = mode + lengths[:, None] * (root @ step)
         heights = log_density(np.vstack([trial, mode]))
         best = int(np.nanargmax(heights))
         mode = trial[best] if best < len(trial) else mode
@@ -74,12 +75,17 @@ def refine(
         log = log_density(at) + 0.5 * (degrees + size) * np.log1p(np.sum(standard**2, axis=1) / degrees)
         if not np.isfinite(log.max()) or _evenness(log) > EVEN:
             break
-        flat = next((power for power in POWERS if _evenness(power * log) > 0.2), POWERS[-1])
-        weight = np.exp(flat * (log - log.max()))
+        weight = flattened(log)
         centre = weight @ at / weight.sum()
         spread = np.cov(at.T, aweights=weight).reshape(size, size)
         root = np.asarray(np.linalg.cholesky(spread + 1e-12 * np.diag(np.diag(spread))), dtype=np.float64)
     return centre, root
+
+
+def flattened(log_weight: FloatArray) -> FloatArray:
+    """Weights [k] raised to the largest power at which a fifth of them counts."""
+    power = next((power for power in POWERS if _evenness(power * log_weight) > 0.2), POWERS[-1])
+    return np.asarray(np.exp(power * (log_weight - log_weight.max())))
 
 
 def _evenness(log: FloatArray) -> float:

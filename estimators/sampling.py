@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from estimators.defaults import SAMPLING
 from estimators.errors import InvalidSamples
+from estimators.laplace import flattened
 
 FloatArray = NDArray[np.float64]
 LogProbability = Callable[[FloatArray], FloatArray]
@@ -47,15 +48,17 @@ def sample(
     accuracy: float | None = None,
     seconds: float | None = None,
     seed: int = 0,
+    local: float = 0.0,
 ) -> Chain:
     """Sample a density that is close to N(0, I) until its Monte-Carlo error is under ``accuracy`` (or time is up).
 
-    An independence proposal from a multivariate Student-t makes every walker a chain of its own; where the target is
-    too far from N(0, I) for it, differential evolution takes over. ``log_probability`` takes [k, d].
+    An independence proposal from a multivariate Student-t makes every walker a chain of its own; ``local`` is the part
+    of the steps that are small instead, which frees walkers from where the proposal seldom comes. Where the target is
+    too far from N(0, I), differential evolution takes over. ``log_probability`` takes [k, d].
     """
     deadline = np.inf if seconds is None else time.perf_counter() + seconds
     goal = SAMPLING.accuracy if accuracy is None else accuracy
-    chain = _run(log_probability, dimension, _independence(dimension), "independence", goal, deadline, seed)
+    chain = _run(log_probability, dimension, _independence(dimension, local), "independence", goal, deadline, seed)
     if chain.acceptance >= SAMPLING.min_acceptance:
         return chain
     from emcee.moves import DEMove
@@ -145,12 +148,12 @@ def _walkers(goal: float) -> int:
 
 
 def _start(log_probability: LogProbability, random: np.random.RandomState, walkers: int, dimension: int) -> FloatArray:
-    """Walkers [w, d] near the posterior already: proposals resampled by their importance."""
+    """Walkers [w, d] near the posterior already: proposals resampled by their importance, never all of them one."""
     candidates = _student(random, 8 * walkers, dimension)
     log_weight = log_probability(candidates) - _log_student(candidates)
     if not np.isfinite(log_weight.max()):
         raise InvalidSamples("mean friction", "0 or less with near certainty", "above 0 over the range of the data")
-    weight = np.exp(log_weight - log_weight.max())
+    weight = flattened(log_weight)
     return np.asarray(candidates[random.choice(len(weight), walkers, p=weight / weight.sum())])
 
 
@@ -192,14 +195,17 @@ def _trouble(steps: int, time_steps: float, rhat: float) -> str:
     return ""
 
 
-def _independence(dimension: int) -> object:
-    from emcee.moves import MHMove
+def _independence(dimension: int, local: float) -> object:
+    from emcee.moves import GaussianMove, MHMove
 
     def propose(coordinates: FloatArray, random: np.random.RandomState) -> tuple[FloatArray, FloatArray]:
         proposed = _student(random, len(coordinates), dimension)
         return proposed, _log_student(coordinates) - _log_student(proposed)
 
-    return MHMove(propose)
+    if local == 0.0:
+        return MHMove(propose)
+    small = GaussianMove((2.4**2 / dimension) * np.ones(dimension))  # Gelman, Roberts & Gilks (1996)
+    return [(MHMove(propose), 1.0 - local), (small, local)]
 
 
 def _student(random: np.random.RandomState, count: int, dimension: int) -> FloatArray:

@@ -88,15 +88,16 @@ def false_slip(samples: Make, n: int) -> FrictionSamples:
 
 
 def noisy_forces(samples: Make, n: int) -> FrictionSamples:
-    rng, data = np.random.default_rng(3), samples(n)
-    f_n, f_t = (f + 4e-3 * rng.standard_normal(n) for f in (data.normal_force, data.tangential_force))
+    rng = np.random.default_rng(3)
+    data = samples(n, normal_force=rng.uniform(0.05, 0.15, n))
+    f_n, f_t = (f + 5e-3 * rng.standard_normal(n) for f in (data.normal_force, data.tangential_force))
     return replace(data, normal_force=f_n, tangential_force=f_t, friction_coefficient=f_t / f_n)
 
 
 CASES = {
     "student_t": (heavy, {3: 0.02, 4: 3.0}),
     "outlier": (false_slip, {3: 0.02}),
-    "errors_in_variables": (noisy_forces, {3: 0.02, 4: 4e-3}),
+    "errors_in_variables": (noisy_forces, {3: 0.02, 4: 5e-3}),
 }
 
 
@@ -106,14 +107,14 @@ def test_each_recovers_its_own_truth_where_least_squares_does_not(
 ) -> None:
     spoil, parameters = CASES[likelihood]
     data = spoil(samples, 3000)
-    model = estimators.fit(data, method="bayes", likelihood=likelihood)
+    model = estimators.fit(data, method="bayes", likelihood=likelihood, accuracy=0.1)
     assert np.abs((model.coefficients - truth) / model.standard_errors).max() < 3.5
     for column, value in parameters.items():
         draws = model.draws[:, column]
         assert abs(draws.mean() - value) < 4.0 * draws.std()
     plain = estimators.Moments.from_samples(data).fit()
     worst = np.abs((plain.coefficients - truth) / plain.standard_errors).max()
-    assert likelihood == "student_t" or worst > 4.0
+    assert likelihood == "student_t" or worst > 2.5
     assert likelihood != "student_t" or model.standard_errors[0] < 0.9 * plain.standard_errors[0]
 
 

@@ -1,0 +1,81 @@
+"""Which method the data call for, and why."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators import ols, robust
+from estimators.defaults import AUTOMATIC, REFERENCE
+from estimators.evidence import Evidence
+from estimators.least_squares import solve
+from estimators.observations import Observations
+
+FloatArray = NDArray[np.float64]
+
+
+class Choice(NamedTuple):
+    """A method of ``fit``, the likelihood where it is "bayes", and the reason in words and numbers."""
+
+    method: str
+    likelihood: str | None
+    reason: str
+
+
+def choose(evidence: Evidence) -> Choice:
+    """The method for these data: noise in f_n first, then outliers, then how samples cluster.
+
+    Noisy forces and outliers bias the coefficients, which no standard error makes good; clusters only widen them. Noise
+    in the forces looks like outliers where f_n is small, hence its precedence.
+    """
+    observations = evidence.observations
+    if observations is not None:
+        noise, bias = force_noise(evidence, observations)
+        if bias > AUTOMATIC.bias:
+            reason = f"noise of about {noise:.2g} N in the forces shifts beta2 by {bias:.1f} of its standard errors"
+            return Choice("bayes", "errors_in_variables", reason)
+        part = float(robust.fit(evidence).diagnostics["downweighted"])
+        if part > AUTOMATIC.downweighted:
+            return Choice("robust", None, f"{part:.1%} of the samples lie far off the plane; normal errors leave 1.1%")
+    if evidence.cluster_kind == "grasp":
+        return Choice("bayes", "grasp_effects", f"{evidence.clusters} grasps, which may differ from each other")
+    if evidence.clusters < 2:
+        return Choice("conjugate", None, "moments of one grasp, which know of no clusters")
+    reason = f"one grasp, errors shared within {evidence.clusters} clusters ({evidence.cluster_kind})"
+    return Choice("ols", None, reason)
+
+
+def force_noise(evidence: Evidence, observations: Observations) -> tuple[float, float]:
+    """Noise s of a force component (N) as the residuals show it, and the bias of β₂ that it makes, in standard errors.
+
+    The variance of μ's residuals is σ² + s²(1 + μ²)/f_n²: weighted least squares of the squares on 1/f_n². The bias is
+    that of a regressor with error, −β₂ s²/V, and of the ratio, whose error is −μ/f_n times that of f_n: −(μ/f_n) s²/V,
+    with V the variance of f_n (Fuller, 1987, §1.1).
+    """
+    f_n, weight = observations.normal_force, observations.weight
+    if f_n.min() <= 0.0 or np.ptp(f_n) == 0.0:
+        return 0.0, 0.0
+    linear = solve(evidence.factor, REFERENCE.spans(evidence.element_area))
+    beta = linear.coefficients.astype(float)
+    expected = beta[0] + beta[1] * observations.tangential_velocity + beta[2] * f_n
+    square = (observations.friction - expected) ** 2
+    regressor = (1.0 + expected**2) / f_n**2
+    typical = np.average(square, weights=weight) * np.maximum(regressor / np.average(regressor, weights=weight), 0.1)
+    slope, error = _line(regressor, square, weight / typical**2)
+    variance = float(np.average((f_n - np.average(f_n, weights=weight)) ** 2, weights=weight))
+    if slope < AUTOMATIC.significance * error:
+        return 0.0, 0.0
+    pull = abs(beta[2] + np.average(expected, weights=weight) / np.average(f_n, weights=weight))
+    standard_error = float(np.sqrt(ols.fit(evidence).covariance[2, 2]))
+    return float(np.sqrt(slope)), float(pull * slope / variance / standard_error)
+
+
+def _line(x: FloatArray, y: FloatArray, weight: FloatArray) -> tuple[float, float]:
+    """Slope of y on x and its heteroscedasticity-robust standard error."""
+    centre = x - np.average(x, weights=weight)
+    square = float(weight @ centre**2)
+    if square <= 0.0:
+        return 0.0, np.inf
+    slope = float((weight * centre) @ y) / square
+    left = y - np.average(y, weights=weight) - slope * centre
+    return slope, float(np.sqrt((weight * centre) ** 2 @ left**2)) / square

@@ -1,0 +1,75 @@
+"""Friction as it is learnt, and whether the surface has changed: moments that fade, and a sequential test."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import special
+
+from estimators.errors import InvalidSamples
+from estimators.friction_model import FrictionModel
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeDetector:
+    """Whether samples still follow a model, by a two-sided test that may look after every sample.
+
+    Standardised deviations z from the model's prediction are, while nothing changes, as likely above as below and at
+    most as spread as a standard normal. For λ > 0, exp(λ Σz − n λ²/2) then is a non-negative martingale of mean 1, and
+    so is its mean over λ ~ N(0, ``spread``²): by Ville's inequality the probability that it *ever* exceeds 1/``alarm``
+    is at most ``alarm`` (Robbins, 1970; Howard et al., 2021). Samples of one element follow each other closely: give
+    one sample an element and correlation time, or the rate of false alarms is not what is stated.
+
+    ``total`` Σz and ``count`` n since the last ``restart``; ``reset_after``: samples after which the sum starts afresh,
+    so that a late change is not buried under a long quiet past; the false-alarm rate then holds for each such stretch.
+    """
+
+    model: FrictionModel
+    alarm: float = 1e-3
+    spread: float = 0.5
+    reset_after: int = 1000
+    total: float = 0.0
+    count: int = 0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.alarm < 1.0:
+            raise InvalidSamples("alarm", self.alarm, "above 0 and below 1")
+        if not self.spread > 0.0:
+            raise InvalidSamples("spread", self.spread, "above 0")
+        if self.reset_after < 1:
+            raise InvalidSamples("reset_after", self.reset_after, "at least 1")
+
+    @property
+    def evidence(self) -> float:
+        """How many times likelier the deviations are under some constant shift than under none."""
+        precision = 1.0 / self.spread**2 + self.count
+        return float(np.exp(min(0.5 * self.total**2 / precision - 0.5 * np.log(precision * self.spread**2), 700.0)))
+
+    @property
+    def changed(self) -> bool:
+        """Whether the evidence has passed 1/``alarm``."""
+        return self.evidence >= 1.0 / self.alarm
+
+    def step(self, tangential_velocity: float, normal_force: float, friction_coefficient: float) -> "ChangeDetector":
+        """The detector after one more sample; once it has seen a change it stays so until ``restart``."""
+        if self.changed:
+            return self
+        z = self._deviation(tangential_velocity, normal_force, friction_coefficient)
+        if self.count >= self.reset_after:
+            return replace(self, total=z, count=1)
+        return replace(self, total=self.total + z, count=self.count + 1)
+
+    def restart(self, model: FrictionModel) -> "ChangeDetector":
+        """A fresh detector for another model, with the same settings."""
+        return replace(self, model=model, total=0.0, count=0)
+
+    def _deviation(self, v: float, f_n: float, mu: float) -> float:
+        """Normal score of a sample in the model's predictive distribution, which allows for uncertain coefficients."""
+        model = self.model
+        x = np.array([1.0, v, f_n])
+        spread = float(np.sqrt(model.scale**2 + x @ model.covariance @ x))
+        freedom = model.n - 3.0 if model.scatter_degrees_of_freedom is None else model.scatter_degrees_of_freedom
+        deviation = (mu - float(x @ model.coefficients)) / max(spread, np.finfo(float).tiny)
+        if not np.isfinite(deviation):
+            raise InvalidSamples("sample", (v, f_n, mu), "finite numbers")
+        score = special.ndtri(special.stdtr(freedom, -abs(deviation)))
+        return float(np.copysign(min(-score, 8.0), deviation))

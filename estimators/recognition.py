@@ -1,0 +1,103 @@
+"""Which material is this: by the exact predictive likelihood of a grasp's samples under each model."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from estimators.defaults import RECOGNITION, REFERENCE
+from estimators.errors import InvalidSamples
+from estimators.evidence import Evidence, gather
+from estimators.friction_model import FrictionModel
+from estimators.least_squares import upper_triangle, whole_triangle
+
+if TYPE_CHECKING:
+    from estimators.moments import Moments
+    from slipcore.samples import FrictionSamples
+
+FloatArray = NDArray[np.float64]
+
+UNKNOWN = "unknown"
+
+
+def recognise(
+    samples: "FrictionSamples | Moments | Sequence[FrictionSamples] | Sequence[Moments]",
+    materials: Mapping[str, FrictionModel],
+    prior: Mapping[str, float] | None = None,
+    unknown: float = RECOGNITION.unknown,
+) -> dict[str, float]:
+    """Probability of each material, and of "unknown", for the samples of one grasp (or several of one thing).
+
+    The likelihood is exact for Gaussian errors: β of a material is normal with its model's covariance (and, where the
+    model knows of grasps, the scatter between them), σ² inverse-gamma with its degrees of freedom, both integrated
+    out. "unknown" is the same for a surface of which only a population of materials is known. ``prior``: weights of
+    the materials, alike where None; ``unknown``: prior probability that it is none of them.
+
+    Raises ``InvalidSamples`` for no materials, one called "unknown", and a prior that does not fit them.
+    """
+    if not materials or UNKNOWN in materials:
+        raise InvalidSamples("materials", sorted(materials), f'at least one, none of them called "{UNKNOWN}"')
+    if not 0.0 <= unknown < 1.0:
+        raise InvalidSamples("unknown", unknown, "at least 0 and below 1")
+    evidence, belief = gather(samples), _belief(materials, prior)
+    log = {name: belief[name] + np.log1p(-unknown) + _of_material(evidence, materials[name]) for name in materials}
+    log[UNKNOWN] = (np.log(unknown) if unknown > 0.0 else -np.inf) + _of_unknown(evidence)
+    probability = special.softmax(np.array(list(log.values())))
+    return dict(zip(log, map(float, probability), strict=True))
+
+
+def log_predictive(
+    triangle: FloatArray, effective_n: float, mean: FloatArray, covariance: FloatArray, scale: float, freedom: float
+) -> float:
+    """Log density of the data behind a triangle [4, 4] in (1, v, f_n | μ), up to what only the data decide.
+
+    Multivariate Student-t on ``freedom`` degrees of freedom about X ``mean`` with scale matrix ``scale``² I + X
+    ``covariance`` Xᵀ (Gelman et al., BDA3, §14.2), through a factor of 7 × 4: nothing of the size n is formed.
+    """
+    values, vectors = np.linalg.eigh(covariance / scale**2)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    rows = np.column_stack([triangle[:, :3] @ root, triangle[:, 3] - triangle[:, :3] @ mean])
+    updated = upper_triangle(np.concatenate([np.eye(3, 4), rows]))
+    square = float(updated[3, 3]) ** 2 / (freedom * scale**2)
+    total = freedom + effective_n
+    return float(
+        special.gammaln(0.5 * total)
+        - special.gammaln(0.5 * freedom)
+        - 0.5 * effective_n * np.log(freedom * scale**2)
+        - np.log(np.diag(updated)[:3]).sum()
+        - 0.5 * total * np.log1p(square)
+    )
+
+
+def _belief(materials: Mapping[str, FrictionModel], prior: Mapping[str, float] | None) -> dict[str, float]:
+    weight = dict.fromkeys(materials, 1.0) if prior is None else dict(prior)
+    if set(weight) != set(materials) or not all(value > 0.0 for value in weight.values()):
+        raise InvalidSamples("prior", prior, f"a weight above 0 for each of {sorted(materials)}")
+    total = sum(weight.values())
+    return {name: float(np.log(value / total)) for name, value in weight.items()}
+
+
+def _of_material(evidence: Evidence, model: FrictionModel) -> float:
+    triangle = whole_triangle(evidence.factor).astype(float)
+    triangle[:, 2] *= model.element_area / evidence.element_area  # the same pressure on an element of the model's area
+    covariance, scale = model.covariance.copy(), model.scale
+    if model.draws is not None and model.diagnostics.get("likelihood") == "grasp_effects":
+        scale = float(np.sqrt(np.mean(model.draws[:, 3] ** 2)))
+        covariance[0, 0] += float(np.mean(model.draws[:, 4] ** 2))
+    freedom = model.n - 3.0 if model.scatter_degrees_of_freedom is None else model.scatter_degrees_of_freedom
+    floor = 1e-6 * max(abs(float(evidence.mean_friction)), 1e-6)  # a model without scatter still meets rounded data
+    return log_predictive(triangle, evidence.effective_n, model.coefficients, covariance, max(scale, floor), freedom)
+
+
+def _of_unknown(evidence: Evidence) -> float:
+    spans = np.concatenate([[1.0], REFERENCE.spans(evidence.element_area)])
+    return log_predictive(
+        whole_triangle(evidence.factor).astype(float),
+        evidence.effective_n,
+        np.array([REFERENCE.friction, 0.0, 0.0]),
+        np.diag((np.array([RECOGNITION.level, RECOGNITION.slope, RECOGNITION.slope]) / spans) ** 2),
+        REFERENCE.scatter,
+        RECOGNITION.scatter_freedom,
+    )
