@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import typer
 
-from service.cli import database, local, remote, running
+from service.cli import database, local, remote, running, simulation
 from service.cli.exit_codes import exit_code
 
 app = typer.Typer(
@@ -20,6 +20,7 @@ app = typer.Typer(
 for command in (
     running.demo,
     running.serve,
+    simulation.simulate,
     local.detect,
     local.fit,
     remote.upload,

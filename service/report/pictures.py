@@ -1,5 +1,6 @@
 """Pictures of what was detected and fitted; each function returns a matplotlib figure."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -7,12 +8,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from estimators import FrictionModel
 from slipcore import FrictionLaw, FrictionSamples, GraspLog, SlipHistory
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from numpy.typing import NDArray
 
 STICK, SLIP, NO_CONTACT, TRUTH = "#2b6cb0", "#dd6b20", "#e8e8e8", "#2f855a"
@@ -32,13 +35,34 @@ def slip_over_time(log: GraspLog, history: SlipHistory, title: str) -> Figure:
     figure = Figure(figsize=(11, 4.8), layout="constrained")
     figure.suptitle(title)
     grid = figure.add_gridspec(2, SNAPSHOTS, height_ratios=(1.0, 1.25))
-    frames = _snapshots(history)
+    frames = _snapshots(history.contact)
     for column, frame in enumerate(frames):
-        _draw_map(figure.add_subplot(grid[0, column]), log, history, frame)
+        _draw_map(figure.add_subplot(grid[0, column]), log, history.contact, history.slip, frame)
     axes = figure.add_subplot(grid[1, :])
     _draw_stick_ratio(axes, log, history)
     for frame in frames:
         axes.axvline(history.time[frame] - history.time[0], color="0.75", linewidth=0.6, zorder=0)
+    return figure
+
+
+def truth_over_time(log: GraspLog, title: str) -> Figure:
+    """A simulated grasp: true stick-slip maps at eight moments of contact, true stick ratio and forces over time."""
+    if log.truth is None or log.force is None:
+        raise ValueError("log is without truth or forces; allowed: a simulated one")
+    figure = Figure(figsize=(11, 4.8), layout="constrained")
+    figure.suptitle(title)
+    grid = figure.add_gridspec(2, SNAPSHOTS, height_ratios=(1.0, 1.25))
+    frames = _snapshots(log.truth.contact)
+    for column, frame in enumerate(frames):
+        _draw_map(figure.add_subplot(grid[0, column]), log, log.truth.contact, log.truth.slip_contact_factor, frame)
+    axes, since = figure.add_subplot(grid[1, :]), log.time - log.time[0]
+    lines = axes.plot(since, log.truth.stick_ratio, color=TRUTH, label="stick ratio")
+    axes.set(xlabel="time [s]", ylabel="stick ratio [-]", ylim=(-0.03, 1.05), xlim=(0.0, since[-1]))
+    lines += _draw_forces(axes.twinx(), since, log.force)
+    for frame in frames:
+        axes.axvline(since[frame], color="0.75", linewidth=0.6, zorder=0)
+    _tidy(axes)
+    _legend(axes, lines, [str(line.get_label()) for line in lines])
     return figure
 
 
@@ -93,21 +117,31 @@ def _tidy(axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def _snapshots(history: SlipHistory) -> "NDArray[np.intp]":
-    touched = np.flatnonzero(history.contact.any(axis=(1, 2)))
-    first, last = (touched[0], touched[-1]) if len(touched) else (0, len(history.time) - 1)
+def _snapshots(contact: "NDArray[np.bool_]") -> "NDArray[np.intp]":
+    touched = np.flatnonzero(contact.any(axis=(1, 2)))
+    first, last = (touched[0], touched[-1]) if len(touched) else (0, len(contact) - 1)
     return np.unique(np.linspace(first, last, SNAPSHOTS).round().astype(np.intp))
 
 
-def _draw_map(axes: Axes, log: GraspLog, history: SlipHistory, frame: int) -> None:
-    code = np.where(history.contact[frame], 1 + history.slip[frame], 0).ravel()
+def _draw_map(axes: Axes, log: GraspLog, contact: "NDArray[np.bool_]", slip: "NDArray[np.bool_]", frame: int) -> None:
+    code = np.where(contact[frame], 1 + slip[frame], 0).ravel()
     colors = ListedColormap([NO_CONTACT, STICK, SLIP])
     x, y = (log.position[..., k].ravel() * 1e3 for k in (0, 1))
     size = 12.0 * (20.0 / max(log.grid)) ** 2
     axes.scatter(x, y, c=code, s=size, marker="s", cmap=colors, norm=BoundaryNorm([0, 1, 2, 3], 3), linewidths=0)
     axes.set_aspect("equal")
     axes.set_axis_off()
-    axes.set_title(f"{history.time[frame] - history.time[0]:.2f} s", fontsize=8)
+    axes.set_title(f"{log.time[frame] - log.time[0]:.2f} s", fontsize=8)
+
+
+def _draw_forces(axes: Axes, since: "NDArray[np.float64]", force: "NDArray[np.float64]") -> list[Line2D]:
+    total = force.sum(axis=(1, 2))
+    tangential = np.hypot(total[:, 0], total[:, 1])
+    lines = axes.plot(since, -total[:, 2], color="0.35", label="normal force")
+    lines += axes.plot(since, tangential, color="0.35", linestyle=":", label="tangential force")
+    axes.set_ylabel("force [N]")
+    axes.spines["top"].set_visible(False)
+    return lines
 
 
 def _draw_stick_ratio(axes: Axes, log: GraspLog, history: SlipHistory) -> None:
@@ -116,16 +150,20 @@ def _draw_stick_ratio(axes: Axes, log: GraspLog, history: SlipHistory) -> None:
     if log.truth is not None:
         axes.plot(since, log.truth.stick_ratio, color=TRUTH, linestyle="--", label="truth")
     axes.set(xlabel="time [s]", ylabel="stick ratio [-]", ylim=(-0.03, 1.05), xlim=(0.0, since[-1]))
-    line, labels = axes.get_legend_handles_labels()
-    patches = [Patch(color=c, label=n) for c, n in ((STICK, "stick"), (SLIP, "slip"), (NO_CONTACT, "no contact"))]
     _tidy(axes)
+    _legend(axes, *axes.get_legend_handles_labels())
+
+
+def _legend(axes: Axes, lines: "Sequence[Artist]", labels: Sequence[str]) -> None:
+    """Legend of lines and of the maps' colours, below the axes."""
+    patches = [Patch(color=c, label=n) for c, n in ((STICK, "stick"), (SLIP, "slip"), (NO_CONTACT, "no contact"))]
     axes.legend(
-        [*line, *patches],
+        [*lines, *patches],
         [*labels, "stick", "slip", "no contact"],
         loc="upper center",
         bbox_to_anchor=(0.5, -0.18),
         frameon=False,
-        ncols=5,
+        ncols=6,
         fontsize=8,
     )
 

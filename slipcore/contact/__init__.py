@@ -4,7 +4,7 @@ from slipcore.contact import reference
 from slipcore.contact.boundary_elements import Fidelity
 from slipcore.contact.errors import InfeasibleLoad, NotConverged
 from slipcore.contact.ramp import RampSchedule, tangential_ramp
-from slipcore.contact.scene import Finger, Press, Scene
+from slipcore.contact.scene import Finger, Press, Scene, library
 from slipcore.contact.simulate import simulate
 
 __all__ = [
@@ -15,6 +15,7 @@ __all__ = [
     "Press",
     "RampSchedule",
     "Scene",
+    "library",
     "reference",
     "simulate",
     "tangential_ramp",

@@ -72,6 +72,40 @@ def test_detect_tells_a_program_what_was_seen(run: Run, ramps: list[Path], tmp_p
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+def test_simulate_takes_a_scene_by_name_or_by_file_and_writes_a_log_that_detect_reads(run: Run, tmp_path: Path) -> None:
+    log, picture = tmp_path / "grasp.npz", tmp_path / "truth.png"
+    code, out, _ = run("simulate", "lifting_15N", "--accuracy", 0.1, "--output", log, "--picture", picture, "--json")
+    made = json.loads(out)
+    assert code == 0
+    assert float(made["estimated accuracy"]) <= 0.1
+    assert made["largest normal force_N"] == pytest.approx(15.0)
+    assert len(made["time"]) == len(made["stick_ratio"]) == made["frames"]
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert json.loads(run("detect", log, "--json")[1])["frames"] == made["frames"]
+
+    path = tmp_path / "press.toml"
+    path.write_text('name = "my press"\n[[effect]]\nkind = "SensorSampling"\nframe_rate = 3.0\n', encoding="utf-8")
+    code, out, _ = run("simulate", path)
+    assert code == 0
+    assert "my press" in out
+
+
+def test_simulate_explains_a_scene(run: Run) -> None:
+    code, out, _ = run("simulate", "lifting_15N", "--explain")
+    assert code == 0
+    assert "TangentialLoad" in out
+    assert "applications" in out
+    explained = json.loads(run("simulate", "lifting_15N", "--explain", "--json")[1])
+    assert {effect["name"] for effect in explained["effects"]} == {"TangentialLoad", "SensorSampling"}
+    assert "FiniteLayer" in {proposal["effect"] for proposal in explained["proposals"]}
+
+
+def test_an_unknown_scene_is_refused_with_those_that_exist(run: Run) -> None:
+    code, _, err = run("simulate", "crystal_ball")
+    assert code == INPUT_REFUSED
+    assert "lifting_15N" in err
+
+
 def test_fit_finds_the_friction_that_the_ramps_were_made_with(run: Run, ramps: list[Path]) -> None:
     code, out, _ = run("fit", *ramps, "--json")
     model = json.loads(out)

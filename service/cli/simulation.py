@@ -1,0 +1,86 @@
+"""The command that simulates a grasp."""
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from service.cli.output import print_json, print_table
+from service.cli.progress import patience
+
+if TYPE_CHECKING:
+    from slipcore import GraspLog
+    from slipcore.contact import Scene
+
+
+def simulate(
+    scene: Annotated[str, typer.Argument(help="A scene file (TOML), or the name of a scene of the library.")],
+    explain: Annotated[
+        bool, typer.Option("--explain", help="Say what each effect costs and changes, in place of simulating.")
+    ] = False,
+    accuracy: Annotated[
+        float | None, typer.Option(help="Largest error of stick ratio (absolute), displacement and force (relative).")
+    ] = None,
+    seconds: Annotated[float | None, typer.Option(help="Time to spend, s.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of random fields and of noise.")] = 0,
+    output: Annotated[Path | None, typer.Option(help="Write the grasp log with its truth to this NPZ.")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Write a picture of the true slip to this PNG.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")] = False,
+) -> None:
+    """Simulate a grasp whose slip, forces and friction are known."""
+    from slipcore.contact import Scene
+
+    wanted = Scene.from_toml(scene)
+    if explain:
+        _explain(wanted, seed, json)
+        return
+    from slipcore.contact import simulate as simulate_scene
+
+    with patience(f"simulating {wanted.name}"):
+        log = simulate_scene(wanted, accuracy=accuracy, seconds=seconds, seed=seed)
+    if output is not None:
+        from stiction_client import container
+
+        container.write(log, output)
+    if picture is not None:
+        from service.report.pictures import save, truth_over_time
+
+        save(truth_over_time(log, wanted.name), picture)
+    _print(log, wanted.name, json)
+
+
+def _explain(scene: "Scene", seed: int, json: bool) -> None:
+    with patience(f"explaining {scene.name}"):
+        explanation = scene.explain(seed)
+    if json:
+        print_json(asdict(explanation))
+    else:
+        typer.echo(str(explanation))
+
+
+def _print(log: "GraspLog", name: str, json: bool) -> None:
+    summary = _summary(log)
+    if json:
+        assert log.truth is not None  # a simulated log has truth
+        print_json(summary | {"time": log.time, "stick_ratio": log.truth.stick_ratio})
+    else:
+        print_table(name, ("", ""), list(summary.items()))
+
+
+def _summary(log: "GraspLog") -> dict[str, Any]:
+    import numpy as np
+
+    assert log.truth is not None
+    assert log.force is not None  # a simulated log has both
+    ratio, normal = log.truth.stick_ratio, -log.force[..., 2].sum(axis=(1, 2))
+    touched = ~np.isnan(ratio)
+    return {
+        **log.metadata,
+        "frames": len(log),
+        "points": f"{log.grid[0]} x {log.grid[1]}",
+        "duration_s": round(float(log.time[-1] - log.time[0]), 6),
+        "largest normal force_N": round(float(normal.max()), 6),
+        "smallest stick ratio": round(float(ratio[touched].min()), 6) if touched.any() else None,
+        "friction": list(log.truth.friction.coefficients),
+    }
