@@ -1,5 +1,6 @@
 """Three properties of every effect: zero strength is absence, order does not matter, a known answer is met."""
 
+import tracemalloc
 from dataclasses import fields
 from itertools import pairwise
 
@@ -34,7 +35,9 @@ from slipcore.contact.effects import (
     Viscoelasticity,
     WavySurface,
 )
+from slipcore.contact.grid import Grid
 from slipcore.contact.plan import Effect
+from slipcore.contact.quasi_static import QuasiStatic
 from slipcore.contact.scene import Finger, Press, Scene
 from slipcore.contact.simulate import simulate
 from slipcore.errors import InvalidInput
@@ -115,7 +118,43 @@ def test_every_effect_is_held_to_the_three_properties() -> None:
 def test_zero_strength_equals_absence_to_the_last_bit(name: str, plain: GraspLog) -> None:
     effect = ZERO[name]
     assert effect is not None
-    identical(simulate(scene(effect, LOAD, SENSOR), fidelity=COARSE), plain)
+    log = simulate(scene(effect, LOAD, SENSOR), fidelity=COARSE)
+    identical(log, plain)
+    assert log.metadata["applications"] == plain.metadata["applications"]
+
+
+def allocated(*effects: Effect) -> int:
+    """Bytes at most that solving two steps takes."""
+    plan = scene(*effects, LOAD, SENSOR).plan()
+    grid = Grid.square(12, 11e-3)
+    tracemalloc.start()
+    solver = QuasiStatic(plan.problem, grid, 1e-3)
+    kept = list(solver.run([plan.load(0.0, 1.0), plan.load(1.0, 1.5)]))
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(kept) == 2
+    return peak
+
+
+@pytest.mark.parametrize("name", ZERO)
+def test_an_absent_effect_adds_nothing_to_the_plan_and_allocates_nothing(name: str) -> None:
+    effect = ZERO[name]
+    assert effect is not None
+    plan, without = scene(effect, LOAD, SENSOR).plan(), scene(LOAD, SENSOR).plan()
+    assert len(plan.histories) == len(without.histories)
+    assert plan.observations == without.observations
+    for entry in fields(plan.problem):
+        part, other = getattr(plan.problem, entry.name), getattr(without.problem, entry.name)
+        assert len(part) == len(other) if isinstance(part, tuple) else part == other
+    allocated()  # what is made once for all
+    assert allocated(effect) <= allocated() + 1024  # a field on the grid takes more
+
+
+def test_the_counts_tell_an_effect_that_costs_from_one_that_does_not(plain: GraspLog) -> None:
+    allocated()
+    assert allocated(Viscoelasticity((0.3,), (0.5,))) > allocated() + 1024
+    coupled = simulate(scene(NormalTangentialCoupling(), LOAD, SENSOR), fidelity=COARSE)
+    assert int(coupled.metadata["applications"]) > int(plain.metadata["applications"])
 
 
 def test_order_does_not_matter_to_the_last_bit() -> None:
@@ -209,6 +248,21 @@ def test_two_crossed_cylinders_are_a_sphere() -> None:
     )
     sphere = simulate(Scene("sphere", (SphereSurface(30.0), SENSOR)), fidelity=COARSE)
     np.testing.assert_allclose(crossed.displacement, sphere.displacement, rtol=0.0, atol=1e-10)
+
+
+def test_waves_much_longer_than_the_contact_are_a_cylinder() -> None:
+    wavelength, curvature = 0.5, 30.0
+    amplitude = curvature * (wavelength / (2 * np.pi)) ** 2
+    wavy = simulate(scene(WavySurface(amplitude, wavelength, np.pi / 2), SENSOR), fidelity=COARSE)
+    cylinder = simulate(scene(CylinderSurface(curvature), SENSOR), fidelity=COARSE)
+    np.testing.assert_allclose(wavy.displacement, cylinder.displacement, rtol=0.0, atol=1e-7)
+
+
+def test_a_layer_of_a_kilometre_is_a_half_space_and_a_thin_one_is_stiffer(plain: GraspLog) -> None:
+    thick = simulate(scene(FiniteLayer(1e3), LOAD, SENSOR), fidelity=COARSE)
+    np.testing.assert_allclose(thick.displacement, plain.displacement, rtol=0.0, atol=1e-8)
+    thin = simulate(scene(FiniteLayer(3e-3), LOAD, SENSOR), fidelity=COARSE)
+    assert thin.object_pose[-1, 0] < 0.75 * plain.object_pose[-1, 0]
 
 
 def test_a_measured_map_of_a_sphere_is_a_sphere() -> None:
