@@ -1,0 +1,265 @@
+"""What accuracy costs in time: `python -m benchmarks.contact_accuracy [--output FOLDER] [--cells 16 32 64 128]`.
+
+Error against processor time over grids and tolerances, for each contact problem with a closed form and for whole
+scenes against a fine run; then what `simulate(scene, accuracy=...)` was asked and what it kept. Writes JSON and
+pictures, prints Markdown tables.
+"""
+
+import argparse
+import json
+import statistics
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from slipcore.contact import reference
+from slipcore.contact.accuracy import difference, simulate_to
+from slipcore.contact.boundary_elements import Fidelity, run
+from slipcore.contact.grid import Grid
+from slipcore.contact.kernels import HalfSpace
+from slipcore.contact.normal import solve_normal
+from slipcore.contact.operator import Operators
+from slipcore.contact.problem import Problem, StepLoad
+from slipcore.contact.quasi_static import QuasiStatic, StepResult
+from slipcore.contact.reference.mindlin_deresiewicz import MindlinDeresiewicz
+from slipcore.contact.reference.torsion import TorsionPartialSlip, sliding_moment
+from slipcore.contact.scene import Scene
+from slipcore.frames import FloatArray
+
+FRICTION, RADIUS, FORCE, YOUNG = 0.4, 15e-3, 10.0, 1e6
+HERTZ = reference.HertzContact(RADIUS, FORCE, reference.half_space(YOUNG, 0.0))
+SLIDING = FRICTION * FORCE
+WIDTH = 2.1
+"""Of the grid, in contact radii."""
+TOLERANCES = (1e-2, 1e-4, 1e-7)
+REPEATS = 3
+SCENES = (
+    "table1_condition1",
+    "table1_condition2",
+    "table1_condition3",
+    "table1_condition4",
+    "table1_condition1_layer",
+)
+ASKED = (0.1, 0.05, 0.02)
+FINE = Fidelity(cells=110, substeps=2, tolerance=1e-6)
+
+Errors = Callable[[int, float], float]
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One run: cells across the grid (of a scene: across the contact), tolerance, error, median processor seconds."""
+
+    case: str
+    cells: int
+    tolerance: float
+    error: float
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """What was asked of ``simulate``, what it estimated, what was true, and what it took."""
+
+    scene: str
+    asked: float
+    estimated: float
+    true: float
+    seconds: float
+
+
+def relative(values: FloatArray, exact: FloatArray) -> float:
+    """Relative L2 difference."""
+    return float(np.sqrt(((values - exact) ** 2).sum() / (exact**2).sum()))
+
+
+def hertz_grid(cells: int) -> Grid:
+    """Grid around the contact."""
+    return Grid.square(cells, WIDTH * HERTZ.contact_radius)
+
+
+def sphere(poisson: float, *, coupled: bool = False) -> Problem:
+    """The paper's fingertip on a flat object."""
+    heights = (lambda x, y: (x**2 + y**2) / (2.0 * RADIUS),)
+    return Problem((HalfSpace.from_young(YOUNG, poisson),), FRICTION, heights=heights, coupled=coupled)
+
+
+def shear(along_x: float, moment: float = 0.0) -> StepLoad:
+    """Full normal force and a tangential load."""
+    return StepLoad(FORCE, tangential=np.array([along_x, 0.0, moment]))
+
+
+def stepped(problem: Problem, cells: int, tolerance: float, loads: list[StepLoad]) -> list[StepResult]:
+    """Results of loads on a grid of that many cells a side."""
+    grid = hertz_grid(cells)
+    return list(QuasiStatic(problem, grid, tolerance, 1e-2 * tolerance).run(loads))
+
+
+# Cases with a closed form: error of one run
+
+
+def hertz(cells: int, tolerance: float) -> float:
+    """Pressure of a sphere."""
+    grid = hertz_grid(cells)
+    x, y = grid.points()
+    height = (x**2 + y**2) / (2.0 * RADIUS)
+    operators = Operators((HalfSpace.from_young(YOUNG, 0.0),))
+    solved = solve_normal(operators, grid, height, force=FORCE, tolerance=tolerance)
+    return relative(solved.pressure, HERTZ.pressure(np.hypot(x, y)))
+
+
+def cattaneo_mindlin(cells: int, tolerance: float) -> float:
+    """Traction at F_T = 0.7 μF_N, ν = 0."""
+    last = stepped(sphere(0.0), cells, tolerance, [shear(0.0), shear(0.7 * SLIDING)])[-1]
+    grid = hertz_grid(cells)
+    exact = reference.CattaneoMindlin(HERTZ, FRICTION, 0.7 * SLIDING).traction(np.hypot(*grid.points()))
+    return relative(last.force[0] / grid.cell_area, exact)
+
+
+def reversal(cells: int, tolerance: float) -> float:
+    """Traction on a loop between ±0.9 μF_N, ν = 0; the largest error, of the traction at the peak."""
+    forces = SLIDING * np.array([0.0, 0.5, 0.9, 0.4, 0.0, -0.5, -0.9, -0.3, 0.5, 0.9])
+    grid = hertz_grid(cells)
+    r = np.hypot(*grid.points())
+    exact, errors = MindlinDeresiewicz(HERTZ, FRICTION), []
+    peak = np.sqrt((exact.load(FORCE, 0.9 * SLIDING).traction(r) ** 2).sum())
+    for force, result in zip(forces, stepped(sphere(0.0), cells, tolerance, [shear(f) for f in forces]), strict=True):
+        exact = exact.load(FORCE, float(force))
+        errors.append(np.sqrt(((result.force[0] / grid.cell_area - exact.traction(r)) ** 2).sum()) / peak)
+    return float(max(errors))
+
+
+def torsion(cells: int, tolerance: float) -> float:
+    """Traction at 0.6 of the sliding moment."""
+    moment = 0.6 * sliding_moment(HERTZ, FRICTION)
+    last = stepped(sphere(0.0), cells, tolerance, [shear(0.0), shear(0.0, moment)])[-1]
+    grid = hertz_grid(cells)
+    x, y = grid.points()
+    r = np.hypot(x, y)
+    around = (x * last.force[1] - y * last.force[0]) / (np.where(r > 0.0, r, 1.0) * grid.cell_area)
+    return relative(around, TorsionPartialSlip(HERTZ, FRICTION, moment).traction(r))
+
+
+CLOSED: dict[str, Errors] = {
+    "Hertz": hertz,
+    "Cattaneo–Mindlin": cattaneo_mindlin,
+    "unloading and reversal": reversal,
+    "torsion": torsion,
+}
+
+
+def coupled_reference(cells: int) -> Errors:
+    """Forces of a coupled contact at ν = 0.2 against a run on a grid of ``cells``, both summed over 16² elements."""
+
+    def forces(count: int, tolerance: float) -> FloatArray:
+        loads = [shear(0.0), *(shear(share * SLIDING) for share in (0.25, 0.5, 0.75))]
+        last = stepped(sphere(0.2, coupled=True), count, tolerance, loads)[-1].force
+        return last.reshape(3, 16, count // 16, 16, count // 16).sum(axis=(2, 4))
+
+    fine = forces(cells, 1e-7)
+    return lambda count, tolerance: relative(forces(count, tolerance), fine)
+
+
+def timed(errors: Errors, cells: int, tolerance: float) -> tuple[float, float]:
+    """Error and median processor seconds, set-up of operators included."""
+    seconds = []
+    for _ in range(REPEATS):
+        began = time.process_time()
+        error = errors(cells, tolerance)
+        seconds.append(time.process_time() - began)
+    return error, statistics.median(seconds)
+
+
+def closed_forms(grids: list[int]) -> Iterator[Point]:
+    """All cases with a closed form, and the coupled one, over grids and tolerances."""
+    cases = CLOSED | {"coupled, against 192²": coupled_reference(192)}
+    for name, errors in cases.items():
+        errors(grids[0], TOLERANCES[0])  # compilation
+        for cells in grids:
+            for tolerance in TOLERANCES:
+                yield Point(name, cells, tolerance, *timed(errors, cells, tolerance))
+        print(f"{name}: done", flush=True)
+
+
+def scenes() -> Iterator[Point | Kept]:
+    """Whole scenes against a fine run, then on request."""
+    for name in SCENES:
+        plan = Scene.from_toml(name).plan()
+        fine = run(plan, FINE)
+        for cells in (12, 20, 40, 60):
+            began = time.process_time()
+            log = run(plan, Fidelity(cells))
+            yield Point(name, cells, 1e-4, difference(log, fine).largest, time.process_time() - began)
+        for asked in ASKED:
+            began = time.process_time()
+            found = simulate_to(plan, accuracy=asked)
+            seconds = time.process_time() - began
+            yield Kept(name, asked, found.error.largest, difference(found.log, fine).largest, seconds)
+        print(f"{name}: done", flush=True)
+
+
+def curves(points: list[Point]) -> Figure:
+    """Error against time, a panel for each case."""
+    cases = list(dict.fromkeys(point.case for point in points))
+    rows = -(-len(cases) // 3)
+    figure = Figure(figsize=(13.0, 3.7 * rows), layout="constrained")
+    panels = figure.subplots(rows, 3, squeeze=False).ravel()
+    for axes, case in zip(panels, cases, strict=False):
+        for tolerance in dict.fromkeys(p.tolerance for p in points if p.case == case):
+            own = [p for p in points if (p.case, p.tolerance) == (case, tolerance)]
+            axes.loglog([p.seconds for p in own], [p.error for p in own], "o-", ms=4, label=f"tolerance {tolerance:g}")
+        for point in [p for p in points if (p.case, p.tolerance) == (case, own[0].tolerance)]:
+            axes.annotate(str(point.cells), (point.seconds, point.error), textcoords="offset points", xytext=(4, 4))
+        axes.set(title=case, xlabel="processor time, s", ylabel="error")
+        axes.grid(visible=True, which="both", alpha=0.3)
+        axes.legend(fontsize=8)
+    for axes in panels[len(cases) :]:
+        axes.set_visible(False)
+    return figure
+
+
+def table(points: list[Point]) -> str:
+    """Errors and times at the tightest tolerance, with the observed order between grids."""
+    lines = ["| case | cells | error | order | seconds |", "|---|---|---|---|---|"]
+    for case in dict.fromkeys(point.case for point in points):
+        own = [point for point in points if point.case == case]
+        own = [point for point in own if point.tolerance == min(p.tolerance for p in own)]
+        for before, point in zip([None, *own[:-1]], own, strict=True):
+            order = (
+                ""
+                if before is None
+                else f"{np.log(before.error / point.error) / np.log(point.cells / before.cells):.2f}"
+            )
+            lines.append(f"| {case} | {point.cells} | {point.error:.2e} | {order} | {point.seconds:.3f} |")
+    return "\n".join(lines)
+
+
+def request_table(kept: list[Kept]) -> str:
+    """What was asked, estimated and true."""
+    lines = ["| scene | asked | estimated | true | seconds |", "|---|---|---|---|---|"]
+    lines += [f"| {k.scene} | {k.asked:g} | {k.estimated:.4f} | {k.true:.4f} | {k.seconds:.2f} |" for k in kept]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Measure, write, print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--output", type=Path, default=Path("benchmark-output"))
+    parser.add_argument("--cells", type=int, nargs="+", default=[16, 32, 64, 128])
+    options = parser.parse_args()
+    options.output.mkdir(parents=True, exist_ok=True)
+    measured = [*closed_forms(options.cells), *scenes()]
+    points = [entry for entry in measured if isinstance(entry, Point)]
+    kept = [entry for entry in measured if isinstance(entry, Kept)]
+    records = {"points": [asdict(point) for point in points], "on_request": [asdict(entry) for entry in kept]}
+    (options.output / "contact_accuracy.json").write_text(json.dumps(records, indent=1))
+    curves(points).savefig(options.output / "contact_accuracy.png", dpi=100)
+    print(table(points), request_table(kept), sep="\n\n")
+
+
+if __name__ == "__main__":
+    main()
