@@ -65,7 +65,7 @@ class JobPool:
     async def _work(self, lane: "_Lane") -> None:
         try:
             await lane.hire()
-            while not self._stopping and (job_id := await self._queue.get()) is not None:
+            while (job_id := await self._queue.get()) is not None:
                 await self._do(lane, job_id)
         finally:
             await lane.close()

@@ -22,6 +22,7 @@ def empty_database(tmp_path: Path) -> Iterator[Database]:
 @pytest.fixture
 def database(empty_database: Database) -> Database:
     migrate.upgrade(empty_database)
+    empty_database.close()  # what the tests see are connections of its own making, not the migration's
     return empty_database
 
 

@@ -87,8 +87,9 @@ def test_upgrading_again_changes_nothing(database: Database) -> None:
         assert [material.name for material in materials.list_all(session)] == ["paper"]
 
 
-def test_foreign_keys_are_on_again_after_a_migration(database: Database) -> None:
-    with database.read() as session:
+def test_foreign_keys_are_on_again_after_a_migration(empty_database: Database) -> None:
+    migrate.upgrade(empty_database)
+    with empty_database.read() as session:
         assert session.execute(text("PRAGMA foreign_keys")).scalar() == 1
 
 

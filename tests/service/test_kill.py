@@ -87,7 +87,7 @@ class Victim:
 
 
 def wait_until(condition: Callable[[], bool], what: str) -> None:
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + 240.0  # only against waiting for ever: a busy machine may take a minute to start
     while not condition():
         assert time.monotonic() < deadline, f"waited in vain for {what}"
         time.sleep(0.005)
@@ -131,7 +131,7 @@ def check_complete(victim: Victim, accepted: list[str]) -> None:
     assert list((victim.folder / "spool").iterdir()) == []
     with victim.database() as session:
         logs = dict(session.execute(select(GraspLogRow.id, GraspLogRow.sha256)).all())
-        assert set(accepted) <= set(logs)
+        assert set(accepted) == set(logs)
         assert set(session.scalars(select(DetectionRow.grasp_log_id))) == set(logs)
         assert set(session.scalars(select(JobRow.status))) <= {"done"}
         assert Counter(session.scalars(select(FrictionModelRow.job_id))) == Counter(session.scalars(select(JobRow.id)))

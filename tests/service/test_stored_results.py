@@ -54,7 +54,7 @@ def test_a_history_is_summed_up(history: SlipHistory) -> None:
     assert found.stick_ratio_min == np.nanmin(history.stick_ratio)
     assert found.macro_slip_frames == int(history.macro_slip.sum())
     assert (found.onsets, found.touches) == (len(history.events.onset), len(history.events.touch))
-    assert (found.method, found.seconds, found.history_blob) == ("strain_rate", 0.25, "0" * 64)
+    assert (found.method, found.seconds, found.history_blob) == (history.method, 0.25, "0" * 64)
 
 
 def test_a_history_without_contact_has_no_numbers_for_it(history: SlipHistory) -> None:

@@ -148,6 +148,10 @@ def test_an_upload_over_the_limit_is_refused_by_its_length(client: httpx.Client,
     assert problem["allowed"] == "at most 2097152 bytes"
 
 
+def test_an_upload_of_just_the_limit_is_looked_at(client: httpx.Client, upload: Upload) -> None:
+    assert refusal(client, upload, bytes(2 * 2**20), 422)["type"] == "/problems/invalid-grasp-log"
+
+
 def test_an_upload_over_the_limit_is_refused_while_it_streams(client: httpx.Client) -> None:
     sent = 0
 
