@@ -10,6 +10,7 @@ from collections import deque
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 
 from slipcore.contact.errors import NotConverged
 from slipcore.contact.fields import doubled, inner
@@ -220,7 +221,7 @@ class _Relaxation:
         its displacement, by conjugate gradients.
         """
         inverse = self.operator.normal_inverse
-        residual = self._balanced(np.where(active, gap, 0.0), active)
+        residual = self._balanced(gap.copy(), active)
         change, response = np.zeros_like(gap), np.zeros_like(gap)
         improved = self._balanced(inverse(residual), active)
         direction = -improved
@@ -229,22 +230,19 @@ class _Relaxation:
             if size <= 0.0:
                 break
             answer = self.operator.normal(direction)
-            step = size / inner(direction, answer)
-            change += step * direction
-            response += step * answer
-            residual = self._balanced(residual + step * answer, active)
+            _advance(change, response, residual, direction, answer, size / inner(direction, answer))
+            self._balanced(residual, active)
             improved = self._balanced(inverse(residual), active)
             before, size = size, inner(residual, improved)
             if size <= CG_REDUCTION**2 * first:
                 break
-            direction = (size / before) * direction - improved
+            direction *= size / before
+            direction -= improved
         return change, response
 
     def _balanced(self, field: FloatArray, active: BoolArray) -> FloatArray:
-        """The part of a field that is on the active cells and, under a given force, sums to zero."""
-        field = np.where(active, field, 0.0)
-        if self.total is not None:
-            field -= np.where(active, field.sum() / active.sum(), 0.0)
+        """The part of a field that is on the active cells and, under a given force, sums to zero; in place."""
+        _restrict(field, active, self.total is not None)
         return field
 
     def _descend(
@@ -259,3 +257,30 @@ class _Relaxation:
         slope = inner(np.where(way != 0.0, gap, 0.0), way)
         share = min(max(-slope / curvature, 0.0), 1.0) if curvature > 0.0 else 0.0
         return pressure + share * way, displacement + share * response
+
+
+@njit(cache=True)
+def _restrict(field, active, balanced):  # type: ignore[no-untyped-def]
+    total, count = 0.0, 0
+    for i in range(field.shape[0]):
+        for j in range(field.shape[1]):
+            if active[i, j]:
+                total += field[i, j]
+                count += 1
+            else:
+                field[i, j] = 0.0
+    if balanced and count:
+        mean = total / count
+        for i in range(field.shape[0]):
+            for j in range(field.shape[1]):
+                if active[i, j]:
+                    field[i, j] -= mean
+
+
+@njit(cache=True)
+def _advance(change, response, residual, direction, answer, step):  # type: ignore[no-untyped-def]
+    for i in range(change.shape[0]):
+        for j in range(change.shape[1]):
+            change[i, j] += step * direction[i, j]
+            response[i, j] += step * answer[i, j]
+            residual[i, j] += step * answer[i, j]
