@@ -30,6 +30,8 @@ class Identifiability:
 
     effect: float = 0.1
     """-, 0 to 1; largest half-width of its 95 % interval, as a change of μ over the span, in parts of the mean μ."""
+    prior_shift: float = 0.5
+    """Posterior standard deviations; largest move of a known coefficient when the prior is made twice as wide."""
     collinear: float = 1e-10
     """-, 1e-14 to 1e-6; smallest singular value of the equilibrated regressors that still counts as a direction."""
     ill_conditioned: float = 1e3
@@ -62,7 +64,7 @@ class Sampling:
     """Steps between two looks at the chain; ≥ 50 τ for the independence proposal, whose τ is about 1.2."""
     chain_lengths: float = 50.0
     """Steps in units of the integrated autocorrelation time, from which that time is believed (emcee's rule)."""
-    accuracy: float = 0.015
+    accuracy: float = 0.02
     """Posterior standard deviations; Monte-Carlo error of mean, 5 % and 95 % quantile at which sampling stops."""
     accuracy_per_sample: float = 0.05
     """The same where each step of each walker reads all samples: an effective sample size of 2,000."""

@@ -23,6 +23,6 @@ def effects(covariance: FloatArray, degrees_of_freedom: float, evidence: Evidenc
     return np.asarray(half / max(mean, np.finfo(float).tiny))
 
 
-def identifiable(effect: FloatArray) -> NDArray[np.bool_]:
-    """Whether each coefficient counts as known: its ``effect`` is at most ``IDENTIFIABILITY.effect``."""
-    return np.asarray(effect <= IDENTIFIABILITY.effect)
+def identifiable(effect: FloatArray, prior_shift: FloatArray) -> NDArray[np.bool_]:
+    """Whether each coefficient counts as known: its effect is small, and it is the data's rather than the prior's."""
+    return np.asarray((effect <= IDENTIFIABILITY.effect) & (prior_shift <= IDENTIFIABILITY.prior_shift))

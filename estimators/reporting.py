@@ -51,6 +51,7 @@ def report(
 ) -> FrictionModel:
     """The friction model, with what its uncertainty does to friction; ``begin``: when the fit began."""
     effect = effects(covariance, degrees_of_freedom, evidence)
+    prior_shift = np.array([float(diagnostics.get(f"prior_sensitivity_beta{k}", 0.0)) for k in range(3)])
     return FrictionModel(
         method=method,
         coefficients=np.asarray(coefficients, dtype=float),
@@ -59,7 +60,7 @@ def report(
         n=evidence.n,
         degrees_of_freedom=degrees_of_freedom,
         domain=evidence.domain,
-        identifiable=identifiable(effect),
+        identifiable=identifiable(effect, prior_shift),
         element_area=evidence.element_area,
         diagnostics=describe(evidence, linear) | by_coefficient("effect", effect) | diagnostics,
         cost=Cost(time.perf_counter() - begin, monte_carlo_error),

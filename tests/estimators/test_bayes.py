@@ -56,7 +56,7 @@ def test_a_fit_says_how_far_its_chain_can_be_trusted(samples: Make) -> None:
         assert told["steps"] >= 50 * told[f"autocorrelation_time_{name}"]
     assert told["split_rhat"] < 1.01
     assert told["stopped"] == "accuracy"
-    assert 0.0 < model.cost.monte_carlo_error <= 0.015
+    assert 0.0 < model.cost.monte_carlo_error <= 0.02
     assert "sigma^2" in told["prior"]
     assert model.draws.shape[1] == 4
     assert 2000 <= len(model.draws) <= 4000

@@ -79,3 +79,13 @@ def test_zero_residual_leaves_a_scatter_of_the_priors_size(samples: Make) -> Non
     model = estimators.fit(samples(100, scale=0.0), method="conjugate")
     np.testing.assert_allclose(model.coefficients, [0.4, 2.0, -0.8], rtol=5e-3)  # the prior's pull on 100 samples
     assert 0.0 < model.scale < 0.1 * REFERENCE.scatter
+
+
+def test_a_slope_that_the_prior_pulls_is_not_called_known(samples: Make) -> None:
+    """Rock at micrometres a second: the slope is a thousand times what the prior allows, and the prior wins in part."""
+    v = np.repeat([2e-7, 2e-6], 500)
+    data = samples(1000, tangential_velocity=v, coefficients=np.array([0.45, 2.6e4, 0.0]), scale=1e-3)
+    model = estimators.fit(data, method="conjugate")
+    assert model.diagnostics["prior_sensitivity_beta1"] > 1.0
+    assert not model.identifiable[1]
+    np.testing.assert_allclose(estimators.fit(data).coefficients[1], 2.6e4, rtol=0.01)  # least squares has no prior
