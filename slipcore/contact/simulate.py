@@ -10,6 +10,7 @@ from slipcore.contact.accuracy import simulate_to
 from slipcore.contact.boundary_elements import Fidelity
 from slipcore.contact.plan import Plan
 from slipcore.contact.scene import Scene
+from slipcore.contact.tiers import cheapest
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 
@@ -22,7 +23,7 @@ def simulate(
     fidelity: Fidelity | None = None,
 ) -> GraspLog:
     """Simulate a scene to an ``accuracy``, within ``seconds``, or at a ``fidelity``; with none of them, at the default
-    one.
+    one. For an accuracy the cheapest tier is taken that has it.
 
     ``accuracy`` is the largest of: absolute error of the stick ratio, relative L2 error over time of displacement and
     of force at the sensor's points, all before observation effects. ``seed`` draws random fields and noise. The
@@ -33,7 +34,10 @@ def simulate(
     plan = scene.plan(seed)
     if fidelity is not None and (accuracy is not None or seconds is not None):
         raise InvalidInput("fidelity", fidelity, "no fidelity beside an accuracy or seconds")
-    if accuracy is None and seconds is None:
+    tier = None if accuracy is None else cheapest(scene, plan, accuracy)
+    if tier is not None:
+        log, estimated = tier.run(scene, plan), f"{tier.accuracy(scene, plan):.2g}"
+    elif accuracy is None and seconds is None:
         log, estimated = boundary_elements.run(plan, fidelity), "not asked for"
     else:
         found = simulate_to(plan, accuracy, seconds)

@@ -78,7 +78,7 @@ def test_simulate_takes_a_scene_by_name_or_by_file_and_writes_a_log_that_detect_
     made = json.loads(out)
     assert code == 0
     assert float(made["estimated accuracy"]) <= 0.1
-    assert made["largest normal force_N"] == pytest.approx(15.0)
+    assert made["largest normal force_N"] == pytest.approx(15.0, rel=1e-4)  # sums over elements
     assert len(made["time"]) == len(made["stick_ratio"]) == made["frames"]
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert json.loads(run("detect", log, "--json")[1])["frames"] == made["frames"]

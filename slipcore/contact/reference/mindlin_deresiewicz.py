@@ -103,7 +103,8 @@ class MindlinDeresiewicz:
 
     def _shells(self) -> list[tuple[float, HertzContact, HertzContact]]:
         sizes = [self._at(level) for level in self.levels]
-        return list(zip(self.memory, sizes[:-1], sizes[1:], strict=True))
+        shells = zip(self.memory, sizes[:-1], sizes[1:], strict=True)
+        return [shell for shell in shells if shell[0] != 0.0]
 
 
 def cycle_dissipation(contact: HertzContact, friction: float, amplitude: float) -> float:
