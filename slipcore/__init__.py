@@ -1,6 +1,13 @@
 """Tactile frames to friction samples: numerics only (frames → strain → events → slip_state → samples)."""
 
-from slipcore.defaults import Option, SampleOptions, StrainRateLiteralOptions, StrainRateOptions, describe_options
+from slipcore.defaults import (
+    FilterOptions,
+    Option,
+    SampleOptions,
+    StrainRateLiteralOptions,
+    StrainRateOptions,
+    describe_options,
+)
 from slipcore.detector import DetectorState, SlipDetector, collect_history, detect_slip
 from slipcore.element_forces import ElementForces, contact_factor, element_forces, stick_ratio
 from slipcore.errors import InvalidInput, NoForces, SlipcoreError
@@ -14,6 +21,7 @@ __all__ = [
     "DetectorState",
     "ElementForces",
     "EventList",
+    "FilterOptions",
     "Frame",
     "FrictionLaw",
     "FrictionSamples",

@@ -79,8 +79,11 @@ def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
     normal = surface_normal(setup.lattice, steps) if frame.normal is None else frame.normal
     forces = None if frame.force is None else element_forces(frame.force, normal)
     pressing = _pressing(frame, forces)
-    marker_noise = step_noise(state.marker_noise, frame.time, frame.displacement[..., :2].reshape(-1, 2).T)
-    pressing_noise = step_noise(state.pressing_noise, frame.time, pressing.reshape(1, -1))
+    marker_noise, pressing_noise = state.marker_noise, state.pressing_noise
+    if memory is None or not np.array_equal(frame.displacement, memory.frame.displacement):
+        # a repeated frame would make the noise look smaller
+        marker_noise = step_noise(marker_noise, frame.time, frame.displacement[..., :2].reshape(-1, 2).T)
+        pressing_noise = step_noise(pressing_noise, frame.time, pressing.reshape(1, -1))
     known = pressing_noise.sigma if math.isfinite(pressing_noise.sigma) else spatial_noise(pressing)
     contact = _contact(setup, pressing, known, memory, has_force=forces is not None)
     touched = contact if memory is None else contact & ~memory.answer.contact
@@ -127,7 +130,7 @@ def _answer(setup: Setup, memory: Memory | None, seen: Observation, decision: De
     may_slip = seen.contact & ~seen.touched
     slip = decision.slip & may_slip
     probability = np.where(may_slip, decision.probability, 0.0)
-    velocity = _velocity(setup.lattice, memory, seen, slip)
+    velocity = _velocity(setup.lattice, memory, seen, slip, probability)
     for array in (seen.contact, slip, probability, velocity):
         array.flags.writeable = False  # the detector remembers them
     sticking = np.count_nonzero(seen.contact & ~slip)
@@ -136,10 +139,13 @@ def _answer(setup: Setup, memory: Memory | None, seen: Observation, decision: De
     return SlipState(seen.time, seen.contact, slip, probability, ratio, velocity, macro_slip)
 
 
-def _velocity(lattice: Lattice, memory: Memory | None, seen: Observation, slip: BoolArray) -> FloatArray:
+def _velocity(
+    lattice: Lattice, memory: Memory | None, seen: Observation, slip: BoolArray, probability: FloatArray
+) -> FloatArray:
     """Velocity over the last interval of what was in contact all through it, relative to the object.
 
-    The object moves as its pose says, or else as the elements do that stick before and after.
+    The object moves as its pose says, or else as the elements do that stick before and after,
+    the more surely the more.
     """
     if memory is None:
         return np.full((*slip.shape, 2), np.nan)
@@ -150,7 +156,8 @@ def _velocity(lattice: Lattice, memory: Memory | None, seen: Observation, slip: 
         motion = pose_motion(memory.frame.object_pose, seen.object_pose)
     else:
         sticking = observed & ~slip & ~before.slip
-        motion = fit_rigid_motion(points.reshape(-1, 2), moved.reshape(-1, 2), sticking.ravel().astype(float))
+        weight = np.where(sticking, (1.0 - probability) * (1.0 - before.probability), 0.0)
+        motion = fit_rigid_motion(points.reshape(-1, 2), moved.reshape(-1, 2), weight.ravel())
     return relative_velocity(points, moved, observed, motion, seen.interval)
 
 

@@ -3,12 +3,27 @@
 from typing import Any
 
 from slipcore.errors import InvalidInput
-from slipcore.methods import strain_rate, strain_rate_literal
+from slipcore.methods import (
+    deformation_gradient,
+    force_ratio,
+    local_deformation,
+    rigid_fit,
+    strain_rate,
+    strain_rate_literal,
+    strain_threshold,
+)
+from slipcore.methods import filter as probability_filter
 from slipcore.methods.interface import Method
 
 METHODS: dict[str, Method[Any, Any]] = {
+    "filter": probability_filter.METHOD,
     "strain_rate": strain_rate.METHOD,
     "strain_rate_literal": strain_rate_literal.METHOD,
+    "rigid_fit": rigid_fit.METHOD,
+    "local_deformation": local_deformation.METHOD,
+    "deformation_gradient": deformation_gradient.METHOD,
+    "force_ratio": force_ratio.METHOD,
+    "strain_threshold": strain_threshold.METHOD,
 }
 """A further method joins by a file of its own and a line here."""
 

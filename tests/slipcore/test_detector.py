@@ -282,7 +282,7 @@ def test_a_single_frame_sticks_where_it_touches(short_ramp: GraspLog, method: st
 def test_macro_slip_without_known_motion_leaves_the_velocity_unobservable() -> None:
     log = tangential_ramp(tangential_force=1.0, schedule=RampSchedule(0.2, 0.5, 0.2, 1.5, 0.5))
     blind = replace(log, object_pose=None)
-    history, seeing = detect_slip(blind, rate_floor=1e-4), detect_slip(log, rate_floor=1e-4)
+    history, seeing = (detect_slip(seen, "strain_rate", rate_floor=1e-4) for seen in (blind, log))
     assert history.macro_slip.any()
     assert np.isnan(history.velocity[history.macro_slip]).all()
     moving = seeing.contact[1:] & seeing.contact[:-1] & seeing.macro_slip[1:, None, None]
@@ -293,12 +293,21 @@ def test_velocity_of_sticking_elements_is_zero_and_of_slipping_ones_is_the_slip_
     log = tangential_ramp()
     assert log.truth is not None
     for known in (log, replace(log, object_pose=None)):
-        history = detect_slip(known)
+        history = detect_slip(known, "strain_rate")
         speed = np.linalg.norm(history.velocity[1:], axis=-1)
         moves = log.truth.slip_kinematic[1:] & np.isfinite(speed)
         rests = log.truth.contact[1:] & ~log.truth.slip_kinematic[1:] & np.isfinite(speed)
         assert speed[rests].max() < 1e-9  # m/s; a rigid object carries every sticking point along exactly
         assert np.median(speed[moves]) > 1e-5
+
+
+def test_velocity_by_the_filter_errs_little_where_the_front_passes() -> None:
+    log = tangential_ramp()
+    assert log.truth is not None
+    for known in (log, replace(log, object_pose=None)):
+        speed = np.linalg.norm(detect_slip(known, "filter").velocity[1:], axis=-1)
+        rests = log.truth.contact[1:] & ~log.truth.slip_kinematic[1:] & np.isfinite(speed)
+        assert np.quantile(speed[rests], 0.99) < 2e-5  # m/s; the object moves at 3e-4
 
 
 def test_contact_comes_from_the_shape_where_there_are_no_forces() -> None:
@@ -312,7 +321,7 @@ def test_contact_comes_from_the_shape_where_there_are_no_forces() -> None:
 @pytest.mark.parametrize(
     ("method", "options", "message"),
     [
-        ("magic", {}, "method is magic; allowed: strain_rate, strain_rate_literal"),
+        ("magic", {}, "method is magic; allowed: filter, strain_rate, strain_rate_literal"),
         (None, {}, "method is None"),
         ("strain_rate", {"lag": 3}, "option is lag; allowed: .*memory_time.*threshold"),
         ("strain_rate", {"threshold": 0.0}, "threshold is 0.0; allowed: 0.5 to 100 standard deviations"),

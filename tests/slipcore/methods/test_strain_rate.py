@@ -133,4 +133,4 @@ def test_noise_gain_is_what_white_noise_shows(forgotten: float) -> None:
 
 def test_an_option_changes_the_decision(short_ramp: GraspLog) -> None:
     log = replace(short_ramp, truth=None)
-    assert detect_slip(log, threshold=50.0).slip.sum() < detect_slip(log).slip.sum()
+    assert detect_slip(log, "strain_rate", threshold=50.0).slip.sum() < detect_slip(log, "strain_rate").slip.sum()

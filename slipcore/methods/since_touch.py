@@ -1,0 +1,45 @@
+"""What several methods of the literature look at: how a measure of each element has changed since it touched."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from slipcore.defaults import ContactOptions
+from slipcore.frames import BoolArray, FloatArray
+from slipcore.methods.interface import Decision, Method, Observation
+from slipcore.strain import Lattice
+
+Options = TypeVar("Options", bound=ContactOptions)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SinceTouch:
+    """The measure [..., n, m] of each element when it touched, or now where it does not touch."""
+
+    measure: FloatArray
+
+
+def threshold_method(
+    options: type[Options],
+    measure: Callable[[Lattice, Observation], FloatArray],
+    slips: Callable[[Lattice, Observation, FloatArray, Options], BoolArray],
+) -> Method[SinceTouch, Options]:
+    """A method without memory of its own: ``slips`` judges how ``measure`` [..., n, m] changed since the touch.
+
+    The whole field is measured before the difference is taken: elements touch at different times, and a gradient of
+    differences would see steps between them. The probability is 0 or 1.
+    """
+
+    def init(lattice: Lattice, seen: Observation, _: Options) -> SinceTouch:
+        return SinceTouch(measure(lattice, seen))
+
+    def step(state: SinceTouch, lattice: Lattice, seen: Observation, chosen: Options) -> tuple[SinceTouch, Decision]:
+        stays = seen.contact & ~seen.touched
+        now = measure(lattice, seen)
+        start = np.where(stays, state.measure, now)
+        slip = slips(lattice, seen, now - start, chosen) & stays
+        return SinceTouch(start), Decision(slip, slip.astype(float))
+
+    return Method(options, init, step)
