@@ -1,8 +1,9 @@
-"""What the slip detector costs: `python -m benchmarks.detector [--output FOLDER] [--recordings FOLDER]`.
+"""What the slip detector costs and how well it finds slip: `python -m benchmarks.detector [--output FOLDER]`.
 
 Every method streams 250 frames of 20×20 markers through `SlipDetector.step`, frame by frame as a live sensor would,
 and takes them as one batch through `detect_slip`. The log is a simulated ramp with noise, and each real Tac3D recording
-that is found. Prints a table and writes detector.json and detector.png.
+that is found. Then every method is scored on scenes with truth (benchmarks/detector_accuracy.py). Prints tables and
+writes detector.json, detector.png, detector_accuracy.json and detector_accuracy.png.
 """
 
 import argparse
@@ -15,6 +16,7 @@ from time import perf_counter
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks import detector_accuracy
 from service.formats import tac3d
 from slipcore import METHODS, GraspLog, SlipDetector, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
@@ -104,7 +106,32 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("benchmarks/results"), help="folder for JSON and picture")
     parser.add_argument("--recordings", type=Path, default=RECORDINGS, help="folder of Tac3D recordings")
     parser.add_argument("--repeats", type=int, default=5, help="streams and batches of each log")
+    parser.add_argument("--only", choices=("cost", "accuracy"), help="leave out the other")
     arguments = parser.parse_args()
+    arguments.output.mkdir(parents=True, exist_ok=True)
+    if arguments.only != "accuracy":
+        report_costs(arguments)
+    if arguments.only != "cost":
+        report_accuracy(arguments.output)
+
+
+def report_accuracy(output: Path) -> None:
+    """Score all methods on the unseen scenes."""
+    rows = [
+        row
+        for scenes in ("scoring", "reference")
+        for inputs in detector_accuracy.INPUTS
+        for noise in detector_accuracy.NOISES
+        for row in detector_accuracy.measure(scenes, inputs, noise)
+    ]
+    print(detector_accuracy.table(rows))
+    text = json.dumps(detector_accuracy.as_json(rows), indent=1)
+    (output / "detector_accuracy.json").write_text(text, encoding="utf-8")
+    detector_accuracy.draw(rows).savefig(output / "detector_accuracy.png", dpi=150)
+
+
+def report_costs(arguments: argparse.Namespace) -> None:
+    """Time all methods."""
     costs = [
         measure(name, log, method, arguments.repeats) for name, log in logs(arguments.recordings) for method in METHODS
     ]
@@ -115,7 +142,6 @@ def main() -> None:
             f"| {c.log} | {c.method} | {c.frames} | {1e6 * c.median:.0f} | {1e6 * c.p99:.0f} | {1e3 * c.batch:.0f} "
             f"| {c.slipping:.0%} | {1e6 * c.noise:.2f} |"
         )
-    arguments.output.mkdir(parents=True, exist_ok=True)
     text = json.dumps([asdict(cost) for cost in costs], indent=1)
     (arguments.output / "detector.json").write_text(text, encoding="utf-8")
     draw(costs).savefig(arguments.output / "detector.png", dpi=150)
