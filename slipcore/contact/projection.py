@@ -16,6 +16,9 @@ from slipcore.frames import BoolArray, FloatArray
 TIGHT = 2e-14
 """Imbalance, as a share of the sum of the radii, that rounding allows to reach."""
 
+BLOCK = 256
+"""Cells summed at a time: a plain sum of many equal tractions rounds always the same way, and misses ``TIGHT``."""
+
 FLAT = 1e7
 """Dual, as a multiple of the largest wish and radius, beyond which φ is flat to rounding: the load is at its limit."""
 
@@ -110,31 +113,36 @@ def _evaluate(wish, radius, arm, target, given, motion, traction, gradient, hess
     """Tractions for a dual ``motion``, the gradient of φ (the imbalance) and its Hessian."""
     gx, gy, gm = -target[0], -target[1], -target[2]
     hxx = hxy = hyy = hxm = hym = hmm = 0.0
-    for i in range(radius.size):
-        limit = radius[i]
-        if limit <= 0.0:
-            traction[0, i] = traction[1, i] = 0.0
-            continue
-        x, y = arm[0, i], arm[1, i]
-        qx = wish[0, i] + motion[0] - y * motion[2]
-        qy = wish[1, i] + motion[1] + x * motion[2]
-        size = np.sqrt(qx * qx + qy * qy)
-        jxx, jxy, jyy = 1.0, 0.0, 1.0
-        if size > limit:
-            share = limit / size
-            nx, ny = qx / size, qy / size
-            qx, qy = limit * nx, limit * ny
-            jxx, jxy, jyy = share * ny * ny, -share * nx * ny, share * nx * nx
-        traction[0, i], traction[1, i] = qx, qy
-        gx += qx
-        gy += qy
-        gm += x * qy - y * qx
-        hxx += jxx
-        hxy += jxy
-        hyy += jyy
-        hxm += x * jxy - y * jxx
-        hym += x * jyy - y * jxy
-        hmm += x * x * jyy - 2.0 * x * y * jxy + y * y * jxx
+    for first in range(0, radius.size, BLOCK):
+        bx = by = bm = 0.0
+        for i in range(first, min(first + BLOCK, radius.size)):
+            limit = radius[i]
+            if limit <= 0.0:
+                traction[0, i] = traction[1, i] = 0.0
+                continue
+            x, y = arm[0, i], arm[1, i]
+            qx = wish[0, i] + motion[0] - y * motion[2]
+            qy = wish[1, i] + motion[1] + x * motion[2]
+            size = np.sqrt(qx * qx + qy * qy)
+            jxx, jxy, jyy = 1.0, 0.0, 1.0
+            if size > limit:
+                share = limit / size
+                nx, ny = qx / size, qy / size
+                qx, qy = limit * nx, limit * ny
+                jxx, jxy, jyy = share * ny * ny, -share * nx * ny, share * nx * nx
+            traction[0, i], traction[1, i] = qx, qy
+            bx += qx
+            by += qy
+            bm += x * qy - y * qx
+            hxx += jxx
+            hxy += jxy
+            hyy += jyy
+            hxm += x * jxy - y * jxx
+            hym += x * jyy - y * jxy
+            hmm += x * x * jyy - 2.0 * x * y * jxy + y * y * jxx
+        gx += bx
+        gy += by
+        gm += bm
     gradient[0], gradient[1], gradient[2] = gx * given[0], gy * given[1], gm * given[2]
     hessian[0, 0], hessian[0, 1], hessian[0, 2] = hxx, hxy, hxm
     hessian[1, 0], hessian[1, 1], hessian[1, 2] = hxy, hyy, hym

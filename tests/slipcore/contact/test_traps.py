@@ -71,6 +71,18 @@ def test_force_projection_needs_few_steps_up_to_full_slip(lacking: float) -> Non
         assert np.abs(found.imbalance).max() <= 1e-13 * radius.sum()
 
 
+@pytest.mark.parametrize("cells", [128, 256])
+@pytest.mark.parametrize("share", [0.3, 0.7, 0.99])
+def test_force_projection_of_equal_tractions_meets_its_tolerance(cells: int, share: float) -> None:
+    """A plain sum over many equal cells rounds one way and never balances: it once went on to its bound, for 1.5 s."""
+    x, y = np.meshgrid(*2 * [np.linspace(-1.0, 1.0, cells)])
+    radius = np.sqrt(np.clip(1.0 - x**2 - y**2, 0.0, None)).ravel()
+    target = np.array([share * radius.sum(), 0.0, 0.0])
+    arm = np.stack((x.ravel(), y.ravel()))
+    found = project(np.zeros_like(arm), radius, arm, target, np.ones(3, dtype=bool))
+    assert found.iterations <= 10
+
+
 def test_a_thin_slip_annulus_is_warned_of_and_its_error_falls_with_the_grid(sphere) -> None:
     """At F_T = 0.05 μF_N the annulus is 0.5 cells wide on 64 × 64 cells: tractions are off by a tenth, in silence."""
     errors, said = [], []
