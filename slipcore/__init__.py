@@ -15,6 +15,7 @@ from slipcore.frames import Frame, FrictionLaw, GraspLog, GroundTruth
 from slipcore.methods import METHODS
 from slipcore.samples import FrictionSamples, collect_samples
 from slipcore.slip_state import EventList, SlipEvents, SlipHistory, SlipState
+from slipcore.warm_up import warm_up
 
 __all__ = [
     "METHODS",
@@ -45,4 +46,5 @@ __all__ = [
     "detect_slip",
     "element_forces",
     "stick_ratio",
+    "warm_up",
 ]
