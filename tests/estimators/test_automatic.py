@@ -81,7 +81,7 @@ def test_force_noise_is_found_in_the_residuals(samples: Make) -> None:
 def test_intervals_cover_whatever_the_fault(
     samples: Make, truth: np.ndarray, spoil: Callable[..., FrictionSamples]
 ) -> None:
-    fits, inside = 40, np.zeros(3)
+    fits, inside = 20, np.zeros(3)
     for seed in range(fits):
         low, high = estimators.fit(spoil(samples, seed), method="auto").interval(0.95).T
         inside += (low <= truth) & (truth <= high)

@@ -38,7 +38,7 @@ def test_the_sampled_posterior_is_the_exact_one(samples: Make, n: int) -> None:
 
 
 def test_intervals_cover_the_truth(samples: Make, truth: np.ndarray) -> None:
-    fits, level, inside = 60, 0.9, np.zeros(3)
+    fits, level, inside = 30, 0.9, np.zeros(3)
     for seed in range(fits):
         model = estimators.fit(samples(100, seed=seed), method="bayes", likelihood="gaussian", accuracy=0.1)
         low, high = model.interval(level).T

@@ -94,7 +94,7 @@ def test_log_half_student_is_the_t_density() -> None:
 
 @pytest.mark.parametrize("count", [3, 12])
 def test_intervals_cover_where_grasps_differ_and_iid_ones_do_not(samples: Make, truth: np.ndarray, count: int) -> None:
-    fits, level = 60, 0.9
+    fits, level = 30, 0.9
     inside, naive, predicted = np.zeros(3), np.zeros(3), 0
     for seed in range(fits):
         data = grasps(samples, count + 1, seed=seed)
@@ -111,7 +111,7 @@ def test_intervals_cover_where_grasps_differ_and_iid_ones_do_not(samples: Make, 
     assert (inside >= expected.ppf(1e-3)).all()
     assert (inside[1:] <= expected.ppf(1.0 - 1e-3)).all()
     assert predicted >= expected.ppf(1e-3)
-    assert naive[0] < expected.ppf(1e-4)
+    assert naive[0] < expected.ppf(1e-2)
 
 
 def test_it_is_the_default_where_samples_come_in_clusters(samples: Make) -> None:
