@@ -1,4 +1,4 @@
-"""What accuracy costs in time: `python -m benchmarks.contact_accuracy [--output FOLDER] [--cells 16 32 64 128]`.
+"""What accuracy costs in time: `python -m benchmarks.contact_accuracy [--output FOLDER] [--cells ...] [--scenes ...]`.
 
 Error against processor time over grids and tolerances, for each contact problem with a closed form and for whole
 scenes against a fine run; then what `simulate(scene, accuracy=...)` was asked and what it kept. Writes JSON and
@@ -185,9 +185,9 @@ def closed_forms(grids: list[int]) -> Iterator[Point]:
         print(f"{name}: done", flush=True)
 
 
-def scenes() -> Iterator[Point | Kept]:
+def scenes(names: list[str]) -> Iterator[Point | Kept]:
     """Whole scenes against a fine run, then on request."""
-    for name in SCENES:
+    for name in names:
         plan = Scene.from_toml(name).plan()
         fine = run(plan, FINE)
         for cells in (12, 20, 40, 60):
@@ -250,9 +250,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, default=Path("benchmark-output"))
     parser.add_argument("--cells", type=int, nargs="+", default=[16, 32, 64, 128])
+    parser.add_argument("--scenes", nargs="*", default=list(SCENES), help="the layered one takes minutes")
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
-    measured = [*closed_forms(options.cells), *scenes()]
+    measured = [*closed_forms(options.cells), *scenes(options.scenes)]
     points = [entry for entry in measured if isinstance(entry, Point)]
     kept = [entry for entry in measured if isinstance(entry, Kept)]
     records = {"points": [asdict(point) for point in points], "on_request": [asdict(entry) for entry in kept]}
