@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from slipcore.contact import reference
 from slipcore.contact.accuracy import difference, simulate_to
@@ -215,6 +216,7 @@ def curves(points: list[Point]) -> Figure:
         for point in [p for p in points if (p.case, p.tolerance) == (case, own[0].tolerance)]:
             axes.annotate(str(point.cells), (point.seconds, point.error), textcoords="offset points", xytext=(4, 4))
         axes.set(title=case, xlabel="processor time, s", ylabel="error")
+        axes.xaxis.set_minor_formatter(NullFormatter())  # labels of a part of a decade overlap
         axes.grid(visible=True, which="both", alpha=0.3)
         axes.legend(fontsize=8)
     for axes in panels[len(cases) :]:
