@@ -1,4 +1,4 @@
-"""Other contact solvers beside this one: `python -m benchmarks.contact_peers [--peers-python PATH] [--quick]`.
+"""Other contact solvers beside this one: `python -m benchmarks.contact_peers [--peers-python PATH]`.
 
 Tamaas, ContactMechanics and ASPHER on a sphere pressed on a half-space (64² to 512² cells) and ASPHER on partial slip
 (128², 256²; ν = 0, F_T = 0.7 μF_N). All on the same grid 2.2 contact radii wide, one thread each, taken in turns; every
@@ -21,6 +21,8 @@ from typing import Any, Self
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
 
 from slipcore.contact.grid import Grid, bounding_box
 from slipcore.contact.kernels import HalfSpace
@@ -33,14 +35,20 @@ from slipcore.contact.tangential import Control, solve_tangential
 from slipcore.frames import FloatArray
 
 OURS = "Stiction"
-ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """For the peers; this project's solvers start no threads."""
 PEERS = ("Tamaas", "ContactMechanics", "ASPHER", "ASPHER nested", "ASPHER friction")
 YOUNG, RADIUS, FORCE, FRICTION, SHARE = 1e6, 15e-3, 10.0, 0.4, 0.7
 HERTZ = HertzContact(RADIUS, FORCE, half_space(YOUNG, 0.0))
 WIDTH = 2.2 * HERTZ.contact_radius
-TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+TOLERANCES = {
+    "normal contact": (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8),
+    "partial slip": (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7),
+}
 TARGETS = (1e-3, 1e-4, 1e-6)
+ROUNDS = 3
+PATIENCE = 20.0
+"""Seconds of one solution, after which a solver is asked for nothing tighter on that grid."""
 FEATURES = (
     ("normal contact, free space", "yes", "yes", "yes", "yes"),
     ("periodic surfaces", "no", "yes", "yes", "yes"),
@@ -49,15 +57,15 @@ FEATURES = (
     ("torsion, moment control", "yes", "no", "no", "no"),
     ("Coulomb limit that varies in space", "yes", "no", "no", "through a user's law"),
     ("friction that depends on velocity", "yes", "no", "no", "yes"),
-    ("normal–tangential coupling", "yes", "yes (Kato's method)", "no", "no"),
+    ("normal–tangential coupling", "yes", "in the operator", "no", "no"),
     ("bonded layer", "yes", "no", "no", "no"),
     ("viscoelasticity", "yes", "yes (normal)", "no", "no"),
-    ("adhesion", "no", "yes", "yes", "no"),
+    ("adhesion", "no", "yes", "in a package of its own", "no"),
     ("plasticity", "no", "yes", "hardness", "no"),
     ("memory O(n), no FFT grid", "no", "no", "no", "yes (H²)"),
     ("several processes (MPI)", "no", "yes", "yes", "no"),
 )
-"""What each has, from its own documentation of the versions measured; columns: this, Tamaas, ContactMechanics,
+"""What each has, from the documentation and names of the versions measured, not from trials; columns: this, Tamaas, ContactMechanics,
 ASPHER.
 """
 
@@ -191,7 +199,8 @@ def compare(
     problem: str, cells: int, solvers: dict[str, Solver], reference: FloatArray, exact: FloatArray, rounds: int
 ) -> Iterator[Run]:
     """All solvers at all tolerances, in turns."""
-    for tolerance in TOLERANCES if problem == "normal contact" else TOLERANCES[:-1]:
+    solvers = dict(solvers)
+    for tolerance in TOLERANCES[problem]:
         times: dict[str, list[Answer]] = {name: [] for name in solvers}
         fields: dict[str, FloatArray] = {}
         for _ in range(rounds):
@@ -201,36 +210,39 @@ def compare(
                     times[name].append(found)
                     fields[name] = field
         for name, field in fields.items():
+            seconds = float(np.median([run["seconds"] for run in times[name]]))
+            if seconds > PATIENCE:
+                del solvers[name]
             yield Run(
                 problem,
                 name,
                 cells,
                 tolerance,
                 float(max(run["setup"] for run in times[name])),
-                float(np.median([run["seconds"] for run in times[name]])),
+                seconds,
                 int(times[name][0]["iterations"]),
                 distance(field, reference),
                 distance(field, exact),
             )
 
 
-def measure(worker: Worker, present: dict[str, str], quick: bool) -> list[Run]:
-    """Every problem on every grid."""
+def measure(worker: Worker, present: dict[str, str], grids: list[int]) -> list[Run]:
+    """Every problem on every grid; partial slip on those from 128 to 256 cells."""
     ours, runs = Ours(), []
     normal = {OURS: ours.solve} | {p: worker.solve for p in PEERS[:4] if p in present}
     slip = {f"{OURS} friction": ours.solve} | {p: worker.solve for p in PEERS[4:] if p in present}
-    rounds = 3 if quick else 5
-    for cells in (64, 128) if quick else (64, 128, 256, 512):
-        grid, operators, height = ours.prepared(cells)
-        tight = solve_normal(operators, grid, height, force=FORCE, tolerance=1e-12).pressure
-        del ours.known[cells]  # its set-up is timed too
-        exact = HERTZ.pressure(np.hypot(*grid.points()))
-        runs += _told(compare("normal contact", cells, normal, tight, exact, min(rounds, 3) if cells > 256 else rounds))
     closed = CattaneoMindlin(HERTZ, FRICTION, SHARE * FRICTION * FORCE)
-    for cells in (64,) if quick else (128, 256):
+    for cells in (cells for cells in grids if 128 <= cells <= 256):
         _, tight = ours.friction(cells, 1e-11)
         exact = closed.traction(np.hypot(*ours.prepared(cells)[0].points()))
-        runs += _told(compare("partial slip", cells, slip, tight, exact, 1 if cells > 128 else rounds))
+        runs += _told(compare("partial slip", cells, slip, tight, exact, ROUNDS if cells < 256 else 1))
+    ours.known.clear()  # set-up is timed too
+    for cells in grids:
+        grid, operators, height = ours.prepared(cells)
+        tight = solve_normal(operators, grid, height, force=FORCE, tolerance=1e-12).pressure
+        del ours.known[cells]
+        exact = HERTZ.pressure(np.hypot(*grid.points()))
+        runs += _told(compare("normal contact", cells, normal, tight, exact, ROUNDS if cells < 512 else 1))
     return [replace(run, solver=run.solver.removesuffix(" friction")) for run in runs]
 
 
@@ -286,24 +298,28 @@ def draw(runs: list[Run], path: Path) -> None:
     panels = list(dict.fromkeys((run.problem, run.cells) for run in runs))
     columns = min(3, len(panels))
     rows = -(-len(panels) // columns)
-    figure = Figure(figsize=(4.6 * columns, 3.7 * rows), layout="constrained")
+    figure = Figure(figsize=(4.6 * columns, 3.7 * rows + 0.4), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     names = list(dict.fromkeys(run.solver for run in runs))
+    handles: dict[str, Line2D] = {}
     for panel, (problem, cells) in zip(axes, panels, strict=False):
         for number, name in enumerate(names):
             chosen = [r for r in runs if (r.problem, r.cells, r.solver) == (problem, cells, name)]
             if chosen:
                 seconds, error = [1e3 * r.seconds for r in chosen], [r.algebraic for r in chosen]
-                panel.loglog(seconds, error, "osv^D"[number] + "-", color=f"C{number}", label=name, markersize=4)
+                style = "osv^D"[number] + "-"
+                (handles[name],) = panel.loglog(seconds, error, style, color=f"C{number}", markersize=4)
         exact = min(r.exact for r in runs if (r.problem, r.cells) == (problem, cells))
-        panel.axhline(exact, color="0.6", linestyle=":", label="error of the grid itself")
+        handles["error of the grid itself"] = panel.axhline(exact, color="0.6", linestyle=":")
         panel.set_title(f"{problem}, {cells} × {cells} cells")
         panel.set_xlabel("time of the solution, ms")
         panel.set_ylabel("relative L2 error")
+        panel.xaxis.set_minor_formatter(NullFormatter())
+        panel.set_xlim(10 ** np.floor(np.log10(panel.get_xlim()[0])), 10 ** np.ceil(np.log10(panel.get_xlim()[1])))
         panel.grid(alpha=0.3)
     for panel in axes[len(panels) :]:
         panel.set_axis_off()
-    axes[0].legend(fontsize="small")
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=len(handles))
     figure.savefig(path, dpi=130)
 
 
@@ -312,7 +328,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--peers-python", default=sys.executable, help="interpreter that has the peers")
     parser.add_argument("--output", type=Path, default=Path("benchmarks/results"))
-    parser.add_argument("--quick", action="store_true", help="small grids only")
+    parser.add_argument("--cells", type=int, nargs="+", default=[64, 128, 256, 512], help="cells a side of the grids")
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
     with Worker(options.peers_python) as worker:
@@ -320,7 +336,7 @@ def main() -> None:
         for peer in PEERS:
             if peer not in present:
                 print(f"{peer} is not installed for {options.peers_python}: left out")
-        runs = measure(worker, present, options.quick)
+        runs = measure(worker, present, options.cells)
     for target in TARGETS:
         print("\n" + table(runs, target))
     print("\n" + features())
