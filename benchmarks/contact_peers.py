@@ -65,8 +65,8 @@ FEATURES = (
     ("memory O(n), no FFT grid", "no", "no", "no", "yes (H²)"),
     ("several processes (MPI)", "no", "yes", "yes", "no"),
 )
-"""What each has, from the documentation and names of the versions measured, not from trials; columns: this, Tamaas, ContactMechanics,
-ASPHER.
+"""What each has, from the documentation and names of the versions measured, not from trials; columns: this, Tamaas,
+ContactMechanics, ASPHER.
 """
 
 
