@@ -9,6 +9,9 @@ IntArray = NDArray[np.int64]
 FEW = 3
 """Clusters a direction from which the jackknife stands alone: 9 clusters for the three coefficients."""
 
+DOMINANT = 0.8
+"""Share of the information on a direction above which the cluster that holds it is alone there."""
+
 
 def cluster_sums(design: FloatArray, residual: FloatArray, cluster: IntArray) -> tuple[FloatArray, FloatArray]:
     """Per cluster, Q'Q [g, r, r] and Q'e [g, r] of an orthonormal design Q [n, r] and residuals e [n]."""
@@ -27,8 +30,9 @@ def jackknife(square: FloatArray, score: FloatArray, scale: float) -> FloatArray
     CR3 of Bell & McCaffrey (2002), (G − 1)/G Σ (I − Q_g'Q_g)⁻¹ s_g s_g' (I − Q_g'Q_g)⁻¹, is the jackknife over
     clusters and errs on the wide side when there are few. But G clusters span G − 1 directions at most, and a
     direction that one cluster alone determines has no jackknife: both would come out as *certain*. So with fewer than
-    ``FEW`` clusters a direction no direction is given less than the classical variance, and with fewer clusters than
-    directions + 2 none less than the mean over directions.
+    ``FEW`` clusters a direction no direction is given less than the classical variance, with fewer clusters than
+    directions + 2 none less than the mean over directions; and however many they are, a direction that one of them
+    dominates is given no less than the worst has: how far a cluster is off as a whole, only the others tell.
     """
     count, size = score.shape
     values, vectors = np.linalg.eigh(square)
@@ -36,8 +40,22 @@ def jackknife(square: FloatArray, score: FloatArray, scale: float) -> FloatArray
     inverse = np.where(remainder > 1e-8, 1.0 / np.maximum(remainder, 1e-8), 0.0)
     moved = np.einsum("gij,gj,gkj,gk->gi", vectors, inverse, vectors, score, optimize=True)
     covariance = (count - 1) / count * moved.T @ moved
-    if count >= FEW * size:
-        return np.asarray(covariance)
-    floor = scale**2 if count >= size + 2 else max(scale**2, float(np.trace(covariance)) / size)
+    worst = max(scale**2, float(np.linalg.eigvalsh(covariance)[-1]))
+    if count < FEW * size:
+        covariance = _raise_all(
+            covariance, scale**2 if count >= size + 2 else max(scale**2, np.trace(covariance) / size)
+        )
+    return _raise_dominated(covariance, values[:, -1], vectors[..., -1], worst)
+
+
+def _raise_all(covariance: FloatArray, least: float) -> FloatArray:
+    """At least this variance along every direction."""
     values, vectors = np.linalg.eigh(covariance)
-    return np.asarray((vectors * np.maximum(values, floor)) @ vectors.T)
+    return np.asarray((vectors * np.maximum(values, least)) @ vectors.T)
+
+
+def _raise_dominated(covariance: FloatArray, share: FloatArray, direction: FloatArray, least: float) -> FloatArray:
+    """At least this variance along the directions of which one cluster alone holds most of what is known."""
+    for u in direction[share > DOMINANT]:
+        covariance = covariance + max(0.0, least - float(u @ covariance @ u)) * np.outer(u, u)
+    return covariance

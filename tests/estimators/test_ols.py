@@ -183,6 +183,27 @@ def test_large_samples_leave_statsmodels_out(samples: Make, monkeypatch: pytest.
 
 def test_a_prediction_outside_the_data_is_warned_of(samples: Make) -> None:
     model = estimators.fit(samples(300))
-    assert model.warning(2e-3, 0.05) == ""
-    assert "normal_force 1 N lies outside" in model.warning(2e-3, 1.0)
-    np.testing.assert_array_equal(model.within_domain([2e-3, 1.0], 0.05), [True, False])
+    assert model.extrapolation(2e-3, 0.05) is None
+    assert model.extrapolation(0.0, 0.05) is None  # a grasp that holds is the limit of slow slip
+    outside = model.extrapolation(1.0, 1.0)
+    assert outside is not None
+    assert "tangential velocity extrapolated to 1 m/s" in outside
+    assert "normal force extrapolated to 1 N an element" in outside
+
+
+@pytest.mark.parametrize("shared", [0.0, 0.03])
+def test_a_direction_that_one_grasp_alone_tells_is_not_taken_for_certain(shared: float) -> None:
+    """Velocity differs in one grasp of twelve: how far that grasp is off as a whole, its slope cannot tell."""
+    truth, covered = np.array([0.5, 2.0, -0.5]), np.zeros(3)
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        grasps = [_grasp_at(0.01 if g == 0 else 0.001, truth, rng, shared) for g in range(12)]
+        low, high = estimators.fit(grasps).interval(0.95).T
+        covered += (low <= truth) & (truth <= high)
+    assert (covered >= stats.binom(60, 0.95).ppf(1e-3)).all()
+
+
+def _grasp_at(velocity: float, truth: np.ndarray, rng: np.random.Generator, shared: float) -> FrictionSamples:
+    v, f_n = np.full(40, velocity), rng.uniform(0.02, 0.2, 40)
+    mu = truth @ np.stack([np.ones(40), v, f_n]) + 0.03 * rng.standard_normal(40) + shared * rng.standard_normal()
+    return FrictionSamples(mu, v, f_n, mu * f_n, np.arange(40.0), np.arange(40) % 7, np.ones(40), 1e-6)
