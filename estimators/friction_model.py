@@ -86,28 +86,21 @@ class FrictionModel:
         distance = np.hypot(scatter, special.stdtrit(self.degrees_of_freedom, quantile) * error)
         return np.asarray(mean + np.sign(quantile - 0.5) * distance)
 
-    def within_domain(self, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> NDArray[np.bool_]:
-        """Whether v and f_n lie in the range of the data; shapes broadcast."""
-        inside = [
-            (low <= np.asarray(value, float)) & (np.asarray(value, float) <= high)
-            for value, (low, high) in (
-                (tangential_velocity, self.domain.tangential_velocity),
-                (normal_force, self.domain.normal_force),
-            )
-        ]
-        return np.asarray(inside[0] & inside[1])
+    def extrapolation(self, tangential_velocity: float, normal_force: float) -> str | None:
+        """Which of v (m/s) and f_n (N an element) lies outside the data behind the model; None where neither does.
 
-    def warning(self, tangential_velocity: float, normal_force: float) -> str:
-        """What to beware of in a prediction at v and f_n: how far outside the data it lies, or "" inside."""
+        Slower than the data is not outside: slip is never observed at rest, and a grasp that holds is the limit v → 0.
+        """
         asked = (
-            ("tangential_velocity", tangential_velocity, self.domain.tangential_velocity, "m/s"),
-            ("normal_force", normal_force, self.domain.normal_force, "N"),
+            ("tangential velocity", tangential_velocity, (0.0, self.domain.tangential_velocity[1]), "m/s"),
+            ("normal force", normal_force, self.domain.normal_force, "N an element"),
         )
-        return "; ".join(
-            f"{name} {value:.4g} {unit} lies outside the data ({low:.4g} to {high:.4g} {unit})"
+        remarks = [
+            f"{name} extrapolated to {value:.4g} {unit}, observed {low:.4g} to {high:.4g}"
             for name, value, (low, high), unit in asked
             if not low <= value <= high
-        )
+        ]
+        return "; ".join(remarks) or None
 
 
 def _check_probability(name: str, value: float) -> None:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from db.records import NewModel, StoredModel
+from db.records import StoredModel
 from db.repositories import friction_models, materials
 from service.context import Context
 from service.problems import NO_MODEL, Problem
@@ -35,8 +35,8 @@ def _answer(stored: StoredModel, question: Question) -> FrictionOut:
     model = to_friction_model(stored.model)
     mean = float(model.predict(v, f_n))
     asked = mean if question.quantile is None else float(model.predict(v, f_n, quantile=question.quantile))
-    outside = _outside(stored.model, question)
-    warnings = [*outside, *(["the answer is not above 0: nothing is known of the friction there"] * (asked <= 0.0))]
+    outside = model.extrapolation(v, f_n)
+    nothing = "the answer is not above 0: nothing is known of the friction there" if asked <= 0.0 else None
     return FrictionOut(
         material=stored.material,
         method=stored.model.method,
@@ -46,23 +46,6 @@ def _answer(stored: StoredModel, question: Question) -> FrictionOut:
         quantile=question.quantile,
         friction_coefficient=asked,
         mean=mean,
-        within_domain=not outside,
-        warning="; ".join(warnings) or None,
+        within_domain=outside is None,
+        warning="; ".join(filter(None, (outside, nothing))) or None,
     )
-
-
-def _outside(model: NewModel, question: Question) -> list[str]:
-    """What of the question lies outside the range of the samples behind the model.
-
-    Slower is not outside: no sample can be slower than what a detector tells from rest, and the planner's question is
-    the limit v → 0.
-    """
-    asked = {
-        "tangential velocity": (question.tangential_velocity, (0.0, model.tangential_velocity[1]), "m/s"),
-        "normal force": (question.normal_force, model.normal_force, "N"),
-    }
-    return [
-        f"{name} is {value:.4g} {unit}, outside the samples' range of {low:.4g} to {high:.4g} {unit}"
-        for name, (value, (low, high), unit) in asked.items()
-        if not low <= value <= high
-    ]

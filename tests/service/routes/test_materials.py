@@ -118,7 +118,7 @@ def test_a_low_quantile_lies_below_the_mean_and_a_high_one_above(client: httpx.C
 @pytest.mark.usefixtures("fitted")
 @pytest.mark.parametrize(
     ("query", "word"),
-    [({"fn": 50.0}, "normal force is 50 N, outside"), ({"fn": 0.1, "v": 3.0}, "tangential velocity is 3 m/s, outside")],
+    [({"fn": 50.0}, "normal force extrapolated to 50 N"), ({"fn": 0.1, "v": 3.0}, "tangential velocity extrapolated to 3 m/s")],
 )
 def test_a_question_outside_the_samples_is_answered_with_a_warning(
     client: httpx.Client, query: dict[str, float], word: str
