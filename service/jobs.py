@@ -77,6 +77,10 @@ class JobPool:
             logger.warning("job %s waits: %s", job_id, error)
             await asyncio.sleep(RETRY_SECONDS)
             ended = False
+        except Exception as error:  # a lane outlives whatever one job throws at it
+            logger.exception("job %s failed outside its stages", job_id)
+            await asyncio.to_thread(self._fail, job_id, f"{type(error).__name__}: {error}")
+            ended = True
         if not ended:
             self._queue.put_nowait(job_id)
 
@@ -89,6 +93,13 @@ class JobPool:
                 await lane.hire()
                 return not await asyncio.to_thread(self._count_death, job_id)
         return True
+
+    def _fail(self, job_id: str, reason: str) -> None:
+        try:
+            with self._database.write() as session:
+                jobs.finish(session, job_id, "failed", reason=reason)
+        except Exception:
+            logger.exception("job %s could not be marked as failed; the next start takes it up", job_id)
 
     def _count_death(self, job_id: str) -> bool:
         """Note that the job lost its worker; False if that was once too often."""

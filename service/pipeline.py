@@ -17,7 +17,7 @@ from db.blobs import BlobStore
 from db.database import Database
 from db.records import Detection, Job, SampleSummary, StoredGraspLog
 from db.repositories import detections, friction_models, grasp_logs, jobs, materials
-from estimators import FrictionModel
+from estimators import EstimatorError, FrictionModel
 from service import formats
 from service.stored_results import (
     decode_samples,
@@ -27,7 +27,7 @@ from service.stored_results import (
     summarise_samples,
     to_new_model,
 )
-from slipcore import FrictionSamples, GraspLog, SlipHistory
+from slipcore import FrictionSamples, GraspLog, SlipcoreError, SlipHistory
 
 
 class Refused(Exception):
@@ -54,7 +54,7 @@ class Run:
 
 
 def run_job(database: Database, blobs: BlobStore, job_id: str) -> None:
-    """Do a job to its end: done, or refused where the data do not allow it."""
+    """Do a job to its end: done, or refused where the data do not allow it (or no chain of theirs converges)."""
     with database.read() as session:
         job = jobs.get(session, job_id)
     if job.finished_at is not None:
@@ -62,7 +62,7 @@ def run_job(database: Database, blobs: BlobStore, job_id: str) -> None:
     run = Run(database, blobs, job, dict(job.seconds))
     try:
         _take_through_the_stages(run)
-    except Refused as refusal:
+    except (Refused, SlipcoreError, EstimatorError) as refusal:
         with database.write() as session:
             jobs.finish(session, job.id, "refused", reason=str(refusal), seconds=run.seconds)
 
@@ -138,10 +138,7 @@ def _fit(run: Run, parts: Mapping[str, str]) -> FrictionModel:
     if not parts:
         raise Refused("no grasp log of this material has friction samples yet")
     samples = [decode_samples(run.blobs.path(blob)) for blob in parts.values()]
-    try:
-        return estimators.fit(samples, method=run.job.method, seed=run.job.seed)
-    except estimators.InvalidSamples as error:
-        raise Refused(str(error)) from error
+    return estimators.fit(samples, method=run.job.method, seed=run.job.seed)
 
 
 def _store_model(run: Run, material_id: int, model: FrictionModel, parts: Mapping[str, str]) -> bool:

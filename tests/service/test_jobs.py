@@ -174,3 +174,16 @@ def test_stopping_leaves_what_has_not_begun_for_the_next_start(
     working(do, until_begun)
     assert sorted(begun) == sorted(queued[:2])
     assert [get(database, job_id).status for job_id in queued] == ["done", "done", "queued", "queued"]
+
+
+def test_a_lane_outlives_what_a_job_throws_at_it(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    def do(_place: Place, job_id: str) -> None:
+        if job_id == queued[0]:
+            raise RuntimeError("database disk image is malformed")
+        finish(database, job_id)
+
+    working(do, until_finished(database, queued), workers=1)
+    assert [get(database, job_id).status for job_id in queued] == ["failed", "done", "done", "done"]
+    assert "malformed" in (get(database, queued[0]).reason or "")

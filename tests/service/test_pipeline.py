@@ -14,6 +14,7 @@ from db.repositories import detections, friction_models, grasp_logs, jobs, mater
 from service import pipeline
 from service.stored_results import SAMPLE_ARRAYS, encode_samples, summarise_samples
 from slipcore import FrictionSamples, GraspLog
+from stiction_client.container import encode
 
 NOTHING_DETECTED = Detection("strain_rate", None, None, 0, 0, 0, 0, 0, 0, 0.1, "0" * 64)
 
@@ -174,6 +175,20 @@ def test_too_few_samples_are_refused_with_the_reason(shop: Shop, content: bytes,
     assert "2" in job.reason
     assert "allowed" in job.reason
     assert shop.material().models == ()
+
+
+def test_a_lattice_on_which_no_strain_can_be_told_is_refused_with_the_reason(shop: Shop, ramp: GraspLog) -> None:
+    assert ramp.force is not None
+    row = GraspLog(
+        time=ramp.time,
+        position=ramp.position[:1],
+        displacement=ramp.displacement[:, :1],
+        element_area=ramp.element_area,
+        force=ramp.force[:, :1],
+    )
+    job = shop.run(shop.ingest(encode(row))[1])
+    assert job.status == "refused"
+    assert "position is 1 ×" in (job.reason or "")
 
 
 def test_a_repeated_fit_is_a_version_of_its_own(shop: Shop, content: bytes) -> None:
