@@ -37,7 +37,10 @@ class Spool:
 
     def flush(self) -> None:
         """Let readers of ``path`` see all that was written."""
-        self._file.flush()
+        try:
+            self._file.flush()
+        except OSError as error:
+            raise StorageUnavailable(f"blob folder: {error}") from error
 
     @property
     def sha256(self) -> str:
@@ -63,8 +66,12 @@ class Spool:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._file.close()
-        self.path.unlink(missing_ok=True)
+        try:
+            self._file.close()  # what is still buffered may find the disk full once more
+        except OSError as fault:
+            raise StorageUnavailable(f"blob folder: {fault}") from fault
+        finally:
+            self.path.unlink(missing_ok=True)
 
 
 class BlobStore:

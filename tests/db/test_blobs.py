@@ -133,3 +133,31 @@ def test_a_folder_that_takes_no_files_is_named(blobs: BlobStore, tmp_path: Path)
     (tmp_path / "spool").rmdir()
     with pytest.raises(StorageUnavailable, match="blob folder"):
         blobs.ping()
+
+
+def test_a_disk_that_is_full_at_the_last_bytes_leaves_nothing(
+    blobs: BlobStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class FullDisk:
+        """A file whose buffer finds no room on the disk, neither when it is flushed nor when it is closed."""
+
+        def __init__(self, path: Path) -> None:
+            path.touch()
+
+        def write(self, chunk: bytes) -> int:
+            return len(chunk)
+
+        def flush(self) -> None:
+            raise OSError(28, "No space left on device")
+
+        close = flush
+
+    def upload() -> None:
+        with blobs.spool() as spool:
+            spool.write(CONTENT)
+            spool.flush()
+
+    monkeypatch.setattr(Path, "open", lambda path, _mode: FullDisk(path))
+    with pytest.raises(StorageUnavailable, match="No space left"):
+        upload()
+    assert files(tmp_path) == []
