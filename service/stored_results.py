@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from db.records import Detection, NewModel, SampleSummary
 from estimators.friction_model import Cost, Domain, FrictionModel
+from service.formats.npy import HEADER_LOCK
 from slipcore.frames import FloatArray
 from slipcore.samples import FrictionSamples
 from slipcore.slip_state import EventList, SlipEvents, SlipHistory
@@ -148,5 +149,5 @@ def _pack(arrays: Sequence[NDArray[Any]]) -> bytes:
 
 
 def _unpack(path: Path, count: int) -> list[NDArray[Any]]:
-    with path.open("rb") as stream:
+    with path.open("rb") as stream, HEADER_LOCK:
         return [np.load(stream, allow_pickle=False) for _ in range(count)]

@@ -1,6 +1,7 @@
 """One array in the .npy format, read from bytes that nobody vouches for."""
 
 import math
+import threading
 from typing import IO, Any
 
 import numpy as np
@@ -41,12 +42,17 @@ def read_array(stream: IO[bytes], name: str, size: int) -> NDArray[Any]:
     return np.frombuffer(content, dtype).reshape(shape, order="F" if fortran_order else "C")
 
 
+HEADER_LOCK = threading.Lock()
+"""numpy parses a header by building a syntax tree, which CPython 3.11 does not do safely in several threads at once."""
+
+
 def _header(stream: IO[bytes], name: str) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     try:
         version = np.lib.format.read_magic(stream)
-        shape, fortran_order, dtype = _HEADER_READERS[version](stream, max_header_size=MAX_HEADER_BYTES)
-    except OSError:
-        raise
+        with HEADER_LOCK:
+            shape, fortran_order, dtype = _HEADER_READERS[version](stream, max_header_size=MAX_HEADER_BYTES)
+    except (OSError, MemoryError, SystemError):
+        raise  # the machine's fault, not the file's
     except Exception as error:  # numpy's parser answers hostile bytes with whatever its parts raise
         detail = str(error).splitlines()[0][:100] if str(error) else type(error).__name__
         raise InvalidInput(name, f"not a .npy array ({detail})", "the .npy format, version 1.0 or 2.0") from error
