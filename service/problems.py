@@ -79,7 +79,7 @@ class Problem(Exception):
     @classmethod
     def wrong_value(cls, kind: ProblemType, name: str, value: object, allowed: str) -> "Problem":
         """One named thing has a value that is not allowed."""
-        shown = str(value)[:LONGEST_VALUE]
+        shown = str(value)[:LONGEST_VALUE].encode(errors="backslashreplace").decode()  # a lone surrogate is not UTF-8
         return cls(kind, f"{name} is {shown}; allowed: {allowed}", name=name, value=shown, allowed=allowed)
 
 

@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 from pydantic.config import JsonDict
 
 from db.records import Job, JobKind, JobStatus, Material, StoredGraspLog, StoredModel
@@ -64,6 +64,13 @@ class NewMaterial(BaseModel):
 
     name: Annotated[str, Field(pattern=NAME_PATTERN, description="1 to 100 letters, digits, spaces and `._-`.")]
     description: Annotated[str, Field(max_length=10_000)] = ""
+
+    @field_validator("description")
+    @classmethod
+    def _storable(cls, description: str) -> str:
+        if "\0" in description or any("\ud800" <= letter <= "\udfff" for letter in description):
+            raise ValueError("text without NUL and lone surrogates")
+        return description
 
 
 class NewFit(BaseModel):

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
+from sqlalchemy import URL
 
 MIB = 2**20
 
@@ -54,4 +55,5 @@ class Settings(BaseSettings):
     @property
     def resolved_database_url(self) -> str:
         """The database's URL: the one that was set, or that of the SQLite file in the data folder."""
-        return self.database_url or f"sqlite:///{self.data_folder.resolve() / 'stiction.sqlite3'}"
+        file = self.data_folder.resolve() / "stiction.sqlite3"
+        return self.database_url or URL.create("sqlite", database=str(file)).render_as_string()

@@ -36,6 +36,12 @@ router = APIRouter(prefix="/v1/materials", tags=["materials"], route_class=JsonR
 
 Finite = Query(allow_inf_nan=False, ge=0.0)
 
+LARGEST_FORCE, LARGEST_VELOCITY = 1e4, 1e3
+"""N on one element, as of an uploaded log, and m/s: beyond, a question is a mistake of units."""
+
+SMALLEST_TAIL = 1e-12
+"""As the planner's smallest slip probability; a Student-t quantile further out says nothing of friction."""
+
 
 @router.post(
     "",
@@ -80,10 +86,18 @@ def read_material(context: Given, name: str) -> MaterialOut:
 def read_friction(
     context: Given,
     name: str,
-    fn: Annotated[float, Finite, Query(description="Normal force on an element, N", examples=[0.05])],
-    v: Annotated[float, Finite, Query(description="Tangential velocity, m/s", examples=[0.0])] = 0.0,
+    fn: Annotated[float, Finite, Query(le=LARGEST_FORCE, description="Normal force on an element, N", examples=[0.05])],
+    v: Annotated[
+        float, Finite, Query(le=LARGEST_VELOCITY, description="Tangential velocity, m/s", examples=[0.0])
+    ] = 0.0,
     quantile: Annotated[
-        float | None, Query(gt=0.0, lt=1.0, description="Of a new observation of μ; the mean without", examples=[0.05])
+        float | None,
+        Query(
+            ge=SMALLEST_TAIL,
+            le=1.0 - SMALLEST_TAIL,
+            description="Of a new observation of μ; the mean without",
+            examples=[0.05],
+        ),
     ] = None,
     method: Annotated[FitMethod, Query(description="Whose current model answers")] = "ols",
 ) -> FrictionOut:

@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
+from sqlalchemy import make_url
 
 from service.settings import Settings
 
@@ -50,3 +51,9 @@ def test_a_setting_comes_from_the_environment(monkeypatch: pytest.MonkeyPatch, t
 def test_a_value_outside_its_range_is_refused_by_name(name: str, value: object) -> None:
     with pytest.raises(ValidationError, match=name):
         Settings.model_validate({name: value})
+
+
+def test_the_database_stands_in_the_data_folder_whatever_its_name(tmp_path: Path) -> None:
+    folder = tmp_path / "we?ird#100%"
+    url = make_url(Settings(data_folder=folder).resolved_database_url)
+    assert url.database == str(folder / "stiction.sqlite3")

@@ -293,3 +293,14 @@ def test_one_frames_pose_and_normals_get_the_checks_of_a_log() -> None:
 def test_the_error_carries_name_value_and_allowed_through_pickling() -> None:
     error = pickle.loads(pickle.dumps(InvalidInput("force", 3, "less")))
     assert (error.name, error.value, error.allowed, str(error)) == ("force", "3", "less", "force is 3; allowed: less")
+
+
+@pytest.mark.parametrize("time", [[-1.7e308, 0.0, 1.7e308], [0.0, 0.1, 1e8], [1e15, 1e15 + 1, 1e15 + 2]])
+def test_a_time_that_no_recording_has_is_refused(time: list[float]) -> None:
+    with pytest.raises(InvalidInput, match="time is"):
+        GraspLog(
+            time=np.array(time),
+            position=np.zeros((1, 1, 3)),
+            displacement=np.zeros((3, 1, 1, 3)),
+            element_area=1e-6,
+        )

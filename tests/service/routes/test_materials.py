@@ -118,7 +118,10 @@ def test_a_low_quantile_lies_below_the_mean_and_a_high_one_above(client: httpx.C
 @pytest.mark.usefixtures("fitted")
 @pytest.mark.parametrize(
     ("query", "word"),
-    [({"fn": 50.0}, "normal force extrapolated to 50 N"), ({"fn": 0.1, "v": 3.0}, "tangential velocity extrapolated to 3 m/s")],
+    [
+        ({"fn": 50.0}, "normal force extrapolated to 50 N"),
+        ({"fn": 0.1, "v": 3.0}, "tangential velocity extrapolated to 3 m/s"),
+    ],
 )
 def test_a_question_outside_the_samples_is_answered_with_a_warning(
     client: httpx.Client, query: dict[str, float], word: str
@@ -183,3 +186,26 @@ def test_head_is_get_without_the_body(client: httpx.Client, material: str) -> No
         assert head.content == b""
         assert head.headers["content-length"] == get.headers["content-length"] == str(len(get.content))
         assert head.headers["content-type"] == get.headers["content-type"]
+
+
+@pytest.mark.usefixtures("fitted")
+@pytest.mark.parametrize(
+    ("query", "name"),
+    [
+        ({"fn": 0.1, "quantile": 1e-300}, "quantile"),
+        ({"fn": 1e308}, "fn"),
+        ({"fn": 0.1, "v": 1e155, "quantile": 0.05}, "v"),
+    ],
+)
+def test_a_question_that_no_number_answers_is_refused(client: httpx.Client, query: dict[str, float], name: str) -> None:
+    answer = client.get("/v1/materials/fitted/friction", params=query)
+    assert answer.status_code == 422
+    assert answer.json()["name"] == name
+
+
+@pytest.mark.parametrize("description", ["\\ud800", "\\u0000"])
+def test_a_description_that_no_database_holds_is_refused(client: httpx.Client, description: str) -> None:
+    body = '{"name": "odd", "description": "' + description + '"}'
+    answer = client.post("/v1/materials", content=body, headers={"Content-Type": "application/json"})
+    assert answer.status_code == 422
+    assert answer.json()["name"] == "description"
