@@ -1,21 +1,25 @@
 """Which error ends a command with which exit code."""
 
 INPUT_REFUSED = 3
+FAILURE = 1
 SERVICE_REFUSED = 4
 NOT_FEASIBLE = 5
 
 
 def exit_code(error: Exception) -> int | None:
     """Exit code of an error that a user can act upon; None for one that is ours (a traceback is due)."""
-    from db.errors import DatabaseError
-    from stiction_client.errors import NoFeasibleForce, StictionError
+    from pydantic import ValidationError
 
+    from db.errors import DatabaseError
     from estimators.errors import EstimatorError
     from slipcore.errors import SlipcoreError
+    from stiction_client.errors import InvalidArgument, NoFeasibleForce, StictionError
 
     codes: list[tuple[type[Exception], int]] = [
         (NoFeasibleForce, NOT_FEASIBLE),
+        (InvalidArgument, INPUT_REFUSED),
         (StictionError, SERVICE_REFUSED),
+        (ValidationError, INPUT_REFUSED),  # a setting outside its range
         (DatabaseError, INPUT_REFUSED),
         (EstimatorError, INPUT_REFUSED),
         (SlipcoreError, INPUT_REFUSED),

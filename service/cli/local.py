@@ -15,24 +15,34 @@ if TYPE_CHECKING:
 Log = Annotated[
     Path, typer.Argument(help="A grasp log: Stiction NPZ, a Tac3D recording folder, or that folder zipped.")
 ]
+DETECTOR_HELP = "Slip detector (docs/detector.md); the best one where none is named."
 Logs = Annotated[list[Path], typer.Argument(help="Grasp logs of one material, each one grasp.")]
-Method = Annotated[str, typer.Option("--method", help="Slip detector.")]
+
+
+def _as_png(path: Path | None) -> Path | None:
+    if path is not None and path.suffix.lower() != ".png":
+        raise typer.BadParameter(f"{path.name}; allowed: a name that ends in .png")
+    return path
+
+
+Picture = Annotated[Path | None, typer.Option(callback=_as_png, help="Write a picture of slip over time to this PNG.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
 
 
 def detect(
     log: Log,
-    method: Method = "strain_rate",
+    method: Annotated[str | None, typer.Option(help=DETECTOR_HELP)] = None,
     json: Json = False,
-    picture: Annotated[Path | None, typer.Option(help="Write a picture of slip over time to this PNG.")] = None,
+    picture: Picture = None,
 ) -> None:
     """Detect local slip in one grasp log and say what was seen."""
     from service import formats
     from slipcore import detect_slip
+    from slipcore.defaults import DEFAULT_METHOD
 
     grasp = formats.read(log)
     start = perf_counter()
-    history = detect_slip(grasp, method=method)
+    history = detect_slip(grasp, method=method or DEFAULT_METHOD)
     seconds = perf_counter() - start
     if picture is not None:
         from service.report.pictures import save, slip_over_time
@@ -42,25 +52,30 @@ def detect(
     if json:
         print_json(summary | {"time": history.time, "stick_ratio": history.stick_ratio})
     else:
-        print_table(f"{log.name}: local slip by {method}", ("", ""), list(summary.items()))
+        print_table(
+            f"{log.name}: local slip by {history.method}",
+            ("", ""),
+            [(name.replace("_", " "), value) for name, value in summary.items()],
+        )
 
 
 def fit(
     logs: Logs,
-    method: Annotated[str, typer.Option("--method", help="Estimator: ols or bayes.")] = "ols",
-    detector: Annotated[str, typer.Option(help="Slip detector.")] = "strain_rate",
-    seed: Annotated[int, typer.Option(help="Seed of the sampler.")] = 0,
+    method: Annotated[str, typer.Option("--method", help="Estimator: ols, robust, conjugate, bayes or auto.")] = "ols",
+    detector: Annotated[str | None, typer.Option(help=DETECTOR_HELP)] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the sampler.")] = 0,
     json: Json = False,
 ) -> None:
     """Fit the stochastic linear friction model to the slip seen in one or more grasp logs."""
     from estimators import fit as fit_model
     from service import formats
     from slipcore import collect_samples, detect_slip
+    from slipcore.defaults import DEFAULT_METHOD
 
     grasps = []
     for path in logs:
         grasp = formats.read(path)
-        grasps.append(collect_samples(grasp, detect_slip(grasp, method=detector)))
+        grasps.append(collect_samples(grasp, detect_slip(grasp, method=detector or DEFAULT_METHOD)))
     model = fit_model(grasps, method=method, seed=seed)
     if json:
         print_json(model_record(model))
@@ -112,14 +127,14 @@ def _detection_summary(log: "GraspLog", history: "SlipHistory", seconds: float) 
     return {
         "method": history.method,
         "frames": len(log),
-        "duration_s": round(float(log.time[-1] - log.time[0]), 6),
-        "frames in contact": int(in_contact.sum()),
-        "frames in macro slip": int(history.macro_slip.sum()),
-        "smallest stick ratio": float(np.nanmin(history.stick_ratio)) if in_contact.any() else None,
-        "slip onsets": len(events.onset),
-        "slip ends": len(events.end),
+        "duration": round(float(log.time[-1] - log.time[0]), 6),
+        "frames_in_contact": int(in_contact.sum()),
+        "frames_in_macro_slip": int(history.macro_slip.sum()),
+        "smallest_stick_ratio": float(np.nanmin(history.stick_ratio)) if in_contact.any() else None,
+        "slip_onsets": len(events.onset),
+        "slip_ends": len(events.end),
         "touches": len(events.touch),
         "releases": len(events.release),
-        "marker noise_m": history.noise,
+        "marker_noise": history.noise,
         "seconds": round(seconds, 6),
     }

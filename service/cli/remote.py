@@ -2,14 +2,15 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from service.cli.exit_codes import FAILURE, INPUT_REFUSED, SERVICE_REFUSED
 from service.cli.output import print_json, print_table
 
 if TYPE_CHECKING:
-    from stiction_client import FrictionModel
+    from stiction_client import FrictionClient, FrictionModel
 
 Url = Annotated[str, typer.Option("--url", envvar="STICTION_URL", help="Address of the service.")]
 Key = Annotated[str | None, typer.Option("--key", envvar="STICTION_KEY", help="Access key, where the service asks.")]
@@ -17,6 +18,9 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to 
 MaterialName = Annotated[str, typer.Argument(help="Name of a material.")]
 Method = Annotated[str, typer.Option("--method", help="Which current model: ols or bayes.")]
 Velocity = Annotated[float, typer.Option("--velocity", help="Tangential velocity of the slip, m/s.")]
+
+CODE_OF_STATUS = {"failed": FAILURE, "refused": INPUT_REFUSED, "rejected": SERVICE_REFUSED}
+"""How an upload ended, as an exit code: our fault, data that allow no fit, a file that the service does not take."""
 
 DEFAULT_URL = "http://127.0.0.1:8000"
 
@@ -35,19 +39,20 @@ def upload(
     """Upload grasp logs and wait until their slip is detected and the material's model is fitted."""
     from stiction_client import FrictionClient
 
-    results = []
+    if create and material is None:
+        raise typer.BadParameter("--create needs --material")
     with FrictionClient(url, key=key) as client:
         if create and material is not None:
             client.ensure_material(material)
-        for path in logs:
-            receipt = client.upload(path, material=material)
-            job = client.wait(receipt.job) if wait else receipt.job
-            results.append({"file": path.name, "grasp_log": receipt.id, **asdict(job)})
+        results = [_upload(client, path, material, wait) for path in logs]
     if json:
         print_json({"uploads": results})
-        return
-    columns = ("file", "grasp_log", "status", "reason", "model_version")
-    print_table("Uploads", columns, [["" if r[c] is None else r[c] for c in columns] for r in results])
+    else:
+        columns = ("file", "grasp_log", "status", "reason", "model_version")
+        print_table(
+            "Uploads", columns, [["" if (cell := r.get(c)) is None else cell for c in columns] for r in results]
+        )
+    raise typer.Exit(max(CODE_OF_STATUS.get(result["status"], 0) for result in results))
 
 
 def lookup(
@@ -101,6 +106,18 @@ def plan(
         print_json(asdict(answer))
     else:
         print_table(f"Grip for {load:g} N on {material}", ("", ""), list(asdict(answer).items()))
+
+
+def _upload(client: "FrictionClient", path: Path, material: str | None, wait: bool) -> dict[str, Any]:
+    """Upload one file; that the service does not take it is a result like any other."""
+    from stiction_client import ProblemError
+
+    try:
+        receipt = client.upload(path, material=material)
+    except ProblemError as problem:
+        return {"file": path.name, "status": "rejected", "reason": str(problem)}
+    job = client.wait(receipt.job) if wait else receipt.job
+    return {"file": path.name, "grasp_log": receipt.id, **asdict(job)}
 
 
 def _middle_force(model: "FrictionModel") -> float:

@@ -5,6 +5,8 @@ from typing import Annotated, Any
 
 import typer
 
+from service.cli.exit_codes import FAILURE
+
 
 def serve(
     host: Annotated[str | None, typer.Option(help="Address to listen on.")] = None,
@@ -20,7 +22,10 @@ def serve(
 
     given: dict[str, Any] = {"host": host, "port": port, "data_folder": data_folder, "database_url": database_url}
     settings = Settings(**{name: value for name, value in given.items() if value is not None})
-    uvicorn.run(create_app(settings), host=settings.host, port=settings.port)
+    server = uvicorn.Server(uvicorn.Config(create_app(settings), host=settings.host, port=settings.port))
+    server.run()
+    if not server.started:  # its log says why
+        raise typer.Exit(FAILURE)
 
 
 def demo(
@@ -28,7 +33,7 @@ def demo(
     recordings: Annotated[
         Path | None, typer.Option(help="Folder of real Tac3D recordings; left out where it isn't there.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the simulated sensor noise and of the sampler.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the simulated sensor noise and of the sampler.")] = 0,
 ) -> None:
     """Run the whole path on real input: recordings in, friction of each material, a planner's answer, a report."""
     from service.demo.run import run_demo

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from service.cli.local import Picture
 from service.cli.output import print_json, print_table
 from service.cli.progress import patience
 
@@ -23,9 +24,9 @@ def simulate(
         float | None, typer.Option(help="Largest error of stick ratio (absolute), displacement and force (relative).")
     ] = None,
     seconds: Annotated[float | None, typer.Option(help="Time to spend, s.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of random fields and of noise.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of random fields and of noise.")] = 0,
     output: Annotated[Path | None, typer.Option(help="Write the grasp log with its truth to this NPZ.")] = None,
-    picture: Annotated[Path | None, typer.Option(help="Write a picture of the true slip to this PNG.")] = None,
+    picture: Picture = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")] = False,
 ) -> None:
     """Simulate a grasp whose slip, forces and friction are known."""

@@ -12,8 +12,10 @@ from service.cli.exit_codes import INPUT_REFUSED, NOT_FEASIBLE, SERVICE_REFUSED
 from service.cli.output import plain
 from service.demo.server import running_server
 from slipcore.contact import tangential_ramp
+from slipcore.contact.ramp import RampSchedule
 from stiction_client import container
 
+WRONG_USAGE = 2
 Run = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).parents[2]
 
@@ -67,7 +69,7 @@ def test_detect_tells_a_program_what_was_seen(run: Run, ramps: list[Path], tmp_p
     code, out, _ = run("detect", ramps[0], "--json", "--picture", picture)
     seen = json.loads(out)
     assert code == 0
-    assert seen["slip onsets"] > 0
+    assert seen["slip_onsets"] > 0
     assert len(seen["time"]) == len(seen["stick_ratio"]) == seen["frames"]
     assert picture.read_bytes().startswith(b"\x89PNG")
 
@@ -153,6 +155,48 @@ def test_upload_lookup_and_plan_go_through_a_real_service(run: Run, ramps: list[
     assert code == 0
     assert json.loads(out)["normal_force"] > 2.0  # more than load/μ: the planner gets a quantile, not a mean
     assert run(*grip, "--load", 1e6, "--limit", 50.0)[0] == NOT_FEASIBLE
+
+
+def test_what_becomes_of_an_upload_shows_in_the_exit_code(
+    run: Run, ramps: list[Path], url: str, tmp_path: Path
+) -> None:
+    still = tmp_path / "still.npz"
+    container.write(tangential_ramp(tangential_force=0.0, schedule=RampSchedule(shear=0.5)), still)
+    code, out, _ = run("upload", still, ramps[0], "--material", "still", "--create", "--url", url, "--json")
+    first, second = json.loads(out)["uploads"]
+    assert (code, first["status"], second["status"]) == (INPUT_REFUSED, "refused", "done")
+    assert "slip" in first["reason"]
+
+    noise = tmp_path / "noise.npz"
+    noise.write_bytes(b"not a log at all")
+    code, out, _ = run("upload", noise, ramps[1], "--url", url, "--json")
+    first, second = json.loads(out)["uploads"]
+    assert (code, first["status"], second["status"]) == (SERVICE_REFUSED, "rejected", "done")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("upload", "x.npz", "--create"),
+        ("fit", "x.npz", "--seed", -1),
+        ("detect", "x.npz", "--picture", "x.foo"),
+    ],
+)
+def test_wrong_usage_is_told_from_refused_input(run: Run, arguments: tuple[object, ...]) -> None:
+    assert run(*arguments)[0] == WRONG_USAGE
+
+
+def test_a_setting_out_of_range_is_refused_by_name(run: Run) -> None:
+    code, _, err = run("serve", "--port", 99999)
+    assert code == INPUT_REFUSED
+    assert "port" in err
+
+
+def test_an_argument_that_cannot_be_is_refused_before_anything_is_asked(run: Run, url: str) -> None:
+    run("upload", "--help")
+    code, _, err = run("lookup", "..", "--url", url)
+    assert code == INPUT_REFUSED
+    assert "allowed" in err
 
 
 def test_an_unknown_material_is_named(run: Run, url: str) -> None:
