@@ -110,9 +110,7 @@ class _Capacity:
 
     @classmethod
     def of(cls, model: FrictionModel, tangential_velocity: float, slip_probability: float) -> "_Capacity":
-        scatter, error = special.stdtrit(
-            [model.scatter_degrees_of_freedom, model.degrees_of_freedom], slip_probability
-        )
+        scatter, error = special.stdtrit([model.scatter_degrees_of_freedom, model.degrees_of_freedom], slip_probability)
         if not np.isfinite([*model.coefficients, *model.covariance.flat, model.scale, scatter, error]).all():
             raise InvalidArgument("model", "not finite at this slip probability", "finite coefficients and quantile")
         variance, axes = np.linalg.eigh(model.covariance)
