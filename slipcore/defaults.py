@@ -26,8 +26,8 @@ class Limits:
     """m²; 1 µm to 100 mm pitch."""
     median_interval: tuple[float, float] = (1e-6, 60.0)
     """s; 1 MHz down to one frame a minute. A longer single gap is allowed."""
-    span: float = 1e7
-    """s from the first frame to the last; four months. Microseconds taken for seconds go beyond."""
+    span: float = 1e9
+    """s from the first frame to the last; thirty years. A clock that was set meanwhile shows more."""
     yaw: float = 1e3
     """rad, cumulative."""
     normal_length: float = 1e-3
