@@ -266,7 +266,7 @@ class SampleOptions(Options):
     """Least probability of slip."""
 
 
-DEFAULT_METHOD = "filter"
+DEFAULT_METHOD = "strain_rate"
 
 Kind = TypeVar("Kind", bound=Options)
 

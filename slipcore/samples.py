@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,8 @@ from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.noise import estimate_noise
 from slipcore.slip_state import SlipHistory
 from slipcore.strain import Lattice, lattice_steps, surface_normal
+
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,10 +85,11 @@ def collect_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
     forces = element_forces(log.force, _normals(log))
     noise = _force_noise(log, forces, chosen)
     speed = np.sqrt(np.vecdot(history.velocity, history.velocity))
+    weight = _before(history.probability)
     keep = (
-        history.slip
+        _before(history.slip)
         & history.contact
-        & (history.probability >= chosen.least_weight)
+        & (weight >= chosen.least_weight)
         & _fast_enough(log, history, speed, chosen)
         & _pressed_enough(forces, noise.normal, chosen)
     )
@@ -99,9 +102,20 @@ def collect_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
         tangential_force=f_t,
         time=log.time[frame],
         element=element.astype(np.int64),
-        weight=history.probability[keep],
+        weight=weight[keep],
         element_area=log.element_area,
     )
+
+
+def _before(field: NDArray[Scalar]) -> NDArray[Scalar]:
+    """The field [t, ...] as it was one frame earlier; zero in the first.
+
+    A detector that looks at the forces finds slip where their noise raises f_t/f_n: samples that it chose by their own
+    noise would be biased. The noise of the frame before is independent of theirs.
+    """
+    earlier = np.zeros_like(field)
+    earlier[1:] = field[:-1]
+    return earlier
 
 
 def _normals(log: GraspLog) -> FloatArray:
