@@ -19,7 +19,7 @@ from slipcore.contact import tangential_ramp
 
 FRICTION = (0.25, 0.45, 0.8)
 NORMAL_FORCES = (4.0, 6.0, 9.0, 13.0)
-DETECTORS = ("strain_rate", "strain_rate_literal")
+DETECTORS = ("filter", "strain_rate", "strain_rate_literal")
 ESTIMATORS = ("ols", "bayes")
 MARKER_NOISE, FORCE_NOISE = 1e-6, 2e-3
 
@@ -111,7 +111,7 @@ def _row(rows: list[Finding]) -> str:
 
 def picture(found: list[Finding]) -> Figure:
     """Relative error of β₀ with its interval, one column a detector and estimator."""
-    figure = Figure(figsize=(10, 3.6), layout="constrained")
+    figure = Figure(figsize=(13, 3.6), layout="constrained")
     panels = [(d, e) for d in DETECTORS for e in ESTIMATORS]
     for axes, (detector, estimator) in zip(figure.subplots(1, len(panels), sharey=True), panels, strict=True):
         rows = [f for f in found if (f.detector, f.estimator) == (detector, estimator) and f.estimate is not None]
