@@ -69,9 +69,9 @@ def test_a_job_whose_worker_is_killed_is_done_by_the_next_one(
     job = upload(client, content, material=material).json()["job"]["id"]
     while client.get(f"/v1/jobs/{job}").json()["stage"] is None:
         time.sleep(0.001)
-    (process,) = multiprocessing.active_children()
-    assert process.pid is not None
-    os.kill(process.pid, signal.SIGKILL)
+    for process in multiprocessing.active_children():  # another server of this process may have its own
+        assert process.pid is not None
+        os.kill(process.pid, signal.SIGKILL)
     done = wait(client, job)
     assert (done["status"], done["model_version"]) == ("done", 1)
     assert len(client.get(f"/v1/materials/{material}/fits").json()["items"]) == 1
