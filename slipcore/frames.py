@@ -23,6 +23,8 @@ class Frame(NamedTuple):
     force: FloatArray | None
     object_pose: FloatArray | None
     normal: FloatArray | None = None
+    contact: BoolArray | None = None
+    observed: BoolArray | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +66,11 @@ class GraspLog:
     Shapes and units: ``time`` [t] s, strictly increasing, gaps allowed; ``position`` [n, m, 3] m, markers at rest;
     ``displacement`` [t, n, m, 3] m; ``element_area`` m²; ``force`` [t, n, m, 3] N on each element by the object, or
     None; ``normal`` [t, n, m, 3], outward unit vectors, or None (then taken from the deformed shape); ``object_pose``
-    [t, 3], x m, y m and yaw rad of the object relative to the sensor, or None.
+    [t, 3], x m, y m and yaw rad of the object relative to the sensor, or None; ``contact`` [t, n, m] bool where it is
+    known otherwise than from force or shape, or None; ``observed`` [t, n, m] bool, or None for all: where it is False
+    no marker tells of the element, and its displacement is a placeholder that only neighbours' derivatives may see.
 
-    Arrays are held as read-only float64. Raises ``InvalidInput`` naming the field, its value and what is allowed.
+    Arrays are held as read-only float64 (or bool). Raises ``InvalidInput`` naming the field, its value and what is allowed.
     """
 
     time: FloatArray
@@ -79,6 +83,8 @@ class GraspLog:
     sensor: str = "unknown"
     metadata: Mapping[str, str] = field(default_factory=dict)
     truth: GroundTruth | None = None
+    contact: BoolArray | None = None
+    observed: BoolArray | None = None
 
     def __post_init__(self) -> None:
         time = _array("time", self.time, (None,))
@@ -95,6 +101,9 @@ class GraspLog:
             "normal": _optional("normal", self.normal, field_shape),
             "object_pose": _optional("object_pose", self.object_pose, (len(time), 3)),
         }
+        for name in ("contact", "observed"):
+            mask = getattr(self, name)
+            _set(self, name, None if mask is None else check_mask(name, mask, field_shape[:3]))
         for name, array in arrays.items():
             _set(self, name, array)
         _set(self, "element_area", check_element_area(self.element_area))
@@ -127,6 +136,8 @@ class GraspLog:
                 None if self.force is None else self.force[k],
                 None if self.object_pose is None else self.object_pose[k],
                 None if self.normal is None else self.normal[k],
+                None if self.contact is None else self.contact[k],
+                None if self.observed is None else self.observed[k],
             )
 
 
@@ -171,6 +182,15 @@ def check_normal(normal: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
     checked = _array("normal", normal, shape)
     _check_normal(checked)
     return checked
+
+
+def check_mask(name: str, value: ArrayLike, shape: tuple[int, ...]) -> BoolArray:
+    """One truth value an element, of exactly this shape."""
+    mask = np.array(value)
+    if mask.dtype != np.bool_ or mask.shape != shape:
+        raise InvalidInput(name, f"{mask.dtype} of shape {list(mask.shape)}", f"bool of shape {list(shape)}")
+    mask.flags.writeable = False
+    return mask
 
 
 def _rebuild(values: dict[str, Any]) -> GraspLog:
@@ -277,20 +297,12 @@ def _truth(truth: GroundTruth | None, shape: tuple[int, ...]) -> GroundTruth | N
     if truth is None:
         return None
     return GroundTruth(
-        contact=_mask("truth.contact", truth.contact, shape),
-        slip_kinematic=_mask("truth.slip_kinematic", truth.slip_kinematic, shape),
-        slip_contact_factor=_mask("truth.slip_contact_factor", truth.slip_contact_factor, shape),
+        contact=check_mask("truth.contact", truth.contact, shape),
+        slip_kinematic=check_mask("truth.slip_kinematic", truth.slip_kinematic, shape),
+        slip_contact_factor=check_mask("truth.slip_contact_factor", truth.slip_contact_factor, shape),
         stick_ratio=_stick_ratio(truth.stick_ratio, shape[0]),
         friction=truth.friction,
     )
-
-
-def _mask(name: str, value: ArrayLike, shape: tuple[int, ...]) -> BoolArray:
-    mask = np.array(value)
-    if mask.dtype != np.bool_ or mask.shape != shape:
-        raise InvalidInput(name, f"{mask.dtype} of shape {list(mask.shape)}", f"bool of shape {list(shape)}")
-    mask.flags.writeable = False
-    return mask
 
 
 def _stick_ratio(value: ArrayLike, frames: int) -> FloatArray:

@@ -1,10 +1,12 @@
 """Local slip: what a detector says of one frame and of a whole log (stage 4: slip_state)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slipcore.element_forces import stick_ratio
 from slipcore.frames import BoolArray, FloatArray
 
 
@@ -14,7 +16,8 @@ class SlipState:
 
     ``contact``, ``slip`` [n, m] bool; ``probability`` of slip [n, m]; ``stick_ratio``: stick area over contact area
     (paper, eq. 37 corrected), NaN without contact; ``velocity`` [n, m, 2] m/s, tangential velocity of the surface
-    relative to the object, NaN where it is unobservable; ``macro_slip``: no element in contact sticks.
+    relative to the object, NaN where it is unobservable; ``macro_slip``: no element in contact sticks; ``observed``
+    [n, m], or None for all: of an element that was not, nothing is said, as if it did not touch.
     """
 
     time: float
@@ -24,6 +27,21 @@ class SlipState:
     stick_ratio: float
     velocity: FloatArray
     macro_slip: bool
+    observed: BoolArray | None = None
+
+    def masked(self, observed: BoolArray, throughout: BoolArray) -> "SlipState":
+        """The answer without the elements [n, m] that were not ``observed``, nor velocity where not ``throughout``."""
+        contact, slip = self.contact & observed, self.slip & observed
+        return SlipState(
+            self.time,
+            contact,
+            slip,
+            np.where(observed, self.probability, 0.0),
+            stick_ratio(contact, slip),
+            np.where(throughout[..., None], self.velocity, np.nan),
+            macro_slip=bool(contact.any()) and not (contact & ~slip).any(),
+            observed=observed,
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,20 +82,32 @@ class SlipHistory:
     events: SlipEvents
     noise: float
     method: str
+    observed: BoolArray | None = None
 
 
-def slip_events(time: FloatArray, contact: BoolArray, slip: BoolArray) -> SlipEvents:
+def observed_over_time(answers: Sequence[SlipState]) -> BoolArray | None:
+    """Which elements were observed, [t, n, m]; None where all were, always."""
+    if all(answer.observed is None for answer in answers):
+        return None
+    return np.array(
+        [np.ones_like(answer.contact) if answer.observed is None else answer.observed for answer in answers]
+    )
+
+
+def slip_events(time: FloatArray, contact: BoolArray, slip: BoolArray, observed: BoolArray | None = None) -> SlipEvents:
     """The changes of state in ``contact`` and ``slip`` [t, n, m] at times [t] s.
 
-    A release ends slip without an ``end``: what let go did not stick again. The first frame changes nothing.
+    A release ends slip without an ``end``: what let go did not stick again. The first frame changes nothing, and
+    nothing is told of an element that was not ``observed`` [t, n, m] (None: all were) in both frames.
     """
+    seen = True if observed is None else observed[:-1] & observed[1:]
     was, now = contact[:-1], contact[1:]
     slipped, slips = slip[:-1], slip[1:]
     return SlipEvents(
-        onset=_event_list(time, slips & ~slipped),
+        onset=_event_list(time, slips & ~slipped & seen),
         end=_event_list(time, slipped & ~slips & now),
-        touch=_event_list(time, now & ~was),
-        release=_event_list(time, was & ~now),
+        touch=_event_list(time, now & ~was & seen),
+        release=_event_list(time, was & ~now & seen),
     )
 
 

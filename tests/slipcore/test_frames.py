@@ -118,6 +118,20 @@ def test_frames_of_a_log_without_forces_have_none(fields: dict[str, Any]) -> Non
     assert all(frame.force is frame.object_pose is frame.normal is None for frame in log.frames())
 
 
+@pytest.mark.parametrize("name", ["contact", "observed"])
+def test_masks_are_kept_and_walked_through_frame_by_frame(fields: dict[str, Any], name: str) -> None:
+    mask = np.random.default_rng(2).random(SHAPE) < 0.5
+    log = GraspLog(**(fields | {name: mask}))
+    np.testing.assert_array_equal(getattr(log, name), mask)
+    assert not getattr(log, name).flags.writeable
+    for k, frame in enumerate(log.frames()):
+        np.testing.assert_array_equal(getattr(frame, name), mask[k])
+    refused(
+        fields, rf"{name} is bool of shape \[4, 3, 4\]; allowed: bool of shape \[4, 3, 5\]", **{name: mask[..., 1:]}
+    )
+    refused(fields, f"{name} is int64 of shape", **{name: mask.astype(np.int64)})
+
+
 @pytest.mark.parametrize(
     ("time", "message"),
     [

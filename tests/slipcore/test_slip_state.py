@@ -1,6 +1,6 @@
 import numpy as np
 
-from slipcore.slip_state import slip_events
+from slipcore.slip_state import SlipState, observed_over_time, slip_events
 
 
 def field(*frames: list[int]) -> np.ndarray:
@@ -34,3 +34,39 @@ def test_a_release_while_slipping_is_no_end_of_slip() -> None:
 def test_the_first_frame_changes_nothing() -> None:
     events = slip_events(TIME[:1], field([1]), field([1]))
     assert not any(len(kind) for kind in (events.onset, events.end, events.touch, events.release))
+
+
+def test_nothing_is_told_of_an_element_that_was_not_observed_in_both_frames() -> None:
+    contact, slip = field([0, 1], [0], [0, 1], [0, 1]), field([0], [0], [0, 1], [0])
+    observed = field(*[list(range(6))] * 4)
+    observed[1, 0, 1] = False
+    events = slip_events(TIME, contact, slip, observed)
+    assert not any(len(kind) for kind in (events.touch, events.release, events.onset))
+    assert (list(events.end.element), list(events.end.time)) == ([1], [2.0])
+    assert [len(kind) for kind in (slip_events(TIME, contact, slip).touch, slip_events(TIME, contact, slip).onset)] == [
+        1,
+        1,
+    ]
+
+
+def test_a_masked_answer_counts_what_was_observed_only() -> None:
+    contact, slip = field([0, 1, 2])[0], field([0])[0]
+    whole = SlipState(0.1, contact, slip, 0.9 * slip, 2 / 3, np.zeros((2, 3, 2)), macro_slip=False)
+    observed, throughout = field([0, 2, 3])[0], field([0, 3])[0]
+    seen = whole.masked(observed, throughout)
+    np.testing.assert_array_equal(seen.contact, field([0, 2])[0])
+    assert seen.stick_ratio == 0.5
+    np.testing.assert_array_equal(np.isfinite(seen.velocity[..., 0]), throughout)
+    assert whole.masked(field([0])[0], throughout).macro_slip
+    nothing = whole.masked(field([])[0], throughout)
+    assert np.isnan(nothing.stick_ratio)
+    assert not nothing.macro_slip
+
+
+def test_what_was_observed_is_none_where_all_was() -> None:
+    contact = field([0])[0]
+    whole = SlipState(0.1, contact, contact, 1.0 * contact, 0.0, np.zeros((2, 3, 2)), macro_slip=True)
+    assert observed_over_time([whole, whole]) is None
+    observed = observed_over_time([whole, whole.masked(contact, contact)])
+    assert observed is not None
+    np.testing.assert_array_equal(observed, np.stack([np.ones_like(contact), contact]))
