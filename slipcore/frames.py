@@ -70,7 +70,8 @@ class GraspLog:
     known otherwise than from force or shape, or None; ``observed`` [t, n, m] bool, or None for all: where it is False
     no marker tells of the element, and its displacement is a placeholder that only neighbours' derivatives may see.
 
-    Arrays are held as read-only float64 (or bool). Raises ``InvalidInput`` naming the field, its value and what is allowed.
+    Arrays are held as read-only float64 or bool. Raises ``InvalidInput`` naming the field, its value and what is
+    allowed.
     """
 
     time: FloatArray
