@@ -39,7 +39,7 @@ $(VENV)/.installed: pyproject.toml clients/pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt uv
 	$(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/python --constraint constraints.txt --editable ./clients --editable '.[test]'
-	@$(BIN)/python -c 'import slipcore; print(f"compiled the detector in {slipcore.warm_up():.1f} s")'
+	@$(BIN)/python -c 'import estimators, slipcore; print(f"compiled the kernels in {slipcore.warm_up() + estimators.warm_up():.1f} s")'
 	@touch $@
 
 recordings: $(CACHE)/tac3d.tried

@@ -6,6 +6,7 @@ from estimators.friction_model import Cost, Domain, FrictionModel
 from estimators.moments import Moments
 from estimators.online import ChangeDetector
 from estimators.recognition import recognise
+from estimators.warm_up import warm_up
 
 __all__ = [
     "ChangeDetector",
@@ -19,4 +20,5 @@ __all__ = [
     "TooFewSamples",
     "fit",
     "recognise",
+    "warm_up",
 ]

@@ -22,19 +22,18 @@ from estimators.sampling import Chain, sample
 
 
 class Likelihood(NamedTuple):
-    """How a posterior is made from evidence, the accuracy it is sampled to by default, and its part of small steps."""
+    """How a posterior is made from evidence, and the accuracy that it is sampled to by default."""
 
     posterior: Callable[[Evidence], Posterior]
     accuracy: float
-    local: float = 0.0
 
 
 LIKELIHOODS = {
     "gaussian": Likelihood(gaussian, SAMPLING.accuracy),
     "grasp_effects": Likelihood(grasp_effects, SAMPLING.accuracy),
-    "student_t": Likelihood(student_t, SAMPLING.accuracy_per_sample, SAMPLING.local),
-    "outlier": Likelihood(outlier, SAMPLING.accuracy_per_sample, SAMPLING.local),
-    "errors_in_variables": Likelihood(errors_in_variables, SAMPLING.accuracy_per_sample, SAMPLING.local),
+    "student_t": Likelihood(student_t, SAMPLING.accuracy_per_sample),
+    "outlier": Likelihood(outlier, SAMPLING.accuracy_per_sample),
+    "errors_in_variables": Likelihood(errors_in_variables, SAMPLING.accuracy_per_sample),
 }
 
 
@@ -63,8 +62,8 @@ def fit(
     goal = LIKELIHOODS[name].accuracy if accuracy is None else accuracy
     posterior = LIKELIHOODS[name].posterior(evidence)
     left = None if seconds is None else max(seconds - (time.perf_counter() - begin), 0.0)
-    chain = sample(posterior.log_probability, len(posterior.sampled), goal, left, seed, LIKELIHOODS[name].local)
-    summary = posterior.summarise(chain.flat())
+    chain = sample(posterior.log_probability, len(posterior.sampled), goal, left, seed, posterior.local)
+    summary = posterior.summarise(chain.flat(), np.random.default_rng([seed, 1]))
     diagnostics: Diagnostics = {"likelihood": name, "prior": posterior.prior, "draws": ", ".join(posterior.names)}
     diagnostics |= _convergence(chain, posterior) | sensitivity(evidence, exact_posterior(evidence))
     model = report(

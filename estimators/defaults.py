@@ -58,10 +58,12 @@ class Prior:
 class Sampling:
     """How a posterior is sampled, and when the sampling stops."""
 
-    walkers: tuple[int, int] = (20, 440)
+    walkers: tuple[int, int] = (16, 440)
     """Fewest and most, even: as many as bring the accuracy within one block, so that the overhead a step is shared."""
-    block: int = 90
-    """Steps between two looks at the chain; ≥ 50 τ for the independence proposal, whose τ is about 1.2."""
+    block: int = 130
+    """Steps before the first look at the chain: 50 τ of a good proposal, and enough for R̂ to tell it from others."""
+    batch: int = 10
+    """Steps whose proposals are drawn and looked at together: the overhead of a call is shared."""
     chain_lengths: float = 50.0
     """Steps in units of the integrated autocorrelation time, from which that time is believed (emcee's rule)."""
     accuracy: float = 0.02
@@ -75,7 +77,9 @@ class Sampling:
     proposal_degrees_of_freedom: float = 10.0
     """Of the multivariate Student-t proposal: tails heavier than the posterior's, at an acceptance of 0.88."""
     local: float = 0.25
-    """0 to 1; part of small steps where the whitening is only Laplace's: they free walkers stuck in a tail."""
+    """0 to 1; part of small steps where the proposal's weights are uneven: they free walkers stuck in a tail."""
+    even: float = 0.85
+    """0 to 1; evenness of the proposal's weights (effective number over number) from which no small steps are taken."""
     max_split_rhat: float = 1.01
     """Vehtari et al. (2021), Bayesian Analysis 16:667."""
     kept_draws: int = 4000

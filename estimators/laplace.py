@@ -61,25 +61,27 @@ def _differences(log_density: LogDensity, at: FloatArray, root: FloatArray) -> t
 
 def refine(
     log_density: LogDensity, centre: FloatArray, root: FloatArray, rng: np.random.Generator
-) -> tuple[FloatArray, FloatArray]:
-    """Centre [d] and root [d, d] closer to a skewed density than mode and curvature are: adaptive importance sampling.
+) -> tuple[FloatArray, FloatArray, float]:
+    """Centre [d] and root [d, d] closer to a skewed density than mode and curvature are, and how even weights are then.
 
-    Draws from a Student-t are weighted by the density, their weights flattened until a fifth of them counts, and their
-    mean and covariance taken, until the weights are even enough as they are (Cappé et al., 2004).
+    Adaptive importance sampling (Cappé et al., 2004): draws from a Student-t are weighted by the density, their weights
+    flattened until a fifth of them counts, and their mean and covariance taken, until the weights are even enough as
+    they are. Evenness is the effective number of weights over their number; 0 where that of the result is not known.
     """
-    size, degrees = len(centre), 10.0
+    size, degrees, even = len(centre), 10.0, 0.0
     for _ in range(ROUNDS):
         radius = np.sqrt(degrees / rng.chisquare(degrees, (DRAWS, 1)))
         standard = rng.standard_normal((DRAWS, size)) * radius
         at = centre + standard @ root.T
         log = log_density(at) + 0.5 * (degrees + size) * np.log1p(np.sum(standard**2, axis=1) / degrees)
-        if not np.isfinite(log.max()) or _evenness(log) > EVEN:
+        even = _evenness(log) if np.isfinite(log.max()) else 0.0
+        if not np.isfinite(log.max()) or even > EVEN:
             break
         weight = flattened(log)
         centre = weight @ at / weight.sum()
         spread = np.cov(at.T, aweights=weight).reshape(size, size)
         root = np.asarray(np.linalg.cholesky(spread + 1e-12 * np.diag(np.diag(spread))), dtype=np.float64)
-    return centre, root
+    return centre, root, even
 
 
 def flattened(log_weight: FloatArray) -> FloatArray:

@@ -58,22 +58,27 @@ def sample(
     """
     deadline = np.inf if seconds is None else time.perf_counter() + seconds
     goal = SAMPLING.accuracy if accuracy is None else accuracy
-    chain = _run(log_probability, dimension, _independence(dimension, local), "independence", goal, deadline, seed)
+    from emcee.moves import DEMove, GaussianMove  # emcee takes a second to load
+
+    from estimators.ensemble import IndependenceMove
+
+    small = GaussianMove((2.4**2 / dimension) * np.ones(dimension))  # Gelman, Roberts & Gilks (1996)
+    moves = [(IndependenceMove(), 1.0 - local), (small, local)]
+    walkers = _walkers(goal, 3.0 if local > 0.0 else 1.0)
+    chain = _run(log_probability, dimension, moves, "independence", walkers, goal, deadline, seed)
     if chain.acceptance >= SAMPLING.min_acceptance:
         return chain
-    from emcee.moves import DEMove
-
-    return _run(log_probability, dimension, DEMove(), "differential evolution", goal, deadline, seed)
+    return _run(log_probability, dimension, DEMove(), "differential evolution", walkers, goal, deadline, seed)
 
 
 def autocorrelation_time(series: FloatArray) -> FloatArray:
     """Integrated autocorrelation time [d] of chains [steps, walkers, d], averaged over walkers (Sokal; as emcee's).
 
     Lag by lag until the window is five times the time: a good proposal needs a handful of lags, where a Fourier
-    transform would cost more than the chain. Of long chains as many walkers are read as hold 2¹⁷ draws.
+    transform would cost more than the chain. Of long chains as many walkers are read as hold 2¹⁵ draws.
     """
     steps = len(series)
-    centred = (series - series.mean(axis=(0, 1)))[:, : max(16, 2**17 // steps)]
+    centred = (series - series.mean(axis=(0, 1)))[:, : max(16, 2**15 // steps)]
     variance = np.einsum("swd,swd->d", centred, centred)
     variance[variance == 0.0] = 1.0
     times = np.ones_like(variance)
@@ -115,17 +120,23 @@ def monte_carlo_error(draws: FloatArray, times: FloatArray) -> float:
 
 
 def _run(
-    log_probability: LogProbability, dimension: int, move: object, name: str, goal: float, deadline: float, seed: int
+    log_probability: LogProbability,
+    dimension: int,
+    move: object,
+    name: str,
+    walkers: int,
+    goal: float,
+    deadline: float,
+    seed: int,
 ) -> Chain:
-    from emcee import State  # takes a second to load
+    from emcee import State
 
     from estimators.ensemble import VectorisedSampler
 
-    random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed)))
-    walkers = _walkers(goal)
     sampler = VectorisedSampler(walkers, dimension, log_probability, moves=move, vectorize=True)
-    sampler.random_state = random.get_state()
+    random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed)))
     start = _start(log_probability, random, walkers, dimension)
+    sampler.random_state = random.get_state()
     state = State(start, log_prob=log_probability(start))
     begin, steps = time.perf_counter(), SAMPLING.block
     while True:
@@ -137,20 +148,25 @@ def _run(
         affordable = min((deadline - now) * done / (now - begin), float(SAMPLING.max_steps - done))
         if affordable < 1.0:
             return replace(chain, stopped="steps" if done >= SAMPLING.max_steps else "seconds")
-        steps = int(min(max(_missing(chain, goal), SAMPLING.block / 4), 4 * done, affordable))
+        steps = int(min(_missing(chain, goal), 4 * done, affordable))
 
 
-def _walkers(goal: float) -> int:
-    """Even number of walkers whose first block should do: the 5 % quantile's error is 2.1/√ESS, τ about 1.3."""
+def _walkers(goal: float, slowness: float) -> int:
+    """Even number of walkers whose first block should do: the 5 % quantile's error is 2.1/√ESS, τ about 1.4.
+
+    Half as many again are drawn, as the worst of all parameters counts and a second look costs as much as they do.
+    """
     fewest, most = SAMPLING.walkers
-    draws = 1.3 * 1.3 * (2.1 / goal) ** 2
+    draws = 1.5 * 1.4 * slowness * (2.1 / goal) ** 2
     return 2 * int(np.clip(np.ceil(draws / SAMPLING.block / 2.0), fewest // 2, most // 2))
 
 
 def _start(log_probability: LogProbability, random: np.random.RandomState, walkers: int, dimension: int) -> FloatArray:
     """Walkers [w, d] near the posterior already: proposals resampled by their importance, never all of them one."""
-    candidates = _student(random, 8 * walkers, dimension)
-    log_weight = log_probability(candidates) - _log_student(candidates)
+    from estimators.ensemble import log_student, student
+
+    candidates = student(random, 8 * walkers, dimension)
+    log_weight = log_probability(candidates) - log_student(candidates)
     if not np.isfinite(log_weight.max()):
         raise InvalidSamples("mean friction", "0 or less with near certainty", "above 0 over the range of the data")
     weight = flattened(log_weight)
@@ -165,7 +181,8 @@ def _missing(chain: Chain, goal: float) -> float:
     """Steps that the chain still lacks, with a tenth to spare, so that it seldom has to be looked at again."""
     length = len(chain.draws)
     accurate = length * (chain.monte_carlo_error / goal) ** 2
-    return 1.1 * max(accurate, SAMPLING.chain_lengths * float(chain.autocorrelation_time.max())) - length
+    wanted = 1.1 * max(accurate, SAMPLING.chain_lengths * float(chain.autocorrelation_time.max()))
+    return float(SAMPLING.batch * np.ceil(max(wanted - length, SAMPLING.block / 4) / SAMPLING.batch))
 
 
 def _judge(draws: FloatArray, acceptance: float, move: str) -> Chain:
@@ -193,27 +210,3 @@ def _trouble(steps: int, time_steps: float, rhat: float) -> str:
     if rhat > SAMPLING.max_split_rhat:
         return f"split R-hat {rhat:.3f}; at most {SAMPLING.max_split_rhat:g} allowed"
     return ""
-
-
-def _independence(dimension: int, local: float) -> object:
-    from emcee.moves import GaussianMove, MHMove
-
-    def propose(coordinates: FloatArray, random: np.random.RandomState) -> tuple[FloatArray, FloatArray]:
-        proposed = _student(random, len(coordinates), dimension)
-        return proposed, _log_student(coordinates) - _log_student(proposed)
-
-    if local == 0.0:
-        return MHMove(propose)
-    small = GaussianMove((2.4**2 / dimension) * np.ones(dimension))  # Gelman, Roberts & Gilks (1996)
-    return [(MHMove(propose), 1.0 - local), (small, local)]
-
-
-def _student(random: np.random.RandomState, count: int, dimension: int) -> FloatArray:
-    degrees = SAMPLING.proposal_degrees_of_freedom
-    radius = np.sqrt(degrees / random.chisquare(degrees, (count, 1)))
-    return np.asarray(random.standard_normal((count, dimension)) * radius)
-
-
-def _log_student(x: FloatArray) -> FloatArray:
-    degrees = SAMPLING.proposal_degrees_of_freedom
-    return np.asarray(-0.5 * (degrees + x.shape[1]) * np.log1p(np.einsum("ki,ki->k", x, x) / degrees))

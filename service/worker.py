@@ -43,6 +43,7 @@ def warm_up() -> None:
     try:
         log = ramp.tangential_ramp(points=8, pitch=1.5e-3)
         estimators.fit(slipcore.collect_samples(log, slipcore.detect_slip(log)), method="ols")
+        estimators.warm_up()
     except Exception:
         logger.exception("the %s is not warmed up; its first job will be slow", pipeline.__name__)
 

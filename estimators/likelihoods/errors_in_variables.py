@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.evidence import Evidence
+from estimators.likelihoods.kernels import sum_log_normal
 from estimators.likelihoods.per_sample import PerSample, Rows, per_sample
 from estimators.priors import log_half_student
 
@@ -48,16 +49,8 @@ class ErrorsInVariables:
 
     def log_likelihood(self, beta: FloatArray, natural: FloatArray, rows: Rows) -> FloatArray:
         """Sum of w log N(f_t; its mean given what was measured, scatter and noise together)."""
-        sigma, noise = (column[:, None] for column in natural.T)
-        kept = 1.0 - noise**2 / self.variance
-        force = self.mean + kept * (rows.regressors[2] - self.mean)
-        spread = kept * noise**2
-        at_force = beta[:, :2] @ rows.regressors[:2]
-        expected = (at_force + beta[:, 2:] * force) * force + beta[:, 2:] * spread
-        slope = at_force + 2.0 * beta[:, 2:] * force
-        variance = sigma**2 * (force**2 + spread) + noise**2 + slope**2 * spread
-        misfit = (rows.tangential_force - expected) ** 2 / variance
-        return np.asarray(-0.5 * (np.log(variance) + misfit) @ rows.weight)
+        moments = np.array([self.mean, self.variance])
+        return sum_log_normal(beta, natural**2, moments, rows.v, rows.f_n, rows.tangential_force, rows.weight)
 
     def scatter_degrees_of_freedom(self, natural: FloatArray, otherwise: float) -> float:
         """That of σ: the prediction is for the true f_n."""

@@ -33,6 +33,7 @@ class Gaussian:
     sampled: tuple[str, ...] = NAMES
     names: tuple[str, ...] = NAMES
     prior: str = positive_friction()
+    local: float = 0.0
 
     def log_probability(self, whitened: FloatArray) -> FloatArray:
         """Log posterior density [k]; the change of variables takes away what σ³ in β's prior adds."""
@@ -42,7 +43,7 @@ class Gaussian:
         log = -(self.effective_n + PRIOR.degrees_of_freedom) * np.log(sigma) - 0.5 * square / sigma**2
         return supported(log, beta, self.corners)
 
-    def summarise(self, whitened: FloatArray) -> Summary:
+    def summarise(self, whitened: FloatArray, _rng: np.random.Generator, /) -> Summary:
         """Student-t of β from the draws: in z, which is independent of σ, its moments exist for any ν."""
         _, sigma = self._natural(whitened)
         scale = float(1.0 / np.sqrt(np.mean(sigma**-2.0)))

@@ -48,6 +48,7 @@ class GraspEffects:
     sampled: tuple[str, ...] = ("log_sigma", "log_tau")
     names: tuple[str, ...] = ("beta0", "beta1", "beta2", "sigma", "tau")
     prior: str = grasp_effect()
+    local: float = 0.0
 
     def log_probability(self, whitened: FloatArray) -> FloatArray:
         """Log posterior density [k] in whitened coordinates."""
@@ -68,7 +69,7 @@ class GraspEffects:
         prior = log_half_student(bounded_exp(log_sigma + 0.5 * log_ratio), REFERENCE.scatter)
         return np.asarray(given.log_weight - 0.5 * degrees * np.log(given.square) + prior + 0.5 * log_ratio)
 
-    def summarise(self, whitened: FloatArray) -> Summary:
+    def summarise(self, whitened: FloatArray, rng: np.random.Generator, /) -> Summary:
         """β given each (σ, τ) is exactly normal: its mean and covariance need no draws of it."""
         kept = whitened[:: -(-len(whitened) // SAMPLING.kept_draws)]
         log_ratio = self.score(kept[:, 1])[0]
@@ -76,7 +77,7 @@ class GraspEffects:
         sigma = bounded_exp(self._log_sigma(given, kept[:, 0]))
         tau = sigma * bounded_exp(0.5 * log_ratio)
         gamma, spread = given.gamma, np.linalg.cholesky(np.linalg.inv(given.precision)) * sigma[:, None, None]
-        normal = np.random.default_rng(len(kept)).standard_normal((len(kept), 3, 1))
+        normal = rng.standard_normal((len(kept), 3, 1))
         covariance = np.mean(spread @ spread.transpose(0, 2, 1), axis=0) + np.cov(gamma.T)
         scale, degrees = scatter(sigma**2 + tau**2)
         centre, root = self.pooled.mean, self.pooled.root

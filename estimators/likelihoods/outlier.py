@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.evidence import Evidence
-from estimators.likelihoods.per_sample import PerSample, Rows, per_sample, residual
+from estimators.likelihoods.kernels import sum_log_mixture
+from estimators.likelihoods.per_sample import PerSample, Rows, per_sample
 from estimators.likelihoods.posterior import bounded_exp
 
 FloatArray = NDArray[np.float64]
@@ -52,21 +53,11 @@ class Outlier:
         return np.where(inside, log, -np.inf)
 
     def log_likelihood(self, beta: FloatArray, natural: FloatArray, rows: Rows) -> FloatArray:
-        """Sum of w log of the mixture; a floor of 1e-300 stands where both components vanish."""
-        sigma, part, wide, offset = (column[:, None] for column in natural.T)
-        near = residual(beta, rows)
-        far = near - offset
-        near *= near
-        near *= -0.5 / sigma**2
-        np.exp(near, out=near)
-        near *= (1.0 - part) / sigma
-        far *= far
-        far *= -0.5 / wide**2
-        np.exp(far, out=far)
-        far *= part / wide
-        near += far
-        near += 1e-300
-        return np.asarray(np.log(near, out=near) @ rows.weight)
+        """Sum of w log of the mixture, in logarithms: no sample is so far off that both components vanish."""
+        sigma, part, wide, offset = natural.T
+        near = np.column_stack([np.log1p(-part) - np.log(sigma), 0.5 / sigma**2])
+        far = np.column_stack([np.log(part) - np.log(wide), 0.5 / wide**2, offset])
+        return sum_log_mixture(beta, near, far, rows.v, rows.f_n, rows.friction, rows.weight)
 
     def scatter_degrees_of_freedom(self, natural: FloatArray, otherwise: float) -> float:
         """That of σ: a new slipping element is no outlier."""

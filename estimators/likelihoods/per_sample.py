@@ -16,18 +16,15 @@ from estimators.priors import positive_friction, prior_rows
 
 FloatArray = NDArray[np.float64]
 
-CACHED = 2**15
-"""Numbers in a block of walkers × samples: a quarter of a megabyte, so that a core's cache holds it."""
-
-
 COARSE = 4000
 """Samples on which the mode is looked for first."""
 
 
 class Rows(NamedTuple):
-    """Some of the samples: regressors (1, v, f_n) [3, c], μ [c], tangential force [c] N, weight [c]."""
+    """Some of the samples, contiguous [c]: v m/s, f_n N, μ, tangential force N, weight."""
 
-    regressors: FloatArray
+    v: FloatArray
+    f_n: FloatArray
     friction: FloatArray
     tangential_force: FloatArray
     weight: FloatArray
@@ -82,6 +79,7 @@ class PerSample:
     centre: FloatArray
     root: FloatArray
     whitening: Whitening
+    local: float = SAMPLING.local
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -105,14 +103,15 @@ class PerSample:
         log = self._log_prior(beta, natural[:, 0]) + self.terms.log_prior(coordinates[:, 3:])
         log = supported(log, beta, self.corners)
         inside = np.isfinite(log)
-        log[inside] += self._log_likelihood(beta[inside], natural[inside])
+        if inside.any():
+            log[inside] += self.terms.log_likelihood(beta[inside], natural[inside], self.rows)
         return log
 
     def natural(self, coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
         """β [k, 3] and the other natural parameters [k, m]."""
         return self.centre + coordinates[:, :3] @ self.root.T, self.terms.natural(coordinates[:, 3:])
 
-    def summarise(self, whitened: FloatArray) -> Summary:
+    def summarise(self, whitened: FloatArray, _rng: np.random.Generator, /) -> Summary:
         """Moments of the draws."""
         beta, natural = self.natural(self.whitening(whitened))
         scale, degrees = scatter(natural[:, 0] ** 2)
@@ -131,27 +130,16 @@ class PerSample:
         square = np.einsum("ki,ki->k", misfit, misfit) + PRIOR.degrees_of_freedom * REFERENCE.scatter**2
         return np.asarray(-(3.0 + PRIOR.degrees_of_freedom) * np.log(sigma) - 0.5 * square / sigma**2)
 
-    def _log_likelihood(self, beta: FloatArray, natural: FloatArray) -> FloatArray:
-        total = np.zeros(len(beta))
-        if len(beta) == 0:
-            return total
-        size = max(CACHED // len(beta), 64)
-        for start in range(0, len(self.rows.friction), size):
-            part = slice(start, start + size)
-            total += self.terms.log_likelihood(beta, natural, Rows(*(column[..., part] for column in self.rows)))
-        return total
-
 
 def per_sample(evidence: Evidence, terms: Terms, name: str) -> PerSample:
     """Posterior around the robust fit, whose plane and scale no outlier moves far."""
     observations = evidence.raw(f"bayes, {name}")
     start = robust.fit(evidence, loss="tukey")
     v, f_n = observations.tangential_velocity, observations.normal_force
-    columns = np.stack([np.ones(len(v)), v, f_n])
     initial, spread = terms.start(max(start.scale, 1e-9))
     posterior = PerSample(
         terms=terms,
-        rows=Rows(columns, observations.friction, observations.tangential_force, observations.weight),
+        rows=Rows(v, f_n, observations.friction, observations.tangential_force, observations.weight),
         prior_rows=prior_rows(evidence.element_area),
         corners=corners(evidence.domain),
         effective_n=evidence.effective_n,
@@ -166,17 +154,16 @@ def per_sample(evidence: Evidence, terms: Terms, name: str) -> PerSample:
 
 def _rewhitened(posterior: PerSample, every: int) -> PerSample:
     """Whitened by Laplace's approximation, refined by importance, to the posterior of every so many samples."""
-    rows = posterior.rows
-    first, second, third = (column[..., ::every] for column in rows[:3])
-    thin = Rows(first, second, third, every * rows.weight[::every])
+    thin = Rows(*(np.ascontiguousarray(column[::every]) for column in posterior.rows))
+    thin = thin._replace(weight=every * thin.weight)
     target = replace(posterior, rows=thin).log_probability
     mode, root = laplace(target, np.zeros(len(posterior.names)))
+    even = 0.0
     if every == 1:
-        mode, root = refine(target, mode, root, np.random.default_rng(0))
+        mode, root, even = refine(target, mode, root, np.random.default_rng(0))
     before = posterior.whitening
-    return replace(posterior, whitening=Whitening(before(mode[None])[0], before.root @ root))
-
-
-def residual(beta: FloatArray, rows: Rows) -> FloatArray:
-    """Residuals of μ, [k, c]."""
-    return rows.friction - beta @ rows.regressors
+    return replace(
+        posterior,
+        whitening=Whitening(before(mode[None])[0], before.root @ root),
+        local=0.0 if even > SAMPLING.even else SAMPLING.local,
+    )

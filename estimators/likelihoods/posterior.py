@@ -41,12 +41,17 @@ class Posterior(Protocol):
         """The prior in words and numbers."""
         ...
 
+    @property
+    def local(self) -> float:
+        """Part of small steps that its sampling needs."""
+        ...
+
     def log_probability(self, whitened: FloatArray) -> FloatArray:
         """Log posterior density [k] in whitened coordinates [k, d], up to a constant; -inf outside the support."""
         ...
 
-    def summarise(self, whitened: FloatArray) -> Summary:
-        """What draws [k, d] in whitened coordinates amount to."""
+    def summarise(self, whitened: FloatArray, rng: np.random.Generator, /) -> Summary:
+        """What draws [k, d] in whitened coordinates amount to; ``rng`` draws what was integrated out."""
         ...
 
 

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 from scipy import special
 
 from estimators.evidence import Evidence
-from estimators.likelihoods.per_sample import PerSample, Rows, per_sample, residual
+from estimators.likelihoods.kernels import sum_log1p_square
+from estimators.likelihoods.per_sample import PerSample, Rows, per_sample
 from estimators.likelihoods.posterior import bounded_exp
 
 FloatArray = NDArray[np.float64]
@@ -38,11 +39,7 @@ class StudentT:
     def log_likelihood(self, beta: FloatArray, natural: FloatArray, rows: Rows) -> FloatArray:
         """Sum of w log t_ν(r/σ)/σ."""
         sigma, nu = natural.T
-        square = residual(beta, rows)
-        square *= square
-        square *= (1.0 / (nu * sigma**2))[:, None]
-        square += 1.0
-        tails = np.log(square, out=square) @ rows.weight
+        tails = sum_log1p_square(beta, 1.0 / (nu * sigma**2), rows.v, rows.f_n, rows.friction, rows.weight)
         constant = special.gammaln(0.5 * (nu + 1.0)) - special.gammaln(0.5 * nu) - 0.5 * np.log(nu) - np.log(sigma)
         return np.asarray(constant * rows.weight.sum() - 0.5 * (nu + 1.0) * tails)
 

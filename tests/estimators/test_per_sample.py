@@ -8,9 +8,8 @@ import pytest
 from scipy import integrate, stats
 
 import estimators
-from estimators.evidence import gather
 from estimators.laplace import refine
-from estimators.likelihoods import errors_in_variables, outlier, per_sample, student_t
+from estimators.likelihoods import errors_in_variables, kernels, outlier, student_t
 from estimators.likelihoods.per_sample import Rows
 from slipcore.samples import FrictionSamples
 
@@ -19,9 +18,12 @@ Make = Callable[..., FrictionSamples]
 
 def rows(n: int = 40, seed: int = 0) -> Rows:
     rng = np.random.default_rng(seed)
-    x = np.stack([np.ones(n), rng.uniform(0, 5e-3, n), rng.uniform(0.02, 0.1, n)])
-    mu = rng.normal(0.36, 0.05, n)
-    return Rows(x, mu, mu * x[2], rng.uniform(0.5, 1.0, n))
+    f_n, mu = rng.uniform(0.02, 0.1, n), rng.normal(0.36, 0.05, n)
+    return Rows(rng.uniform(0, 5e-3, n), f_n, mu, mu * f_n, rng.uniform(0.5, 1.0, n))
+
+
+def plane(beta: np.ndarray, part: Rows) -> np.ndarray:
+    return np.asarray(beta @ np.stack([np.ones(len(part.v)), part.v, part.f_n]))
 
 
 BETA = np.array([[0.4, 2.0, -0.8], [0.38, 1.0, -0.5]])
@@ -31,7 +33,7 @@ def test_student_t_is_scipys() -> None:
     part, natural = rows(), np.array([[0.02, 4.0], [0.05, 30.0]])
     found = student_t.StudentT().log_likelihood(BETA, natural, part)
     wanted = [
-        part.weight @ stats.t(nu, beta @ part.regressors, sigma).logpdf(part.friction)
+        part.weight @ stats.t(nu, plane(beta, part), sigma).logpdf(part.friction)
         for beta, (sigma, nu) in zip(BETA, natural, strict=True)
     ]
     constant = 0.5 * np.log(np.pi) * part.weight.sum()  # left out
@@ -43,7 +45,7 @@ def test_outlier_is_the_mixture_of_two_normals() -> None:
     found = outlier.Outlier().log_likelihood(BETA, natural, part)
     wanted = []
     for beta, (sigma, pi, wide, offset) in zip(BETA, natural, strict=True):
-        mean = beta @ part.regressors
+        mean = plane(beta, part)
         near, far = stats.norm(mean, sigma).pdf(part.friction), stats.norm(mean + offset, wide).pdf(part.friction)
         wanted.append(part.weight @ np.log((1.0 - pi) * near + pi * far))
     constant = 0.5 * np.log(2.0 * np.pi) * part.weight.sum()  # left out
@@ -58,17 +60,17 @@ def test_errors_in_variables_has_the_mean_and_variance_of_the_integral_over_the_
     kept = 1.0 - noise**2 / variance
     true = stats.norm(mean + kept * (measured - mean), np.sqrt(kept) * noise)
 
-    def plane(f: float) -> float:
+    def expected(f: float) -> float:
         return float(beta[0] @ [1.0, v, f])
 
     ends = true.ppf([1e-9, 1.0 - 1e-9])
-    first = integrate.quad(lambda f: true.pdf(f) * f * plane(f), *ends)[0]
-    second = integrate.quad(lambda f: true.pdf(f) * (f**2 * (plane(f) ** 2 + sigma**2) + noise**2), *ends)[0]
+    first = integrate.quad(lambda f: true.pdf(f) * f * expected(f), *ends)[0]
+    second = integrate.quad(lambda f: true.pdf(f) * (f**2 * (expected(f) ** 2 + sigma**2) + noise**2), *ends)[0]
     points = np.linspace(0.01, 0.02, 5)
     natural = np.array([[sigma, noise]])
     found = [
         terms.log_likelihood(
-            beta, natural, Rows(np.array([[1.0], [v], [measured]]), np.ones(1), np.array([t]), np.ones(1))
+            beta, natural, Rows(np.array([v]), np.array([measured]), np.ones(1), np.array([t]), np.ones(1))
         )[0]
         for t in points
     ]
@@ -130,13 +132,36 @@ def test_each_gives_the_exact_answer_on_clean_data(samples: Make, likelihood: st
     np.testing.assert_allclose(model.standard_errors, exact.standard_errors, rtol=0.25)  # it pays for its caution
 
 
-def test_chunks_and_walkers_do_not_show(samples: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    posterior = student_t.student_t(gather(samples(300)))
-    at = np.random.default_rng(0).standard_normal((7, 5))
-    whole = posterior.log_probability(at)
-    monkeypatch.setattr(per_sample, "CACHED", 448)
-    np.testing.assert_allclose(posterior.log_probability(at), whole, rtol=1e-12)
-    np.testing.assert_allclose(posterior.log_probability(at[3:4]), whole[3:4], rtol=1e-12)
+def test_blocks_of_samples_and_other_walkers_do_not_show() -> None:
+    part = rows(2 * kernels.BLOCK + 77)
+    natural = np.tile([0.02, 4.0], (7, 1))
+    beta = BETA[0] * (1.0 + 0.01 * np.random.default_rng(0).standard_normal((7, 3)))
+    whole = student_t.StudentT().log_likelihood(beta, natural, part)
+    cuts = [slice(0, 5), slice(5, kernels.BLOCK + 3), slice(kernels.BLOCK + 3, None)]
+    pieces = [Rows(*(np.ascontiguousarray(column[cut]) for column in part)) for cut in cuts]
+    parts = [student_t.StudentT().log_likelihood(beta, natural, piece) for piece in pieces]
+    np.testing.assert_allclose(np.sum(parts, axis=0), whole, rtol=1e-12)
+    np.testing.assert_allclose(student_t.StudentT().log_likelihood(beta[3:4], natural[3:4], part), whole[3:4])
+
+
+def test_elementary_functions_are_right_to_a_part_in_a_trillion() -> None:
+    rng = np.random.default_rng(0)
+    x = np.concatenate([10.0 ** rng.uniform(-300, 300, 2000), 1.0 + 10.0 ** rng.uniform(-16, 0, 2000), [1.0, 2.0]])
+    np.testing.assert_allclose([kernels.log(value) for value in x], np.log(x), rtol=1e-12, atol=1e-12)
+    m = rng.uniform(1.0, 2.0, 2000)
+    np.testing.assert_allclose([kernels.log_mantissa(value) for value in m], np.log(m), rtol=0.0, atol=1e-12)
+    y = np.concatenate([-rng.uniform(0.0, 700.0, 2000), [0.0, kernels.LEAST]])
+    np.testing.assert_allclose([kernels.exp(value) for value in y], np.exp(y), rtol=1e-12)
+
+
+def test_a_sample_that_no_component_explains_still_has_a_density() -> None:
+    """Far out on both sides of where exponentials underflow: the logarithm of a sum, not the sum."""
+    part = Rows(np.zeros(3), np.ones(3), np.array([-1e3, 0.4, 1e6]), np.ones(3), np.ones(3))
+    found = outlier.Outlier().log_likelihood(np.array([[0.4, 0.0, 0.0]]), np.array([[0.02, 0.1, 0.2, -0.1]]), part)
+    residual = part.friction - 0.4
+    near = np.log(0.9 / 0.02) - 0.5 * (residual / 0.02) ** 2
+    far = np.log(0.1 / 0.2) - 0.5 * ((residual + 0.1) / 0.2) ** 2
+    np.testing.assert_allclose(found, np.logaddexp(near, far).sum(), rtol=1e-12)
 
 
 def test_outside_the_support_there_is_no_density(samples: Make) -> None:
@@ -151,7 +176,8 @@ def test_refinement_finds_centre_and_spread_of_a_skewed_density() -> None:
     def log_density(x: np.ndarray) -> np.ndarray:
         return np.asarray((0.5 * x - np.exp(x))[:, 0])  # log of a gamma variable of shape 1/2
 
-    mode, root = refine(log_density, np.array([np.log(0.5)]), np.array([[1.4]]), np.random.default_rng(0))
+    mode, root, even = refine(log_density, np.array([np.log(0.5)]), np.array([[1.4]]), np.random.default_rng(0))
     law = stats.loggamma(0.5)
+    assert 0.6 < even <= 1.0
     assert abs(mode[0] - law.mean()) < 0.5 * law.std()
     np.testing.assert_allclose(np.abs(root[0, 0]), law.std(), rtol=0.35)

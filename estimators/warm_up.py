@@ -1,0 +1,23 @@
+"""Compile what a first fit would otherwise wait for."""
+
+import time
+
+import numpy as np
+
+
+def warm_up() -> float:
+    """Compile the likelihoods' sums, or load them from the cache beside the package; seconds that it took.
+
+    The libraries that only some methods need are loaded on the way.
+    """
+    began = time.perf_counter()
+    import statsmodels.regression.linear_model  # noqa: F401
+
+    import estimators.ensemble  # noqa: F401
+    from estimators.likelihoods import kernels
+
+    beta, one, column = np.zeros((1, 3)), np.ones(1), np.ones(3)
+    kernels.sum_log1p_square(beta, one, column, column, column, column)
+    kernels.sum_log_mixture(beta, np.ones((1, 2)), np.ones((1, 3)), column, column, column, column)
+    kernels.sum_log_normal(beta, np.ones((1, 2)), np.ones(2), column, column, column, column)
+    return time.perf_counter() - began

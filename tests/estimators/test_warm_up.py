@@ -1,0 +1,17 @@
+"""After warming up, no fit compiles."""
+
+from collections.abc import Callable
+
+import estimators
+from slipcore.samples import FrictionSamples
+
+
+def test_after_warming_up_no_fit_compiles(samples: Callable[..., FrictionSamples]) -> None:
+    assert estimators.warm_up() >= 0.0
+    from estimators.likelihoods import kernels
+
+    sums = (kernels.sum_log1p_square, kernels.sum_log_mixture, kernels.sum_log_normal)
+    compiled = [len(kernel.signatures) for kernel in sums]
+    for likelihood in ("student_t", "outlier", "errors_in_variables"):
+        estimators.fit(samples(1000), method="bayes", likelihood=likelihood, accuracy=0.1)
+    assert [len(kernel.signatures) for kernel in sums] == compiled == [1, 1, 1]
