@@ -1,5 +1,7 @@
 """Standard errors where samples share errors: the cluster jackknife (CR3), from sums over clusters."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,9 +15,21 @@ DOMINANT = 0.8
 """Share of the information on a direction above which the cluster that holds it is alone there."""
 
 
-def cluster_sums(design: FloatArray, residual: FloatArray, cluster: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Per cluster, Q'Q [g, r, r] and Q'e [g, r] of an orthonormal design Q [n, r] and residuals e [n]."""
-    count, size = int(cluster.max()) + 1, design.shape[1]
+def cluster_sums(
+    blocks: Iterable[tuple[FloatArray, FloatArray, IntArray]], count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Per cluster, Q'Q [count, r, r] and Q'e [count, r] of blocks (Q [n, r], e [n], cluster [n]).
+
+    Q is an orthonormal design, e its residuals.
+    """
+    sums = [_block_sums(*block, count) for block in blocks]
+    return np.sum([square for square, _ in sums], axis=0), np.sum([score for _, score in sums], axis=0)
+
+
+def _block_sums(
+    design: FloatArray, residual: FloatArray, cluster: IntArray, count: int
+) -> tuple[FloatArray, FloatArray]:
+    size = design.shape[1]
     square = np.empty((count, size, size))
     for i in range(size):
         for j in range(i, size):

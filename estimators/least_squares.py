@@ -14,8 +14,8 @@ RealArray = NDArray[np.floating]
 
 UNBOUNDED = 1e16
 """Reported in place of an infinite condition number or variance inflation."""
-CHUNK = 32_768
-"""Rows that are factored at once: they fit the processor's cache, so memory and time stay bounded."""
+CHUNK = 8192
+"""Rows that are worked on at once: they fit the processor's cache, so memory and time stay bounded."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,11 +58,9 @@ def factorise(columns: RealArray, weight: FloatArray | None = None, intercept: b
     Extended precision is ``np.longdouble``: 64 bits of mantissa on x86-64; where a platform has none, plain double.
     Columns that come as ``longdouble`` are taken at their full precision.
     """
-    if columns.dtype == np.longdouble:
-        return _block(columns, weight, intercept)
-    factor = merge(_chunks(columns, weight, intercept))
+    factor = merge(_chunks(columns, weight, intercept, columns.dtype))
     if condition_number(factor.triangle[:-1, :-1]) > IDENTIFIABILITY.ill_conditioned:
-        return _block(columns.astype(np.longdouble), weight, intercept)
+        return merge(_chunks(columns, weight, intercept, np.dtype(np.longdouble)))
     return factor
 
 
@@ -135,22 +133,27 @@ def condition_number(triangle: RealArray) -> float:
     return float(values[0] / max(values[-1], values[0] / UNBOUNDED)) if len(values) and values[0] > 0.0 else 1.0
 
 
-def _chunks(columns: RealArray, weight: FloatArray | None, intercept: bool) -> Iterator[Factor]:
+def _chunks(
+    columns: RealArray, weight: FloatArray | None, intercept: bool, precision: np.dtype[np.floating]
+) -> Iterator[Factor]:
     for start in range(0, len(columns), CHUNK):
         rows = slice(start, start + CHUNK)
-        yield _block(columns[rows], None if weight is None else weight[rows], intercept)
+        yield _block(columns[rows].astype(precision), None if weight is None else weight[rows], intercept)
 
 
-def _block(columns: RealArray, weight: FloatArray | None, intercept: bool) -> Factor:
-    root = None if weight is None else np.sqrt(weight).astype(columns.dtype)[:, None]
-    total, mean = 0.0, np.zeros(columns.shape[1], dtype=columns.dtype)
-    centred = columns
+def _block(rows: RealArray, weight: FloatArray | None, intercept: bool) -> Factor:
+    """Factor of some rows, which it overwrites."""
+    share = np.ones(len(rows)) if weight is None else weight
+    total, mean = 0.0, np.zeros(rows.shape[1], dtype=rows.dtype)
     if intercept:
-        total = float(len(columns) if weight is None else weight.sum())
+        total = float(share.sum())
         for _ in range(2):  # the second pass takes away what rounding of a large mean left
-            shift = np.average(centred, axis=0, weights=weight)
-            centred, mean = centred - shift, mean + shift
-    return Factor(total, mean, upper_triangle(centred if root is None else centred * root))
+            shift = share @ rows / total
+            rows -= shift
+            mean += shift
+    if weight is not None:
+        rows *= np.sqrt(weight).astype(rows.dtype)[:, None]
+    return Factor(total, mean, upper_triangle(rows))
 
 
 def upper_triangle(rows: RealArray) -> RealArray:

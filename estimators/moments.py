@@ -10,7 +10,7 @@ import numpy as np
 from estimators.errors import InvalidSamples
 from estimators.friction_model import Domain, FrictionModel
 from estimators.least_squares import Factor, factorise, merge
-from estimators.observations import check_columns, common_element_area
+from estimators.observations import check_columns, common_element_area, positive
 
 if TYPE_CHECKING:
     from slipcore.samples import FrictionSamples
@@ -38,15 +38,15 @@ class Moments:
         """Moments of one grasp's samples, none of them allowed; raises ``InvalidSamples`` as ``fit`` does."""
         area = common_element_area([samples.element_area])
         columns = check_columns([samples])
-        used = columns["weight"] > 0.0
-        if not used.any():
-            return cls.empty(area)
+        used = positive(columns["weight"])
         v, f_n, mu, weight = (
             columns[name][used] for name in ("tangential_velocity", "normal_force", "friction_coefficient", "weight")
         )
+        if len(weight) == 0:
+            return cls.empty(area)
         domain = Domain((float(v.min()), float(v.max())), (float(f_n.min()), float(f_n.max())))
         factor = factorise(np.stack([v, f_n, mu]).T, weight)
-        return cls(factor, float(weight @ weight), int(used.sum()), domain, area)
+        return cls(factor, float(weight @ weight), len(weight), domain, area)
 
     @classmethod
     def empty(cls, element_area: float) -> "Moments":

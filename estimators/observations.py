@@ -78,23 +78,19 @@ def observe(samples: "FrictionSamples | Sequence[FrictionSamples]") -> Observati
     """
     parts = _parts(samples)
     area = common_element_area([part.element_area for part in parts])
-    parts = [part.at_element_area(area) for part in parts]
-    count = sum(map(len, parts))
-    if count == 0:
+    parts = [part if part.element_area == area else part.at_element_area(area) for part in parts]
+    if sum(map(len, parts)) == 0:
         raise TooFewSamples("samples", "none (no slip was seen)", f"at least {MIN_SAMPLES}")
     values = check_columns(parts)
     weight = _relative_weight(values.pop("weight"))
-    used = weight > 0.0
-    _check_count(weight, int(used.sum()))
+    used = positive(weight)
+    weight = weight[used]
+    _check_count(weight)
     grasp = np.repeat(np.arange(len(parts)), [len(part) for part in parts])[used]
-    element = np.concatenate([np.asarray(part.element) for part in parts])[used]
-    time = np.concatenate([np.asarray(part.time, float) for part in parts])[used]
-    cluster, kind = _clusters(grasp, element, time)
+    cluster, kind = _clusters(parts, grasp, used)
     names = {"friction_coefficient": "friction"}
     columns = {names.get(name, name): value[used] for name, value in values.items()}
-    return Observations(
-        **columns, weight=weight[used], grasp=grasp, cluster=cluster, cluster_kind=kind, element_area=area
-    )
+    return Observations(**columns, weight=weight, grasp=grasp, cluster=cluster, cluster_kind=kind, element_area=area)
 
 
 _LOWEST = {
@@ -116,10 +112,20 @@ def _parts(samples: "FrictionSamples | Sequence[FrictionSamples]") -> "list[Fric
 
 def check_columns(parts: "Sequence[FrictionSamples]") -> dict[str, FloatArray]:
     """The numeric columns of all parts joined, refused where not finite or below what they can be."""
-    values = {name: np.concatenate([getattr(part, name) for part in parts]).astype(float) for name in _LOWEST}
+    values = {name: joined([getattr(part, name) for part in parts]) for name in _LOWEST}
     for name, lowest in _LOWEST.items():
         _check_column(name, values[name], lowest)
     return values
+
+
+def joined(arrays: Sequence[NDArray[np.generic]]) -> FloatArray:
+    """All arrays in one; a single one as it is, not to be written to."""
+    return np.asarray(arrays[0] if len(arrays) == 1 else np.concatenate(arrays), dtype=np.float64)
+
+
+def positive(weight: FloatArray) -> NDArray[np.bool_] | slice:
+    """The entries above 0: a slice that copies nothing where all are."""
+    return slice(None) if len(weight) and weight.min() > 0.0 else weight > 0.0
 
 
 def common_element_area(areas: Sequence[float]) -> float:
@@ -149,22 +155,33 @@ def _relative_weight(weight: FloatArray) -> FloatArray:
     return np.asarray(scaled * (scaled.sum() / (scaled @ scaled)), dtype=float)
 
 
-def _check_count(weight: FloatArray, used: int) -> None:
-    if used < MIN_SAMPLES:
-        raise TooFewSamples("samples", f"{used} of positive weight", f"at least {MIN_SAMPLES}")
+def _check_count(weight: FloatArray) -> None:
+    if len(weight) < MIN_SAMPLES:
+        raise TooFewSamples("samples", f"{len(weight)} of positive weight", f"at least {MIN_SAMPLES}")
     effective = float(weight.sum())
     if effective <= MIN_SAMPLES - 1:
         raise TooFewSamples("samples", f"worth {effective:.3g} by their weights", f"more than {MIN_SAMPLES - 1}")
 
 
-def _clusters(grasp: IntArray, element: IntArray, time: FloatArray) -> tuple[IntArray, str]:
+def _clusters(parts: "list[FrictionSamples]", grasp: IntArray, used: NDArray[np.bool_] | slice) -> tuple[IntArray, str]:
     """Codes [k] from 0 of what shares an error: the grasp, else the element, else a stretch of time."""
     if grasp[-1] > grasp[0]:
-        return np.unique(grasp, return_inverse=True)[1], "grasp"
-    codes = np.unique(element, return_inverse=True)[1]
+        return _codes(grasp), "grasp"
+    codes = _codes(np.concatenate([np.asarray(part.element) for part in parts])[used])
     if codes.max() > 0:
         return codes, "element"
-    order = np.argsort(time, kind="stable")
-    block = np.empty(len(time), dtype=np.int64)
-    block[order] = np.arange(len(time)) * min(TIME_BLOCKS, len(time)) // len(time)
+    order = np.argsort(joined([part.time for part in parts])[used], kind="stable")
+    block = np.empty(len(order), dtype=np.int64)
+    block[order] = np.arange(len(order)) * min(TIME_BLOCKS, len(order)) // len(order)
     return block, "time block"
+
+
+def _codes(labels: IntArray) -> IntArray:
+    """Labels [k] numbered from 0 in their order; by a table where their range allows: a sort takes ten times longer."""
+    lowest = int(labels.min())
+    span = int(labels.max()) - lowest + 1
+    if span > 4 * len(labels):
+        return np.unique(labels, return_inverse=True)[1]
+    occurs = np.zeros(span, dtype=bool)
+    occurs[labels - lowest] = True
+    return np.asarray((np.cumsum(occurs) - 1)[labels - lowest])

@@ -1,6 +1,7 @@
 """Ordinary (weighted) least squares with errors that hold when samples of one grasp or element move together."""
 
 import time
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +12,11 @@ from estimators.evidence import Evidence
 from estimators.friction_model import FrictionModel
 from estimators.least_squares import LinearFit, solve
 from estimators.observations import IntArray
-from estimators.orthonormal import in_coefficients, orthonormal
+from estimators.orthonormal import in_coefficients, orthonormal, orthonormal_blocks
 from estimators.reporting import Diagnostics, by_coefficient, report
 
 FloatArray = NDArray[np.float64]
+Rows = tuple[FloatArray, FloatArray, IntArray]
 
 STATSMODELS_LIMIT = 20_000
 """Samples up to which statsmodels adds its classical, HC3 and CR1 errors for comparison; it takes seconds beyond."""
@@ -68,18 +70,17 @@ def _honest_covariance(evidence: Evidence, linear: LinearFit, scale: float) -> t
     if evidence.clusters < 2:
         return classical(linear, scale), {}
     if observations is None:
-        design, residual, cluster = _of_blocks(evidence, linear)
+        blocks: Iterable[Rows] = [_of_blocks(evidence, linear)]
     else:
-        design, residual = orthonormal(observations, linear)
-        cluster = observations.cluster
-    covariance = in_coefficients(linear, jackknife(*cluster_sums(design, residual, cluster), scale))
+        blocks = orthonormal_blocks(observations, linear)
+    covariance = in_coefficients(linear, jackknife(*cluster_sums(blocks, evidence.clusters), scale))
     errors = by_coefficient("standard_error_cluster", np.sqrt(np.diag(covariance)))
     if observations is not None and len(observations) <= STATSMODELS_LIMIT:
-        errors |= _statsmodels_errors(design, residual, cluster, linear)
+        errors |= _statsmodels_errors(*orthonormal(observations, linear), observations.cluster, linear)
     return covariance, errors
 
 
-def _of_blocks(evidence: Evidence, linear: LinearFit) -> tuple[FloatArray, FloatArray, IntArray]:
+def _of_blocks(evidence: Evidence, linear: LinearFit) -> Rows:
     """The same from moments: four rows a grasp that have the sums of squares and products of all its samples."""
     rows = evidence.centred_rows()
     basis = linear.basis.astype(float)

@@ -158,7 +158,7 @@ def _model(
     base = observations.weight[used]
     correction = float(base @ weight[used] / max(base @ loss.slope(u), 0.2 * (base @ weight[used])))
     scale = plane.scale * float(np.sqrt(np.average(u**2, weights=kept.weight) / normal_square(loss)))
-    covariance = jackknife(*cluster_sums(design, residual, kept.cluster), scale) * correction**2
+    covariance = jackknife(*cluster_sums([(design, residual, kept.cluster)], kept.clusters), scale) * correction**2
     degrees = evidence.effective_n - 1.0 - linear.rank
     return report(
         evidence,
