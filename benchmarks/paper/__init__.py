@@ -1,0 +1,1 @@
+"""The paper's experiments, run again on simulated scenes; one figure a module."""
