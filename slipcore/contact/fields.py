@@ -49,7 +49,7 @@ def _doubled_last(field: FloatArray) -> FloatArray:
     return halves.reshape(*field.shape[:-1], -1)
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"reassoc", "nsz", "contract"})
 def _inner(a, b):  # type: ignore[no-untyped-def]
     total = 0.0
     for i in range(a.size):

@@ -7,7 +7,7 @@ import numpy as np
 from slipcore.contact.grid import Grid
 from slipcore.contact.kernels import Component, ElasticBody
 from slipcore.contact.preconditioner import NormalInverse, TangentialInverse
-from slipcore.contact.transform import Transform, multiply_pair, padded_lengths
+from slipcore.contact.transform import Transform, fast_lengths, multiply_pair, padded_lengths
 from slipcore.frames import FloatArray
 
 
@@ -90,14 +90,16 @@ class ElasticOperator:
     def normal_inverse(self) -> NormalInverse:
         """Approximate inverse of ``normal``."""
         if self._normal_inverse is None:
-            self._normal_inverse = NormalInverse(self._nonzero("nn"))
+            self._normal_inverse = NormalInverse(self.grid.shape, self._nonzero("nn", self._fast_grid))
         return self._normal_inverse
 
     @property
     def tangential_inverse(self) -> TangentialInverse:
         """Approximate inverse of ``tangential``."""
         if self._tangential_inverse is None:
-            self._tangential_inverse = TangentialInverse(self._nonzero("xx"), self._nonzero("yy"), self.kernel("xy"))
+            xx, yy = (self._nonzero(component, self._fast_grid) for component in ("xx", "yy"))
+            xy = self._influence("xy", self._fast_grid)
+            self._tangential_inverse = TangentialInverse(self.grid.shape, xx, yy, xy)
         return self._tangential_inverse
 
     @property
@@ -112,10 +114,17 @@ class ElasticOperator:
     def kernel(self, component: Component) -> FloatArray | None:
         """Influence of one cell, summed over the bodies; first quadrant [ny, nx], None where it is zero."""
         if component not in self._kernels:
-            parts = [body.influence(component, self.grid) for body in self.bodies]
-            present = [part for part in parts if part is not None]
-            self._kernels[component] = sum(present[1:], start=present[0]) if present else None
+            self._kernels[component] = self._influence(component, self.grid)
         return self._kernels[component]
+
+    @property
+    def _fast_grid(self) -> Grid:
+        return replace(self.grid, shape=fast_lengths(self.grid.shape))
+
+    def _influence(self, component: Component, grid: Grid) -> FloatArray | None:
+        parts = [body.influence(component, grid) for body in self.bodies]
+        present = [part for part in parts if part is not None]
+        return sum(present[1:], start=present[0]) if present else None
 
     def _symbol(self, component: Component) -> FloatArray | None:
         if component not in self._symbols:
@@ -129,8 +138,8 @@ class ElasticOperator:
         assert symbol is not None  # no body is rigid in nn, xx and yy
         return symbol
 
-    def _nonzero(self, component: Component) -> FloatArray:
-        kernel = self.kernel(component)
+    def _nonzero(self, component: Component, grid: Grid) -> FloatArray:
+        kernel = self._influence(component, grid)
         assert kernel is not None  # as above
         return kernel
 

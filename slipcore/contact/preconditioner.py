@@ -1,7 +1,8 @@
-"""Cheap approximate inverses of the compliance: T. Chan's optimal circulant on the unpadded box.
+"""Cheap approximate inverses of the compliance: T. Chan's optimal circulant on a box hardly larger than the contact's.
 
 Chan (1988): of all circulants the nearest, in the Frobenius norm, to a Toeplitz matrix; positive definite where that
-is. It costs a quarter of an application of the operator, and makes conjugate gradients independent of the grid.
+is, and so is its part on a smaller box. It costs a quarter of an application of the operator, and makes conjugate
+gradients independent of the grid. The box is padded to ``fast_lengths``: a prime one would take four times as long.
 """
 
 import numpy as np
@@ -28,12 +29,12 @@ def _average(kernel: FloatArray, sign: float) -> FloatArray:
 
 
 class NormalInverse:
-    """Approximate pressure [ny, nx] that makes a normal displacement."""
+    """Approximate pressure [ny, nx] that makes a normal displacement; the kernel ``nn`` reaches over a larger box."""
 
     __slots__ = ("_inverse", "_transform")
 
-    def __init__(self, nn: FloatArray) -> None:
-        self._transform = Transform(nn.shape, nn.shape)
+    def __init__(self, shape: tuple[int, int], nn: FloatArray) -> None:
+        self._transform = Transform(shape, nn.shape)
         self._inverse = 1.0 / circulant_symbol(nn)
 
     def __call__(self, displacement: FloatArray) -> FloatArray:
@@ -45,12 +46,12 @@ class NormalInverse:
 
 
 class TangentialInverse:
-    """Approximate traction [2, ny, nx] that makes a tangential displacement [2, ny, nx]."""
+    """Approximate traction [2, ny, nx] that makes a tangential displacement [2, ny, nx]; kernels as above."""
 
     __slots__ = ("_inverse", "_transform")
 
-    def __init__(self, xx: FloatArray, yy: FloatArray, xy: FloatArray | None) -> None:
-        self._transform = Transform(xx.shape, xx.shape)
+    def __init__(self, shape: tuple[int, int], xx: FloatArray, yy: FloatArray, xy: FloatArray | None) -> None:
+        self._transform = Transform(shape, xx.shape)
         a, d = circulant_symbol(xx), circulant_symbol(yy)
         self._inverse: tuple[FloatArray, FloatArray, FloatArray | None] = (1.0 / a, 1.0 / d, None)
         if xy is not None:

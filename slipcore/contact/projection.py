@@ -22,6 +22,9 @@ BLOCK = 256
 FLAT = 1e7
 """Dual, as a multiple of the largest wish and radius, beyond which φ is flat to rounding: the load is at its limit."""
 
+SMALLEST = 1e-300
+"""Added to squares that are divided by."""
+
 LONGEST = 1e6
 """Steps a search may grow to: φ is then as good as linear along it."""
 
@@ -114,39 +117,51 @@ def _evaluate(wish, radius, arm, target, given, motion, traction, gradient, hess
     gx, gy, gm = -target[0], -target[1], -target[2]
     hxx = hxy = hyy = hxm = hym = hmm = 0.0
     for first in range(0, radius.size, BLOCK):
-        bx = by = bm = 0.0
-        for i in range(first, min(first + BLOCK, radius.size)):
-            limit = radius[i]
-            if limit <= 0.0:
-                traction[0, i] = traction[1, i] = 0.0
-                continue
-            x, y = arm[0, i], arm[1, i]
-            qx = wish[0, i] + motion[0] - y * motion[2]
-            qy = wish[1, i] + motion[1] + x * motion[2]
-            size = np.sqrt(qx * qx + qy * qy)
-            jxx, jxy, jyy = 1.0, 0.0, 1.0
-            if size > limit:
-                share = limit / size
-                nx, ny = qx / size, qy / size
-                qx, qy = limit * nx, limit * ny
-                jxx, jxy, jyy = share * ny * ny, -share * nx * ny, share * nx * nx
-            traction[0, i], traction[1, i] = qx, qy
-            bx += qx
-            by += qy
-            bm += x * qy - y * qx
-            hxx += jxx
-            hxy += jxy
-            hyy += jyy
-            hxm += x * jxy - y * jxx
-            hym += x * jyy - y * jxy
-            hmm += x * x * jyy - 2.0 * x * y * jxy + y * y * jxx
-        gx += bx
-        gy += by
-        gm += bm
+        part = slice(first, min(first + BLOCK, radius.size))
+        (bx, by, bm), (bxx, bxy, byy, bxm, bym, bmm) = _evaluate_block(
+            wish[0, part],
+            wish[1, part],
+            radius[part],
+            arm[0, part],
+            arm[1, part],
+            motion,
+            traction[0, part],
+            traction[1, part],
+        )
+        gx, gy, gm = gx + bx, gy + by, gm + bm
+        hxx, hxy, hyy, hxm, hym, hmm = hxx + bxx, hxy + bxy, hyy + byy, hxm + bxm, hym + bym, hmm + bmm
     gradient[0], gradient[1], gradient[2] = gx * given[0], gy * given[1], gm * given[2]
     hessian[0, 0], hessian[0, 1], hessian[0, 2] = hxx, hxy, hxm
     hessian[1, 0], hessian[1, 1], hessian[1, 2] = hxy, hyy, hym
     hessian[2, 0], hessian[2, 1], hessian[2, 2] = hxm, hym, hmm
+
+
+@njit(cache=True, fastmath={"reassoc", "nsz", "contract"}, error_model="numpy")
+def _evaluate_block(wish_x, wish_y, radius, arm_x, arm_y, motion, traction_x, traction_y):  # type: ignore[no-untyped-def]
+    """Tractions of a few cells, their resultants and derivatives; without branches, so that it runs in vectors."""
+    mx, my, yaw = motion[0], motion[1], motion[2]
+    bx = by = bm = hxx = hxy = hyy = hxm = hym = hmm = 0.0
+    for i in range(radius.size):
+        x, y = arm_x[i], arm_y[i]
+        qx, qy = wish_x[i] + mx - y * yaw, wish_y[i] + my + x * yaw
+        square = qx * qx + qy * qy + SMALLEST
+        share = min(1.0, radius[i] / np.sqrt(square))
+        free = 1.0 if share == 1.0 else 0.0
+        turning = (1.0 - free) * share / square  # at its limit a traction turns, but does not grow
+        jxx, jxy, jyy = free + turning * qy * qy, -turning * qx * qy, free + turning * qx * qx
+        qx, qy = share * qx, share * qy
+        traction_x[i], traction_y[i] = qx, qy
+        bx += qx
+        by += qy
+        bm += x * qy - y * qx
+        jxm, jym = x * jxy - y * jxx, x * jyy - y * jxy
+        hxx += jxx
+        hxy += jxy
+        hyy += jyy
+        hxm += jxm
+        hym += jym
+        hmm += x * jym - y * jxm
+    return (bx, by, bm), (hxx, hxy, hyy, hxm, hym, hmm)
 
 
 @njit(cache=True)

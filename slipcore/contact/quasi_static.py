@@ -13,6 +13,7 @@ from slipcore.contact.creep import creep_compliance, creep_recalled, creep_step
 from slipcore.contact.fields import rigid_displacement
 from slipcore.contact.grid import Grid
 from slipcore.contact.kernels import Scaled
+from slipcore.contact.normal import NormalContact
 from slipcore.contact.operator import Count, Operators
 from slipcore.contact.problem import Problem, StepLoad
 from slipcore.contact.resolution import unresolved
@@ -31,12 +32,14 @@ LEAST_SHARE = 1e-3
 class State:
     """What the next step depends on; fields on the whole grid.
 
-    ``pressure`` [ny, nx], ``traction`` [2, ny, nx] Pa and its last ``change``; ``displacement`` [2, ny, nx] m of the
+    ``normal`` contact, its ``pressure`` [ny, nx], ``traction`` [2, ny, nx] Pa and the last ``change`` [3, ny, nx] of
+    both; ``displacement`` [2, ny, nx] m of the
     finger against the object's own surface; ``elastic`` [3, ny, nx] m, the finger's displacement without creep;
     ``creep`` m, one [3, ny, nx] a branch; ``pose`` [3] of the object (m, m, rad); ``load``: the last; ``drive`` [3]:
     how it differed from the one before.
     """
 
+    normal: NormalContact | None
     pressure: FloatArray
     traction: FloatArray
     change: FloatArray
@@ -46,6 +49,11 @@ class State:
     pose: FloatArray
     load: StepLoad
     drive: FloatArray
+
+    def foreseen(self, drive: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Pressure and traction if stresses go on changing as in the last step."""
+        share = _foresight(self.drive, drive)
+        return np.maximum(self.pressure + share * self.change[2], 0.0), self.traction + share * self.change[:2]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +114,7 @@ class QuasiStatic:
         """Bodies apart."""
         zero = np.zeros((3, *self.grid.shape))
         creep = tuple(zero for _ in self.problem.creep)
-        return State(zero[0], zero[:2], zero[:2], zero[:2], zero, creep, np.zeros(3), StepLoad(0.0), np.zeros(3))
+        return State(None, zero[0], zero[:2], zero, zero[:2], zero, creep, np.zeros(3), StepLoad(0.0), np.zeros(3))
 
     def run(self, loads: Iterable[StepLoad]) -> Iterator[StepResult]:
         """Results of loads one after the other, from bodies apart."""
@@ -130,12 +138,18 @@ class QuasiStatic:
             load,
             self.tolerance * self._share(state, load, drive),
             self.normal_tolerance,
+            state.normal if self._pressed_alike(state, load) else None,
         )
-        solution = equations.solve(state.pressure, state.traction + _foresight(state.drive, drive) * state.change)
+        solution = equations.solve(*state.foreseen(drive))
         after = self._advance(equations, state, load, drive, solution, recalled)
         result = self._result(equations, state, after, solution)
         seconds = time.perf_counter() - began
         return after, replace(result, applications=self.count.since(counted), seconds=seconds)
+
+    def _pressed_alike(self, state: State, load: StepLoad) -> bool:
+        """Whether nothing that pressure depends on has changed since the last step."""
+        pressed = (load.normal_force, load.approach) == (state.load.normal_force, state.load.approach)
+        return pressed and not self.problem.coupled and not self.problem.creep
 
     def _operators(self, duration: float) -> Operators:
         """Compliance of both bodies together within a step of this duration."""
@@ -170,33 +184,27 @@ class QuasiStatic:
         traction[:, *solution.box] = solution.tangential.traction
         pose += solution.tangential.motion
         pressure = solution.normal.pressure
-        elastic = self._displacement(self.finger, pressure, traction, self._normal_known(solution))
-        if equations.operators.bodies == self.finger.bodies:
-            displacement = elastic[:2]
-        else:
-            displacement = self._displacement(equations.operators, pressure, traction, solution.normal.displacement)[:2]
+        both = self._displacement(equations.operators, pressure, traction, solution)
+        alone = equations.operators.bodies == self.finger.bodies
+        elastic = both if alone else self._displacement(self.finger, pressure, traction)
+        displacement = both[:2]
         creep = creep_step(self.problem.creep, state.creep, state.elastic, elastic, load.duration)
         if recalled is not None:
             displacement = displacement + recalled[:2]
-        return State(pressure, traction, traction - state.traction, displacement, elastic, creep, pose, load, drive)
-
-    def _normal_known(self, solution: StepSolution) -> FloatArray | None:
-        """The finger's normal displacement where the normal solver has it already: no other body, no creep."""
-        alone = not self.problem.obstacle and not self.problem.creep
-        return solution.normal.displacement if alone else None
+        change = np.stack((*(traction - state.traction), pressure - state.pressure))
+        return State(solution.normal, pressure, traction, change, displacement, elastic, creep, pose, load, drive)
 
     def _displacement(
-        self, operators: Operators, pressure: FloatArray, traction: FloatArray, known: FloatArray | None
+        self, operators: Operators, pressure: FloatArray, traction: FloatArray, known: StepSolution | None = None
     ) -> FloatArray:
-        """Displacement [3, ny, nx] m on the whole grid by pressure and traction; ``known``: its normal part by
-        pressure.
-        """
+        """Displacement [3, ny, nx] m on the whole grid by pressure and traction, as far as not ``known`` already."""
         operator = operators.on(self.grid)
         whole = np.zeros((3, *self.grid.shape))
         if pressure.any():
-            whole[2] = operator.normal(pressure) if known is None else known
+            whole[2] = operator.normal(pressure) if known is None else known.normal.displacement
             if traction.any():
-                whole[:2] = operator.tangential(traction)
+                everywhere = known is not None and known.limit.shape == self.grid.shape
+                whole[:2] = known.tangential.displacement if known and everywhere else operator.tangential(traction)
             if self.problem.coupled:
                 whole[2] += operator.normal_by_traction(traction)
             if self.problem.coupled or self.problem.spread:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.contact.errors import NotConverged
+from slipcore.contact.fields import inner
 from slipcore.contact.grid import Box, Grid, bounding_box
 from slipcore.contact.normal import NormalContact, solve_normal
 from slipcore.contact.operator import Operators
@@ -18,6 +19,32 @@ BOX_MULTIPLE = 4
 """Boxes grow by so many cells, so that a growing contact meets few new operators."""
 OUTER_ITERATIONS = 60
 """Of coupling and of velocity-dependent friction."""
+PRESSURE_BY_LIFT = 5.0
+"""Change of a sphere's pressure, as a share of its largest, by a lift as a share of the indentation: π²/2."""
+COUPLING_START = 1e-2
+"""What the first guess of the lift is taken to be off by, in the same measure."""
+INEXACT = 0.3
+"""Of the last change of the lift: how far contact is solved under one that will change again."""
+
+
+class Mixing:
+    """Anderson's acceleration of a fixed point, of depth one (J. ACM 12 (1965) 547)."""
+
+    def __init__(self) -> None:
+        self._last: tuple[FloatArray, FloatArray] | None = None
+
+    def next(self, point: FloatArray, answer: FloatArray) -> FloatArray:
+        """The next point, given the last and what the map made of it."""
+        change, share = answer - point, 0.0
+        if self._last is not None:
+            bend = change - self._last[0]
+            size = inner(bend, bend)
+            share = float(np.clip(inner(change, bend) / size, -1.0, 1.0)) if size > 0.0 else 0.0
+            following = answer - share * (answer - self._last[1])
+        else:
+            following = answer
+        self._last = (change, answer)
+        return following
 
 
 class StepSolution(NamedTuple):
@@ -38,7 +65,7 @@ class StepEquations:
 
     ``height`` [ny, nx] m, with what creep recalls; ``friction`` [ny, nx]; ``offset`` [2, ny, nx] m: what the surface
     has moved since the last step apart from traction and pressure; ``tolerance`` of tractions, as a share of the
-    largest limit.
+    largest limit; ``known``: normal contact where it is that of the last step.
     """
 
     problem: Problem
@@ -50,39 +77,44 @@ class StepEquations:
     load: StepLoad
     tolerance: float
     normal_tolerance: float
+    known: NormalContact | None = None
 
     def solve(self, pressure: FloatArray, traction: FloatArray) -> StepSolution:
         """Pressure and traction that agree with each other, from guesses of both on the whole grid."""
-        solution = self._once(pressure, traction, self.height)
         if not self.problem.coupled:
-            return solution
-        iterations = solution.iterations
+            return self._once(pressure, traction, self.height, self.tolerance)
+        lift, change, iterations, mixing = self._lift(traction), COUPLING_START, 0, Mixing()
         for _ in range(OUTER_ITERATIONS):
-            if not solution.normal.pressure.any():
-                return solution
-            before, traction = solution.normal.pressure, self._whole(solution)
-            lifted = self.height + self.operators.on(self.grid).normal_by_traction(traction)
-            solution = self._once(before, traction, lifted)
+            goal = max(self.tolerance, INEXACT * change)
+            solution = self._once(pressure, traction, self.height + lift, goal)
+            pressure, traction = solution.normal.pressure, self._whole(solution)
             iterations += solution.iterations
-            change = float(np.abs(solution.normal.pressure - before).max() / before.max())
-            if change <= self.tolerance:
+            if not pressure.any():
+                return solution
+            answer = self._lift(traction)
+            change = PRESSURE_BY_LIFT * float(np.abs(answer - lift).max() / solution.normal.displacement.max())
+            if max(10.0 * change, goal) <= self.tolerance:
                 return solution._replace(iterations=iterations)
+            lift = mixing.next(lift, answer)
         raise NotConverged("normal-tangential coupling", change, self.tolerance, OUTER_ITERATIONS)
+
+    def _lift(self, traction: FloatArray) -> FloatArray:
+        return self.operators.on(self.grid).normal_by_traction(traction)
 
     def _whole(self, solution: StepSolution) -> FloatArray:
         whole = np.zeros((2, *self.grid.shape))
         whole[:, *solution.box] = solution.tangential.traction
         return whole
 
-    def _once(self, pressure: FloatArray, traction: FloatArray, height: FloatArray) -> StepSolution:
+    def _once(self, pressure: FloatArray, traction: FloatArray, height: FloatArray, tolerance: float) -> StepSolution:
         """Normal contact, then tangential contact under its pressure."""
-        normal = solve_normal(
+        normal = self.known or solve_normal(
             self.operators,
             self.grid,
             height,
             self.load.normal_force,
             self.load.approach,
-            self.normal_tolerance,
+            self.normal_tolerance * tolerance / self.tolerance,
             pressure,
         )
         touching = normal.pressure > 0.0
@@ -90,33 +122,37 @@ class StepEquations:
         offset = self.offset
         if self.problem.coupled or self.problem.spread:
             offset = offset + self.operators.on(self.grid).tangential_by_pressure(normal.pressure)
-        return self._slide(normal, box, offset[:, *box], traction[:, *box])
+        return self._slide(normal, box, offset[:, *box], traction[:, *box], tolerance)
 
-    def _slide(self, normal: NormalContact, box: Box, offset: FloatArray, start: FloatArray) -> StepSolution:
+    def _slide(
+        self, normal: NormalContact, box: Box, offset: FloatArray, start: FloatArray, tolerance: float
+    ) -> StepSolution:
         """Tangential contact; again with new limits as long as friction depends on the velocity that comes out."""
         pressure, coefficient = normal.pressure[box], self.friction[box]
         for law in self.problem.pressure_laws:
             coefficient = coefficient + law(pressure)
         limit = _coulomb_limit(coefficient, pressure)
         if not self.problem.velocity_laws:
-            tangential = self._tangential(box, limit, offset, start)
+            tangential = self._tangential(box, limit, offset, start, tolerance)
             return StepSolution(normal, tangential, limit, box, tangential.iterations)
         iterations, velocity = 0, np.zeros_like(pressure)
         for k in range(OUTER_ITERATIONS):
             added = [law(velocity) for law in self.problem.velocity_laws]
             before, limit = limit, _coulomb_limit(sum(added, start=coefficient), pressure)
-            tangential = self._tangential(box, limit, offset, start)
+            tangential = self._tangential(box, limit, offset, start, tolerance)
             iterations += tangential.iterations
             change = float(np.abs(limit - before).max()) / max(float(limit.max()), 1e-300)
-            if change <= self.tolerance and k > 0:
+            if change <= tolerance and k > 0:
                 return StepSolution(normal, tangential, limit, box, iterations)
             start, velocity = tangential.traction, np.hypot(*tangential.slip) / self.load.duration
-        raise NotConverged("velocity-dependent friction", change, self.tolerance, OUTER_ITERATIONS)
+        raise NotConverged("velocity-dependent friction", change, tolerance, OUTER_ITERATIONS)
 
-    def _tangential(self, box: Box, limit: FloatArray, offset: FloatArray, start: FloatArray) -> TangentialContact:
+    def _tangential(
+        self, box: Box, limit: FloatArray, offset: FloatArray, start: FloatArray, tolerance: float
+    ) -> TangentialContact:
         part = self.grid.part(box)
         operator = self.operators.on(part)
-        return solve_tangential(operator, part.points(), limit, offset, self.load.control(), start, self.tolerance)
+        return solve_tangential(operator, part.points(), limit, offset, self.load.control(), start, tolerance)
 
 
 def _coulomb_limit(coefficient: FloatArray, pressure: FloatArray) -> FloatArray:

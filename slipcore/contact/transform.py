@@ -10,10 +10,16 @@ from slipcore.frames import FloatArray
 ComplexArray = NDArray[np.complex128]
 
 
+def fast_lengths(shape: tuple[int, int]) -> tuple[int, int]:
+    """The next lengths that transform fast."""
+    ny, nx = (int(scipy.fft.next_fast_len(size, real=True)) for size in shape)
+    return ny, nx
+
+
 def padded_lengths(shape: tuple[int, int]) -> tuple[int, int]:
     """Lengths from which a circular convolution of such fields does not wrap, and that transform fast."""
-    ny, nx = (int(scipy.fft.next_fast_len(2 * size - 1, real=True)) for size in shape)
-    return ny, nx
+    ny, nx = shape
+    return fast_lengths((2 * ny - 1, 2 * nx - 1))
 
 
 class Transform:

@@ -113,6 +113,30 @@ def test_coupling_presses_the_surface_sideways_and_balances() -> None:
     assert sheared.force[0].sum() == pytest.approx(2.0, rel=1e-10)
 
 
+@pytest.mark.parametrize("poisson", [0.0, 0.3, 0.49])
+def test_pressure_and_traction_of_coupled_steps_agree_with_each_other(poisson: float) -> None:
+    """One more pass of either leaves the other as it is: the fixed point is reached, not merely slow."""
+    loads = [shear(FORCE, force) for force in np.linspace(0.0, 3.6, 10)]
+    grid = Grid.square(40, 11e-3)
+    loose, tight = (
+        list(QuasiStatic(sphere_on(poisson, coupled=True), grid, tolerance).run(loads))[-1]
+        for tolerance in (1e-3, 1e-7)
+    )
+    size = np.linalg.norm(tight.force[2])
+    # tolerances are shares of what a step changes, a tenth of the capacity; errors of ten steps add up
+    assert np.linalg.norm(loose.force[2] - tight.force[2]) <= 1e-3 * size
+    assert np.linalg.norm(loose.force[:2] - tight.force[:2]) <= 5e-3 * FRICTION * size
+
+
+def test_a_step_under_unchanged_pressing_leaves_normal_contact_alone() -> None:
+    solver = QuasiStatic(sphere_on(0.3), Grid.square(32, 11e-3))
+    state, _ = solver.step(solver.start(), shear(FORCE, 0.0))
+    state, sheared = solver.step(state, shear(FORCE, 1.0))
+    assert sheared.applications.normal == 0
+    _, pressed = solver.step(state, shear(1.1 * FORCE, 1.0))
+    assert pressed.applications.normal > 0
+
+
 def test_velocity_dependent_friction_meets_its_own_law() -> None:
     solver = QuasiStatic(sphere_on(0.3, velocity_laws=(lambda v: 2.0 * v,)), Grid.square(32, 11e-3), tolerance=1e-7)
     state, _ = solver.step(solver.start(), shear(FORCE, 0.0))
