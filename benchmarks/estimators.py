@@ -150,7 +150,7 @@ def ours(moments: estimators.Moments, exact: NormalInverseGamma, accuracy: float
     seconds = median_seconds(
         lambda seed: moments.fit("bayes", accuracy=accuracy, seed=seed, likelihood="gaussian"), repeats
     )
-    chains = [sample(posterior.log_probability, 4, accuracy, seed=seed) for seed in range(repeats)]
+    chains = [sample(posterior.log_probability, posterior.proposal, accuracy, seed=seed) for seed in range(repeats)]
     found = [errors(np.column_stack(posterior._natural(chain.flat())), exact) for chain in chains]
     size = statistics.median(float(chain.effective_sample_size.min()) for chain in chains)
     return {"seconds": seconds, "ess": size, **{k: statistics.median(f[k] for f in found) for k in found[0]}}

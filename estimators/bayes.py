@@ -62,7 +62,7 @@ def fit(
     goal = LIKELIHOODS[name].accuracy if accuracy is None else accuracy
     posterior = LIKELIHOODS[name].posterior(evidence)
     left = None if seconds is None else max(seconds - (time.perf_counter() - begin), 0.0)
-    chain = sample(posterior.log_probability, len(posterior.sampled), goal, left, seed, posterior.local)
+    chain = sample(posterior.log_probability, posterior.proposal, goal, left, seed, posterior.local)
     summary = posterior.summarise(chain.flat(), np.random.default_rng([seed, 1]))
     diagnostics: Diagnostics = {"likelihood": name, "prior": posterior.prior, "draws": ", ".join(posterior.names)}
     diagnostics |= _convergence(chain, posterior) | sensitivity(evidence, exact_posterior(evidence))

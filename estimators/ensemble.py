@@ -8,6 +8,7 @@ from emcee.moves import Move
 from numpy.typing import NDArray
 
 from estimators.defaults import SAMPLING
+from estimators.proposal import Proposal
 
 FloatArray = NDArray[np.float64]
 
@@ -27,12 +28,13 @@ class VectorisedSampler(emcee.EnsembleSampler):  # type: ignore[misc]
 
 
 class IndependenceMove(Move):  # type: ignore[misc]
-    """Metropolis-Hastings with proposals from a multivariate Student-t, whatever the walker's place.
+    """Metropolis-Hastings with proposals that depend on no walker's place.
 
-    They depend on no walker, so those of ``SAMPLING.batch`` steps are drawn and looked at in one call.
+    Those of ``SAMPLING.batch`` steps are drawn and looked at in one call.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, proposal: Proposal) -> None:
+        self._proposal = proposal
         self._waiting: Iterator[tuple[FloatArray, FloatArray, FloatArray]] = iter(())
 
     def propose(self, model: emcee.model.Model, state: emcee.State) -> tuple[emcee.State, NDArray[np.bool_]]:
@@ -40,30 +42,17 @@ class IndependenceMove(Move):  # type: ignore[misc]
         if (ready := next(self._waiting, None)) is None:
             self._waiting = self._batch(model, *state.coords.shape)
             ready = next(self._waiting)
-        coords, log_prob, log_uniform = ready
-        weight = state.log_prob - log_student(state.coords)
-        accepted = log_uniform < log_prob - log_student(coords) - weight
+        coords, log_prob, log_weight = ready
+        accepted = log_weight > state.log_prob - self._proposal.log_density(state.coords)
         return self.update(state, emcee.State(coords, log_prob=log_prob), accepted), accepted
 
-    @staticmethod
     def _batch(
-        model: emcee.model.Model, walkers: int, dimension: int
+        self, model: emcee.model.Model, walkers: int, dimension: int
     ) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-        coords = student(model.random, SAMPLING.batch * walkers, dimension)
-        log_prob, _ = model.compute_log_prob_fn(coords)
+        """Positions, log probability and log weight of a walker that they just replace, a step after another."""
         shape = (SAMPLING.batch, walkers)
-        log_uniform = np.log(model.random.random_sample(shape))
-        return zip(coords.reshape(*shape, dimension), log_prob.reshape(shape), log_uniform, strict=True)
-
-
-def student(random: np.random.RandomState, count: int, dimension: int) -> FloatArray:
-    """Draws [count, dimension] of the multivariate Student-t proposal."""
-    degrees = SAMPLING.proposal_degrees_of_freedom
-    radius = np.sqrt(degrees / random.chisquare(degrees, (count, 1)))
-    return np.asarray(random.standard_normal((count, dimension)) * radius)
-
-
-def log_student(x: FloatArray) -> FloatArray:
-    """Its log density [k] at x [k, d], up to a constant."""
-    degrees = SAMPLING.proposal_degrees_of_freedom
-    return np.asarray(-0.5 * (degrees + x.shape[1]) * np.log1p(np.einsum("ki,ki->k", x, x) / degrees))
+        coords = self._proposal.draw(model.random, SAMPLING.batch * walkers)
+        log_prob, _ = model.compute_log_prob_fn(coords)
+        log_uniform = np.log(model.random.random_sample(log_prob.shape))
+        log_weight = log_prob - self._proposal.log_density(coords) - log_uniform
+        return zip(coords.reshape(*shape, dimension), log_prob.reshape(shape), log_weight.reshape(shape), strict=True)

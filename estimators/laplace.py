@@ -5,17 +5,20 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.proposal import evenness, flattened, standard
+
 FloatArray = NDArray[np.float64]
 LogDensity = Callable[[FloatArray], FloatArray]
 
 STEP = 0.1
 """Finite-difference step, in units of the start's spread: wide enough for sums of 10⁶ rounded terms."""
+FALL = 10.0
+"""What the edge of the support counts for in a difference of the log density."""
 ITERATIONS = 60
 CLOSE = 0.02
 """Newton step, in standard deviations, below which a proposal gains nothing from a better mode."""
 ROUNDS, DRAWS, EVEN = 8, 400, 0.6
-"""Rounds and draws of the refinement, and the evenness of weights at which an independence proposal does well."""
-POWERS = np.array([1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02])
+"""Rounds and draws of the refinement, and the evenness of weights at which it ends."""
 LENGTHS = np.array([1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.001])
 
 
@@ -51,6 +54,7 @@ def _differences(log_density: LogDensity, at: FloatArray, root: FloatArray) -> t
     unit = STEP * np.eye(size)
     moves = np.vstack([np.zeros((1, size)), unit, -unit, unit[first] + unit[second], -unit[first] - unit[second]])
     value = log_density(at + moves @ root.T)
+    value = np.where(np.isfinite(value), value, value[0] - FALL)
     centre, plus, minus = value[0], value[1 : size + 1], value[size + 1 : 2 * size + 1]
     both = value[2 * size + 1 :].reshape(2, -1).sum(axis=0)
     hessian = np.diag(plus + minus - 2.0 * centre)
@@ -65,32 +69,18 @@ def refine(
     """Centre [d] and root [d, d] closer to a skewed density than mode and curvature are, and how even weights are then.
 
     Adaptive importance sampling (Cappé et al., 2004): draws from a Student-t are weighted by the density, their weights
-    flattened until a fifth of them counts, and their mean and covariance taken, until the weights are even enough as
-    they are. Evenness is the effective number of weights over their number; 0 where that of the result is not known.
+    flattened until a fifth of them counts, and their mean and covariance taken, until the weights are even enough.
     """
-    size, degrees, even = len(centre), 10.0, 0.0
+    proposal, even = standard(len(centre)), 0.0
     for _ in range(ROUNDS):
-        radius = np.sqrt(degrees / rng.chisquare(degrees, (DRAWS, 1)))
-        standard = rng.standard_normal((DRAWS, size)) * radius
-        at = centre + standard @ root.T
-        log = log_density(at) + 0.5 * (degrees + size) * np.log1p(np.sum(standard**2, axis=1) / degrees)
-        even = _evenness(log) if np.isfinite(log.max()) else 0.0
-        if not np.isfinite(log.max()) or even > EVEN:
+        draws = proposal.draw(rng, DRAWS)
+        at = centre + draws @ root.T
+        log_weight = log_density(at) - proposal.log_density(draws)
+        even = evenness(log_weight) if np.isfinite(log_weight.max()) else 0.0
+        if not np.isfinite(log_weight.max()) or even > EVEN:
             break
-        weight = flattened(log)
+        weight = flattened(log_weight)
         centre = weight @ at / weight.sum()
-        spread = np.cov(at.T, aweights=weight).reshape(size, size)
+        spread = np.cov(at.T, aweights=weight).reshape(len(centre), -1)
         root = np.asarray(np.linalg.cholesky(spread + 1e-12 * np.diag(np.diag(spread))), dtype=np.float64)
     return centre, root, even
-
-
-def flattened(log_weight: FloatArray) -> FloatArray:
-    """Weights [k] raised to the largest power at which a fifth of them counts."""
-    power = next((power for power in POWERS if _evenness(power * log_weight) > 0.2), POWERS[-1])
-    return np.asarray(np.exp(power * (log_weight - log_weight.max())))
-
-
-def _evenness(log: FloatArray) -> float:
-    """Effective number of weights over their number."""
-    weight = np.exp(log - log.max())
-    return float(weight.sum() ** 2 / (weight @ weight) / len(weight))

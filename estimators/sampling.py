@@ -3,18 +3,21 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimators.defaults import SAMPLING
 from estimators.errors import InvalidSamples
-from estimators.laplace import flattened
+from estimators.proposal import Proposal, flattened
 
 FloatArray = NDArray[np.float64]
 LogProbability = Callable[[FloatArray], FloatArray]
 
 TAILS = (0.05, 0.95)
+CANDIDATES = 8
+"""Proposals a walker of which its start is chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,31 +47,30 @@ class Chain:
 
 def sample(
     log_probability: LogProbability,
-    dimension: int,
+    proposal: Proposal,
     accuracy: float | None = None,
     seconds: float | None = None,
     seed: int = 0,
     local: float = 0.0,
 ) -> Chain:
-    """Sample a density that is close to N(0, I) until its Monte-Carlo error is under ``accuracy`` (or time is up).
+    """Sample a density in d dimensions until its Monte-Carlo error is under ``accuracy`` (or time is up).
 
-    An independence proposal from a multivariate Student-t makes every walker a chain of its own; ``local`` is the part
-    of the steps that are small instead, which frees walkers from where the proposal seldom comes. Where the target is
-    too far from N(0, I), differential evolution takes over. ``log_probability`` takes [k, d].
+    Independence proposals make every walker a chain of its own; ``local`` is the part of the steps that are small
+    instead, which frees walkers from where the proposal seldom comes. Where the density, which should be close to
+    N(0, I), is too far from the proposal, differential evolution takes over. ``log_probability`` takes [k, d].
     """
-    deadline = np.inf if seconds is None else time.perf_counter() + seconds
-    goal = SAMPLING.accuracy if accuracy is None else accuracy
     from emcee.moves import DEMove, GaussianMove  # emcee takes a second to load
 
     from estimators.ensemble import IndependenceMove
 
-    small = GaussianMove((2.4**2 / dimension) * np.ones(dimension))  # Gelman, Roberts & Gilks (1996)
-    moves = [(IndependenceMove(), 1.0 - local), (small, local)]
-    walkers = _walkers(goal, 3.0 if local > 0.0 else 1.0)
-    chain = _run(log_probability, dimension, moves, "independence", walkers, goal, deadline, seed)
+    deadline = np.inf if seconds is None else time.perf_counter() + seconds
+    goal = SAMPLING.accuracy if accuracy is None else accuracy
+    task = _Task(log_probability, proposal, _walkers(goal, 3.0 if local > 0.0 else 1.0), goal, deadline, seed)
+    small = GaussianMove((2.4**2 / proposal.dimension) * np.ones(proposal.dimension))  # Gelman, Roberts & Gilks (1996)
+    chain = _run(task, [(IndependenceMove(proposal), 1.0 - local), (small, local)], "independence")
     if chain.acceptance >= SAMPLING.min_acceptance:
         return chain
-    return _run(log_probability, dimension, DEMove(), "differential evolution", walkers, goal, deadline, seed)
+    return _run(task, DEMove(), "differential evolution")
 
 
 def autocorrelation_time(series: FloatArray) -> FloatArray:
@@ -119,36 +121,41 @@ def monte_carlo_error(draws: FloatArray, times: FloatArray) -> float:
     return float((np.array(errors) / ranked.std(axis=0)).max())
 
 
-def _run(
-    log_probability: LogProbability,
-    dimension: int,
-    move: object,
-    name: str,
-    walkers: int,
-    goal: float,
-    deadline: float,
-    seed: int,
-) -> Chain:
+class _Task(NamedTuple):
+    """What is to be sampled, by how many walkers, how well and until when."""
+
+    log_probability: LogProbability
+    proposal: Proposal
+    walkers: int
+    goal: float
+    deadline: float
+    seed: int
+
+
+def _run(task: _Task, move: object, name: str) -> Chain:
     from emcee import State
 
     from estimators.ensemble import VectorisedSampler
 
-    sampler = VectorisedSampler(walkers, dimension, log_probability, moves=move, vectorize=True)
-    random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed)))
-    start = _start(log_probability, random, walkers, dimension)
+    sampler = VectorisedSampler(task.walkers, task.proposal.dimension, task.log_probability, moves=move, vectorize=True)
+    random = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(task.seed)))
+    begin = time.perf_counter()
+    start = _start(task, random)
     sampler.random_state = random.get_state()
-    state = State(start, log_prob=log_probability(start))
-    begin, steps = time.perf_counter(), SAMPLING.block
+    state = State(start, log_prob=task.log_probability(start))
+    cost = (time.perf_counter() - begin) / (CANDIDATES + 1)  # of a step: as many walkers are looked at
+    steps = int(np.clip((task.deadline - time.perf_counter()) / cost, SAMPLING.batch, SAMPLING.block))
+    begin = time.perf_counter()
     while True:
         state = sampler.run_mcmc(state, steps, skip_initial_state_check=True)
         chain = _judge(sampler.get_chain(), float(sampler.acceptance_fraction.mean()), name)
         now, done = time.perf_counter(), sampler.iteration
-        if _hopeless(chain) or (not chain.trouble and chain.monte_carlo_error <= goal):
+        if _hopeless(chain) or (not chain.trouble and chain.monte_carlo_error <= task.goal):
             return chain
-        affordable = min((deadline - now) * done / (now - begin), float(SAMPLING.max_steps - done))
+        affordable = min((task.deadline - now) * done / (now - begin), float(SAMPLING.max_steps - done))
         if affordable < 1.0:
             return replace(chain, stopped="steps" if done >= SAMPLING.max_steps else "seconds")
-        steps = int(min(_missing(chain, goal), 4 * done, affordable))
+        steps = int(min(_missing(chain, task.goal), 4 * done, affordable))
 
 
 def _walkers(goal: float, slowness: float) -> int:
@@ -161,16 +168,14 @@ def _walkers(goal: float, slowness: float) -> int:
     return 2 * int(np.clip(np.ceil(draws / SAMPLING.block / 2.0), fewest // 2, most // 2))
 
 
-def _start(log_probability: LogProbability, random: np.random.RandomState, walkers: int, dimension: int) -> FloatArray:
+def _start(task: _Task, random: np.random.RandomState) -> FloatArray:
     """Walkers [w, d] near the posterior already: proposals resampled by their importance, never all of them one."""
-    from estimators.ensemble import log_student, student
-
-    candidates = student(random, 8 * walkers, dimension)
-    log_weight = log_probability(candidates) - log_student(candidates)
+    candidates = task.proposal.draw(random, CANDIDATES * task.walkers)
+    log_weight = task.log_probability(candidates) - task.proposal.log_density(candidates)
     if not np.isfinite(log_weight.max()):
         raise InvalidSamples("mean friction", "0 or less with near certainty", "above 0 over the range of the data")
     weight = flattened(log_weight)
-    return np.asarray(candidates[random.choice(len(weight), walkers, p=weight / weight.sum())])
+    return np.asarray(candidates[random.choice(len(weight), task.walkers, p=weight / weight.sum())])
 
 
 def _hopeless(chain: Chain) -> bool:

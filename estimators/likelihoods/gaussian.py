@@ -1,6 +1,6 @@
 """Independent Gaussian errors: the likelihood reads a triangle of 4 × 4, whatever the number of samples behind it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from estimators.evidence import Evidence
 from estimators.least_squares import whole_triangle
 from estimators.likelihoods.posterior import Summary, Whitening, bounded_exp, corners, supported
 from estimators.priors import positive_friction, prior_rows
+from estimators.proposal import Proposal, standard
 
 FloatArray = NDArray[np.float64]
 
@@ -33,6 +34,7 @@ class Gaussian:
     sampled: tuple[str, ...] = NAMES
     names: tuple[str, ...] = NAMES
     prior: str = positive_friction()
+    proposal: Proposal = field(default_factory=lambda: standard(4))
     local: float = 0.0
 
     def log_probability(self, whitened: FloatArray) -> FloatArray:

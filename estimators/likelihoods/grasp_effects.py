@@ -1,6 +1,6 @@
 """A random intercept per grasp: β and the intercepts are integrated out exactly, emcee walks on two scatters only."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from estimators.evidence import Evidence
 from estimators.likelihoods.posterior import Summary, bounded_exp, scatter
 from estimators.normal_score import NormalScore, normal_score
 from estimators.priors import grasp_effect, log_half_student, prior_rows
+from estimators.proposal import Proposal, standard
 
 FloatArray = NDArray[np.float64]
 
@@ -48,6 +49,7 @@ class GraspEffects:
     sampled: tuple[str, ...] = ("log_sigma", "log_tau")
     names: tuple[str, ...] = ("beta0", "beta1", "beta2", "sigma", "tau")
     prior: str = grasp_effect()
+    proposal: Proposal = field(default_factory=lambda: standard(2))
     local: float = 0.0
 
     def log_probability(self, whitened: FloatArray) -> FloatArray:

@@ -13,7 +13,10 @@ from estimators.likelihoods.posterior import bounded_exp
 FloatArray = NDArray[np.float64]
 
 CLEAN = 4.0
-"""Part of outliers π ~ Beta(1, 4): a fifth of the samples on average, and none at all as likely as any."""
+"""Part of outliers π ~ Beta(1, 4) below ½: a sixth of the samples on average, and none at all as likely as any.
+
+A majority would not be outliers: the two components would trade places, at a plane that is the prior's own.
+"""
 RATIO = (6.0, 0.5)
 """Scatter of outliers over that of the rest, less 1: log-normal about 6, as outliers as narrow as the rest are none."""
 OFFSET = (-0.1, 0.2)
@@ -29,8 +32,8 @@ class Outlier:
 
     names: tuple[str, ...] = ("sigma", "outlier_part", "outlier_scatter", "outlier_offset")
     prior: str = (
-        f"part of outliers ~ Beta(1, {CLEAN:g}); their scatter sigma (1 + kappa), log kappa ~ N(log {RATIO[0]:g}, "
-        f"{RATIO[1]:g}^2); their mean residual ~ N({OFFSET[0]:g}, {OFFSET[1]:g}^2)"
+        f"part of outliers ~ Beta(1, {CLEAN:g}) below 1/2; their scatter sigma (1 + kappa), "
+        f"log kappa ~ N(log {RATIO[0]:g}, {RATIO[1]:g}^2); their mean residual ~ N({OFFSET[0]:g}, {OFFSET[1]:g}^2)"
     )
 
     def start(self, scale: float) -> FloatArray:
@@ -44,9 +47,9 @@ class Outlier:
         return np.column_stack([sigma, part, sigma * (1.0 + ratio), coordinates[:, 3]])
 
     def log_prior(self, coordinates: FloatArray) -> FloatArray:
-        """That of (π^⅓, log κ, δ); none outside 0 < π < 1."""
+        """That of (π^⅓, log κ, δ); none outside 0 < π < ½."""
         _, root, log_ratio, offset = coordinates.T
-        inside = (root > 0.0) & (root < 1.0)
+        inside = (root > 0.0) & (root**3 < 0.5)
         part = np.where(inside, root, 0.5)
         log = 2.0 * np.log(part) + (CLEAN - 1.0) * np.log1p(-(part**3))
         log -= 0.5 * ((log_ratio - np.log(RATIO[0])) / RATIO[1]) ** 2 + 0.5 * ((offset - OFFSET[0]) / OFFSET[1]) ** 2

@@ -13,6 +13,7 @@ from estimators.evidence import Evidence
 from estimators.laplace import laplace, refine
 from estimators.likelihoods.posterior import Summary, Whitening, corners, scatter, supported
 from estimators.priors import positive_friction, prior_rows
+from estimators.proposal import Fit, Proposal, adapted, standard
 
 FloatArray = NDArray[np.float64]
 
@@ -79,7 +80,8 @@ class PerSample:
     centre: FloatArray
     root: FloatArray
     whitening: Whitening
-    local: float = SAMPLING.local
+    proposal: Proposal
+    local: float
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -111,6 +113,10 @@ class PerSample:
         """β [k, 3] and the other natural parameters [k, m]."""
         return self.centre + coordinates[:, :3] @ self.root.T, self.terms.natural(coordinates[:, 3:])
 
+    def moved(self, centre: FloatArray, root: FloatArray) -> "PerSample":
+        """The same in coordinates about ``centre`` [d] of these, with unit ``root`` [d, d]."""
+        return replace(self, whitening=Whitening(self.whitening(centre[None])[0], self.whitening.root @ root))
+
     def summarise(self, whitened: FloatArray, _rng: np.random.Generator, /) -> Summary:
         """Moments of the draws."""
         beta, natural = self.natural(self.whitening(whitened))
@@ -135,35 +141,38 @@ def per_sample(evidence: Evidence, terms: Terms, name: str) -> PerSample:
     """Posterior around the robust fit, whose plane and scale no outlier moves far."""
     observations = evidence.raw(f"bayes, {name}")
     start = robust.fit(evidence, loss="tukey")
-    v, f_n = observations.tangential_velocity, observations.normal_force
+    forces = observations.normal_force, observations.friction, observations.tangential_force
+    columns = (observations.tangential_velocity, *forces, observations.weight)
     initial, spread = terms.start(max(start.scale, 1e-9))
     posterior = PerSample(
         terms=terms,
-        rows=Rows(v, f_n, observations.friction, observations.tangential_force, observations.weight),
+        rows=Rows(*(np.require(column, requirements=["C", "W"]) for column in columns)),  # else kernels compile anew
         prior_rows=prior_rows(evidence.element_area),
         corners=corners(evidence.domain),
         effective_n=evidence.effective_n,
         centre=start.coefficients,
         root=max(start.scale, 1e-9) * exact_posterior(evidence).root,
         whitening=Whitening(np.concatenate([np.zeros(3), initial]), np.diag(np.concatenate([np.ones(3), spread]))),
+        proposal=standard(3 + len(initial)),
+        local=SAMPLING.local,
     )
-    for every in sorted({1, max(len(v) // COARSE, 1)}, reverse=True):  # a few samples tell where to look
-        posterior = _rewhitened(posterior, every)
-    return posterior
+    if len(observations) > 2 * COARSE:  # a few samples tell where to look
+        posterior = _rewhitened(posterior, len(observations) // COARSE)
+    return _proposing(_rewhitened(posterior, 1))
 
 
 def _rewhitened(posterior: PerSample, every: int) -> PerSample:
-    """Whitened by Laplace's approximation, refined by importance, to the posterior of every so many samples."""
+    """Whitened by Laplace's approximation to the posterior of every so many samples."""
     thin = Rows(*(np.ascontiguousarray(column[::every]) for column in posterior.rows))
     thin = thin._replace(weight=every * thin.weight)
     target = replace(posterior, rows=thin).log_probability
-    mode, root = laplace(target, np.zeros(len(posterior.names)))
-    even = 0.0
-    if every == 1:
-        mode, root, even = refine(target, mode, root, np.random.default_rng(0))
-    before = posterior.whitening
-    return replace(
-        posterior,
-        whitening=Whitening(before(mode[None])[0], before.root @ root),
-        local=0.0 if even > SAMPLING.even else SAMPLING.local,
-    )
+    return posterior.moved(*laplace(target, np.zeros(len(posterior.names))))
+
+
+def _proposing(posterior: PerSample) -> PerSample:
+    """Whitened again by importance, and with a proposal of several components where one does not do."""
+    size, rng = len(posterior.names), np.random.default_rng(0)
+    centre, root, even = refine(posterior.log_probability, np.zeros(size), np.eye(size), rng)
+    moved = posterior.moved(centre, root)
+    fit = Fit(moved.proposal, even) if even > SAMPLING.even else adapted(moved.log_probability, size, rng)
+    return replace(moved, proposal=fit.proposal, local=0.0 if fit.even > SAMPLING.even else SAMPLING.local)

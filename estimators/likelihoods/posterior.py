@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.friction_model import Domain
+from estimators.proposal import Proposal
 
 FloatArray = NDArray[np.float64]
 
@@ -39,6 +40,11 @@ class Posterior(Protocol):
     @property
     def prior(self) -> str:
         """The prior in words and numbers."""
+        ...
+
+    @property
+    def proposal(self) -> Proposal:
+        """What its independence sampling proposes."""
         ...
 
     @property

@@ -166,7 +166,7 @@ def test_a_sample_that_no_component_explains_still_has_a_density() -> None:
 
 def test_outside_the_support_there_is_no_density(samples: Make) -> None:
     terms = outlier.Outlier()
-    log = terms.log_prior(np.array([[0.0, -0.1, 1.8, -0.1], [0.0, 1.1, 1.8, -0.1], [0.0, 0.4, 1.8, -0.1]]))
+    log = terms.log_prior(np.array([[0.0, -0.1, 1.8, -0.1], [0.0, 0.8, 1.8, -0.1], [0.0, 0.4, 1.8, -0.1]]))
     np.testing.assert_array_equal(np.isfinite(log), [False, False, True])
     with pytest.raises(estimators.InvalidSamples, match='which "bayes, outlier" needs'):
         estimators.Moments.from_samples(samples(50)).fit("bayes", likelihood="outlier")

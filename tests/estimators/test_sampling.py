@@ -6,6 +6,7 @@ import pytest
 
 from estimators import sampling
 from estimators.defaults import SAMPLING
+from estimators.proposal import standard
 
 
 def autoregressive(rho: float, steps: int, walkers: int, seed: int = 0) -> np.ndarray:
@@ -48,7 +49,7 @@ def test_split_rhat_sees_chains_that_disagree() -> None:
 def test_a_target_far_from_the_proposal_falls_back_to_differential_evolution() -> None:
     scale = np.array([0.05, 1.0, 1.0])  # acceptance of the independence proposal about 0.05
 
-    chain = sampling.sample(lambda x: -0.5 * np.sum((x / scale) ** 2, axis=1), 3, accuracy=0.1, seed=2)
+    chain = sampling.sample(lambda x: -0.5 * np.sum((x / scale) ** 2, axis=1), standard(3), accuracy=0.1, seed=2)
     assert chain.move == "differential evolution"
     assert not chain.trouble
     assert np.isnan(chain.split_rhat)
@@ -57,7 +58,9 @@ def test_a_target_far_from_the_proposal_falls_back_to_differential_evolution() -
 
 
 def test_more_accuracy_takes_more_steps_and_is_reached() -> None:
-    rough, fine = (sampling.sample(lambda x: -0.5 * np.sum(x**2, axis=1), 2, accuracy=a) for a in (0.05, 0.007))
+    rough, fine = (
+        sampling.sample(lambda x: -0.5 * np.sum(x**2, axis=1), standard(2), accuracy=a) for a in (0.05, 0.007)
+    )
     assert len(fine.flat()) > 4 * len(rough.flat())
     assert fine.monte_carlo_error <= 0.007
     assert abs(fine.flat().mean()) < 5 * 0.007
