@@ -1,8 +1,8 @@
 """Scenes that detectors are tuned on, and others that they are only scored on.
 
-Three disjoint sets: ``TUNING`` (the defaults of slipcore were chosen on these), ``SCORING`` (simulated, never looked at
-while choosing) and ``REFERENCE`` (an independent solver's, ../shared/data/contact; scoring only). Simulated truth is
-kept under .cache, by a hash of the scene.
+Three disjoint sets: ``tuning`` (the defaults of slipcore were chosen on these), ``scoring`` (simulated, written before
+the defaults were chosen and scored on after that) and ``reference`` (an independent solver's, ../shared/data/contact;
+scoring only). Simulated truth is kept under .cache, by a hash of the scene.
 """
 
 import hashlib
@@ -18,6 +18,7 @@ from slipcore.contact.boundary_elements import Fidelity
 from slipcore.contact.effects import (
     CylinderSurface,
     ElasticObject,
+    FiniteLayer,
     FlatSurface,
     FrictionPatch,
     LoadPath,
@@ -53,6 +54,10 @@ def scene(name: str, *effects: object, force: float, friction: float, duration: 
 
 def tuning() -> list[Scene]:
     """Scenes that defaults may be chosen on."""
+    return [*_first_tuning(), *_second_tuning()]
+
+
+def _first_tuning() -> list[Scene]:
     return [
         scene("ramp", _shear(0.7, 2.4, 3.8), force=8.0, friction=0.5, duration=2.6),
         scene("diagonal", LoadPath((0.7, 2.2), force_x=(0, -2.4), force_y=(0, 2.0)),
@@ -82,8 +87,7 @@ def tuning() -> list[Scene]:
     ]  # fmt: skip
 
 
-def scoring() -> list[Scene]:
-    """Scenes that are only scored on."""
+def _second_tuning() -> list[Scene]:
     return [
         scene("steep ramp", _shear(0.6, 1.4, 5.2), force=11.0, friction=0.5, duration=1.7, radius=18e-3),
         scene("lift a cylinder", CylinderSurface(25.0, 0.4), LoadPath((0.7, 2.4), force_x=(0, 0.6), force_y=(0, 3.2)),
@@ -122,6 +126,74 @@ def scoring() -> list[Scene]:
         scene("set down", LoadPath((0.7, 1.4, 2.0, 2.5, 3.1), force_x=(0, 2.9, 2.9, 0.0, 0.0),
               normal_force=(0, 0, 0, 0, -8.7)), force=9.0, friction=0.42, duration=3.1, radius=12e-3),
     ]  # fmt: skip
+
+
+def scoring() -> list[Scene]:
+    """Scenes that are only scored on: other loads, shapes, materials and friction than those of ``tuning``."""
+    return [*_scoring_of_loads(), *_scoring_of_bodies()]
+
+
+def _scoring_of_loads() -> list[Scene]:
+    time, normal_force, force_x, force_y = _wandering_load(8.0, 0.4, seed=20)
+    return [
+        scene("gentle ramp", LoadPath((0.8, 3.0), force_x=(0, 2.5), force_y=(0, 3.1)), force=7.0, friction=0.62,
+              duration=3.2, radius=22e-3, young_modulus=0.7e6),
+        scene("quick pull", LoadPath((0.6, 0.95), force_y=(0, -1.68)), force=6.0, friction=0.3, duration=1.3),
+        scene("screw and unscrew", LoadPath((0.7, 1.8, 2.2, 3.2), moment=(0, -9.5e-3, -9.5e-3, 4e-3)), force=12.0,
+              friction=0.35, duration=3.4),
+        scene("pull while turning", LoadPath((0.7, 1.6, 2.8), force_x=(0, -1.0, -2.6), force_y=(0, 1.2, 1.2),
+              moment=(0, -3e-3, -5e-3)), force=9.0, friction=0.55, duration=3.0, radius=18e-3),
+        scene("swing", LoadPath((0.6, 1.3, 2.7, 3.6), force_y=(0, 3.6, -3.4, 2.0)), force=11.0, friction=0.38,
+              duration=3.7),
+        scene("grip tightens", LoadPath((0.7, 1.5, 1.7, 2.5, 3.5), force_x=(0, 3.1, 3.1, 3.1, 6.2),
+              normal_force=(0, 0, 0, 6.0, 6.0)), force=7.0, friction=0.55, duration=3.6),
+        scene("grip loosens", LoadPath((0.7, 1.4, 1.6, 3.0), force_x=(0, 1.5, 1.5, 1.5), force_y=(0, -2.1, -2.1, -2.1),
+              normal_force=(0, 0, 0, -7.6)), force=14.0, friction=0.45, duration=3.1, radius=12e-3),
+        scene("lift, hold, set down", LoadPath((0.7, 1.5, 2.1, 2.6, 3.2), force_y=(0, 4.2, 4.2, 0.3, 0.0),
+              normal_force=(0, 0, 0, 0, -9.6)), force=10.0, friction=0.5, duration=3.2),
+        scene("load wanders", LoadPath(time, normal_force, force_x, force_y), force=8.0, friction=0.4,
+              duration=time[-1] + 0.1, radius=16e-3),
+        scene("stage turns and slides", ObjectMotion((0.6, 1.8, 3.0), x=(0.0, 0.6e-3, 0.1e-3), y=(0.0, -3e-4, -3e-4),
+              yaw=(0.0, 0.05, 0.05)), force=8.0, friction=0.42, duration=3.1),
+        scene("press hard and let go", LoadPath((0.9, 1.9), normal_force=(0, -14.0)), NormalTangentialCoupling(),
+              force=15.0, friction=0.5, duration=1.9, poisson_ratio=0.45),
+    ]  # fmt: skip
+
+
+def _scoring_of_bodies() -> list[Scene]:
+    return [
+        scene("soft fruit", ElasticObject(1.2e6, 0.45), LoadPath((0.7, 1.9, 2.4, 3.0), force_x=(0, 3.6, 3.6, 1.0)),
+              force=8.0, friction=0.5, duration=3.1),
+        scene("thin gel", FiniteLayer(4e-3), NormalTangentialCoupling(), LoadPath((0.7, 2.2), force_x=(0, 2.2),
+              force_y=(0, 2.2)), force=9.0, friction=0.4, duration=2.4),
+        scene("layer, squeezed", FiniteLayer(6e-3), LoadPath((0.7, 1.5, 2.1, 2.9, 3.5), force_x=(0, 2.9, 2.9, 4.2, 4.2),
+              normal_force=(0, 0, 4.0, 4.0, 2.7)), force=8.0, friction=0.42, duration=3.6),
+        scene("bar across", CylinderSurface(40.0, 1.1), LoadPath((0.7, 2.2), force_x=(0, 3.6), moment=(0, 3e-3)),
+              force=12.0, friction=0.4, duration=2.5, radius=25e-3),
+        scene("edge of a book", FlatSurface((9e-3, 6e-3), (1e-3, -0.5e-3)), LoadPath((0.7, 2.1), force_x=(0, -3.0),
+              force_y=(0, 2.2)), force=12.0, friction=0.36, duration=2.4, radius=30e-3),
+        scene("sandpaper", RandomFriction(0.06, 1.2e-3), _shear(0.6, 2.4, 4.3), force=8.0, friction=0.6, duration=2.6),
+        scene("slow gel, twisted", Viscoelasticity((0.15, 0.1), (0.2, 1.0)), LoadPath((0.7, 1.9), force_y=(0, 1.0),
+              moment=(0, 7e-3)), force=10.0, friction=0.42, duration=2.7),
+        scene("rim of a glass", RingSurface(5e-3, 2e-3), LoadPath((0.7, 1.8, 3.0), force_x=(0, 6.6, -2.0)), force=18.0,
+              friction=0.45, duration=3.1, radius=20e-3),
+        scene("wet spot", FrictionPatch(-0.25, (-1e-3, 1.5e-3), 2e-3), PressureFriction(-0.4, PITCH**2),
+              LoadPath((0.7, 2.2), force_x=(0, 1.8), force_y=(0, -2.0)), force=9.0, friction=0.5, duration=2.4),
+        scene("press a bar", CylinderSurface(60.0, 0.7), PressingSpread(), force=11.0, friction=0.45, duration=1.5,
+              poisson_ratio=0.42),
+    ]  # fmt: skip
+
+
+def _wandering_load(normal_force: float, friction: float, seed: int) -> tuple[tuple[float, ...], ...]:
+    """Knots (time, extra F_N, F_x, F_y) of a load that wanders within 0.9 of the sliding force."""
+    rng = np.random.default_rng(seed)
+    time = 0.7 + np.cumsum(np.r_[0.0, rng.uniform(0.25, 0.6, 7)])
+    extra = normal_force * np.r_[0.0, rng.uniform(-0.4, 0.5, 7)]
+    level = friction * (normal_force + extra) * np.r_[0.0, rng.uniform(0.3, 0.9, 7)]
+    angle = rng.uniform(0.0, 2.0 * np.pi) + np.cumsum(rng.normal(0.0, 0.7, 8))
+    return tuple(
+        tuple(float(v) for v in knots) for knots in (time, extra, level * np.cos(angle), level * np.sin(angle))
+    )
 
 
 def _shear(start: float, end: float, force: float) -> LoadPath:

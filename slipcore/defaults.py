@@ -47,6 +47,8 @@ class NoiseDefaults:
 
     memory: int = 31
     """Frames whose estimates are kept; about a second at 30 fps, so that a burst of motion is outvoted."""
+    series: int = 64
+    """Most elements that are looked at, evenly chosen: a frame's estimate then errs by 10 %, the median by 2 %."""
     least_series: int = 4
     """Series that must have changed for a frame to tell anything."""
     deviation_to_sigma: float = 1.4826022185056018

@@ -6,14 +6,12 @@ again; ``SlipDetector`` holds such a state, and ``detect_slip`` is the fold of `
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from slipcore.defaults import DEFAULT_METHOD, LIMITS, ContactOptions, choose_options
-from slipcore.element_forces import ElementForces, element_forces, stick_ratio
+from slipcore.defaults import DEFAULT_METHOD, LIMITS, NOISE, ContactOptions, choose_options
 from slipcore.errors import InvalidInput
 from slipcore.frames import (
     BoolArray,
@@ -22,45 +20,75 @@ from slipcore.frames import (
     GraspLog,
     check_element_area,
     check_frame,
+    check_mask,
     check_normal,
     check_pose,
 )
+from slipcore.kernels.answer import answer
+from slipcore.kernels.contact import Touch
+from slipcore.kernels.observe import observe
 from slipcore.methods import find_method
-from slipcore.methods.interface import Decision, Observation
-from slipcore.noise import NOTHING_SEEN, NoiseState, step_noise
-from slipcore.rigid_motion import fit_rigid_motion, pose_motion, relative_velocity
-from slipcore.slip_state import SlipHistory, SlipState, slip_events
-from slipcore.strain import Lattice, lattice_steps, surface_normal
-from slipcore.touch import contact_from_force, contact_from_shape, spatial_noise
+from slipcore.methods.interface import CompiledMethod, Method, Observation, Start
+from slipcore.slip_state import SlipHistory, SlipState, observed_over_time, slip_events
+from slipcore.strain import Lattice
+
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Setup:
-    """What stays the same over a stream: the sensor's lattice and element area (m²), the method and its options."""
+def _read_only(array: NDArray[Scalar]) -> NDArray[Scalar]:
+    """The same data, not to be written to: users can't change what a detector remembers, kernels see one type."""
+    if not array.flags.writeable:
+        return array
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+NO_FIELD, NO_MASK, NO_POSE = (_read_only(np.empty(s, t)) for s, t in (((0, 0, 3), float), ((0, 0), bool), (0, float)))
+"""Stand for what a frame does not have."""
+
+
+class Setup(NamedTuple):
+    """What stays the same over a stream: the sensor's lattice and element area (m²), the method and its options; and
+    as arrays these options and what an element needs to touch by force and by shape (``kernels.contact.Touch``).
+    """
 
     lattice: Lattice
     element_area: float
     method: str
     options: ContactOptions
+    settings: FloatArray
+    touch_by_force: FloatArray
+    touch_by_shape: FloatArray
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Memory:
-    """What a detector remembers of the last frame: the frame itself, its answer and the method's own state."""
+class Memory(NamedTuple):
+    """What a detector remembers of the last frame: what it saw; ``masks`` [2, n, m], contact and slip, and the
+    ``probability`` that it answered; of ``noise`` (``kernels.observe.step_noise``); and the method's own. Before the
+    first frame ``time`` is −∞ and nothing touches.
+    """
 
-    frame: Frame
-    answer: SlipState
-    method: Any
+    time: float
+    displacement: FloatArray
+    force: FloatArray
+    object_pose: FloatArray
+    observed: BoolArray | None
+    masks: BoolArray
+    probability: FloatArray
+    noise: FloatArray
+    own: FloatArray
+    numbers: FloatArray
+    other: Any
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class DetectorState:
-    """A detector between two frames; immutable, and can be pickled."""
+class DetectorState(NamedTuple):
+    """A detector between two frames, never written to; can be pickled. ``noise``: estimated standard deviation of one
+    marker coordinate, m; NaN while it cannot be estimated.
+    """
 
     setup: Setup
-    memory: Memory | None = None
-    marker_noise: NoiseState = NOTHING_SEEN
-    pressing_noise: NoiseState = NOTHING_SEEN
+    memory: Memory
+    noise: float
 
 
 def init(position: ArrayLike, element_area: float, method: str = DEFAULT_METHOD, **options: float) -> DetectorState:
@@ -68,97 +96,156 @@ def init(position: ArrayLike, element_area: float, method: str = DEFAULT_METHOD,
 
     Raises ``InvalidInput`` for a lattice that has no strain, an unknown method and unknown or out-of-range options.
     """
-    chosen = choose_options(find_method(method).options, options)
-    return DetectorState(Setup(Lattice.at_rest(position), check_element_area(element_area), method, chosen))
+    found = find_method(method)
+    chosen = choose_options(found.options, options)
+    lattice, area = Lattice.at_rest(position), check_element_area(element_area)
+    if isinstance(found, CompiledMethod):
+        start, other = found.start(lattice, chosen), None
+    else:
+        start, other = Start(np.zeros(0), np.zeros((0, 0, 0)), np.zeros(0)), found.init(lattice, chosen)
+    setup = Setup(lattice, area, method, chosen, start.settings, *touch_thresholds(chosen, area))
+    shape = lattice.position.shape
+    still, nothing, none = _read_only(np.zeros(shape)), np.zeros(shape[:2]), np.zeros((2, *shape[:2]), bool)
+    noise = np.zeros((9, max(1 + NOISE.memory, NOISE.series)))
+    memory = Memory(-math.inf, still, NO_FIELD, NO_POSE, None, none, nothing, noise, start.own, start.numbers, other)
+    return DetectorState(setup, memory, math.nan)
+
+
+def touch_thresholds(options: ContactOptions, element_area: float) -> tuple[FloatArray, FloatArray]:
+    """What an element of that area, m², needs to touch, by force and by shape: ``kernels.contact.Touch`` as arrays."""
+    least = options.contact_pressure * element_area
+    noise, release = options.contact_noise, options.release_share
+    by_force = Touch(least, options.contact_force_share, noise, release, 1.0)
+    by_shape = Touch(options.contact_depth, options.contact_depth_share, noise, release, options.rim_curvature)
+    return np.array(by_force), np.array(by_shape)
 
 
 def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
     """Take one valid frame, later than the last; on the first, every element in contact sticks."""
-    setup, memory = state.setup, state.memory
-    steps = lattice_steps(frame.displacement)
-    normal = surface_normal(setup.lattice, steps) if frame.normal is None else frame.normal
-    forces = None if frame.force is None else element_forces(frame.force, normal)
-    pressing = _pressing(frame, forces)
-    marker_noise, pressing_noise = state.marker_noise, state.pressing_noise
-    if memory is None or not np.array_equal(frame.displacement, memory.frame.displacement):
-        # a repeated frame would make the noise look smaller
-        marker_noise = step_noise(marker_noise, frame.time, frame.displacement[..., :2].reshape(-1, 2).T)
-        pressing_noise = step_noise(pressing_noise, frame.time, pressing.reshape(1, -1))
-    known = pressing_noise.sigma if math.isfinite(pressing_noise.sigma) else spatial_noise(pressing)
-    contact = _contact(setup, pressing, known, memory, has_force=forces is not None)
-    touched = contact if memory is None else contact & ~memory.answer.contact
-    seen = Observation(
+    method, (setup, memory, _) = find_method(state.setup.method), state
+    force = NO_FIELD if frame.force is None else frame.force
+    pose = NO_POSE if frame.object_pose is None else frame.object_pose
+    shape = memory.probability.shape
+    after = Memory(
         frame.time,
-        math.inf if memory is None else frame.time - memory.frame.time,
-        frame.displacement,
-        steps,
-        normal,
-        forces,
-        contact,
-        touched,
-        frame.object_pose,
-        marker_noise.sigma,
-        pressing_noise.sigma,
-        frame.force,
+        _read_only(frame.displacement),
+        _read_only(force),
+        _read_only(pose),
+        frame.observed,
+        np.empty((2, *shape), bool),
+        np.empty(shape),
+        np.empty_like(memory.noise),
+        np.empty_like(memory.own),
+        np.empty_like(memory.numbers),
+        None,
     )
-    method_state, decision = _decide(setup, memory, seen)
-    answer = _answer(setup, memory, seen, decision)
-    return DetectorState(setup, Memory(frame, answer, method_state), marker_noise, pressing_noise), answer
-
-
-def _pressing(frame: Frame, forces: ElementForces | None) -> FloatArray:
-    """How much each element is pressed inwards: by force, N, or without forces by indentation, m."""
-    return -frame.displacement[..., 2] if forces is None else forces.pressing
-
-
-def _contact(setup: Setup, pressing: FloatArray, noise: float, memory: Memory | None, *, has_force: bool) -> BoolArray:
-    before = None if memory is None else memory.answer.contact
-    if has_force:
-        return contact_from_force(pressing, setup.element_area, noise, before, setup.options)
-    return contact_from_shape(pressing, noise, before, setup.options)
-
-
-def _decide(setup: Setup, memory: Memory | None, seen: Observation) -> tuple[Any, Decision]:
-    method = find_method(setup.method)
-    if memory is None:
-        nothing = np.zeros(seen.contact.shape)
-        return method.init(setup.lattice, seen, setup.options), Decision(nothing > 0.0, nothing)
-    return method.step(memory.method, setup.lattice, seen, setup.options)
-
-
-def _answer(setup: Setup, memory: Memory | None, seen: Observation, decision: Decision) -> SlipState:
-    may_slip = seen.contact & ~seen.touched
-    slip = decision.slip & may_slip
-    probability = np.where(may_slip, decision.probability, 0.0)
-    velocity = _velocity(setup.lattice, memory, seen, slip, probability)
-    for array in (seen.contact, slip, probability, velocity):
-        array.flags.writeable = False  # the detector remembers them
-    sticking = np.count_nonzero(seen.contact & ~slip)
-    macro_slip = bool(seen.contact.any()) and sticking == 0
-    ratio = stick_ratio(seen.contact, slip)
-    return SlipState(seen.time, seen.contact, slip, probability, ratio, velocity, macro_slip)
-
-
-def _velocity(
-    lattice: Lattice, memory: Memory | None, seen: Observation, slip: BoolArray, probability: FloatArray
-) -> FloatArray:
-    """Velocity over the last interval of what was in contact all through it, relative to the object.
-
-    The object moves as its pose says, or else as the elements do that stick before and after,
-    the more surely the more.
-    """
-    if memory is None:
-        return np.full((*slip.shape, 2), np.nan)
-    before, observed = memory.answer, seen.contact & memory.answer.contact
-    start = memory.frame.displacement[..., :2]
-    points, moved = lattice.position[..., :2] + start, seen.displacement[..., :2] - start
-    if seen.object_pose is not None and memory.frame.object_pose is not None:
-        motion = pose_motion(memory.frame.object_pose, seen.object_pose)
+    velocity = np.empty((*shape, 2))
+    if isinstance(method, CompiledMethod):
+        noise, touching, slipping = _run(method, setup, memory, frame, after, velocity)
     else:
-        sticking = observed & ~slip & ~before.slip
-        weight = np.where(sticking, (1.0 - probability) * (1.0 - before.probability), 0.0)
-        motion = fit_rigid_motion(points.reshape(-1, 2), moved.reshape(-1, 2), weight.ravel())
-    return relative_velocity(points, moved, observed, motion, seen.interval)
+        after, noise, touching, slipping = _run_by_parts(method, setup, memory, frame, after, velocity)
+    said = SlipState(
+        frame.time,
+        _read_only(after.masks[0]),
+        _read_only(after.masks[1]),
+        _read_only(after.probability),
+        1.0 - slipping / touching if touching else math.nan,
+        _read_only(velocity),
+        0 < touching == slipping,
+    )
+    return DetectorState(setup, after, noise), _masked(said, frame.observed, memory.observed)
+
+
+def _run(
+    method: CompiledMethod[Any], setup: Setup, memory: Memory, frame: Frame, after: Memory, velocity: FloatArray
+) -> tuple[float, int, int]:
+    """Fill the arrays of ``after`` and ``velocity``; the marker noise, and how many elements touch and slip."""
+    lattice = setup.lattice
+    return method.run(
+        lattice.position,
+        lattice.steps,
+        lattice.inverse_jacobian,
+        lattice.orientation,
+        setup.touch_by_shape if frame.force is None else setup.touch_by_force,
+        setup.settings,
+        frame.time,
+        after.displacement,
+        after.force,
+        after.object_pose,
+        NO_FIELD if frame.normal is None else _read_only(frame.normal),
+        NO_MASK if frame.contact is None else _read_only(frame.contact),
+        memory.time,
+        _read_only(memory.displacement),
+        _read_only(memory.force),
+        _read_only(memory.object_pose),
+        memory.masks,
+        memory.probability,
+        memory.noise,
+        memory.own,
+        memory.numbers,
+        after.masks,
+        after.probability,
+        after.noise,
+        after.own,
+        after.numbers,
+        velocity,
+    )
+
+
+def _run_by_parts(
+    method: Method[Any, Any], setup: Setup, memory: Memory, frame: Frame, after: Memory, velocity: FloatArray
+) -> tuple[Memory, float, int, int]:
+    """The same for a method in numpy, and ``after`` with its state."""
+    shape = memory.probability.shape
+    normal, pressing, tangential = np.empty((*shape, 3)), np.empty(shape), np.empty(shape)
+    stays = np.empty(shape, bool)
+    noise, _ = observe(
+        setup.lattice.steps,
+        setup.lattice.orientation,
+        setup.touch_by_shape if frame.force is None else setup.touch_by_force,
+        frame.time,
+        after.displacement,
+        after.force,
+        NO_FIELD if frame.normal is None else _read_only(frame.normal),
+        NO_MASK if frame.contact is None else _read_only(frame.contact),
+        memory.masks[0],
+        memory.noise,
+        normal,
+        pressing,
+        tangential,
+        after.masks[0],
+        stays,
+        after.noise,
+    )
+    interval = frame.time - memory.time
+    seen = Observation(
+        interval, after.displacement, normal, after.force, pressing, tangential, after.masks[0], stays, noise
+    )
+    other, decision = method.step(memory.other, setup.lattice, seen, setup.options)
+    touching, slipping = answer(
+        setup.lattice.position,
+        interval,
+        _read_only(memory.displacement),
+        after.displacement,
+        _read_only(memory.object_pose),
+        after.object_pose,
+        after.masks[0],
+        stays,
+        *decision,
+        memory.masks[1],
+        memory.probability,
+        after.masks[1],
+        after.probability,
+        velocity,
+    )
+    return after._replace(other=other), noise, touching, slipping
+
+
+def _masked(said: SlipState, observed: BoolArray | None, before: BoolArray | None) -> SlipState:
+    """The answer without what was not observed; the detector itself goes on with the placeholders."""
+    if observed is None:
+        return said
+    return said.masked(observed, observed if before is None else observed & before)
 
 
 class SlipDetector:
@@ -180,7 +267,7 @@ class SlipDetector:
     @property
     def noise(self) -> float:
         """Estimated standard deviation of one marker coordinate, m; NaN while it cannot be estimated."""
-        return self.state.marker_noise.sigma
+        return self.state.noise
 
     def step(
         self,
@@ -189,13 +276,16 @@ class SlipDetector:
         force: ArrayLike | None = None,
         object_pose: ArrayLike | None = None,
         normal: ArrayLike | None = None,
+        contact: ArrayLike | None = None,
+        observed: ArrayLike | None = None,
     ) -> SlipState:
-        """Take the next frame: time s, displacement [n, m, 3] m, force [n, m, 3] N, object pose [3] m, m, rad.
+        """Take the next frame: time s, displacement [n, m, 3] m, force [n, m, 3] N, object pose [3] m, m, rad,
+        outward normals [n, m, 3], known contact [n, m] and which elements were observed [n, m] (see ``GraspLog``).
 
         Raises ``InvalidInput`` for wrong shapes, numbers that are not finite or absurd, time that does not grow, and
         forces that are given for some frames only; the detector then stays as it was.
         """
-        frame = _checked(self.state, time, displacement, force, object_pose, normal)
+        frame = _checked(self.state, time, displacement, force, object_pose, normal, contact, observed)
         self.state, answer = step(self.state, frame)
         return answer
 
@@ -224,9 +314,10 @@ def collect_history(answers: Sequence[SlipState], state: DetectorState) -> SlipH
         np.array([getattr(answer, name) for answer in answers])
         for name in ("time", "contact", "slip", "probability", "stick_ratio", "velocity", "macro_slip")
     )
-    events = slip_events(time, contact, slip)
-    noise, method = state.marker_noise.sigma, state.setup.method
-    return SlipHistory(time, contact, slip, probability, ratio, velocity, macro_slip, events, noise, method)
+    observed = observed_over_time(answers)
+    events = slip_events(time, contact, slip, observed)
+    noise, method = state.noise, state.setup.method
+    return SlipHistory(time, contact, slip, probability, ratio, velocity, macro_slip, events, noise, method, observed)
 
 
 def _checked(
@@ -236,19 +327,33 @@ def _checked(
     force: ArrayLike | None,
     object_pose: ArrayLike | None,
     normal: ArrayLike | None,
+    contact: ArrayLike | None,
+    observed: ArrayLike | None,
 ) -> Frame:
-    shape = state.setup.lattice.position.shape
+    shape, last = state.setup.lattice.position.shape, state.memory
     if not math.isfinite(time):
         raise InvalidInput("time", time, "finite seconds")
-    last = None if state.memory is None else state.memory.frame
-    if last is not None and not time > last.time:
+    if not time > last.time:
         raise InvalidInput("time", f"{time:.9g} s after {last.time:.9g} s", "strictly increasing seconds")
-    if last is not None and (force is None) != (last.force is None):
+    if last.time > -math.inf and (force is None) != (last.force.size == 0):
         raise InvalidInput("force", "missing" if force is None else "given", "in every frame or in none")
     return Frame(
         float(time),
-        check_frame("displacement", displacement, shape, LIMITS.displacement, "m"),
-        None if force is None else check_frame("force", force, shape, LIMITS.force, "N per element"),
+        _field("displacement", displacement, shape, LIMITS.displacement, "m"),
+        None if force is None else _field("force", force, shape, LIMITS.force, "N per element"),
         None if object_pose is None else check_pose(object_pose),
         None if normal is None else check_normal(normal, shape),
+        None if contact is None else check_mask("contact", contact, shape[:2]),
+        None if observed is None else check_mask("observed", observed, shape[:2]),
     )
+
+
+def _field(name: str, value: ArrayLike, shape: tuple[int, ...], limit: float, unit: str) -> FloatArray:
+    """A copy of the field that nobody writes to; what is not plainly right is looked at by ``check_frame``."""
+    if isinstance(value, np.ndarray) and value.dtype == np.float64 and value.shape == shape:
+        copy = value.copy()
+        flat = copy.ravel()
+        if flat @ flat <= limit * limit:  # none is larger, nor infinite or NaN
+            copy.flags.writeable = False
+            return copy
+    return check_frame(name, value, shape, limit, unit)

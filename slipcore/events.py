@@ -1,10 +1,8 @@
-"""Extreme events of a signal in real time (stage 3: events): running z-scores as streaming state.
+"""Extreme events of a signal, counted in frames: running z-scores as van Brakel has them and the paper uses ([42]).
 
-Two variants: one in physical time, and the one by van Brakel that the paper uses ([42]), counted in frames.
 An event is +1 where the signal jumps up, −1 where it drops, 0 elsewhere.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,46 +11,6 @@ from numpy.typing import NDArray
 from slipcore.frames import FloatArray
 
 EventArray = NDArray[np.int8]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RunningScore:
-    """Exponentially forgetting mean and variance of a signal [...]."""
-
-    mean: FloatArray
-    variance: FloatArray
-
-
-def init_score(shape: tuple[int, ...]) -> RunningScore:
-    """No signal seen yet: mean and variance zero, so that the floor alone judges the first values."""
-    return RunningScore(np.zeros(shape), np.zeros(shape))
-
-
-def step_score(
-    state: RunningScore,
-    signal: FloatArray,
-    interval: float,
-    floor: FloatArray | float,
-    *,
-    time_constant: float,
-    threshold: float,
-    influence: float,
-) -> tuple[RunningScore, EventArray]:
-    """Judge one value of each signal against its past, then learn from it.
-
-    ``interval`` since the last value and ``time_constant`` of forgetting in s; ``floor`` > 0 under the standard
-    deviation, in the signal's unit; an event is beyond ``threshold`` standard deviations and is learnt from with
-    weight ``influence``. What is remembered depends on the time passed, not on the number of frames.
-    """
-    spread = np.maximum(np.sqrt(state.variance), floor)
-    surprise = signal - state.mean
-    extreme = np.abs(surprise) > threshold * spread
-    events = (np.sign(surprise) * extreme).astype(np.int8)
-    surprise *= np.where(extreme, influence, 1.0)
-    forgotten = -math.expm1(-interval / time_constant)
-    mean = state.mean + forgotten * surprise
-    variance = (1.0 - forgotten) * (state.variance + forgotten * surprise * surprise)
-    return RunningScore(mean, variance), events
 
 
 @dataclass(frozen=True, slots=True, eq=False)

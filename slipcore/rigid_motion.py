@@ -1,11 +1,12 @@
-"""Planar rigid motion between frames, and the velocity of the surface relative to the object."""
+"""Planar rigid motion between frames."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from slipcore.frames import BoolArray, FloatArray
+from slipcore.frames import FloatArray
+from slipcore.kernels.rigid_motion import fit_motion
 
 
 class RigidMotion(NamedTuple):
@@ -36,46 +37,13 @@ class RigidMotion(NamedTuple):
         return math.isfinite(self.rotation)
 
 
-UNOBSERVABLE = RigidMotion((math.nan, math.nan), (math.nan, math.nan), math.nan)
-
-
 def fit_rigid_motion(points: FloatArray, moved: FloatArray, weight: FloatArray | None = None) -> RigidMotion:
     """The rigid motion that best explains displacements ``moved`` [k, 2] m of ``points`` [k, 2] m.
 
     Weighted least squares in closed form (planar Procrustes problem), exact for finite rotation. ``weight`` [k] ≥ 0.
-    Fewer than two distinct points of positive weight leave it ``UNOBSERVABLE``.
+    Fewer than two distinct points of positive weight leave it unobservable.
     """
+    start, moved = np.zeros((1, *points.shape)), np.ascontiguousarray(moved)[None]
     w = np.ones(len(points)) if weight is None else weight
-    total = w.sum()
-    if not total > 0.0:
-        return UNOBSERVABLE
-    (x, y), (u, v) = points.T, moved.T
-    start = float(w @ x / total), float(w @ y / total)
-    translation = float(w @ u / total), float(w @ v / total)
-    x, y, u, v = x - start[0], y - start[1], u - translation[0], v - translation[1]
-    spread = float(w @ (x * x + y * y))
-    if not spread > (np.finfo(float).eps * np.abs(points).max()) ** 2 * total:
-        return UNOBSERVABLE
-    rotation = math.atan2(float(w @ (x * v - y * u)), spread + float(w @ (x * u + y * v)))
-    return RigidMotion(start, translation, rotation)
-
-
-def pose_motion(before: FloatArray, after: FloatArray) -> RigidMotion:
-    """The rigid motion between two object poses (x m, y m, yaw rad)."""
-    x, y, yaw = (float(value) for value in before)
-    return RigidMotion((x, y), (float(after[0]) - x, float(after[1]) - y), float(after[2]) - yaw)
-
-
-def relative_velocity(
-    points: FloatArray, moved: FloatArray, observed: BoolArray, motion: RigidMotion, interval: float
-) -> FloatArray:
-    """Tangential velocity of surface elements relative to an object in rigid motion: [n, m, 2] m/s.
-
-    ``points`` [n, m, 2] m where the elements stood, ``moved`` [n, m, 2] m their displacement in ``interval`` s.
-    NaN where not ``observed`` [n, m], and everywhere when the motion is unobservable.
-    """
-    if not motion.observable:
-        return np.full(points.shape, np.nan)
-    velocity = (moved - motion.displacement(points)) / interval
-    velocity[~observed] = np.nan
-    return velocity
+    found = fit_motion(np.ascontiguousarray(points)[None], start, moved, np.ascontiguousarray(w)[None])
+    return RigidMotion((found.x, found.y), (found.dx, found.dy), found.rotation)

@@ -5,6 +5,7 @@ import time
 import numpy as np
 
 from slipcore.detector import SlipDetector
+from slipcore.methods import METHODS
 
 
 def warm_up() -> float:
@@ -13,7 +14,6 @@ def warm_up() -> float:
     axis = 1e-3 * np.arange(3.0)
     position = np.stack([*np.meshgrid(axis, axis, indexing="ij"), np.zeros((3, 3))], axis=-1)
     force = np.broadcast_to([0.0, 0.0, -0.1], position.shape)
-    detector = SlipDetector(position, 1e-6, "filter")
-    for frame in range(3):
-        detector.step(float(frame), np.full(position.shape, 1e-6 * frame), force, np.zeros(3))
+    for method in METHODS:
+        SlipDetector(position, 1e-6, method).step(0.0, np.zeros(position.shape), force)
     return time.perf_counter() - began

@@ -13,9 +13,9 @@ from slipcore.methods import (
     strain_threshold,
 )
 from slipcore.methods import filter as probability_filter
-from slipcore.methods.interface import Method
+from slipcore.methods.interface import CompiledMethod, Method
 
-METHODS: dict[str, Method[Any, Any]] = {
+METHODS: dict[str, Method[Any, Any] | CompiledMethod[Any]] = {
     "filter": probability_filter.METHOD,
     "strain_rate": strain_rate.METHOD,
     "strain_rate_literal": strain_rate_literal.METHOD,
@@ -28,7 +28,7 @@ METHODS: dict[str, Method[Any, Any]] = {
 """A further method joins by a file of its own and a line here."""
 
 
-def find_method(name: str) -> Method[Any, Any]:
+def find_method(name: str) -> Method[Any, Any] | CompiledMethod[Any]:
     """The method of that name; raises ``InvalidInput`` listing those that exist."""
     try:
         return METHODS[name]

@@ -11,12 +11,12 @@ from slipcore.defaults import DeformationGradientOptions
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.methods.interface import Observation
 from slipcore.methods.since_touch import threshold_method
-from slipcore.strain import Lattice, displacement_gradient
+from slipcore.strain import Lattice, displacement_gradient, lattice_steps
 
 
 def measure(lattice: Lattice, seen: Observation) -> FloatArray:
     """Displacement gradient [2, 2, n, m]."""
-    return displacement_gradient(lattice, seen.steps)
+    return displacement_gradient(lattice, lattice_steps(seen.displacement))
 
 
 def slips(_: Lattice, seen: Observation, change: FloatArray, options: DeformationGradientOptions) -> BoolArray:

@@ -11,15 +11,15 @@ from slipcore.methods.interface import Decision, Method, Observation
 from slipcore.strain import Lattice
 
 
-def init(_: Lattice, __: Observation, ___: ForceRatioOptions) -> None:
+def init(_: Lattice, __: ForceRatioOptions) -> None:
     """Nothing to remember."""
 
 
 def step(state: None, _: Lattice, seen: Observation, options: ForceRatioOptions) -> tuple[None, Decision]:
     """An element slips where its f_t/f_n is over the break-away ratio."""
-    if seen.forces is None:
+    if seen.force.size == 0:
         return state, Decision(np.zeros(seen.contact.shape, bool), np.full(seen.contact.shape, 0.5))
-    slip = seen.forces.compressive & (seen.forces.tangential > options.break_away_ratio * seen.forces.normal)
+    slip = (seen.pressing > 0.0) & (seen.tangential > options.break_away_ratio * seen.pressing)
     return state, Decision(slip, slip.astype(float))
 
 

@@ -12,12 +12,12 @@ from slipcore.defaults import LocalDeformationOptions
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.methods.interface import Observation
 from slipcore.methods.since_touch import threshold_method
-from slipcore.strain import Lattice
+from slipcore.strain import Lattice, lattice_steps
 
 
 def measure(_: Lattice, seen: Observation) -> FloatArray:
     """Relative displacement in the plane of opposite neighbours [2 (along), 2, n, m] m."""
-    return seen.steps[:, :2]
+    return lattice_steps(seen.displacement)[:, :2]
 
 
 def slips(lattice: Lattice, _: Observation, change: FloatArray, options: LocalDeformationOptions) -> BoolArray:

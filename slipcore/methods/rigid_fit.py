@@ -24,7 +24,7 @@ def measure(_: Lattice, seen: Observation) -> FloatArray:
 def slips(lattice: Lattice, seen: Observation, change: FloatArray, options: RigidFitOptions) -> BoolArray:
     """Deviation of the displacement since the touch from the core's rigid motion."""
     points, moved = lattice.position[..., :2], np.moveaxis(change, 0, -1)
-    core = _core(points, seen.contact & ~seen.touched, options.core_share)
+    core = _core(points, seen.stays, options.core_share)
     motion = fit_rigid_motion(points.reshape(-1, 2), moved.reshape(-1, 2), core.ravel().astype(float))
     if not motion.observable:
         return np.zeros(seen.contact.shape, bool)

@@ -16,7 +16,7 @@ Options = TypeVar("Options", bound=ContactOptions)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SinceTouch:
-    """The measure [..., n, m] of each element when it touched, or now where it does not touch."""
+    """The measure [..., n, m] of each element when it touched, or now where it does not touch; zero at first."""
 
     measure: FloatArray
 
@@ -32,14 +32,13 @@ def threshold_method(
     differences would see steps between them. The probability is 0 or 1.
     """
 
-    def init(lattice: Lattice, seen: Observation, _: Options) -> SinceTouch:
-        return SinceTouch(measure(lattice, seen))
+    def init(_: Lattice, __: Options) -> SinceTouch:
+        return SinceTouch(np.zeros(()))
 
     def step(state: SinceTouch, lattice: Lattice, seen: Observation, chosen: Options) -> tuple[SinceTouch, Decision]:
-        stays = seen.contact & ~seen.touched
         now = measure(lattice, seen)
-        start = np.where(stays, state.measure, now)
-        slip = slips(lattice, seen, now - start, chosen) & stays
+        start = np.where(seen.stays, state.measure, now)
+        slip = slips(lattice, seen, now - start, chosen)
         return SinceTouch(start), Decision(slip, slip.astype(float))
 
     return Method(options, init, step)

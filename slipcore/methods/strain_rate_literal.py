@@ -13,6 +13,7 @@ from slipcore.strain import (
     displacement_gradient,
     green_lagrange,
     inclination_factor,
+    lattice_steps,
     literal_rate,
     principal_strains,
 )
@@ -27,10 +28,10 @@ class LiteralState:
     slip: BoolArray
 
 
-def init(lattice: Lattice, seen: Observation, options: StrainRateLiteralOptions) -> LiteralState:
+def init(lattice: Lattice, options: StrainRateLiteralOptions) -> LiteralState:
     """Start at rest."""
-    shape = seen.contact.shape
-    return LiteralState(_strains(lattice, seen), init_lagged_score(shape, options.lag), np.zeros(shape, bool))
+    shape = lattice.position.shape[:2]
+    return LiteralState(np.zeros((2, *shape)), init_lagged_score(shape, options.lag), np.zeros(shape, bool))
 
 
 def step(
@@ -38,17 +39,19 @@ def step(
 ) -> tuple[LiteralState, Decision]:
     """A positive extreme of δ above "0.1 × strain / Δt" begins slip, a negative one ends it (paper, section II-D)."""
     strains = _strains(lattice, seen)
+    if np.isinf(seen.interval):  # the first frame has no rate
+        return LiteralState(strains, state.score, state.slip), Decision(state.slip, state.slip.astype(float))
     rate = literal_rate(state.strains, strains, seen.interval)
     score, events = step_lagged_score(
         state.score, rate, options.rate_floor, threshold=options.threshold, influence=options.influence
     )
     onset = (events > 0) & (rate > options.growth_share * np.hypot(*strains) / seen.interval)
-    slip = (state.slip | onset) & ~(events < 0) & seen.contact & ~seen.touched
+    slip = (state.slip | onset) & ~(events < 0) & seen.stays
     return LiteralState(strains, score, slip), Decision(slip, slip.astype(float))
 
 
 def _strains(lattice: Lattice, seen: Observation) -> FloatArray:
-    strain = green_lagrange(displacement_gradient(lattice, seen.steps))
+    strain = green_lagrange(displacement_gradient(lattice, lattice_steps(seen.displacement)))
     return principal_strains(strain) * inclination_factor(seen.normal)
 
 

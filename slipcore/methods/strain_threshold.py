@@ -4,12 +4,12 @@ from slipcore.defaults import StrainThresholdOptions
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.methods.interface import Observation
 from slipcore.methods.since_touch import threshold_method
-from slipcore.strain import Lattice, displacement_gradient, frobenius, green_lagrange
+from slipcore.strain import Lattice, displacement_gradient, frobenius, green_lagrange, lattice_steps
 
 
 def measure(lattice: Lattice, seen: Observation) -> FloatArray:
     """Green–Lagrange strain [3, n, m]."""
-    return green_lagrange(displacement_gradient(lattice, seen.steps))
+    return green_lagrange(displacement_gradient(lattice, lattice_steps(seen.displacement)))
 
 
 def slips(_: Lattice, __: Observation, change: FloatArray, options: StrainThresholdOptions) -> BoolArray:

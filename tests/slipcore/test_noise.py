@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from slipcore.noise import NOTHING_SEEN, estimate_noise, step_noise
+from slipcore.kernels.observe import step_noise
+from slipcore.noise import estimate_noise
 
 
 def smooth(time: np.ndarray) -> np.ndarray:
@@ -50,8 +51,38 @@ def test_markers_behind_a_dead_zone_are_left_out() -> None:
     assert estimate_noise(np.arange(60) / 30.0, values) == pytest.approx(1e-6, rel=0.05)
 
 
-def test_a_step_leaves_the_state_before_it_alone() -> None:
-    state = step_noise(NOTHING_SEEN, 0.0, np.zeros((2, 9)))
-    step_noise(state, 1.0, np.ones((2, 9)))
-    assert len(state.before) == 1
-    assert NOTHING_SEEN.before == ()
+def by_numpy(time: np.ndarray, values: np.ndarray) -> float:
+    """The estimate written out with numpy's own medians."""
+    found = []
+    for (t0, t1, t2), (first, middle, last) in zip(
+        zip(time, time[1:], time[2:], strict=False), zip(values, values[1:], values[2:], strict=False), strict=True
+    ):
+        share = (t1 - t0) / (t2 - t0)
+        residual = middle - ((1.0 - share) * first + share * last)
+        upper = residual.shape[1] // 2
+        about = np.sort(residual)[:, upper : upper + 1]
+        deviation = np.sort(np.abs(residual - about))[:, upper]
+        found.append(1.4826022185056018 * np.sqrt((deviation**2).mean() / (1.0 + (1.0 - share) ** 2 + share**2)))
+    recent = np.sort(found[-31:])
+    return float(recent[len(recent) // 2] * (1.0 + 1.0 / len(recent) - 1.0 / 31))
+
+
+@pytest.mark.parametrize("count", [5, 64, 400])
+def test_compiled_medians_are_those_of_numpy(count: int) -> None:
+    rng = np.random.default_rng(13)
+    time = np.cumsum(rng.choice([1, 2, 5], 60)) / 60.0
+    values = rng.standard_normal((60, 2, count)) * rng.choice([1.0, 5.0], (60, 1, 1))
+    np.testing.assert_allclose(estimate_noise(time, values), by_numpy(time, values), rtol=1e-13)  # rounding
+
+
+def test_an_online_estimate_looks_at_few_elements_and_skips_repeated_frames() -> None:
+    rng = np.random.default_rng(14)
+    frames = 1e-6 * rng.standard_normal((60, 20, 20, 3))
+    noise = np.zeros((9, 64))
+    for k, frame in enumerate(np.repeat(frames, 2, axis=0)):
+        after = np.full_like(noise, np.nan)
+        marker, pressing = step_noise(noise, k / 60.0, frame, -frame[..., 2].copy(), after)
+        noise = after
+    assert marker == pytest.approx(1e-6, rel=0.1)  # 64 of 400 elements: 2 %, and uneven thirds of a second
+    assert pressing == pytest.approx(1e-6, rel=0.1)
+    assert noise[2, 2] == 60.0

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from slipcore.rigid_motion import UNOBSERVABLE, RigidMotion, fit_rigid_motion, pose_motion, relative_velocity
+from slipcore.rigid_motion import RigidMotion, fit_rigid_motion
 
 POINTS = 1e-3 * np.random.default_rng(2).standard_normal((30, 2))
 
@@ -72,25 +72,3 @@ def test_points_without_weight_do_not_make_a_motion_observable() -> None:
 def test_two_points_give_a_motion() -> None:
     moved = carried(POINTS[:2], 0.5, (0.0, 1e-4))
     assert fit_rigid_motion(POINTS[:2], moved).rotation == pytest.approx(0.5, rel=1e-12)
-
-
-def test_the_motion_between_two_poses_carries_the_body_along() -> None:
-    before, after = np.array([1e-3, 2e-3, 0.4]), np.array([3e-3, -1e-3, 0.9])
-
-    def place(pose: np.ndarray, body: np.ndarray) -> np.ndarray:
-        c, s = np.cos(pose[2]), np.sin(pose[2])
-        return body @ np.array([[c, s], [-s, c]]) + pose[:2]
-
-    found = pose_motion(before, after).displacement(place(before, POINTS))
-    np.testing.assert_allclose(found, place(after, POINTS) - place(before, POINTS), rtol=0, atol=1e-16)
-
-
-def test_relative_velocity_is_nan_where_not_observed_and_everywhere_without_a_motion() -> None:
-    points = POINTS[:6].reshape(2, 3, 2)
-    observed = np.array([[True, False, True], [True, True, False]])
-    moved = points * 0.0 + [3e-4, 0.0]
-    motion = RigidMotion((0.0, 0.0), (1e-4, 0.0), 0.0)
-    velocity = relative_velocity(points, moved, observed, motion, 0.1)
-    np.testing.assert_allclose(velocity[observed], np.tile([2e-3, 0.0], (4, 1)), rtol=1e-12, atol=1e-18)
-    assert np.isnan(velocity[~observed]).all()
-    assert np.isnan(relative_velocity(points, moved, observed, UNOBSERVABLE, 0.1)).all()

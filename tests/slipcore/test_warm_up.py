@@ -1,10 +1,11 @@
-from slipcore import SlipDetector, kernels_filter, warm_up
+from slipcore import SlipDetector, warm_up
 from slipcore.contact import RampSchedule, tangential_ramp
+from slipcore.kernels.run import run_filter
 
 
 def test_after_warming_up_no_first_frame_compiles() -> None:
     assert warm_up() >= 0.0
-    compiled = len(kernels_filter.step_filter.signatures)
+    compiled = len(run_filter.signatures)
     log = tangential_ramp(points=6, pitch=2e-3, schedule=RampSchedule(0.1, 0.1, 0.1, 0.1, 0.1))
     for force, pose in ((True, True), (True, False), (False, True), (False, False)):
         detector = SlipDetector(log.position, log.element_area, "filter")
@@ -12,4 +13,4 @@ def test_after_warming_up_no_first_frame_compiles() -> None:
             detector.step(
                 frame.time, frame.displacement, frame.force if force else None, frame.object_pose if pose else None
             )
-    assert len(kernels_filter.step_filter.signatures) == compiled
+    assert len(run_filter.signatures) == compiled

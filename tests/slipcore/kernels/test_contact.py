@@ -6,10 +6,29 @@ import pytest
 from slipcore import detect_slip
 from slipcore.contact import tangential_ramp
 from slipcore.defaults import ContactOptions
-from slipcore.touch import CURVATURE_NOISE, contact_from_force, contact_from_shape, curvature, spatial_noise
+from slipcore.detector import touch_thresholds
+from slipcore.kernels.contact import CURVATURE_NOISE, Touch, curvature, find_contact, spatial_noise
 
 OPTIONS = ContactOptions()
 AREA = 1e-6
+
+
+def contact_from_force(
+    pressing: np.ndarray, area: float, noise: float, before: np.ndarray | None, options: ContactOptions
+) -> np.ndarray:
+    return found_contact(pressing, noise, before, touch_thresholds(options, area)[0])
+
+
+def contact_from_shape(
+    pressing: np.ndarray, noise: float, before: np.ndarray | None, options: ContactOptions
+) -> np.ndarray:
+    return found_contact(pressing, noise, before, touch_thresholds(options, AREA)[1])
+
+
+def found_contact(pressing: np.ndarray, noise: float, before: np.ndarray | None, touch: np.ndarray) -> np.ndarray:
+    contact = np.zeros(pressing.shape, bool)
+    find_contact(pressing, noise, contact.copy() if before is None else before, Touch(*touch), contact)
+    return contact
 
 
 def test_the_threshold_is_the_largest_of_pressure_share_and_noise() -> None:

@@ -1,0 +1,95 @@
+"""Measurement noise from three frames, by medians."""
+
+import math
+
+import numpy as np
+
+from slipcore.defaults import NOISE
+from slipcore.frames import FloatArray
+from slipcore.kernels import compiled
+
+_LEAST, _MEMORY, _TO_SIGMA = NOISE.least_series, NOISE.memory, NOISE.deviation_to_sigma
+
+
+@compiled
+def median(values: FloatArray) -> float:
+    """Upper median of values [k], by Hoare's selection; their order is changed."""
+    low, high, middle = 0, len(values) - 1, len(values) // 2
+    while low < high:
+        pivot, i, j = values[middle], low, high
+        while i <= j:
+            while values[i] < pivot:
+                i += 1
+            while pivot < values[j]:
+                j -= 1
+            if i <= j:
+                values[i], values[j] = values[j], values[i]
+                i += 1
+                j -= 1
+        if j < middle:
+            low = i
+        if middle < i:
+            high = j
+    return float(values[middle])
+
+
+@compiled
+def noise_of_three(first: FloatArray, middle: FloatArray, last: FloatArray, share: float) -> float:
+    """Standard deviation of one value of the series [axes, k], the middle ``share`` of the time from first to last.
+
+    The middle is compared with the line through its neighbours. Each axis gives a median absolute deviation about its
+    own median over the k series (a common jerk drops out), leaving out series that did not change at all. NaN where
+    fewer than ``NOISE.least_series`` changed.
+    """
+    axes, k = first.shape
+    residual = np.empty((axes, k))
+    count = 0
+    for s in range(k):
+        changed = True
+        for a in range(axes):
+            residual[a, count] = middle[a, s] - ((1.0 - share) * first[a, s] + share * last[a, s])
+            changed &= residual[a, count] != 0.0
+        if not changed:  # a sensor that repeats a value, or is at rest behind a dead zone
+            for a in range(axes):
+                changed |= residual[a, count] != 0.0
+        count += changed
+    if count < _LEAST:
+        return math.nan
+    total = 0.0
+    for a in range(axes):
+        about = median(residual[a, :count])
+        for s in range(count):
+            residual[a, s] = abs(residual[a, s] - about)
+        total += median(residual[a, :count]) ** 2
+    gain = math.sqrt(1.0 + (1.0 - share) ** 2 + share**2)
+    return _TO_SIGMA * math.sqrt(total / axes) / gain
+
+
+@compiled
+def remember(recent: FloatArray, estimate: float) -> None:
+    """Put an estimate into a ring, a count of how many there were and the last of them; NaN is no estimate."""
+    if not math.isnan(estimate):
+        recent[1 + int(recent[0]) % _MEMORY] = estimate
+        recent[0] += 1.0
+
+
+@compiled
+def recent_median(recent: FloatArray) -> float:
+    """Median of the estimates in a ring (a moment of fast change drops out); NaN while there is none.
+
+    Rounded up, to double at first, while there are few: too little noise does more harm than too much.
+    """
+    count = min(int(recent[0]), _MEMORY)
+    if count == 0:
+        return math.nan
+    return median(recent[1 : 1 + count].copy()) * (1.0 + 1.0 / count - 1.0 / _MEMORY)
+
+
+@compiled
+def noise_of_series(time: FloatArray, series: FloatArray) -> float:
+    """Noise of recorded series [t, axes, k]: the median of the last estimates; NaN for fewer than 3 frames."""
+    recent = np.zeros(1 + _MEMORY)
+    for t in range(2, len(time)):
+        share = (time[t - 1] - time[t - 2]) / (time[t] - time[t - 2])
+        remember(recent, noise_of_three(series[t - 2], series[t - 1], series[t], share))
+    return recent_median(recent)
