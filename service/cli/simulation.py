@@ -24,6 +24,9 @@ def simulate(
         float | None, typer.Option(help="Largest error of stick ratio (absolute), displacement and force (relative).")
     ] = None,
     seconds: Annotated[float | None, typer.Option(help="Time to spend, s.")] = None,
+    tier: Annotated[
+        str | None, typer.Option(help='"closed form", "beams" or "boundary elements", in place of the cheapest.')
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of random fields and of noise.")] = 0,
     output: Annotated[Path | None, typer.Option(help="Write the grasp log with its truth to this NPZ.")] = None,
     picture: Picture = None,
@@ -39,7 +42,7 @@ def simulate(
     from slipcore.contact import simulate as simulate_scene
 
     with patience(f"simulating {wanted.name}"):
-        log = simulate_scene(wanted, accuracy=accuracy, seconds=seconds, seed=seed)
+        log = simulate_scene(wanted, accuracy=accuracy, seconds=seconds, seed=seed, tier=tier)
     if output is not None:
         from stiction_client import container
 

@@ -12,6 +12,7 @@ from slipcore.contact.normal import solve_normal
 from slipcore.contact.operator import Operators
 from slipcore.contact.plan import Plan
 from slipcore.contact.quasi_static import QuasiStatic, StepResult
+from slipcore.contact.resolution import summary
 from slipcore.contact.sampling import FrameRecord, Lattice, frame_record, frame_times, grasp_log, lattice, untouched
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray, GraspLog
@@ -45,12 +46,13 @@ def run(plan: Plan, fidelity: Fidelity | None = None) -> GraspLog:
     where = lattice(plan.sampling, ROOM * contact_reach(plan), fidelity.cells)
     solver = QuasiStatic(plan.problem, where.grid, fidelity.tolerance, 1e-2 * fidelity.tolerance)
     times = frame_times(plan)
-    frames, steps = _frames(plan, solver, where, times, fidelity.substeps)
+    frames, warnings = _frames(plan, solver, where, times, fidelity.substeps)
     metadata = {
         "tier": "boundary elements",
         "grid": f"{where.grid.shape[1]} x {where.grid.shape[0]} cells of {where.grid.pitch[0]:.6g} m",
-        "steps": str(steps),
+        "steps": str(len(warnings)),
         "tolerance": f"{fidelity.tolerance:g}",
+        "unresolved": summary(warnings),
         "applications": str(solver.count.normal + solver.count.tangential + solver.count.coupling),
         "seconds": f"{time.perf_counter() - began:.3f}",
     }
@@ -59,10 +61,10 @@ def run(plan: Plan, fidelity: Fidelity | None = None) -> GraspLog:
 
 def _frames(
     plan: Plan, solver: QuasiStatic, where: Lattice, times: FloatArray, substeps: int
-) -> tuple[list[FrameRecord], int]:
-    """Records of all frames, and the number of load steps they took."""
-    corners, state, count = plan.corners(), solver.start(), 0
-    frames = [untouched(where)]
+) -> tuple[list[FrameRecord], list[tuple[str, ...]]]:
+    """Records of all frames, and of each load step what the grid does not resolve."""
+    corners, state = plan.corners(), solver.start()
+    frames, warnings = [untouched(where)], list[tuple[str, ...]]()
     for begin, end in pairwise(times):
         bends = corners[(corners > begin) & (corners < end)]
         instants = np.union1d(np.linspace(begin, end, substeps + 1), bends)
@@ -70,9 +72,9 @@ def _frames(
         for before, now in pairwise(instants):
             state, result = solver.step(state, plan.load(float(before), float(now)))
             results.append(result)
-        count += len(results)
+        warnings += [result.warnings() for result in results]
         frames.append(frame_record(where, results))
-    return frames, count
+    return frames, warnings
 
 
 def contact_reach(plan: Plan) -> float:

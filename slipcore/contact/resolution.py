@@ -1,5 +1,8 @@
 """Whether a grid is fine and wide enough for a contact and its slip zone."""
 
+from collections import Counter
+from collections.abc import Iterable
+
 import numpy as np
 
 from slipcore.frames import BoolArray
@@ -30,6 +33,13 @@ def unresolved(contact: BoolArray, at_limit: BoolArray, sheared: bool) -> tuple[
     if sheared and width < SLIP_CELLS:
         found.append(f"the slip zone spans {width:.1f} cells, {SLIP_CELLS:g} or more are needed")
     return tuple(found)
+
+
+def summary(steps: Iterable[tuple[str, ...]]) -> str:
+    """What ``unresolved`` found, and in how many of the steps; "nothing" where that is all."""
+    found = [[sentence.partition(" spans ")[0] for sentence in step] for step in steps]
+    counts = Counter(kind for step in found for kind in step)
+    return "; ".join(f"{kind}, in {count} of {len(found)} steps" for kind, count in counts.items()) or "nothing"
 
 
 def _rim(contact: BoolArray) -> int:

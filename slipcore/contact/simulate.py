@@ -10,7 +10,7 @@ from slipcore.contact.accuracy import simulate_to
 from slipcore.contact.boundary_elements import Fidelity
 from slipcore.contact.plan import Plan
 from slipcore.contact.scene import Scene
-from slipcore.contact.tiers import cheapest
+from slipcore.contact.tiers import cheapest, named
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 
@@ -21,9 +21,11 @@ def simulate(
     seconds: float | None = None,
     seed: int = 0,
     fidelity: Fidelity | None = None,
+    tier: str | None = None,
 ) -> GraspLog:
     """Simulate a scene to an ``accuracy``, within ``seconds``, or at a ``fidelity``; with none of them, at the default
-    one. For an accuracy the cheapest tier is taken that has it.
+    one. For an accuracy the cheapest tier is taken that has it, unless ``tier`` names one: "closed form", "beams" (the
+    paper's, at its own accuracy) or "boundary elements".
 
     ``accuracy`` is the largest of: absolute error of the stick ratio, relative L2 error over time of displacement and
     of force at the sensor's points, all before observation effects. ``seed`` draws random fields and noise. The
@@ -34,9 +36,9 @@ def simulate(
     plan = scene.plan(seed)
     if fidelity is not None and (accuracy is not None or seconds is not None):
         raise InvalidInput("fidelity", fidelity, "no fidelity beside an accuracy or seconds")
-    tier = None if accuracy is None else cheapest(scene, plan, accuracy)
-    if tier is not None:
-        log, estimated = tier.run(scene, plan), f"{tier.accuracy(scene, plan):.2g}"
+    cheap = named(tier, scene, plan) if tier else cheapest(scene, plan, accuracy) if accuracy is not None else None
+    if cheap is not None:
+        log, estimated = cheap.run(scene, plan), f"{cheap.accuracy(scene, plan):.2g}"
     elif accuracy is None and seconds is None:
         log, estimated = boundary_elements.run(plan, fidelity), "not asked for"
     else:

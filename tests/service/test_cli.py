@@ -74,6 +74,21 @@ def test_detect_tells_a_program_what_was_seen(run: Run, ramps: list[Path], tmp_p
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+def test_detect_reads_tracked_markers_and_says_what_it_cannot_know(run: Run, tmp_path: Path) -> None:
+    dots = Path(__file__).parent / "formats" / "tracked_dots.csv"
+    code, out, _ = run("detect", dots, "--method", "filter", "--json", "--picture", tmp_path / "slip.png")
+    seen = json.loads(out)
+    assert (code, seen["frames"], "unknown" in seen) == (0, 31, False)
+    assert seen["marker_noise"] == pytest.approx(2e-6, rel=0.5)
+    text = dots.read_text(encoding="utf-8").replace("# scale", "# was").replace("# frame_rate", "# was")
+    (tmp_path / "dots.csv").write_text(text, encoding="utf-8")
+    code, out, _ = run("detect", tmp_path / "dots.csv", "--method", "filter", "--frame-rate", 30, "--json")
+    seen = json.loads(out)
+    assert (code, seen["marker_noise"]) == (0, None)
+    assert "scale" in seen["unknown"]
+    assert run("detect", tmp_path / "dots.csv")[0] == INPUT_REFUSED
+
+
 def test_simulate_takes_a_scene_by_name_or_by_file_and_writes_a_log_that_detect_reads(run: Run, tmp_path: Path) -> None:
     log, picture = tmp_path / "grasp.npz", tmp_path / "truth.png"
     code, out, _ = run("simulate", "lifting_15N", "--accuracy", 0.1, "--output", log, "--picture", picture, "--json")
@@ -90,6 +105,15 @@ def test_simulate_takes_a_scene_by_name_or_by_file_and_writes_a_log_that_detect_
     code, out, _ = run("simulate", path)
     assert code == 0
     assert "my press" in out
+
+
+def test_simulate_takes_the_tier_that_is_named_and_refuses_one_that_is_not(run: Run) -> None:
+    code, out, _ = run("simulate", "lifting_15N", "--tier", "beams", "--json")
+    assert code == 0
+    assert json.loads(out)["tier"] == "beams"
+    code, _, err = run("simulate", "lifting_15N", "--tier", "finite elements")
+    assert code != 0
+    assert "boundary elements" in err
 
 
 def test_simulate_explains_a_scene(run: Run) -> None:

@@ -4,12 +4,17 @@ from typing import Protocol
 
 from slipcore.contact.plan import Plan
 from slipcore.contact.scene import Scene
-from slipcore.contact.tiers import closed_form
+from slipcore.contact.tiers import beam_lattice, closed_form
+from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
+
+BOUNDARY_ELEMENTS = "boundary elements"
 
 
 class Tier(Protocol):
-    """A module that simulates some scenes."""
+    """A module that simulates some scenes, under its ``NAME``."""
+
+    NAME: str
 
     def accuracy(self, scene: Scene, plan: Plan) -> float | None:
         """Largest error to expect, as ``simulate`` counts it; None for a scene of which the tier knows nothing."""
@@ -18,7 +23,7 @@ class Tier(Protocol):
         """The log of a scene of which the tier knows the accuracy, before observation effects."""
 
 
-TIERS: tuple[Tier, ...] = (closed_form,)
+TIERS: tuple[Tier, ...] = (closed_form, beam_lattice)
 
 
 def cheapest(scene: Scene, plan: Plan, accuracy: float) -> Tier | None:
@@ -28,3 +33,14 @@ def cheapest(scene: Scene, plan: Plan, accuracy: float) -> Tier | None:
         if known is not None and known <= accuracy:
             return tier
     return None
+
+
+def named(name: str, scene: Scene, plan: Plan) -> Tier | None:
+    """The tier of that name, None for boundary elements. Raises ``InvalidInput`` for a scene that it cannot do."""
+    known: dict[str, Tier | None] = {**{tier.NAME: tier for tier in TIERS}, BOUNDARY_ELEMENTS: None}
+    if name not in known:
+        raise InvalidInput("tier", name, ", ".join(known))
+    tier = known[name]
+    if tier is not None and tier.accuracy(scene, plan) is None:
+        raise InvalidInput("tier", name, f"one that holds for scene {scene.name}, as {BOUNDARY_ELEMENTS} does")
+    return tier

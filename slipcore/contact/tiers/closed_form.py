@@ -121,6 +121,7 @@ def run(scene: Scene, plan: Plan) -> GraspLog:
         "grid": "none",
         "steps": str(steps),
         "tolerance": "none",
+        "unresolved": "nothing",
         "applications": "0",
         "seconds": f"{time.perf_counter() - began:.3f}",
     }

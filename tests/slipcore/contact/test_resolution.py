@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from slipcore.contact.grid import Grid
-from slipcore.contact.resolution import unresolved
+from slipcore.contact.resolution import summary, unresolved
 
 
 def disk(radius: float, cells: int = 40) -> np.ndarray:
@@ -37,3 +37,10 @@ def test_what_is_too_small_is_named(contact, at_limit, sheared: bool, said: str)
 
 def test_a_contact_that_only_sticks_needs_no_slip_zone() -> None:
     assert unresolved(disk(15.0), disk(0.0), sheared=False) == ()
+
+
+def test_a_summary_counts_the_steps_of_each_kind() -> None:
+    thin = unresolved(disk(15.0), disk(0.0), sheared=True)
+    small = unresolved(disk(4.0), disk(0.0), sheared=True)
+    assert summary([(), thin, small]) == "the slip zone, in 2 of 3 steps; the contact's radius, in 1 of 3 steps"
+    assert summary([(), ()]) == "nothing"
