@@ -2,11 +2,12 @@
 
 Draw θ from p(θ | y₀), simulate y₁ from θ, fit both: the rank of θ among the draws of p(θ | y₀, y₁) is uniform if, and
 only if, prior, likelihood and sampler agree (Talts et al., 2018; Säilynoja et al., 2025, who condition on y₀ so that
-weak priors do no harm). Test level: 1e-3 a parameter. "errors_in_variables" is left out: it plugs in the mean and
-variance of f_n and is calibrated only as far as those are known.
+weak priors do no harm). Test level: 1e-3 a parameter. "errors_in_variables" takes the true f_n as normal, and their
+mean and variance from the data.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -32,6 +33,8 @@ def noise_of(likelihood: str, theta: np.ndarray, n: int, rng: np.random.Generato
 
 def simulate(samples: Make, likelihood: str, theta: np.ndarray, seed: int, size: int) -> list[FrictionSamples]:
     rng = np.random.default_rng([seed, 11])
+    if likelihood == "errors_in_variables":
+        return [noisy_forces(samples, theta, seed, size, rng)]
     grasps = range(3) if likelihood == "grasp_effects" else range(1)
     return [
         samples(
@@ -43,6 +46,14 @@ def simulate(samples: Make, likelihood: str, theta: np.ndarray, seed: int, size:
         )
         for g in grasps
     ]
+
+
+def noisy_forces(samples: Make, theta: np.ndarray, seed: int, size: int, rng: np.random.Generator) -> FrictionSamples:
+    sigma, noise = theta[3:]
+    force = rng.normal(0.1, 0.015, size)
+    data = samples(size, seed=10_000 * (seed + 1), coefficients=theta[:3], scale=sigma, normal_force=force)
+    f_n, f_t = (f + noise * rng.standard_normal(size) for f in (data.normal_force, data.tangential_force))
+    return replace(data, normal_force=f_n, tangential_force=f_t, friction_coefficient=f_t / f_n)
 
 
 def ranks(samples: Make, likelihood: str, fits: int, first: np.ndarray, size: int) -> np.ndarray:
@@ -71,6 +82,7 @@ TRUTHS = {
     "grasp_effects": np.array([0.4, 2.0, -0.8, 0.02, 0.03]),
     "student_t": np.array([0.4, 2.0, -0.8, 0.02, 4.0]),
     "outlier": np.array([0.4, 2.0, -0.8, 0.02, 0.15, 0.1, -0.15]),
+    "errors_in_variables": np.array([0.4, 2.0, -0.8, 0.02, 3e-3]),
 }
 
 

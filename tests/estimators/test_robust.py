@@ -38,11 +38,25 @@ def test_one_gross_outlier_does_not_move_the_plane(samples: Make) -> None:
 
 @pytest.mark.parametrize("fraction", [0.1, 0.3, 0.45])
 def test_false_slip_up_to_nearly_half_leaves_the_plane_in_place(samples: Make, fraction: float) -> None:
-    model = estimators.fit(spoiled(samples, fraction, n=2000), method="robust")
-    error = np.abs(model.predict([0.0, 5e-3], [0.05, 0.05]) - (0.36 + 2.0 * np.array([0.0, 5e-3])))
-    assert error.max() < {0.1: 0.005, 0.3: 0.01, 0.45: 0.06}[fraction]
-    plain = estimators.fit(spoiled(samples, fraction, n=2000))
-    assert abs(plain.predict(0.0, 0.05) - 0.36) > 2 * error[0]
+    """Over twelve records it strays no further than an oracle that knows the plane and drops all beyond 3.5 scatters.
+
+    Outliers closer than that cannot be told from good samples; four standard errors of the mean are added.
+    """
+    errors, oracle = [], []
+    for seed in range(12):
+        data = spoiled(samples, fraction, n=2000, seed=seed)
+        errors.append(off(estimators.fit(data, method="robust")))
+        plane = 0.4 + 2.0 * data.tangential_velocity - 0.8 * data.normal_force
+        near = (np.abs(data.friction_coefficient - plane) < 3.5 * 0.02).astype(float)
+        oracle.append(off(estimators.fit(replace(data, weight=near))))
+    noise = np.std(errors, axis=0) / np.sqrt(12)
+    assert (np.abs(np.mean(errors, axis=0)) < np.abs(np.mean(oracle, axis=0)) + 4 * noise).all()
+    assert np.abs(off(estimators.fit(data))).min() > 5 * np.abs(errors).max()  # least squares
+
+
+def off(model: estimators.FrictionModel) -> np.ndarray:
+    """Error of friction at two places of the data."""
+    return np.asarray(model.predict([0.0, 5e-3], [0.05, 0.05]) - (0.36 + 2.0 * np.array([0.0, 5e-3])))
 
 
 def test_on_clean_data_it_costs_a_twentieth_in_variance(samples: Make) -> None:
