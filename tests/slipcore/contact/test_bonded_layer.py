@@ -1,6 +1,4 @@
-"""Kernels of a bonded layer against its compliance in wave number, thin and thick limits and another solver."""
-
-from pathlib import Path
+"""Kernels of a bonded layer against its compliance in wave number, thin and thick limits."""
 
 import numpy as np
 import pytest
@@ -16,7 +14,6 @@ from slipcore.contact.quasi_static import QuasiStatic
 from slipcore.contact.reference.bonded_layer import half_space_modes
 
 YOUNG, RADIUS, FRICTION = 1e6, 15e-3, 0.4
-SCENE = Path("../shared/data/contact/cond1_layer5c.npz")
 COMPONENTS: tuple[Component, ...] = ("nn", "xx", "xy", "yy", "zx", "zy")
 
 
@@ -161,23 +158,3 @@ def test_a_layer_costs_no_application_by_itself() -> None:
         counts.append(solver.count.normal + solver.count.tangential)
         assert solver.count.coupling == 0
     assert counts[0] <= 1.25 * counts[1]  # the same solver on other kernels; only its iterations differ
-
-
-def test_the_layered_scene_of_an_independent_solver_is_met() -> None:
-    if not SCENE.exists():
-        pytest.skip("reference scenes of the independent solver are not here")
-    scene = np.load(SCENE)
-    poisson, grid = float(scene["nu"]), Grid.square(64, 16e-3)
-    heights = (lambda x, y: (x**2 + y**2) / (2 * RADIUS),)
-    solver = QuasiStatic(Problem(bodies(5e-3, poisson), FRICTION, heights=heights, coupled=True), grid, 1e-4)
-    rows = [int(np.argmin(abs(grid.y - 1e-3 * y))) for y in scene["y"]]
-    columns = [int(np.argmin(abs(grid.x - 1e-3 * x))) for x in scene["x"]]
-    at = np.ix_(rows, columns)
-    steps = list(zip(scene["F_N"], scene["F_T"], strict=True))[:32]  # to two thirds of sliding
-    largest = 1e-3 * np.abs(scene["u"]).max()
-    for k, result in enumerate(solver.run(StepLoad(n, tangential=np.array([t, 0.0, 0.0])) for n, t in steps)):
-        expected = 1e-3 * np.moveaxis(scene["u"][k], -1, 0)
-        # 1.2e-4 at a tolerance of 1e-5, smooth over the contact: what a transform over a finite box leaves in the scene
-        np.testing.assert_allclose(result.displacement[:, *at], expected, rtol=0.0, atol=2e-4 * largest)
-        np.testing.assert_array_equal(result.contact[at], scene["contact"][k])
-        assert result.stick_ratio == pytest.approx(scene["stick_ratio"][k], abs=0.015, nan_ok=True)  # four cells

@@ -1,6 +1,4 @@
-"""Histories of load against closed forms and against scenes of an independent solver."""
-
-from pathlib import Path
+"""Histories of load against closed forms."""
 
 import numpy as np
 import pytest
@@ -13,7 +11,6 @@ from slipcore.contact.quasi_static import QuasiStatic
 from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
 from slipcore.contact.reference.mindlin_deresiewicz import MindlinDeresiewicz
 
-SCENES = Path("../shared/data/contact")
 FRICTION, RADIUS, FORCE, YOUNG = 0.4, 15e-3, 10.0, 1e6
 SLIDING = FRICTION * FORCE
 
@@ -146,28 +143,3 @@ def test_velocity_dependent_friction_meets_its_own_law() -> None:
     ratio = np.hypot(*result.force[:2])[sliding] / result.force[2][sliding]
     velocity = np.hypot(*result.slip)[sliding] / 0.1
     np.testing.assert_allclose(ratio, FRICTION + 2.0 * velocity, rtol=1e-5)
-
-
-def read_scene(name: str):
-    if not SCENES.exists():
-        pytest.skip("reference scenes of the independent solver are not here")
-    return np.load(SCENES / f"{name}.npz")
-
-
-@pytest.mark.parametrize("name", ["cond1", "cond4"])
-def test_scenes_of_an_independent_solver_are_met(name: str) -> None:
-    scene = read_scene(name)
-    grid = Grid.square(64, 16e-3)
-    solver = QuasiStatic(sphere_on(float(scene["nu"])), grid)
-    loads = [shear(n, t, 1e-3 * m) for n, t, m in zip(scene["F_N"], scene["F_T"], scene["M"], strict=True)]
-    rows = [int(np.argmin(abs(grid.y - 1e-3 * y))) for y in scene["y"]]
-    columns = [int(np.argmin(abs(grid.x - 1e-3 * x))) for x in scene["x"]]
-    points = np.ix_(rows, columns)
-    for k, result in enumerate(solver.run(loads)):
-        expected = 1e-3 * np.moveaxis(scene["u"][k], -1, 0)
-        atol = 1e-5 * np.abs(scene["u"]).max() * 1e-3  # single precision in the file
-        np.testing.assert_allclose(result.displacement[:, *points], expected, rtol=0.0, atol=atol)
-        np.testing.assert_array_equal(result.contact[points], scene["contact"][k])
-        np.testing.assert_array_equal(result.at_limit[points], scene["slip_contact_factor"][k])
-        np.testing.assert_array_equal(result.moved[points], scene["slip_kinematic"][k])
-        assert result.stick_ratio == pytest.approx(scene["stick_ratio"][k], abs=1e-3, nan_ok=True)
