@@ -10,7 +10,7 @@ from slipcore.defaults import (
 )
 from slipcore.detector import DetectorState, SlipDetector, collect_history, detect_slip
 from slipcore.element_forces import ElementForces, contact_factor, element_forces, stick_ratio
-from slipcore.errors import InvalidInput, NoForces, SlipcoreError
+from slipcore.errors import InvalidInput, NoForces, SlipcoreError, UnknownScale
 from slipcore.frames import Frame, FrictionLaw, GraspLog, GroundTruth
 from slipcore.methods import METHODS
 from slipcore.samples import FrictionSamples, collect_samples
@@ -39,6 +39,7 @@ __all__ = [
     "SlipcoreError",
     "StrainRateLiteralOptions",
     "StrainRateOptions",
+    "UnknownScale",
     "collect_history",
     "collect_samples",
     "contact_factor",

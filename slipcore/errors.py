@@ -19,5 +19,9 @@ class InvalidInput(SlipcoreError, ValueError):
         return f"{self.name} is {self.value}; allowed: {self.allowed}"
 
 
+class UnknownScale(SlipcoreError):
+    """A log whose lengths are not known in metres was asked for something that needs them."""
+
+
 class NoForces(SlipcoreError):
     """A log without micro-element forces was asked for something that needs them."""

@@ -125,6 +125,11 @@ class GraspLog:
         """Number of markers along the two axes of the lattice."""
         return self.position.shape[0], self.position.shape[1]
 
+    @property
+    def is_scaled(self) -> bool:
+        """Whether lengths are true metres; False where the metadata tell that the scale is unknown, and one assumed."""
+        return self.metadata.get("scale") != "unknown"
+
     def __len__(self) -> int:
         return len(self.time)
 

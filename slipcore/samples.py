@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from slipcore.defaults import SampleOptions, choose_options
 from slipcore.element_forces import ElementForces, element_forces
-from slipcore.errors import InvalidInput, NoForces
+from slipcore.errors import InvalidInput, NoForces, UnknownScale
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.noise import estimate_noise
 from slipcore.slip_state import SlipHistory
@@ -73,33 +73,40 @@ def collect_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
     """Observe friction where ``history`` says that elements of ``log`` slip: f_t/f_n, velocity and forces.
 
     Only at compressed elements in contact, of observable velocity above what noise alone makes (a stuck point's
-    f_t/f_n is below the friction coefficient) and of normal force well above its noise. The tangential force is freed
-    of what noise adds to a magnitude. A log without (observable) slip gives no samples, of length 0.
+    f_t/f_n is below the friction coefficient) and of normal force well above its noise. Noise must not choose samples
+    nor stand on both sides of a fit: an element is chosen by the frame before, its velocity is that from the frame
+    before to the next, and its normal force is what these two say; f_t/f_n alone is of the frame itself, freed of what
+    noise adds to a magnitude and to a quotient. A log without (observable) slip gives no samples, of length 0.
     ``options``: see ``defaults.SampleOptions``.
-    Raises ``NoForces`` for a log without forces, ``InvalidInput`` for a history of another log and for bad options.
+    Raises ``NoForces`` for a log without forces, ``UnknownScale`` for one whose lengths and velocities are not in
+    metres, ``InvalidInput`` for a history of another log and for bad options.
     """
     chosen = choose_options(SampleOptions, options)
+    if not log.is_scaled:
+        raise UnknownScale("friction samples need velocities in m/s, and the log's scale is unknown")
     if log.force is None:
         raise NoForces("friction samples need the force on each element, and the log has none")
     _check_same(log, history)
     forces = element_forces(log.force, _normals(log))
     noise = _force_noise(log, forces, chosen)
-    speed = np.sqrt(np.vecdot(history.velocity, history.velocity))
+    velocity = _central(log.time, history.velocity)
+    speed = np.sqrt(np.vecdot(velocity, velocity))
+    steady = _between(log.time, forces.pressing)
     weight = _before(history.probability)
     keep = (
         _before(history.slip)
         & history.contact
         & (weight >= chosen.least_weight)
-        & _fast_enough(log, history, speed, chosen)
-        & _pressed_enough(forces, noise.normal, chosen)
+        & _fast_enough(log, history.noise, speed, chosen)
+        & _pressed_enough(steady, forces.pressing, noise.normal, chosen)
     )
     frame, element = np.nonzero(keep.reshape(len(log), -1))
-    f_n, f_t = forces.normal[keep], _without_noise(forces.tangential[keep], noise.tangential)
+    friction = _ratio(forces.tangential[keep], forces.normal[keep], noise)
     return FrictionSamples(
-        friction_coefficient=f_t / f_n,
+        friction_coefficient=friction,
         tangential_velocity=speed[keep],
-        normal_force=f_n,
-        tangential_force=f_t,
+        normal_force=steady[keep],
+        tangential_force=friction * steady[keep],
         time=log.time[frame],
         element=element.astype(np.int64),
         weight=weight[keep],
@@ -133,9 +140,26 @@ def _check_same(log: GraspLog, history: SlipHistory) -> None:
         raise InvalidInput("history", "at other times than the log", "the log's own")
 
 
-def _fast_enough(log: GraspLog, history: SlipHistory, speed: FloatArray, options: SampleOptions) -> BoolArray:
-    interval = np.diff(log.time, prepend=-np.inf)[:, None, None]
-    noise = np.sqrt(2.0) * np.nan_to_num(history.noise) / interval
+def _central(time: FloatArray, velocity: FloatArray) -> FloatArray:
+    """Velocity from the frame before to the next: [t, n, m, 2]; NaN in the first and last frame."""
+    central = np.full_like(velocity, np.nan)
+    behind, ahead = np.diff(time)[:-1, None, None, None], np.diff(time)[1:, None, None, None]
+    central[1:-1] = (behind * velocity[1:-1] + ahead * velocity[2:]) / (behind + ahead)
+    return central
+
+
+def _between(time: FloatArray, field: FloatArray) -> FloatArray:
+    """A field [t, n, m] as the frames before and after have it, at the true times; NaN in the first and last frame."""
+    between = np.full_like(field, np.nan)
+    share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None, None]
+    between[1:-1] = (1.0 - share) * field[:-2] + share * field[2:]
+    return between
+
+
+def _fast_enough(log: GraspLog, marker_noise: float, speed: FloatArray, options: SampleOptions) -> BoolArray:
+    interval = np.full(len(log), -np.inf)
+    interval[1:-1] = log.time[2:] - log.time[:-2]
+    noise = np.sqrt(2.0) * np.nan_to_num(marker_noise) / interval[:, None, None]
     fast: BoolArray = speed > np.maximum(options.least_velocity, options.velocity_to_noise * noise)
     return fast
 
@@ -156,13 +180,15 @@ def _force_noise(log: GraspLog, forces: ElementForces, options: SampleOptions) -
     return _ForceNoise(float(np.nan_to_num(normal)), float(np.nan_to_num(estimate_noise(log.time, plane))))
 
 
-def _without_noise(tangential: FloatArray, noise: float) -> FloatArray:
-    """Noise across a small force only ever lengthens it, by σ²/(2 f_t) on average: 3 % at f_t = 4 σ."""
-    return np.sqrt(np.maximum(tangential**2 - noise**2, 0.0))
+def _ratio(tangential: FloatArray, normal: FloatArray, noise: _ForceNoise) -> FloatArray:
+    """f_t/f_n without what noise adds on average: σ²/(2 f_t) to a magnitude (3 % at f_t = 4 σ), (σ/f_n)² to 1/f_n."""
+    friction: FloatArray = np.sqrt(np.maximum(tangential**2 - noise.tangential**2, 0.0)) / normal
+    return friction * (1.0 - (noise.normal / normal) ** 2)
 
 
-def _pressed_enough(forces: ElementForces, noise: float, options: SampleOptions) -> BoolArray:
-    peak = forces.pressing.max(axis=(1, 2))
+def _pressed_enough(steady: FloatArray, pressing: FloatArray, noise: float, options: SampleOptions) -> BoolArray:
+    """By the ``steady`` normal force; that of the frame itself need only not be lost in noise."""
+    peak = pressing.max(axis=(1, 2))
     least = np.maximum(options.force_to_noise * noise, options.least_force_share * peak)
-    enough: BoolArray = forces.pressing > np.maximum(least, 0.0)[:, None, None]
+    enough: BoolArray = (steady > np.maximum(least, 0.0)[:, None, None]) & (pressing > 0.5 * steady)
     return enough

@@ -4,7 +4,16 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from slipcore import FrictionSamples, GraspLog, InvalidInput, NoForces, SlipHistory, collect_samples, detect_slip
+from slipcore import (
+    FrictionSamples,
+    GraspLog,
+    InvalidInput,
+    NoForces,
+    SlipHistory,
+    UnknownScale,
+    collect_samples,
+    detect_slip,
+)
 from slipcore.contact import RampSchedule, tangential_ramp
 
 Scene = Callable[..., GraspLog]
@@ -120,6 +129,12 @@ def test_the_probability_of_slip_is_the_weight_and_unlikely_slip_is_left_out(
     likely = replace(history, probability=0.7 * history.slip)
     np.testing.assert_allclose(collect_samples(log, likely).weight, 0.7, rtol=1e-15)
     assert len(collect_samples(log, likely, least_weight=0.8)) == 0
+
+
+def test_a_log_of_unknown_scale_is_refused() -> None:
+    log = replace(tangential_ramp(), metadata={"scale": "unknown"})
+    with pytest.raises(UnknownScale, match="velocities in m/s"):
+        collect_samples(log, detect_slip(log))
 
 
 def test_a_log_without_forces_is_refused() -> None:
