@@ -91,7 +91,8 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         history = slipcore.detect_slip(log, method=stored.detector)  # strain and events are its inner stages
     with run.stage("samples"):
         samples, none_because = _collect(log, history)
-        detection = summarise_history(history, run.seconds["slip_state"], run.blobs.put(encode_history(history)))
+        blob = run.blobs.put(encode_history(history))
+        detection = summarise_history(history, run.seconds["slip_state"], blob, is_scaled=log.is_scaled)
         summary = summarise_samples(samples, none_because, run.blobs.put(encode_samples(samples)))
         _store(run.database, stored, detection, summary)
     return summary
@@ -112,6 +113,8 @@ def fit_material(run: Run, material: str) -> None:
 
 def _collect(log: GraspLog, history: SlipHistory) -> tuple[FrictionSamples, str | None]:
     """The samples, and if there are none, why."""
+    if not log.is_scaled:
+        return _no_samples(log), "the log's scale is unknown; friction needs velocities in m/s, not pixels a second"
     if log.force is None:
         return _no_samples(log), "the log has no forces; friction is tangential over normal force"
     if not history.contact.any():

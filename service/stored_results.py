@@ -54,13 +54,13 @@ def decode_samples(path: Path) -> FrictionSamples:
     return FrictionSamples(**dict(zip(SAMPLE_ARRAYS, arrays, strict=True)), element_area=float(element_area))
 
 
-def summarise_history(history: SlipHistory, seconds: float, blob: str) -> Detection:
-    """A history in numbers."""
+def summarise_history(history: SlipHistory, seconds: float, blob: str, *, is_scaled: bool = True) -> Detection:
+    """A history in numbers; a length only where the log is in metres (``is_scaled``)."""
     in_contact = ~np.isnan(history.stick_ratio)
     events = history.events
     return Detection(
         method=history.method,
-        noise=finite_or_none(history.noise),
+        noise=finite_or_none(history.noise) if is_scaled else None,
         stick_ratio_min=float(history.stick_ratio[in_contact].min()) if in_contact.any() else None,
         contact_frames=int(in_contact.sum()),
         macro_slip_frames=int(history.macro_slip.sum()),

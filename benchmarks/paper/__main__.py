@@ -7,19 +7,13 @@ pictures of that page are made anew. Simulated scenes are kept under .cache, so 
 import argparse
 import importlib
 import json
-import re
 import time
 from pathlib import Path
 
+from benchmarks.pages import renew
 from benchmarks.paper.common import Finding, save
 
 FIGURES = ("02", "03", "06", "07", "08", "09", "10", "13", "14", "15", "16")
-
-
-def renew(page: str, figure: str, table: str) -> str:
-    """The page with a figure's table, which stands between two comments, replaced."""
-    pattern = rf"(<!-- table {figure} -->\n).*?(<!-- end -->)"
-    return re.sub(pattern, lambda found: f"{found[1]}{table}\n{found[2]}", page, flags=re.DOTALL)
 
 
 def make(figure: str, pictures: Path) -> Finding:
@@ -48,10 +42,7 @@ def main() -> None:
     numbers = {figure: finding.numbers for figure, finding in findings.items()}
     (arguments.output / "paper.json").write_text(json.dumps(numbers, indent=1), encoding="utf-8")
     if arguments.page is not None:
-        page = arguments.page.read_text(encoding="utf-8")
-        for figure, finding in findings.items():
-            page = renew(page, figure, finding.table)
-        arguments.page.write_text(page, encoding="utf-8")
+        renew(arguments.page, {figure: finding.table for figure, finding in findings.items()})
 
 
 if __name__ == "__main__":

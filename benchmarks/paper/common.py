@@ -1,7 +1,6 @@
 """What the figures share: scenes, strain rates, detection, tables and the looks of pictures."""
 
 import io
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -113,18 +112,6 @@ def stick_ratio_error(log: GraspLog, history: SlipHistory, frames: BoolArray | s
     """Root mean square error of the stick ratio over frames in contact."""
     assert log.truth is not None
     return float(np.sqrt(np.nanmean((history.stick_ratio - log.truth.stick_ratio)[frames] ** 2)))
-
-
-def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A Markdown table; numbers with three digits."""
-    lines = [columns, ["---"] * len(columns), *([_cell(value) for value in row] for row in rows)]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def _cell(value: object) -> str:
-    if isinstance(value, (float, np.floating)):
-        return "–" if np.isnan(value) else f"{value:.3g}"
-    return str(value)
 
 
 def save(picture: Figure, path: Path) -> None:

@@ -3,7 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks.paper.common import Finding, table, tidy
+from benchmarks.pages import table
+from benchmarks.paper.common import Finding, tidy
 from slipcore.contact.reference import CattaneoMindlin, HertzContact, half_space
 from slipcore.frames import FloatArray
 

@@ -4,13 +4,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from benchmarks.pages import table
 from benchmarks.paper.common import (
     COLOURS,
     Finding,
     first,
     scene_log,
     strain_rates,
-    table,
     tidy,
     total_force,
     true_slip,

@@ -5,7 +5,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from benchmarks.paper.common import Finding, draw_field, radius, scene_log, strain_rates, strains, table
+from benchmarks.pages import table
+from benchmarks.paper.common import Finding, draw_field, radius, scene_log, strain_rates, strains
 from slipcore import GraspLog
 from slipcore.contact.effects import FiniteLayer, NormalTangentialCoupling, SensorSampling
 from slipcore.frames import FloatArray

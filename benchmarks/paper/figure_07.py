@@ -4,7 +4,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from benchmarks.paper.common import COLOURS, METHODS, Finding, detected, scene_log, strain_rates, table, tidy, true_slip
+from benchmarks.pages import table
+from benchmarks.paper.common import COLOURS, METHODS, Finding, detected, scene_log, strain_rates, tidy, true_slip
 from slipcore import GraspLog, SlipHistory, contact_factor, element_forces
 from slipcore.frames import BoolArray, FloatArray
 

@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
+from benchmarks.pages import table
 from benchmarks.paper.common import (
     COLOURS,
     Finding,
@@ -12,7 +13,6 @@ from benchmarks.paper.common import (
     f1_score,
     scene_log,
     stick_ratio_error,
-    table,
     tidy,
     total_force,
     true_slip,

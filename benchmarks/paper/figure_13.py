@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from benchmarks.pages import table
 from benchmarks.paper.common import (
     COLOURS,
     NOISE,
@@ -11,7 +12,6 @@ from benchmarks.paper.common import (
     detected,
     scene_log,
     strain_rates,
-    table,
     tidy,
     total_force,
     true_slip,

@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.detector_scenes import simulated
-from benchmarks.paper.common import Finding, draw_field, strain_rates, table, tidy
+from benchmarks.pages import table
+from benchmarks.paper.common import Finding, draw_field, strain_rates, tidy
 from slipcore import GraspLog
 from slipcore.contact.effects import LoadPath, MarkerNoise, SensorSampling
 from slipcore.contact.scene import Finger, Press, Scene

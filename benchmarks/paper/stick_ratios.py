@@ -5,13 +5,13 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks.pages import table
 from benchmarks.paper.common import (
     METHODS,
     detected,
     draw_stick_ratio,
     f1_score,
     stick_ratio_error,
-    table,
     true_slip,
 )
 from slipcore import GraspLog, SlipHistory

@@ -62,13 +62,16 @@ class FrictionClient:
         material: str | None = None,
         sensor: str | None = None,
         detector: str | None = None,
+        scale: float | None = None,
+        frame_rate: float | None = None,
     ) -> GraspLogReceipt:
         """Upload a grasp log: a record, a file, or a Tac3D recording folder.
 
         With ``material`` the service refits that material once the slip is detected; follow with ``wait``. The same
         content twice is one log. ``sensor`` and ``detector`` default to what the log and the service say.
+        ``scale`` (m per pixel) and ``frame_rate`` (1/s) are for a table of tracked markers that does not tell them.
         """
-        return self._run(flows.upload(log, material, sensor, detector))
+        return self._run(flows.upload(log, material, sensor, detector, scale, frame_rate))
 
     def grasp_log(self, id: str) -> GraspLogReceipt:  # noqa: A002 - the API's own name
         """A grasp log by its id, with what was detected."""
@@ -163,9 +166,11 @@ class AsyncFrictionClient:
         material: str | None = None,
         sensor: str | None = None,
         detector: str | None = None,
+        scale: float | None = None,
+        frame_rate: float | None = None,
     ) -> GraspLogReceipt:
         """As ``FrictionClient.upload``."""
-        return await self._run(flows.upload(log, material, sensor, detector))
+        return await self._run(flows.upload(log, material, sensor, detector, scale, frame_rate))
 
     async def grasp_log(self, id: str) -> GraspLogReceipt:  # noqa: A002 - the API's own name
         """As ``FrictionClient.grasp_log``."""

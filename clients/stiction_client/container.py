@@ -19,6 +19,8 @@ EPOCH = (1980, 1, 1, 0, 0, 0)
 """The earliest time a zip can hold; a real clock would make two copies of one log differ."""
 
 FLOAT32_ALLOWED = {"displacement", "force", "normal"}
+MASKS = ("contact", "observed")
+"""Optional too: a log that was made before there were any need not have them."""
 
 
 class GraspLogLike(Protocol):
@@ -104,6 +106,10 @@ def _members(log: GraspLogLike) -> dict[str, NDArray[Any]]:
         value = getattr(log, name)
         if value is not None:
             members[name] = _real(name, value)
+    for name in MASKS:
+        mask = getattr(log, name, None)
+        if mask is not None:
+            members[name] = np.ascontiguousarray(mask, dtype=np.bool_)
     return members if log.truth is None else members | _truth(log.truth)
 
 

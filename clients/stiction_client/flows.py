@@ -81,11 +81,16 @@ def advance(flow: Flow[T], answer: Answer) -> Request | Pause | Ended[T]:
 
 
 def upload(
-    log: GraspLogLike | Path | str, material: str | None, sensor: str | None, detector: str | None
+    log: GraspLogLike | Path | str,
+    material: str | None,
+    sensor: str | None,
+    detector: str | None,
+    scale: float | None,
+    frame_rate: float | None,
 ) -> Flow[GraspLogReceipt]:
     """Upload a log; the service knows logs by content, so that a repetition is no second log."""
     content, content_type = _body(log)
-    params = _given(material=material, sensor=sensor, detector=detector)
+    params = _given(material=material, sensor=sensor, detector=detector, scale=scale, frame_rate=frame_rate)
     request = Request("POST", "/v1/grasp-logs", True, params, content=content, content_type=content_type)
     return _record(GraspLogReceipt.from_json, (yield from _ask(request)))
 

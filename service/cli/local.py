@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from slipcore import GraspLog, SlipHistory
 
 Log = Annotated[
-    Path, typer.Argument(help="A grasp log: Stiction NPZ, a Tac3D recording folder, or that folder zipped.")
+    Path,
+    typer.Argument(help="A grasp log: Stiction NPZ, a Tac3D recording folder, that folder zipped, or tracked markers."),
 ]
 DETECTOR_HELP = "Slip detector (docs/detector.md); the best one where none is named."
 Logs = Annotated[list[Path], typer.Argument(help="Grasp logs of one material, each one grasp.")]
@@ -26,12 +27,16 @@ def _as_png(path: Path | None) -> Path | None:
 
 
 Picture = Annotated[Path | None, typer.Option(callback=_as_png, help="Write a picture of slip over time to this PNG.")]
+Scale = Annotated[float | None, typer.Option(help="Of tracked markers: m per pixel.")]
+FrameRate = Annotated[float | None, typer.Option(help="Of tracked markers whose file counts frames: 1/s.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
 
 
 def detect(
     log: Log,
     method: Annotated[str | None, typer.Option(help=DETECTOR_HELP)] = None,
+    scale: Scale = None,
+    frame_rate: FrameRate = None,
     json: Json = False,
     picture: Picture = None,
 ) -> None:
@@ -40,7 +45,7 @@ def detect(
     from slipcore import detect_slip
     from slipcore.defaults import DEFAULT_METHOD
 
-    grasp = formats.read(log)
+    grasp = formats.read(log, scale=scale, frame_rate=frame_rate)
     start = perf_counter()
     history = detect_slip(grasp, method=method or DEFAULT_METHOD)
     seconds = perf_counter() - start
@@ -135,6 +140,7 @@ def _detection_summary(log: "GraspLog", history: "SlipHistory", seconds: float) 
         "slip_ends": len(events.end),
         "touches": len(events.touch),
         "releases": len(events.release),
-        "marker_noise": history.noise,
+        "marker_noise": history.noise if log.is_scaled else None,
         "seconds": round(seconds, 6),
+        **({} if log.is_scaled else {"unknown": "the scale: no noise, velocity or friction can be told in SI units"}),
     }

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from service.cli.exit_codes import FAILURE, INPUT_REFUSED, SERVICE_REFUSED
+from service.cli.local import FrameRate, Scale
 from service.cli.output import print_json, print_table
 
 if TYPE_CHECKING:
@@ -26,12 +27,16 @@ DEFAULT_URL = "http://127.0.0.1:8000"
 
 
 def upload(
-    logs: Annotated[list[Path], typer.Argument(help="Grasp logs: Stiction NPZ, or a zipped Tac3D folder.")],
+    logs: Annotated[
+        list[Path], typer.Argument(help="Grasp logs: Stiction NPZ, a zipped Tac3D folder, or tracked markers.")
+    ],
     material: Annotated[
         str | None, typer.Option(help="Material that was held; without it slip is only detected.")
     ] = None,
     create: Annotated[bool, typer.Option("--create", help="Create the material if it isn't there.")] = False,
     wait: Annotated[bool, typer.Option(help="Wait for detection and fit.")] = True,
+    scale: Scale = None,
+    frame_rate: FrameRate = None,
     url: Url = DEFAULT_URL,
     key: Key = None,
     json: Json = False,
@@ -44,7 +49,7 @@ def upload(
     with FrictionClient(url, key=key) as client:
         if create and material is not None:
             client.ensure_material(material)
-        results = [_upload(client, path, material, wait) for path in logs]
+        results = [_upload(client, path, wait, material=material, scale=scale, frame_rate=frame_rate) for path in logs]
     if json:
         print_json({"uploads": results})
     else:
@@ -108,12 +113,12 @@ def plan(
         print_table(f"Grip for {load:g} N on {material}", ("", ""), list(asdict(answer).items()))
 
 
-def _upload(client: "FrictionClient", path: Path, material: str | None, wait: bool) -> dict[str, Any]:
+def _upload(client: "FrictionClient", path: Path, wait: bool, **said: Any) -> dict[str, Any]:
     """Upload one file; that the service does not take it is a result like any other."""
     from stiction_client import ProblemError
 
     try:
-        receipt = client.upload(path, material=material)
+        receipt = client.upload(path, **said)
     except ProblemError as problem:
         return {"file": path.name, "status": "rejected", "reason": str(problem)}
     job = client.wait(receipt.job) if wait else receipt.job

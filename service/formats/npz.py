@@ -28,6 +28,8 @@ _OPTIONAL = {
     "force": _FLOAT,
     "normal": _FLOAT,
     "object_pose": _FLOAT64,
+    "contact": _FLAG,
+    "observed": _FLAG,
     "sensor": _TEXT,
     "metadata": _TEXT,
 }
@@ -57,6 +59,8 @@ def read(path: Path) -> GraspLog:
         sensor=_scalar(members, "sensor") if "sensor" in members else "unknown",
         metadata=_metadata(_scalar(members, "metadata")) if "metadata" in members else {},
         truth=_truth(members),
+        contact=members.get("contact"),
+        observed=members.get("observed"),
     )
 
 

@@ -8,6 +8,7 @@ from db.records import StoredGraspLog
 from db.repositories import grasp_logs
 from service import formats
 from service.context import Context, Given
+from service.formats.tracked_markers import FRAME_RATE, SCALE
 from service.problems import (
     INVALID_GRASP_LOG,
     INVALID_REQUEST,
@@ -73,6 +74,13 @@ async def create_grasp_log(
     detector: Annotated[
         str, Query(description="Method of detection", json_schema_extra={"enum": list(METHODS)})
     ] = DEFAULT_METHOD,
+    scale: Annotated[
+        float | None, Query(description="Of tracked markers: m per pixel", ge=SCALE[0], le=SCALE[1])
+    ] = None,
+    frame_rate: Annotated[
+        float | None,
+        Query(description="Of tracked markers whose file counts frames: 1/s", ge=FRAME_RATE[0], le=FRAME_RATE[1]),
+    ] = None,
 ) -> GraspLogOut:
     """Stored once it is answered; slip, samples and, with a material, its refit follow in the job.
 
@@ -85,6 +93,8 @@ async def create_grasp_log(
         detector,
         request.headers.get("content-type"),
         int(length) if length.isdecimal() else None,
+        scale,
+        frame_rate,
     )
     accepted = await upload(context, request.stream(), wish)
     response.status_code = 202 if accepted.is_new else 200

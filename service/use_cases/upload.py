@@ -12,6 +12,7 @@ from db.records import NewGraspLog, StoredGraspLog
 from db.repositories import grasp_logs, jobs, materials
 from service import formats
 from service.context import Context
+from service.formats import tracked_markers
 from service.problems import (
     INVALID_GRASP_LOG,
     INVALID_REQUEST,
@@ -31,13 +32,17 @@ LONGEST_SENSOR_NAME = 200
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What the uploader says of a log: its material, sensor and detector, and the content type of its bytes."""
+    """What the uploader says of a log: its material, sensor and detector, the content type of its bytes, and of
+    tracked markers the scale (m per pixel) and frame rate (1/s).
+    """
 
     material: str | None
     sensor: str | None
     detector: str
     content_type: str | None
     content_length: int | None
+    scale: float | None = None
+    frame_rate: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +63,7 @@ async def upload(context: Context, chunks: AsyncIterator[bytes], wish: Wish) -> 
     _check_size(wish.content_length or 0, context.settings.max_upload_bytes)
     material_id = await asyncio.to_thread(_check, context, wish)
     with context.blobs.spool() as spool:
-        await _receive(spool, chunks, context.settings.max_upload_bytes)
+        await _receive(spool, _with_settings(chunks, wish), context.settings.max_upload_bytes)
         described = await asyncio.to_thread(_describe, spool, wish, material_id)
         accepted = await asyncio.to_thread(_store, context, spool, described)
     if accepted.is_queued:
@@ -79,6 +84,19 @@ def _check(context: Context, wish: Wish) -> int | None:
 def _check_size(size: int, limit: int) -> None:
     if size > limit:
         raise Problem.wrong_value(UPLOAD_TOO_LARGE, "body", f"{size} bytes or more", f"at most {limit} bytes")
+
+
+async def _with_settings(chunks: AsyncIterator[bytes], wish: Wish) -> AsyncIterator[bytes]:
+    """The body with the given scale and frame rate as its first lines, so that what is stored tells all."""
+    settings = tracked_markers.settings_lines(wish.scale, wish.frame_rate)
+    async for chunk in chunks:
+        if settings and chunk:
+            if chunk.startswith(b"PK"):
+                allowed = "only beside a table of tracked markers: other formats are in SI units"
+                raise Problem.wrong_value(INVALID_REQUEST, "scale, frame_rate", "given with a zip", allowed)
+            yield settings
+            settings = b""
+        yield chunk
 
 
 async def _receive(spool: Spool, chunks: AsyncIterator[bytes], limit: int) -> None:

@@ -58,6 +58,7 @@ def test_a_history_is_summed_up(history: SlipHistory) -> None:
 
 
 def test_a_history_without_contact_has_no_numbers_for_it(history: SlipHistory) -> None:
+    assert stored_results.summarise_history(history, 0.0, "", is_scaled=False).noise is None
     nothing = replace(history, stick_ratio=np.full(len(history.time), np.nan), noise=math.nan)
     found = stored_results.summarise_history(nothing, 0.0, "")
     assert (found.contact_frames, found.stick_ratio_min, found.noise) == (0, None, None)

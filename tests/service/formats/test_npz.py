@@ -2,6 +2,7 @@ import io
 import struct
 import zipfile
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,14 @@ def test_a_log_comes_back_as_it_was_written(log: GraspLog, tmp_path: Path) -> No
     for name in ("contact", "slip_kinematic", "slip_contact_factor", "stick_ratio"):
         np.testing.assert_array_equal(getattr(back.truth, name), getattr(log.truth, name), err_msg=name)
     assert back.truth.friction == log.truth.friction
+
+
+def test_masks_come_back_as_they_were_written(log: GraspLog, tmp_path: Path) -> None:
+    masks = np.random.default_rng(1).random((2, 5, 3, 4)) < 0.5
+    back = npz.read(container.write(replace(log, contact=masks[0], observed=masks[1]), tmp_path / "log.npz"))
+    np.testing.assert_array_equal(back.contact, masks[0])
+    np.testing.assert_array_equal(back.observed, masks[1])
+    assert npz.read(container.write(log, tmp_path / "log.npz")).observed is None
 
 
 def test_a_log_without_options_comes_back_without_them(log: GraspLog, tmp_path: Path) -> None:

@@ -142,6 +142,55 @@ def test_a_wish_that_cannot_be_met_is_refused_by_name(
     assert (problem["type"], problem["name"]) == (f"/problems/{kind}", name)
 
 
+DOTS = Path(__file__).parents[1] / "formats" / "tracked_dots.csv"
+
+
+def unscaled() -> bytes:
+    """A tracker's file that tells neither scale nor frame rate."""
+    lines = DOTS.read_bytes().splitlines(keepends=True)
+    return b"".join(line for line in lines if not line.startswith((b"# scale", b"# frame_rate")))
+
+
+def test_the_scale_given_with_an_upload_is_kept_with_it(client: httpx.Client, upload: Upload, wait: Wait) -> None:
+    accepted = upload(client, unscaled(), "text/csv", scale="2.5e-5", frame_rate="30")
+    assert accepted.status_code == httpx.codes.ACCEPTED, accepted.text
+    log = accepted.json()
+    assert (log["format"], log["frames"], log["sensor"]) == ("tracked markers", 31, "fingertip camera")
+    assert log["duration"] == pytest.approx(1.0)
+    job = wait(client, log["job"]["id"])
+    assert job["status"] == "done"  # without a material there is nothing to refuse
+    assert client.get(accepted.headers["location"]).json()["detection"]["noise"] == pytest.approx(2e-6, rel=0.5)
+    again = upload(client, unscaled(), "text/csv", scale="2.5e-5", frame_rate="30")
+    assert again.status_code == httpx.codes.OK
+    assert upload(client, unscaled(), "text/csv", scale="3e-5", frame_rate="30").json()["id"] != log["id"]
+
+
+def test_slip_is_detected_without_a_scale_but_no_friction_found(
+    client: httpx.Client, material: str, upload: Upload, wait: Wait
+) -> None:
+    accepted = upload(client, unscaled(), "text/csv", material=material, frame_rate="30")
+    job = wait(client, accepted.json()["job"]["id"])
+    assert job["status"] == "refused"
+    assert "scale is unknown" in job["reason"]
+    detection = client.get(accepted.headers["location"]).json()["detection"]
+    assert detection["noise"] is None
+    assert detection["contact_frames"] > 0
+
+
+def test_a_frame_count_without_a_rate_is_refused(client: httpx.Client, upload: Upload) -> None:
+    problem = refusal(client, upload, unscaled(), 422, "text/csv")
+    assert (problem["type"], problem["name"], problem["value"]) == (
+        "/problems/invalid-grasp-log",
+        "frame_rate",
+        "missing",
+    )
+
+
+def test_a_scale_beside_a_zip_is_refused(client: httpx.Client, upload: Upload, content: bytes) -> None:
+    problem = refusal(client, upload, content, 422, scale="1e-5")
+    assert (problem["type"], problem["value"]) == ("/problems/invalid-request", "given with a zip")
+
+
 def test_an_upload_over_the_limit_is_refused_by_its_length(client: httpx.Client, upload: Upload) -> None:
     problem = refusal(client, upload, bytes(2 * 2**20 + 1), 413)
     assert (problem["type"], problem["value"]) == ("/problems/upload-too-large", "2097153 bytes or more")

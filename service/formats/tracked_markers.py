@@ -1,0 +1,274 @@
+"""Tracked markers as text: one row a marker and frame, in pixels or metres (docs/formats.md)."""
+
+import csv
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.formats.npy import MAX_ARRAY_BYTES
+from slipcore.errors import InvalidInput
+from slipcore.frames import BoolArray, FloatArray, GraspLog
+from slipcore.markers import on_lattice
+
+ALIASES = {
+    "time": "time", "frame": "frame", "marker": "marker", "particle": "marker", "id": "marker", "track_id": "marker",
+    "x": "x", "y": "y", "z": "z", "contact": "contact",
+}  # fmt: skip
+"""Columns that are read, by the names that trackers give them."""
+SETTINGS = ("scale", "frame_rate", "sensor")
+"""What lines before the header may tell: ``# scale: 2.5e-5``."""
+SCALE, FRAME_RATE = (1e-9, 1.0), (1e-3, 1e6)
+"""m per pixel (1 where the file is in metres) and frames a second that can be."""
+ASSUMED_WIDTH = 15e-3
+"""m that the markers span where their scale is unknown: a fingertip's sensor. Detection depends on it a little."""
+MAX_ROWS = 5_000_000
+MOST_DELIMITERS = ",;\t"
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """What stands before the rows: ``settings``, the column of each quantity, and what is left unread."""
+
+    settings: Mapping[str, str]
+    columns: Mapping[str, int]
+    width: int
+    delimiter: str
+    ignored: tuple[str, ...]
+    lines: int
+
+
+@dataclass(frozen=True, slots=True)
+class Tracks:
+    """Markers over time: ``time`` [t] s, ``place`` [t, k, 3] as in the file (NaN where lost), ``contact`` [t, k]."""
+
+    time: FloatArray
+    place: FloatArray
+    contact: BoolArray | None
+    has_height: bool
+
+
+def read(path: Path, scale: float | None = None, frame_rate: float | None = None) -> GraspLog:
+    """Read a file of tracked markers; ``scale`` (m per pixel) and ``frame_rate`` (1/s) go before what the file says.
+
+    Raises ``InvalidInput`` naming the line and the value that is wrong.
+    """
+    given = {name: repr(value) for name, value in (("scale", scale), ("frame_rate", frame_rate)) if value is not None}
+    return read_lines(_lines(path), given)
+
+
+def read_lines(lines: Iterator[str], given: Mapping[str, str] = MappingProxyType({})) -> GraspLog:
+    """Read a file's lines, with what is ``given`` in place of the settings that it tells."""
+    header = read_header(lines)
+    settings = {**header.settings, **given}
+    return _grasp_log(_tracks(header, lines, settings), settings, header.ignored)
+
+
+def settings_lines(scale: float | None, frame_rate: float | None) -> bytes:
+    """The lines that say so at the head of a file, so that what is stored of an upload tells all."""
+    given = (("scale", scale), ("frame_rate", frame_rate))
+    return "".join(f"# {name}: {value!r}\n" for name, value in given if value is not None).encode()
+
+
+def looks_like(start: bytes) -> bool:
+    """Whether a file that begins so has a header of tracked markers."""
+    try:
+        lines = start.decode("utf-8", errors="ignore").splitlines()
+        read_header(iter(lines))
+    except InvalidInput:
+        return False
+    return True
+
+
+def read_header(lines: Iterator[str]) -> Header:
+    """Settings and column names; the lines after them stay in the iterator."""
+    settings: dict[str, str] = {}
+    for number, line in enumerate(lines, start=1):
+        text = line.strip("\ufeff \r\n")
+        if text.startswith("#"):
+            name, _, value = text[1:].partition(":")
+            if name.strip() in SETTINGS:
+                settings.setdefault(name.strip(), value.strip())
+        elif text:
+            return _columns(text, settings, number)
+    raise InvalidInput("file", "without a header", "a line that names the columns: time or frame, marker, x, y")
+
+
+def _columns(text: str, settings: Mapping[str, str], number: int) -> Header:
+    delimiter = max(MOST_DELIMITERS, key=text.count)
+    names = [name.strip(' "').lower() for name in text.split(delimiter)]
+    columns: dict[str, int] = {}
+    for place, name in enumerate(names):
+        if name in ALIASES and ALIASES[name] in columns:
+            raise InvalidInput(f"line {number}", f"two columns of {ALIASES[name]}", "one of each")
+        if name in ALIASES:
+            columns[ALIASES[name]] = place
+    missing = [name for name in ("marker", "x", "y") if name not in columns]
+    if not {"time", "frame"} & columns.keys():
+        missing.insert(0, "time or frame")
+    if missing:
+        value = f"a header without {', '.join(missing)} ({text[:60]!r})"
+        raise InvalidInput(f"line {number}", value, "columns time or frame, marker, x, y; optional z, contact")
+    ignored = tuple(name for name in names if name not in ALIASES)
+    return Header(settings, columns, len(names), delimiter, ignored, number)
+
+
+def _lines(path: Path) -> Iterator[str]:
+    size = path.stat().st_size
+    if size > MAX_ARRAY_BYTES:
+        raise InvalidInput("file", f"{size} bytes", f"at most {MAX_ARRAY_BYTES} bytes")
+    with path.open("rb") as stream:
+        for number, line in enumerate(stream, start=1):
+            try:
+                yield line.decode("utf-8")
+            except UnicodeDecodeError as error:
+                raise InvalidInput(f"line {number}", f"not UTF-8 ({error.reason})", "UTF-8 text") from error
+
+
+def _tracks(header: Header, lines: Iterator[str], settings: Mapping[str, str]) -> Tracks:
+    """All rows, sorted into frames and markers."""
+    rows, names = _rows(header, lines)
+    moment, number = rows[:, 0], rows[:, -1]
+    if "time" not in header.columns:
+        moment = moment / _setting("frame_rate", settings, FRAME_RATE, "1/s, because the file counts frames")
+    time, frame = np.unique(moment, return_inverse=True)
+    marker = rows[:, 1].astype(np.intp)
+    _check_size(len(time), len(names))
+    _check_once(frame * len(names) + marker, number, names, marker)
+    place = np.full((len(time), len(names), 3), np.nan)
+    place[frame, marker] = rows[:, 2:5]
+    contact = None
+    if "contact" in header.columns:
+        contact = _held(frame, marker, rows[:, 5], place.shape[:2])
+    return Tracks(time, place, contact, "z" in header.columns)
+
+
+def _rows(header: Header, lines: Iterator[str]) -> tuple[FloatArray, dict[str, int]]:
+    """Rows [r, 7] of moment, marker (its number), x, y, z, contact and line; and the markers by name."""
+    names: dict[str, int] = {}
+    rows: list[tuple[float, ...]] = []
+    reader = csv.reader(lines, delimiter=header.delimiter)
+    try:
+        for cells in reader:
+            if not cells or cells[0].lstrip().startswith("#"):
+                continue
+            if len(rows) >= MAX_ROWS:
+                raise InvalidInput("file", f"more than {MAX_ROWS} rows", f"at most {MAX_ROWS} rows")
+            rows.append(_row(header, cells, header.lines + reader.line_num, names))
+    except csv.Error as error:
+        line = header.lines + reader.line_num
+        raise InvalidInput(f"line {line}", f"not a row of text ({error})", "delimited text") from error
+    if not rows:
+        raise InvalidInput("file", "a header without rows", "one row a marker and frame")
+    return np.array(rows), names
+
+
+def _row(header: Header, cells: list[str], line: int, names: dict[str, int]) -> tuple[float, ...]:
+    if len(cells) != header.width:
+        raise InvalidInput(f"line {line}", f"of {len(cells)} cells", f"{header.width}, as in the header")
+    text = {name: cells[place].strip() for name, place in header.columns.items()}
+    key = "time" if "time" in text else "frame"
+    moment = _number(text[key], line, key)
+    if math.isnan(moment):
+        raise InvalidInput(f"line {line}, {key}", repr(text[key])[:40], "a finite number")
+    if not text["marker"]:
+        raise InvalidInput(f"line {line}, marker", "empty", "a name or number")
+    marker = names.setdefault(text["marker"], len(names))
+    x, y = _number(text["x"], line, "x"), _number(text["y"], line, "y")
+    z = _number(text["z"], line, "z") if "z" in text else 0.0
+    touching = _number(text["contact"], line, "contact") if "contact" in text else 1.0
+    if touching not in (0.0, 1.0) and not math.isnan(touching):
+        raise InvalidInput(f"line {line}, contact", repr(text["contact"])[:40], "0 or 1, empty where unknown")
+    return moment, marker, x, y, z, touching, line
+
+
+def _number(text: str, line: int, name: str) -> float:
+    """A number; NaN where the cell is empty."""
+    try:
+        value = float(text) if text else math.nan
+    except ValueError:
+        value = math.inf
+    if math.isinf(value):
+        raise InvalidInput(f"line {line}, {name}", repr(text)[:40], "a finite number; empty or nan where it is lost")
+    return value
+
+
+def _setting(name: str, settings: Mapping[str, str], limits: tuple[float, float], unit: str) -> float:
+    low, high = limits
+    text = settings.get(name, "")
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not low <= value <= high:
+        raise InvalidInput(name, repr(text)[:40] if text else "missing", f"{low:g} to {high:g} {unit}")
+    return value
+
+
+def _check_size(frames: int, markers: int) -> None:
+    claimed = frames * markers * 3 * 8
+    if claimed > MAX_ARRAY_BYTES:
+        raise InvalidInput("file", f"{frames} frames of {markers} markers", f"at most {MAX_ARRAY_BYTES} bytes of them")
+
+
+def _check_once(
+    places: NDArray[np.intp], lines: FloatArray, names: Mapping[str, int], marker: NDArray[np.intp]
+) -> None:
+    """No marker twice in a frame."""
+    order = np.argsort(places, kind="stable")
+    twice = np.flatnonzero(np.diff(places[order]) == 0)
+    if twice.size:
+        row = int(order[twice[0] + 1])
+        name = list(names)[int(marker[row])]
+        raise InvalidInput(f"line {lines[row]:.0f}", f"marker {name[:40]!r} again in one frame", "each marker once")
+
+
+def _held(frame: NDArray[np.intp], marker: NDArray[np.intp], touching: FloatArray, shape: tuple[int, int]) -> BoolArray:
+    """Contact [t, k]; where it isn't told, as it was told last, at first none."""
+    told = np.full(shape, np.nan)
+    told[frame, marker] = touching
+    last = np.where(np.isnan(told), 0, np.arange(shape[0])[:, None])
+    held: BoolArray = np.take_along_axis(told, np.maximum.accumulate(last, axis=0), axis=0) == 1.0
+    return held
+
+
+def _grasp_log(tracks: Tracks, settings: Mapping[str, str], ignored: tuple[str, ...]) -> GraspLog:
+    """The log in metres, from the markers that the first frame shows: there they are at rest."""
+    known = np.isfinite(tracks.place[0]).all(axis=1)
+    if not known.any():
+        raise InvalidInput("first frame", "without any marker", "markers at rest in the first frame")
+    place, metadata = tracks.place[:, known], _metadata(tracks, known, ignored)
+    if "scale" in settings:
+        scale = _setting("scale", settings, SCALE, "m per pixel")
+        metadata["scale"] = f"{scale:g} m per pixel"
+    else:
+        scale = ASSUMED_WIDTH / max(float(np.ptp(place[0, :, :2], axis=0).max()), 1e-300)
+        metadata |= {"scale": "unknown", "assumed_scale": f"{scale:.6g} m per pixel"}
+    contact = tracks.contact
+    if contact is None and not tracks.has_height:
+        contact, metadata["contact"] = np.ones(tracks.place.shape[:2], bool), "assumed: every marker"
+    log, _ = on_lattice(
+        tracks.time,
+        scale * place[0],
+        scale * (place - place[0]),
+        None if contact is None else contact[:, known],
+        settings.get("sensor", "unknown"),
+        metadata,
+    )
+    return log
+
+
+def _metadata(tracks: Tracks, known: BoolArray, ignored: tuple[str, ...]) -> dict[str, Any]:
+    lost = int(np.isnan(tracks.place[:, known, 0] + tracks.place[:, known, 1]).sum())
+    told = {"format": "tracked markers", "markers": str(int(known.sum())), "lost_places": str(lost)}
+    left_out = int(len(known) - known.sum())
+    if left_out:
+        told["markers_left_out"] = f"{left_out} (not in the first frame)"
+    if ignored:
+        told["columns_left_out"] = ", ".join(ignored)[:200]
+    return told
