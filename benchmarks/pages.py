@@ -1,10 +1,13 @@
-"""Tables of pages that commands make: each stands between `<!-- table NAME -->` and `<!-- end -->`."""
+"""What commands put on pages: small pictures, and tables between `<!-- table NAME -->` and `<!-- end -->`."""
 
+import io
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
+from PIL import Image
 
 
 def renew(page: Path, tables: Mapping[str, str]) -> None:
@@ -16,6 +19,13 @@ def renew(page: Path, tables: Mapping[str, str]) -> None:
         if count != 1:
             raise SystemExit(f"{page} has {count} places for the table {name}; needed: one")
     page.write_text(text, encoding="utf-8")
+
+
+def save(picture: Figure, path: Path) -> None:
+    """Write a small PNG: 256 colours are plenty for lines and maps."""
+    buffer = io.BytesIO()
+    picture.savefig(buffer, dpi=100, bbox_inches="tight")
+    Image.open(buffer).convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE).save(path, optimize=True)
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

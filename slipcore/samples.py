@@ -87,7 +87,7 @@ def collect_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
     if log.force is None:
         raise NoForces("friction samples need the force on each element, and the log has none")
     _check_same(log, history)
-    forces = element_forces(log.force, _normals(log))
+    forces = element_forces(log.force, normals_of(log))
     noise = _force_noise(log, forces, chosen)
     velocity = _central(log.time, history.velocity)
     speed = np.sqrt(np.vecdot(velocity, velocity))
@@ -125,7 +125,8 @@ def _before(field: NDArray[Scalar]) -> NDArray[Scalar]:
     return earlier
 
 
-def _normals(log: GraspLog) -> FloatArray:
+def normals_of(log: GraspLog) -> FloatArray:
+    """Outward normals [t, n, m, 3] of a log, from the deformed shape where it has none."""
     if log.normal is not None:
         return log.normal
     lattice = Lattice.at_rest(log.position)

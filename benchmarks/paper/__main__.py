@@ -10,8 +10,8 @@ import json
 import time
 from pathlib import Path
 
-from benchmarks.pages import renew
-from benchmarks.paper.common import Finding, save
+from benchmarks.pages import renew, save
+from benchmarks.paper.common import Finding
 
 FIGURES = ("02", "03", "06", "07", "08", "09", "10", "13", "14", "15", "16")
 

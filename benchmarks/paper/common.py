@@ -1,15 +1,12 @@
 """What the figures share: scenes, strain rates, detection, tables and the looks of pictures."""
 
-import io
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
-from PIL import Image
 
 from benchmarks.detector_scenes import simulated
 from slipcore import GraspLog, GroundTruth, SlipHistory, detect_slip
@@ -112,13 +109,6 @@ def stick_ratio_error(log: GraspLog, history: SlipHistory, frames: BoolArray | s
     """Root mean square error of the stick ratio over frames in contact."""
     assert log.truth is not None
     return float(np.sqrt(np.nanmean((history.stick_ratio - log.truth.stick_ratio)[frames] ** 2)))
-
-
-def save(picture: Figure, path: Path) -> None:
-    """Write a small PNG: 256 colours are plenty for lines and maps."""
-    buffer = io.BytesIO()
-    picture.savefig(buffer, dpi=100, bbox_inches="tight")
-    Image.open(buffer).convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE).save(path, optimize=True)
 
 
 def tidy(axes: Axes, **labels: Any) -> None:
