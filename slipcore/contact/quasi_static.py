@@ -33,10 +33,10 @@ class State:
     """What the next step depends on; fields on the whole grid.
 
     ``normal`` contact, its ``pressure`` [ny, nx], ``traction`` [2, ny, nx] Pa and the last ``change`` [3, ny, nx] of
-    both; ``displacement`` [2, ny, nx] m of the
-    finger against the object's own surface; ``elastic`` [3, ny, nx] m, the finger's displacement without creep;
-    ``creep`` m, one [3, ny, nx] a branch; ``pose`` [3] of the object (m, m, rad); ``load``: the last; ``drive`` [3]:
-    how it differed from the one before.
+    both; ``displacement`` [2, ny, nx] m of the finger against the object's own surface; ``elastic`` [3, ny, nx] m, the
+    finger's displacement without creep; ``creep`` m, one [3, ny, nx] a branch; ``pose`` [3] of the object (m, m, rad);
+    ``speed`` [ny, nx] m/s of slip, where friction depends on it; ``load``: the last; ``drive`` [3]: how it differed
+    from the one before.
     """
 
     normal: NormalContact | None
@@ -47,6 +47,7 @@ class State:
     elastic: FloatArray
     creep: tuple[FloatArray, ...]
     pose: FloatArray
+    speed: FloatArray
     load: StepLoad
     drive: FloatArray
 
@@ -114,7 +115,9 @@ class QuasiStatic:
         """Bodies apart."""
         zero = np.zeros((3, *self.grid.shape))
         creep = tuple(zero for _ in self.problem.creep)
-        return State(None, zero[0], zero[:2], zero, zero[:2], zero, creep, np.zeros(3), StepLoad(0.0), np.zeros(3))
+        return State(
+            None, zero[0], zero[:2], zero, zero[:2], zero, creep, np.zeros(3), zero[0], StepLoad(0.0), np.zeros(3)
+        )
 
     def run(self, loads: Iterable[StepLoad]) -> Iterator[StepResult]:
         """Results of loads one after the other, from bodies apart."""
@@ -135,6 +138,7 @@ class QuasiStatic:
             self.height if recalled is None else self.height + recalled[2],
             self.friction,
             -state.displacement if recalled is None else recalled[:2] - state.displacement,
+            state.speed,
             load,
             self.tolerance * self._share(state, load, drive),
             self.normal_tolerance,
@@ -192,7 +196,13 @@ class QuasiStatic:
         if recalled is not None:
             displacement = displacement + recalled[:2]
         change = np.stack((*(traction - state.traction), pressure - state.pressure))
-        return State(solution.normal, pressure, traction, change, displacement, elastic, creep, pose, load, drive)
+        speed = state.speed
+        if self.problem.velocity_laws:
+            speed = np.zeros_like(pressure)
+            speed[solution.box] = np.hypot(*solution.tangential.slip) / load.duration
+        return State(
+            solution.normal, pressure, traction, change, displacement, elastic, creep, pose, speed, load, drive
+        )
 
     def _displacement(
         self, operators: Operators, pressure: FloatArray, traction: FloatArray, known: StepSolution | None = None

@@ -64,7 +64,8 @@ class StepEquations:
     """What is given in one step; fields on the whole grid.
 
     ``height`` [ny, nx] m, with what creep recalls; ``friction`` [ny, nx]; ``offset`` [2, ny, nx] m: what the surface
-    has moved since the last step apart from traction and pressure; ``tolerance`` of tractions, as a share of the
+    has moved since the last step apart from traction and pressure; ``speed`` [ny, nx] m/s: a guess of how fast it
+    slips; ``tolerance`` of tractions, as a share of the
     largest limit; ``known``: normal contact where it is that of the last step.
     """
 
@@ -74,6 +75,7 @@ class StepEquations:
     height: FloatArray
     friction: FloatArray
     offset: FloatArray
+    speed: FloatArray
     load: StepLoad
     tolerance: float
     normal_tolerance: float
@@ -131,21 +133,27 @@ class StepEquations:
         pressure, coefficient = normal.pressure[box], self.friction[box]
         for law in self.problem.pressure_laws:
             coefficient = coefficient + law(pressure)
-        limit = _coulomb_limit(coefficient, pressure)
         if not self.problem.velocity_laws:
+            limit = _coulomb_limit(coefficient, pressure)
             tangential = self._tangential(box, limit, offset, start, tolerance)
             return StepSolution(normal, tangential, limit, box, tangential.iterations)
-        iterations, velocity = 0, np.zeros_like(pressure)
-        for k in range(OUTER_ITERATIONS):
-            added = [law(velocity) for law in self.problem.velocity_laws]
-            before, limit = limit, _coulomb_limit(sum(added, start=coefficient), pressure)
+        iterations, speed, mixing = 0, self.speed[box], Mixing()
+        for _ in range(OUTER_ITERATIONS):
+            limit = self._limit(coefficient, speed, pressure)
             tangential = self._tangential(box, limit, offset, start, tolerance)
             iterations += tangential.iterations
-            change = float(np.abs(limit - before).max()) / max(float(limit.max()), 1e-300)
-            if change <= tolerance and k > 0:
+            answer = np.hypot(*tangential.slip) / self.load.duration
+            off = np.abs(self._limit(coefficient, answer, pressure) - limit)
+            change = float(off.max()) / max(float(limit.max()), 1e-300)
+            if change <= tolerance:
                 return StepSolution(normal, tangential, limit, box, iterations)
-            start, velocity = tangential.traction, np.hypot(*tangential.slip) / self.load.duration
+            start, speed = tangential.traction, np.maximum(mixing.next(speed, answer), 0.0)
         raise NotConverged("velocity-dependent friction", change, tolerance, OUTER_ITERATIONS)
+
+    def _limit(self, coefficient: FloatArray, speed: FloatArray, pressure: FloatArray) -> FloatArray:
+        """μp at a slip speed."""
+        added = [law(speed) for law in self.problem.velocity_laws]
+        return _coulomb_limit(sum(added, start=coefficient), pressure)
 
     def _tangential(
         self, box: Box, limit: FloatArray, offset: FloatArray, start: FloatArray, tolerance: float

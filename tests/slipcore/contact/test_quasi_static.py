@@ -143,3 +143,15 @@ def test_velocity_dependent_friction_meets_its_own_law() -> None:
     ratio = np.hypot(*result.force[:2])[sliding] / result.force[2][sliding]
     velocity = np.hypot(*result.slip)[sliding] / 0.1
     np.testing.assert_allclose(ratio, FRICTION + 2.0 * velocity, rtol=1e-5)
+
+
+def test_steady_sliding_under_velocity_dependent_friction_is_known_from_the_step_before() -> None:
+    solver = QuasiStatic(sphere_on(0.49, velocity_laws=(lambda v: 10.0 * v,)), Grid.square(32, 11e-3), tolerance=1e-4)
+    state, _ = solver.step(solver.start(), shear(FORCE, 0.0))
+    pulled = StepLoad(FORCE, motion=np.array([1e-4, 0.0, 0.0]), given=(False, True, True), duration=1.0 / 30.0)
+    applications = []
+    for _ in range(40):
+        state, result = solver.step(state, pulled)
+        applications.append(result.applications.tangential)
+    assert result.sliding
+    assert applications[-1] <= 5  # without a memory of the speed 167
