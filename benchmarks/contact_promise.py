@@ -1,8 +1,9 @@
 """Does `simulate` keep the accuracy that it is asked for? `python -m benchmarks.contact_promise --output FOLDER`.
 
 Boundary elements are asked for several accuracies, on random presses and pulls of a sphere at ν = 0, whose closed form
-is the truth, and on the library's scenes, against a run on 150 cells across the contact with two load steps a frame. Writes contact_promise.json (each case as soon as it is known; what is there already is not run again)
-and contact_promise.png, and prints a Markdown table. The whole takes half an hour.
+is the truth, and on the library's scenes, against a run on 150 cells across the contact with two load steps a frame.
+Writes contact_promise.json (each case as soon as it is known; what is there already is not run again) and
+contact_promise.png, and prints a Markdown table. The whole takes half an hour.
 """
 
 import argparse
