@@ -1,27 +1,38 @@
-"""Friction found from simulated ramps of known friction: `python -m benchmarks.known_truth [--output FOLDER]`.
+"""Friction found from simulated grasps of known friction: `python -m benchmarks.known_truth [--output FOLDER]`.
 
 Each material is seen in four ramps of different normal force (1 µm marker noise, 2 mN force noise), detected by each
-method, fitted by each estimator, over several seeds of the noise. Writes JSON and a picture, prints a Markdown table.
+method, fitted by each estimator, over several seeds of the noise. Then grasps whose friction depends on velocity and
+normal force and scatters from place to place: how often do intervals hold the truth, with and without the object's
+motion? Writes JSON and pictures, prints Markdown tables.
 """
 
 import argparse
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks.detector_scenes import PITCH, simulated
 from estimators import EstimatorError, fit
-from slipcore import FrictionSamples, collect_samples, detect_slip
+from slipcore import FrictionSamples, GraspLog, collect_samples, detect_slip
 from slipcore.contact import tangential_ramp
+from slipcore.contact.boundary_elements import Fidelity
+from slipcore.contact.effects import ObjectMotion, PressureFriction, SensorSampling, VelocityFriction
+from slipcore.contact.scene import Finger, Press, Scene
 
 FRICTION = (0.25, 0.45, 0.8)
 NORMAL_FORCES = (4.0, 6.0, 9.0, 13.0)
 DETECTORS = ("filter", "strain_rate", "strain_rate_literal")
 ESTIMATORS = ("ols", "bayes")
 MARKER_NOISE, FORCE_NOISE = 1e-6, 2e-3
+LAW = (0.45, 8.0, -0.8)
+"""β₀, β₁ s/m and β₂ 1/N of the grasps whose friction depends on velocity and normal force."""
+SCATTER = 0.03
+GRASPS = ((5.0, 1.0), (7.0, 3.0), (9.0, 0.5), (11.0, 2.0), (13.0, 1.5))
+"""Normal force, N, and speed of the object, mm/s, of each of these grasps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +95,93 @@ def _find(detector: str, estimator: str, friction: float, seed: int, samples: li
     return Finding(detector, estimator, friction, seed, count, float(model.coefficients[0]), float(low), float(high))
 
 
+def law_grasps() -> list[GraspLog]:
+    """Grasps without noise or scatter: pressed, then moved until all of the contact slides, and on across."""
+    return [simulated(_law_scene(force, 1e-3 * speed), Fidelity(24, 1, 1e-4)) for force, speed in GRASPS]
+
+
+def _law_scene(force: float, speed: float) -> Scene:
+    time = (0.4, 1.2, 1.6, 2.2)
+    x = (0.0, 0.8 * speed, 1.4 * speed, 1.5 * speed)
+    y = (0.0, 0.0, 0.1 * speed, 0.7 * speed)
+    sampling, motion = SensorSampling((20, 20), PITCH, 30.0), ObjectMotion(time, x=x, y=y)
+    laws = VelocityFriction(LAW[1]), PressureFriction(LAW[2], PITCH**2)
+    return Scene(f"law {force:g}", (sampling, *laws, motion), Finger(), LAW[0], Press(force, 0.3), time[-1])
+
+
+def seen(log: GraspLog, rng: np.random.Generator, *, known_motion: bool) -> GraspLog:
+    """The grasp with noise, and with friction that scatters from element to element where they slip."""
+    assert log.force is not None
+    assert log.truth is not None
+    force = log.force.copy()
+    scatter = 1.0 + SCATTER / LAW[0] * rng.standard_normal(log.grid)
+    force[..., :2] *= np.where(log.truth.slip_contact_factor, scatter, 1.0)[..., None]
+    return replace(
+        log,
+        displacement=log.displacement + MARKER_NOISE * rng.standard_normal(force.shape),
+        force=force + FORCE_NOISE * rng.standard_normal(force.shape),
+        object_pose=log.object_pose if known_motion else None,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class LawFinding:
+    """One fit of the law: estimates and 95 % intervals of β₀, β₁ and β₂, and which the fit says it can tell."""
+
+    known_motion: bool
+    estimator: str
+    seed: int
+    samples: int
+    estimate: list[float]
+    low: list[float]
+    high: list[float]
+    identifiable: list[bool]
+
+
+def law_findings(seeds: int, estimators: tuple[str, ...]) -> Iterator[LawFinding]:
+    """Fits to the same grasps with noise and scatter of each seed, with and without the object's motion."""
+    grasps = law_grasps()
+    for known_motion in (True, False):
+        for seed in range(1000, 1000 + seeds):
+            logs = [
+                seen(log, rng, known_motion=known_motion)
+                for log, rng in zip(grasps, np.random.default_rng(seed).spawn(len(grasps)), strict=True)
+            ]
+            samples = [collect_samples(log, detect_slip(log, "filter")) for log in logs]
+            for estimator in estimators:
+                model = fit(samples, method=estimator, seed=seed)
+                low, high = np.array(model.interval(0.95)).T
+                yield LawFinding(
+                    known_motion,
+                    estimator,
+                    seed,
+                    sum(map(len, samples)),
+                    [float(v) for v in model.coefficients],
+                    [float(v) for v in low],
+                    [float(v) for v in high],
+                    [bool(v) for v in model.identifiable],
+                )
+
+
+def law_markdown(found: list[LawFinding]) -> str:
+    """Mean and scatter of each coefficient, and how often its interval holds the truth."""
+    lines = [
+        "| object motion | estimator | samples | coefficient | true | mean found | standard deviation | truth inside |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for known, estimator in dict.fromkeys((f.known_motion, f.estimator) for f in found):
+        rows = [f for f in found if (f.known_motion, f.estimator) == (known, estimator)]
+        samples = float(np.mean([f.samples for f in rows]))
+        for k, (name, truth) in enumerate(zip(("β₀", "β₁, s/m", "β₂, 1/N"), LAW, strict=True)):
+            values = np.array([f.estimate[k] for f in rows])
+            inside = np.mean([f.low[k] <= truth <= f.high[k] for f in rows])
+            lines.append(
+                f"| {'known' if known else 'unknown'} | {estimator} | {samples:.0f} | {name} | {truth:g} "
+                f"| {values.mean():.4f} | {values.std():.4f} | {inside:.0%} of {len(rows)} |"
+            )
+    return "\n".join(lines)
+
+
 def markdown(found: list[Finding]) -> str:
     """A table of medians over the seeds."""
     lines = [
@@ -133,13 +231,17 @@ def main() -> None:
     """Run, print, write."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, default=Path("benchmarks/results"))
-    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--seeds", type=int, default=20, help="of the ramps")
+    parser.add_argument("--law-seeds", type=int, default=200, help="of the grasps whose friction follows a law")
     arguments = parser.parse_args()
     found = list(findings(arguments.seeds))
     arguments.output.mkdir(parents=True, exist_ok=True)
     (arguments.output / "known_truth.json").write_text(json.dumps([asdict(f) for f in found], indent=1))
     picture(found).savefig(arguments.output / "known_truth.png", dpi=110)
     print(markdown(found))
+    laws = list(law_findings(arguments.law_seeds, ESTIMATORS))
+    (arguments.output / "known_law.json").write_text(json.dumps([asdict(f) for f in laws], indent=1))
+    print(law_markdown(laws))
 
 
 if __name__ == "__main__":

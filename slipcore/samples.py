@@ -73,10 +73,11 @@ def collect_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
     """Observe friction where ``history`` says that elements of ``log`` slip: f_t/f_n, velocity and forces.
 
     Only at compressed elements in contact, of observable velocity above what noise alone makes (a stuck point's
-    f_t/f_n is below the friction coefficient) and of normal force well above its noise. Noise must not choose samples
-    nor stand on both sides of a fit: an element is chosen by the frame before, its velocity is that from the frame
-    before to the next, and its normal force is what these two say; f_t/f_n alone is of the frame itself, freed of what
-    noise adds to a magnitude and to a quotient. A log without (observable) slip gives no samples, of length 0.
+    f_t/f_n is below the friction coefficient) and of normal force well above its noise, whose four neighbours touch
+    too: over an element at the rim pressure differs too much for one friction coefficient. Noise must not choose
+    samples nor stand on both sides of a fit: an element is chosen by the frame before, its velocity is that from the
+    frame before to the next, and its normal force is what these two say; f_t/f_n alone is of the frame itself, freed of
+    what noise adds to a magnitude and to a quotient. A log without (observable) slip gives no samples, of length 0.
     ``options``: see ``defaults.SampleOptions``.
     Raises ``NoForces`` for a log without forces, ``UnknownScale`` for one whose lengths and velocities are not in
     metres, ``InvalidInput`` for a history of another log and for bad options.
@@ -95,7 +96,7 @@ def collect_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
     weight = _before(history.probability)
     keep = (
         _before(history.slip)
-        & history.contact
+        & _inside(history.contact)
         & (weight >= chosen.least_weight)
         & _fast_enough(log, history.noise, speed, chosen)
         & _pressed_enough(steady, forces.pressing, noise.normal, chosen)
@@ -123,6 +124,15 @@ def _before(field: NDArray[Scalar]) -> NDArray[Scalar]:
     earlier = np.zeros_like(field)
     earlier[1:] = field[:-1]
     return earlier
+
+
+def _inside(contact: BoolArray) -> BoolArray:
+    """Elements in contact whose four neighbours are, too; beyond the lattice nothing is known to say otherwise."""
+    around = np.pad(contact, ((0, 0), (1, 1), (1, 1)), constant_values=True)
+    inside: BoolArray = (
+        contact & around[:, :-2, 1:-1] & around[:, 2:, 1:-1] & around[:, 1:-1, :-2] & around[:, 1:-1, 2:]
+    )
+    return inside
 
 
 def normals_of(log: GraspLog) -> FloatArray:
