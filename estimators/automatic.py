@@ -59,6 +59,8 @@ def force_noise(evidence: Evidence, observations: Observations) -> tuple[float, 
     beta = linear.coefficients.astype(float)
     expected = beta[0] + beta[1] * observations.tangential_velocity + beta[2] * f_n
     square = (observations.friction - expected) ** 2
+    if not square.max() > 0.0:
+        return 0.0, 0.0
     regressor = (1.0 + expected**2) / f_n**2
     typical = np.average(square, weights=weight) * np.maximum(regressor / np.average(regressor, weights=weight), 0.1)
     slope, error = _line(regressor, square, weight / typical**2)

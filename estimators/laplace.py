@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.proposal import evenness, flattened, standard
+from estimators.proposal import evenness, flattened, root_of, standard
 
 FloatArray = NDArray[np.float64]
 LogDensity = Callable[[FloatArray], FloatArray]
@@ -81,6 +81,6 @@ def refine(
             break
         weight = flattened(log_weight)
         centre = weight @ at / weight.sum()
-        spread = np.cov(at.T, aweights=weight).reshape(len(centre), -1)
-        root = np.asarray(np.linalg.cholesky(spread + 1e-12 * np.diag(np.diag(spread))), dtype=np.float64)
+        away = at - centre
+        root = root_of((away * weight[:, None]).T @ away / weight.sum(), root)
     return centre, root, even

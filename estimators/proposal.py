@@ -63,10 +63,12 @@ class Proposal:
         part[0] = max(part[0], DEFENSIVE)
         centre, root = self.centre.copy(), self.root.copy()
         for k in range(1, len(part)):
+            if not pull[:, k].sum() > 1e-100:
+                continue  # nothing came near it
             centre[k] = pull[:, k] @ x / pull[:, k].sum()
             away = x - centre[k]
             spread = (away * pull[:, k : k + 1]).T @ away / share[:, k].sum()
-            root[k] = _root(spread, self.root[0])
+            root[k] = root_of(spread, self.root[0])
         return Proposal(part / part.sum(), centre, root)
 
     def _logs(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -101,6 +103,8 @@ def adapted(log_density: LogDensity, dimension: int, rng: np.random.Generator) -
     for _ in range(ROUNDS):
         x = proposal.draw(rng, DRAWS)
         log_weight = log_density(x) - proposal.log_density(x)
+        if not np.isfinite(log_weight.max()):
+            break
         best = max(best, Fit(proposal, evenness(log_weight)), key=lambda fit: fit.even)
         if best.even > SAMPLING.even:
             break
@@ -128,23 +132,29 @@ def _pilot(log_density: LogDensity, dimension: int, rng: np.random.Generator) ->
 
     near = standard(dimension)
     x = near.draw(rng, 8 * PILOT_WALKERS) * rng.choice([1.0, 2.0, 4.0, 8.0], (8 * PILOT_WALKERS, 1))
-    weight = flattened(log_density(x) - near.log_density(x))
-    start = x[rng.choice(len(x), PILOT_WALKERS, replace=False, p=(weight + 1e-12) / (weight + 1e-12).sum())]
+    log_weight = log_density(x) - near.log_density(x)
+    possible = np.isfinite(log_weight)
+    if possible.sum() < 2 * dimension:
+        return np.asarray(x)
+    weight = flattened(log_weight[possible]) + 1e-12
+    start = x[possible][rng.choice(len(weight), PILOT_WALKERS, p=weight / weight.sum())]
     sampler = VectorisedSampler(PILOT_WALKERS, dimension, log_density, moves=DEMove(), vectorize=True)
     sampler.random_state = np.random.RandomState(rng.integers(2**31)).get_state()
     sampler.run_mcmc(start, PILOT_STEPS, skip_initial_state_check=True)
-    return np.asarray(sampler.get_chain(discard=PILOT_STEPS // 2, thin=5, flat=True))
+    chain = sampler.get_chain(discard=PILOT_STEPS // 2, thin=5, flat=True)
+    return np.asarray(chain)
 
 
 def _split(x: FloatArray, rng: np.random.Generator) -> Proposal:
     """A component as wide as all points [k, d], and others about some of them."""
     size = x.shape[1]
-    wide = np.linalg.cholesky(np.cov(x.T).reshape(size, size) + 1e-12 * np.eye(size))
+    wide = root_of(np.cov(x.T).reshape(size, size), np.eye(size))
     root = np.concatenate([1.3 * wide[None], np.repeat(0.7 * wide[None], COMPONENTS, axis=0)])
     part = np.concatenate([[DEFENSIVE], np.full(COMPONENTS, (1.0 - DEFENSIVE) / COMPONENTS)])
     return Proposal(part, np.vstack([x.mean(axis=0), x[rng.choice(len(x), COMPONENTS)]]), root)
 
 
-def _root(spread: FloatArray, wide: FloatArray) -> FloatArray:
-    """Cholesky factor of a spread that few points may have made: never thinner than a tenth of the widest component."""
-    return np.asarray(np.linalg.cholesky(spread + 0.01 * wide @ wide.T))
+def root_of(spread: FloatArray, wide: FloatArray) -> FloatArray:
+    """Root [d, d] of a spread that few points may have made: nowhere thinner than a hundredth of ``wide``."""
+    values, vectors = np.linalg.eigh(spread + 1e-4 * wide @ wide.T)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, np.finfo(float).tiny)))

@@ -100,7 +100,7 @@ def split_rhat(draws: FloatArray) -> float:
     split = np.concatenate([draws[:half], draws[half : 2 * half]], axis=1)
     within = split.var(axis=0, ddof=1).mean(axis=0)
     between = split.mean(axis=0).var(axis=0, ddof=1)
-    return float(np.sqrt((half - 1) / half + between / within).max())
+    return float(np.sqrt((half - 1) / half + between / within).max()) if (within > 0.0).all() else np.inf
 
 
 def monte_carlo_error(draws: FloatArray, times: FloatArray) -> float:
@@ -118,7 +118,8 @@ def monte_carlo_error(draws: FloatArray, times: FloatArray) -> float:
         rows = np.clip([tail - step, tail + step], 0.0, 1.0) * last
         low, high = np.take_along_axis(ranked, np.rint(rows).astype(int), axis=0)
         errors.append(0.5 * (high - low))
-    return float((np.array(errors) / ranked.std(axis=0)).max())
+    spread = ranked.std(axis=0)
+    return float((np.array(errors) / spread).max()) if (spread > 0.0).all() else np.inf
 
 
 class _Task(NamedTuple):

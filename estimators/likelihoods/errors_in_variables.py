@@ -5,9 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.errors import InvalidSamples
 from estimators.evidence import Evidence
 from estimators.likelihoods.kernels import sum_log_normal
 from estimators.likelihoods.per_sample import PerSample, Rows, per_sample
+from estimators.likelihoods.posterior import bounded_exp
 from estimators.priors import log_half_student
 
 FloatArray = NDArray[np.float64]
@@ -18,7 +20,7 @@ NOISE = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ErrorsInVariables:
-    """Coordinates (√σ, √s): s in N is the noise of each component of the force on an element; either may be near 0.
+    """Coordinates (log σ, s): s in N is the noise of each component of the force on an element, and may be near 0.
 
     The true f_n are taken as normal with the mean ``mean`` and variance ``variance`` − s², which gives each its
     expectation and variance from what was measured (regression calibration; Carroll et al., 2006, §4 and §8).
@@ -33,19 +35,17 @@ class ErrorsInVariables:
     def start(self, scale: float) -> FloatArray:
         """The robust scale, and noise well within the variation of f_n."""
         noise = min(0.4 * self.noise_scale, 0.3 * float(np.sqrt(self.variance)))
-        return np.sqrt([[scale, noise], [0.1 * scale, 0.1 * noise]])
+        return np.array([[np.log(scale), noise], [0.1, 0.2 * noise]])
 
     def natural(self, coordinates: FloatArray) -> FloatArray:
         """(σ, s)."""
-        return np.asarray(np.maximum(coordinates, 1e-6) ** 2)
+        return np.column_stack([bounded_exp(coordinates[:, 0]), coordinates[:, 1]])
 
     def log_prior(self, coordinates: FloatArray) -> FloatArray:
-        """That of (√σ, √s); none where noise would exceed all the variation of the measured f_n."""
-        noise = coordinates[:, 1] ** 2
-        inside = (coordinates > 0.0).all(axis=1) & (noise**2 < 0.98 * self.variance)
-        root_sigma, root_noise = np.where(inside, coordinates.T, 1.0)
-        log = log_half_student(noise, self.noise_scale) + np.log(root_noise) - np.log(root_sigma)
-        return np.where(inside, log, -np.inf)
+        """That of s; none where noise would exceed all the variation of the measured f_n."""
+        noise = coordinates[:, 1]
+        inside = (noise > 0.0) & (noise**2 < 0.98 * self.variance)
+        return np.where(inside, log_half_student(noise, self.noise_scale), -np.inf)
 
     def log_likelihood(self, beta: FloatArray, natural: FloatArray, rows: Rows) -> FloatArray:
         """Sum of w log N(f_t; its mean given what was measured, scatter and noise together)."""
@@ -63,6 +63,8 @@ def errors_in_variables(evidence: Evidence) -> PerSample:
     f_n, weight = observations.normal_force, observations.weight
     mean = float(np.average(f_n, weights=weight))
     variance = float(np.average((f_n - mean) ** 2, weights=weight))
+    if variance <= (16.0 * np.finfo(float).eps * mean) ** 2:
+        raise InvalidSamples("normal_force", f"{mean:.6g} N in every sample", "forces that vary, as noisy ones do")
     scale = NOISE * float(np.sqrt(np.average(f_n**2, weights=weight)))
     terms = ErrorsInVariables(
         mean=mean,

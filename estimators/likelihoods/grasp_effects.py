@@ -130,8 +130,9 @@ def grasp_effects(evidence: Evidence) -> GraspEffects:
         pooled=pooled,
         score=NormalScore(np.array([-1.0, 1.0]), np.array([-1.0, 1.0])),
     )
-    lowest = -np.log(means.weight.max()) - 16.0  # an effect of 1/3000 of what a cluster's mean could show
-    highest = 2.0 * max(np.log(REFERENCE.scatter / pooled.scale), 0.0) + 16.0
+    expected = 2.0 * np.log(REFERENCE.scatter / pooled.scale)  # log λ at the prior's scale of τ
+    lowest = min(-np.log(means.weight.max()), expected) - 16.0  # 1/3000 of what a cluster's mean could show
+    highest = max(expected, 0.0) + 16.0
     return replace(effects, score=normal_score(effects.log_marginal, lowest, highest))
 
 

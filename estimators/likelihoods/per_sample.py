@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from estimators import robust
 from estimators.conjugate import exact_posterior
 from estimators.defaults import PRIOR, REFERENCE, SAMPLING
+from estimators.errors import InvalidSamples
 from estimators.evidence import Evidence
 from estimators.laplace import laplace, refine
 from estimators.likelihoods.posterior import Summary, Whitening, corners, scatter, supported
@@ -102,12 +103,14 @@ class PerSample:
         """Log posterior density [k] in whitened coordinates."""
         coordinates = self.whitening(whitened)
         beta, natural = self.natural(coordinates)
-        log = self._log_prior(beta, natural[:, 0]) + self.terms.log_prior(coordinates[:, 3:])
+        with np.errstate(over="ignore"):  # no density is right where a square is too large for a double
+            log = self._log_prior(beta, natural[:, 0]) + self.terms.log_prior(coordinates[:, 3:])
         log = supported(log, beta, self.corners)
         inside = np.isfinite(log)
         if inside.any():
-            log[inside] += self.terms.log_likelihood(beta[inside], natural[inside], self.rows)
-        return log
+            with np.errstate(over="ignore"):
+                log[inside] += self.terms.log_likelihood(beta[inside], natural[inside], self.rows)
+        return np.where(np.isnan(log), -np.inf, log)
 
     def natural(self, coordinates: FloatArray) -> tuple[FloatArray, FloatArray]:
         """β [k, 3] and the other natural parameters [k, m]."""
@@ -143,15 +146,16 @@ def per_sample(evidence: Evidence, terms: Terms, name: str) -> PerSample:
     start = robust.fit(evidence, loss="tukey")
     forces = observations.normal_force, observations.friction, observations.tangential_force
     columns = (observations.tangential_velocity, *forces, observations.weight)
-    initial, spread = terms.start(max(start.scale, 1e-9))
+    scale = float(np.hypot(start.scale, REFERENCE.scatter * np.sqrt(PRIOR.degrees_of_freedom / evidence.effective_n)))
+    initial, spread = terms.start(scale)
     posterior = PerSample(
         terms=terms,
         rows=Rows(*(np.require(column, requirements=["C", "W"]) for column in columns)),  # else kernels compile anew
         prior_rows=prior_rows(evidence.element_area),
         corners=corners(evidence.domain),
         effective_n=evidence.effective_n,
-        centre=start.coefficients,
-        root=max(start.scale, 1e-9) * exact_posterior(evidence).root,
+        centre=_possible(start.coefficients, evidence),
+        root=scale * exact_posterior(evidence).root,
         whitening=Whitening(np.concatenate([np.zeros(3), initial]), np.diag(np.concatenate([np.ones(3), spread]))),
         proposal=standard(3 + len(initial)),
         local=SAMPLING.local,
@@ -159,6 +163,17 @@ def per_sample(evidence: Evidence, terms: Terms, name: str) -> PerSample:
     if len(observations) > 2 * COARSE:  # a few samples tell where to look
         posterior = _rewhitened(posterior, len(observations) // COARSE)
     return _proposing(_rewhitened(posterior, 1))
+
+
+def _possible(plane: FloatArray, evidence: Evidence) -> FloatArray:
+    """The plane, or a level one where it is not above 0 over the data's domain; raises ``InvalidSamples`` for none."""
+    at = corners(evidence.domain)
+    if (at @ plane > 0.0).all():
+        return plane
+    middle = float(at.mean(axis=0) @ plane)
+    if middle > 0.0:
+        return np.array([middle, 0.0, 0.0])
+    raise InvalidSamples("mean friction", f"{middle:.3g}", "above 0 over the range of the data")
 
 
 def _rewhitened(posterior: PerSample, every: int) -> PerSample:
