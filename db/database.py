@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from sqlalchemy import Connection, Engine, create_engine, event, make_url
-from sqlalchemy.exc import DBAPIError, InterfaceError, OperationalError
+from sqlalchemy.exc import DatabaseError, DBAPIError, InterfaceError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 from sqlalchemy.orm import Session
 
@@ -36,6 +36,13 @@ class Database:
         return self.engine.dialect.name == "sqlite"
 
     @contextmanager
+    def connect(self) -> Iterator[Connection]:
+        """A connection below the transactions of the stores: for migrations, whose errors tell the URL too."""
+        shown = self.engine.url.render_as_string(hide_password=True)
+        with _unavailable_named(f"database {shown}"), self.engine.connect() as connection:
+            yield connection
+
+    @contextmanager
     def read(self) -> Iterator[Session]:
         """One consistent view; whatever is changed in it is rolled back."""
         with _unavailable_named(), Session(self.engine) as session:
@@ -59,12 +66,19 @@ class Database:
 
 
 @contextmanager
-def _unavailable_named() -> Iterator[None]:
+def _unavailable_named(name: str = "database") -> Iterator[None]:
     try:
         yield
-    except (OperationalError, InterfaceError, PoolTimeout) as error:
+    except (DBAPIError, PoolTimeout) as error:
+        if isinstance(error, DBAPIError) and not _says_unavailable(error):
+            raise
         cause = error.orig if isinstance(error, DBAPIError) else error
-        raise StorageUnavailable(f"database: {cause}") from error
+        raise StorageUnavailable(f"{name}: {cause}") from error
+
+
+def _says_unavailable(error: DBAPIError) -> bool:
+    """Whether the database itself is at fault; SQLite says so of a damaged file by the base class alone."""
+    return isinstance(error, OperationalError | InterfaceError) or type(error) is DatabaseError
 
 
 def _local(url: str) -> bool:

@@ -31,7 +31,7 @@ def downgrade(database: Database, revision: str) -> None:
 
 def current(database: Database) -> str | None:
     """The database's revision; None for an empty one."""
-    with database.engine.connect() as connection:
+    with database.connect() as connection:
         return MigrationContext.configure(connection).get_current_revision()
 
 
@@ -48,7 +48,7 @@ def check(database: Database) -> None:
     found, wanted = current(database), head()
     if found != wanted:
         raise SchemaMismatch(f"database revision is {found}; allowed: {wanted} (run `stiction db upgrade`)")
-    with database.engine.connect() as connection:
+    with database.connect() as connection:
         context = MigrationContext.configure(connection, opts={"compare_type": True})
         differences = compare_metadata(context, Base.metadata)
     if differences:
@@ -66,7 +66,7 @@ def _config() -> Config:
 @contextmanager
 def _migrating(database: Database) -> Iterator[Config]:
     config = _config()
-    with database.engine.connect() as connection, _foreign_keys_off(database, connection):
+    with database.connect() as connection, _foreign_keys_off(database, connection):
         config.attributes["connection"] = connection
         yield config
 

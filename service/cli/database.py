@@ -62,7 +62,11 @@ def _database(url: str | None) -> Iterator["Database"]:
     from db.database import Database
     from service.settings import Settings
 
-    database = Database(url or Settings().resolved_database_url)
+    if url is None:
+        settings = Settings()
+        settings.data_folder.mkdir(parents=True, exist_ok=True)
+        url = settings.resolved_database_url
+    database = Database(url)
     try:
         yield database
     finally:

@@ -1,4 +1,6 @@
 from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
 
 import pytest
 from alembic.script import ScriptDirectory
@@ -6,7 +8,7 @@ from sqlalchemy import inspect, text
 
 from db import migrate
 from db.database import Database
-from db.errors import SchemaMismatch
+from db.errors import SchemaMismatch, StorageUnavailable
 from db.records import Detection, NewGraspLog, NewModel, SampleSummary
 from db.repositories import detections, friction_models, grasp_logs, jobs, materials
 from db.tables import Base
@@ -116,3 +118,13 @@ def test_a_migration_that_breaks_references_is_named(database: Database) -> None
 
     with pytest.raises(SchemaMismatch, match="jobs"):
         broken_migration()
+
+
+@pytest.mark.parametrize("step", [migrate.current, migrate.check, migrate.upgrade])
+def test_a_database_that_cannot_be_opened_is_named(tmp_path: Path, step: Callable[[Database], object]) -> None:
+    damaged = tmp_path / "damaged.sqlite3"
+    damaged.write_text("not a database, and longer than a header of one hundred bytes " * 4)
+    for path, cause in ((tmp_path / "missing" / "x.sqlite3", "unable to open"), (damaged, "not a database")):
+        with closing(Database(f"sqlite:///{path}")) as database, pytest.raises(StorageUnavailable, match=cause) as seen:
+            step(database)
+        assert path.name in str(seen.value)
