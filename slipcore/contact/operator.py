@@ -27,7 +27,8 @@ class Count:
 class ElasticOperator:
     """Compliance of the bodies in contact on one box: pressure and traction [..., ny, nx] Pa to displacement m.
 
-    Symbols are made when first used, so what is never asked for costs nothing. ``count`` may be shared by many boxes.
+    Symbols are made when first used, so what is never asked for costs nothing. ``count`` may be shared by many boxes;
+    ``source``: an operator on a larger grid of the same pitch, whose kernels hold this one's.
     """
 
     __slots__ = (
@@ -39,11 +40,18 @@ class ElasticOperator:
         "bodies",
         "count",
         "grid",
+        "source",
         "transform",
     )
 
-    def __init__(self, bodies: tuple[ElasticBody, ...], grid: Grid, count: Count | None = None) -> None:
-        self.bodies, self.grid = bodies, replace(grid, centre=(0.0, 0.0))
+    def __init__(
+        self,
+        bodies: tuple[ElasticBody, ...],
+        grid: Grid,
+        count: Count | None = None,
+        source: "ElasticOperator | None" = None,
+    ) -> None:
+        self.bodies, self.grid, self.source = bodies, replace(grid, centre=(0.0, 0.0)), source
         self.count = Count() if count is None else count
         self.transform = Transform(grid.shape, padded_lengths(grid.shape))
         self._kernels: dict[Component, FloatArray | None] = {}
@@ -122,6 +130,9 @@ class ElasticOperator:
         return replace(self.grid, shape=fast_lengths(self.grid.shape))
 
     def _influence(self, component: Component, grid: Grid) -> FloatArray | None:
+        if self.source is not None:
+            whole = self.source.kernel(component)
+            return None if whole is None else whole[: grid.shape[0], : grid.shape[1]]
         parts = [body.influence(component, grid) for body in self.bodies]
         present = [part for part in parts if part is not None]
         return sum(present[1:], start=present[0]) if present else None
@@ -146,18 +157,28 @@ class ElasticOperator:
 
 class Operators:
     """The compliance of the same bodies on boxes of any size; kept, because setting one up costs several
-    applications.
+    applications. Boxes within ``whole`` take their kernels from it.
     """
 
-    __slots__ = ("_known", "bodies", "count")
+    __slots__ = ("_known", "_source", "bodies", "count")
 
-    def __init__(self, bodies: tuple[ElasticBody, ...], count: Count | None = None) -> None:
+    def __init__(self, bodies: tuple[ElasticBody, ...], count: Count | None = None, whole: Grid | None = None) -> None:
         self.bodies, self.count = bodies, Count() if count is None else count
         self._known: dict[tuple[object, ...], ElasticOperator] = {}
+        self._source: ElasticOperator | None = None
+        if whole is not None:
+            self._source = ElasticOperator(bodies, replace(whole, shape=fast_lengths(whole.shape)))
 
     def on(self, grid: Grid) -> ElasticOperator:
         """The operator on a grid; where the grid lies does not matter."""
         key = (grid.shape, grid.pitch)
         if key not in self._known:
-            self._known[key] = ElasticOperator(self.bodies, grid, self.count)
+            self._known[key] = ElasticOperator(self.bodies, grid, self.count, self._holding(grid))
         return self._known[key]
+
+    def _holding(self, grid: Grid) -> ElasticOperator | None:
+        """The source of kernels, if the grid is a part of its."""
+        if self._source is None or self._source.grid.pitch != grid.pitch:
+            return None
+        fits = all(n <= most for n, most in zip(fast_lengths(grid.shape), self._source.grid.shape, strict=True))
+        return self._source if fits else None

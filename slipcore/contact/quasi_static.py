@@ -108,7 +108,7 @@ class QuasiStatic:
         self.tolerance, self.normal_tolerance = tolerance, normal_tolerance
         self.height, self.friction = problem.height(grid), problem.static_friction(grid)
         self.count = Count()
-        self.finger = Operators(problem.finger, self.count)
+        self.finger = Operators(problem.finger, self.count, grid)
         self._relaxed: dict[float, Operators] = {}
 
     def start(self) -> State:
@@ -162,7 +162,7 @@ class QuasiStatic:
             finger = self.problem.finger
             if softening != 1.0:
                 finger = tuple(Scaled(body, softening) for body in finger)
-            self._relaxed[softening] = Operators((*finger, *self.problem.obstacle), self.count)
+            self._relaxed[softening] = Operators((*finger, *self.problem.obstacle), self.count, self.grid)
         return self._relaxed[softening]
 
     def _share(self, state: State, load: StepLoad, drive: FloatArray) -> float:

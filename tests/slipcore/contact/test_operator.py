@@ -81,3 +81,16 @@ def test_boxes_contain_and_round_up() -> None:
     assert bounding_box(mask, 4) == (slice(16, 20), slice(4, 12))
     part = Grid((20, 30), (1.0, 1.0)).part(bounding_box(mask))
     np.testing.assert_array_equal(part.x, Grid((20, 30), (1.0, 1.0)).x[4:9])
+
+
+def test_a_box_takes_its_kernels_from_the_whole() -> None:
+    whole = Grid.square(50, 5e-3)
+    part = Grid((22, 31), whole.pitch)
+    field = np.random.default_rng(4).normal(size=(2, *part.shape))
+    apart, within = Operators((BODY,)).on(part), Operators((BODY,), whole=whole).on(part)
+    np.testing.assert_array_equal(within.tangential(field), apart.tangential(field))
+    np.testing.assert_array_equal(within.tangential_inverse(field), apart.tangential_inverse(field))
+    np.testing.assert_array_equal(within.normal_by_traction(field), apart.normal_by_traction(field))
+    assert within.source is not None
+    assert Operators((BODY,), whole=whole).on(Grid.square(20, 5e-3)).source is None  # another pitch
+    assert Operators((BODY,), whole=whole).on(Grid((64, 20), whole.pitch)).source is None  # larger
