@@ -2,6 +2,7 @@
 
 import csv
 import math
+from array import array
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,8 +28,9 @@ SCALE, FRAME_RATE = (1e-9, 1.0), (1e-3, 1e6)
 """m per pixel (1 where the file is in metres) and frames a second that can be."""
 ASSUMED_WIDTH = 15e-3
 """m that the markers span where their scale is unknown: a fingertip's sensor. Detection depends on it a little."""
-MAX_ROWS = 5_000_000
-MOST_DELIMITERS = ",;\t"
+MAX_ROWS, ROW = 5_000_000, 7
+"""Rows of a file, and numbers that are kept of each."""
+DELIMITERS = ",;\t"
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +102,7 @@ def read_header(lines: Iterator[str]) -> Header:
 
 
 def _columns(text: str, settings: Mapping[str, str], number: int) -> Header:
-    delimiter = max(MOST_DELIMITERS, key=text.count)
+    delimiter = max(DELIMITERS, key=text.count)
     names = [name.strip(' "').lower() for name in text.split(delimiter)]
     columns: dict[str, int] = {}
     for place, name in enumerate(names):
@@ -151,21 +153,21 @@ def _tracks(header: Header, lines: Iterator[str], settings: Mapping[str, str]) -
 def _rows(header: Header, lines: Iterator[str]) -> tuple[FloatArray, dict[str, int]]:
     """Rows [r, 7] of moment, marker (its number), x, y, z, contact and line; and the markers by name."""
     names: dict[str, int] = {}
-    rows: list[tuple[float, ...]] = []
+    values = array("d")  # a list of tuples would take five times the memory
     reader = csv.reader(lines, delimiter=header.delimiter)
     try:
         for cells in reader:
             if not cells or cells[0].lstrip().startswith("#"):
                 continue
-            if len(rows) >= MAX_ROWS:
+            if len(values) >= MAX_ROWS * ROW:
                 raise InvalidInput("file", f"more than {MAX_ROWS} rows", f"at most {MAX_ROWS} rows")
-            rows.append(_row(header, cells, header.lines + reader.line_num, names))
+            values.extend(_row(header, cells, header.lines + reader.line_num, names))
     except csv.Error as error:
         line = header.lines + reader.line_num
         raise InvalidInput(f"line {line}", f"not a row of text ({error})", "delimited text") from error
-    if not rows:
+    if not values:
         raise InvalidInput("file", "a header without rows", "one row a marker and frame")
-    return np.array(rows), names
+    return np.frombuffer(values).reshape(-1, ROW), names
 
 
 def _row(header: Header, cells: list[str], line: int, names: dict[str, int]) -> tuple[float, ...]:
