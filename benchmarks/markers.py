@@ -5,17 +5,14 @@ jittered, hexagonal, Poisson disc), with 1 µm of noise, none lost, 5 % lost for
 Detection is from displacement alone, with contact from the shape or known. Writes markers.json, prints a table.
 """
 
-import argparse
-import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.detector_scenes import scoring, simulated
-from benchmarks.pages import renew, table
+from benchmarks.pages import options, picture_folder, table, write
 from slipcore import GraspLog, detect_slip
 from slipcore.contact.effects import SensorSampling
 from slipcore.frames import BoolArray, FloatArray
@@ -130,20 +127,15 @@ def dense_logs() -> dict[str, GraspLog]:
 
 def main() -> None:
     """Measure, print and write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--output", type=Path, default=Path("benchmarks/results"), help="folder for JSON")
-    parser.add_argument("--page", type=Path, help="page whose table to renew")
-    arguments = parser.parse_args()
-    arguments.output.mkdir(parents=True, exist_ok=True)
+    arguments = options(__doc__).parse_args()
+    picture_folder(arguments)
     logs = dense_logs()
     scores = [measure(logs, dots, lost, known) for known in (True, False) for dots in DOTS for lost in LOSSES]
     columns = ("dots", "5 % lost", "contact", "dots used", "F1", "worst scene")
     rows = [(s.dots, s.lost, s.contact, f"{s.used:.0%}", s.f1, f"{s.worst:.2f} ({s.worst_scene})") for s in scores]
     text = table(columns, rows)
     print(text)
-    (arguments.output / "markers.json").write_text(json.dumps([asdict(s) for s in scores], indent=1), encoding="utf-8")
-    if arguments.page is not None:
-        renew(arguments.page, {"markers": text})
+    write([asdict(score) for score in scores], {"markers": text}, arguments, "markers.json")
 
 
 if __name__ == "__main__":

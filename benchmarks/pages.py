@@ -1,6 +1,8 @@
 """What commands put on pages: small pictures, and tables between `<!-- table NAME -->` and `<!-- end -->`."""
 
+import argparse
 import io
+import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -8,6 +10,29 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
+
+
+def options(description: str | None) -> argparse.ArgumentParser:
+    """A command with a folder for its results, and the page that it may renew."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--output", type=Path, default=Path("benchmarks/results"), help="folder for JSON and pictures")
+    parser.add_argument("--page", type=Path, help="page to renew, with its pictures in images/ beside it")
+    return parser
+
+
+def picture_folder(arguments: argparse.Namespace) -> Path:
+    """Where pictures go: beside the page, or with the results. Both folders are made."""
+    pictures: Path = arguments.output if arguments.page is None else arguments.page.parent / "images"
+    for folder in (arguments.output, pictures):
+        folder.mkdir(parents=True, exist_ok=True)
+    return pictures
+
+
+def write(numbers: object, tables: Mapping[str, str], arguments: argparse.Namespace, name: str) -> None:
+    """Write the numbers as JSON, and renew the page if there is one."""
+    (arguments.output / name).write_text(json.dumps(numbers, indent=1), encoding="utf-8")
+    if arguments.page is not None:
+        renew(arguments.page, tables)
 
 
 def renew(page: Path, tables: Mapping[str, str]) -> None:

@@ -5,8 +5,6 @@ likely false: in frames of mere pressing (by Mindlin and Deresiewicz all sticks)
 half of the median at which elements slip. Writes recordings.json and a picture each; says so where they are not there.
 """
 
-import argparse
-import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -14,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks.pages import renew, save, table
+from benchmarks.pages import options, picture_folder, save, table, write
 from service.formats import tac3d
 from service.report.pictures import slip_over_time
 from slipcore import GraspLog, SlipHistory, detect_slip, element_forces
@@ -149,17 +147,13 @@ def tables(met: list[Met], found: list[Found]) -> dict[str, str]:
 
 def main() -> None:
     """Detect, print and write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--output", type=Path, default=Path("benchmarks/results"), help="folder for JSON and pictures")
+    parser = options(__doc__)
     parser.add_argument("--recordings", type=Path, default=RECORDINGS, help="folder of Tac3D recordings")
-    parser.add_argument("--page", type=Path, help="page to renew, with its pictures in images/ beside it")
     arguments = parser.parse_args()
     logs = dict(recordings(arguments.recordings))
     if not logs:
         raise SystemExit(f"no recordings in {arguments.recordings}: `make recordings` fetches them where it can")
-    pictures = arguments.output if arguments.page is None else arguments.page.parent / "images"
-    for folder in (arguments.output, pictures):
-        folder.mkdir(parents=True, exist_ok=True)
+    pictures = picture_folder(arguments)
     met, found = [meet(name, log) for name, log in logs.items()], []
     for name, log in logs.items():
         histories = {method: detect_slip(log, method) for method in METHODS}
@@ -168,9 +162,7 @@ def main() -> None:
     made = tables(met, found)
     print("\n\n".join(made.values()))
     numbers = {"met": [asdict(entry) for entry in met], "found": [asdict(entry) for entry in found]}
-    (arguments.output / "recordings.json").write_text(json.dumps(numbers, indent=1), encoding="utf-8")
-    if arguments.page is not None:
-        renew(arguments.page, made)
+    write(numbers, made, arguments, "recordings.json")
 
 
 if __name__ == "__main__":
