@@ -127,62 +127,62 @@ class FilterOptions(ContactOptions):
         float, Option(0.0, 0.99, "-", "½ on a half-space (Hertz), less on a bonded gel; tuning scenes")
     ] = 0.45
     """Least share of the frame's deepest indentation, without forces."""
-    rim_curvature: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.008
+    rim_curvature: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.022
     """Without forces, elements where the indentation is hollow by more than this share of its peak (Laplacian times
     pitch squared) lie beyond the contact's rim."""
-    noise_margin: Annotated[float, Option(1.0, 10.0, "-", "half the true noise costs more than twice of it")] = 1.2
+    noise_margin: Annotated[float, Option(1.0, 10.0, "-", "half the true noise costs more than twice of it")] = 1.05
     """Factor on the estimated marker noise."""
     unknown_noise: Annotated[float, Option(0.0, 1e-2, "m", "the noisiest of the scenes; never underestimate")] = 1e-5
     """Marker noise while it cannot be estimated yet."""
-    displacement_floor: Annotated[float, Option(0.0, 1e-3, "m", "no camera tracks a marker better")] = 3e-8
+    displacement_floor: Annotated[float, Option(0.0, 1e-3, "m", "no camera tracks a marker better")] = 3.5e-08
     """Least standard deviation of a marker coordinate."""
-    rigidity: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.01
+    rigidity: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.012
     """How far a stuck element may stray from the object's motion, as a share of it."""
-    slip_share: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes; between 0 at the front and 1 at the rim")] = 0.4
+    slip_share: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes; between 0 at the front and 1 at the rim")] = 0.37
     """Mean slip of a slipping element as a share of the object's motion."""
-    slip_share_spread: Annotated[float, Option(0.01, 10.0, "-", "tuning scenes")] = 0.25
+    slip_share_spread: Annotated[float, Option(0.01, 10.0, "-", "tuning scenes")] = 0.2
     """Standard deviation of that share."""
-    creep: Annotated[float, Option(0.0, 1e-3, "m/√s", "tuning scenes")] = 2e-7
+    creep: Annotated[float, Option(0.0, 1e-3, "m/√s", "tuning scenes")] = 3e-07
     """Random walk of an element's place on the object."""
-    onset_length: Annotated[float, Option(1e-9, 1.0, "m", "tuning scenes")] = 8e-5
+    onset_length: Annotated[float, Option(1e-9, 1.0, "m", "tuning scenes")] = 0.0001
     """Motion of the object within which an element at the front begins to slip."""
-    onset_time: Annotated[float, Option(1e-3, 1e6, "s", "tuning scenes")] = 30.0
+    onset_time: Annotated[float, Option(1e-3, 1e6, "s", "tuning scenes")] = 23.0
     """Time within which it does without motion."""
-    onset_inside: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 0.02
+    onset_inside: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 0.005
     """Onset rate amid sticking neighbours, relative to these."""
-    onset_at_front: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 4.0
+    onset_at_front: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 3.8
     """Onset rate that slipping neighbours, or the rim, add to it."""
-    end_length: Annotated[float, Option(1e-9, 1.0, "m", "tuning scenes")] = 8e-5
+    end_length: Annotated[float, Option(1e-9, 1.0, "m", "tuning scenes")] = 0.0001
     """Motion of the object within which slip ends."""
-    end_time: Annotated[float, Option(1e-3, 1e6, "s", "tuning scenes")] = 30.0
+    end_time: Annotated[float, Option(1e-3, 1e6, "s", "tuning scenes")] = 26.0
     """Time within which it ends without motion."""
-    least_weight: Annotated[float, Option(0.0, 1.0, "-", "slipping points still tell that all stand still")] = 0.02
+    least_weight: Annotated[float, Option(0.0, 1.0, "-", "slipping points still tell that all stand still")] = 0.003
     """Weight of a surely slipping element in the fit of the object's motion."""
-    outlier: Annotated[float, Option(0.1, 100.0, "-", "tuning scenes")] = 3.0
+    outlier: Annotated[float, Option(0.1, 100.0, "-", "tuning scenes")] = 4.4
     """Squared misfit over its variance at which an element's weight falls to a quarter."""
-    motion_margin: Annotated[float, Option(0.0, 100.0, "-", "tuning scenes")] = 8.0
+    motion_margin: Annotated[float, Option(0.0, 100.0, "-", "tuning scenes")] = 9.4
     """How many variances of the fit are taken off the squared motion."""
-    force_smoothing: Annotated[float, Option(0.0, 10.0, "s", "tuning scenes")] = 0.06
+    force_smoothing: Annotated[float, Option(0.0, 10.0, "s", "tuning scenes")] = 0.036
     """Time constant of the low-pass on element forces."""
-    ratio_spread: Annotated[float, Option(1e-4, 10.0, "-", "tuning scenes")] = 0.1
+    ratio_spread: Annotated[float, Option(1e-4, 10.0, "-", "tuning scenes")] = 0.082
     """Scatter of the force ratio in slip, as a share of it."""
-    ratio_difference: Annotated[float, Option(1e-4, 10.0, "-", "tuning scenes")] = 0.15
+    ratio_difference: Annotated[float, Option(1e-4, 10.0, "-", "tuning scenes")] = 0.22
     """How much elements differ in it."""
-    ratio_memory: Annotated[float, Option(1e-3, 1e4, "s", "tuning scenes")] = 1.0
+    ratio_memory: Annotated[float, Option(1e-3, 1e4, "s", "tuning scenes")] = 1.5
     """Time constant of what is learnt about it."""
-    ratio_weight: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 1.0
+    ratio_weight: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 1.2
     """Weight of the force ratio as evidence; 0 leaves it out."""
     force_to_noise: Annotated[float, Option(0.0, 1e3, "-", "tuning scenes")] = 10.0
     """Least normal force over its noise, for a ratio."""
-    loading_smoothing: Annotated[float, Option(0.0, 10.0, "s", "tuning scenes")] = 0.03
+    loading_smoothing: Annotated[float, Option(0.0, 10.0, "s", "tuning scenes")] = 0.01
     """Time constant of the load's rates."""
-    pressing_share: Annotated[float, Option(0.01, 10.0, "-", "Mindlin–Deresiewicz: all stick below 1")] = 0.9
+    pressing_share: Annotated[float, Option(0.01, 10.0, "-", "Mindlin–Deresiewicz: all stick below 1")] = 1.2
     """All stick while the tangential load grows by less than this share of friction times the normal load's growth."""
-    pressing_slope: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 0.4
+    pressing_slope: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 0.58
     """Without forces, all stick while the tangential load (by stiffness) grows less than this share of the normal."""
     pressing_floor: Annotated[float, Option(0.0, 1.0, "m/s", "drift of a gel")] = 1e-5
     """Least rate of indentation that counts."""
-    pressing_rate: Annotated[float, Option(0.0, 1e6, "1/s", "within a frame at 30 fps")] = 200.0
+    pressing_rate: Annotated[float, Option(0.0, 1e6, "1/s", "within a frame at 30 fps")] = 100.0
     """Rate at which slip then ends."""
     threshold: Annotated[float, Option(0.01, 0.99, "-", "tuning scenes; the reported probability is ½ there")] = 0.4
     """Least posterior of slip."""
@@ -268,7 +268,7 @@ class SampleOptions(Options):
     """Least probability of slip."""
 
 
-DEFAULT_METHOD = "strain_rate"
+DEFAULT_METHOD = "filter"
 
 Kind = TypeVar("Kind", bound=Options)
 

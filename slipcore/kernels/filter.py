@@ -2,7 +2,7 @@
 
 An element's memory is a column of ``elements`` [11, n, m]: its slip probability; where in the object's frame it would
 be if it stuck (x, y m, variance m²) and if it slipped (the same); its force low-passed (normal, tangential N); and the
-force ratio that it slipped at with the weight of that knowledge. What is common to all is ``body`` [12].
+force ratio that it slipped at with the weight of that knowledge. What is common to all is ``body`` [14].
 """
 
 import math
@@ -15,14 +15,27 @@ from slipcore.kernels import compiled, unpack
 from slipcore.kernels.force_ratio import ratio_evidence
 from slipcore.kernels.loading import Loading, depth_presses_home, forces_press_home, low_pass, step_loading
 from slipcore.kernels.observe import same
-from slipcore.kernels.pose import Anchors, Pose, find_pose, object_motion, place_on_object
+from slipcore.kernels.pose import (
+    Anchors,
+    Pose,
+    Uncertainty,
+    find_pose,
+    object_motion,
+    place_of_object,
+    place_on_object,
+    pose_at,
+)
 
 PROBABILITY, STICK_X, STICK_Y, STICK_VARIANCE, SLIP_X, SLIP_Y, SLIP_VARIANCE, NORMAL, TANGENTIAL, RATIO, KNOWN = range(
     11
 )
 ROWS = 11
-POSE, LOADING, FRICTION, BODY = 0, 4, 10, 12
-"""Where ``body`` holds the pose, the loading, and the slipping force ratio (weighted sum, weight); and its length."""
+POSE, LOADING, FRICTION, FOLLOWS, BODY = 0, 4, 10, 12, 14
+"""Where ``body`` holds the pose, the loading, the slipping force ratio (weighted sum, weight), and the share in which
+the surface follows the known motion (the same); and its length."""
+NOT_GIVEN = np.zeros(0)
+FOLLOWS_PRIOR = 30.0
+"""Prior weight of a surface that follows all of the motion: a share of 1 ± 0.2."""
 CERTAIN = 12.0
 """Largest log-odds that one frame can bring or a filter can hold; the rest of the way out takes too long to go back."""
 
@@ -77,6 +90,7 @@ def step_filter(
     tangential: FloatArray,
     contact: BoolArray,
     stays: BoolArray,
+    given_before: FloatArray,
     given: FloatArray,
     sigma: float,
     pressing_sigma: float,
@@ -86,15 +100,15 @@ def step_filter(
     slip: BoolArray,
     probability: FloatArray,
 ) -> None:
-    """Fill the last four from displacements ``start`` to ``end`` [n, m, 3] and forces [n, m, 3] and pose ``given`` [3]
+    """Fill the last four from displacements ``start`` to ``end`` [n, m, 3] and forces [n, m, 3] and poses ``given`` [3]
     (each empty where there is none). Noise: ``sigma`` of a marker, m, and ``pressing_sigma`` of an element, N; NaN if
     unknown.
     """
     tuning = Tuning(*unpack(settings, TUNING))
-    known = tuning.unknown_noise if math.isnan(sigma) else sigma
-    variance = (tuning.noise_margin * known) ** 2 + tuning.displacement_floor**2
+    marker_noise = tuning.unknown_noise if math.isnan(sigma) else sigma
+    variance = (tuning.noise_margin * marker_noise) ** 2 + tuning.displacement_floor**2
     force_sigma = 0.0 if math.isnan(pressing_sigma) else 1.1 * pressing_sigma
-    before = Pose(body[POSE], body[POSE + 1], body[POSE + 2], body[POSE + 3])
+    before = pose_at(body[POSE], body[POSE + 1], body[POSE + 2], body[POSE + 3])
     next_body[:] = body
     if same(start, end) and not touches_anew(contact, stays):  # a frame that repeats the last tells nothing
         after[:] = elements
@@ -102,7 +116,10 @@ def step_filter(
         return
     places = gather(elements, stays)
     anchors = anchors_of(elements, places, position, end)
-    pose, doubt = find_pose(anchors, before, given, variance, tuning.least_weight, tuning.rigidity, tuning.outlier)
+    pose, doubt = find_pose(anchors, before, NOT_GIVEN, variance, tuning.least_weight, tuning.rigidity, tuning.outlier)
+    if given.size and given_before.size:
+        known = follow_object(anchors, before, pose, doubt, given_before, given, next_body)
+        pose, doubt = find_pose(anchors, before, known, variance, tuning.least_weight, tuning.rigidity, tuning.outlier)
     motion_x, motion_y, noise = object_motion(anchors, before, pose, doubt, tuning.motion_margin)
     change = force_change(places, force_before, force)
     deeper = np.empty(len(places))
@@ -149,6 +166,43 @@ def step_filter(
     for value in range(6):
         next_body[LOADING + value] = loading[value]
     decide(after, tuning.threshold, slip, probability)
+
+
+@compiled
+def follow_object(
+    anchors: Anchors,
+    before: Pose,
+    fitted: Pose,
+    doubt: Uncertainty,
+    given_before: FloatArray,
+    given: FloatArray,
+    next_body: FloatArray,
+) -> FloatArray:
+    """Pose [3] of the object's surface: it follows the known motion of the body, all of it or by a share.
+
+    The surface of a soft object stays behind its body. The share is learnt from what sticks while little slips.
+    """
+    if len(anchors.x) < 2:
+        next_body[FOLLOWS] = next_body[FOLLOWS + 1] = FOLLOWS_PRIOR
+        return given.copy()
+    step = given - given_before
+    step[2] = math.atan2(math.sin(step[2]), math.cos(step[2]))
+    x, y = anchors.marker_x.mean(), anchors.marker_y.mean()
+    dx, dy = step[0] - step[2] * (y - given_before[1]), step[1] + step[2] * (x - given_before[0])
+    ax, ay = place_on_object(before, x, y)
+    fx, fy = place_of_object(fitted, ax, ay)
+    size = dx * dx + dy * dy
+    weight = 1.0 / (doubt.place + 0.0025 * size + 1e-30)
+    along = (fx - x) * dx + (fy - y) * dy
+    begins = next_body[FOLLOWS + 1] < 50.0 * FOLLOWS_PRIOR
+    if along > 0.15 * size and (begins or anchors.stick.mean() > 0.7):
+        next_body[FOLLOWS] += weight * along
+        next_body[FOLLOWS + 1] += weight * size
+    known = next_body[FOLLOWS + 1]
+    share = next_body[FOLLOWS] / known if known > 0.0 else 1.0
+    if share > 0.9 or (1.0 - share) ** 2 * known < 9.0:
+        share = 1.0
+    return np.array([before.x + share * step[0], before.y + share * step[1], before.yaw + share * step[2]])
 
 
 @compiled
@@ -299,16 +353,19 @@ def start_elements(
     variance: float,
     after: FloatArray,
 ) -> None:
-    """Elements that have just touched, or do not touch: they stick where they are."""
+    """Elements that have just touched stick where they are; of those that do not touch nothing is known."""
+    after[STICK_X : SLIP_VARIANCE + 1] = 0.0
     n, m = contact.shape
     for i in range(n):
         for j in range(m):
             if not stays[i, j]:
-                x, y = place_on_object(pose, position[i, j, 0] + end[i, j, 0], position[i, j, 1] + end[i, j, 1])
+                after[STICK_VARIANCE, i, j] = after[SLIP_VARIANCE, i, j] = np.inf
                 after[PROBABILITY, i, j] = 0.0
+            if contact[i, j] and not stays[i, j]:
+                x, y = place_on_object(pose, position[i, j, 0] + end[i, j, 0], position[i, j, 1] + end[i, j, 1])
                 after[STICK_X, i, j], after[STICK_Y, i, j] = x, y
                 after[SLIP_X, i, j], after[SLIP_Y, i, j] = x, y
-                after[STICK_VARIANCE, i, j] = after[SLIP_VARIANCE, i, j] = variance if contact[i, j] else np.inf
+                after[STICK_VARIANCE, i, j] = after[SLIP_VARIANCE, i, j] = variance
 
 
 @compiled

@@ -10,12 +10,16 @@ from slipcore.kernels import compiled
 
 
 class Pose(NamedTuple):
-    """Where the object is: x, y m, yaw rad, and a stretch that stands in for linear rotation (1 for a rigid body)."""
+    """Where the object is: x, y m, yaw rad, and a stretch that stands in for linear rotation (1 for a rigid body); with
+    the cosine and sine of the yaw, see ``pose_at``.
+    """
 
     x: float
     y: float
     yaw: float
     stretch: float
+    cosine: float
+    sine: float
 
 
 class Uncertainty(NamedTuple):
@@ -41,9 +45,15 @@ class Anchors(NamedTuple):
 
 
 @compiled
+def pose_at(x: float, y: float, yaw: float, stretch: float) -> Pose:
+    """The pose with its cosine and sine, which a loop over elements would otherwise work out for each."""
+    return Pose(x, y, yaw, stretch, math.cos(yaw), math.sin(yaw))
+
+
+@compiled
 def place_on_object(pose: Pose, x: float, y: float) -> tuple[float, float]:
     """A point in the object's frame."""
-    cosine, sine = math.cos(pose.yaw) / pose.stretch, math.sin(pose.yaw) / pose.stretch
+    cosine, sine = pose.cosine / pose.stretch, pose.sine / pose.stretch
     dx, dy = x - pose.x, y - pose.y
     return cosine * dx + sine * dy, cosine * dy - sine * dx
 
@@ -51,7 +61,7 @@ def place_on_object(pose: Pose, x: float, y: float) -> tuple[float, float]:
 @compiled
 def place_of_object(pose: Pose, x: float, y: float) -> tuple[float, float]:
     """Where a point of the object's frame is."""
-    cosine, sine = math.cos(pose.yaw) * pose.stretch, math.sin(pose.yaw) * pose.stretch
+    cosine, sine = pose.cosine * pose.stretch, pose.sine * pose.stretch
     return cosine * x - sine * y + pose.x, sine * x + cosine * y + pose.y
 
 
@@ -88,10 +98,10 @@ def fit_pose(anchors: Anchors, weight: FloatArray, given: FloatArray) -> tuple[P
     if given.size:
         room = turned**6 / 9.0 + 1e-16
         difference = math.atan2(math.sin(yaw - turned), math.cos(yaw - turned))
-        pose = Pose(given[0], given[1], turned + difference * room / (room + variance), stretch)
+        pose = pose_at(given[0], given[1], turned + difference * room / (room + variance), stretch)
         return pose, Uncertainty(0.0, 0.0, mx, my)
     c, s = stretch * math.cos(yaw), stretch * math.sin(yaw)
-    return Pose(mx - c * ax + s * ay, my - s * ax - c * ay, yaw, stretch), Uncertainty(1.0 / total, variance, mx, my)
+    return pose_at(mx - c * ax + s * ay, my - s * ax - c * ay, yaw, stretch), Uncertainty(1.0 / total, variance, mx, my)
 
 
 @compiled
@@ -106,7 +116,7 @@ def find_pose(
 ) -> tuple[Pose, Uncertainty]:
     """Pose of the object by iteratively reweighted fits to what most likely sticks; ``variance`` of a marker, m²."""
     if len(anchors.x) < 2:
-        known = Pose(given[0], given[1], given[2], 1.0) if given.size else before
+        known = pose_at(given[0], given[1], given[2], 1.0) if given.size else before
         return known, Uncertainty(0.0, 1e-30, 0.0, 0.0)
     base = np.maximum(anchors.stick * anchors.stick, least_weight) / (variance + anchors.variance)
     pose, doubt = fit_pose(anchors, base, given)
@@ -132,7 +142,7 @@ def object_motion(
     """
     count = len(anchors.x)
     motion_x, motion_y, noise = np.zeros(count), np.zeros(count), np.empty(count)
-    cosine, sine = math.cos(pose.yaw), math.sin(pose.yaw)
+    cosine, sine = pose.cosine, pose.sine
     for e in range(count):
         px, py = place_of_object(pose, anchors.x[e], anchors.y[e])
         bx, by = place_of_object(before, anchors.x[e], anchors.y[e])

@@ -56,7 +56,7 @@ def run_filter(
     interval = time - was_time
     step_filter(
         own, numbers, settings, position, was_displacement, displacement, was_force, force, pressing, tangential,
-        next_masks[0], stays, pose, sigma, pressing_sigma, interval,
+        next_masks[0], stays, was_pose, pose, sigma, pressing_sigma, interval,
         next_own, next_numbers, decided, guess,
     )  # fmt: skip
     touching, slipping = answer(

@@ -9,7 +9,7 @@ from slipcore import FilterOptions, GraspLog, SlipHistory, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.kernels import filter as kernels
 from slipcore.kernels.force_ratio import log_normal_cdf, ratio_evidence
-from slipcore.kernels.pose import Anchors, Pose, find_pose, place_of_object, place_on_object
+from slipcore.kernels.pose import Anchors, find_pose, place_of_object, place_on_object, pose_at
 
 Scene = Callable[..., GraspLog]
 Score = Callable[[GraspLog, SlipHistory], float]
@@ -56,18 +56,18 @@ def test_the_probability_is_one_half_at_the_decision() -> None:
 
 
 def test_a_pose_carries_points_to_and_fro() -> None:
-    pose = Pose(1e-3, -2e-3, 0.4, 1.01)
+    pose = pose_at(1e-3, -2e-3, 0.4, 1.01)
     x, y = place_of_object(pose, *place_on_object(pose, 3e-3, 5e-3))
     np.testing.assert_allclose([x, y], [3e-3, 5e-3], rtol=0.0, atol=1e-17)
 
 
 def test_a_fitted_pose_is_the_motion_of_what_sticks_though_a_third_slips() -> None:
     x, y = (axis.ravel() for axis in np.meshgrid(1e-3 * np.arange(6.0), 1e-3 * np.arange(6.0), indexing="ij"))
-    true = Pose(2e-4, -1e-4, 0.02, 1.0)
+    true = pose_at(2e-4, -1e-4, 0.02, 1.0)
     moved_x, moved_y = np.array([place_of_object(true, *p) for p in zip(x, y, strict=True)]).T.copy()
     moved_x[:12], moved_y[:12] = x[:12], y[:12]  # these stand still
     anchors = Anchors(x.copy(), y.copy(), np.zeros(36), moved_x, moved_y, np.ones(36))
-    before = Pose(0.0, 0.0, 0.0, 1.0)
+    before = pose_at(0.0, 0.0, 0.0, 1.0)
     fitted, doubt = find_pose(anchors, before, np.zeros(0), 1e-14, TUNING.least_weight, TUNING.rigidity, TUNING.outlier)
     np.testing.assert_allclose(fitted[:3], true[:3], rtol=0.0, atol=1e-5)  # 5 % of the motion
     assert doubt.place > 0.0
