@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 STICK, SLIP, NO_CONTACT, TRUTH = "#2b6cb0", "#dd6b20", "#e8e8e8", "#2f855a"
 SNAPSHOTS = 8
+DENSE = 60
+"""Points a side above which squares of less than a pixel would leave stripes, so that a map has no gaps."""
 COEFFICIENTS = ("β₀ [-]", "β₁ [s/m]", "β₂ [1/N]", "σ [-]")
 
 
@@ -124,11 +126,14 @@ def _snapshots(contact: "NDArray[np.bool_]") -> "NDArray[np.intp]":
 
 
 def _draw_map(axes: Axes, log: GraspLog, contact: "NDArray[np.bool_]", slip: "NDArray[np.bool_]", frame: int) -> None:
-    code = np.where(contact[frame], 1 + slip[frame], 0).ravel()
-    colors = ListedColormap([NO_CONTACT, STICK, SLIP])
-    x, y = (log.position[..., k].ravel() * 1e3 for k in (0, 1))
-    size = 12.0 * (20.0 / max(log.grid)) ** 2
-    axes.scatter(x, y, c=code, s=size, marker="s", cmap=colors, norm=BoundaryNorm([0, 1, 2, 3], 3), linewidths=0)
+    code = np.where(contact[frame], 1 + slip[frame], 0)
+    colors, norm = ListedColormap([NO_CONTACT, STICK, SLIP]), BoundaryNorm([0, 1, 2, 3], 3)
+    x, y = (log.position[..., k] * 1e3 for k in (0, 1))
+    if max(log.grid) > DENSE:
+        axes.pcolormesh(x, y, code, cmap=colors, norm=norm, shading="nearest")
+    else:
+        size = 12.0 * (20.0 / max(log.grid)) ** 2
+        axes.scatter(x, y, c=code, s=size, marker="s", cmap=colors, norm=norm, linewidths=0)
     axes.set_aspect("equal")
     axes.set_axis_off()
     axes.set_title(f"{log.time[frame] - log.time[0]:.2f} s", fontsize=8)
