@@ -1,8 +1,8 @@
 """What 95 % intervals cover: `python -m benchmarks.coverage [--output FOLDER] [--fits N] [--cross N] [--only …]`.
 
 Every method on its own model's data (``--fits``), and on the data of the other models (``--cross``; a quarter of that
-for the methods that take tenths of a second a fit). A grasp has 400 samples of 20 elements; the last kind has 8 grasps of 50.
-A fit that does not converge is counted apart and with the intervals that its exception carries. Writes
+for the methods that take tenths of a second a fit). A grasp has 400 samples of 20 elements; the last kind has 8 grasps
+of 50. A fit that does not converge is counted apart, and with the intervals that its exception carries. Writes
 estimators-coverage.json and estimators-coverage.png.
 """
 

@@ -1,9 +1,12 @@
 """Accuracy against time of the estimators: `python -m benchmarks.estimators [--output FOLDER] [--quick] [--only …]`.
 
-Parts: `gaussian` (sampled against exact posterior, with emcee as its tutorial has it and statsmodels in the same run),
-`likelihoods` (those that read every sample, and grasp effects), `ols` (time and memory), `import`, `digits` (NIST StRD
-beside statsmodels, NumPy and SciPy) and `coverage` (what the intervals of each method cover on each fault). Medians of
-several runs. Writes JSON, pictures and a Markdown table a part.
+Parts: `gaussian` (sampled against exact posterior for n = 200 to 2,000,000, with emcee as its tutorial has it, NUTS of
+NumPyro and statsmodels in the same run), `settings` (emcee's moves and numbers of walkers on the same posterior),
+`likelihoods` (those without a closed form, against a very long run), `ols` (time and memory), `import`, and `digits`
+(NIST StRD beside statsmodels, NumPy and SciPy). What intervals cover has a command of its own, `benchmarks.coverage`.
+Seconds are CPU seconds of one thread: a shared machine makes wall times longer, not these. Medians of several runs.
+``--peers-python`` names the interpreter that has NumPyro; without it NUTS is left out. Writes JSON, pictures and a
+Markdown table a part.
 """
 
 import os
@@ -17,6 +20,7 @@ import json
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 import tracemalloc
 from collections.abc import Callable
@@ -30,10 +34,12 @@ from scipy import stats
 
 import estimators
 from benchmarks.nist import digits_table
+from estimators.bayes import LIKELIHOODS
 from estimators.conjugate import NormalInverseGamma, exact_posterior
+from estimators.ensemble import IndependenceMove, VectorisedSampler
 from estimators.evidence import gather
 from estimators.likelihoods.gaussian import gaussian
-from estimators.sampling import sample
+from estimators.sampling import Chain, autocorrelation_time, sample
 from slipcore.samples import FrictionSamples
 
 TRUTH, SIGMA, AREA = np.array([0.4, 2.0, -0.8]), 0.02, 1e-6
@@ -47,12 +53,6 @@ def make(n: int, seed: int, elements: int = 20) -> FrictionSamples:
     v, f_n = rng.uniform(0.0, 5e-3, n), rng.uniform(0.02, 0.1, n)
     mu = TRUTH @ [np.ones(n), v, f_n] + SIGMA * rng.standard_normal(n)
     return FrictionSamples(mu, v, f_n, mu * f_n, np.arange(n) * 0.01, rng.integers(0, elements, n), np.ones(n), AREA)
-
-
-def correlated(data: FrictionSamples, seed: int) -> FrictionSamples:
-    """Errors shared within an element."""
-    shared = np.random.default_rng([seed, 1]).standard_normal(20)
-    return with_friction(data, data.friction_coefficient + 0.015 * shared[data.element])
 
 
 def heteroscedastic(data: FrictionSamples, seed: int) -> FrictionSamples:
@@ -81,21 +81,14 @@ def with_friction(data: FrictionSamples, friction: np.ndarray) -> FrictionSample
     return replace(data, friction_coefficient=friction, tangential_force=friction * data.normal_force)
 
 
-FAULTS = {
-    "autocorrelated": correlated,
-    "heteroscedastic": heteroscedastic,
-    "outliers": outliers,
-    "noisy f_n": noisy_forces,
-}
-
-
 def median_seconds(call: Callable[[int], object], repeats: int) -> float:
-    """Median wall time of calls with the seeds 0, 1, …"""
+    """Median CPU time of calls with the seeds 0, 1, …, after one that warms up."""
+    call(0)
     seconds = []
     for seed in range(repeats):
-        begin = time.perf_counter()
+        begin = time.process_time()
         call(seed)
-        seconds.append(time.perf_counter() - begin)
+        seconds.append(time.process_time() - begin)
     return statistics.median(seconds)
 
 
@@ -115,25 +108,77 @@ def errors(draws: np.ndarray, exact: NormalInverseGamma) -> dict[str, float]:
     }
 
 
-def gaussian_part(quick: bool) -> list[Row]:
-    """Ours at several accuracies, the tutorial's emcee and statsmodels, for growing n."""
+def gaussian_part(options: argparse.Namespace) -> list[Row]:
+    """Ours at several accuracies, the tutorial's emcee, NUTS and statsmodels, for growing n."""
     rows: list[Row] = []
-    for n in (200, 2_000, 20_000, 200_000) if quick else (200, 2_000, 20_000, 200_000, 2_000_000):
+    for n in (200, 2_000, 20_000, 200_000) if options.quick else (200, 2_000, 20_000, 200_000, 2_000_000):
         data, repeats = make(n, n), 5 if n > 100_000 else 9
         moments = estimators.Moments.from_samples(data)
         seconds = median_seconds(lambda _, d=data: estimators.Moments.from_samples(d), repeats)
         rows.append({"n": n, "what": "moments", "seconds": seconds})
-        evidence = gather(moments)
-        exact = exact_posterior(evidence)
-        rows += [
+        exact = exact_posterior(gather(moments))
+        own = [
             {"n": n, "what": f"ours, accuracy {accuracy:g}", **ours(moments, exact, accuracy, repeats)}
             for accuracy in (0.1, 0.05, 0.02, 0.01)
         ]
-        rows.append({"n": n, "what": "exact draws (4,000)", **exact_draws(exact)})
+        rows += [*own, {"n": n, "what": "exact draws (4,000)", **exact_draws(exact)}]
         if n <= 200_000:
-            rows.append({"n": n, "what": "emcee as in its tutorial", **tutorial(data, exact, 5.0 if quick else 20.0)})
+            goal = float(own[0]["quantile"])
+            found = tutorial(data, exact, min(4.0 + n / 4_000, 40.0), goal)
+            found["times ours at equal error"] = float(found["seconds to ours at 0.1"]) / float(own[0]["seconds"])
+            rows.append({"n": n, "what": "emcee as in its tutorial", **found})
+            if options.peers_python:
+                rows.append({"n": n, "what": "NUTS (NumPyro)", **nuts(data, exact, options.peers_python)})
         rows.append({"n": n, "what": "statsmodels OLS", "seconds": median_seconds(lambda _, d=data: peer_ols(d), 3)})
     return rows
+
+
+def settings_part(options: argparse.Namespace) -> list[Row]:
+    """emcee's moves and numbers of walkers on the whitened posterior from moments, n = 200,000; 20,000 draws each."""
+    moments = estimators.Moments.from_samples(make(200_000, 200_000))
+    posterior, exact = gaussian(gather(moments)), exact_posterior(gather(moments))
+    moves = {
+        "stretch": emcee.moves.StretchMove(),
+        "differential evolution": emcee.moves.DEMove(),
+        "kernel density": emcee.moves.KDEMove(),
+        "independence": IndependenceMove(posterior.proposal),
+    }
+    rows: list[Row] = []
+    for name, move in moves.items():
+        for walkers in (32, 200) if options.quick else (32, 100, 200, 440):
+            found = []
+            for seed in range(3):
+                start = posterior.proposal.draw(np.random.default_rng(seed), walkers)
+                sampler = VectorisedSampler(walkers, 4, posterior.log_probability, moves=move, vectorize=True)
+                begin = time.process_time()
+                sampler.run_mcmc(start, 22_000 // walkers, skip_initial_state_check=True)
+                seconds = time.process_time() - begin
+                chain = sampler.get_chain(discard=2_000 // walkers)
+                size = chain.shape[0] * walkers / max(float(autocorrelation_time(chain).max()), 1.0)
+                draws = np.column_stack(posterior._natural(chain.reshape(-1, 4)))
+                found.append({"seconds": seconds, "ess": size, **errors(draws, exact)})
+            middle = {key: statistics.median(one[key] for one in found) for key in found[0]}
+            rows.append({"move": name, "walkers": walkers, **middle, "ess a second": middle["ess"] / middle["seconds"]})
+    return rows
+
+
+def nuts(data: FrictionSamples, exact: NormalInverseGamma, python: str) -> Row:
+    """NUTS on standardised columns, 500 + 2,000 draws; wall seconds of an interpreter of its own, without compiling."""
+    columns = np.column_stack([data.tangential_velocity, data.normal_force])
+    centre, width = columns.mean(axis=0), columns.std(axis=0)
+    x = np.column_stack([np.ones(len(data)), (columns - centre) / width])
+    y = data.friction_coefficient
+    with tempfile.TemporaryDirectory() as folder:
+        job = {"data": f"{folder}/data.npy", "output": f"{folder}/draws.npy", "likelihood": "gaussian"}
+        np.save(job["data"], np.column_stack([x, y]))
+        job |= {"start": [*np.linalg.lstsq(x, y)[0], float(np.log(y.std()))], "warmup": 500, "draws": 2000}
+        worker = Path(__file__).with_name("estimator_peer_worker.py")
+        done = subprocess.run([python, worker], input=json.dumps(job), capture_output=True, text=True, check=True)
+        answer, draws = json.loads(done.stdout), np.load(job["output"])
+    slopes = draws[:, 1:3] / width
+    beta = np.column_stack([draws[:, 0] - slopes @ centre, slopes])
+    found = errors(np.column_stack([beta, np.exp(draws[:, 3])]), exact)
+    return {"seconds": answer["seconds"], "ess": answer["ess"], **found}
 
 
 def peer_ols(data: FrictionSamples) -> np.ndarray:
@@ -162,8 +207,12 @@ def exact_draws(exact: NormalInverseGamma) -> Row:
     return {"seconds": seconds, "ess": 4000.0, **errors(exact.draw(4000, np.random.default_rng(0)), exact)}
 
 
-def tutorial(data: FrictionSamples, exact: NormalInverseGamma, budget: float) -> Row:
-    """32 walkers in a tiny ball about least squares, stretch moves, a function that takes one point at a time."""
+def tutorial(data: FrictionSamples, exact: NormalInverseGamma, budget: float, goal: float) -> Row:
+    """32 walkers in a tiny ball about least squares, stretch moves, a function that takes one point at a time.
+
+    "seconds to ours at 0.1": until the worst quantile of the chain's later half stays within ``goal``; or, where it
+    never did, all the seconds that it had, which is a lower bound.
+    """
     x = np.column_stack([np.ones(len(data)), data.tangential_velocity, data.normal_force])
     y = data.friction_coefficient
 
@@ -175,57 +224,84 @@ def tutorial(data: FrictionSamples, exact: NormalInverseGamma, budget: float) ->
         1.0 + 1e-4 * np.random.default_rng(0).standard_normal((32, 4))
     )
     sampler = emcee.EnsembleSampler(32, 4, log_probability)
-    begin, state = time.perf_counter(), start
-    while time.perf_counter() - begin < budget and sampler.iteration < 20_000:
+    begin, state, trace = time.process_time(), start, []
+    while time.process_time() - begin < budget and sampler.iteration < 20_000:
         state = sampler.run_mcmc(state, 50)
-    seconds = time.perf_counter() - begin
+        later = sampler.get_chain(discard=sampler.iteration // 2, flat=True)
+        trace.append((time.process_time() - begin, natural_errors(later, exact)["quantile"]))
+    far = [k for k, (_, error) in enumerate(trace) if error > goal]
+    reached = trace[min(far[-1] + 1 if far else 0, len(trace) - 1)][0]
     chain = sampler.get_chain(discard=sampler.iteration // 5)
     tau = float(np.max(emcee.autocorr.integrated_time(chain, quiet=True)))
-    draws = chain.reshape(-1, 4)
-    found = errors(np.column_stack([draws[:, :3], np.exp(draws[:, 3])]), exact)
-    size = len(draws) / tau
-    return {"seconds": seconds, "ess": size, **found, "seconds_to_ess_10000": seconds * 10_000 / size}
+    found = natural_errors(chain.reshape(-1, 4), exact)
+    return {"seconds": trace[-1][0], "ess": chain[..., 0].size / tau, **found, "seconds to ours at 0.1": reached}
 
 
-def likelihood_part(quick: bool) -> list[Row]:
-    """Seconds to an effective sample size of 1,000 where no closed form exists."""
+def natural_errors(draws: np.ndarray, exact: NormalInverseGamma) -> dict[str, float]:
+    """Errors of draws [k, 4] of (β, log σ)."""
+    return errors(np.column_stack([draws[:, :3], np.exp(draws[:, 3])]), exact)
+
+
+def likelihood_part(options: argparse.Namespace) -> list[Row]:
+    """Seconds and errors where no closed form exists, against a run to 0.01 posterior standard deviations."""
     rows: list[Row] = []
-    heavy = with_friction(
-        make(20_000, 1), make(20_000, 1).friction_coefficient + 0.02 * np.random.default_rng(9).standard_t(3, 20_000)
-    )
-    cases = {
-        "student_t": heavy,
-        "outlier": outliers(make(20_000, 2), 2),
-        "errors_in_variables": noisy_forces(make(20_000, 3), 3),
-    }
-    for name, data in cases.items():
-        rows.append({"likelihood": name, "n": 20_000, **timed(data, name, 3 if quick else 5)})
-    offsets = 0.03 * np.random.default_rng(4).standard_normal(400)
-    grasps = [make(50, 100 + g) for g in range(400)]
-    shifted = [with_friction(g, g.friction_coefficient + u) for g, u in zip(grasps, offsets, strict=True)]
-    rows.append({"likelihood": "grasp_effects, 400 grasps", "n": 20_000, **timed(shifted, "grasp_effects", 5)})
-    kept = [estimators.Moments.from_samples(g) for g in shifted]
-    rows.append({"likelihood": "grasp_effects, 400 moments", "n": 20_000, **timed(kept, "grasp_effects", 5)})
+    for n in (200, 20_000) if options.quick else (200, 2_000, 20_000, 200_000):
+        data = make(n, 1)
+        error = np.random.default_rng(9).standard_t(3, n) - np.random.default_rng(1).standard_normal(n)
+        cases: dict[str, object] = {
+            "student_t": with_friction(data, data.friction_coefficient + SIGMA * error),
+            "outlier": outliers(make(n, 2), 2),
+            "errors_in_variables": noisy_forces(make(n, 3), 3),
+        }
+        if n == 20_000:
+            offsets = 0.03 * np.random.default_rng(4).standard_normal(400)
+            grasps = [make(50, 100 + g) for g in range(400)]
+            shifted = [with_friction(g, g.friction_coefficient + u) for g, u in zip(grasps, offsets, strict=True)]
+            cases["grasp_effects, 400 grasps"] = shifted
+            cases["grasp_effects, 400 moments"] = [estimators.Moments.from_samples(g) for g in shifted]
+        for name, given in cases.items():
+            rows += against_long_run(n, name, given, (0.2, 0.08) if options.quick else (0.2, 0.08, 0.05, 0.02))
     return rows
 
 
-def timed(data: object, likelihood: str, repeats: int) -> Row:
-    """Median seconds and least effective sample size of fits with the seeds 0, 1, …"""
-    models = []
+def against_long_run(n: int, name: str, data: object, accuracies: tuple[float, ...]) -> list[Row]:
+    """Median seconds of whole fits, and errors of chains to the same accuracy in their whitened coordinates."""
+    likelihood = name.split(",")[0]
+    posterior = LIKELIHOODS[likelihood].posterior(gather(data))
 
-    def fit(seed: int) -> None:
-        models.append(estimators.fit(data, "bayes", accuracy=0.067, seed=seed, likelihood=likelihood))
+    def chain(accuracy: float, seed: int) -> Chain:
+        return sample(posterior.log_probability, posterior.proposal, accuracy, seed=seed, local=posterior.local)
 
-    seconds = median_seconds(fit, repeats)
-    told = models[-1].diagnostics
-    sizes = [float(value) for name, value in told.items() if name.startswith("effective_sample_size")]
-    return {"seconds": seconds, "ess": min(sizes), "acceptance": told["acceptance"], "move": told["move"]}
+    long = chain(0.01, 99).flat() if n <= 20_000 else None
+    rows: list[Row] = []
+    for accuracy in accuracies if long is not None else (0.08,):
+        options = {"likelihood": likelihood, "accuracy": accuracy}
+        seconds = median_seconds(lambda seed, o=options: estimators.fit(data, "bayes", seed=seed, **o), 3)
+        chains = [chain(accuracy, seed) for seed in range(3)]
+        size = statistics.median(float(one.effective_sample_size.min()) for one in chains)
+        row: Row = {"likelihood": name, "n": n, "accuracy": accuracy, "seconds": seconds, "ess": size}
+        if long is not None:
+            found = [whitened_errors(one.flat(), long) for one in chains]
+            row |= {key: statistics.median(one[key] for one in found) for key in found[0]}
+        rows.append(row | {"acceptance": chains[0].acceptance, "trouble": chains[0].trouble})
+    return rows
 
 
-def ols_part(quick: bool) -> list[Row]:
+def whitened_errors(draws: np.ndarray, long: np.ndarray) -> dict[str, float]:
+    """Worst error over the coordinates of mean, sd and 5/95 % quantile of draws [k, d], in the long run's sd."""
+    spread = long.std(axis=0)
+    quantiles = np.quantile(draws, TAILS, axis=0) - np.quantile(long, TAILS, axis=0)
+    return {
+        "mean": float(np.abs((draws.mean(axis=0) - long.mean(axis=0)) / spread).max()),
+        "sd": float(np.abs(draws.std(axis=0) / spread - 1.0).max()),
+        "quantile": float(np.abs(quantiles / spread).max()),
+    }
+
+
+def ols_part(options: argparse.Namespace) -> list[Row]:
     """Time and peak memory of least squares, with its cluster jackknife."""
     rows: list[Row] = []
-    for n in (2_000, 200_000) if quick else (2_000, 200_000, 2_000_000):
+    for n in (2_000, 200_000) if options.quick else (2_000, 200_000, 2_000_000):
         data = make(n, 1, elements=400)
         seconds = median_seconds(lambda _, d=data: estimators.fit(d), 5)
         tracemalloc.start()
@@ -236,56 +312,27 @@ def ols_part(quick: bool) -> list[Row]:
     return rows
 
 
-def import_part(_: bool) -> list[Row]:
-    """Wall time of `import estimators` in a fresh interpreter, less that of the interpreter and NumPy."""
+def import_part(_: argparse.Namespace) -> list[Row]:
+    """Wall time of `import estimators` in a fresh interpreter, less that of the interpreter; the least of seven."""
 
     def run(code: str) -> float:
-        return median_seconds(lambda _: subprocess.run([sys.executable, "-c", code], check=True), 5)
+        seconds = []
+        for _ in range(7):
+            begin = time.perf_counter()
+            subprocess.run([sys.executable, "-c", code], check=True)
+            seconds.append(time.perf_counter() - begin)
+        return min(seconds)
 
     return [{"what": "import estimators", "seconds": run("import estimators") - run("pass")}]
 
 
-def coverage_part(quick: bool) -> list[Row]:
-    """Part of 95 % intervals that hold the true coefficients, n = 400, over each kind of data."""
-    fits = 100 if quick else 1000
-    methods = {
-        "ols": {"method": "ols"},
-        "robust": {"method": "robust"},
-        "conjugate": {"method": "conjugate"},
-        "bayes, grasp_effects": {"method": "bayes", "accuracy": 0.1},
-        "auto": {"method": "auto", "accuracy": 0.1},
-    }
-    kinds: dict[str, Callable[[FrictionSamples, int], FrictionSamples]] = {"clean": lambda data, _: data, **FAULTS}
-    rows: list[Row] = []
-    for kind, spoil in kinds.items():
-        for name, options in methods.items():
-            inside, failed = np.zeros(3), 0
-            for seed in range(fits):
-                try:
-                    low, high = estimators.fit(spoil(make(400, 7000 + seed), seed), **options).interval().T
-                except estimators.NotConverged:
-                    failed += 1
-                    continue
-                inside += (low <= TRUTH) & (high >= TRUTH)
-            share = inside / max(fits - failed, 1)
-            rows.append(
-                {
-                    "data": kind,
-                    "method": name,
-                    **{f"beta{k}": float(p) for k, p in enumerate(share)},
-                    "not converged": failed,
-                }
-            )
-    return rows
-
-
-PARTS: dict[str, Callable[[bool], list[Row]]] = {
+PARTS: dict[str, Callable[[argparse.Namespace], list[Row]]] = {
     "gaussian": gaussian_part,
+    "settings": settings_part,
     "likelihoods": likelihood_part,
     "ols": ols_part,
     "import": import_part,
     "digits": lambda _: digits_table(),
-    "coverage": coverage_part,
 }
 
 
@@ -310,9 +357,11 @@ def picture(rows: list[Row], path: Path) -> None:
         for row in rows:
             if row["n"] == n and row["what"] == "emcee as in its tutorial":
                 axes.loglog(row["seconds"], row["quantile"], "x", color=f"C{k}", markersize=9)
-    axes.set_xlabel("seconds (moments excluded)")
+            if row["n"] == n and str(row["what"]).startswith("NUTS"):
+                axes.loglog(row["seconds"], row["quantile"], "s", color=f"C{k}", markerfacecolor="none")
+    axes.set_xlabel("CPU seconds (moments excluded)")
     axes.set_ylabel("worst error of a 5 % or 95 % quantile, posterior sd")
-    axes.set_title("Gaussian fit: this package (o) and emcee as in its tutorial (x)")
+    axes.set_title("Gaussian fit: this package (o), emcee as in its tutorial (x), NUTS (□)")
     axes.legend()
     axes.grid(alpha=0.3, which="both")
     figure.savefig(path, dpi=130)
@@ -323,11 +372,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--output", type=Path, default=Path("benchmark-output"))
     parser.add_argument("--quick", action="store_true", help="fewer sizes and repeats")
+    parser.add_argument("--peers-python", help="interpreter of an environment that has NumPyro")
     parser.add_argument("--only", nargs="+", choices=list(PARTS), default=list(PARTS))
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
     for name in options.only:
-        rows = PARTS[name](options.quick)
+        rows = PARTS[name](options)
         (options.output / f"estimators-{name}.json").write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
         print(f"\n## {name}\n\n{markdown(rows)}", flush=True)
         if name == "gaussian":

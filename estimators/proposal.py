@@ -76,7 +76,8 @@ class Proposal:
         degrees, size = SAMPLING.proposal_degrees_of_freedom, self.dimension
         inverse = np.linalg.inv(self.root)
         z = np.einsum("mij,kmj->kmi", inverse, x[:, None] - self.centre)
-        squares = np.einsum("kmi,kmi->km", z, z)
+        with np.errstate(over="ignore"):
+            squares = np.minimum(np.einsum("kmi,kmi->km", z, z), 1e200)  # so far off that no component is near
         height = np.log(self.part) + np.linalg.slogdet(inverse)[1]
         return height - 0.5 * (degrees + size) * np.log1p(squares / degrees), squares
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import estimators
-from estimators import Domain, Moments
+from estimators import Moments
 from slipcore.samples import FrictionSamples
 
 Make = Callable[..., FrictionSamples]
@@ -65,27 +65,6 @@ def test_one_by_one_equals_all_at_once(samples: Make) -> None:
     assert online.domain == batch.domain
 
 
-def test_an_offset_of_a_billion_costs_no_more_than_its_own_rounding(samples: Make) -> None:
-    """Centred factors: merged grasps at 1e9 give the slopes of the very same numbers, centred exactly first."""
-    rng = np.random.default_rng(0)
-    v = 1e9 + np.round(rng.uniform(0.0, 100.0, 400), 3)
-    base = samples(400, tangential_velocity=v - 1e9, coefficients=np.array([0.4, 1e-3, -0.8]))
-    far = replace(base, tangential_velocity=v)
-    near = replace(base, tangential_velocity=v - 1e9)
-    take = [slice(k, k + 50) for k in range(0, 400, 50)]
-    names = [name for name in FrictionSamples.__slots__ if name != "element_area"]
-
-    def cut(whole: FrictionSamples, rows: slice) -> Moments:
-        columns = {name: getattr(whole, name)[rows] for name in names}
-        return Moments.from_samples(FrictionSamples(**columns, element_area=1e-6))
-
-    found, wanted = (
-        coefficients(parts[0].merge(*parts[1:]))
-        for parts in ([cut(whole, rows) for rows in take] for whole in (far, near))
-    )
-    np.testing.assert_allclose(found[1:], wanted[1:], rtol=1e-8)  # the mean of v is itself rounded to 1e-7
-
-
 def test_forgetting_is_exponential_weighting(samples: Make) -> None:
     data = samples(100)
     faded = Moments.empty(data.element_area)
@@ -114,28 +93,6 @@ def test_bytes_bring_back_the_same_fit(samples: Make) -> None:
 def test_other_bytes_are_refused(samples: Make, spoil: Callable[[bytes], bytes]) -> None:
     with pytest.raises(estimators.InvalidSamples, match="moments"):
         Moments.from_bytes(spoil(Moments.from_samples(samples(20)).to_bytes()))
-
-
-def test_many_moments_merge_to_the_fit_of_all_their_samples(samples: Make) -> None:
-    _merge_many(samples, 20_000)
-
-
-@pytest.mark.long
-def test_a_million_moments_merge_to_the_fit_of_all_their_samples(samples: Make) -> None:
-    _merge_many(samples, 1_000_000)
-
-
-def _merge_many(samples: Make, count: int) -> None:
-    data = samples(count)
-    columns = np.stack([data.tangential_velocity, data.normal_force, data.friction_coefficient]).T
-    one = Moments.empty(1e-6).add(*columns[0])
-    single = [
-        replace(one, factor=replace(one.factor, mean=row), domain=Domain((row[0], row[0]), (row[1], row[1])))
-        for row in columns
-    ]
-    merged = single[0].merge(*single[1:])
-    np.testing.assert_allclose(coefficients(merged), coefficients(Moments.from_samples(data)), rtol=1e-11)
-    assert merged.n == count
 
 
 def test_moments_of_nothing_are_neutral_and_not_fitted(samples: Make) -> None:

@@ -115,27 +115,6 @@ def test_constant_velocity_leaves_its_slope_open_and_prediction_valid(samples: M
     assert model.predict(speed + 5e-3, 0.05, 0.05) < 0.0  # and does beyond it
 
 
-def test_constant_normal_force_leaves_its_slope_open(samples: Make) -> None:
-    model = estimators.fit(samples(300, normal_force=np.full(300, 0.05)))
-    np.testing.assert_array_equal(model.identifiable, [False, True, False])
-    assert abs(model.predict(2e-3, 0.05) - (0.4 + 2.0 * 2e-3 - 0.8 * 0.05)) < 5 * 0.02 / np.sqrt(300)
-
-
-@pytest.mark.parametrize("jitter", [0.0, 1e-15, 1e-12])
-def test_collinear_velocity_and_force_flag_both_slopes_and_predict_on_the_line(samples: Make, jitter: float) -> None:
-    v = np.linspace(1e-3, 5e-3, 300)
-    f_n = 20.0 * v * (1.0 + jitter * np.random.default_rng(0).standard_normal(300))
-    model = estimators.fit(samples(300, tangential_velocity=v, normal_force=f_n))
-    np.testing.assert_array_equal(model.identifiable, [True, False, False])
-    assert model.diagnostics["rank"] == 2.0
-    on_line = model.predict(v, f_n)
-    assert np.abs(on_line - (0.4 + 2.0 * v - 0.8 * f_n)).max() < 5 * 0.02 * np.sqrt(3 / 300)
-    spread = model.predict(v, f_n, 0.95) - model.predict(v, f_n, 0.05)
-    assert spread.max() < 4.5 * model.scale
-    off_line = model.predict(1e-3, 0.1, 0.95) - model.predict(1e-3, 0.1, 0.05)
-    assert off_line > 2.0 * spread.max()  # a corner of the box that no sample was near
-
-
 def test_a_collinear_pair_splits_the_slope_by_the_prior() -> None:
     """The closed form: of all (β₁, β₂) that fit, the least β₁² v_ref² + β₂² f_ref²."""
     from estimators.least_squares import factorise, solve

@@ -1,0 +1,32 @@
+"""What 95 % intervals cover: every method on its own model's data, and the automatic choice on everyone's."""
+
+import pytest
+from scipy import stats
+
+from benchmarks.coverage import KINDS, METHODS, covered
+
+OWN = [name for name, method in METHODS.items() if method.own]
+
+
+@pytest.mark.parametrize("name", ["ols", "conjugate", "grasp_effects"])
+def test_intervals_of_the_quick_methods_cover_their_own_data(name: str) -> None:
+    fits = 60
+    row = covered(METHODS[name].own, METHODS[name].options, fits)
+    for k in range(3):
+        assert float(row[f"beta{k}"]) * fits >= stats.binom(fits, 0.95).ppf(1e-3)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", OWN)
+def test_95_percent_intervals_cover_93_to_97_on_their_own_data(name: str) -> None:
+    row = covered(METHODS[name].own, METHODS[name].options, 1000)
+    for k in range(3):  # three standard errors of 0.7 % at the edges
+        assert 0.93 - 0.024 <= float(row[f"beta{k}"]) <= 0.97 + 0.016, row
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_automatic_choice_covers_90_to_98_on_every_kind_of_data(kind: str) -> None:
+    row = covered(kind, METHODS["auto"].options, 400)
+    for k in range(3):  # one and a half standard errors of 1.5 % at the lower edge, one of 0.7 % at the upper
+        assert 0.90 - 0.022 <= float(row[f"beta{k}"]) <= 0.98 + 0.007, row
