@@ -3,7 +3,8 @@
 Every method streams 250 frames of 20×20 markers through `SlipDetector.step`, frame by frame as a live sensor would,
 and takes them as one batch through `detect_slip`. The log is a simulated ramp with noise, and each real Tac3D recording
 that is found. Then every method is scored on scenes with truth (benchmarks/detector_accuracy.py). Prints tables and
-writes detector.json, detector.png, detector_accuracy.json and detector_accuracy.png.
+writes detector.json, detector.png, detector_accuracy.json, detector_accuracy.png, detector_reliability.json and .png
+(is a reported probability the share that slips?) and detector_conditions.json (benchmarks/detector_conditions.py).
 """
 
 import argparse
@@ -16,7 +17,8 @@ from time import perf_counter
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks import detector_accuracy
+from benchmarks import detector_accuracy, detector_conditions
+from benchmarks.detector_scenes import cases, observed
 from service.formats import tac3d
 from slipcore import METHODS, GraspLog, SlipDetector, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
@@ -128,6 +130,18 @@ def report_accuracy(output: Path) -> None:
     text = json.dumps(detector_accuracy.as_json(rows), indent=1)
     (output / "detector_accuracy.json").write_text(text, encoding="utf-8")
     detector_accuracy.draw(rows).savefig(output / "detector_accuracy.png", dpi=150)
+    calibrated = {
+        inputs: detector_accuracy.reliability(
+            (case, detect_slip(observed(case.log, 1e-6, detector_accuracy.FORCE_NOISE, inputs, seed=7)))
+            for case in cases("scoring")
+        )
+        for inputs in detector_accuracy.INPUTS
+    }
+    (output / "detector_reliability.json").write_text(json.dumps(calibrated, indent=1), encoding="utf-8")
+    detector_accuracy.draw_reliability(calibrated).savefig(output / "detector_reliability.png", dpi=150)
+    conditions = list(detector_conditions.measure())
+    (output / "detector_conditions.json").write_text(json.dumps(conditions, indent=1), encoding="utf-8")
+    print(detector_conditions.table(conditions))
 
 
 def report_costs(arguments: argparse.Namespace) -> None:

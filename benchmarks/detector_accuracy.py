@@ -19,6 +19,7 @@ NOISES = (0.0, 1e-6, 3e-6, 1e-5)
 FORCE_NOISE = 2e-3
 INPUTS = ("displacement", "force", "motion")
 PHASES = ("shear", "unload", "hold", "normal rises", "normal falls")
+ONSET_REACH = 5
 BEST_OF = [
     {"threshold": threshold, "growth_rate": growth} for threshold in (2.0, 3.0, 5.0) for growth in (0.1, 0.3, 1.0)
 ]
@@ -49,6 +50,7 @@ class Score:
     f1_kinematic: float
     stick_ratio_error: float
     false_slip: float
+    onset_error: float
     phases: dict[str, Count]
 
 
@@ -66,6 +68,7 @@ class Summary:
     f1_kinematic: float
     stick_ratio_error: float
     false_slip: float
+    onset_error: float
     phases: dict[str, float]
     each: dict[str, float]
 
@@ -73,6 +76,38 @@ class Summary:
 def count(true: BoolArray, found: BoolArray) -> Count:
     """Points of two masks."""
     return Count(int(true.sum()), int(found.sum()), int((true & found).sum()))
+
+
+def onset_error(true: BoolArray, found: BoolArray) -> float:
+    """Mean distance in frames from each true onset [t, n, m] to the nearest found one of the same element.
+
+    Onsets without any within ``ONSET_REACH`` frames are left to F1; NaN where none is left.
+    """
+    distances = []
+    for element in zip(*np.nonzero(true.any(axis=0)), strict=True):
+        was, now = (np.flatnonzero(np.diff(mask[:, *element].astype(int)) > 0) for mask in (true, found))
+        if len(now):
+            nearest = np.abs(was[:, None] - now).min(axis=1)
+            distances += nearest[nearest <= ONSET_REACH].tolist()
+    return float(np.mean(distances)) if distances else float("nan")
+
+
+def reliability(cases_and_histories: Iterable[tuple[Case, SlipHistory]]) -> list[tuple[float, float, int]]:
+    """Mean reported probability, share that truly slips, and count, of tenths of the reported probability."""
+    said, truth = [], []
+    for case, history in cases_and_histories:
+        known = case.log.truth
+        assert known is not None
+        judged = known.contact[1:] & history.contact[1:] & history.contact[:-1]
+        said.append(history.probability[1:][judged])
+        truth.append(known.slip_contact_factor[1:][judged])
+    probability, slips = np.concatenate(said), np.concatenate(truth)
+    tenth = np.minimum((10.0 * probability).astype(int), 9)
+    return [
+        (float(probability[tenth == k].mean()), float(slips[tenth == k].mean()), int((tenth == k).sum()))
+        for k in range(10)
+        if (tenth == k).any()
+    ]
 
 
 def score(case: Case, log: GraspLog, history: SlipHistory) -> Score:
@@ -89,8 +124,15 @@ def score(case: Case, log: GraspLog, history: SlipHistory) -> Score:
         f1_kinematic=count(moving, found).f1,
         stick_ratio_error=float(np.sqrt(np.nanmean((history.stick_ratio - truth.stick_ratio) ** 2))),
         false_slip=float((found & pressing).sum() / max(1, pressing.sum())),
+        onset_error=onset_error(true, found),
         phases={name: count(true[phase == name], found[phase == name]) for name in PHASES},
     )
+
+
+def mean_known(values: list[float]) -> float:
+    """Mean without NaN; NaN where nothing else is left."""
+    known = [value for value in values if not np.isnan(value)]
+    return float(np.mean(known)) if known else float("nan")
 
 
 def summarise(scenes: str, inputs: str, noise: float, method: str, scores: Iterable[Score]) -> Summary:
@@ -113,6 +155,7 @@ def summarise(scenes: str, inputs: str, noise: float, method: str, scores: Itera
         f1_kinematic=float(np.mean([s.f1_kinematic for s in slipping])),
         stick_ratio_error=float(np.mean([s.stick_ratio_error for s in slipping])),
         false_slip=float(np.mean([s.false_slip for s in scores])),
+        onset_error=mean_known([s.onset_error for s in slipping]),
         phases=pooled,
         each={s.scene: s.f1 for s in scores},
     )
@@ -139,14 +182,14 @@ def measure(scenes: str, inputs: str, noise: float, seed: int = 3) -> list[Summa
 def table(rows: list[Summary]) -> str:
     """A table of summaries in Markdown."""
     lines = [
-        "| scenes | input | noise, µm | method | F1 | worst | kinematic F1 | stick ratio | false slip | "
+        "| scenes | input | noise, µm | method | F1 | worst | kinematic F1 | stick ratio | onset | false slip | "
         + " | ".join(PHASES)
         + " |",
-        "|---" * (9 + len(PHASES)) + "|",
+        "|---" * (10 + len(PHASES)) + "|",
     ]
     lines += [
         f"| {r.scenes} | {r.inputs} | {1e6 * r.noise:.0f} | {r.method} | {r.f1:.3f} | {r.worst:.2f} ({r.worst_scene}) "
-        f"| {r.f1_kinematic:.3f} | {r.stick_ratio_error:.3f} | {r.false_slip:.2%} | "
+        f"| {r.f1_kinematic:.3f} | {r.stick_ratio_error:.3f} | {r.onset_error:.2f} | {r.false_slip:.2%} | "
         + " | ".join(f"{r.phases[name]:.2f}" for name in PHASES)
         + " |"
         for r in rows
@@ -173,6 +216,18 @@ def draw(rows: list[Summary]) -> Figure:
         axes.grid(alpha=0.3)
     panels[0].set_ylabel("mean F1 over unseen scenes")
     panels[1].legend(fontsize=7, loc="lower left")
+    return figure
+
+
+def draw_reliability(calibrated: dict[str, list[tuple[float, float, int]]]) -> Figure:
+    """Share of points that truly slip over the probability reported, at 1 µm of noise."""
+    figure = Figure(figsize=(4.5, 4), layout="constrained")
+    axes = figure.subplots()
+    axes.plot((0.0, 1.0), (0.0, 1.0), color="0.6", ls=":")
+    for inputs, tenths in calibrated.items():
+        axes.plot([t[0] for t in tenths], [t[1] for t in tenths], marker="o", label=f"input: {inputs}")
+    axes.set(xlabel="reported probability of slip", ylabel="share that slips", xlim=(0.0, 1.0), ylim=(0.0, 1.0))
+    axes.legend(fontsize=8)
     return figure
 
 

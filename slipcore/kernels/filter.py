@@ -33,6 +33,9 @@ ROWS = 11
 POSE, LOADING, FRICTION, FOLLOWS, BODY = 0, 4, 10, 12, 14
 """Where ``body`` holds the pose, the loading, the slipping force ratio (weighted sum, weight), and the share in which
 the surface follows the known motion (the same); and its length."""
+WILD = 25.0
+"""Squared distance over its variance from where an element would be, stuck or slipping, beyond which a marker was lost
+and found elsewhere: it then tells nothing, but is believed if it stays there."""
 NOT_GIVEN = np.zeros(0)
 FOLLOWS_PRIOR = 30.0
 """Prior weight of a surface that follows all of the motion: a share of 1 ± 0.2."""
@@ -426,20 +429,17 @@ def update_element(
     stick2 = (px - sx) ** 2 + (py - sy) ** 2
     slip2 = (px - lx) ** 2 + (py - ly) ** 2
     gained = 0.5 * stick2 / (vs + doubt) - 0.5 * slip2 / (vl + doubt) + math.log((vs + doubt) / (vl + doubt))
-    odds = math.log(slip / (1.0 - slip)) + min(max(gained, -CERTAIN), CERTAIN) + evidence
+    trust = 1.0
+    if stick2 > WILD * (vs + doubt) and slip2 > WILD * (vl + doubt):
+        trust, vs, vl = 0.0, vs + 0.25 * stick2, vl + 0.25 * slip2
+    odds = math.log(slip / (1.0 - slip)) + trust * min(max(gained, -CERTAIN), CERTAIN) + evidence
     new[PROBABILITY, i, j] = 1.0 / (1.0 + math.exp(-min(max(odds, -CERTAIN), CERTAIN)))
-    k = vs / (vs + doubt)
-    new[STICK_X, i, j], new[STICK_Y, i, j], new[STICK_VARIANCE, i, j] = (
-        sx + k * (px - sx),
-        sy + k * (py - sy),
-        vs * (1.0 - k),
-    )
-    k = vl / (vl + doubt)
-    new[SLIP_X, i, j], new[SLIP_Y, i, j], new[SLIP_VARIANCE, i, j] = (
-        lx + k * (px - lx),
-        ly + k * (py - ly),
-        vl * (1.0 - k),
-    )
+    k = trust * vs / (vs + doubt)
+    new[STICK_X, i, j], new[STICK_Y, i, j] = sx + k * (px - sx), sy + k * (py - sy)
+    new[STICK_VARIANCE, i, j] = vs * (1.0 - k)
+    k = trust * vl / (vl + doubt)
+    new[SLIP_X, i, j], new[SLIP_Y, i, j] = lx + k * (px - lx), ly + k * (py - ly)
+    new[SLIP_VARIANCE, i, j] = vl * (1.0 - k)
 
 
 @compiled

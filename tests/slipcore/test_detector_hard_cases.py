@@ -119,6 +119,34 @@ def test_duplicated_frames_change_no_decision() -> None:
     assert np.count_nonzero(once.slip ^ again.slip[1::2]) < 0.1 * np.count_nonzero(once.slip)
 
 
+def test_the_surface_of_a_soft_object_stays_behind_its_body_without_slip() -> None:
+    motion = steadily()
+    pose = np.concatenate([2.5 * motion[:, 0, 0], np.zeros((FRAMES, 1))], axis=1)
+    slips_at_last = motion.copy()
+    slips_at_last[30:, :2] = motion[30, :2]
+    assert not detect_slip(grasp(motion, everywhere(), pose=pose)).slip.any()
+    history = detect_slip(grasp(slips_at_last, everywhere(), pose=pose))
+    assert history.slip[40:, :2].all()
+    assert not history.slip[:, 2:].any()
+
+
+def test_saturated_frames_are_no_slip_and_leave_no_trace() -> None:
+    motion = steadily()
+    motion[20:, :2] = motion[20, :2]
+    saturated = motion.copy()
+    saturated[40:45] = np.minimum(saturated[40:45], 3.9e-4)  # markers stop where the sensor's range ends
+    whole, clipped = (detect_slip(grasp(seen, everywhere())) for seen in (motion, saturated))
+    assert not clipped.slip[:, 2:].any()
+    np.testing.assert_array_equal(clipped.slip[50:], whole.slip[50:])
+
+
+def test_a_marker_lost_and_found_elsewhere_is_no_slip_unless_it_stays_behind() -> None:
+    log = grasp(steadily(), everywhere())
+    displacement = log.displacement.copy()
+    displacement[30, 5, 5, 1] += 1e-4
+    assert not detect_slip(replace(log, displacement=displacement)).slip.any()
+
+
 def test_a_frozen_sensor_reports_what_it_last_saw() -> None:
     motion = steadily()
     motion[20:, :2] = motion[20, :2]
@@ -182,4 +210,4 @@ def test_one_percent_of_outlier_markers_costs_little() -> None:
         found = detect_slip(seen).slip & true | detect_slip(seen).slip & log.truth.contact
         return 2.0 * np.count_nonzero(true & found) / (np.count_nonzero(true) + np.count_nonzero(found))
 
-    assert score(replace(log, displacement=displacement)) > score(log) - 0.1
+    assert score(replace(log, displacement=displacement)) > score(log) - 0.03
