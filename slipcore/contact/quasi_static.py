@@ -11,6 +11,7 @@ import numpy as np
 
 from slipcore.contact.creep import creep_compliance, creep_recalled, creep_step
 from slipcore.contact.fields import rigid_displacement
+from slipcore.contact.foresight import Stress, continuation, foreseen
 from slipcore.contact.grid import Grid
 from slipcore.contact.kernels import Scaled
 from slipcore.contact.normal import NormalContact
@@ -32,17 +33,15 @@ LEAST_SHARE = 1e-3
 class State:
     """What the next step depends on; fields on the whole grid.
 
-    ``normal`` contact, its ``pressure`` [ny, nx], ``traction`` [2, ny, nx] Pa and the last ``change`` [3, ny, nx] of
-    both; ``displacement`` [2, ny, nx] m of the finger against the object's own surface; ``elastic`` [3, ny, nx] m, the
-    finger's displacement without creep; ``creep`` m, one [3, ny, nx] a branch; ``pose`` [3] of the object (m, m, rad);
-    ``speed`` [ny, nx] m/s of slip, where friction depends on it; ``load``: the last; ``drive`` [3]: how it differed
-    from the one before.
+    ``normal`` contact, ``stress`` and that of the step ``before``; ``displacement`` [2, ny, nx] m of the finger against
+    the object's own surface; ``elastic`` [3, ny, nx] m, the finger's displacement without creep; ``creep`` m, one
+    [3, ny, nx] a branch; ``pose`` [3] of the object (m, m, rad); ``speed`` [ny, nx] m/s of slip, where friction depends
+    on it; ``load``: the last; ``drive`` [3]: how it differed from the one before.
     """
 
     normal: NormalContact | None
-    pressure: FloatArray
-    traction: FloatArray
-    change: FloatArray
+    stress: Stress
+    before: Stress
     displacement: FloatArray
     elastic: FloatArray
     creep: tuple[FloatArray, ...]
@@ -50,11 +49,6 @@ class State:
     speed: FloatArray
     load: StepLoad
     drive: FloatArray
-
-    def foreseen(self, drive: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Pressure and traction if stresses go on changing as in the last step."""
-        share = _foresight(self.drive, drive)
-        return np.maximum(self.pressure + share * self.change[2], 0.0), self.traction + share * self.change[:2]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,9 +109,8 @@ class QuasiStatic:
         """Bodies apart."""
         zero = np.zeros((3, *self.grid.shape))
         creep = tuple(zero for _ in self.problem.creep)
-        return State(
-            None, zero[0], zero[:2], zero, zero[:2], zero, creep, np.zeros(3), zero[0], StepLoad(0.0), np.zeros(3)
-        )
+        apart, still = Stress(zero[0], zero[:2], zero[0]), np.zeros(3)
+        return State(None, apart, apart, zero[:2], zero, creep, still, zero[0], StepLoad(0.0), still)
 
     def run(self, loads: Iterable[StepLoad]) -> Iterator[StepResult]:
         """Results of loads one after the other, from bodies apart."""
@@ -144,7 +137,7 @@ class QuasiStatic:
             self.normal_tolerance,
             state.normal if self._pressed_alike(state, load) else None,
         )
-        solution = equations.solve(*state.foreseen(drive))
+        solution = equations.solve(foreseen(state.stress, state.before, continuation(state.drive, drive)))
         after = self._advance(equations, state, load, drive, solution, recalled)
         result = self._result(equations, state, after, solution)
         seconds = time.perf_counter() - began
@@ -171,7 +164,7 @@ class QuasiStatic:
         if before is None or now is None or now == 0.0 or not all(load.given):
             return max(LEAST_SHARE, 0.01)
         capacity = float(self.friction.max()) * now
-        shear = float(np.hypot(drive[0], drive[1])) + abs(drive[2]) / _lever(state.pressure, self.grid)
+        shear = float(np.hypot(drive[0], drive[1])) + abs(drive[2]) / _lever(state.stress.pressure, self.grid)
         return float(np.clip(max(abs(now - before) / now, shear / max(capacity, 1e-300)), LEAST_SHARE, 1.0))
 
     def _advance(
@@ -184,10 +177,8 @@ class QuasiStatic:
         recalled: FloatArray | None,
     ) -> State:
         """The state at the end of the step."""
-        traction, pose = np.zeros_like(state.traction), state.pose.copy()
-        traction[:, *solution.box] = solution.tangential.traction
-        pose += solution.tangential.motion
-        pressure = solution.normal.pressure
+        pressure, traction, limit = solution.normal.pressure, np.zeros((2, *self.grid.shape)), np.zeros(self.grid.shape)
+        traction[:, *solution.box], limit[solution.box] = solution.tangential.traction, solution.limit
         both = self._displacement(equations.operators, pressure, traction, solution)
         alone = equations.operators.bodies == self.finger.bodies
         elastic = both if alone else self._displacement(self.finger, pressure, traction)
@@ -195,13 +186,21 @@ class QuasiStatic:
         creep = creep_step(self.problem.creep, state.creep, state.elastic, elastic, load.duration)
         if recalled is not None:
             displacement = displacement + recalled[:2]
-        change = np.stack((*(traction - state.traction), pressure - state.pressure))
         speed = state.speed
         if self.problem.velocity_laws:
             speed = np.zeros_like(pressure)
             speed[solution.box] = np.hypot(*solution.tangential.slip) / load.duration
         return State(
-            solution.normal, pressure, traction, change, displacement, elastic, creep, pose, speed, load, drive
+            normal=solution.normal,
+            stress=Stress(pressure, traction, limit),
+            before=state.stress,
+            displacement=displacement,
+            elastic=elastic,
+            creep=creep,
+            pose=state.pose + solution.tangential.motion,
+            speed=speed,
+            load=load,
+            drive=drive,
         )
 
     def _displacement(
@@ -224,7 +223,7 @@ class QuasiStatic:
     def _result(self, equations: StepEquations, state: State, after: State, solution: StepSolution) -> StepResult:
         normal, tangential, box = solution.normal, solution.tangential, solution.box
         contact = normal.pressure > 0.0
-        slip, at_limit, moved = np.zeros_like(after.traction), np.zeros_like(contact), np.zeros_like(contact)
+        slip, at_limit, moved = np.zeros_like(after.stress.traction), np.zeros_like(contact), np.zeros_like(contact)
         touching = contact[box]
         slip[:, *box] = np.where(touching, tangential.slip, 0.0)
         at_limit[box] = touching & (np.hypot(*tangential.traction) >= (1.0 - AT_LIMIT) * solution.limit)
@@ -232,7 +231,7 @@ class QuasiStatic:
         creep = sum(after.creep, start=np.zeros_like(after.elastic))
         return StepResult(
             displacement=after.elastic + creep,
-            force=np.stack((*after.traction, after.pressure)) * self.grid.cell_area,
+            force=np.stack((*after.stress.traction, after.stress.pressure)) * self.grid.cell_area,
             slip=slip,
             contact=contact,
             at_limit=at_limit,
@@ -262,12 +261,6 @@ class QuasiStatic:
 def _drive(before: StepLoad, load: StepLoad) -> FloatArray:
     """By how much the step changes what drives the object: load where that is given, otherwise motion [3]."""
     return np.where(load.given, load.tangential - before.tangential, load.motion)
-
-
-def _foresight(before: FloatArray, drive: FloatArray) -> float:
-    """How far the last step's change of traction goes on in this one: along the same drive, never backward."""
-    size = float((before**2).sum())
-    return min(max(float((before * drive).sum()) / size, 0.0), 2.0) if size > 0.0 else 0.0
 
 
 def _lever(pressure: FloatArray, grid: Grid) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 
 from slipcore.contact.errors import NotConverged
 from slipcore.contact.fields import inner
+from slipcore.contact.foresight import Stress
 from slipcore.contact.grid import Box, Grid, bounding_box
 from slipcore.contact.normal import NormalContact, solve_normal
 from slipcore.contact.operator import Operators
@@ -81,8 +82,9 @@ class StepEquations:
     normal_tolerance: float
     known: NormalContact | None = None
 
-    def solve(self, pressure: FloatArray, traction: FloatArray) -> StepSolution:
-        """Pressure and traction that agree with each other, from guesses of both on the whole grid."""
+    def solve(self, guess: Stress) -> StepSolution:
+        """Pressure and traction that agree with each other, from a guess of both on the whole grid."""
+        pressure, traction, _ = guess
         if not self.problem.coupled:
             return self._once(pressure, traction, self.height, self.tolerance)
         lift, change, iterations, mixing = self._lift(traction), COUPLING_START, 0, Mixing()

@@ -34,7 +34,7 @@ def test_press_shear_reverse_and_release_follow_mindlin_and_deresiewicz(sphere) 
     for force in (1.0, 2.0, 3.0, 3.5, 2.0, 0.0, -2.0, -3.5, 0.0, 2.5):
         state, result = solver.step(state, shear(FORCE, force))
         exact = exact.load(FORCE, force)
-        assert np.sqrt(((state.traction[0] - exact.traction(r)) ** 2).sum()) <= 0.02 * largest
+        assert np.sqrt(((state.stress.traction[0] - exact.traction(r)) ** 2).sum()) <= 0.02 * largest
         assert result.pose[0] == pytest.approx(exact.rigid_displacement, abs=2e-4 * abs(solver.height).max())
         assert result.imbalance <= 1e-10
     state, result = solver.step(state, shear(0.0, 0.0))

@@ -1,0 +1,60 @@
+"""What stresses come to if the load goes on as it did: where the next step's equations start.
+
+Traction itself cannot be extrapolated: its growth has a spike at the front of the stick zone, which moves on. In contact
+that slips from its edge, (1 − |q|/μp)² = (c² − r²)/(a² − r²) within the stick radius c (Cattaneo–Mindlin): linear in
+c², and zero at the front. So this is extrapolated, along the traction; across it traction goes on as it did.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from slipcore.frames import FloatArray
+
+
+class Stress(NamedTuple):
+    """``pressure`` [ny, nx], ``traction`` [2, ny, nx] and Coulomb ``limit`` [ny, nx], all Pa."""
+
+    pressure: FloatArray
+    traction: FloatArray
+    limit: FloatArray
+
+
+def continuation(before: FloatArray, drive: FloatArray) -> float:
+    """How far the last step's change of stress goes on in this one: along the same drive, never backward."""
+    size = float((before**2).sum())
+    return min(max(float((before * drive).sum()) / size, 0.0), 2.0) if size > 0.0 else 0.0
+
+
+def foreseen(now: Stress, before: Stress, share: float) -> Stress:
+    """Stresses after ``share`` of the change from ``before`` to ``now`` once more."""
+    pressure = np.maximum(now.pressure + share * (now.pressure - before.pressure), 0.0)
+    limit = np.maximum(now.limit + share * (now.limit - before.limit), 0.0)
+    traction = np.empty_like(now.traction)
+    _go_on(
+        now.traction.reshape(2, -1),
+        before.traction.reshape(2, -1),
+        now.limit.ravel(),
+        before.limit.ravel(),
+        limit.ravel(),
+        share,
+        traction.reshape(2, -1),
+    )
+    return Stress(pressure, traction, limit)
+
+
+@njit(cache=True)
+def _go_on(traction, earlier, limit, earlier_limit, coming_limit, share, coming):  # type: ignore[no-untyped-def]
+    for i in range(limit.size):
+        qx, qy, ex, ey = traction[0, i], traction[1, i], earlier[0, i], earlier[1, i]
+        cx, cy = qx + share * (qx - ex), qy + share * (qy - ey)
+        size = np.sqrt(qx * qx + qy * qy)
+        if size > 0.0 and limit[i] > 0.0 and earlier_limit[i] > 0.0:
+            nx, ny = qx / size, qy / size
+            left = 1.0 - min(size / limit[i], 1.0)
+            left_before = 1.0 - min((ex * nx + ey * ny) / earlier_limit[i], 1.0)
+            square = left * left + share * (left * left - left_before * left_before)
+            along = coming_limit[i] * (1.0 - np.sqrt(max(square, 0.0))) - (cx * nx + cy * ny)
+            cx, cy = cx + along * nx, cy + along * ny
+        coming[0, i], coming[1, i] = cx, cy
