@@ -21,7 +21,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import estimators
-from benchmarks.estimators import SIGMA, TRUTH, Row, heteroscedastic, make, markdown, outliers, with_friction
+from benchmarks.estimators import SIGMA, TRUTH, Row, heteroscedastic, make, outliers, with_friction
 from estimators import ols
 from slipcore.samples import FrictionSamples
 
@@ -157,6 +157,19 @@ def table(fits: int, cross: int, only: list[str]) -> list[Row]:
     return rows
 
 
+def compact(rows: list[Row]) -> str:
+    """Coverage of β₀, β₁, β₂ in per cent, a row a method and a column a kind of data; its own in bold."""
+    lines = ["| method | " + " | ".join(KINDS) + " |", "|---|" + "---|" * len(KINDS)]
+    for name in dict.fromkeys(str(row["method"]) for row in rows):
+        cells = dict.fromkeys(KINDS, "")
+        for row in rows:
+            if row["method"] == name:
+                values = " ".join(f"{100.0 * float(row[f'beta{k}']):.0f}" for k in range(3))
+                cells[str(row["data"])] = f"**{values}**" if METHODS[name].own == row["data"] else values
+        lines.append(f"| {name} | " + " | ".join(cells.values()) + " |")
+    return "\n".join(lines)
+
+
 def picture(rows: list[Row], path: Path) -> None:
     """Coverage of the worst and the best covered coefficient, a panel a kind of data."""
     figure = Figure(figsize=(12.0, 7.5), layout="constrained")
@@ -197,7 +210,7 @@ def main() -> None:
     rows = table(options.fits, options.cross, options.only)
     (options.output / "estimators-coverage.json").write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     picture(rows, options.output / "estimators-coverage.png")
-    print(markdown(rows))
+    print(compact(rows))
 
 
 if __name__ == "__main__":

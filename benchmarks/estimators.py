@@ -137,11 +137,11 @@ def settings_part(options: argparse.Namespace) -> list[Row]:
     """emcee's moves and numbers of walkers on the whitened posterior from moments, n = 200,000; 20,000 draws each."""
     moments = estimators.Moments.from_samples(make(200_000, 200_000))
     posterior, exact = gaussian(gather(moments)), exact_posterior(gather(moments))
-    moves = {
-        "stretch": emcee.moves.StretchMove(),
-        "differential evolution": emcee.moves.DEMove(),
-        "kernel density": emcee.moves.KDEMove(),
-        "independence": IndependenceMove(posterior.proposal),
+    moves: dict[str, Callable[[], object]] = {
+        "stretch": emcee.moves.StretchMove,
+        "differential evolution": emcee.moves.DEMove,
+        "kernel density": emcee.moves.KDEMove,
+        "independence": lambda: IndependenceMove(posterior.proposal),
     }
     rows: list[Row] = []
     for name, move in moves.items():
@@ -149,7 +149,7 @@ def settings_part(options: argparse.Namespace) -> list[Row]:
             found = []
             for seed in range(3):
                 start = posterior.proposal.draw(np.random.default_rng(seed), walkers)
-                sampler = VectorisedSampler(walkers, 4, posterior.log_probability, moves=move, vectorize=True)
+                sampler = VectorisedSampler(walkers, 4, posterior.log_probability, moves=move(), vectorize=True)
                 begin = time.process_time()
                 sampler.run_mcmc(start, 22_000 // walkers, skip_initial_state_check=True)
                 seconds = time.process_time() - begin

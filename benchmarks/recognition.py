@@ -62,13 +62,16 @@ def summary(trials: list[dict[str, float | str]]) -> list[str]:
     for n in (*SIZES, 0):
         some = [t for t in trials if n in (0, t["n"])]
         right = np.mean([t["answer"] == t["truth"] for t in some])
-        told = np.mean([float(t["probability"]) for t in some])
+        claimed = np.mean([float(t["probability"]) for t in some])
         strange = [t["answer"] == "unknown" for t in some if t["truth"] == "unknown"]
         wrongly = np.mean([t["answer"] == "unknown" for t in some if t["truth"] != "unknown"])
-        parts = f"{right:.1%} | {told:.1%} | {np.mean(strange):.0%} of {len(strange)} | {wrongly:.2%}"
+        parts = f"{right:.1%} | {claimed:.1%} | {np.mean(strange):.0%} of {len(strange)} | {wrongly:.2%}"
         lines.append(f"| {n or 'all'} | {parts} |")
-    expected = sum(float(t["unknown"]) for t in trials)
-    lines.append(f"\nUnknown: {sum(t['truth'] == 'unknown' for t in trials)} grasps; told: {expected:.0f} expected.")
+    told = np.array([float(t["unknown"]) for t in trials])
+    strangers, error = sum(t["truth"] == "unknown" for t in trials), np.sqrt(np.sum(told * (1.0 - told)))
+    lines.append(
+        f"\nUnknown: {strangers} grasps; told: {told.sum():.0f} expected, with a standard error of {error:.0f}."
+    )
     return lines
 
 

@@ -93,7 +93,8 @@ def test_ranks_of_the_gaussian_posterior_are_uniform(samples: Make) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("likelihood", TRUTHS)
 def test_ranks_of_every_sampled_posterior_are_uniform(samples: Make, likelihood: str) -> None:
-    assert_uniform(ranks(samples, likelihood, 500, TRUTHS[likelihood], size=40))
+    size = 150 if likelihood == "errors_in_variables" else 40  # fewer samples leave the noise of the forces unknown
+    assert_uniform(ranks(samples, likelihood, 500, TRUTHS[likelihood], size))
 
 
 def test_a_scatter_taken_too_small_would_be_found_out() -> None:
