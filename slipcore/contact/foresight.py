@@ -1,8 +1,8 @@
 """What stresses come to if the load goes on as it did: where the next step's equations start.
 
-Traction itself cannot be extrapolated: its growth has a spike at the front of the stick zone, which moves on. In contact
-that slips from its edge, (1 − |q|/μp)² = (c² − r²)/(a² − r²) within the stick radius c (Cattaneo–Mindlin): linear in
-c², and zero at the front. So this is extrapolated, along the traction; across it traction goes on as it did.
+Traction itself cannot be extrapolated: its growth has a spike at the front of the stick zone, which moves on. Where a
+contact slips from its edge, (1 − |q|/μp)² = (c² − r²)/(a² − r²) within the stick radius c (Cattaneo–Mindlin): linear
+in c², and zero at the front. So this is extrapolated, along the traction; across it traction goes on as it did.
 """
 
 from typing import NamedTuple
