@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import estimators
+from benchmarks.pages import save
 from slipcore.samples import FrictionSamples
 
 AREA, GRASPS, SAMPLES = 1e-6, 6, 60
@@ -55,9 +56,9 @@ def grasps_of(material: Material, seed: int) -> list[FrictionSamples]:
 
 def picture(data: list[list[FrictionSamples]], models: list[estimators.FrictionModel], path: Path) -> None:
     """Samples with fitted planes above, projections below."""
-    figure = Figure(figsize=(12.0, 11.5))
+    figure = Figure(figsize=(11.0, 10.5))
     above, below = figure.subfigures(2, 1, height_ratios=[2.0, 1.0])
-    above.subplots_adjust(left=0.0, right=0.96, bottom=0.04, top=0.96, wspace=0.1, hspace=0.1)
+    above.subplots_adjust(left=0.0, right=0.97, bottom=0.04, top=0.97, wspace=0.0, hspace=0.05)
     below.subplots_adjust(left=0.07, right=0.76, bottom=0.13, top=0.92)
     for k, (material, grasps, model) in enumerate(zip(MATERIALS, data, models, strict=True)):
         space(above.add_subplot(2, 3, k + 1, projection="3d"), k, material, grasps, model)
@@ -73,7 +74,7 @@ def picture(data: list[list[FrictionSamples]], models: list[estimators.FrictionM
     flat.set_ylabel("friction at v = 0")
     flat.set_title("Projections on v = 0: fitted, with 95 % intervals of the plane; truth dashed", fontsize=10)
     flat.legend(fontsize=9, loc="center left", bbox_to_anchor=(1.01, 0.5))
-    figure.savefig(path, dpi=110)
+    save(figure, path)
 
 
 def space(
@@ -93,7 +94,8 @@ def space(
     axes.set_zlabel("μ", fontsize=8)
     axes.set_zlim(0.0, 1.1)
     axes.tick_params(labelsize=7)
-    axes.set_box_aspect((1.0, 1.0, 0.75), zoom=1.05)
+    axes.set_box_aspect((1.0, 1.0, 0.75), zoom=0.9)
+    axes.patch.set_visible(False)  # it would cover the labels of its neighbour
 
 
 def main() -> None:
