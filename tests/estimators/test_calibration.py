@@ -59,7 +59,7 @@ def noisy_forces(samples: Make, theta: np.ndarray, seed: int, size: int, rng: np
 def ranks(samples: Make, likelihood: str, fits: int, first: np.ndarray, size: int) -> np.ndarray:
     start = simulate(samples, likelihood, first, seed=0, size=2 * size)
     options = {"method": "bayes", "likelihood": likelihood, "accuracy": 0.05}
-    prior = estimators.fit(start, **(options | {"accuracy": 0.01})).draws  # its error is shared by all fits
+    prior = estimators.fit(start, **(options | {"accuracy": 0.02})).draws  # its error is shared by all fits
     chosen = prior[np.random.default_rng(0).choice(len(prior), fits, replace=False)]
     found = np.empty((fits, prior.shape[1]), dtype=int)
     for k, theta in enumerate(chosen):
