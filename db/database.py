@@ -1,34 +1,55 @@
 """The database behind any SQLAlchemy URL: one engine, one transaction a unit of work."""
 
+import json
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
+from typing import Any
 
-from sqlalchemy import Connection, Engine, create_engine, event, make_url
+from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
+from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import DatabaseError, DBAPIError, InterfaceError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 from sqlalchemy.orm import Session
 
-from db.defaults import POOL_OVERFLOW, POOL_SIZE, SQLITE_BUSY_TIMEOUT, SQLITE_SYNCHRONOUS
-from db.errors import StorageUnavailable
+from db.defaults import (
+    CONNECT_TIMEOUT,
+    IDLE_TRANSACTION_TIMEOUT,
+    LOCK_TIMEOUT,
+    POOL_SIZE,
+    POSTGRESQL_POOL_OVERFLOW,
+    SQLITE_POOL_OVERFLOW,
+    SQLITE_SYNCHRONOUS,
+)
+from db.errors import DriverMissing, StorageUnavailable
 
 _BEGIN = "sqlite_begin"
+_READ_ONLY = "25006"
+"""SQLSTATE of a PostgreSQL that takes no writes: a standby that has not been promoted yet."""
 
 
 class Database:
     """An engine with the two kinds of transaction that the rest of the code uses.
 
-    ``url`` is any SQLAlchemy URL; SQLite gets write-ahead logging, foreign keys and a busy timeout of
-    ``busy_timeout`` seconds. Raises ``StorageUnavailable`` wherever the database cannot be reached or is full.
+    ``url`` is any SQLAlchemy URL. SQLite, embedded, gets write-ahead logging and foreign keys, and has one writer at a
+    time; PostgreSQL has many, which wait for each other only where they lock the same row. A writer waits
+    ``lock_timeout`` seconds at most. Raises ``DriverMissing`` for a URL whose driver is not installed, and
+    ``StorageUnavailable`` wherever the database cannot be reached or is full.
     """
 
-    def __init__(self, url: str, busy_timeout: float = SQLITE_BUSY_TIMEOUT) -> None:
+    def __init__(self, url: str, lock_timeout: float = LOCK_TIMEOUT) -> None:
         self.url = url
-        self.engine = create_engine(url, pool_size=POOL_SIZE, max_overflow=POOL_OVERFLOW, pool_pre_ping=not _local(url))
-        if self.is_sqlite:
-            _prepare_sqlite(self.engine, busy_timeout)
+        self.engine = _engine(make_url(url))
         # a deferred transaction that reads first cannot always be upgraded to writing: take the write lock at once
         self._writing = self.engine.execution_options(**{_BEGIN: "BEGIN IMMEDIATE"})
+        self._reading = self.engine
+        if self.is_sqlite:
+            _prepare_sqlite(self.engine, lock_timeout)
+        if self.engine.dialect.name == "postgresql":
+            _prepare_postgresql(self.engine, lock_timeout)
+            # by default each statement would see what was committed meanwhile
+            self._reading = self.engine.execution_options(isolation_level="REPEATABLE READ")
 
     @property
     def is_sqlite(self) -> bool:
@@ -45,14 +66,14 @@ class Database:
     @contextmanager
     def read(self) -> Iterator[Session]:
         """One consistent view; whatever is changed in it is rolled back."""
-        with _unavailable_named(), Session(self.engine) as session:
+        with _unavailable_named(), Session(self._reading) as session:
             yield session
 
     @contextmanager
     def write(self) -> Iterator[Session]:
         """One transaction: committed as a whole at the end, rolled back as a whole on any exception."""
         with _unavailable_named(), Session(self._writing) as session, session.begin():
-            session.connection()  # waits for the write lock here, not at the first statement
+            session.connection()  # SQLite waits for the write lock here, not at the first statement
             yield session
 
     def ping(self) -> None:
@@ -78,11 +99,31 @@ def _unavailable_named(name: str = "database") -> Iterator[None]:
 
 def _says_unavailable(error: DBAPIError) -> bool:
     """Whether the database itself is at fault; SQLite says so of a damaged file by the base class alone."""
-    return isinstance(error, OperationalError | InterfaceError) or type(error) is DatabaseError
+    if isinstance(error, OperationalError | InterfaceError) or type(error) is DatabaseError:
+        return True
+    return getattr(error.orig, "sqlstate", None) == _READ_ONLY
 
 
-def _local(url: str) -> bool:
-    return make_url(url).get_backend_name() == "sqlite"
+def _engine(url: URL) -> Engine:
+    options: dict[str, Any] = {"pool_size": POOL_SIZE, "max_overflow": SQLITE_POOL_OVERFLOW}
+    if url.get_backend_name() != "sqlite":  # a server may have restarted since a connection was last used
+        options |= {"max_overflow": POSTGRESQL_POOL_OVERFLOW, "pool_pre_ping": True}
+    if url.get_backend_name() == "postgresql":
+        options["connect_args"] = {"connect_timeout": url.query.get("connect_timeout", CONNECT_TIMEOUT)}
+    try:  # JSON knows no NaN: SQLite would take it, PostgreSQL would not
+        return create_engine(url, json_serializer=partial(json.dumps, allow_nan=False), **options)
+    except ModuleNotFoundError as error:
+        raise DriverMissing(url.render_as_string(hide_password=True), error.name or str(error)) from error
+
+
+def _prepare_postgresql(engine: Engine, lock_timeout: float) -> None:
+    @event.listens_for(engine, "connect")
+    def set_timeouts(connection: DBAPIConnection, _record: object) -> None:
+        cursor = connection.cursor()
+        cursor.execute(f"SET lock_timeout = {round(lock_timeout * 1000)}")
+        cursor.execute(f"SET idle_in_transaction_session_timeout = {round(IDLE_TRANSACTION_TIMEOUT * 1000)}")
+        cursor.close()
+        connection.commit()
 
 
 def _prepare_sqlite(engine: Engine, busy_timeout: float) -> None:

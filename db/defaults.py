@@ -1,16 +1,25 @@
 """Every default of db, with unit, source and valid range."""
 
-SQLITE_BUSY_TIMEOUT = 10.0
+LOCK_TIMEOUT = 10.0
 """s, above 0; how long a writer waits for another: our transactions last milliseconds, a slow disk's fsync a second."""
 
 SQLITE_SYNCHRONOUS = "FULL"
 """FULL or EXTRA: what was accepted survives a power cut; NORMAL may lose it in WAL mode (PRAGMA synchronous)."""
 
 POOL_SIZE = 5
-"""Connections kept open, at least 1."""
+"""Connections that a process keeps open, at least 1."""
 
-POOL_OVERFLOW = 45
+SQLITE_POOL_OVERFLOW = 45
 """Connections opened beyond that under load, at least 0: more than the 40 threads that serve requests."""
+
+POSTGRESQL_POOL_OVERFLOW = 5
+"""The same on PostgreSQL, at least 0: a server takes 100 connections by default, and many processes share them."""
+
+CONNECT_TIMEOUT = 10
+"""s, at least 2 (libpq); how long PostgreSQL may take to answer at all before it counts as away."""
+
+IDLE_TRANSACTION_TIMEOUT = 60.0
+"""s, above 0; PostgreSQL ends the transaction of a machine that vanished, else its row locks would stay."""
 
 HASHES_PER_QUERY = 500
 """Hashes asked for at once, 1 to 999 (the smallest limit of SQLite on bound parameters)."""

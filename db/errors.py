@@ -27,6 +27,17 @@ class AlreadyExists(DatabaseError):
         return f"{self.kind} {self.name!r} is stored already"
 
 
+class DriverMissing(DatabaseError):
+    """The database of this URL needs a driver that is not installed."""
+
+    def __init__(self, url: str, module: str) -> None:
+        self.url, self.module = url, module
+        super().__init__(url, module)
+
+    def __str__(self) -> str:
+        return f"database is {self.url}, whose driver {self.module} is not installed (stiction[postgresql] brings one)"
+
+
 class StorageUnavailable(DatabaseError):
     """The database or the blob folder cannot be used now: locked, full, gone. Worth another try later."""
 

@@ -1,14 +1,20 @@
 """Runs migrations on the connection that ``db.migrate`` hands over, all of them in one transaction."""
 
 from alembic import context
+from sqlalchemy import text
 
 from db.tables import Base
 
+connection = context.config.attributes["connection"]
 context.configure(
-    connection=context.config.attributes["connection"],
+    connection=connection,
     target_metadata=Base.metadata,
     render_as_batch=True,  # SQLite alters a table by copying it
     compare_type=True,
 )
 with context.begin_transaction():
+    if connection.dialect.name == "postgresql":  # several servers may start at once: the others wait, then find it done
+        connection.execute(text("SET LOCAL lock_timeout = 0"))
+        connection.execute(text("SELECT pg_advisory_xact_lock(hashtext('stiction migrations'))"))
+        connection.execute(text("SET LOCAL lock_timeout TO DEFAULT"))
     context.run_migrations()

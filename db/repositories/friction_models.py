@@ -25,8 +25,11 @@ def add(session: Session, material_id: int, job_id: str, model: NewModel) -> int
 
 
 def lock(session: Session, material_id: int) -> None:
-    """Make other writers of this material's models wait for this transaction (SQLite has one writer anyway)."""
-    session.execute(select(MaterialRow.id).where(MaterialRow.id == material_id).with_for_update())
+    """Make other writers of this material's models wait for this transaction (SQLite has one writer anyway).
+
+    Rows that refer to the material may come in meanwhile.
+    """
+    session.execute(select(MaterialRow.id).where(MaterialRow.id == material_id).with_for_update(key_share=True))
 
 
 def current(session: Session, material: str, method: str) -> StoredModel | None:

@@ -43,10 +43,10 @@ def list_all(session: Session) -> list[Material]:
 
 def _with_counts_and_models(session: Session, ids: Sequence[int] | None) -> list[Material]:
     logs = select(func.count()).where(GraspLogRow.material_id == MaterialRow.id).scalar_subquery()
-    query = select(MaterialRow, logs).order_by(MaterialRow.name)
+    query = select(MaterialRow, logs)
     if ids is not None:
         query = query.where(MaterialRow.id.in_(ids))
-    rows = session.execute(query).all()
+    rows = sorted(session.execute(query).all(), key=lambda row: row[0].name)  # not by the server's collation
     models = friction_models.all_current(session, ids)
     return [_record(row, count, [model for model in models if model.material == row.name]) for row, count in rows]
 

@@ -13,17 +13,20 @@ HASH = "{:064x}"
 
 
 @pytest.fixture
-def empty_database(tmp_path: Path) -> Iterator[Database]:
-    database = Database(f"sqlite:///{tmp_path / 'stiction.sqlite3'}", busy_timeout=0.2)
+def empty_database(new_url: Callable[..., str], tmp_path: Path) -> Iterator[Database]:
+    database = Database(new_url(tmp_path, empty=True), lock_timeout=0.2)
     yield database
     database.close()
 
 
 @pytest.fixture
-def database(empty_database: Database) -> Database:
-    migrate.upgrade(empty_database)
-    empty_database.close()  # what the tests see are connections of its own making, not the migration's
-    return empty_database
+def database(new_url: Callable[..., str], tmp_path: Path) -> Iterator[Database]:
+    database = Database(new_url(tmp_path), lock_timeout=0.2)
+    if database.is_sqlite:  # elsewhere a copy of a migrated one
+        migrate.upgrade(database)
+        database.close()  # what the tests see are connections of its own making, not the migration's
+    yield database
+    database.close()
 
 
 @pytest.fixture

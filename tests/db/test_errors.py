@@ -2,12 +2,18 @@ import pickle
 
 import pytest
 
-from db.errors import AlreadyExists, DatabaseError, NotFound, SchemaMismatch, StorageUnavailable
+from db.errors import AlreadyExists, DatabaseError, DriverMissing, NotFound, SchemaMismatch, StorageUnavailable
 
 
 @pytest.mark.parametrize(
     "error",
-    [NotFound("material", "x"), AlreadyExists("material", "x"), StorageUnavailable("full"), SchemaMismatch("old")],
+    [
+        NotFound("material", "x"),
+        AlreadyExists("material", "x"),
+        DriverMissing("postgresql://h/d", "psycopg"),
+        StorageUnavailable("full"),
+        SchemaMismatch("old"),
+    ],
     ids=lambda error: type(error).__name__,
 )
 def test_errors_survive_the_way_between_processes(error: DatabaseError) -> None:

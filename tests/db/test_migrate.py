@@ -1,3 +1,5 @@
+import subprocess
+import sys
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -13,6 +15,7 @@ from db.records import Detection, NewGraspLog, NewModel, SampleSummary
 from db.repositories import detections, friction_models, grasp_logs, jobs, materials
 from db.tables import Base
 
+ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
 REVISIONS = [entry.revision for entry in ScriptDirectory.from_config(migrate._config()).walk_revisions()][::-1]
 
 
@@ -35,9 +38,12 @@ def test_models_and_migrations_agree(database: Database) -> None:
     assert tables(database) == set(Base.metadata.tables)
 
 
-def test_models_and_migrations_agree_on_check_constraints(database: Database, tmp_path: object) -> None:
+def test_models_and_migrations_agree_on_check_constraints(
+    database: Database, new_url: Callable[..., str], tmp_path: Path
+) -> None:
     """Alembic does not compare these."""
-    made = Database(f"sqlite:///{tmp_path}/made.sqlite3")
+    (tmp_path / "made").mkdir()
+    made = Database(new_url(tmp_path / "made", empty=True))
     Base.metadata.create_all(made.engine)
     for table in Base.metadata.tables:
         assert sorted(map(str, inspect(database.engine).get_check_constraints(table))) == sorted(
@@ -89,6 +95,15 @@ def test_upgrading_again_changes_nothing(database: Database) -> None:
         assert [material.name for material in materials.list_all(session)] == ["paper"]
 
 
+@pytest.mark.parametrize("engine_name", ["postgresql"], indirect=True)
+def test_servers_that_start_at_once_upgrade_once(empty_database: Database) -> None:
+    upgrade = f"from db import database, migrate; migrate.upgrade(database.Database({empty_database.url!r}))"
+    servers = [subprocess.Popen([sys.executable, "-c", upgrade]) for _ in range(3)]
+    assert [server.wait(timeout=240) for server in servers] == [0, 0, 0]
+    assert migrate.check(empty_database) is None
+
+
+@ONLY_SQLITE
 def test_foreign_keys_are_on_again_after_a_migration(empty_database: Database) -> None:
     migrate.upgrade(empty_database)
     with empty_database.read() as session:
@@ -108,6 +123,7 @@ def test_a_table_that_someone_changed_is_named(database: Database) -> None:
         migrate.check(database)
 
 
+@ONLY_SQLITE
 def test_a_migration_that_breaks_references_is_named(database: Database) -> None:
     row = "'1', 'fit', 'queued', '{}', 99, 'ols', 0, 0, '2026-01-01'"
     columns = "id, kind, status, seconds, material_id, method, seed, deaths, created_at"

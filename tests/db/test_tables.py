@@ -36,12 +36,12 @@ def test_the_database_keeps_one_current_model_a_material_and_method(
         for _ in range(2):
             job = jobs.add(session, "fit", "ols", material_id=material.id)
             friction_models.add(session, material.id, job, new_model())
-    with pytest.raises(IntegrityError, match="UNIQUE"), database.write() as session:
+    with pytest.raises(IntegrityError, match=r"(?i)unique"), database.write() as session:
         session.execute(update(FrictionModelRow).values(current=True))
 
 
 def test_a_row_cannot_refer_to_a_material_that_is_not_there(database: Database) -> None:
-    with pytest.raises(IntegrityError, match="FOREIGN KEY"), database.write() as session:
+    with pytest.raises(IntegrityError, match=r"(?i)foreign key"), database.write() as session:
         jobs.add(session, "fit", "ols", material_id=77)
 
 
@@ -61,7 +61,7 @@ def test_the_database_refuses_a_job_that_cannot_be(database: Database, wrong: di
     with database.write() as session:
         material = materials.create(session, "paper", "")
         jobs.add(session, "fit", "ols", material_id=material.id)
-    with pytest.raises(IntegrityError, match="CHECK"), database.write() as session:
+    with pytest.raises(IntegrityError, match=r"(?i)check"), database.write() as session:
         session.execute(update(JobRow).values(**wrong))
 
 
@@ -70,7 +70,7 @@ def test_a_log_without_material_is_stored_once(database: Database, new_log: Call
         log_id = grasp_logs.add(session, new_log(sha256="a" * 64))
         sensor = session.scalars(select(GraspLogRow.sensor_id)).one()
         columns = {"sha256": "a" * 64, "bytes": 1, "format": "npz", "detector": "strain_rate", "frames": 2}
-        with pytest.raises(IntegrityError, match="UNIQUE"), session.begin_nested():
+        with pytest.raises(IntegrityError, match=r"(?i)unique"), session.begin_nested():
             session.execute(
                 insert(GraspLogRow).values(
                     id="other", sensor_id=sensor, duration=1.0, grid_rows=1, grid_columns=1, **columns

