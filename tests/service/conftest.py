@@ -133,8 +133,8 @@ def fitted(
 
 
 @pytest.fixture
-def database(tmp_path: Path) -> Iterator[Database]:
-    database = Database(f"sqlite:///{tmp_path / 'stiction.sqlite3'}")
+def database(new_url: Callable[..., str], tmp_path: Path) -> Iterator[Database]:
+    database = Database(new_url(tmp_path))
     migrate.upgrade(database)
     yield database
     database.close()
