@@ -9,6 +9,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import httpx
 import numpy as np
 import pytest
 from sqlalchemy import select, text
+from sqlalchemy.orm import Session
 
 from db.blobs import BlobStore
 from db.database import Database
@@ -29,8 +31,8 @@ NPZ = "application/vnd.stiction.grasp-log+npz"
 class Victim:
     """A server in a process of its own, started and killed again and again in one folder."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, database_url: str) -> None:
+        self.folder, self.database_url = folder, database_url
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self.port = int(probe.getsockname()[1])
@@ -39,7 +41,10 @@ class Victim:
 
     def start(self) -> None:
         command = [sys.executable, "-m", "uvicorn", "service.app:create_app", "--factory", "--port", str(self.port)]
-        environment = os.environ | {"STICTION_DATA_FOLDER": str(self.folder)}
+        environment = os.environ | {
+            "STICTION_DATA_FOLDER": str(self.folder),
+            "STICTION_DATABASE_URL": self.database_url,
+        }
         with (self.folder / "server.log").open("ab") as log:
             self.process = subprocess.Popen(command, env=environment, stdout=log, stderr=subprocess.STDOUT)
         wait_until(self.is_ready, "the server to be ready")
@@ -82,8 +87,10 @@ class Victim:
             lambda: all(self.client.get(f"/v1/jobs/{id_}").json()["finished_at"] for id_ in ids), "all jobs to end"
         )
 
-    def database(self) -> Any:
-        return Database(f"sqlite:///{self.folder / 'stiction.sqlite3'}").read()
+    @contextmanager
+    def database(self) -> Iterator[Session]:
+        with closing(Database(self.database_url)) as database, database.read() as session:
+            yield session
 
 
 def wait_until(condition: Callable[[], bool], what: str) -> None:
@@ -115,8 +122,9 @@ def check_consistent(victim: Victim) -> None:
     for sha256 in stored:
         assert hashlib.sha256(blobs.path(sha256).read_bytes()).hexdigest() == sha256
     with victim.database() as session:
-        assert session.execute(text("PRAGMA integrity_check")).scalars().all() == ["ok"]
-        assert session.execute(text("PRAGMA foreign_key_check")).all() == []
+        if victim.database_url.startswith("sqlite"):
+            assert session.execute(text("PRAGMA integrity_check")).scalars().all() == ["ok"]
+            assert session.execute(text("PRAGMA foreign_key_check")).all() == []
         for column in (GraspLogRow.sha256, DetectionRow.history_blob, SampleSummaryRow.samples_blob):
             assert set(session.scalars(select(column))) <= stored
         assert set(session.scalars(select(JobRow.grasp_log_id))) == set(session.scalars(select(GraspLogRow.id)))
@@ -148,8 +156,8 @@ def check_complete(victim: Victim, accepted: list[str]) -> None:
 
 
 @pytest.fixture
-def victim(tmp_path: Path) -> Iterator[Victim]:
-    victim = Victim(tmp_path)
+def victim(tmp_path: Path, new_url: Callable[..., str]) -> Iterator[Victim]:
+    victim = Victim(tmp_path, new_url(tmp_path))
     victim.start()
     victim.client.post("/v1/materials", json={"name": "paper"}).raise_for_status()
     yield victim
