@@ -97,10 +97,10 @@ def test_a_material_without_a_model_says_so(client: httpx.Client, material: str)
 
 @pytest.mark.usefixtures("fitted")
 def test_the_friction_of_a_fitted_material_is_its_truth(client: httpx.Client) -> None:
-    mean = client.get("/v1/materials/fitted/friction", params={"fn": 0.3}).json()
+    mean = client.get("/v1/materials/fitted/friction", params={"fn": 0.4}).json()
     assert mean["friction_coefficient"] == mean["mean"] == pytest.approx(0.4, abs=0.004)
     assert (mean["material"], mean["method"], mean["version"]) == ("fitted", "ols", 1)
-    assert (mean["tangential_velocity"], mean["normal_force"], mean["quantile"]) == (0.0, 0.3, None)
+    assert (mean["tangential_velocity"], mean["normal_force"], mean["quantile"]) == (0.0, 0.4, None)
     assert (mean["within_domain"], mean["warning"]) == (True, None)
 
 
