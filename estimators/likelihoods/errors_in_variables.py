@@ -20,32 +20,45 @@ NOISE = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ErrorsInVariables:
-    """Coordinates (log σ, s): s in N is the noise of each component of the force on an element, and may be near 0.
+    """Of (σ, s): s in N is the noise of each component of the force on an element, and may be near 0.
 
     The true f_n are taken as normal with the mean ``mean`` and variance ``variance`` − s², which gives each its
     expectation and variance from what was measured (regression calibration; Carroll et al., 2006, §4 and §8).
+
+    Coordinates (log R, x): R² = σ² + ``gain``² s² is the scatter of the measured ratio, which the samples tell well;
+    x² = ``gain`` s/σ, the share of the noise in it, they tell badly. Few samples leave an arc between σ = 0 and s = 0,
+    which is straight in these; the root bends the density to 0 where s ends. ``gain``: that of s in the ratio, 1/N.
     """
 
     mean: float
     variance: float
+    gain: float
     noise_scale: float
     prior: str
     names: tuple[str, ...] = ("sigma", "force_noise")
 
     def start(self, scale: float) -> FloatArray:
-        """The robust scale, and noise well within the variation of f_n."""
-        noise = min(0.4 * self.noise_scale, 0.3 * float(np.sqrt(self.variance)))
-        return np.array([[np.log(scale), noise], [0.1, 0.2 * noise]])
+        """The robust scale, half of its square noise, but noise well within the variation of f_n."""
+        noise = min(float(np.sqrt(0.5)) * scale, 0.3 * self.gain * float(np.sqrt(self.variance)))
+        root = float(np.sqrt(noise / np.sqrt(scale**2 - noise**2)))
+        return np.array([[np.log(scale), root], [0.1, 0.3 * root]])
 
     def natural(self, coordinates: FloatArray) -> FloatArray:
         """(σ, s)."""
-        return np.column_stack([bounded_exp(coordinates[:, 0]), coordinates[:, 1]])
+        ratio = np.clip(coordinates[:, 1], 0.0, 1e30) ** 2
+        sigma = bounded_exp(coordinates[:, 0]) / np.hypot(1.0, ratio)
+        return np.column_stack([sigma, ratio * sigma / self.gain])
 
     def log_prior(self, coordinates: FloatArray) -> FloatArray:
-        """That of s; none where noise would exceed all the variation of the measured f_n."""
-        noise = coordinates[:, 1]
-        inside = (noise > 0.0) & (noise**2 < 0.98 * self.variance)
-        return np.where(inside, log_half_student(noise, self.noise_scale), -np.inf)
+        """That of s; none where noise would exceed all the variation of the measured f_n.
+
+        ∂(log σ, s)/∂(log R, x) is 2 x σ/``gain``.
+        """
+        root = coordinates[:, 1]
+        sigma, noise = self.natural(coordinates).T
+        inside = (root > 0.0) & (noise**2 < 0.98 * self.variance)
+        log = log_half_student(noise, self.noise_scale) + np.log(np.where(inside, root, 1.0) * sigma)
+        return np.where(inside, log, -np.inf)
 
     def log_likelihood(self, beta: FloatArray, natural: FloatArray, rows: Rows) -> FloatArray:
         """Sum of w log N(f_t; its mean given what was measured, scatter and noise together)."""
@@ -65,10 +78,13 @@ def errors_in_variables(evidence: Evidence) -> PerSample:
     variance = float(np.average((f_n - mean) ** 2, weights=weight))
     if variance <= (16.0 * np.finfo(float).eps * mean) ** 2:
         raise InvalidSamples("normal_force", f"{mean:.6g} N in every sample", "forces that vary, as noisy ones do")
-    scale = NOISE * float(np.sqrt(np.average(f_n**2, weights=weight)))
+    size = float(np.sqrt(np.average(f_n**2, weights=weight)))
+    friction = float(np.average(observations.tangential_force, weights=weight)) / mean
+    scale = NOISE * size
     terms = ErrorsInVariables(
         mean=mean,
         variance=variance,
+        gain=float(np.hypot(1.0, friction)) / size,
         noise_scale=scale,
         prior=f"noise of a force component ~ half-Student-t with scale {scale:.3g} N",
     )

@@ -55,7 +55,7 @@ def test_outlier_is_the_mixture_of_two_normals() -> None:
 def test_errors_in_variables_has_the_mean_and_variance_of_the_integral_over_the_true_force() -> None:
     """One sample: f_t given the measured f_n, against quadrature over the true f_n and its noise."""
     mean, variance, noise, sigma = 0.06, 5e-4, 2e-3, 0.02
-    terms = errors_in_variables.ErrorsInVariables(mean, variance, 1.0, "")
+    terms = errors_in_variables.ErrorsInVariables(mean, variance, gain=10.0, noise_scale=1.0, prior="")
     measured, v, beta = 0.04, 3e-3, BETA[:1]
     kept = 1.0 - noise**2 / variance
     true = stats.norm(mean + kept * (measured - mean), np.sqrt(kept) * noise)
@@ -130,6 +130,38 @@ def test_each_gives_the_exact_answer_on_clean_data(samples: Make, likelihood: st
     assert model.diagnostics["move"] == "independence"
     assert np.abs((model.coefficients - exact.coefficients) / exact.standard_errors).max() < 0.6
     np.testing.assert_allclose(model.standard_errors, exact.standard_errors, rtol=0.25)  # it pays for its caution
+
+
+def test_coordinates_of_scatter_and_noise_leave_the_prior_as_it_is_stated() -> None:
+    """Density of coordinates = density of (log σ, s) × Jacobian, here by central differences."""
+    terms = errors_in_variables.ErrorsInVariables(0.06, 5e-4, gain=12.0, noise_scale=3e-3, prior="")
+    at = np.array([[np.log(0.02), 0.3], [np.log(0.03), 1.4], [np.log(0.01), 0.01]])
+
+    def physical(coordinates: np.ndarray) -> np.ndarray:
+        sigma, noise = terms.natural(coordinates).T
+        return np.column_stack([np.log(sigma), noise])
+
+    steps = 1e-5 * np.eye(2)
+    columns = [(physical(at + step) - physical(at - step)) / 2e-5 for step in steps]
+    jacobian = np.abs(np.linalg.det(np.stack(columns, axis=2)))
+    stated = stats.t(4.0, scale=3e-3).logpdf(terms.natural(at)[:, 1])
+    constant = terms.log_prior(at) - stated - np.log(jacobian)
+    np.testing.assert_allclose(constant, constant[0], atol=1e-6)  # differences are good to 1e-8 of a value
+
+
+@pytest.mark.parametrize("seed", [4, 6, 7])
+def test_few_samples_do_not_tell_scatter_from_noise_and_yet_converge(samples: Make, seed: int) -> None:
+    """Much of the arc from σ = 0 to s = 0 is possible, and no end of it holds a walker for long."""
+    rng = np.random.default_rng(seed)
+    data = samples(80, seed=seed, normal_force=rng.normal(0.1, 0.015, 80))
+    f_n, f_t = (f + 3e-3 * rng.standard_normal(80) for f in (data.normal_force, data.tangential_force))
+    data = replace(data, normal_force=f_n, tangential_force=f_t, friction_coefficient=f_t / f_n)
+    model = estimators.fit(data, method="bayes", likelihood="errors_in_variables", accuracy=0.02)
+    times = [float(model.diagnostics[f"autocorrelation_time_{name}"]) for name in ("sigma", "force_noise")]
+    sigma = model.draws[:, 3]
+    assert sigma.std() > 0.3 * sigma.mean()
+    assert model.diagnostics["move"] == "independence"
+    assert max(times) < 5.0
 
 
 def test_blocks_of_samples_and_other_walkers_do_not_show() -> None:
