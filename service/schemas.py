@@ -44,7 +44,7 @@ _JOB: JsonDict = {
     "finished_at": _MOMENT,
 }
 _DETECTION: JsonDict = {
-    "method": "strain_rate",
+    "method": "filter",
     "noise": 1.1e-6,
     "stick_ratio_min": 0.12,
     "contact_frames": 240,
