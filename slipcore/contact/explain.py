@@ -196,7 +196,7 @@ def _coupling(whole: Measured) -> Proposal | None:
         return Proposal("add", "NormalTangentialCoupling", reason, "boundary elements with and without it")
     ratio = whole.plan.poisson_ratio
     dundurs = (1.0 - 2.0 * ratio) / (2.0 * (1.0 - ratio))
-    if dundurs < COUPLING_RATIO * friction:
+    if friction == 0.0 or dundurs < COUPLING_RATIO * friction:
         return None
     reason = f"Dundurs' β = {dundurs:.2g} at ν = {ratio:g} against a rigid object, {dundurs / friction:.2g} of μ"
     return Proposal(
@@ -210,7 +210,8 @@ def _off_centre(whole: Measured) -> Proposal | None:
     assert force is not None  # simulated logs have forces
     normal = np.abs(force[..., 2]).sum(axis=(1, 2))
     k = int(np.argmax(normal))
-    if whole.plan.drives("moment") or whole.plan.drives("yaw") or normal[k] == 0.0:
+    driven = whole.plan.drives("moment") or whole.plan.drives("yaw")
+    if driven or normal[k] == 0.0 or whole.scene.friction == 0.0:
         return None
     weight = np.abs(force[k, ..., 2])[..., None]
     centre = (weight * whole.log.position[..., :2]).sum(axis=(0, 1)) / normal[k]

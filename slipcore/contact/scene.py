@@ -90,7 +90,11 @@ class Scene:
             path = LIBRARY / f"{path}.toml"
         if not path.exists():
             raise InvalidInput("scene", path, "a TOML file, or one of " + ", ".join(library()))
-        return cls.from_mapping(tomllib.loads(path.read_text(encoding="utf-8")))
+        try:
+            entries = tomllib.loads(path.read_text(encoding="utf-8"))
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise InvalidInput("scene file", path, f"TOML ({error})") from error
+        return cls.from_mapping(entries)
 
     @classmethod
     def from_mapping(cls, entries: Mapping[str, Any]) -> "Scene":

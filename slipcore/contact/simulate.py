@@ -36,7 +36,11 @@ def simulate(
     plan = scene.plan(seed)
     if fidelity is not None and (accuracy is not None or seconds is not None):
         raise InvalidInput("fidelity", fidelity, "no fidelity beside an accuracy or seconds")
-    cheap = named(tier, scene, plan) if tier else cheapest(scene, plan, accuracy) if accuracy is not None else None
+    cheap = None
+    if tier is not None:
+        cheap = named(tier, scene, plan, accuracy)
+    elif accuracy is not None:
+        cheap = cheapest(scene, plan, accuracy)
     if cheap is not None:
         log, estimated = cheap.run(scene, plan), f"{cheap.accuracy(scene, plan):.2g}"
     elif accuracy is None and seconds is None:

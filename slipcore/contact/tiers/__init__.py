@@ -35,12 +35,19 @@ def cheapest(scene: Scene, plan: Plan, accuracy: float) -> Tier | None:
     return None
 
 
-def named(name: str, scene: Scene, plan: Plan) -> Tier | None:
-    """The tier of that name, None for boundary elements. Raises ``InvalidInput`` for a scene that it cannot do."""
+def named(name: str, scene: Scene, plan: Plan, accuracy: float | None = None) -> Tier | None:
+    """The tier of that name, None for boundary elements.
+
+    Raises ``InvalidInput`` for a scene that it cannot do, or not as accurately as asked.
+    """
     known: dict[str, Tier | None] = {**{tier.NAME: tier for tier in TIERS}, BOUNDARY_ELEMENTS: None}
     if name not in known:
         raise InvalidInput("tier", name, ", ".join(known))
     tier = known[name]
-    if tier is not None and tier.accuracy(scene, plan) is None:
-        raise InvalidInput("tier", name, f"one that holds for scene {scene.name}, as {BOUNDARY_ELEMENTS} does")
+    if tier is None:
+        return None
+    reached = tier.accuracy(scene, plan)
+    if reached is None or (accuracy is not None and accuracy < reached):
+        wanted = "" if reached is None else f" to {accuracy:g} (this one to {reached:g})"
+        raise InvalidInput("tier", name, f"one that holds for scene {scene.name}{wanted}, as {BOUNDARY_ELEMENTS} does")
     return tier

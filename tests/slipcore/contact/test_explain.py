@@ -112,3 +112,8 @@ def test_a_scene_explains_itself_and_its_record_is_frozen() -> None:
     assert explanation.effects == ()
     with pytest.raises(dataclasses.FrozenInstanceError):
         explanation.scene = "other"  # type: ignore[misc]
+
+
+def test_a_scene_without_friction_is_explained_too() -> None:
+    explanation = explain(Scene("slippery", (SENSOR,), friction=0.0))
+    assert "NormalTangentialCoupling" not in {effect for _, effect in proposed(explanation)}

@@ -1,5 +1,7 @@
 """Scene files, sampling and the log that comes out."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -119,3 +121,11 @@ def test_without_a_sensor_every_cell_and_step_is_in_the_log() -> None:
     log = simulate(Scene("bare"), fidelity=Fidelity(cells=10))
     assert log.grid == (10, 10)
     assert len(log) == 61
+
+
+@pytest.mark.parametrize("content", [b"garbage = [", b"\xff\xfe"])
+def test_a_file_that_is_not_toml_is_refused_by_name(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "broken.toml"
+    path.write_bytes(content)
+    with pytest.raises(InvalidInput, match=r"broken\.toml"):
+        Scene.from_toml(path)

@@ -102,3 +102,10 @@ def test_an_unknown_tier_is_refused_by_name() -> None:
     scene = Scene.from_toml("table1_condition1")
     with pytest.raises(InvalidInput, match="finite elements"):
         named("finite elements", scene, scene.plan())
+
+
+def test_a_tier_that_is_not_as_accurate_as_asked_is_refused() -> None:
+    scene = Scene.from_toml("table1_condition1")
+    with pytest.raises(InvalidInput, match=r"0\.01"):
+        simulate(scene, tier="beams", accuracy=0.01)
+    assert named("beams", scene, scene.plan(), 0.6) is beam_lattice
