@@ -7,6 +7,9 @@ from numba import njit
 
 from slipcore.frames import FloatArray
 
+VECTOR = {"reassoc", "nsz", "contract"}
+"""Liberties that compiled sums take to run in vectors; infinities and NaN keep their meaning."""
+
 
 def inner(a: FloatArray, b: FloatArray) -> float:
     """Σ a·b of two contiguous fields.
@@ -49,7 +52,7 @@ def _doubled_last(field: FloatArray) -> FloatArray:
     return halves.reshape(*field.shape[:-1], -1)
 
 
-@njit(cache=True, fastmath={"reassoc", "nsz", "contract"})
+@njit(cache=True, fastmath=VECTOR)
 def _inner(a, b):  # type: ignore[no-untyped-def]
     total = 0.0
     for i in range(a.size):

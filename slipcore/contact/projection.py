@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from slipcore.contact.fields import VECTOR
 from slipcore.frames import BoolArray, FloatArray
 
 TIGHT = 2e-14
@@ -136,7 +137,7 @@ def _evaluate(wish, radius, arm, target, given, motion, traction, gradient, hess
     hessian[2, 0], hessian[2, 1], hessian[2, 2] = hxm, hym, hmm
 
 
-@njit(cache=True, fastmath={"reassoc", "nsz", "contract"}, error_model="numpy")
+@njit(cache=True, fastmath=VECTOR, error_model="numpy")
 def _evaluate_block(wish_x, wish_y, radius, arm_x, arm_y, motion, traction_x, traction_y):  # type: ignore[no-untyped-def]
     """Tractions of a few cells, their resultants and derivatives; without branches, so that it runs in vectors."""
     mx, my, yaw = motion[0], motion[1], motion[2]

@@ -7,12 +7,11 @@ costs as much as its arithmetic.
 import numpy as np
 from numba import njit
 
+from slipcore.contact.fields import VECTOR
 from slipcore.contact.operator import ElasticOperator
 from slipcore.frames import BoolArray, FloatArray
 
 OUTSIDE, STICK, SLIP = 0, 1, 2
-VECTOR = {"reassoc", "nsz", "contract"}
-"""Liberties of sums; infinities and NaN keep their meaning."""
 
 
 class TangentSpace:
