@@ -1,12 +1,13 @@
 """What the repositories hand out and take in: plain frozen records, independent of any session."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from typing import Literal
 
 JobKind = Literal["ingest", "fit"]
 JobStatus = Literal["queued", "running", "done", "failed", "refused"]
+Scope = Literal["read", "upload", "admin"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,3 +148,15 @@ class StoredGraspLog:
     job: Job
     detection: Detection | None
     samples: SampleSummary | None
+
+
+@dataclass(frozen=True, slots=True)
+class AccessKey:
+    """An access key as it is known: its public ``id``, what it may do, and the SHA-256 of its secret."""
+
+    id: str
+    name: str
+    scope: Scope
+    sha256: str = field(repr=False)
+    created_at: datetime
+    revoked_at: datetime | None

@@ -19,7 +19,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-from db.records import JobKind, JobStatus
+from db.records import JobKind, JobStatus, Scope
 
 CONSTRAINT_NAMES = {
     "ix": "ix_%(table_name)s_%(column_0_N_name)s",
@@ -235,3 +235,17 @@ class FrictionModelRow(Base):
     cost_seconds: Mapped[float]
     monte_carlo_error: Mapped[float]
     created_at: Mapped[datetime] = mapped_column(default=now)
+
+
+class AccessKeyRow(Base):
+    """An access key; of its secret only the digest is kept."""
+
+    __tablename__ = "access_keys"
+    __table_args__ = (_one_of("scope", get_args(Scope)),)
+
+    id: Mapped[str] = mapped_column(String(12), primary_key=True)
+    name: Mapped[str] = mapped_column(String(100))
+    scope: Mapped[str] = mapped_column(String(10))
+    sha256: Mapped[str] = mapped_column(String(64))
+    created_at: Mapped[datetime] = mapped_column(default=now)
+    revoked_at: Mapped[datetime | None]

@@ -10,9 +10,10 @@ from db import migrate
 from db.blobs import BlobStore
 from db.database import Database
 from db.repositories import blobs as blob_references
-from service import openapi, problems
+from service import access, gate, openapi, problems
 from service.context import Context
 from service.folder_lock import locked
+from service.gate import Gate
 from service.head_requests import HeadRequests
 from service.jobs import JobPool
 from service.routes import grasp_logs, health, jobs, materials
@@ -47,6 +48,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     for module in (health, materials, grasp_logs, jobs):
         app.include_router(module.router)
+    access.check_routes(app)
+    app.add_middleware(Gate, settings=chosen)
     app.add_middleware(HeadRequests)
     problems.install(app)
     openapi.describe_problems(app)
@@ -61,6 +64,7 @@ async def running(settings: Settings) -> AsyncIterator[Context]:
             migrate.upgrade(database)
         else:
             migrate.check(database)
+        gate.check_start(settings, database)
         blobs = BlobStore(settings.data_folder)
         _sweep(database, blobs)
         pool = JobPool(

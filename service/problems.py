@@ -1,6 +1,7 @@
 """Errors as RFC 9457 problem details: one stable type a kind of problem (docs/problems.md)."""
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Any
@@ -36,6 +37,9 @@ class ProblemType:
 
 BAD_REQUEST = ProblemType("bad-request", "The request cannot be understood", 400)
 UPLOAD_INTERRUPTED = ProblemType("upload-interrupted", "The upload broke off", 400)
+KEY_REQUIRED = ProblemType("key-required", "An access key is needed", 401)
+INVALID_KEY = ProblemType("invalid-key", "The access key is not valid", 401)
+INSUFFICIENT_SCOPE = ProblemType("insufficient-scope", "The access key does not allow this", 403)
 UNKNOWN_ROUTE = ProblemType("unknown-route", "No such route", 404)
 UNKNOWN_MATERIAL = ProblemType("unknown-material", "No such material", 404)
 UNKNOWN_GRASP_LOG = ProblemType("unknown-grasp-log", "No such grasp log", 404)
@@ -60,7 +64,7 @@ _BY_STATUS = {404: UNKNOWN_ROUTE, 405: METHOD_NOT_ALLOWED, 413: UPLOAD_TOO_LARGE
 class Problem(Exception):
     """An answer other than the one that was asked for.
 
-    ``name``, ``value`` and ``allowed`` say what was wrong, where one thing was.
+    ``name``, ``value`` and ``allowed`` say what was wrong, where one thing was; ``headers`` are those of the answer.
     """
 
     def __init__(
@@ -71,9 +75,10 @@ class Problem(Exception):
         name: str | None = None,
         value: object = None,
         allowed: str | None = None,
+        headers: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__(detail)
-        self.kind, self.detail = kind, detail
+        self.kind, self.detail, self.headers = kind, detail, dict(headers or {})
         self.name, self.value, self.allowed = name, None if value is None else str(value), allowed
 
     @classmethod
@@ -93,7 +98,12 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(Exception, _on_unexpected)
 
 
-def answer(request: Request, problem: Problem, headers: dict[str, str] | None = None, **more: object) -> JSONResponse:
+def storage_unavailable(error: StorageUnavailable) -> Problem:
+    """That the stores cannot be used now, with the time to try again."""
+    return Problem(STORAGE_UNAVAILABLE, str(error), headers={"Retry-After": "1"})
+
+
+def answer(request: Request, problem: Problem, **more: object) -> JSONResponse:
     """The problem as a response."""
     content: dict[str, Any] = {
         "type": problem.kind.uri,
@@ -104,7 +114,7 @@ def answer(request: Request, problem: Problem, headers: dict[str, str] | None = 
     }
     if problem.name is not None:
         content |= {"name": problem.name, "value": problem.value, "allowed": problem.allowed}
-    return JSONResponse(content | more, problem.kind.status, headers, MEDIA_TYPE)
+    return JSONResponse(content | more, problem.kind.status, problem.headers, MEDIA_TYPE)
 
 
 async def _on_problem(request: Request, error: Exception) -> JSONResponse:
@@ -122,7 +132,8 @@ async def _on_not_found(request: Request, error: Exception) -> JSONResponse:
 
 async def _on_storage_unavailable(request: Request, error: Exception) -> JSONResponse:
     logger.error("storage unavailable", exc_info=error)
-    return answer(request, Problem(STORAGE_UNAVAILABLE, str(error)), {"Retry-After": "1"})
+    assert isinstance(error, StorageUnavailable)
+    return answer(request, storage_unavailable(error))
 
 
 async def _on_invalid_request(request: Request, error: Exception) -> JSONResponse:
@@ -150,7 +161,7 @@ async def _on_http_exception(request: Request, error: Exception) -> JSONResponse
     headers = dict(error.headers or {})
     if kind is METHOD_NOT_ALLOWED:
         headers["Allow"] = ", ".join(_allowed_methods(request))
-    return answer(request, Problem(kind, f"{request.method} {request.url.path}: {error.detail}"), headers)
+    return answer(request, Problem(kind, f"{request.method} {request.url.path}: {error.detail}", headers=headers))
 
 
 def _allowed_methods(request: Request) -> list[str]:

@@ -1,7 +1,7 @@
 """Settings of the service, each from an environment variable of the same name with the prefix ``STICTION_``."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -21,6 +21,7 @@ class Settings(BaseSettings):
     )
     database_url: str | None = Field(
         default=None,
+        repr=False,  # it may hold a password
         description="SQLAlchemy URL of the database; by default the SQLite file `stiction.sqlite3` in the data folder.",
     )
     migrate_at_start: bool = Field(
@@ -30,6 +31,10 @@ class Settings(BaseSettings):
     host: str = Field(default="127.0.0.1", description="Address to listen on.")
     port: Annotated[int, Field(ge=0, le=65535)] = Field(
         default=8000, description="Port to listen on; 0 takes a free one."
+    )
+    access: Literal["auto", "keys", "open"] = Field(
+        default="auto",
+        description="Who must send a key: all but users of this machine (auto), everybody (keys), or nobody (open).",
     )
     max_upload_bytes: Annotated[int, Field(ge=1, le=2**40)] = Field(
         default=256 * MIB, description="Largest grasp log that is accepted, in bytes."

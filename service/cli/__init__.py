@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import typer
 
-from service.cli import database, local, remote, running, simulation
+from service.cli import database, keys, local, remote, running, simulation
 from service.cli.exit_codes import exit_code
 
 app = typer.Typer(
@@ -29,6 +29,7 @@ for command in (
 ):
     app.command()(command)
 app.add_typer(database.app, name="db")
+app.add_typer(keys.app, name="keys")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

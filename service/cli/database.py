@@ -20,7 +20,7 @@ def upgrade(database_url: Url = None) -> None:
     """Bring the database to this version's schema; a new one gets all its tables."""
     from db import migrate
 
-    with _database(database_url) as database:
+    with opened(database_url) as database:
         migrate.upgrade(database)
         typer.echo(f"at revision {migrate.current(database)}")
 
@@ -33,7 +33,7 @@ def downgrade(
     """Bring the database back to an older schema."""
     from db import migrate
 
-    with _database(database_url) as database:
+    with opened(database_url) as database:
         migrate.downgrade(database, revision)
         typer.echo(f"at revision {migrate.current(database)}")
 
@@ -43,7 +43,7 @@ def current(database_url: Url = None) -> None:
     """Print the database's revision."""
     from db import migrate
 
-    with _database(database_url) as database:
+    with opened(database_url) as database:
         typer.echo(migrate.current(database) or "empty")
 
 
@@ -52,13 +52,14 @@ def check(database_url: Url = None) -> None:
     """Make sure that the database's schema is this version's; exit code 3 and the difference if not."""
     from db import migrate
 
-    with _database(database_url) as database:
+    with opened(database_url) as database:
         migrate.check(database)
         typer.echo("the schema is this version's")
 
 
 @contextmanager
-def _database(url: str | None) -> Iterator["Database"]:
+def opened(url: str | None) -> Iterator["Database"]:
+    """The database at this URL, or the service's own."""
     from db.database import Database
     from service.settings import Settings
 

@@ -16,13 +16,16 @@ MAX_JSON_BYTES = 64 * 1024
 
 
 def problems(*kinds: ProblemType) -> dict[int | str, dict[str, Any]]:
-    """Description of the problems that a route may answer with, by status."""
-    described: dict[int | str, dict[str, Any]] = {}
-    for status in sorted({kind.status for kind in kinds}):
-        of_status = [kind for kind in kinds if kind.status == status]
-        text = "; ".join(f"{kind.title} (`{kind.uri}`)" for kind in of_status)
-        described[status] = {"description": text, "model": ProblemOut}
-    return described
+    """Description of the problems that a route may answer with, by status, as the framework takes it."""
+    return {status: {"description": text, "model": ProblemOut} for status, text in description_of(*kinds).items()}
+
+
+def description_of(*kinds: ProblemType) -> dict[int, str]:
+    """What is said of problems, by status."""
+    by_status: dict[int, list[str]] = {}
+    for kind in sorted(kinds, key=lambda kind: kind.status):
+        by_status.setdefault(kind.status, []).append(f"{kind.title} (`{kind.uri}`)")
+    return {status: "; ".join(texts) for status, texts in by_status.items()}
 
 
 class JsonRoute(APIRoute):

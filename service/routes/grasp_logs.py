@@ -7,6 +7,7 @@ from fastapi import APIRouter, Query, Request, Response
 from db.records import StoredGraspLog
 from db.repositories import grasp_logs
 from service import formats
+from service.access import READ, UPLOAD
 from service.context import Context, Given
 from service.formats.tracked_markers import FRAME_RATE, SCALE
 from service.problems import (
@@ -49,6 +50,7 @@ _RESULTS = problems(UNKNOWN_GRASP_LOG, NOT_READY, INVALID_REQUEST, STORAGE_UNAVA
 
 @router.post(
     "",
+    dependencies=[UPLOAD],
     summary="Upload a grasp log",
     status_code=202,
     openapi_extra=_BODY,
@@ -102,13 +104,13 @@ async def create_grasp_log(
     return GraspLogOut.of(accepted.log)
 
 
-@router.get("/{id}", summary="Look at a grasp log", responses=_FOUND)
+@router.get("/{id}", dependencies=[READ], summary="Look at a grasp log", responses=_FOUND)
 def read_grasp_log(context: Given, id: str) -> GraspLogOut:  # noqa: A002  (the path's own name)
     """With its job and, once there, what was found in it."""
     return GraspLogOut.of(_find(context, id))
 
 
-@router.get("/{id}/stick-ratio", summary="Look at the stick ratio over time", responses=_RESULTS)
+@router.get("/{id}/stick-ratio", dependencies=[READ], summary="Look at the stick ratio over time", responses=_RESULTS)
 def read_stick_ratio(context: Given, id: str) -> StickRatioOut:  # noqa: A002
     """One value a frame."""
     log = _find(context, id)
@@ -118,7 +120,7 @@ def read_stick_ratio(context: Given, id: str) -> StickRatioOut:  # noqa: A002
     )
 
 
-@router.get("/{id}/events", summary="Look at slip and contact events", responses=_RESULTS)
+@router.get("/{id}/events", dependencies=[READ], summary="Look at slip and contact events", responses=_RESULTS)
 def read_events(context: Given, id: str) -> EventsOut:  # noqa: A002
     """Of each element."""
     log = _find(context, id)
@@ -132,7 +134,7 @@ def read_events(context: Given, id: str) -> EventsOut:  # noqa: A002
     )
 
 
-@router.get("/{id}/samples", summary="Look at the friction samples", responses=_RESULTS)
+@router.get("/{id}/samples", dependencies=[READ], summary="Look at the friction samples", responses=_RESULTS)
 def read_samples(context: Given, id: str) -> SamplesOut:  # noqa: A002
     """One entry an element and frame; empty where no slip gave one."""
     log = _find(context, id)

@@ -6,6 +6,7 @@ from fastapi import APIRouter, Query, Response
 
 from db.errors import AlreadyExists
 from db.repositories import friction_models, materials
+from service.access import READ, UPLOAD
 from service.context import Given
 from service.problems import (
     INVALID_REQUEST,
@@ -45,6 +46,7 @@ SMALLEST_TAIL = 1e-12
 
 @router.post(
     "",
+    dependencies=[UPLOAD],
     summary="Make a material known",
     status_code=201,
     responses=problems(MATERIAL_EXISTS, UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILABLE),
@@ -60,7 +62,7 @@ def create_material(context: Given, new: NewMaterial, response: Response) -> Mat
     return MaterialOut.of(made)
 
 
-@router.get("", summary="List all materials", responses=problems(STORAGE_UNAVAILABLE))
+@router.get("", dependencies=[READ], summary="List all materials", responses=problems(STORAGE_UNAVAILABLE))
 def list_materials(context: Given) -> MaterialsOut:
     """By name, each with its current models."""
     with context.database.read() as session:
@@ -69,6 +71,7 @@ def list_materials(context: Given) -> MaterialsOut:
 
 @router.get(
     "/{name}",
+    dependencies=[READ],
     summary="Look at one material",
     responses=problems(UNKNOWN_MATERIAL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
@@ -80,6 +83,7 @@ def read_material(context: Given, name: str) -> MaterialOut:
 
 @router.get(
     "/{name}/friction",
+    dependencies=[READ],
     summary="Look up the friction coefficient",
     responses=problems(UNKNOWN_MATERIAL, NO_MODEL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
@@ -110,6 +114,7 @@ def read_friction(
 
 @router.post(
     "/{name}/fits",
+    dependencies=[UPLOAD],
     summary="Fit a material's model",
     status_code=202,
     responses=problems(UNKNOWN_MATERIAL, UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILABLE),
@@ -123,6 +128,7 @@ def create_fit(context: Given, name: str, wish: NewFit, response: Response) -> J
 
 @router.get(
     "/{name}/fits",
+    dependencies=[READ],
     summary="List all versions of a material's models",
     responses=problems(UNKNOWN_MATERIAL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )

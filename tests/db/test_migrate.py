@@ -12,7 +12,7 @@ from db import migrate
 from db.database import Database
 from db.errors import SchemaMismatch, StorageUnavailable
 from db.records import Detection, NewGraspLog, NewModel, SampleSummary
-from db.repositories import detections, friction_models, grasp_logs, jobs, materials
+from db.repositories import access_keys, detections, friction_models, grasp_logs, jobs, materials
 from db.tables import Base
 
 ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -27,6 +27,7 @@ def fill(database: Database, log: NewGraspLog, detection: Detection, samples: Sa
         job = jobs.add(session, "ingest", "ols", material_id=material.id, grasp_log_id=log_id)
         detections.add(session, log_id, detection, samples)
         friction_models.add(session, material.id, job, model)
+        access_keys.add(session, "0" * 12, "robot", "read", log.sha256)
 
 
 def tables(database: Database) -> set[str]:

@@ -64,6 +64,14 @@ def test_every_command_explains_itself_and_is_documented(name: str, run: Run) ->
     assert f"`stiction {name}" in (ROOT / "docs" / "cli.md").read_text(encoding="utf-8")
 
 
+def test_the_key_of_the_environment_is_sent_and_not_shown(run: Run, url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("STICTION_KEY", "hush")
+    code, out, err = run("lookup", "paper", "--url", url)
+    assert code == SERVICE_REFUSED
+    assert "invalid-key" in err
+    assert "hush" not in out + err
+
+
 def test_detect_tells_a_program_what_was_seen(run: Run, ramps: list[Path], tmp_path: Path) -> None:
     picture = tmp_path / "slip.png"
     code, out, _ = run("detect", ramps[0], "--json", "--picture", picture)

@@ -33,12 +33,18 @@ def test_a_setting_comes_from_the_environment(monkeypatch: pytest.MonkeyPatch, t
     assert Settings(database_url="postgresql://db/stiction").resolved_database_url == "postgresql://db/stiction"
 
 
+def test_the_databases_password_is_not_shown() -> None:
+    settings = Settings(database_url="postgresql://stiction:hush@db/stiction")
+    assert "hush" not in f"{settings!r}{settings}"
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [
         ("port", 65536),
         ("port", -1),
         ("max_upload_bytes", 0),
+        ("access", "none"),
         ("workers", 0),
         ("workers", 65),
         ("job_attempts", 0),

@@ -1,0 +1,121 @@
+"""The gate before all routes: finds out who asks, and turns away who may not."""
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+from fastapi import Request
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import HTTPConnection
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from db.database import Database
+from db.errors import NotFound, StorageUnavailable
+from db.records import AccessKey
+from db.repositories import access_keys
+from service import access, problems
+from service.access import CHALLENGE, EVERYTHING, PUBLIC_PATHS, Access, is_loopback
+from service.context import Context
+from service.problems import INVALID_KEY, KEY_REQUIRED, Problem
+from service.settings import Settings
+
+KEPT_SECONDS = 2.0
+"""s that a key read from the database is believed: so long a revoked one may still work."""
+
+MOST_KEPT = 10_000
+"""Keys; more than a fleet has."""
+
+
+class NoKeys(RuntimeError):
+    """The service would ask everybody for a key, and there is none."""
+
+
+def check_start(settings: Settings, database: Database) -> None:
+    """Refuse to listen where others can reach the service, unless there are keys; raises ``NoKeys``."""
+    if settings.access == "open" or (settings.access == "auto" and is_loopback(settings.host)):
+        return
+    with database.read() as session:
+        if not access_keys.any_valid(session):
+            what = f"host is {settings.host}, access is {settings.access}, and there are no keys"
+            raise NoKeys(f"{what}; allowed: make one with `stiction keys create`, or set STICTION_ACCESS=open")
+
+
+class KeyRing:
+    """Keys of the database, each read once every few seconds at most."""
+
+    def __init__(self) -> None:
+        self._kept: dict[str, tuple[AccessKey, float]] = {}
+
+    async def find(self, database: Database, text: str) -> AccessKey | None:
+        """The key with this text, if it is a valid one."""
+        key_id = access.key_id(text)
+        if key_id is None:
+            return None
+        known, until = self._kept.get(key_id, (None, 0.0))
+        if known is None or time.monotonic() > until:
+            known = await run_in_threadpool(_read, database, key_id)
+            if known is None:
+                return None
+            if len(self._kept) >= MOST_KEPT:
+                self._kept.clear()
+            self._kept[key_id] = (known, time.monotonic() + KEPT_SECONDS)
+        return known if access.is_key(text, known) else None
+
+
+class Gate:
+    """Tells the routes who asks (``request.state.access``); answers by itself who has no key where one is needed."""
+
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+        self.app = app
+        self._settings = settings
+        self._ring = KeyRing()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one connection."""
+        if scope["type"] not in {"http", "websocket"} or scope["path"] in PUBLIC_PATHS:
+            await self.app(scope, receive, send)
+            return
+        connection = HTTPConnection(scope)
+        try:
+            connection.state.access = await self._identify(connection)
+        except Problem as problem:
+            await problems.answer(Request({**scope, "type": "http"}), problem)(scope, receive, send)
+            return
+        await self.app(scope, receive, send)
+
+    async def _identify(self, connection: HTTPConnection) -> Access:
+        """Who asks; a key that is sent counts even where none is needed."""
+        kind, _, text = connection.headers.get("authorization", "").partition(" ")
+        if kind.lower() != "bearer":
+            if self._needs_key(connection.scope):
+                detail = f"send an access key: Authorization: Bearer KEY; got {kind or 'no such header'}"
+                raise Problem(KEY_REQUIRED, detail, headers={"WWW-Authenticate": CHALLENGE})
+            return EVERYTHING
+        context: Context = connection.app.state.context
+        try:
+            found = await self._ring.find(context.database, text.strip())
+        except StorageUnavailable as error:
+            raise problems.storage_unavailable(error) from error
+        if found is None:
+            headers = {"WWW-Authenticate": f'{CHALLENGE}, error="invalid_token"'}
+            raise Problem(INVALID_KEY, "the access key is unknown, revoked or garbled", headers=headers)
+        return Access(found.id, found.scope)
+
+    def _needs_key(self, scope: Scope) -> bool:
+        """Without a setting, all but those who are on this machine themselves, behind no proxy."""
+        if self._settings.access == "auto":
+            return not all(is_loopback(host) for host in _ends(scope))
+        return self._settings.access == "keys"
+
+
+def _ends(scope: Scope) -> Iterator[Any]:
+    for end in ("server", "client"):
+        yield (scope.get(end) or ("",))[0]
+
+
+def _read(database: Database, key_id: str) -> AccessKey | None:
+    with database.read() as session:
+        try:
+            return access_keys.get(session, key_id)
+        except NotFound:
+            return None

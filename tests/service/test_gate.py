@@ -1,0 +1,253 @@
+import asyncio
+import logging
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import httpx
+import pytest
+from fastapi import FastAPI
+from sqlalchemy import event
+
+from db.blobs import BlobStore
+from db.database import Database
+from db.repositories import access_keys
+from service import access, gate
+from service.access import SCOPES
+from service.app import create_app
+from service.context import Context
+from service.gate import NoKeys, check_start
+from service.settings import Settings
+from stiction_client import AsyncFrictionClient, Material, ProblemError
+
+ROUTES = access.scopes_of_routes(create_app(Settings()))
+ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+
+Make = Callable[..., str]
+
+
+@dataclass
+class Caller:
+    """Somebody who asks the application itself, from a network address of his own."""
+
+    app: FastAPI
+    server: str
+    address: str
+    headers: dict[str, str]
+
+    def request(self, method: str, path: str, **more: Any) -> httpx.Response:
+        return asyncio.run(self._request(method, path, **more))
+
+    def get(self, path: str, **more: Any) -> httpx.Response:
+        return self.request("GET", path, **more)
+
+    async def _request(self, method: str, path: str, **more: Any) -> httpx.Response:
+        transport = httpx.ASGITransport(self.app, raise_app_exceptions=False, client=(self.address, 50000))
+        url = f"http://{self.server}"
+        async with httpx.AsyncClient(transport=transport, base_url=url, headers=self.headers) as client:
+            return await client.request(method, path, **more)
+
+    def open_stream(self, path: str) -> httpx.Response:
+        """What a WebSocket is answered before it is open."""
+        headers = [(name.lower().encode(), value.encode()) for name, value in self.headers.items()]
+        ends = {"server": (self.server, 80), "client": (self.address, 50000)}
+        scope = {"type": "websocket", "path": path, "raw_path": path.encode(), "query_string": b"", "headers": headers}
+        sent: list[Any] = []
+
+        async def receive() -> dict[str, str]:
+            return {"type": "websocket.connect"}
+
+        async def send(message: Any) -> None:
+            sent.append(message)
+
+        scope |= ends | {"scheme": "ws", "extensions": {"websocket.http.response": {}}, "subprotocols": []}  # type: ignore[dict-item]
+        asyncio.run(self.app(scope, receive, send))
+        if sent[0]["type"] == "websocket.accept":
+            return httpx.Response(101)
+        return httpx.Response(sent[0]["status"], headers=sent[0]["headers"], content=sent[1]["body"])
+
+
+Reach = Callable[..., Caller]
+
+
+@pytest.fixture
+def make(database: Database) -> Make:
+    def make_key(scope: str = "read") -> str:
+        key_id, text = access.new_key()
+        with database.write() as session:
+            access_keys.add(session, key_id, "robot", scope, access.digest(text))
+        return text
+
+    return make_key
+
+
+@pytest.fixture
+def reach(database: Database, blobs: BlobStore) -> Reach:
+    """A client as the application sees it; it starts no jobs."""
+
+    def client(mode: str = "auto", server: str = "10.0.0.5", address: str = "10.0.0.9", key: str = "") -> Caller:
+        settings = Settings(access=mode)
+        app = create_app(settings)
+        no_jobs: Any = None
+        app.state.context = Context(settings, database, blobs, no_jobs)
+        headers = {"Authorization": f"Bearer {key}"} if key else {}
+        return Caller(app, server, address, headers)
+
+    return client
+
+
+def knock(client: Caller, route: str) -> httpx.Response:
+    """The answer of a route to a request that is well-formed as far as anybody without the route's secrets knows."""
+    method, _, path = route.partition(" ")
+    path = re.sub(r"\{\w+\}", "x", path)
+    if method == "WS":
+        return client.open_stream(path)
+    return client.request(method, path, json={} if method != "GET" else None)
+
+
+@ONLY_SQLITE
+def test_no_route_answers_without_its_scope(reach: Reach, make: Make) -> None:
+    keys = {scope: make(scope) for scope in SCOPES}
+    clients = {scope: reach(key=key) for scope, key in keys.items()}
+    assert ROUTES
+    for route, needed in ROUTES.items():
+        answer = knock(reach(), route)
+        assert (answer.status_code, answer.headers["www-authenticate"]) == (401, 'Bearer realm="stiction"'), route
+        assert answer.headers["content-type"] == "application/problem+json"
+        for scope, client in clients.items():
+            answer = knock(client, route)
+            if SCOPES.index(scope) < max(map(SCOPES.index, needed)):
+                assert answer.status_code == 403, route
+                assert answer.json()["type"] == "/problems/insufficient-scope"
+                assert f'error="insufficient_scope", scope="{max(needed)}"' in answer.headers["www-authenticate"]
+            else:
+                assert answer.status_code not in {401, 403}, route
+
+
+@ONLY_SQLITE
+@pytest.mark.parametrize(
+    "path", ["/v1", "/v1/nothing", "/v1/materials/", "/", "//healthz", "/healthz/", "/v1/%2e%2e/healthz"]
+)
+def test_even_what_is_not_there_is_not_told_without_a_key(reach: Reach, path: str) -> None:
+    assert reach().get(path).status_code == 401
+
+
+def test_a_key_lets_in_and_a_revoked_or_changed_one_does_not(
+    reach: Reach, make: Make, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(gate, "KEPT_SECONDS", -1.0)
+    text = make()
+    client = reach(key=text)
+    assert client.get("/v1/materials").status_code == 200
+    for wrong in (text[:-1] + ("0" if text[-1] != "0" else "1"), text + "0", make().replace("stiction_", ""), "x"):
+        answer = reach(key=wrong).get("/v1/materials")
+        assert (answer.status_code, answer.json()["type"]) == (401, "/problems/invalid-key")
+        assert answer.headers["www-authenticate"] == 'Bearer realm="stiction", error="invalid_token"'
+        assert wrong not in answer.text or wrong == "x"
+    with database.write() as session:
+        access_keys.revoke(session, access.key_id(text) or "")
+    assert client.get("/v1/materials").status_code == 401
+
+
+@ONLY_SQLITE
+@pytest.mark.parametrize("header", ["Basic dTpw", "Bearer", "Bearer ", "bearer a b", "Bearer ü".encode(), "\x00"])
+def test_other_headers_are_no_keys(reach: Reach, header: Any) -> None:
+    assert reach().get("/v1/materials", headers={"Authorization": header}).status_code == 401
+
+
+@ONLY_SQLITE
+def test_a_key_is_read_from_the_database_once_in_a_while(reach: Reach, make: Make, database: Database) -> None:
+    client, seen = reach(key=make()), []
+
+    def note(_connection: object, _cursor: object, statement: str, *_rest: object) -> None:
+        seen.extend([statement] if "access_keys" in statement else [])
+
+    event.listen(database.engine, "before_cursor_execute", note)
+    for _ in range(3):
+        assert client.get("/v1/materials").status_code == 200
+    event.remove(database.engine, "before_cursor_execute", note)
+    assert len(seen) == 1
+
+
+@ONLY_SQLITE
+@pytest.mark.parametrize(
+    ("mode", "server", "address", "status"),
+    [
+        ("auto", "127.0.0.1", "127.0.0.1", 200),
+        ("auto", "[::1]", "::1", 200),
+        ("auto", "127.0.0.1", "10.0.0.9", 401),  # a proxy on this machine says for whom it asks
+        ("auto", "10.0.0.5", "127.0.0.1", 401),
+        ("open", "10.0.0.5", "10.0.0.9", 200),
+        ("keys", "127.0.0.1", "127.0.0.1", 401),
+    ],
+)
+def test_who_must_send_a_key(reach: Reach, mode: str, server: str, address: str, status: int) -> None:
+    assert reach(mode, server, address).get("/v1/materials").status_code == status
+    assert reach(mode, server, address).get("/healthz").status_code == 200
+
+
+@ONLY_SQLITE
+def test_a_key_that_is_sent_counts_where_none_is_needed(reach: Reach, make: Make) -> None:
+    assert reach("open", key=make("read")).request("POST", "/v1/materials", json={"name": "felt"}).status_code == 403
+    assert reach("open", key="wrong").get("/v1/materials").status_code == 401
+
+
+@ONLY_SQLITE
+def test_the_client_sends_its_key(reach: Reach, make: Make) -> None:
+    async def materials(key: str | None) -> list[Material]:
+        transport = httpx.ASGITransport(reach().app, client=("10.0.0.9", 50000))
+        async with AsyncFrictionClient("http://10.0.0.5", key=key, transport=transport) as client:
+            return await client.materials()
+
+    assert asyncio.run(materials(make())) == []
+    with pytest.raises(ProblemError) as refused:
+        asyncio.run(materials(None))
+    assert (refused.value.status, refused.value.type) == (401, "/problems/key-required")
+
+
+@ONLY_SQLITE
+def test_no_key_reaches_the_logs(reach: Reach, make: Make, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.DEBUG)
+    text = make()
+    for key in (text, text + "0"):
+        reach(key=key).get("/v1/materials")
+    assert text.rpartition("_")[2] not in caplog.text
+
+
+@ONLY_SQLITE
+def test_a_database_that_is_away_is_said_at_the_gate(reach: Reach, make: Make, database: Database) -> None:
+    client = reach(key=make())
+    with database.connect() as connection:
+        connection.exec_driver_sql("ALTER TABLE access_keys RENAME TO hidden")
+        connection.commit()
+    answer = client.get("/v1/materials")
+    assert (answer.status_code, answer.headers["retry-after"]) == (503, "1")
+
+
+@pytest.mark.parametrize(
+    ("settings", "needed"),
+    [
+        (Settings(host="0.0.0.0"), True),
+        (Settings(host="::"), True),
+        (Settings(access="keys"), True),
+        (Settings(), False),
+        (Settings(host="::1"), False),
+        (Settings(host="0.0.0.0", access="open"), False),
+    ],
+    ids=str,
+)
+def test_a_service_that_others_reach_does_not_start_without_keys(
+    database: Database, make: Make, settings: Settings, needed: bool
+) -> None:
+    if needed:
+        with pytest.raises(NoKeys, match=f"host is {settings.host}.* `stiction keys create`"):
+            check_start(settings, database)
+        key_id = access.key_id(make()) or ""
+        check_start(settings, database)
+        with database.write() as session:
+            access_keys.revoke(session, key_id)
+        with pytest.raises(NoKeys):
+            check_start(settings, database)
+    else:
+        check_start(settings, database)
