@@ -35,24 +35,27 @@ class NewModel:
 
 @dataclass(frozen=True, slots=True)
 class StoredModel:
-    """One version of a material's friction model."""
+    """One version of a material's friction model; ``outdated`` where a log behind it was withdrawn since."""
 
     material: str
     version: int
     current: bool
+    outdated: bool
     created_at: datetime
     model: NewModel
 
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """A material with the number of its grasp logs and its current models, one a method."""
+    """A material with its other names, the number of its logs, of those withdrawn, and a current model a method."""
 
     id: int
     name: str
     description: str
     created_at: datetime
+    aliases: tuple[str, ...]
     grasp_logs: int
+    withdrawn_grasp_logs: int
     models: tuple[StoredModel, ...]
 
 
@@ -131,6 +134,14 @@ class NewGraspLog:
 
 
 @dataclass(frozen=True, slots=True)
+class Withdrawal:
+    """That a log was taken out of the fits, when and why."""
+
+    at: datetime
+    because: str
+
+
+@dataclass(frozen=True, slots=True)
 class StoredGraspLog:
     """A grasp log with its ingest job and, once there, what detection and sampling found."""
 
@@ -145,6 +156,7 @@ class StoredGraspLog:
     duration: float
     grid: tuple[int, int]
     created_at: datetime
+    withdrawal: Withdrawal | None
     job: Job
     detection: Detection | None
     samples: SampleSummary | None

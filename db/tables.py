@@ -30,6 +30,10 @@ CONSTRAINT_NAMES = {
 }
 
 
+NAME = String(100).with_variant(String(100, collation="C"), "postgresql")
+"""A name of a material, in the same order on every server, whatever its language."""
+
+
 class UtcDateTime(TypeDecorator[datetime]):
     """A moment in UTC; SQLite keeps no zone, so it is put back on reading."""
 
@@ -71,14 +75,24 @@ class Base(DeclarativeBase):
 
 
 class MaterialRow(Base):
-    """A material whose friction is identified."""
+    """A material whose friction is identified; one that was merged into another keeps the models it had."""
 
     __tablename__ = "materials"
 
     id: Mapped[int] = mapped_column(primary_key=True)
-    name: Mapped[str] = mapped_column(String(100), unique=True)
+    name: Mapped[str] = mapped_column(NAME, index=True)
     description: Mapped[str]
     created_at: Mapped[datetime] = mapped_column(default=now)
+    merged_into_id: Mapped[int | None] = mapped_column(ForeignKey("materials.id"), index=True)
+
+
+class MaterialNameRow(Base):
+    """A name under which a material is found, its own or an alias: no two materials share one."""
+
+    __tablename__ = "material_names"
+
+    name: Mapped[str] = mapped_column(NAME, primary_key=True)
+    material_id: Mapped[int] = mapped_column(ForeignKey("materials.id"), index=True)
 
 
 class SensorRow(Base):
@@ -109,6 +123,9 @@ class GraspLogRow(Base):
         CheckConstraint("bytes > 0", name="bytes"),
         CheckConstraint("frames > 1", name="frames"),
         CheckConstraint("duration > 0", name="duration"),
+        CheckConstraint("(withdrawn_at IS NULL) = (withdrawn_because IS NULL)", name="withdrawn"),
+        Index(None, "created_at", "id"),
+        Index(None, "material_id", "created_at", "id"),
     )
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
@@ -116,13 +133,15 @@ class GraspLogRow(Base):
     bytes: Mapped[int] = mapped_column(BigInteger)
     format: Mapped[str] = mapped_column(String(50))
     detector: Mapped[str] = mapped_column(String(50))
-    material_id: Mapped[int | None] = mapped_column(ForeignKey("materials.id"), index=True)
+    material_id: Mapped[int | None] = mapped_column(ForeignKey("materials.id"))
     sensor_id: Mapped[int] = mapped_column(ForeignKey("sensors.id"), index=True)
     frames: Mapped[int]
     duration: Mapped[float]
     grid_rows: Mapped[int]
     grid_columns: Mapped[int]
     created_at: Mapped[datetime] = mapped_column(default=now)
+    withdrawn_at: Mapped[datetime | None]
+    withdrawn_because: Mapped[str | None]
 
 
 class JobRow(Base):
@@ -197,7 +216,10 @@ class SampleSummaryRow(Base):
 
 
 class FrictionModelRow(Base):
-    """One version of a material's friction model; exactly one a material and method is current."""
+    """One version of a material's friction model; at most one a material and method is current.
+
+    It is ``outdated`` once a log behind it was withdrawn.
+    """
 
     __tablename__ = "friction_models"
     __table_args__ = (
@@ -219,6 +241,7 @@ class FrictionModelRow(Base):
     method: Mapped[str] = mapped_column(String(30))
     version: Mapped[int]
     current: Mapped[bool]
+    outdated: Mapped[bool] = mapped_column(default=False)
     coefficients: Mapped[list[Any]]
     covariance: Mapped[list[Any]]
     scale: Mapped[float]

@@ -16,7 +16,7 @@ from service.folder_lock import locked
 from service.gate import Gate
 from service.head_requests import HeadRequests
 from service.jobs import JobPool
-from service.routes import grasp_logs, health, jobs, materials
+from service.routes import curation, grasp_logs, health, jobs, materials
 from service.settings import Settings
 from service.worker import Place
 
@@ -46,7 +46,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         redirect_slashes=False,
         generate_unique_id_function=openapi.operation_id,
     )
-    for module in (health, materials, grasp_logs, jobs):
+    for module in (health, materials, grasp_logs, curation, jobs):
         app.include_router(module.router)
     access.check_routes(app)
     app.add_middleware(Gate, settings=chosen)

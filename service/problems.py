@@ -12,7 +12,7 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 from starlette.routing import Match, Router
 
-from db.errors import NotFound, StorageUnavailable
+from db.errors import AlreadyExists, NotFound, StorageUnavailable
 
 logger = logging.getLogger(__name__)
 
@@ -42,6 +42,7 @@ INVALID_KEY = ProblemType("invalid-key", "The access key is not valid", 401)
 INSUFFICIENT_SCOPE = ProblemType("insufficient-scope", "The access key does not allow this", 403)
 UNKNOWN_ROUTE = ProblemType("unknown-route", "No such route", 404)
 UNKNOWN_MATERIAL = ProblemType("unknown-material", "No such material", 404)
+UNKNOWN_ALIAS = ProblemType("unknown-alias", "No such alias", 404)
 UNKNOWN_GRASP_LOG = ProblemType("unknown-grasp-log", "No such grasp log", 404)
 UNKNOWN_JOB = ProblemType("unknown-job", "No such job", 404)
 METHOD_NOT_ALLOWED = ProblemType("method-not-allowed", "The route does not take this method", 405)
@@ -57,7 +58,12 @@ STORAGE_UNAVAILABLE = ProblemType("storage-unavailable", "Database or blob folde
 
 PROBLEM_TYPES = {entry.name: entry for entry in list(globals().values()) if isinstance(entry, ProblemType)}
 
-_UNKNOWN = {"material": UNKNOWN_MATERIAL, "grasp log": UNKNOWN_GRASP_LOG, "job": UNKNOWN_JOB}
+_UNKNOWN = {
+    "material": UNKNOWN_MATERIAL,
+    "alias": UNKNOWN_ALIAS,
+    "grasp log": UNKNOWN_GRASP_LOG,
+    "job": UNKNOWN_JOB,
+}
 _BY_STATUS = {404: UNKNOWN_ROUTE, 405: METHOD_NOT_ALLOWED, 413: UPLOAD_TOO_LARGE}
 
 
@@ -92,6 +98,7 @@ def install(app: FastAPI) -> None:
     """Let every error of the application be answered as problem details."""
     app.add_exception_handler(Problem, _on_problem)
     app.add_exception_handler(NotFound, _on_not_found)
+    app.add_exception_handler(AlreadyExists, _on_already_exists)
     app.add_exception_handler(StorageUnavailable, _on_storage_unavailable)
     app.add_exception_handler(RequestValidationError, _on_invalid_request)
     app.add_exception_handler(HTTPException, _on_http_exception)
@@ -128,6 +135,12 @@ async def _on_not_found(request: Request, error: Exception) -> JSONResponse:
     if kind is INTERNAL_ERROR:
         logger.error("%s is referred to but missing", error.kind, exc_info=error)
     return answer(request, Problem.wrong_value(kind, error.kind, error.name, f"the name of a stored {error.kind}"))
+
+
+async def _on_already_exists(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, AlreadyExists)
+    allowed = f"a name that no {error.kind} has yet"
+    return answer(request, Problem.wrong_value(MATERIAL_EXISTS, "name", error.name, allowed))
 
 
 async def _on_storage_unavailable(request: Request, error: Exception) -> JSONResponse:

@@ -3,10 +3,10 @@
 from datetime import datetime
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from pydantic.config import JsonDict
 
-from db.records import Job, JobKind, JobStatus, Material, StoredGraspLog, StoredModel
+from db.records import Job, JobKind, JobStatus, Material, StoredGraspLog, StoredModel, Withdrawal
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}$"
 FitMethod = Literal["ols", "bayes"]
@@ -17,6 +17,7 @@ _MODEL: JsonDict = {
     "method": "ols",
     "version": 3,
     "current": True,
+    "outdated": False,
     "coefficients": [0.41, -0.8, -0.35],
     "covariance": [[1.0e-5, 0.0, 0.0], [0.0, 1.0e-2, 0.0], [0.0, 0.0, 4.0e-3]],
     "scale": 0.021,
@@ -29,6 +30,15 @@ _MODEL: JsonDict = {
     "diagnostics": {"r_squared": 0.31, "cluster_kind": "grasp"},
     "cost": {"seconds": 0.012, "monte_carlo_error": 0.0},
     "created_at": _MOMENT,
+}
+_MATERIAL: JsonDict = {
+    "name": "paper",
+    "aliases": ["80 g paper"],
+    "description": "80 g/m²",
+    "created_at": _MOMENT,
+    "grasp_logs": 12,
+    "withdrawn_grasp_logs": 0,
+    "models": {"ols": _MODEL},
 }
 _JOB: JsonDict = {
     "id": "0f8fad5bd9cb469fa16570867728950e",
@@ -53,6 +63,31 @@ _DETECTION: JsonDict = {
     "samples": 1932,
     "seconds": 0.06,
 }
+_GRASP_LOG: JsonDict = {
+    "id": "7c9e6679742540de944be07fc1f90ae7",
+    "sha256": "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08",
+    "bytes": 4806144,
+    "format": "npz",
+    "material": "paper",
+    "sensor": "AD2-0065L",
+    "frames": 250,
+    "duration": 8.3,
+    "grid": [20, 20],
+    "created_at": _MOMENT,
+    "withdrawal": None,
+    "job": _JOB,
+    "detection": _DETECTION,
+}
+
+
+def _storable(text: str) -> str:
+    if "\0" in text or any("\ud800" <= letter <= "\udfff" for letter in text):
+        raise ValueError("text without NUL and lone surrogates")
+    return text
+
+
+Name = Annotated[str, Field(pattern=NAME_PATTERN, description="1 to 100 letters, digits, spaces and `._-`.")]
+Text = Annotated[str, Field(max_length=10_000), AfterValidator(_storable)]
 
 
 class NewMaterial(BaseModel):
@@ -62,15 +97,33 @@ class NewMaterial(BaseModel):
         extra="forbid", json_schema_extra={"examples": [{"name": "paper", "description": "80 g/m²"}]}
     )
 
-    name: Annotated[str, Field(pattern=NAME_PATTERN, description="1 to 100 letters, digits, spaces and `._-`.")]
-    description: Annotated[str, Field(max_length=10_000)] = ""
+    name: Name
+    description: Text = ""
 
-    @field_validator("description")
-    @classmethod
-    def _storable(cls, description: str) -> str:
-        if "\0" in description or any("\ud800" <= letter <= "\udfff" for letter in description):
-            raise ValueError("text without NUL and lone surrogates")
-        return description
+
+class MaterialChange(BaseModel):
+    """What is to be different about a material; what is left out stays."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"name": "cardboard brown"}]})
+
+    name: Annotated[Name | None, Field(description="Its new name; the old one becomes an alias")] = None
+    description: Text | None = None
+
+
+class NewMerge(BaseModel):
+    """A merge that is asked for."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"source": "papre"}]})
+
+    source: Annotated[str, Field(max_length=100, description="The material whose logs and names move here")]
+
+
+class NewWithdrawal(BaseModel):
+    """Why a log is to be withdrawn."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"reason": "the sensor was wet"}]})
+
+    reason: Annotated[Text, Field(min_length=1)]
 
 
 class NewFit(BaseModel):
@@ -105,6 +158,7 @@ class FrictionModelOut(BaseModel):
     method: str
     version: int
     current: bool
+    outdated: Annotated[bool, Field(description="A log behind it was withdrawn; the fit without it is not there")]
     coefficients: Annotated[list[float], Field(description="β₀ [-], β₁ [s/m], β₂ [1/N]")]
     covariance: Annotated[list[list[float]], Field(description="Of the coefficients, 3×3")]
     scale: Annotated[float, Field(description="σ, standard deviation of ε [-]")]
@@ -127,6 +181,7 @@ class FrictionModelOut(BaseModel):
             method=model.method,
             version=stored.version,
             current=stored.current,
+            outdated=stored.outdated,
             coefficients=list(model.coefficients),
             covariance=[list(line) for line in model.covariance],
             scale=model.scale,
@@ -151,24 +206,14 @@ class FrictionModelsOut(BaseModel):
 class MaterialOut(BaseModel):
     """A material with its current models."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "name": "paper",
-                    "description": "80 g/m²",
-                    "created_at": _MOMENT,
-                    "grasp_logs": 12,
-                    "models": {"ols": _MODEL},
-                }
-            ]
-        }
-    )
+    model_config = ConfigDict(json_schema_extra={"examples": [_MATERIAL]})
 
     name: str
+    aliases: Annotated[list[str], Field(description="Other names under which it is found")]
     description: str
     created_at: datetime
     grasp_logs: Annotated[int, Field(description="How many logs of it are stored")]
+    withdrawn_grasp_logs: Annotated[int, Field(description="How many of them count in no fit")]
     models: Annotated[dict[str, FrictionModelOut], Field(description="The current model of each method")]
 
     @classmethod
@@ -176,9 +221,11 @@ class MaterialOut(BaseModel):
         """The stored material as an answer."""
         return cls(
             name=material.name,
+            aliases=list(material.aliases),
             description=material.description,
             created_at=material.created_at,
             grasp_logs=material.grasp_logs,
+            withdrawn_grasp_logs=material.withdrawn_grasp_logs,
             models={stored.model.method: FrictionModelOut.of(stored) for stored in material.models},
         )
 
@@ -282,29 +329,22 @@ class JobOut(BaseModel):
         )
 
 
+class WithdrawalOut(BaseModel):
+    """That a log counts in no fit."""
+
+    at: datetime
+    reason: str
+
+    @classmethod
+    def of(cls, withdrawal: Withdrawal) -> "WithdrawalOut":
+        """The stored withdrawal as an answer."""
+        return cls(at=withdrawal.at, reason=withdrawal.because)
+
+
 class GraspLogOut(BaseModel):
     """A stored grasp log, its ingest job and, once there, what was found in it."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "id": "7c9e6679742540de944be07fc1f90ae7",
-                    "sha256": "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08",
-                    "bytes": 4806144,
-                    "format": "npz",
-                    "material": "paper",
-                    "sensor": "AD2-0065L",
-                    "frames": 250,
-                    "duration": 8.3,
-                    "grid": [20, 20],
-                    "created_at": _MOMENT,
-                    "job": _JOB,
-                    "detection": _DETECTION,
-                }
-            ]
-        }
-    )
+    model_config = ConfigDict(json_schema_extra={"examples": [_GRASP_LOG]})
 
     id: str
     sha256: Annotated[str, Field(description="Of the uploaded bytes")]
@@ -316,6 +356,7 @@ class GraspLogOut(BaseModel):
     duration: Annotated[float, Field(description="s")]
     grid: Annotated[tuple[int, int], Field(description="Markers along the two axes")]
     created_at: datetime
+    withdrawal: WithdrawalOut | None
     job: JobOut
     detection: DetectionOut | None
 
@@ -333,6 +374,7 @@ class GraspLogOut(BaseModel):
             duration=log.duration,
             grid=log.grid,
             created_at=log.created_at,
+            withdrawal=WithdrawalOut.of(log.withdrawal) if log.withdrawal else None,
             job=JobOut.of(log.job),
             detection=_detection_out(log),
         )
@@ -352,6 +394,24 @@ def _detection_out(log: StoredGraspLog) -> DetectionOut | None:
         samples=log.samples.count,
         seconds=found.seconds,
     )
+
+
+class MergedOut(BaseModel):
+    """A material after a merge, and the fits that follow from it."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"material": _MATERIAL, "jobs": [_JOB]}]})
+
+    material: MaterialOut
+    jobs: list[JobOut]
+
+
+class WithdrawnOut(BaseModel):
+    """A log after its withdrawal or its return, and the fits that follow from it."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"grasp_log": _GRASP_LOG, "jobs": [_JOB]}]})
+
+    grasp_log: GraspLogOut
+    jobs: list[JobOut]
 
 
 class StickRatioOut(BaseModel):

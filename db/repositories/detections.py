@@ -31,14 +31,15 @@ def add(session: Session, log_id: str, detection: Detection, samples: SampleSumm
 
 
 def sample_blobs(session: Session, material_id: int) -> dict[str, str]:
-    """Blobs of samples of a material, by content hash of the log, oldest first; logs without samples left out.
+    """Blobs of samples of a material, by content hash of the log, oldest first.
 
-    A log that went through several detectors is one grasp still: its newest samples count.
+    Logs without samples, and withdrawn ones, are left out. A log that went through several detectors is one grasp
+    still: its newest samples count.
     """
     query = (
         select(GraspLogRow.sha256, SampleSummaryRow.samples_blob)
         .join(SampleSummaryRow)
-        .where(GraspLogRow.material_id == material_id, SampleSummaryRow.count > 0)
+        .where(GraspLogRow.material_id == material_id, GraspLogRow.withdrawn_at.is_(None), SampleSummaryRow.count > 0)
         .order_by(SampleSummaryRow.created_at, GraspLogRow.id)
     )
     return dict(session.execute(query).all())

@@ -7,7 +7,7 @@ from sqlalchemy import Select, func, select, update
 from sqlalchemy.orm import Session
 
 from db.records import NewModel, StoredModel
-from db.tables import FrictionModelRow, MaterialRow
+from db.tables import FrictionModelRow, MaterialNameRow, MaterialRow
 
 _PLAIN = tuple(entry.name for entry in fields(NewModel) if entry.name not in {"tangential_velocity", "normal_force"})
 
@@ -34,17 +34,38 @@ def lock(session: Session, material_id: int) -> None:
 
 def current(session: Session, material: str, method: str) -> StoredModel | None:
     """The current model of a material by a method, if there is one."""
-    query = _models().where(MaterialRow.name == material, FrictionModelRow.method == method, FrictionModelRow.current)
+    query = (
+        _models()
+        .join(MaterialNameRow, MaterialNameRow.material_id == MaterialRow.id)
+        .where(MaterialNameRow.name == material, FrictionModelRow.method == method, FrictionModelRow.current)
+    )
     found = session.execute(query).one_or_none()
     return None if found is None else _record(found[0], found[1])
 
 
 def all_current(session: Session, material_ids: Sequence[int] | None) -> list[StoredModel]:
     """Current models of some materials, or of all."""
-    query = _models().where(FrictionModelRow.current).order_by(FrictionModelRow.method)
+    query = _models().where(FrictionModelRow.current, MaterialRow.merged_into_id.is_(None))
+    query = query.order_by(FrictionModelRow.method)
     if material_ids is not None:
         query = query.where(FrictionModelRow.material_id.in_(material_ids))
     return [_record(row, material) for row, material in session.execute(query)]
+
+
+def current_methods(session: Session, material_ids: Sequence[int]) -> list[str]:
+    """Methods by which some of these materials have a current model, in alphabetical order."""
+    of_them = FrictionModelRow.material_id.in_(material_ids) & FrictionModelRow.current
+    return sorted(session.scalars(select(FrictionModelRow.method).where(of_them).distinct()))
+
+
+def mark_outdated(session: Session, material_id: int) -> None:
+    """Say of a material's current models that a log behind them was withdrawn."""
+    _change_current(session, material_id, outdated=True)
+
+
+def retire(session: Session, material_id: int) -> None:
+    """Let none of a material's models be current."""
+    _change_current(session, material_id, current=False)
 
 
 def versions(session: Session, material_id: int, method: str | None) -> list[StoredModel]:
@@ -53,6 +74,12 @@ def versions(session: Session, material_id: int, method: str | None) -> list[Sto
     if method is not None:
         query = query.where(FrictionModelRow.method == method)
     return [_record(row, material) for row, material in session.execute(query)]
+
+
+def _change_current(session: Session, material_id: int, **values: bool) -> None:
+    lock(session, material_id)
+    of_it = (FrictionModelRow.material_id == material_id, FrictionModelRow.current)
+    session.execute(update(FrictionModelRow).where(*of_it).values(**values))
 
 
 def _models() -> Select[FrictionModelRow, str]:
@@ -90,4 +117,4 @@ def _record(row: FrictionModelRow, material: str) -> StoredModel:
         cost_seconds=row.cost_seconds,
         monte_carlo_error=row.monte_carlo_error,
     )
-    return StoredModel(material, row.version, row.current, row.created_at, model)
+    return StoredModel(material, row.version, row.current, row.outdated, row.created_at, model)

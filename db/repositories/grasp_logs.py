@@ -2,14 +2,14 @@
 
 import uuid
 
-from sqlalchemy import select
+from sqlalchemy import exists, select, update
 from sqlalchemy.exc import IntegrityError
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, aliased
 
 from db.errors import AlreadyExists, NotFound
-from db.records import NewGraspLog, StoredGraspLog
+from db.records import NewGraspLog, StoredGraspLog, Withdrawal
 from db.repositories import detections, jobs
-from db.tables import DetectionRow, GraspLogRow, JobRow, MaterialRow, SampleSummaryRow, SensorRow
+from db.tables import DetectionRow, GraspLogRow, JobRow, MaterialRow, SampleSummaryRow, SensorRow, now
 
 
 def add(session: Session, log: NewGraspLog) -> str:
@@ -72,10 +72,59 @@ def get(session: Session, log_id: str) -> StoredGraspLog:
         duration=row.duration,
         grid=(row.grid_rows, row.grid_columns),
         created_at=row.created_at,
+        withdrawal=_withdrawal(row),
         job=jobs.record(job, material),
         detection=detections.detection_record(detection),
         samples=detections.samples_record(samples),
     )
+
+
+def material_id(session: Session, log_id: str) -> int | None:
+    """The key of a log's material, if it has one; raises ``NotFound``."""
+    found = session.execute(select(GraspLogRow.material_id).where(GraspLogRow.id == log_id)).one_or_none()
+    if found is None:
+        raise NotFound("grasp log", log_id)
+    return found[0]
+
+
+def withdraw(session: Session, log_id: str, because: str) -> bool:
+    """Take a log out of the fits, or only renew the reason; True if that was the first time. Raises ``NotFound``."""
+    row = _locked(session, log_id)
+    is_new = row.withdrawn_at is None
+    row.withdrawn_at, row.withdrawn_because = row.withdrawn_at or now(), because
+    session.flush()
+    return is_new
+
+
+def restore(session: Session, log_id: str) -> bool:
+    """Put a log back into the fits; False if it was in them. Raises ``NotFound``."""
+    row = _locked(session, log_id)
+    was_withdrawn = row.withdrawn_at is not None
+    row.withdrawn_at = row.withdrawn_because = None
+    session.flush()
+    return was_withdrawn
+
+
+def move(session: Session, source_id: int, target_id: int) -> None:
+    """Give a material's logs to another; those that it has already, by content and detector, stay where they are."""
+    there = aliased(GraspLogRow)
+    same = (there.sha256 == GraspLogRow.sha256, there.detector == GraspLogRow.detector)
+    is_there = exists().where(there.material_id == target_id, *same)
+    moved = update(GraspLogRow).where(GraspLogRow.material_id == source_id, ~is_there).values(material_id=target_id)
+    session.execute(moved.execution_options(synchronize_session=False))
+
+
+def _locked(session: Session, log_id: str) -> GraspLogRow:
+    row = session.get(GraspLogRow, log_id, with_for_update=True)
+    if row is None:
+        raise NotFound("grasp log", log_id)
+    return row
+
+
+def _withdrawal(row: GraspLogRow) -> Withdrawal | None:
+    if row.withdrawn_at is None or row.withdrawn_because is None:
+        return None
+    return Withdrawal(row.withdrawn_at, row.withdrawn_because)
 
 
 def _sensor_id(session: Session, name: str) -> int:

@@ -51,6 +51,12 @@ def unfinished(session: Session) -> list[str]:
     return list(session.scalars(query))
 
 
+def move_unfinished(session: Session, source_id: int, target_id: int) -> None:
+    """Let the jobs that a material still has be about another one."""
+    of_it = (JobRow.material_id == source_id, JobRow.status.in_(("queued", "running")))
+    session.execute(update(JobRow).where(*of_it).values(material_id=target_id))
+
+
 def start_stage(session: Session, job_id: str, stage: str, seconds: Mapping[str, float]) -> None:
     """Say that the job runs and in which stage; ``seconds`` are those of the stages done."""
     _change(session, job_id, status="running", stage=stage, seconds=dict(seconds))

@@ -1,55 +1,128 @@
-"""Queries on materials."""
+"""Queries on materials and their names."""
 
 from collections.abc import Sequence
 
-from sqlalchemy import func, select
+from sqlalchemy import delete, func, select, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from db.errors import AlreadyExists, NotFound
 from db.records import Material, StoredModel
-from db.repositories import friction_models
-from db.tables import GraspLogRow, MaterialRow
+from db.repositories import friction_models, grasp_logs, jobs
+from db.tables import GraspLogRow, MaterialNameRow, MaterialRow
 
 
 def create(session: Session, name: str, description: str) -> Material:
-    """Store a new material; raises ``AlreadyExists``."""
+    """Store a new material; raises ``AlreadyExists`` where a material or an alias has this name."""
     row = MaterialRow(name=name, description=description)
     try:
         with session.begin_nested():
             session.add(row)
+            session.flush()
+            session.add(MaterialNameRow(name=name, material_id=row.id))
     except IntegrityError as error:
         raise AlreadyExists("material", name) from error
-    return _record(row, 0, [])
+    return _record(row, [], 0, 0, [])
 
 
 def find_id(session: Session, name: str) -> int:
-    """A material's key; raises ``NotFound``."""
-    found = session.scalar(select(MaterialRow.id).where(MaterialRow.name == name))
+    """The key of the material that has this name or alias; raises ``NotFound``."""
+    found = session.scalar(select(MaterialNameRow.material_id).where(MaterialNameRow.name == name))
     if found is None:
         raise NotFound("material", name)
     return found
 
 
 def get(session: Session, name: str) -> Material:
-    """One material with its current models; raises ``NotFound``."""
+    """One material, by its name or an alias, with its current models; raises ``NotFound``."""
     return _with_counts_and_models(session, [find_id(session, name)])[0]
 
 
 def list_all(session: Session) -> list[Material]:
-    """Every material with its current models, by name: two queries however many there are."""
+    """Every material with its current models, by name: three queries however many there are."""
     return _with_counts_and_models(session, None)
 
 
+def still(session: Session, material_id: int) -> int:
+    """This material, or the one that it was merged into: it stays so until the transaction ends."""
+    query = select(MaterialRow.merged_into_id).where(MaterialRow.id == material_id)
+    merged_into = session.scalar(query.with_for_update(read=True, key_share=True))
+    return material_id if merged_into is None else still(session, merged_into)
+
+
+def describe(session: Session, material_id: int, description: str) -> None:
+    """Change a material's description."""
+    session.execute(update(MaterialRow).where(MaterialRow.id == material_id).values(description=description))
+
+
+def rename(session: Session, material_id: int, name: str) -> None:
+    """Give a material another name of its own; the old one stays as an alias. Raises ``AlreadyExists``."""
+    add_alias(session, material_id, name)
+    session.execute(update(MaterialRow).where(MaterialRow.id == material_id).values(name=name))
+
+
+def add_alias(session: Session, material_id: int, name: str) -> None:
+    """Let a material be found by one more name; raises ``AlreadyExists`` where another material has it."""
+    try:
+        with session.begin_nested():
+            session.add(MaterialNameRow(name=name, material_id=material_id))
+    except IntegrityError as error:
+        if find_id(session, name) != material_id:
+            raise AlreadyExists("material", name) from error
+
+
+def remove_alias(session: Session, material_id: int, name: str) -> None:
+    """Free a name that is not a material's own; raises ``NotFound``."""
+    own = select(MaterialRow.name).where(MaterialRow.id == material_id).scalar_subquery()
+    of_it = (MaterialNameRow.material_id == material_id, MaterialNameRow.name == name, MaterialNameRow.name != own)
+    if session.scalar(delete(MaterialNameRow).where(*of_it).returning(MaterialNameRow.name)) is None:
+        raise NotFound("alias", name)
+
+
+def merge(session: Session, target_id: int, source_id: int) -> None:
+    """Give a material's names, logs and unfinished jobs to another; its models stay with it, as history.
+
+    Raises ``NotFound`` where one of the two was merged away meanwhile.
+    """
+    two = select(MaterialRow).where(MaterialRow.id.in_((target_id, source_id))).order_by(MaterialRow.id)
+    for row in session.scalars(two.with_for_update()):
+        if row.merged_into_id is not None:
+            raise NotFound("material", row.name)
+    for table, column in ((MaterialNameRow, "material_id"), (MaterialRow, "merged_into_id")):
+        session.execute(update(table).where(getattr(table, column) == source_id).values({column: target_id}))
+    session.execute(update(MaterialRow).where(MaterialRow.id == source_id).values(merged_into_id=target_id))
+    friction_models.retire(session, source_id)
+    grasp_logs.move(session, source_id, target_id)
+    jobs.move_unfinished(session, source_id, target_id)
+
+
 def _with_counts_and_models(session: Session, ids: Sequence[int] | None) -> list[Material]:
-    logs = select(func.count()).where(GraspLogRow.material_id == MaterialRow.id).scalar_subquery()
-    query = select(MaterialRow, logs)
+    of_it = GraspLogRow.material_id == MaterialRow.id
+    counted = select(func.count()).where(of_it)
+    counts = (counted.scalar_subquery(), counted.where(GraspLogRow.withdrawn_at.is_not(None)).scalar_subquery())
+    query = select(MaterialRow, *counts).where(MaterialRow.merged_into_id.is_(None)).order_by(MaterialRow.name)
     if ids is not None:
         query = query.where(MaterialRow.id.in_(ids))
-    rows = sorted(session.execute(query).all(), key=lambda row: row[0].name)  # not by the server's collation
     models = friction_models.all_current(session, ids)
-    return [_record(row, count, [model for model in models if model.material == row.name]) for row, count in rows]
+    names = _names(session, ids)
+    return [
+        _record(row, names[row.id], logs, withdrawn, [model for model in models if model.material == row.name])
+        for row, logs, withdrawn in session.execute(query)
+    ]
 
 
-def _record(row: MaterialRow, logs: int, models: Sequence[StoredModel]) -> Material:
-    return Material(row.id, row.name, row.description, row.created_at, logs, tuple(models))
+def _names(session: Session, ids: Sequence[int] | None) -> dict[int, list[str]]:
+    query = select(MaterialNameRow.material_id, MaterialNameRow.name).order_by(MaterialNameRow.name)
+    if ids is not None:
+        query = query.where(MaterialNameRow.material_id.in_(ids))
+    names: dict[int, list[str]] = {}
+    for material_id, name in session.execute(query):
+        names.setdefault(material_id, []).append(name)
+    return names
+
+
+def _record(
+    row: MaterialRow, names: Sequence[str], logs: int, withdrawn: int, models: Sequence[StoredModel]
+) -> Material:
+    aliases = tuple(name for name in names if name != row.name)
+    return Material(row.id, row.name, row.description, row.created_at, aliases, logs, withdrawn, tuple(models))

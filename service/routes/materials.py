@@ -4,7 +4,6 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from db.errors import AlreadyExists
 from db.repositories import friction_models, materials
 from service.access import READ, UPLOAD
 from service.context import Given
@@ -16,7 +15,6 @@ from service.problems import (
     UNKNOWN_MATERIAL,
     UNSUPPORTED_FORMAT,
     UPLOAD_TOO_LARGE,
-    Problem,
 )
 from service.routes.common import JsonRoute, problems
 from service.schemas import (
@@ -53,11 +51,8 @@ SMALLEST_TAIL = 1e-12
 )
 def create_material(context: Given, new: NewMaterial, response: Response) -> MaterialOut:
     """Logs can be uploaded for it from then on."""
-    try:
-        with context.database.write() as session:
-            made = materials.create(session, new.name, new.description)
-    except AlreadyExists as error:
-        raise Problem.wrong_value(MATERIAL_EXISTS, "name", new.name, "a name that no material has yet") from error
+    with context.database.write() as session:
+        made = materials.create(session, new.name, new.description)
     response.headers["Location"] = f"/v1/materials/{new.name.replace(' ', '%20')}"
     return MaterialOut.of(made)
 

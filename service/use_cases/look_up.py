@@ -36,6 +36,7 @@ def _answer(stored: StoredModel, question: Question) -> FrictionOut:
     mean = float(model.predict(v, f_n))
     asked = mean if question.quantile is None else float(model.predict(v, f_n, quantile=question.quantile))
     outside = model.extrapolation(v, f_n)
+    outdated = "a log behind the model was withdrawn, and the fit without it is not there" if stored.outdated else None
     nothing = "the answer is not above 0: nothing is known of the friction there" if asked <= 0.0 else None
     return FrictionOut(
         material=stored.material,
@@ -47,5 +48,5 @@ def _answer(stored: StoredModel, question: Question) -> FrictionOut:
         friction_coefficient=asked,
         mean=mean,
         within_domain=outside is None,
-        warning="; ".join(filter(None, (outside, nothing))) or None,
+        warning="; ".join(filter(None, (outside, nothing, outdated))) or None,
     )

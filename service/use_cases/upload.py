@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from starlette.requests import ClientDisconnect
 
@@ -146,6 +146,8 @@ def _store(context: Context, spool: Spool, log: NewGraspLog) -> Accepted:
     """First the blob, durably, then the rows that refer to it."""
     spool.keep()
     with context.database.write() as session:
+        if log.material_id is not None:  # it may have been merged into another while the log came in
+            log = replace(log, material_id=materials.still(session, log.material_id))
         try:
             log_id = grasp_logs.add(session, log)
         except AlreadyExists:

@@ -88,6 +88,23 @@ def test_migrations_go_down_and_up_with_data_in_every_table(
     migrate.check(database)
 
 
+def test_materials_of_before_aliases_are_found_by_name_and_merged_ones_stop_the_way_back(
+    empty_database: Database,
+) -> None:
+    migrate.upgrade(empty_database, "0002")
+    with empty_database.write() as session:
+        for number, name in enumerate(("paper", "papre"), 1):
+            row = {"id": number, "name": name, "description": "old", "created_at": "2026-01-01 00:00:00+00:00"}
+            session.execute(text("INSERT INTO materials VALUES (:id, :name, :description, :created_at)"), row)
+    migrate.upgrade(empty_database)
+    with empty_database.write() as session:
+        assert materials.get(session, "paper").description == "old"
+        materials.merge(session, 1, 2)
+    with pytest.raises(RuntimeError, match="1 materials were merged"):
+        migrate.downgrade(empty_database, "0002")
+    assert migrate.current(empty_database) == migrate.head()
+
+
 def test_upgrading_again_changes_nothing(database: Database) -> None:
     with database.write() as session:
         materials.create(session, "paper", "")

@@ -62,4 +62,81 @@ def test_the_number_of_queries_does_not_grow_with_the_materials(database: Databa
         with database.read() as session:
             assert len(materials.list_all(session)) == number
         counts.append(len(statements))
-    assert set(counts) == {2}
+    assert set(counts) == {3}
+
+
+def test_a_material_is_found_by_its_aliases_too(database: Database, new_model: Callable[..., NewModel]) -> None:
+    with database.write() as session:
+        paper = materials.create(session, "paper", "").id
+        job = jobs.add(session, "fit", "ols", material_id=paper)
+        friction_models.add(session, paper, job, new_model())
+        materials.rename(session, paper, "cardboard")
+        materials.add_alias(session, paper, "Pappe")
+        materials.add_alias(session, paper, "Pappe")
+    with database.read() as session:
+        found = [materials.get(session, name) for name in ("paper", "cardboard", "Pappe")]
+        assert found[0] == found[1] == found[2]
+        assert (found[0].name, found[0].aliases) == ("cardboard", ("Pappe", "paper"))
+        for name in ("paper", "cardboard", "Pappe"):
+            model = friction_models.current(session, name, "ols")
+            assert model is not None
+            assert model.material == "cardboard"
+
+
+def test_a_name_belongs_to_one_material(database: Database) -> None:
+    with database.write() as session:
+        paper, steel = (materials.create(session, name, "").id for name in ("paper", "steel"))
+        materials.add_alias(session, steel, "iron")
+        for take in (materials.rename, materials.add_alias):
+            for name in ("steel", "iron"):
+                with pytest.raises(AlreadyExists, match=f"material '{name}'"):
+                    take(session, paper, name)
+        with pytest.raises(AlreadyExists):
+            materials.create(session, "iron", "")
+        for name in ("iron", "paper", "felt"):
+            with pytest.raises(NotFound, match=f"no alias '{name}'"):
+                materials.remove_alias(session, paper, name)
+        materials.remove_alias(session, steel, "iron")
+        materials.rename(session, paper, "iron")
+        materials.rename(session, paper, "paper")
+        assert materials.get(session, "iron").aliases == ("iron",)
+
+
+def test_names_are_listed_in_the_same_order_everywhere(database: Database) -> None:
+    with database.write() as session:
+        for name in ("b", "a", "B", "A", "a b", "a-b", "10", "9"):
+            materials.create(session, name, "")
+    with database.read() as session:
+        assert [entry.name for entry in materials.list_all(session)] == ["10", "9", "A", "B", "a", "a b", "a-b", "b"]
+
+
+def test_a_merged_material_leaves_its_logs_names_and_unfinished_jobs(
+    database: Database, new_log: Callable[..., NewGraspLog], new_model: Callable[..., NewModel]
+) -> None:
+    with database.write() as session:
+        paper, papre, pepar = (materials.create(session, name, "").id for name in ("paper", "papre", "pepar"))
+        twice = new_log(paper)
+        logs = [grasp_logs.add(session, log) for log in (twice, new_log(papre), new_log(papre, twice.sha256))]
+        waiting, done = (jobs.add(session, "fit", "ols", material_id=papre) for _ in range(2))
+        jobs.finish(session, done, "done", model_version=1)
+        friction_models.add(session, papre, done, new_model())
+        materials.merge(session, pepar, papre)
+        materials.merge(session, paper, pepar)
+        for target, source in ((papre, paper), (paper, papre)):
+            with pytest.raises(NotFound, match="no material 'papre'"):
+                materials.merge(session, target, source)
+    with database.read() as session:
+        (merged,) = materials.list_all(session)
+        assert (merged.name, merged.aliases, merged.grasp_logs, merged.models) == ("paper", ("papre", "pepar"), 2, ())
+        assert materials.get(session, "papre") == merged
+        assert materials.still(session, papre) == materials.still(session, pepar) == paper
+        assert [grasp_logs.material_id(session, log) for log in logs] == [paper, paper, pepar]
+        assert [jobs.get(session, job).material for job in (waiting, done)] == ["paper", "papre"]
+
+
+def test_the_name_of_a_merged_material_may_be_its_heirs(database: Database) -> None:
+    with database.write() as session:
+        paper, papre = (materials.create(session, name, "").id for name in ("paper", "papre"))
+        materials.merge(session, papre, paper)
+        materials.rename(session, papre, "paper")
+        assert [(entry.id, entry.name) for entry in materials.list_all(session)] == [(papre, "paper")]

@@ -14,9 +14,11 @@ def test_a_new_material_is_there_from_then_on(client: httpx.Client) -> None:
     assert client.get(made.headers["location"]).json() == made.json()
     assert made.json() | {"created_at": None} == {
         "name": "card board",
+        "aliases": [],
         "description": "brown",
         "created_at": None,
         "grasp_logs": 0,
+        "withdrawn_grasp_logs": 0,
         "models": {},
     }
     assert made.json() in client.get("/v1/materials").json()["items"]

@@ -1,0 +1,166 @@
+from collections.abc import Callable
+from contextlib import closing
+from threading import Thread
+from typing import Any
+
+import numpy as np
+import pytest
+
+from db.blobs import BlobStore
+from db.database import Database
+from db.errors import NotFound
+from db.records import Job, NewGraspLog
+from db.repositories import grasp_logs, jobs, materials
+from service import pipeline
+from service.context import Context
+from service.problems import Problem
+from service.settings import Settings
+from service.use_cases import curate
+from service.use_cases.look_up import Question, look_up
+
+Repack = Callable[..., bytes]
+ANYWHERE = Question(0.0, 0.1, None)
+
+
+class Shop:
+    """The stores, and a worker that does jobs at once when it is told to."""
+
+    def __init__(self, database: Database, blobs: BlobStore, contents: list[bytes]) -> None:
+        self.database, self.blobs, self.contents = database, blobs, contents
+        self.submitted: list[str] = []
+        pool: Any = self
+        self.context = Context(Settings(), database, blobs, pool)
+
+    def submit(self, job_id: str) -> None:
+        self.submitted.append(job_id)
+
+    def work(self) -> list[Job]:
+        done, self.submitted = self.submitted, []
+        for job_id in done:
+            pipeline.run_job(self.database, self.blobs, job_id)
+        with self.database.read() as session:
+            return [jobs.get(session, job_id) for job_id in done]
+
+    def ingest(self, material: str, number: int, method: str = "ols") -> str:
+        """A log of the material, with its model fitted."""
+        content = self.contents[number]
+        with self.database.write() as session:
+            try:
+                material_id = materials.find_id(session, material)
+            except NotFound:
+                material_id = materials.create(session, material, "").id
+            log = NewGraspLog(self.blobs.put(content), len(content), "npz", "filter", material_id, "s", 82, 2.7, (8, 8))
+            log_id = grasp_logs.add(session, log)
+            job_id = jobs.add(session, "ingest", method, material_id=material_id, grasp_log_id=log_id)
+        self.submit(job_id)
+        (job,) = self.work()
+        assert job.status == "done", job.reason
+        return log_id
+
+    def model(self, material: str, method: str = "ols") -> tuple[int, int, bool]:
+        """Version, samples, and whether it is outdated."""
+        with self.database.read() as session:
+            (found,) = [each for each in materials.get(session, material).models if each.model.method == method]
+        return found.version, found.model.n, found.outdated
+
+
+@pytest.fixture
+def shop(database: Database, blobs: BlobStore, members: dict[str, Any], repack: Repack) -> Shop:
+    contents = [repack(members | {"sensor": np.str_(f"finger {number}")}) for number in range(3)]
+    return Shop(database, blobs, contents)
+
+
+def test_a_withdrawn_log_leaves_every_fit_and_comes_back(shop: Shop) -> None:
+    good, bad = shop.ingest("paper", 0), shop.ingest("paper", 1, method="conjugate")
+    both = shop.model("paper", "conjugate")[1]
+    log, queued = curate.withdraw(shop.context, bad, "wet")
+    assert log.withdrawal is not None
+    assert log.withdrawal.because == "wet"
+    assert [(job.kind, job.method) for job in queued] == [("fit", "conjugate"), ("fit", "ols")]
+    assert shop.model("paper", "conjugate") == (1, both, True)
+    assert "withdrawn" in str(look_up(shop.context, "paper", "ols", ANYWHERE).warning)
+    assert [job.status for job in shop.work()] == ["done", "done"]
+    assert shop.model("paper", "conjugate") == (2, both // 2, False)
+    assert shop.model("paper", "ols") == (2, both // 2, False)
+    assert "withdrawn" not in str(look_up(shop.context, "paper", "ols", ANYWHERE).warning)
+
+    again, queued = curate.withdraw(shop.context, bad, "wet, and dropped")
+    assert again.withdrawal is not None
+    assert (again.withdrawal.at, again.withdrawal.because) == (log.withdrawal.at, "wet, and dropped")
+    assert queued == []
+    back, queued = curate.restore(shop.context, bad)
+    assert back.withdrawal is None
+    assert len(queued) == len(shop.work()) == 2
+    assert shop.model("paper", "ols") == (3, both, False)
+    assert curate.restore(shop.context, good)[1] == []
+
+
+def test_a_material_without_its_only_log_has_no_model(shop: Shop) -> None:
+    log = shop.ingest("paper", 0)
+    assert curate.withdraw(shop.context, log, "wrong material")[1] == []
+    with pytest.raises(Problem, match="has no model fitted by 'ols'"):
+        look_up(shop.context, "paper", "ols", ANYWHERE)
+    curate.restore(shop.context, log)
+    shop.work()
+    assert shop.model("paper")[0] == 2
+
+
+def test_a_fit_under_way_does_not_bring_a_withdrawn_log_back(shop: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
+    shop.ingest("paper", 0)
+    bad, fit = shop.ingest("paper", 1), pipeline._fit
+    both, withdrawn = shop.model("paper")[1], []
+
+    def withdraw_meanwhile(*given: Any) -> Any:
+        model = fit(*given)
+        if not withdrawn:
+            withdrawn.append(curate.withdraw(shop.context, bad, "late"))
+        return model
+
+    with shop.database.write() as session:
+        job = jobs.add(session, "fit", "ols", material_id=materials.find_id(session, "paper"))
+    monkeypatch.setattr(pipeline, "_fit", withdraw_meanwhile)
+    pipeline.run_job(shop.database, shop.blobs, job)
+    assert shop.model("paper") == (3, both // 2, False)
+
+
+def test_a_merged_material_is_fitted_over_all_its_logs(shop: Shop) -> None:
+    shop.ingest("paper", 0)
+    shop.ingest("papre", 1, method="conjugate")
+    each = shop.model("paper")[1]
+    merged, queued = curate.merge(shop.context, "paper", "papre")
+    assert (merged.name, merged.aliases, merged.grasp_logs) == ("paper", ("papre",), 2)
+    assert [job.method for job in queued] == ["conjugate", "ols"]
+    assert [job.status for job in shop.work()] == ["done", "done"]
+    assert shop.model("papre") == shop.model("paper") == (2, 2 * each, False)
+    assert look_up(shop.context, "papre", "conjugate", ANYWHERE).material == "paper"
+    with pytest.raises(Problem, match="source is papre; allowed: another material"):
+        curate.merge(shop.context, "paper", "papre")
+
+
+def test_two_merges_against_each_other_leave_one_material(shop: Shop) -> None:
+    shop.ingest("a", 0)
+    shop.ingest("b", 1)
+    ends: list[object] = []
+
+    def merge(target: str, source: str) -> None:
+        with closing(Database(shop.database.url)) as own:
+            try:
+                ends.append(curate.merge(Context(Settings(), own, shop.blobs, shop.context.jobs), target, source))
+            except (Problem, NotFound) as refused:
+                ends.append(refused)
+
+    threads = [Thread(target=merge, args=names) for names in (("a", "b"), ("b", "a"))]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sum(isinstance(end, tuple) for end in ends) == 1
+    with shop.database.read() as session:
+        (left,) = materials.list_all(session)
+    assert left.grasp_logs == 2
+    assert materials_of(shop) == {left.id}
+
+
+def materials_of(shop: Shop) -> set[int]:
+    with shop.database.read() as session:
+        return {materials.find_id(session, name) for name in ("a", "b")}
