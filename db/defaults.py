@@ -23,3 +23,6 @@ IDLE_TRANSACTION_TIMEOUT = 60.0
 
 HASHES_PER_QUERY = 500
 """Hashes asked for at once, 1 to 999 (the smallest limit of SQLite on bound parameters)."""
+
+EXPIRED_KEYS_PER_CLAIM = 10
+"""Expired idempotency keys that a new one removes, at least 1: more than come in, so that none stay for ever."""

@@ -53,6 +53,7 @@ UPLOAD_TOO_LARGE = ProblemType("upload-too-large", "The body is too large", 413)
 UNSUPPORTED_FORMAT = ProblemType("unsupported-format", "The format is not supported", 415)
 INVALID_GRASP_LOG = ProblemType("invalid-grasp-log", "The grasp log is not valid", 422)
 INVALID_REQUEST = ProblemType("invalid-request", "A value in the request is not allowed", 422)
+IDEMPOTENCY_KEY_REUSED = ProblemType("idempotency-key-reused", "The key stands for another request", 422)
 INTERNAL_ERROR = ProblemType("internal-error", "The service failed", 500)
 STORAGE_UNAVAILABLE = ProblemType("storage-unavailable", "Database or blob folder cannot be used now", 503)
 

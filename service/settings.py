@@ -39,6 +39,9 @@ class Settings(BaseSettings):
     max_upload_bytes: Annotated[int, Field(ge=1, le=2**40)] = Field(
         default=256 * MIB, description="Largest grasp log that is accepted, in bytes."
     )
+    idempotency_hours: Annotated[float, Field(gt=0.0, le=8760.0)] = Field(
+        default=24.0, description="How long an Idempotency-Key counts, in hours."
+    )
     workers: Annotated[int, Field(ge=1, le=64)] = Field(
         default=1, description="Worker processes that detect and fit; the server process itself never does."
     )

@@ -29,7 +29,7 @@ class FrictionClient:
     """A Stiction service over one kept-open connection; use it as a context manager, or ``close`` it.
 
     ``key`` is sent as ``Authorization: Bearer``; ``timeout`` s holds for one request; ``transport`` replaces the
-    network, as in tests. Requests that do no harm twice are tried three times where the connection breaks.
+    network, as in tests. Where the connection breaks, a request is tried three times; the service does it once.
 
     Every call raises ``ConnectionFailed``, ``ProblemError`` (the service refused) or ``UnexpectedAnswer``.
     """
@@ -239,7 +239,8 @@ def _options(url: str, key: str | None, timeout: float) -> dict[str, Any]:
 
 
 def _http_request(http: httpx.Client | httpx.AsyncClient, request: Request) -> httpx.Request:
-    headers = {"Content-Type": request.content_type} if request.content_type else {}
+    given = {"Content-Type": request.content_type, "Idempotency-Key": request.idempotency_key}
+    headers = {name: value for name, value in given.items() if value is not None}
     return http.build_request(
         request.method,
         request.path,

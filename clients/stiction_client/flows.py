@@ -11,6 +11,7 @@ from json import JSONDecodeError
 from pathlib import Path
 from typing import Any, Generic, NoReturn, TypeVar
 from urllib.parse import quote
+from uuid import uuid4
 
 import httpx
 
@@ -28,7 +29,7 @@ from stiction_client.model import FrictionModel
 from stiction_client.records import FrictionAnswer, GraspLogReceipt, Job, Material
 
 ATTEMPTS = 3
-"""Times that an idempotent request is tried before a broken connection is an error."""
+"""Times that a request is tried before a broken connection is an error."""
 
 RETRY_PAUSE = 0.2
 """s before the second attempt; doubled for each one after."""
@@ -41,15 +42,15 @@ MATERIAL_EXISTS = "/problems/material-exists"
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One HTTP request; ``idempotent``: sent twice it does no more than once, so it may be tried again."""
+    """One HTTP request, which may be sent again: it is harmless twice, or done once under its ``idempotency_key``."""
 
     method: str
     path: str
-    idempotent: bool
     params: Mapping[str, str | float] = field(default_factory=dict)
     json: Mapping[str, Any] | None = None
     content: bytes | None = None
     content_type: str | None = None
+    idempotency_key: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +92,7 @@ def upload(
     """Upload a log; the service knows logs by content, so that a repetition is no second log."""
     content, content_type = _body(log)
     params = _given(material=material, sensor=sensor, detector=detector, scale=scale, frame_rate=frame_rate)
-    request = Request("POST", "/v1/grasp-logs", True, params, content=content, content_type=content_type)
+    request = Request("POST", "/v1/grasp-logs", params, content=content, content_type=content_type)
     return _record(GraspLogReceipt.from_json, (yield from _ask(request)))
 
 
@@ -103,7 +104,7 @@ def grasp_log(log_id: str) -> Flow[GraspLogReceipt]:
 def create_material(name: str, description: str) -> Flow[Material]:
     """Create a material."""
     body = {"name": name, "description": description}
-    return _record(Material.from_json, (yield from _ask(Request("POST", "/v1/materials", False, json=body))))
+    return _record(Material.from_json, (yield from _ask(_post_once("/v1/materials", body))))
 
 
 def ensure_material(name: str, description: str) -> Flow[Material]:
@@ -146,8 +147,8 @@ def friction(
 
 
 def fit(name: str, method: str, seed: int) -> Flow[Job]:
-    """Ask for a fit; not repeated of itself, since each one makes a model version."""
-    request = Request("POST", f"/v1/materials/{_part(name)}/fits", False, json={"method": method, "seed": seed})
+    """Ask for a fit."""
+    request = _post_once(f"/v1/materials/{_part(name)}/fits", {"method": method, "seed": seed})
     return _record(Job.from_json, (yield from _ask(request)))
 
 
@@ -170,18 +171,21 @@ def wait(job_id: str, timeout: float) -> Flow[Job]:
 
 
 def _get(path: str, params: Mapping[str, str | float] | None = None) -> Flow[Any]:
-    return (yield from _ask(Request("GET", path, True, params or {})))
+    return (yield from _ask(Request("GET", path, params or {})))
+
+
+def _post_once(path: str, body: Mapping[str, Any]) -> Request:
+    return Request("POST", path, json=body, idempotency_key=uuid4().hex)
 
 
 def _ask(request: Request) -> Flow[Any]:
-    """Send a request, again where that is harmless, and return the JSON of a good answer."""
-    attempts = ATTEMPTS if request.idempotent else 1
-    for attempt in range(attempts):
+    """Send a request, again where the connection breaks, and return the JSON of a good answer."""
+    for attempt in range(ATTEMPTS):
         try:
             response = yield request
             break
         except ConnectionFailed:
-            if attempt == attempts - 1:
+            if attempt == ATTEMPTS - 1:
                 raise
         yield Pause(RETRY_PAUSE * 2**attempt)
     assert response is not None  # what a driver sends for a request

@@ -10,7 +10,9 @@ from service import formats
 from service.access import READ, UPLOAD
 from service.context import Context, Given
 from service.formats.tracked_markers import FRAME_RATE, SCALE
+from service.idempotency import OnceWithoutBody
 from service.problems import (
+    IDEMPOTENCY_KEY_REUSED,
     INVALID_GRASP_LOG,
     INVALID_REQUEST,
     NOT_READY,
@@ -53,6 +55,7 @@ _RESULTS = problems(UNKNOWN_GRASP_LOG, NOT_READY, INVALID_REQUEST, STORAGE_UNAVA
     dependencies=[UPLOAD],
     summary="Upload a grasp log",
     status_code=202,
+    response_model=GraspLogOut,
     openapi_extra=_BODY,
     responses=_ALREADY_THERE
     | problems(
@@ -62,13 +65,14 @@ _RESULTS = problems(UNKNOWN_GRASP_LOG, NOT_READY, INVALID_REQUEST, STORAGE_UNAVA
         UNSUPPORTED_FORMAT,
         INVALID_GRASP_LOG,
         INVALID_REQUEST,
+        IDEMPOTENCY_KEY_REUSED,
         STORAGE_UNAVAILABLE,
     ),
 )
 async def create_grasp_log(
     context: Given,
     request: Request,
-    response: Response,
+    once: OnceWithoutBody,
     material: Annotated[
         str | None, Query(description="What was held; without it slip is only detected", examples=["paper"])
     ] = None,
@@ -83,7 +87,7 @@ async def create_grasp_log(
         float | None,
         Query(description="Of tracked markers whose file counts frames: 1/s", ge=FRAME_RATE[0], le=FRAME_RATE[1]),
     ] = None,
-) -> GraspLogOut:
+) -> Response:
     """Stored once it is answered; slip, samples and, with a material, its refit follow in the job.
 
     The body is streamed to disk, up to the largest size that is set.
@@ -97,11 +101,9 @@ async def create_grasp_log(
         int(length) if length.isdecimal() else None,
         scale,
         frame_rate,
+        once,
     )
-    accepted = await upload(context, request.stream(), wish)
-    response.status_code = 202 if accepted.is_new else 200
-    response.headers["Location"] = f"/v1/grasp-logs/{accepted.log.id}"
-    return GraspLogOut.of(accepted.log)
+    return (await upload(context, request.stream(), wish)).response()
 
 
 @router.get("/{id}", dependencies=[READ], summary="Look at a grasp log", responses=_FOUND)

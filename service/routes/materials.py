@@ -1,13 +1,16 @@
 """Materials, their models and their friction."""
 
 from typing import Annotated
+from urllib.parse import quote
 
 from fastapi import APIRouter, Query, Response
 
 from db.repositories import friction_models, materials
 from service.access import READ, UPLOAD
 from service.context import Given
+from service.idempotency import Answer, OnceGiven, answer_once
 from service.problems import (
+    IDEMPOTENCY_KEY_REUSED,
     INVALID_REQUEST,
     MATERIAL_EXISTS,
     NO_MODEL,
@@ -33,6 +36,8 @@ from service.use_cases.look_up import Question, look_up
 
 router = APIRouter(prefix="/v1/materials", tags=["materials"], route_class=JsonRoute)
 
+_BODY = (UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, IDEMPOTENCY_KEY_REUSED, STORAGE_UNAVAILABLE)
+
 Finite = Query(allow_inf_nan=False, ge=0.0)
 
 LARGEST_FORCE, LARGEST_VELOCITY = 1e4, 1e3
@@ -47,14 +52,18 @@ SMALLEST_TAIL = 1e-12
     dependencies=[UPLOAD],
     summary="Make a material known",
     status_code=201,
-    responses=problems(MATERIAL_EXISTS, UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+    response_model=MaterialOut,
+    responses=problems(MATERIAL_EXISTS, *_BODY),
 )
-def create_material(context: Given, new: NewMaterial, response: Response) -> MaterialOut:
+def create_material(context: Given, new: NewMaterial, once: OnceGiven) -> Response:
     """Logs can be uploaded for it from then on."""
     with context.database.write() as session:
-        made = materials.create(session, new.name, new.description)
-    response.headers["Location"] = f"/v1/materials/{new.name.replace(' ', '%20')}"
-    return MaterialOut.of(made)
+
+        def create() -> Answer:
+            made = MaterialOut.of(materials.create(session, new.name, new.description))
+            return Answer(201, f"/v1/materials/{quote(new.name)}", made.model_dump(mode="json"))
+
+        return answer_once(session, once, create).response()
 
 
 @router.get("", dependencies=[READ], summary="List all materials", responses=problems(STORAGE_UNAVAILABLE))
@@ -112,13 +121,12 @@ def read_friction(
     dependencies=[UPLOAD],
     summary="Fit a material's model",
     status_code=202,
-    responses=problems(UNKNOWN_MATERIAL, UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+    response_model=JobOut,
+    responses=problems(UNKNOWN_MATERIAL, *_BODY),
 )
-def create_fit(context: Given, name: str, wish: NewFit, response: Response) -> JobOut:
+def create_fit(context: Given, name: str, wish: NewFit, once: OnceGiven) -> Response:
     """Over the samples of all its logs. Answers at once; the job at `Location` tells how it went."""
-    job = request_fit(context, name, wish.method, wish.seed)
-    response.headers["Location"] = f"/v1/jobs/{job.id}"
-    return JobOut.of(job)
+    return request_fit(context, name, wish.method, wish.seed, once).response()
 
 
 @router.get(

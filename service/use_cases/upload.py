@@ -4,15 +4,17 @@ import asyncio
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, replace
 
+from sqlalchemy.orm import Session
 from starlette.requests import ClientDisconnect
 
 from db.blobs import Spool
 from db.errors import AlreadyExists
-from db.records import NewGraspLog, StoredGraspLog
+from db.records import NewGraspLog
 from db.repositories import grasp_logs, jobs, materials
 from service import formats
 from service.context import Context
 from service.formats import tracked_markers
+from service.idempotency import Answer, Once, answer_once
 from service.problems import (
     INVALID_GRASP_LOG,
     INVALID_REQUEST,
@@ -21,6 +23,7 @@ from service.problems import (
     UPLOAD_TOO_LARGE,
     Problem,
 )
+from service.schemas import GraspLogOut
 from slipcore.errors import InvalidInput
 from slipcore.methods import METHODS
 
@@ -43,18 +46,10 @@ class Wish:
     content_length: int | None
     scale: float | None = None
     frame_rate: float | None = None
+    once: Once | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Accepted:
-    """A stored log: whether it is new, and whether its job has just been queued."""
-
-    log: StoredGraspLog
-    is_new: bool
-    is_queued: bool
-
-
-async def upload(context: Context, chunks: AsyncIterator[bytes], wish: Wish) -> Accepted:
+async def upload(context: Context, chunks: AsyncIterator[bytes], wish: Wish) -> Answer:
     """Store a log and queue its ingest.
 
     Raises ``Problem`` for what cannot be taken, ``NotFound`` for an unknown material. Nothing stays of a log that is
@@ -65,10 +60,8 @@ async def upload(context: Context, chunks: AsyncIterator[bytes], wish: Wish) -> 
     with context.blobs.spool() as spool:
         await _receive(spool, _with_settings(chunks, wish), context.settings.max_upload_bytes)
         described = await asyncio.to_thread(_describe, spool, wish, material_id)
-        accepted = await asyncio.to_thread(_store, context, spool, described)
-    if accepted.is_queued:
-        context.jobs.submit(accepted.log.job.id)
-    return accepted
+        once = wish.once and wish.once.about(spool.sha256)
+        return await asyncio.to_thread(_store, context, spool, described, once)
 
 
 def _check(context: Context, wish: Wish) -> int | None:
@@ -142,19 +135,29 @@ def _sensor_name(name: str) -> str:
     return name
 
 
-def _store(context: Context, spool: Spool, log: NewGraspLog) -> Accepted:
+def _store(context: Context, spool: Spool, log: NewGraspLog, once: Once | None) -> Answer:
     """First the blob, durably, then the rows that refer to it."""
     spool.keep()
+    queued: list[str] = []
     with context.database.write() as session:
-        if log.material_id is not None:  # it may have been merged into another while the log came in
-            log = replace(log, material_id=materials.still(session, log.material_id))
-        try:
-            log_id = grasp_logs.add(session, log)
-        except AlreadyExists:
-            known = grasp_logs.get(session, grasp_logs.find_id(session, log.sha256, log.material_id, log.detector))
-            if known.job.status != "failed":
-                return Accepted(known, is_new=False, is_queued=False)
-            jobs.requeue(session, known.job.id)  # a failure is ours: whoever sends the log again may have another try
-            return Accepted(grasp_logs.get(session, known.id), is_new=False, is_queued=True)
-        jobs.add(session, "ingest", "ols", material_id=log.material_id, grasp_log_id=log_id)
-        return Accepted(grasp_logs.get(session, log_id), is_new=True, is_queued=True)
+        answer = answer_once(session, once, lambda: _accept(session, log, queued))
+    for job_id in queued:
+        context.jobs.submit(job_id)
+    return answer
+
+
+def _accept(session: Session, log: NewGraspLog, queued: list[str]) -> Answer:
+    """Store a new log with its job; a known one whose job failed, which is our fault, gets another try."""
+    if log.material_id is not None:  # it may have been merged into another while the log came in
+        log = replace(log, material_id=materials.still(session, log.material_id))
+    try:
+        log_id, status = grasp_logs.add(session, log), 202
+        queued.append(jobs.add(session, "ingest", "ols", material_id=log.material_id, grasp_log_id=log_id))
+    except AlreadyExists:
+        log_id, status = grasp_logs.find_id(session, log.sha256, log.material_id, log.detector), 200
+        job = grasp_logs.get(session, log_id).job
+        if job.status == "failed":
+            jobs.requeue(session, job.id)
+            queued.append(job.id)
+    body = GraspLogOut.of(grasp_logs.get(session, log_id)).model_dump(mode="json")
+    return Answer(status, f"/v1/grasp-logs/{log_id}", body)

@@ -265,12 +265,17 @@ def test_a_connection_that_stays_broken_is_an_error(ask: Ask, service: Service) 
     assert isinstance(caught.value.__cause__, httpx.ConnectError)
 
 
+@pytest.mark.usefixtures("quick")
 @pytest.mark.parametrize(("method", "argument"), [("create_material", "paper"), ("fit", "paper")])
-def test_what_would_happen_twice_is_sent_once(ask: Ask, service: Service, method: str, argument: str) -> None:
+def test_what_would_happen_twice_is_sent_under_one_key(ask: Ask, service: Service, method: str, argument: str) -> None:
     server = service(httpx.ReadTimeout("slow"))
-    with pytest.raises(ConnectionFailed):
-        ask(server, method, argument)
-    assert len(server.requests) == 1
+    for _ in range(2):
+        with pytest.raises(ConnectionFailed):
+            ask(server, method, argument)
+    keys = [request.headers["idempotency-key"] for request in server.requests]
+    assert len(keys) == 6
+    assert len(set(keys[:3])) == len(set(keys[3:])) == 1
+    assert keys[0] != keys[3]
 
 
 @pytest.mark.usefixtures("quick")

@@ -2,6 +2,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from contextlib import closing
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from db import migrate
 from db.database import Database
 from db.errors import SchemaMismatch, StorageUnavailable
 from db.records import Detection, NewGraspLog, NewModel, SampleSummary
-from db.repositories import access_keys, detections, friction_models, grasp_logs, jobs, materials
+from db.repositories import access_keys, detections, friction_models, grasp_logs, idempotency_keys, jobs, materials
 from db.tables import Base
 
 ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -27,6 +28,7 @@ def fill(database: Database, log: NewGraspLog, detection: Detection, samples: Sa
         job = jobs.add(session, "ingest", "ols", material_id=material.id, grasp_log_id=log_id)
         detections.add(session, log_id, detection, samples)
         friction_models.add(session, material.id, job, model)
+        idempotency_keys.claim(session, "", "once", log.sha256, timedelta(hours=1))
         access_keys.add(session, "0" * 12, "robot", "read", log.sha256)
 
 
@@ -96,13 +98,13 @@ def test_materials_of_before_aliases_are_found_by_name_and_merged_ones_stop_the_
         for number, name in enumerate(("paper", "papre"), 1):
             row = {"id": number, "name": name, "description": "old", "created_at": "2026-01-01 00:00:00+00:00"}
             session.execute(text("INSERT INTO materials VALUES (:id, :name, :description, :created_at)"), row)
-    migrate.upgrade(empty_database)
+    migrate.upgrade(empty_database, "0003")
     with empty_database.write() as session:
         assert materials.get(session, "paper").description == "old"
         materials.merge(session, 1, 2)
     with pytest.raises(RuntimeError, match="1 materials were merged"):
         migrate.downgrade(empty_database, "0002")
-    assert migrate.current(empty_database) == migrate.head()
+    assert migrate.current(empty_database) == "0003"
 
 
 def test_upgrading_again_changes_nothing(database: Database) -> None:

@@ -1,21 +1,26 @@
+import asyncio
 import io
 import itertools
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import httpx
 import numpy as np
 import pytest
 import uvicorn
+from fastapi import FastAPI
 
 from db import migrate
 from db.blobs import BlobStore
 from db.database import Database
 from service.app import create_app
+from service.context import Context
 from service.settings import Settings
 from slipcore import GraspLog
 from slipcore.contact.ramp import RampSchedule, tangential_ramp
@@ -42,6 +47,63 @@ def serve(settings: Settings) -> Iterator[httpx.Client]:
         yield client
     server.should_exit = True
     thread.join()
+
+
+@dataclass
+class Caller:
+    """Somebody who asks the application itself, from a network address of his own."""
+
+    app: FastAPI
+    server: str
+    address: str
+    headers: dict[str, str]
+
+    def request(self, method: str, path: str, **more: Any) -> httpx.Response:
+        return asyncio.run(self._request(method, path, **more))
+
+    def get(self, path: str, **more: Any) -> httpx.Response:
+        return self.request("GET", path, **more)
+
+    async def _request(self, method: str, path: str, **more: Any) -> httpx.Response:
+        transport = httpx.ASGITransport(self.app, raise_app_exceptions=False, client=(self.address, 50000))
+        url = f"http://{self.server}"
+        async with httpx.AsyncClient(transport=transport, base_url=url, headers=self.headers) as client:
+            return await client.request(method, path, **more)
+
+    def open_stream(self, path: str) -> httpx.Response:
+        """What a WebSocket is answered before it is open."""
+        headers = [(name.lower().encode(), value.encode()) for name, value in self.headers.items()]
+        ends = {"server": (self.server, 80), "client": (self.address, 50000)}
+        scope = {"type": "websocket", "path": path, "raw_path": path.encode(), "query_string": b"", "headers": headers}
+        sent: list[Any] = []
+
+        async def receive() -> dict[str, str]:
+            return {"type": "websocket.connect"}
+
+        async def send(message: Any) -> None:
+            sent.append(message)
+
+        scope |= ends | {"scheme": "ws", "extensions": {"websocket.http.response": {}}, "subprotocols": []}  # type: ignore[dict-item]
+        asyncio.run(self.app(scope, receive, send))
+        if sent[0]["type"] == "websocket.accept":
+            return httpx.Response(101)
+        return httpx.Response(sent[0]["status"], headers=sent[0]["headers"], content=sent[1]["body"])
+
+
+@pytest.fixture
+def reach(database: Database, blobs: BlobStore) -> Callable[..., Caller]:
+    """Reach an application of its own on the database; its jobs stay queued."""
+
+    def client(
+        access: str = "auto", server: str = "10.0.0.5", address: str = "10.0.0.9", key: str = "", **settings: Any
+    ) -> Caller:
+        chosen = Settings(access=access, **settings)
+        app = create_app(chosen)
+        jobs: Any = SimpleNamespace(submit=lambda _: None)
+        app.state.context = Context(chosen, database, blobs, jobs)
+        return Caller(app, server, address, {"Authorization": f"Bearer {key}"} if key else {})
+
+    return client
 
 
 @pytest.fixture(scope="session")

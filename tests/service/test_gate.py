@@ -2,21 +2,17 @@ import asyncio
 import logging
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import httpx
 import pytest
-from fastapi import FastAPI
 from sqlalchemy import event
 
-from db.blobs import BlobStore
 from db.database import Database
 from db.repositories import access_keys
 from service import access, gate
 from service.access import SCOPES
 from service.app import create_app
-from service.context import Context
 from service.gate import NoKeys, check_start
 from service.settings import Settings
 from stiction_client import AsyncFrictionClient, Material, ProblemError
@@ -25,50 +21,7 @@ ROUTES = access.scopes_of_routes(create_app(Settings()))
 ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
 
 Make = Callable[..., str]
-
-
-@dataclass
-class Caller:
-    """Somebody who asks the application itself, from a network address of his own."""
-
-    app: FastAPI
-    server: str
-    address: str
-    headers: dict[str, str]
-
-    def request(self, method: str, path: str, **more: Any) -> httpx.Response:
-        return asyncio.run(self._request(method, path, **more))
-
-    def get(self, path: str, **more: Any) -> httpx.Response:
-        return self.request("GET", path, **more)
-
-    async def _request(self, method: str, path: str, **more: Any) -> httpx.Response:
-        transport = httpx.ASGITransport(self.app, raise_app_exceptions=False, client=(self.address, 50000))
-        url = f"http://{self.server}"
-        async with httpx.AsyncClient(transport=transport, base_url=url, headers=self.headers) as client:
-            return await client.request(method, path, **more)
-
-    def open_stream(self, path: str) -> httpx.Response:
-        """What a WebSocket is answered before it is open."""
-        headers = [(name.lower().encode(), value.encode()) for name, value in self.headers.items()]
-        ends = {"server": (self.server, 80), "client": (self.address, 50000)}
-        scope = {"type": "websocket", "path": path, "raw_path": path.encode(), "query_string": b"", "headers": headers}
-        sent: list[Any] = []
-
-        async def receive() -> dict[str, str]:
-            return {"type": "websocket.connect"}
-
-        async def send(message: Any) -> None:
-            sent.append(message)
-
-        scope |= ends | {"scheme": "ws", "extensions": {"websocket.http.response": {}}, "subprotocols": []}  # type: ignore[dict-item]
-        asyncio.run(self.app(scope, receive, send))
-        if sent[0]["type"] == "websocket.accept":
-            return httpx.Response(101)
-        return httpx.Response(sent[0]["status"], headers=sent[0]["headers"], content=sent[1]["body"])
-
-
-Reach = Callable[..., Caller]
+Reach = Callable[..., Any]
 
 
 @pytest.fixture
@@ -82,28 +35,16 @@ def make(database: Database) -> Make:
     return make_key
 
 
-@pytest.fixture
-def reach(database: Database, blobs: BlobStore) -> Reach:
-    """A client as the application sees it; it starts no jobs."""
-
-    def client(mode: str = "auto", server: str = "10.0.0.5", address: str = "10.0.0.9", key: str = "") -> Caller:
-        settings = Settings(access=mode)
-        app = create_app(settings)
-        no_jobs: Any = None
-        app.state.context = Context(settings, database, blobs, no_jobs)
-        headers = {"Authorization": f"Bearer {key}"} if key else {}
-        return Caller(app, server, address, headers)
-
-    return client
-
-
-def knock(client: Caller, route: str) -> httpx.Response:
+def knock(client: Any, route: str) -> httpx.Response:
     """The answer of a route to a request that is well-formed as far as anybody without the route's secrets knows."""
     method, _, path = route.partition(" ")
     path = re.sub(r"\{\w+\}", "x", path)
-    if method == "WS":
-        return client.open_stream(path)
-    return client.request(method, path, json={} if method != "GET" else None)
+    answer: httpx.Response = (
+        client.open_stream(path)
+        if method == "WS"
+        else client.request(method, path, json={} if method != "GET" else None)
+    )
+    return answer
 
 
 @ONLY_SQLITE
