@@ -3,9 +3,9 @@
 import io
 import json
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, Protocol
+from typing import IO, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -73,13 +73,16 @@ def encode(log: GraspLogLike) -> bytes:
     Equal logs give equal bytes on every machine, so that a content hash finds duplicates (deflate would depend on
     the compressor's version). float32 is kept for displacement, force and normal; all else is float64.
     """
-    return _zip({f"{name}.npy": _npy(array) for name, array in _members(log).items()})
+    buffer = io.BytesIO()
+    _zip(buffer, _npy_members(log))
+    return buffer.getvalue()
 
 
 def write(log: GraspLogLike, path: Path | str) -> Path:
     """Write a grasp log to ``path`` as an NPZ container and return the path."""
     target = Path(path)
-    target.write_bytes(encode(log))
+    with target.open("wb") as stream:
+        _zip(stream, _npy_members(log))
     return target
 
 
@@ -92,11 +95,14 @@ def pack_folder(folder: Path | str) -> bytes:
     paths = sorted(source.glob("*.npy"))
     if not paths:
         raise InvalidArgument("folder", f"{source.name!r} without .npy files", "a recording, one .npy a field")
-    return _zip({f"{source.name}/{path.name}": path.read_bytes() for path in paths})
+    buffer = io.BytesIO()
+    _zip(buffer, ((f"{source.name}/{path.name}", path.read_bytes()) for path in paths))
+    return buffer.getvalue()
 
 
-def _members(log: GraspLogLike) -> dict[str, NDArray[Any]]:
-    members: dict[str, NDArray[Any]] = {
+def members(log: GraspLogLike) -> dict[str, NDArray[Any]]:
+    """The arrays that a container of this log holds, by name; optional ones that the log lacks are left out."""
+    arrays: dict[str, NDArray[Any]] = {
         "format": np.array(FORMAT),
         "version": np.array(VERSION, dtype="<i8"),
         "sensor": np.array(str(log.sensor)),
@@ -105,12 +111,12 @@ def _members(log: GraspLogLike) -> dict[str, NDArray[Any]]:
     for name in ("time", "position", "displacement", "element_area", "force", "normal", "object_pose"):
         value = getattr(log, name)
         if value is not None:
-            members[name] = _real(name, value)
+            arrays[name] = _real(name, value)
     for name in MASKS:
         mask = getattr(log, name, None)
         if mask is not None:
-            members[name] = np.ascontiguousarray(mask, dtype=np.bool_)
-    return members if log.truth is None else members | _truth(log.truth)
+            arrays[name] = np.ascontiguousarray(mask, dtype=np.bool_)
+    return arrays if log.truth is None else arrays | _truth(log.truth)
 
 
 def _truth(truth: Any) -> dict[str, NDArray[Any]]:
@@ -134,11 +140,14 @@ def _npy(array: NDArray[Any]) -> bytes:
     return buffer.getvalue()
 
 
-def _zip(members: Mapping[str, bytes]) -> bytes:
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
-        for name, content in members.items():
+def _npy_members(log: GraspLogLike) -> Iterator[tuple[str, bytes]]:
+    """One at a time, so that a log is never there twice."""
+    return ((f"{name}.npy", _npy(array)) for name, array in members(log).items())
+
+
+def _zip(target: IO[bytes], members: Iterable[tuple[str, bytes]]) -> None:
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_STORED) as archive:
+        for name, content in members:
             entry = zipfile.ZipInfo(name, date_time=EPOCH)
             entry.create_system, entry.external_attr = 3, 0o644 << 16  # as on Unix, wherever it is written
             archive.writestr(entry, content)
-    return buffer.getvalue()

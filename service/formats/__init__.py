@@ -1,27 +1,65 @@
 """File formats of grasp logs, one module each."""
 
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
+from typing import Any
 
-from service.formats import npz, tac3d, tracked_markers
+from service.formats import mapping as mappings
+from service.formats import tac3d, tracked_markers
 from service.formats.archive import open_archive
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 
-__all__ = ["CONTENT_TYPES", "UnsupportedFormat", "identify", "read"]
+__all__ = ["CONTENT_TYPES", "FORMATS", "UNSPECIFIC_TYPES", "Format", "UnsupportedFormat", "identify", "read"]
 
-CONTENT_TYPES = {
-    "application/vnd.stiction.grasp-log+npz": "npz",
-    "application/vnd.tac3d+zip": "tac3d",
-    "text/csv": "tracked markers",
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A format: its content type, where its reader is, how its files begin, and which settings it takes.
+
+    ``plain``: read by our own bounded code; the others go through libraries, and so through a process of their own.
+    """
+
+    content_type: str
+    reader: str
+    magic: bytes = b""
+    settings: tuple[str, ...] = ("mapping",)
+    plain: bool = False
+
+
+FORMATS = {
+    "npz": Format("application/vnd.stiction.grasp-log+npz", "npz.read", settings=(), plain=True),
+    "tac3d": Format("application/vnd.tac3d+zip", "tac3d.read", settings=(), plain=True),
+    "tracked markers": Format("text/csv", "tracked_markers.read", settings=("scale", "frame_rate")),
+    "mcap": Format("application/x-mcap", "mcap.read", b"\x89MCAP0\r\n"),
+    "rosbag1": Format("application/x-rosbag", "rosbag.read_bag1", b"#ROSBAG V"),
+    "rosbag2": Format("application/x-rosbag2", "rosbag.read_bag2", b"SQLite format 3\x00"),
+    "hdf5": Format("application/x-hdf5", "hdf5.read", b"\x89HDF\r\n\x1a\n"),
+    "parquet": Format("application/vnd.apache.parquet", "parquet.read", b"PAR1"),
+    "json": Format("application/json", "json_log.read"),
 }
+
+CONTENT_TYPES = {each.content_type: name for name, each in FORMATS.items()}
 """Content types that name a format; the others below leave it to the file's own content."""
 
 UNSPECIFIC_TYPES = ("application/zip", "application/octet-stream")
 
+_WHERE = {
+    "scale": "only beside a table of tracked markers: other formats are in SI units",
+    "frame_rate": "only beside a table of tracked markers: other formats tell times",
+    "mapping": "only beside a format of topics, fields or columns",
+}
+
+EXTRA = "formats"
+"""The extra that brings the libraries of the formats that need some."""
+
+STORAGE = (".db3", ".mcap")
+"""Names of rosbag2's storage files end so."""
+
 SNIFFED_BYTES = 4096
 """Enough for the lines before a table and its header."""
-
-_READERS = {"npz": npz.read, "tac3d": tac3d.read}
 
 
 class UnsupportedFormat(InvalidInput):
@@ -29,48 +67,76 @@ class UnsupportedFormat(InvalidInput):
 
     def __init__(self, name: str, value: object, allowed: str | None = None) -> None:
         types = ", ".join((*CONTENT_TYPES, *UNSPECIFIC_TYPES))
-        accepted = f"{types}; a Stiction NPZ, a zipped Tac3D recording or a table of tracked markers"
-        super().__init__(name, value, allowed or accepted)
+        super().__init__(name, value, allowed or f"{types} (docs/formats.md)")
 
 
-def read(path: Path, content_type: str | None = None, **settings: float | None) -> GraspLog:
-    """Read a grasp log of any known format: an NPZ container, a Tac3D recording folder or a zip of one, or a table of
-    tracked markers, whose ``scale`` (m per pixel) and ``frame_rate`` (1/s) may be given as ``settings``.
+def read(path: Path, content_type: str | None = None, **settings: float | str | None) -> GraspLog:
+    """Read a grasp log of any known format: a file, or the folder of a Tac3D or rosbag2 recording.
 
-    The format is what ``content_type`` names or, without one, what the file's content tells. Raises
-    ``UnsupportedFormat``, or ``InvalidInput`` for what is wrong inside.
+    The format is what ``content_type`` names or, without one, what the file's content tells. ``settings``, where they
+    are not None: of tracked markers ``scale`` (m per pixel) and ``frame_rate`` (1/s), of formats with topics, fields or
+    columns the ``mapping`` (JSON). Raises ``UnsupportedFormat``, or ``InvalidInput`` for what is wrong inside.
     """
     name = identify(path, content_type)
-    given = {key: value for key, value in settings.items() if value is not None}
-    if name == "tracked markers":
-        return tracked_markers.read(path, **given)
+    given: dict[str, Any] = {key: value for key, value in settings.items() if value is not None}
+    taken = FORMATS[name].settings
     for key, value in given.items():
-        raise InvalidInput(key, value, "only beside a table of tracked markers: other formats are in SI units")
-    return _READERS[name](path)
+        if key not in taken:
+            raise InvalidInput(key, f"{str(value)[:60]} with {name}", _WHERE[key])
+    if "mapping" in given:
+        given["mapping"] = mappings.parse(given["mapping"])
+    return _reader(name)(path, **given)
 
 
 def identify(path: Path, content_type: str | None = None) -> str:
-    """Name of the format of the log at ``path``: "npz", "tac3d" or "tracked markers"; raises ``UnsupportedFormat``."""
+    """Name of the format of the log at ``path``, a key of ``FORMATS``; raises ``UnsupportedFormat``."""
     media_type = (content_type or UNSPECIFIC_TYPES[0]).partition(";")[0].strip().lower()
     if media_type in CONTENT_TYPES:
         return CONTENT_TYPES[media_type]
     if media_type not in UNSPECIFIC_TYPES:
         raise UnsupportedFormat("content type", media_type[:100])
-    return "tac3d" if path.is_dir() else _sniff(path)
+    if path.is_dir():
+        return "rosbag2" if any(file.suffix in STORAGE for file in path.iterdir()) else "tac3d"
+    return _sniff(path)
+
+
+def _reader(name: str) -> Callable[..., GraspLog]:
+    """The format's reader, whose library is imported only now."""
+    module, _, function = FORMATS[name].reader.partition(".")
+    try:
+        found = importlib.import_module(f"service.formats.{module}")
+    except ModuleNotFoundError as error:
+        if str(error.name).startswith("service"):
+            raise
+        allowed = f"the extra `{EXTRA}`, which brings it: pip install 'stiction[{EXTRA}]'"
+        raise UnsupportedFormat(f"reader of {name}", f"without its library {error.name}", allowed) from error
+    reader: Callable[..., GraspLog] = getattr(found, function)
+    return reader
 
 
 def _sniff(path: Path) -> str:
     with path.open("rb") as stream:
         start = stream.read(SNIFFED_BYTES)
-    if not start.startswith(b"PK\x03\x04"):
-        if tracked_markers.looks_like(start):
-            return "tracked markers"
-        value = f"neither a zip nor a table of markers (it starts with {start[:4]!r})" if start else "empty"
-        raise UnsupportedFormat("file", value)
+    for name, each in FORMATS.items():
+        if each.magic and start.startswith(each.magic):
+            return name
+    if start.startswith(b"PK\x03\x04"):
+        return _sniff_zip(path)
+    if start.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
+        return "json"
+    if tracked_markers.looks_like(start):
+        return "tracked markers"
+    value = f"of no known format (it starts with {start[:4]!r})" if start else "empty"
+    raise UnsupportedFormat("file", value)
+
+
+def _sniff_zip(path: Path) -> str:
     with open_archive(path) as archive:
         names = archive.namelist()
     if "format.npy" in names:
         return "npz"
     if any(PurePosixPath(name).stem in tac3d.REQUIRED for name in names):
         return "tac3d"
+    if any(PurePosixPath(name).suffix in STORAGE for name in names):
+        return "rosbag2"
     raise UnsupportedFormat("file", f"a zip of {', '.join(names)[:100] or 'nothing'}")

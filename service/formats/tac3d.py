@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.formats.archive import open_archive, read_member
+from service.formats.lattice import element_area
 from service.formats.npy import MAX_ARRAY_BYTES, read_array
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray, GraspLog
@@ -40,7 +41,7 @@ def read(path: Path) -> GraspLog:
         time=time - time[0],
         position=position,
         displacement=displacement,
-        element_area=_element_area(position),
+        element_area=element_area("3D_Positions", position),
         force=vectors.get("3D_Forces"),
         normal=vectors.get("3D_Normals"),
         sensor=sensor,
@@ -135,15 +136,6 @@ def _check_finite(name: str, array: FloatArray) -> None:
         raise InvalidInput(
             name, f"{array[tuple(bad[0])]} at index {bad[0].tolist()} ({len(bad)} in all)", "finite numbers"
         )
-
-
-def _element_area(position: FloatArray) -> float:
-    """Mean area of the cells between four neighbouring markers, on the curved surface at rest, m²."""
-    if min(position.shape[:2]) < 2:
-        raise InvalidInput("3D_Positions", f"{position.shape[0]} marker(s) a side", "at least 2 markers a side")
-    diagonal = position[1:, 1:] - position[:-1, :-1]
-    other_diagonal = position[1:, :-1] - position[:-1, 1:]
-    return float(0.5 * np.linalg.norm(np.cross(diagonal, other_diagonal), axis=-1).mean())
 
 
 def _frame_counts(index: FloatArray, time: FloatArray) -> dict[str, str]:

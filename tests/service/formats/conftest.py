@@ -1,10 +1,22 @@
 import io
+import json
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import h5py
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
+from mcap.writer import Writer as McapWriter
+from rosbags.rosbag1 import Writer as Bag1
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Bag2
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
 
 from slipcore import FrictionLaw, GraspLog, GroundTruth
 
@@ -112,3 +124,136 @@ def recording(request: pytest.FixtureRequest) -> Path:
     if not folder.is_dir():
         pytest.skip("the Tac3D example recordings are not in .cache (make recordings)")
     return folder
+
+
+TACTILE = "std_msgs/Header header\nfloat64[] displacement\nfloat64[] force\n"
+ROBOT_MAPPING = {
+    "topic": "/tactile",
+    "grid": [3, 4],
+    "time": "header.stamp",
+    "displacement": {"field": "displacement", "unit": "mm"},
+    "force": "force",
+    "position": {"topic": "/tactile/rest", "field": "data", "unit": "mm"},
+    "object_pose": {"topic": "/object", "field": ["x", "y", "theta"]},
+    "element_area": {"value": 1.0, "unit": "mm²"},
+}
+"""What leads from a robot's topics, as ``robot_messages`` makes them, to ``robot_log``."""
+
+START = 1_700_000_000_000_000_000
+"""ns since 1970 of the first frame."""
+
+
+@pytest.fixture
+def robot_log(log: GraspLog) -> GraspLog:
+    """What a robot's recording of ``log`` is read as: without names and truth, its time from 0."""
+    return GraspLog(
+        log.time, log.position, log.displacement, 1e-6, force=log.force, object_pose=log.object_pose
+    )
+
+
+def robot_messages(log: GraspLog, store: Typestore) -> Iterator[tuple[str, str, int, object]]:
+    """Topic, type, time of receipt and message of a robot that publishes a grasp in three topics, in mm."""
+    types = store.types
+    layout = types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
+    rest = types["std_msgs/msg/Float64MultiArray"](layout=layout, data=1e3 * log.position.reshape(-1))
+    yield "/tactile/rest", "std_msgs/msg/Float64MultiArray", START, rest
+    for k, time in enumerate(log.time):
+        moment = START + round(time * 1e9)
+        stamp = types["builtin_interfaces/msg/Time"](sec=moment // 10**9, nanosec=moment % 10**9)
+        sequence = {"seq": k} if "seq" in types["std_msgs/msg/Header"].__dataclass_fields__ else {}
+        yield "/tactile", "sensor/msg/Tactile", moment + 2_000_000, types["sensor/msg/Tactile"](
+            header=types["std_msgs/msg/Header"](stamp=stamp, frame_id="finger", **sequence),
+            displacement=1e3 * log.displacement[k].reshape(-1),
+            force=log.force[k].reshape(-1),
+        )
+        x, y, theta = log.object_pose[k]
+        pose = types["geometry_msgs/msg/Pose2D"](x=x, y=y, theta=theta)
+        yield "/object", "geometry_msgs/msg/Pose2D", moment + 5_000_000, pose
+
+
+def robot_types(stores: Stores) -> Typestore:
+    store = get_typestore(stores)
+    store.register(get_types_from_msg(TACTILE, "sensor/msg/Tactile"))
+    return store
+
+
+def write_bag1(log: GraspLog, path: Path, compression: Bag1.CompressionFormat | None = None) -> Path:
+    store = robot_types(Stores.ROS1_NOETIC)
+    bag = Bag1(path)
+    if compression is not None:
+        bag.set_compression(compression)
+    with bag:
+        connections = {}
+        for topic, kind, moment, message in robot_messages(log, store):
+            if topic not in connections:
+                connections[topic] = bag.add_connection(topic, kind, typestore=store)
+            bag.write(connections[topic], moment, store.serialize_ros1(message, kind))
+    return path
+
+
+def write_bag2(log: GraspLog, folder: Path, plugin: StoragePlugin = StoragePlugin.SQLITE3) -> Path:
+    store = robot_types(Stores.ROS2_HUMBLE)
+    with Bag2(folder, version=9, storage_plugin=plugin) as bag:
+        connections = {}
+        for topic, kind, moment, message in robot_messages(log, store):
+            if topic not in connections:
+                connections[topic] = bag.add_connection(topic, kind, typestore=store)
+            bag.write(connections[topic], moment, store.serialize_cdr(message, kind))
+    return folder
+
+
+def write_json_mcap(log: GraspLog, path: Path, mapping: str = "", **options: Any) -> Path:
+    """An MCAP of JSON messages."""
+    with path.open("wb") as stream:
+        writer = McapWriter(stream, **options)
+        writer.start()
+        schema = writer.register_schema("tactile", "jsonschema", b"{}")
+        channel = writer.register_channel("/tactile", "json", schema)
+        for k, time in enumerate(log.time):
+            frame = {"displacement": log.displacement[k].tolist(), "rest": log.position.tolist()}
+            moment = START + round(time * 1e9)
+            writer.add_message(channel, moment, json.dumps(frame).encode(), moment)
+        if mapping:
+            writer.add_metadata("stiction", {"mapping": mapping})
+        writer.finish()
+    return path
+
+
+def write_hdf5(log: GraspLog, path: Path) -> Path:
+    with h5py.File(path, "w") as file:
+        for name in ("time", "position", "displacement", "force", "normal", "object_pose"):
+            file.create_dataset(name, data=getattr(log, name), compression="gzip", shuffle=True)
+        file.attrs["element_area"] = log.element_area
+        file.attrs["sensor"] = log.sensor
+    return path
+
+
+def write_lerobot(log: GraspLog, path: Path) -> Path:
+    """A data file as LeRobot v3 lays it out: episodes one after the other, arrays as nested lists."""
+    frames = len(log)
+    columns = {
+        "observation.displacement": pa.array([*log.displacement.tolist(), *log.displacement.tolist()]),
+        "observation.force": pa.array([*log.force.tolist(), *(-log.force).tolist()]),
+        "timestamp": pa.array(np.concatenate([log.time, log.time]).astype(np.float32)),
+        "frame_index": pa.array([*range(frames), *range(frames)]),
+        "episode_index": pa.array([0] * frames + [1] * frames),
+        "index": pa.array(range(2 * frames)),
+        "task_index": pa.array([0] * 2 * frames),
+    }
+    pq.write_table(pa.table(columns), path, row_group_size=4)
+    return path
+
+
+def write_json(log: GraspLog, path: Path) -> Path:
+    names = ("time", "position", "displacement", "force", "object_pose")
+    path.write_text(json.dumps({name: getattr(log, name).tolist() for name in names} | {"sensor": "left"}))
+    return path
+
+
+@pytest.fixture
+def write() -> SimpleNamespace:
+    """Writers of a log, each by its format's own library."""
+    return SimpleNamespace(
+        bag1=write_bag1, bag2=write_bag2, json_mcap=write_json_mcap, hdf5=write_hdf5, lerobot=write_lerobot,
+        json=write_json, mapping=ROBOT_MAPPING,
+    )  # fmt: skip

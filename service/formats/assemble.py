@@ -1,0 +1,164 @@
+"""From what a mapping points at to a grasp log: units, lattice, checks."""
+
+import json
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.formats.lattice import element_area, flat_lattice
+from service.formats.mapping import FieldMapping, Origin
+from service.formats.members import DTYPES, FLAG, ONCE, REQUIRED, TEXT, Members, grasp_log, told_metadata
+from service.formats.npy import MAX_ARRAY_BYTES
+from slipcore.errors import InvalidInput
+from slipcore.frames import GraspLog
+
+MAX_CONTENT_BYTES = MAX_ARRAY_BYTES // 2
+"""Bytes of all that is read of one file: they are held twice while the log is made of them."""
+
+VECTORS = ("displacement", "position", "force", "normal")
+MASKS = tuple(name for name, dtypes in DTYPES.items() if dtypes == FLAG)
+
+
+class Recording(Protocol):
+    """A file of named fields."""
+
+    def column(self, name: str, topic: str | None, field: str, once: bool) -> NDArray[Any] | None:
+        """A field as an array, one entry a frame or ``once`` for the log; None where it isn't there."""
+
+    def grid(self) -> tuple[int, int] | None:
+        """Markers along the two axes of the lattice, where the file tells it apart from the arrays' shapes."""
+
+    def contents(self) -> str:
+        """What is there, for an error's message."""
+
+
+def assemble(recording: Recording, mapping: FieldMapping) -> GraspLog:
+    """The log that ``mapping`` finds in a recording; raises ``InvalidInput`` naming the member that is wrong."""
+    members: dict[str, NDArray[Any]] = {}
+    metadata: dict[str, str] = {"mapping": mapping.text} if mapping.text else {}
+    for name, origin in mapping.origins.items():
+        array = _read(recording, name, origin)
+        if array is None and origin.explicit:
+            raise InvalidInput(name, f"not there ({origin})", recording.contents())
+        if array is not None:
+            members[name] = _in_si(name, array, origin, metadata)
+    return _log(members, mapping, metadata, recording)
+
+
+def _log(
+    members: dict[str, NDArray[Any]], mapping: FieldMapping, metadata: dict[str, str], recording: Recording
+) -> GraspLog:
+    for name in ("displacement", "time"):
+        _require(name, members, recording)
+    grid = mapping.grid or recording.grid()
+    for name in (*VECTORS, *MASKS):
+        if name in members:
+            members[name] = _on_grid(name, members[name], grid)
+    if "position" not in members and mapping.pitch is not None:
+        members["position"] = flat_lattice(members["displacement"].shape[1:3], mapping.pitch)
+        metadata["position"] = f"a flat lattice of pitch {mapping.pitch:g} m"
+    _require("position", members, recording)
+    if "element_area" not in members:
+        members["element_area"] = np.array(element_area("position", members["position"]))
+        metadata["element_area"] = "mean of the cells between the markers"
+    if metadata:
+        members["metadata"] = _with(members, metadata)
+    return grasp_log(members)
+
+
+def _require(name: str, members: Members, recording: Recording) -> None:
+    if name not in members:
+        allowed = f"{', '.join(REQUIRED)} by a mapping or by name; the file has {recording.contents()}"
+        raise InvalidInput(name, "not there", allowed)
+
+
+def _read(recording: Recording, name: str, origin: Origin) -> NDArray[Any] | None:
+    """A member as it is in the file; components stacked on its last axis."""
+    if origin.value is not None:
+        return as_array(name, origin.value)
+    parts = []
+    for field in origin.fields:
+        part = recording.column(name, origin.topic, field, name in ONCE)
+        if part is None:
+            return None
+        parts.append(part)
+    if len(parts) == 1:
+        return parts[0]
+    if len({part.shape for part in parts}) > 1:
+        shapes = ", ".join(str(list(part.shape)) for part in parts)
+        raise InvalidInput(name, f"of components of shapes {shapes}"[:200], "components of one shape")
+    return np.stack(parts, axis=-1)
+
+
+def as_array(name: str, value: Any) -> NDArray[Any]:
+    """Numbers, truth values or text, nested as they may be; null is NaN among numbers. Raises ``InvalidInput``."""
+    if isinstance(value, dict):
+        return np.array(json.dumps(value))
+    try:
+        array = np.asarray(value)
+        if array.dtype == object:
+            array = np.asarray(value, dtype=np.float64)
+    except (ValueError, TypeError, OverflowError, RecursionError) as error:
+        raise InvalidInput(name, f"not an array ({str(error)[:80]})", "an array of real numbers") from error
+    return array
+
+
+def _in_si(name: str, array: NDArray[Any], origin: Origin, metadata: dict[str, str]) -> NDArray[Any]:
+    if name == "time":
+        return _seconds(array, origin, metadata)
+    dtypes = DTYPES[name]
+    if dtypes == TEXT:
+        if array.dtype.kind != "U":
+            raise InvalidInput(name, f"of dtype {array.dtype}", "text")
+        return array
+    if dtypes == FLAG:
+        return _truth_values(name, array)
+    if array.dtype.kind not in "iuf":
+        raise InvalidInput(name, f"of dtype {array.dtype}", "an array of real numbers")
+    if origin.factors is None:
+        return array
+    if array.ndim and len(origin.factors) > 1 and array.shape[-1] != len(origin.factors):
+        raise InvalidInput(name, f"of shape {list(array.shape)}", f"shape [any, {len(origin.factors)}]")
+    return np.asarray(array * np.array(origin.factors if len(origin.factors) > 1 else origin.factors[0]))
+
+
+def _seconds(time: NDArray[Any], origin: Origin, metadata: dict[str, str]) -> NDArray[np.float64]:
+    """Seconds; whole numbers (nanoseconds since 1970, as a rule) count from the first, lest they lose digits."""
+    factor = origin.factors[0] if origin.factors else 1.0
+    if time.dtype.kind == "M":
+        time, factor = time.astype("datetime64[ns]").astype(np.int64), 1e-9
+    if time.ndim != 1 or time.size == 0 or time.dtype.kind not in "iuf":
+        raise InvalidInput("time", f"{time.dtype} of shape {list(time.shape)}", "one number a frame")
+    if time.dtype.kind == "f":
+        return np.asarray(time * factor, dtype=np.float64)
+    if factor < 1.0 and time[0]:
+        metadata["start_time"] = f"{int(time[0])} / {1.0 / factor:.0f} s"
+        time = time.astype(np.int64) - np.int64(time[0])
+    return np.asarray(time / (1.0 / factor), dtype=np.float64)
+
+
+def _truth_values(name: str, array: NDArray[Any]) -> NDArray[np.bool_]:
+    if array.dtype != np.bool_ and (array.dtype.kind not in "iu" or ((array != 0) & (array != 1)).any()):
+        raise InvalidInput(name, f"of dtype {array.dtype}", "truth values, or whole numbers 0 and 1")
+    return array.astype(np.bool_)
+
+
+def _on_grid(name: str, array: NDArray[Any], grid: tuple[int, int] | None) -> NDArray[Any]:
+    """A field on its lattice: [t, n, m, 3] (masks [t, n, m], position [n, m, 3]) from any flatter shape."""
+    ndim = (0 if name in ONCE else 1) + 2 + (1 if name in VECTORS else 0)
+    if array.ndim >= ndim:
+        return array
+    if grid is None:
+        allowed = f"{ndim} axes, or a grid in the mapping, such as [20, 20]"
+        raise InvalidInput(name, f"of shape {list(array.shape)}", allowed)
+    lead = () if name in ONCE else array.shape[:1]
+    shape = (*lead, *grid, *((3,) if name in VECTORS else ()))
+    if array.size != np.prod(shape, dtype=object):
+        raise InvalidInput(name, f"of shape {list(array.shape)}", f"{list(shape)} or as many numbers")
+    return array.reshape(shape)
+
+
+def _with(members: Members, metadata: dict[str, str]) -> NDArray[Any]:
+    """The file's metadata with what the reader has to say."""
+    return np.array(json.dumps({**told_metadata(members), **metadata}))

@@ -1,0 +1,60 @@
+"""Small logs in JSON: one object of the members, or of frames (docs/formats.md)."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from service.formats import mapping as mappings
+from service.formats.assemble import as_array, assemble
+from service.formats.mapping import FieldMapping, Origin, default_origins
+from service.formats.members import DTYPES, ONCE
+from service.formats.messages import follow
+from slipcore.errors import InvalidInput
+from slipcore.frames import GraspLog
+
+MAX_JSON_BYTES = 32 * 2**20
+"""Bytes of a JSON file, which takes ten times as many in memory; larger logs have better formats."""
+
+
+def read(path: Path, mapping: FieldMapping | None = None) -> GraspLog:
+    """Read a grasp log from a JSON file. Raises ``InvalidInput`` naming the member that is wrong."""
+    document = _document(path)
+    own = mappings.parse(json.dumps(document["mapping"])) if "mapping" in document else mappings.UNMAPPED
+    defaults = default_origins()
+    if isinstance(document.get("frames"), list):
+        defaults |= {name: Origin((f"frames.{name}",), explicit=False) for name in DTYPES if name not in ONCE}
+    return assemble(_Document(document), (mapping or own).over(defaults))
+
+
+class _Document:
+    """A JSON object; a ``Recording``."""
+
+    def __init__(self, document: dict[str, Any]) -> None:
+        self._document = document
+
+    def column(self, name: str, _topic: str | None, field: str, _once: bool) -> NDArray[Any] | None:
+        """What a dotted path leads to."""
+        value = follow(self._document, field)
+        return None if value is None else as_array(name, value)
+
+    def grid(self) -> None:
+        """Told by the arrays' shapes alone."""
+
+    def contents(self) -> str:
+        """The object's keys."""
+        return f"the keys {', '.join(self._document)}"[:300]
+
+
+def _document(path: Path) -> dict[str, Any]:
+    size = path.stat().st_size
+    if size > MAX_JSON_BYTES:
+        raise InvalidInput("file", f"{size} bytes of JSON", f"at most {MAX_JSON_BYTES} bytes")
+    try:
+        document = json.loads(path.read_bytes())
+    except (ValueError, RecursionError) as error:
+        raise InvalidInput("file", f"not JSON ({str(error)[:80]})", "a JSON object") from error
+    if not isinstance(document, dict):
+        raise InvalidInput("file", f"JSON of a {type(document).__name__}", "a JSON object")
+    return document

@@ -1,0 +1,151 @@
+"""Which topic, field or column of a file becomes which member of a grasp log, in which unit (docs/formats.md)."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from service.formats.members import DTYPES, ONCE
+from slipcore.errors import InvalidInput
+
+MAX_MAPPING_BYTES = 64 * 1024
+"""Bytes of a mapping's JSON: enough for the rest positions of 30 × 30 markers given as a value."""
+
+LENGTH = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
+TIME = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+ANGLE = {"rad": 1.0, "deg": math.pi / 180.0}
+UNITS: dict[str, Mapping[str, float]] = {
+    "time": TIME,
+    "position": LENGTH,
+    "displacement": LENGTH,
+    "element_area": {"m²": 1.0, "m2": 1.0, "mm²": 1e-6, "mm2": 1e-6},
+    "force": {"N": 1.0, "mN": 1e-3},
+}
+"""Factors to SI of what may be given otherwise; ``object_pose`` has a unit a component."""
+
+_ORIGIN_KEYS = {"field", "topic", "unit", "value"}
+_ALLOWED_ORIGIN = "a field, a list of fields, or an object of field or value, topic and unit"
+_SETTINGS = ("topic", "grid", "pitch", "tolerance", "episode")
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where one member comes from: the ``fields`` of a topic (several are stacked as components), or a ``value``.
+
+    ``factors`` bring it, or its components, to SI; None where it is in SI. ``explicit`` origins must be there.
+    """
+
+    fields: tuple[str, ...] = ()
+    topic: str | None = None
+    factors: tuple[float, ...] | None = None
+    value: Any = None
+    explicit: bool = True
+
+    def __str__(self) -> str:
+        named = ", ".join(self.fields)
+        return f"{named} of {self.topic}" if self.topic else named
+
+
+@dataclass(frozen=True, slots=True)
+class FieldMapping:
+    """Origin of each member, and what the file may not tell: lattice, pitch (m), tolerance (s) and episode.
+
+    ``text`` is the mapping as it was given, empty where none was.
+    """
+
+    origins: Mapping[str, Origin]
+    grid: tuple[int, int] | None = None
+    pitch: float | None = None
+    tolerance: float | None = None
+    episode: int | None = None
+    text: str = ""
+
+    def over(self, defaults: Mapping[str, Origin]) -> "FieldMapping":
+        """This mapping with ``defaults`` for the members that it does not name."""
+        return replace(self, origins={**defaults, **self.origins})
+
+
+UNMAPPED = FieldMapping({})
+
+
+def parse(text: str) -> FieldMapping:
+    """A mapping from its JSON; raises ``InvalidInput`` naming the entry that is wrong."""
+    if len(text.encode(errors="replace")) > MAX_MAPPING_BYTES:
+        raise InvalidInput("mapping", f"{len(text)} characters", f"at most {MAX_MAPPING_BYTES} bytes")
+    try:
+        given = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InvalidInput("mapping", f"not JSON ({error})", "a JSON object") from error
+    if not isinstance(given, dict):
+        raise InvalidInput("mapping", text[:60], "a JSON object")
+    unknown = sorted(given.keys() - DTYPES.keys() - set(_SETTINGS))
+    if unknown:
+        raise InvalidInput("mapping", f"of the unknown {unknown[0][:60]!r}", ", ".join((*DTYPES, *_SETTINGS)))
+    topic = _text("topic", given["topic"]) if "topic" in given else None
+    return FieldMapping(
+        origins={name: _origin(name, given[name], topic) for name in DTYPES if name in given},
+        grid=_grid(given["grid"]) if "grid" in given else None,
+        pitch=_positive("pitch", given["pitch"]) if "pitch" in given else None,
+        tolerance=_positive("tolerance", given["tolerance"]) if "tolerance" in given else None,
+        episode=_episode(given["episode"]) if "episode" in given else None,
+        text=json.dumps(given, sort_keys=True, ensure_ascii=False),
+    )
+
+
+def default_origins(frame_topic: str | None = None, once_topic: str | None = None) -> dict[str, Origin]:
+    """Each member under its own name, in SI; in messages, those of a frame and those of the log in a topic each."""
+    return {name: Origin((name,), once_topic if name in ONCE else frame_topic, explicit=False) for name in DTYPES}
+
+
+def _origin(name: str, given: Any, topic: str | None) -> Origin:
+    entry = given if isinstance(given, dict) else {"field": given}
+    if not entry or entry.keys() - _ORIGIN_KEYS or ("value" in entry) == ("field" in entry):
+        raise InvalidInput(f"mapping of {name}", repr(given)[:60], _ALLOWED_ORIGIN)
+    factors = _factors(name, entry["unit"]) if "unit" in entry else None
+    if "value" in entry:
+        return Origin(value=entry["value"], factors=factors)
+    fields = entry["field"] if isinstance(entry["field"], list) else [entry["field"]]
+    if not fields or len(fields) > 10_000:
+        raise InvalidInput(f"mapping of {name}", f"{len(fields)} fields", "1 to 10000 fields")
+    chosen = _text(f"topic of {name}", entry["topic"]) if "topic" in entry else topic
+    return Origin(tuple(_text(f"mapping of {name}", field) for field in fields), chosen, factors)
+
+
+def _factors(name: str, unit: Any) -> tuple[float, ...]:
+    if name == "object_pose":
+        if not isinstance(unit, list) or len(unit) != 3:
+            raise InvalidInput("unit of object_pose", repr(unit)[:60], 'one a component, such as ["mm", "mm", "deg"]')
+        return tuple(_factor(name, str(part), kind) for part, kind in zip(unit, (LENGTH, LENGTH, ANGLE), strict=True))
+    return (_factor(name, unit, UNITS.get(name, {})),)
+
+
+def _factor(name: str, unit: Any, units: Mapping[str, float]) -> float:
+    if not isinstance(unit, str) or unit not in units:
+        raise InvalidInput(f"unit of {name}", repr(unit)[:60], ", ".join(units) or "none: it has no unit")
+    return units[unit]
+
+
+def _text(name: str, value: Any) -> str:
+    if not isinstance(value, str) or not 0 < len(value) <= 500:
+        raise InvalidInput(name, repr(value)[:60], "a text of 1 to 500 characters")
+    return value
+
+
+def _grid(value: Any) -> tuple[int, int]:
+    sides = value if isinstance(value, list) else []
+    if len(sides) != 2 or not all(type(side) is int and 1 <= side <= 10_000 for side in sides):
+        raise InvalidInput("grid", repr(value)[:60], "two whole numbers of markers, 1 to 10000")
+    return sides[0], sides[1]
+
+
+def _positive(name: str, value: Any) -> float:
+    if type(value) not in (int, float) or not 0.0 < value < math.inf:
+        raise InvalidInput(name, repr(value)[:60], "a number above 0")
+    return float(value)
+
+
+def _episode(value: Any) -> int:
+    if type(value) is not int or not 0 <= value < 2**63:
+        raise InvalidInput("episode", repr(value)[:60], "a whole number, at least 0")
+    return value
