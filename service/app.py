@@ -16,6 +16,7 @@ from service.folder_lock import locked
 from service.gate import Gate
 from service.head_requests import HeadRequests
 from service.jobs import JobPool
+from service.reading import Readers
 from service.routes import curation, grasp_logs, health, jobs, materials
 from service.settings import Settings
 from service.worker import Place
@@ -74,11 +75,13 @@ async def running(settings: Settings) -> AsyncIterator[Context]:
             attempts=settings.job_attempts,
             shutdown_seconds=settings.shutdown_seconds,
         )
+        readers = Readers(settings.read_seconds)
         await pool.start()
         try:
-            yield Context(settings, database, blobs, pool)
+            yield Context(settings, database, blobs, pool, readers)
         finally:
             await pool.stop()
+            await readers.stop()
 
 
 def _sweep(database: Database, blobs: BlobStore) -> None:

@@ -1,6 +1,6 @@
 """What a request has to work with."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 from fastapi import Depends, Request
@@ -8,6 +8,7 @@ from fastapi import Depends, Request
 from db.blobs import BlobStore
 from db.database import Database
 from service.jobs import JobPool
+from service.reading import Readers
 from service.settings import Settings
 
 
@@ -19,6 +20,7 @@ class Context:
     database: Database
     blobs: BlobStore
     jobs: JobPool
+    readers: Readers = field(default_factory=Readers)
 
 
 async def _context(request: Request) -> Context:

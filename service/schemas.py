@@ -347,7 +347,7 @@ class GraspLogOut(BaseModel):
     model_config = ConfigDict(json_schema_extra={"examples": [_GRASP_LOG]})
 
     id: str
-    sha256: Annotated[str, Field(description="Of the uploaded bytes")]
+    sha256: Annotated[str, Field(description="Of what is stored: the uploaded bytes, or the container made of them")]
     bytes: int
     format: str
     material: str | None

@@ -42,6 +42,12 @@ class Settings(BaseSettings):
     idempotency_hours: Annotated[float, Field(gt=0.0, le=8760.0)] = Field(
         default=24.0, description="How long an Idempotency-Key counts, in hours."
     )
+    max_expansion: Annotated[int, Field(ge=1, le=100_000)] = Field(
+        default=200, description="How many times its size a compressed body may unpack to, once that is over 16 MiB."
+    )
+    read_seconds: Annotated[float, Field(gt=0.0, le=3600.0)] = Field(
+        default=60.0, description="How long reading a file of another library's format may take, in s."
+    )
     workers: Annotated[int, Field(ge=1, le=64)] = Field(
         default=1, description="Worker processes that detect and fit; the server process itself never does."
     )

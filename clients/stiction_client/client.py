@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -64,14 +65,16 @@ class FrictionClient:
         detector: str | None = None,
         scale: float | None = None,
         frame_rate: float | None = None,
+        mapping: Mapping[str, Any] | None = None,
     ) -> GraspLogReceipt:
         """Upload a grasp log: a record, a file, or a Tac3D recording folder.
 
         With ``material`` the service refits that material once the slip is detected; follow with ``wait``. The same
         content twice is one log. ``sensor`` and ``detector`` default to what the log and the service say.
-        ``scale`` (m per pixel) and ``frame_rate`` (1/s) are for a table of tracked markers that does not tell them.
+        ``scale`` (m per pixel) and ``frame_rate`` (1/s) are for a table of tracked markers that does not tell them,
+        ``mapping`` for a recording whose topics, fields or columns have names of their own.
         """
-        return self._run(flows.upload(log, material, sensor, detector, scale, frame_rate))
+        return self._run(flows.upload(log, material, sensor, detector, scale, frame_rate, mapping))
 
     def grasp_log(self, id: str) -> GraspLogReceipt:  # noqa: A002 - the API's own name
         """A grasp log by its id, with what was detected."""
@@ -168,9 +171,10 @@ class AsyncFrictionClient:
         detector: str | None = None,
         scale: float | None = None,
         frame_rate: float | None = None,
+        mapping: Mapping[str, Any] | None = None,
     ) -> GraspLogReceipt:
         """As ``FrictionClient.upload``."""
-        return await self._run(flows.upload(log, material, sensor, detector, scale, frame_rate))
+        return await self._run(flows.upload(log, material, sensor, detector, scale, frame_rate, mapping))
 
     async def grasp_log(self, id: str) -> GraspLogReceipt:  # noqa: A002 - the API's own name
         """As ``FrictionClient.grasp_log``."""

@@ -4,6 +4,7 @@ A flow is a generator: it yields a ``Request`` or a ``Pause``, is sent the ``Ans
 clients only carry requests out, one waiting, the other awaiting, so nothing is written twice.
 """
 
+import json
 import time
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
@@ -88,10 +89,18 @@ def upload(
     detector: str | None,
     scale: float | None,
     frame_rate: float | None,
+    mapping: Mapping[str, Any] | None,
 ) -> Flow[GraspLogReceipt]:
     """Upload a log; the service knows logs by content, so that a repetition is no second log."""
     content, content_type = _body(log)
-    params = _given(material=material, sensor=sensor, detector=detector, scale=scale, frame_rate=frame_rate)
+    params = _given(
+        material=material,
+        sensor=sensor,
+        detector=detector,
+        scale=scale,
+        frame_rate=frame_rate,
+        mapping=None if mapping is None else json.dumps(mapping),
+    )
     request = Request("POST", "/v1/grasp-logs", params, content=content, content_type=content_type)
     return _record(GraspLogReceipt.from_json, (yield from _ask(request)))
 

@@ -23,6 +23,7 @@ for command in (
     simulation.simulate,
     local.detect,
     local.fit,
+    local.convert,
     remote.upload,
     remote.lookup,
     remote.plan,

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 Log = Annotated[
     Path,
-    typer.Argument(help="A grasp log: Stiction NPZ, a Tac3D recording folder, that folder zipped, or tracked markers."),
+    typer.Argument(help="A grasp log in any format of docs/formats.md: NPZ, Tac3D, tracked markers, MCAP, ROS bag, …"),
 ]
 DETECTOR_HELP = "Slip detector (docs/detector.md); the best one where none is named."
 Logs = Annotated[list[Path], typer.Argument(help="Grasp logs of one material, each one grasp.")]
@@ -29,6 +29,10 @@ def _as_png(path: Path | None) -> Path | None:
 Picture = Annotated[Path | None, typer.Option(callback=_as_png, help="Write a picture of slip over time to this PNG.")]
 Scale = Annotated[float | None, typer.Option(help="Of tracked markers: m per pixel.")]
 FrameRate = Annotated[float | None, typer.Option(help="Of tracked markers whose file counts frames: 1/s.")]
+Mapping = Annotated[
+    Path | None,
+    typer.Option("--mapping", help="A JSON file that says which topic, field or column of the log is what."),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
 
 
@@ -37,6 +41,7 @@ def detect(
     method: Annotated[str | None, typer.Option(help=DETECTOR_HELP)] = None,
     scale: Scale = None,
     frame_rate: FrameRate = None,
+    mapping: Mapping = None,
     json: Json = False,
     picture: Picture = None,
 ) -> None:
@@ -45,7 +50,7 @@ def detect(
     from slipcore import detect_slip
     from slipcore.defaults import DEFAULT_METHOD
 
-    grasp = formats.read(log, scale=scale, frame_rate=frame_rate)
+    grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
     start = perf_counter()
     history = detect_slip(grasp, method=method or DEFAULT_METHOD)
     seconds = perf_counter() - start
@@ -69,6 +74,7 @@ def fit(
     method: Annotated[str, typer.Option("--method", help="Estimator: ols, robust, conjugate, bayes or auto.")] = "ols",
     detector: Annotated[str | None, typer.Option(help=DETECTOR_HELP)] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the sampler.")] = 0,
+    mapping: Mapping = None,
     json: Json = False,
 ) -> None:
     """Fit the stochastic linear friction model to the slip seen in one or more grasp logs."""
@@ -79,13 +85,35 @@ def fit(
 
     grasps = []
     for path in logs:
-        grasp = formats.read(path)
+        grasp = formats.read(path, mapping=mapping_text(mapping))
         grasps.append(collect_samples(grasp, detect_slip(grasp, method=detector or DEFAULT_METHOD)))
     model = fit_model(grasps, method=method, seed=seed)
     if json:
         print_json(model_record(model))
     else:
         print_model(model, f"{method} fit of {model.n} samples from {len(logs)} grasp(s)")
+
+
+def convert(
+    log: Log,
+    output: Annotated[Path, typer.Argument(help="Where to write it: a name that ends in .npz, .parquet or .mcap.")],
+    scale: Scale = None,
+    frame_rate: FrameRate = None,
+    mapping: Mapping = None,
+) -> None:
+    """Write a grasp log of any format as a Stiction NPZ, Parquet or MCAP, bit for bit."""
+    from service import formats
+    from service.formats import writing
+
+    name = writing.format_of(output)
+    grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
+    writing.write(grasp, output, name)
+    typer.echo(f"{output}: {len(grasp)} frames of {grasp.grid[0]} × {grasp.grid[1]} markers")
+
+
+def mapping_text(path: Path | None) -> str | None:
+    """What a mapping's file says, where there is one."""
+    return None if path is None else path.read_text(encoding="utf-8")
 
 
 def model_record(model: "FrictionModel") -> dict[str, Any]:

@@ -1,13 +1,14 @@
 """Commands that ask a running service: upload, lookup, plan."""
 
 from dataclasses import asdict
+from json import loads
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from service.cli.exit_codes import FAILURE, INPUT_REFUSED, SERVICE_REFUSED
-from service.cli.local import FrameRate, Scale
+from service.cli.local import FrameRate, Mapping, Scale, mapping_text
 from service.cli.output import print_json, print_table
 
 if TYPE_CHECKING:
@@ -27,9 +28,7 @@ DEFAULT_URL = "http://127.0.0.1:8000"
 
 
 def upload(
-    logs: Annotated[
-        list[Path], typer.Argument(help="Grasp logs: Stiction NPZ, a zipped Tac3D folder, or tracked markers.")
-    ],
+    logs: Annotated[list[Path], typer.Argument(help="Grasp logs in any format of docs/formats.md.")],
     material: Annotated[
         str | None, typer.Option(help="Material that was held; without it slip is only detected.")
     ] = None,
@@ -37,6 +36,7 @@ def upload(
     wait: Annotated[bool, typer.Option(help="Wait for detection and fit.")] = True,
     scale: Scale = None,
     frame_rate: FrameRate = None,
+    mapping: Mapping = None,
     url: Url = DEFAULT_URL,
     key: Key = None,
     json: Json = False,
@@ -46,10 +46,12 @@ def upload(
 
     if create and material is None:
         raise typer.BadParameter("--create needs --material")
+    told = _mapping(mapping)
     with FrictionClient(url, key=key) as client:
         if create and material is not None:
             client.ensure_material(material)
-        results = [_upload(client, path, wait, material=material, scale=scale, frame_rate=frame_rate) for path in logs]
+        said = {"material": material, "scale": scale, "frame_rate": frame_rate, "mapping": told}
+        results = [_upload(client, path, wait, **said) for path in logs]
     if json:
         print_json({"uploads": results})
     else:
@@ -111,6 +113,14 @@ def plan(
         print_json(asdict(answer))
     else:
         print_table(f"Grip for {load:g} N on {material}", ("", ""), list(asdict(answer).items()))
+
+
+def _mapping(path: Path | None) -> Any:
+    """A mapping's file, looked at before anything is sent."""
+    from service.formats.mapping import parse
+
+    text = mapping_text(path)
+    return None if text is None else loads(parse(text).text)
 
 
 def _upload(client: "FrictionClient", path: Path, wait: bool, **said: Any) -> dict[str, Any]:

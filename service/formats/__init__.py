@@ -1,9 +1,10 @@
 """File formats of grasp logs, one module each."""
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
+from types import ModuleType
 from typing import Any
 
 from service.formats import mapping as mappings
@@ -12,7 +13,19 @@ from service.formats.archive import open_archive
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 
-__all__ = ["CONTENT_TYPES", "FORMATS", "UNSPECIFIC_TYPES", "Format", "UnsupportedFormat", "identify", "read"]
+__all__ = [
+    "CONTENT_TYPES",
+    "FORMATS",
+    "UNSPECIFIC_TYPES",
+    "Format",
+    "UnsupportedFormat",
+    "UnusedSetting",
+    "check_settings",
+    "identify",
+    "module_of",
+    "parse_mapping",
+    "read",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +83,10 @@ class UnsupportedFormat(InvalidInput):
         super().__init__(name, value, allowed or f"{types} (docs/formats.md)")
 
 
+class UnusedSetting(InvalidInput):
+    """A setting given with a format that has no use for it."""
+
+
 def read(path: Path, content_type: str | None = None, **settings: float | str | None) -> GraspLog:
     """Read a grasp log of any known format: a file, or the folder of a Tac3D or rosbag2 recording.
 
@@ -78,14 +95,24 @@ def read(path: Path, content_type: str | None = None, **settings: float | str | 
     columns the ``mapping`` (JSON). Raises ``UnsupportedFormat``, or ``InvalidInput`` for what is wrong inside.
     """
     name = identify(path, content_type)
+    check_settings(name, settings)
     given: dict[str, Any] = {key: value for key, value in settings.items() if value is not None}
-    taken = FORMATS[name].settings
-    for key, value in given.items():
-        if key not in taken:
-            raise InvalidInput(key, f"{str(value)[:60]} with {name}", _WHERE[key])
     if "mapping" in given:
-        given["mapping"] = mappings.parse(given["mapping"])
+        given["mapping"] = parse_mapping(settings)
     return _reader(name)(path, **given)
+
+
+def check_settings(name: str, settings: Mapping[str, float | str | None]) -> None:
+    """Raises ``UnusedSetting`` for one that the format does not take."""
+    for key, value in settings.items():
+        if value is not None and key not in FORMATS[name].settings:
+            raise UnusedSetting(key, f"{str(value)[:60]} with {name}", _WHERE[key])
+
+
+def parse_mapping(settings: Mapping[str, float | str | None]) -> mappings.FieldMapping | None:
+    """The mapping among the settings; raises ``InvalidInput``."""
+    text = settings.get("mapping")
+    return None if text is None else mappings.parse(str(text))
 
 
 def identify(path: Path, content_type: str | None = None) -> str:
@@ -100,17 +127,19 @@ def identify(path: Path, content_type: str | None = None) -> str:
     return _sniff(path)
 
 
-def _reader(name: str) -> Callable[..., GraspLog]:
-    """The format's reader, whose library is imported only now."""
-    module, _, function = FORMATS[name].reader.partition(".")
+def module_of(name: str) -> ModuleType:
+    """The module of a format, imported only now, with its library; ``UnsupportedFormat`` where that is missing."""
     try:
-        found = importlib.import_module(f"service.formats.{module}")
+        return importlib.import_module(f"service.formats.{FORMATS[name].reader.partition('.')[0]}")
     except ModuleNotFoundError as error:
         if str(error.name).startswith("service"):
             raise
         allowed = f"the extra `{EXTRA}`, which brings it: pip install 'stiction[{EXTRA}]'"
-        raise UnsupportedFormat(f"reader of {name}", f"without its library {error.name}", allowed) from error
-    reader: Callable[..., GraspLog] = getattr(found, function)
+        raise UnsupportedFormat(f"library of {name}", f"{error.name}, which is not installed", allowed) from error
+
+
+def _reader(name: str) -> Callable[..., GraspLog]:
+    reader: Callable[..., GraspLog] = getattr(module_of(name), FORMATS[name].reader.partition(".")[2])
     return reader
 
 

@@ -71,12 +71,6 @@ def read_lines(lines: Iterator[str], given: Mapping[str, str] = MappingProxyType
     return _grasp_log(_tracks(header, lines, settings), settings, header.ignored)
 
 
-def settings_lines(scale: float | None, frame_rate: float | None) -> bytes:
-    """The lines that say so at the head of a file, so that what is stored of an upload tells all."""
-    given = (("scale", scale), ("frame_rate", frame_rate))
-    return "".join(f"# {name}: {value!r}\n" for name, value in given if value is not None).encode()
-
-
 def looks_like(start: bytes) -> bool:
     """Whether a file that begins so has a header of tracked markers."""
     try:

@@ -2,15 +2,23 @@
 
 import bz2
 import io
+import sys
 from pathlib import Path
 
 import lz4.frame
-import zstandard
 
 from slipcore.errors import InvalidInput
 
+if sys.version_info >= (3, 14):
+    from compression import zstd
+else:
+    from backports import zstd
+
 MAX_CHUNK_BYTES = 64 * 2**20
 """Bytes of one chunk of a recording, unpacked; recorders write chunks of 1 to 10 MB."""
+
+WINDOW_LOG = 26
+"""log₂ of the memory that unpacking zstd may take."""
 
 MAX_UNPACKED_BYTES = 2 * 2**30
 """Bytes of all chunks of a recording together, unpacked one at a time: what can be gone through in seconds."""
@@ -61,7 +69,7 @@ class Unpacker:
         limit = MAX_CHUNK_BYTES if size is None else size
         try:
             unpacked = _unpacked(content, compression, limit)
-        except (zstandard.ZstdError, RuntimeError, OSError, ValueError, EOFError) as error:
+        except (zstd.ZstdError, RuntimeError, OSError, ValueError, EOFError) as error:
             raise InvalidInput("chunk", f"damaged ({str(error)[:80]})", f"{compression or 'plain'} data") from error
         self._total += len(unpacked)
         if len(unpacked) > limit or self._total > MAX_UNPACKED_BYTES:
@@ -79,6 +87,6 @@ def _unpacked(content: bytes, compression: str, limit: int) -> bytes:
     if compression == "bz2":
         return bz2.BZ2Decompressor().decompress(content, max_length=limit + 1)
     if compression == "zstd":
-        with zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK_BYTES).stream_reader(content) as reader:
-            return reader.read(limit + 1)
+        options = {int(zstd.DecompressionParameter.window_log_max): WINDOW_LOG}
+        return bytes(zstd.ZstdDecompressor(options=options).decompress(content, max_length=limit + 1))
     raise InvalidInput("chunk", f"compressed by {compression[:20]!r}", "lz4, zstd, bz2 or not at all")

@@ -87,10 +87,17 @@ async def create_grasp_log(
         float | None,
         Query(description="Of tracked markers whose file counts frames: 1/s", ge=FRAME_RATE[0], le=FRAME_RATE[1]),
     ] = None,
+    mapping: Annotated[
+        str | None,
+        Query(
+            description="Of formats with topics, fields or columns: which of them is what, as JSON (docs/formats.md)",
+            examples=['{"topic": "/tactile", "displacement": {"field": "markers", "unit": "mm"}, "grid": [20, 20]}'],
+        ),
+    ] = None,
 ) -> Response:
     """Stored once it is answered; slip, samples and, with a material, its refit follow in the job.
 
-    The body is streamed to disk, up to the largest size that is set.
+    The body is streamed to disk, up to the largest size that is set; `Content-Encoding` may be gzip or zstd.
     """
     length = request.headers.get("content-length", "")
     wish = Wish(
@@ -99,8 +106,8 @@ async def create_grasp_log(
         detector,
         request.headers.get("content-type"),
         int(length) if length.isdecimal() else None,
-        scale,
-        frame_rate,
+        ",".join(request.headers.getlist("content-encoding")),
+        {"scale": scale, "frame_rate": frame_rate, "mapping": mapping},
         once,
     )
     return (await upload(context, request.stream(), wish)).response()

@@ -2,10 +2,10 @@
 
 import asyncio
 from collections.abc import AsyncIterator
-from dataclasses import dataclass, replace
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
 
 from sqlalchemy.orm import Session
-from starlette.requests import ClientDisconnect
 
 from db.blobs import Spool
 from db.errors import AlreadyExists
@@ -13,30 +13,26 @@ from db.records import NewGraspLog
 from db.repositories import grasp_logs, jobs, materials
 from service import formats
 from service.context import Context
-from service.formats import tracked_markers
 from service.idempotency import Answer, Once, answer_once
 from service.problems import (
     INVALID_GRASP_LOG,
     INVALID_REQUEST,
     UNSUPPORTED_FORMAT,
-    UPLOAD_INTERRUPTED,
-    UPLOAD_TOO_LARGE,
     Problem,
 )
+from service.reading import Description, Settings, read_plain
 from service.schemas import GraspLogOut
+from service.use_cases.receive import check_encoding, check_size, receive, unpack
 from slipcore.errors import InvalidInput
 from slipcore.methods import METHODS
-
-CHUNK_BYTES = 2**20
-"""Bytes gathered before a thread hashes and writes them: about a millisecond of work."""
 
 LONGEST_SENSOR_NAME = 200
 
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What the uploader says of a log: its material, sensor and detector, the content type of its bytes, and of
-    tracked markers the scale (m per pixel) and frame rate (1/s).
+    """What the uploader says of a log: its material, sensor and detector, type and encoding of its bytes, and the
+    settings that its format needs (``formats.read``).
     """
 
     material: str | None
@@ -44,8 +40,8 @@ class Wish:
     detector: str
     content_type: str | None
     content_length: int | None
-    scale: float | None = None
-    frame_rate: float | None = None
+    content_encoding: str = ""
+    settings: Settings = field(default_factory=dict)
     once: Once | None = None
 
 
@@ -55,76 +51,78 @@ async def upload(context: Context, chunks: AsyncIterator[bytes], wish: Wish) -> 
     Raises ``Problem`` for what cannot be taken, ``NotFound`` for an unknown material. Nothing stays of a log that is
     not taken.
     """
-    _check_size(wish.content_length or 0, context.settings.max_upload_bytes)
+    limit, expansion = context.settings.max_upload_bytes, context.settings.max_expansion
+    check_size(wish.content_length or 0, limit)
+    encoding = check_encoding(wish.content_encoding)
     material_id = await asyncio.to_thread(_check, context, wish)
-    with context.blobs.spool() as spool:
-        await _receive(spool, _with_settings(chunks, wish), context.settings.max_upload_bytes)
-        described = await asyncio.to_thread(_describe, spool, wish, material_id)
-        once = wish.once and wish.once.about(spool.sha256)
-        return await asyncio.to_thread(_store, context, spool, described, once)
+    with ExitStack() as spools:
+        body = spool = spools.enter_context(context.blobs.spool())
+        await receive(body, chunks, limit)
+        if encoding:
+            spool = spools.enter_context(context.blobs.spool())
+            await asyncio.to_thread(unpack, body, spool, encoding, limit, expansion)
+        kept, description = await _read(context, spools, spool, wish)
+        log = _new_log(kept, description, wish, material_id)
+        once = wish.once and wish.once.about(body.sha256)
+        return await asyncio.to_thread(_store, context, kept, log, once)
 
 
 def _check(context: Context, wish: Wish) -> int | None:
     """What can be told before the bytes are there; returns the material's key."""
     if wish.detector not in METHODS:
         raise Problem.wrong_value(INVALID_REQUEST, "detector", wish.detector, ", ".join(METHODS))
+    try:
+        formats.parse_mapping(wish.settings)
+    except InvalidInput as error:
+        raise Problem.wrong_value(INVALID_REQUEST, error.name, error.value, error.allowed) from error
     if wish.material is None:
         return None
     with context.database.read() as session:
         return materials.find_id(session, wish.material)
 
 
-def _check_size(size: int, limit: int) -> None:
-    if size > limit:
-        raise Problem.wrong_value(UPLOAD_TOO_LARGE, "body", f"{size} bytes or more", f"at most {limit} bytes")
-
-
-async def _with_settings(chunks: AsyncIterator[bytes], wish: Wish) -> AsyncIterator[bytes]:
-    """The body with the given scale and frame rate as its first lines, so that what is stored tells all."""
-    settings = tracked_markers.settings_lines(wish.scale, wish.frame_rate)
-    async for chunk in chunks:
-        if settings and chunk:
-            if chunk.startswith(b"PK"):
-                allowed = "only beside a table of tracked markers: other formats are in SI units"
-                raise Problem.wrong_value(INVALID_REQUEST, "scale, frame_rate", "given with a zip", allowed)
-            yield settings
-            settings = b""
-        yield chunk
-
-
-async def _receive(spool: Spool, chunks: AsyncIterator[bytes], limit: int) -> None:
-    waiting = bytearray()
-    try:
-        async for chunk in chunks:
-            _check_size(spool.size + len(waiting) + len(chunk), limit)
-            waiting += chunk
-            if len(waiting) >= CHUNK_BYTES:
-                await asyncio.to_thread(spool.write, bytes(waiting))
-                waiting.clear()
-    except ClientDisconnect as error:
-        raise Problem(UPLOAD_INTERRUPTED, f"the connection ended after {spool.size + len(waiting)} bytes") from error
-    await asyncio.to_thread(spool.write, bytes(waiting))
-
-
-def _describe(spool: Spool, wish: Wish, material_id: int | None) -> NewGraspLog:
+def _identify(spool: Spool, wish: Wish) -> str:
+    """The body's format, which must take what was said beside it."""
     spool.flush()
     try:
         name = formats.identify(spool.path, wish.content_type)
-        log = formats.read(spool.path, wish.content_type)
+        formats.check_settings(name, wish.settings)
+    except formats.UnsupportedFormat as error:
+        raise Problem.wrong_value(UNSUPPORTED_FORMAT, error.name, error.value, error.allowed) from error
+    except formats.UnusedSetting as error:
+        raise Problem.wrong_value(INVALID_REQUEST, error.name, error.value, error.allowed) from error
+    except InvalidInput as error:
+        raise Problem.wrong_value(INVALID_GRASP_LOG, error.name, error.value, error.allowed) from error
+    return name
+
+
+async def _read(context: Context, spools: ExitStack, spool: Spool, wish: Wish) -> tuple[Spool, Description]:
+    """What is to be stored, the body or a container made of it, with its description."""
+    name = await asyncio.to_thread(_identify, spool, wish)
+    try:
+        if formats.FORMATS[name].plain:
+            return spool, await asyncio.to_thread(read_plain, spool.path, name)
+        made = spools.enter_context(context.blobs.spool())
+        description = await context.readers.convert(spool.path, made.path, name, wish.settings)
+        await asyncio.to_thread(made.adopt)
     except formats.UnsupportedFormat as error:
         raise Problem.wrong_value(UNSUPPORTED_FORMAT, error.name, error.value, error.allowed) from error
     except InvalidInput as error:
         raise Problem.wrong_value(INVALID_GRASP_LOG, error.name, error.value, error.allowed) from error
+    return made, description
+
+
+def _new_log(spool: Spool, found: Description, wish: Wish, material_id: int | None) -> NewGraspLog:
     return NewGraspLog(
         sha256=spool.sha256,
         bytes=spool.size,
-        format=name,
+        format=found.format,
         detector=wish.detector,
         material_id=material_id,
-        sensor=_sensor_name(wish.sensor or log.sensor),
-        frames=len(log),
-        duration=float(log.time[-1] - log.time[0]),
-        grid=log.grid,
+        sensor=_sensor_name(wish.sensor or found.sensor),
+        frames=found.frames,
+        duration=found.duration,
+        grid=found.grid,
     )
 
 

@@ -1,5 +1,6 @@
 """The command line, as an outsider uses it: real files, a real server, documented exit codes."""
 
+import itertools
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -7,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from service import formats
 from service.cli import app, main
 from service.cli.exit_codes import INPUT_REFUSED, NOT_FEASIBLE, SERVICE_REFUSED
 from service.cli.output import plain
@@ -247,3 +249,28 @@ def test_db_upgrade_makes_a_database_that_check_approves_of(run: Run, tmp_path: 
 def test_json_holds_no_number_that_json_does_not_know() -> None:
     record: dict[str, Any] = {"a": float("nan"), "b": [float("inf"), 1.5], "c": {"d": (1, None)}}
     assert plain(record) == {"a": None, "b": [None, 1.5], "c": {"d": [1, None]}}
+
+
+def test_a_log_is_converted_and_read_by_its_mapping(run: Run, ramps: list[Path], tmp_path: Path) -> None:
+    steps = [ramps[0], tmp_path / "log.mcap", tmp_path / "log.parquet", tmp_path / "back.npz"]
+    for source, target in itertools.pairwise(steps):
+        assert run("convert", source, target)[0] == 0
+    assert steps[-1].read_bytes() == ramps[0].read_bytes()
+    (tmp_path / "mapping.json").write_text('{"time": "clock"}')
+    code, _, err = run("detect", tmp_path / "log.parquet", "--mapping", tmp_path / "mapping.json")
+    assert code == INPUT_REFUSED
+    assert "time is not there (clock)" in err
+    assert run("convert", ramps[0], tmp_path / "log.txt")[0] == INPUT_REFUSED
+
+
+def test_a_recording_is_uploaded_with_its_mapping(run: Run, url: str, ramps: list[Path], tmp_path: Path) -> None:
+    log = formats.read(ramps[0])
+    path, mapping = tmp_path / "log.json", tmp_path / "mapping.json"
+    path.write_text(json.dumps({"t": log.time.tolist(), "u": (1e3 * log.displacement).tolist()}))
+    mapping.write_text(json.dumps({"time": "t", "displacement": {"field": "u", "unit": "mm"}, "pitch": 1e-3}))
+    code, out, _ = run("upload", path, "--mapping", mapping, "--url", url, "--json")
+    assert (code, json.loads(out)["uploads"][0]["status"]) == (0, "done")
+    mapping.write_text('{"tim": "t"}')
+    code, _, err = run("upload", path, "--mapping", mapping, "--url", url)
+    assert code == INPUT_REFUSED
+    assert "mapping is of the unknown 'tim'" in err

@@ -146,9 +146,7 @@ START = 1_700_000_000_000_000_000
 @pytest.fixture
 def robot_log(log: GraspLog) -> GraspLog:
     """What a robot's recording of ``log`` is read as: without names and truth, its time from 0."""
-    return GraspLog(
-        log.time, log.position, log.displacement, 1e-6, force=log.force, object_pose=log.object_pose
-    )
+    return GraspLog(log.time, log.position, log.displacement, 1e-6, force=log.force, object_pose=log.object_pose)
 
 
 def robot_messages(log: GraspLog, store: Typestore) -> Iterator[tuple[str, str, int, object]]:
@@ -161,10 +159,15 @@ def robot_messages(log: GraspLog, store: Typestore) -> Iterator[tuple[str, str, 
         moment = START + round(time * 1e9)
         stamp = types["builtin_interfaces/msg/Time"](sec=moment // 10**9, nanosec=moment % 10**9)
         sequence = {"seq": k} if "seq" in types["std_msgs/msg/Header"].__dataclass_fields__ else {}
-        yield "/tactile", "sensor/msg/Tactile", moment + 2_000_000, types["sensor/msg/Tactile"](
-            header=types["std_msgs/msg/Header"](stamp=stamp, frame_id="finger", **sequence),
-            displacement=1e3 * log.displacement[k].reshape(-1),
-            force=log.force[k].reshape(-1),
+        yield (
+            "/tactile",
+            "sensor/msg/Tactile",
+            moment + 2_000_000,
+            types["sensor/msg/Tactile"](
+                header=types["std_msgs/msg/Header"](stamp=stamp, frame_id="finger", **sequence),
+                displacement=1e3 * log.displacement[k].reshape(-1),
+                force=log.force[k].reshape(-1),
+            ),
         )
         x, y, theta = log.object_pose[k]
         pose = types["geometry_msgs/msg/Pose2D"](x=x, y=y, theta=theta)

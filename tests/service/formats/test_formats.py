@@ -50,7 +50,7 @@ def test_a_content_type_that_is_not_known_lists_what_is(npz_path: Path) -> None:
         assert accepted in caught.value.allowed
 
 
-@pytest.mark.parametrize("content", [b"", b"PK", b"time,force\n1,2\n", b"\x93NUMPY\x01\x00", b"\x89HDF\r\n\x1a\n"])
+@pytest.mark.parametrize("content", [b"", b"PK", b"time,force\n1,2\n", b"\x93NUMPY\x01\x00", b"\x89PNG\r\n\x1a\n"])
 def test_a_file_that_is_not_a_log_is_unsupported(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "upload"
     path.write_bytes(content)

@@ -83,7 +83,9 @@ def test_the_uploads_mapping_goes_before_the_files(robot_log: GraspLog, write: S
     back = formats.read(path, mapping=given)
     np.testing.assert_allclose(back.position[1, 0] - back.position[0, 0], [2e-3, 0.0, 0.0], rtol=1e-12, atol=1e-18)
     np.testing.assert_allclose(back.position.mean(axis=(0, 1)), 0.0, atol=1e-18)
-    with pytest.raises(InvalidInput, match=r"displacement is not there \(x of /nothing\); allowed: the topics /tactile"):
+    with pytest.raises(
+        InvalidInput, match=r"displacement is not there \(x of /nothing\); allowed: the topics /tactile"
+    ):
         formats.read(path)
 
 
@@ -200,7 +202,7 @@ def test_a_mapping_that_is_none_is_refused_by_name(
 
 def test_settings_of_another_format_are_refused(log: GraspLog, tmp_path: Path) -> None:
     path = container.write(log, tmp_path / "log.npz")
-    with pytest.raises(InvalidInput, match="mapping is .* with npz; allowed: only beside a format of topics"):
+    with pytest.raises(InvalidInput, match=r"mapping is .* with npz; allowed: only beside a format of topics"):
         formats.read(path, mapping="{}")
     with pytest.raises(InvalidInput, match="scale is 1 with npz"):
         formats.read(path, scale=1)
@@ -212,7 +214,7 @@ def test_settings_of_another_format_are_refused(log: GraspLog, tmp_path: Path) -
         (lambda log: {"time": log.time[::-1].tolist()}, "time is 0.1 s at frame 1, after 0.2 s"),
         (lambda log: {"displacement": [None, *log.displacement.tolist()[1:]]}, "displacement is not an array"),
         (lambda log: {"displacement": log.displacement.tolist()[1:]}, r"displacement is of shape \[4, 3, 4, 3\]"),
-        (lambda log: {"force": np.full(log.displacement.shape, np.nan).tolist()}, r"force is nan at index \[0, 0, 0, 0"),
+        (lambda log: {"force": np.full(log.displacement.shape, np.nan).tolist()}, r"force is nan at index \[0, 0, 0"),
         (lambda _: {"time": [1e400, 2, 3, 4, 5]}, "time is inf at index"),
         (lambda _: {"displacement": "text"}, "displacement is of dtype"),
         (lambda _: {"position": []}, r"position is of shape \[0\]"),
@@ -235,14 +237,17 @@ def test_a_missing_library_is_answered_with_the_extra_that_brings_it(
     path = write.hdf5(log, tmp_path / "log")
     monkeypatch.delitem(__import__("sys").modules, "service.formats.hdf5", raising=False)
     monkeypatch.setitem(__import__("sys").modules, "h5py", None)
-    with pytest.raises(formats.UnsupportedFormat, match=r"without its library h5py; allowed: the extra `formats`"):
+    with pytest.raises(
+        formats.UnsupportedFormat,
+        match=r"library of hdf5 is h5py, .*; allowed: the extra `formats`",
+    ):
         formats.read(path)
 
 
-def test_a_message_type_cannot_smuggle_code_in(robot_log: GraspLog, tmp_path: Path) -> None:
+def test_a_message_type_cannot_smuggle_code_in(tmp_path: Path) -> None:
     """The library that decodes messages executes code made of the types' names."""
     path = tmp_path / "log"
-    for name in ('a/msg/B:\n  x = print("run")', "a/msg/B\"\"\"\nimport os", "../x", "a/msg/B; y"):
+    for name in ('a/msg/B:\n  x = print("run")', 'a/msg/B"""\nimport os', "../x", "a/msg/B; y"):
         with path.open("wb") as stream:
             writer = McapWriter(stream)
             writer.start(profile="ros2")
@@ -280,7 +285,7 @@ def test_a_chunk_that_unpacks_to_more_than_it_says_is_refused() -> None:
     bomb = lz4.frame.compress(bytes(50_000_000))
     with pytest.raises(InvalidInput, match="chunk is 1001 bytes or more; allowed: at most 1000 bytes unpacked"):
         unpack.Unpacker().unpack(bomb, "lz4", 1000)
-    with pytest.raises(InvalidInput, match="chunk is .* bytes by its header"):
+    with pytest.raises(InvalidInput, match=r"chunk is .* bytes by its header"):
         unpack.Unpacker().unpack(b"", "zstd", 2**40)
 
 
@@ -315,7 +320,7 @@ def test_hdf5_that_points_elsewhere_or_claims_too_much_is_refused(log: GraspLog,
             file.create_dataset("time", (10**9,), "f8", chunks=(1000,))
         else:
             file.create_dataset("time", (5,), "f8", maxshape=(None,), chunks=(2**24,))
-    with pytest.raises(InvalidInput, match="time is .*; allowed: (a dataset in this file|at most)"):
+    with pytest.raises(InvalidInput, match=r"time is .*; allowed: (a dataset in this file|at most)"):
         formats.read(tmp_path / "log")
 
 
@@ -332,7 +337,7 @@ def test_messages_that_never_come_are_told_with_the_frame(
 ) -> None:
     path = write.bag1(replace(robot_log, time=np.array([0.0, 0.03, 0.07, 0.1, 9.0])), tmp_path / "grasp.bag")
     mapping = write.mapping | {"force": {"topic": "/tactile/rest", "field": "data"}}
-    with pytest.raises(InvalidInput, match="force is 9.002 s away from frame 4 in /tactile/rest; allowed: a message wi"):
+    with pytest.raises(InvalidInput, match=r"force is 9.002 s away from frame 4 in /tactile/rest; allowed: a mess"):
         formats.read(path, mapping=json.dumps(mapping))
 
 

@@ -154,12 +154,12 @@ def test_what_is_given_goes_before_what_the_file_says(write: Write) -> None:
     log = formats.read(path, scale=5e-5, frame_rate=20.0)
     np.testing.assert_allclose(log.time, [0.0, 0.05, 0.1])
     assert log.metadata["scale"] == "5e-05 m per pixel"
-    path.write_bytes(tracked_markers.settings_lines(5e-5, 20.0) + path.read_bytes())
+    path.write_bytes(b"# scale: 5e-05\n# frame_rate: 20.0\n" + path.read_bytes())
     np.testing.assert_array_equal(formats.read(path).displacement, log.displacement)
 
 
 def test_a_scale_beside_another_format_is_refused(npz_log: Path) -> None:
-    with pytest.raises(InvalidInput, match=r"scale is 0\.1; allowed: only beside a table of tracked markers"):
+    with pytest.raises(InvalidInput, match=r"scale is 0\.1 with npz; allowed: only beside a table of tracked markers"):
         formats.read(npz_log, scale=0.1)
 
 

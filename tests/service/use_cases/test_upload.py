@@ -1,16 +1,20 @@
+import gzip
 import hashlib
 import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import httpx
 import numpy as np
 import pytest
+from backports import zstd
 
+from service.formats import parquet
 from slipcore import GraspLog
 from slipcore.contact.ramp import tangential_ramp
 from stiction_client.container import encode
@@ -112,7 +116,6 @@ def test_a_truncated_file_is_refused(client: httpx.Client, upload: Upload, conte
         (b"time,x,y\n0,1,2\n", "application/octet-stream"),
         (b"", "application/octet-stream"),
         (b"PK\x03\x04", "text/html"),
-        (b"{}", "application/json"),
     ],
 )
 def test_what_is_no_log_at_all_is_refused(
@@ -188,7 +191,7 @@ def test_a_frame_count_without_a_rate_is_refused(client: httpx.Client, upload: U
 
 def test_a_scale_beside_a_zip_is_refused(client: httpx.Client, upload: Upload, content: bytes) -> None:
     problem = refusal(client, upload, content, 422, scale="1e-5")
-    assert (problem["type"], problem["value"]) == ("/problems/invalid-request", "given with a zip")
+    assert (problem["type"], problem["value"]) == ("/problems/invalid-request", "1e-05 with npz")
 
 
 def test_an_upload_over_the_limit_is_refused_by_its_length(client: httpx.Client, upload: Upload) -> None:
@@ -320,3 +323,61 @@ def test_different_uploads_at_once_all_count(
     samples = client.get(answers[0].headers["location"]).json()["detection"]["samples"]
     current = client.get(f"/v1/materials/{material}").json()["models"]["ols"]
     assert (current["version"], current["n"]) == (5, 5 * samples)
+
+
+@pytest.mark.parametrize("encoding", ["gzip", "zstd"])
+def test_a_body_packed_on_its_way_is_the_log_in_it(client: httpx.Client, content: bytes, encoding: str) -> None:
+    packed = {"gzip": gzip.compress, "zstd": zstd.compress}[encoding](content)
+    headers = {"content-type": NPZ, "content-encoding": encoding}
+    detector = {"detector": "rigid_fit"}
+    response = client.post("/v1/grasp-logs", params=detector, content=packed, headers=headers)
+    assert response.status_code in (200, 202), response.text
+    assert response.json()["sha256"] == hashlib.sha256(content).hexdigest()
+    broken = client.post("/v1/grasp-logs", content=packed[:-20], headers=headers)
+    assert (broken.status_code, broken.json()["type"]) == (422, "/problems/invalid-request")
+    assert "complete" in broken.json()["value"]
+
+
+def test_a_content_encoding_that_is_not_known_is_refused(client: httpx.Client, content: bytes) -> None:
+    for encoding in ("br", "gzip, zstd"):
+        headers = {"content-type": NPZ, "content-encoding": encoding}
+        response = client.post("/v1/grasp-logs", content=content, headers=headers)
+        assert (response.status_code, response.json()["name"]) == (415, "content encoding")
+
+
+def test_a_compression_bomb_is_refused(client: httpx.Client) -> None:
+    before = stored_files(client)
+    headers = {"content-type": NPZ, "content-encoding": "zstd"}
+    refused = client.post("/v1/grasp-logs", content=zstd.compress(bytes(10**9)), headers=headers)
+    assert (refused.status_code, refused.json()["type"]) == (413, "/problems/upload-too-large")
+    assert refused.json()["allowed"] == "at most 2097152 bytes"
+    assert stored_files(client) == before
+
+
+def test_a_recording_is_kept_as_the_log_in_it(
+    client: httpx.Client, upload: Upload, wait: Wait, ramp: GraspLog, tmp_path: Path
+) -> None:
+    recorded = replace(ramp, sensor="recorder")
+    parquet.write(recorded, tmp_path / "log")
+    accepted = upload(client, (tmp_path / "log").read_bytes(), "application/vnd.apache.parquet")
+    assert accepted.status_code == httpx.codes.ACCEPTED, accepted.text
+    found = accepted.json()
+    assert (found["format"], found["frames"], found["sensor"]) == ("parquet", len(ramp), "recorder")
+    assert found["sha256"] == hashlib.sha256(encode(recorded)).hexdigest()
+    assert wait(client, found["job"]["id"])["status"] == "done"
+    again = upload(client, (tmp_path / "log").read_bytes(), "application/octet-stream")
+    assert (again.status_code, again.json()["id"]) == (200, found["id"])
+
+
+@pytest.mark.parametrize(
+    ("mapping", "status", "name"),
+    [("{", 422, "mapping"), ('{"time": "clock"}', 422, "time"), ('{"forces": "f"}', 422, "mapping")],
+)
+def test_a_mapping_that_does_not_fit_is_refused(
+    client: httpx.Client, upload: Upload, ramp: GraspLog, tmp_path: Path, mapping: str, status: int, name: str
+) -> None:
+    parquet.write(ramp, tmp_path / "log")
+    problem = refusal(
+        client, upload, (tmp_path / "log").read_bytes(), status, "application/octet-stream", mapping=mapping
+    )
+    assert problem["name"] == name

@@ -1,0 +1,76 @@
+import asyncio
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service import formats
+from service.formats import parquet
+from service.reading import Readers
+from slipcore import GraspLog, InvalidInput
+from stiction_client.container import encode
+
+TABLE = b"time,marker,x,y\n" + b"".join(
+    b"%d,%d,%d,%d\n" % (k // 900, k % 900, k % 30, k % 900 // 30) for k in range(90_000)
+)
+
+
+def with_readers(seconds: float, do: Callable[[Readers], Awaitable[Any]]) -> Any:
+    async def run() -> Any:
+        readers = Readers(seconds)
+        try:
+            return await do(readers)
+        finally:
+            await readers.stop()
+
+    return asyncio.run(run())
+
+
+def running(readers: Readers) -> list[Any]:
+    return list(dict(getattr(readers._executor, "_processes", None) or {}).values())
+
+
+def test_a_reader_that_dies_takes_only_its_file_with_it(ramp: GraspLog, tmp_path: Path) -> None:
+    source, other, target = (tmp_path / name for name in ("source", "other", "target"))
+    source.write_bytes(TABLE)
+    parquet.write(ramp, other)
+
+    async def lose_one(readers: Readers) -> Any:
+        lost = asyncio.ensure_future(readers.convert(source, target, "tracked markers", {}))
+        while not (processes := running(readers)):
+            await asyncio.sleep(0.01)
+        waiting = asyncio.ensure_future(readers.convert(other, target, "parquet", {}))
+        for process in processes:
+            process.kill()
+        with pytest.raises(InvalidInput, match="such that its tracked markers reader died of it"):
+            await lost
+        return await waiting
+
+    described = with_readers(60.0, lose_one)
+    assert (described.format, described.frames, described.grid) == ("parquet", len(ramp), ramp.grid)
+    assert target.read_bytes() == encode(ramp)
+
+
+def test_a_reader_that_takes_too_long_or_too_much_is_ended(tmp_path: Path) -> None:
+    source, target = tmp_path / "source", tmp_path / "target"
+    source.write_bytes(TABLE)
+
+    async def hurry(readers: Readers) -> None:
+        with pytest.raises(InvalidInput, match=r"file is not read within 0.01 s; allowed: a smaller file"):
+            await readers.convert(source, target, "tracked markers", {})
+        assert not running(readers)
+
+    with_readers(0.01, hurry)
+
+
+def test_what_a_reader_refuses_is_told_as_it_is(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_bytes(b"time,marker,x,y\n0,1,2\n")
+
+    async def refuse(readers: Readers) -> None:
+        with pytest.raises(InvalidInput, match="line 2 is of 3 cells"):
+            await readers.convert(source, tmp_path / "target", "tracked markers", {})
+
+    with_readers(60.0, refuse)
+    assert not formats.FORMATS["tracked markers"].plain
