@@ -42,6 +42,12 @@ class Spool:
         except OSError as error:
             raise StorageUnavailable(f"blob folder: {error}") from error
 
+    def adopt(self) -> None:
+        """Take what another process wrote to ``path`` as what was written here."""
+        with self.path.open("rb") as stream:
+            self._hash = hashlib.file_digest(stream, hashlib.sha256)
+            self.size = stream.tell()
+
     @property
     def sha256(self) -> str:
         """Hash of what was written so far."""
