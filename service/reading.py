@@ -8,13 +8,16 @@ import asyncio
 import multiprocessing
 import os
 import resource
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 from service import formats
+from service.formats import writing
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 from stiction_client import container
@@ -22,6 +25,7 @@ from stiction_client import container
 MEMORY_BYTES = 2 * 2**30
 """Address space that a reader may take beyond what it has when it starts: eight times what it may read of a file."""
 
+Result = TypeVar("Result")
 Settings = Mapping[str, float | str | None]
 
 
@@ -56,12 +60,17 @@ class Readers:
 
     async def convert(self, source: Path, target: Path, name: str, settings: Settings) -> Description:
         """Read a log of format ``name`` and write it to ``target`` as a container; raises ``InvalidInput``."""
+        return await self._do(partial(convert, source, target, name, dict(settings)), name)
+
+    async def write(self, source: Path, target: Path, name: str) -> None:
+        """Write a stored log to ``target`` in the format ``name``; raises ``UnsupportedFormat``."""
+        await self._do(partial(rewrite, source, target, name), name)
+
+    async def _do(self, do: Callable[[], Result], name: str) -> Result:
         async with self._one_at_a_time:
             if self._executor is None:
                 self._executor = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _limit_memory)
-            work = asyncio.get_running_loop().run_in_executor(
-                self._executor, convert, source, target, name, dict(settings)
-            )
+            work = asyncio.get_running_loop().run_in_executor(self._executor, do)
             try:
                 return await asyncio.wait_for(work, self._seconds)
             except TimeoutError as error:
@@ -94,6 +103,11 @@ def convert(source: Path, target: Path, name: str, settings: Settings) -> Descri
             "file", f"in need of more than {MEMORY_BYTES} bytes", "a smaller or undamaged file"
         ) from error
     return describe(name, log)
+
+
+def rewrite(source: Path, target: Path, name: str) -> None:
+    """In the reader's process: a stored log in the format ``name`` at ``target``."""
+    writing.write(formats.read(source), target, name)
 
 
 def _limit_memory() -> None:

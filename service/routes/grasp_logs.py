@@ -1,14 +1,18 @@
 """Grasp logs and what was found in them."""
 
+import asyncio
 from typing import Annotated, Any, TypeVar
 
 from fastapi import APIRouter, Query, Request, Response
+from fastapi.responses import FileResponse
+from starlette.background import BackgroundTask
 
 from db.records import StoredGraspLog
 from db.repositories import grasp_logs
 from service import formats
 from service.access import READ, UPLOAD
 from service.context import Context, Given
+from service.formats import writing
 from service.formats.tracked_markers import FRAME_RATE, SCALE
 from service.idempotency import OnceWithoutBody
 from service.problems import (
@@ -27,6 +31,7 @@ from service.problems import (
 from service.routes.common import problems
 from service.schemas import EventsOfOneKind, EventsOut, GraspLogOut, SamplesOut, StickRatioOut
 from service.stored_results import EVENT_KINDS, SAMPLE_ARRAYS, decode_history, decode_samples, finite_or_none
+from service.use_cases.export import export
 from service.use_cases.upload import Wish, upload
 from slipcore.defaults import DEFAULT_METHOD
 from slipcore.methods import METHODS
@@ -45,6 +50,12 @@ _BODY: dict[str, Any] = {
 }
 _ALREADY_THERE: dict[int | str, dict[str, Any]] = {
     200: {"model": GraspLogOut, "description": "The same content, material and detector is stored already"}
+}
+_FILE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "The log as a file",
+        "content": {formats.FORMATS[name].content_type: _BINARY for name in writing.SUFFIXES},
+    }
 }
 _FOUND = problems(UNKNOWN_GRASP_LOG, INVALID_REQUEST, STORAGE_UNAVAILABLE)
 _RESULTS = problems(UNKNOWN_GRASP_LOG, NOT_READY, INVALID_REQUEST, STORAGE_UNAVAILABLE)
@@ -150,6 +161,32 @@ def read_samples(context: Given, id: str) -> SamplesOut:  # noqa: A002
     samples = decode_samples(context.blobs.path(_ready(log.samples, log).samples_blob))
     arrays = {name: getattr(samples, name).tolist() for name in SAMPLE_ARRAYS}
     return SamplesOut(**arrays, element_area=samples.element_area)
+
+
+@router.get(
+    "/{id}/file",
+    dependencies=[READ],
+    summary="Download a grasp log",
+    response_class=FileResponse,
+    responses=_FILE | problems(UNKNOWN_GRASP_LOG, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+async def read_file(
+    context: Given,
+    id: str,  # noqa: A002
+    format: Annotated[  # noqa: A002
+        str, Query(description="Of the file", json_schema_extra={"enum": list(writing.SUFFIXES)})
+    ] = "npz",
+) -> FileResponse:
+    """As it was uploaded, or as NPZ, Parquet or MCAP made of it: each is read back bit for bit."""
+    if format not in writing.SUFFIXES:
+        raise Problem.wrong_value(INVALID_REQUEST, "format", format, ", ".join(writing.SUFFIXES))
+    file = await export(context, await asyncio.to_thread(_find, context, id), format)
+    return FileResponse(
+        file.path,
+        media_type=formats.FORMATS[format].content_type,
+        filename=f"{id}{writing.SUFFIXES[format]}",
+        background=BackgroundTask(file.close.close),
+    )
 
 
 def _find(context: Context, log_id: str) -> StoredGraspLog:

@@ -1,12 +1,15 @@
 import hashlib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import httpx
 import numpy as np
 import pytest
 
+from service import formats
 from slipcore import GraspLog, collect_samples, detect_slip
+from stiction_client.container import encode
 
 Upload = Callable[..., httpx.Response]
 Wait = Callable[[httpx.Client, str], dict[str, Any]]
@@ -102,3 +105,22 @@ def test_results_that_are_not_there_yet_are_not_ready(
     assert client.get(waiting[-1].headers["location"]).json()["detection"] is None
     for response in waiting:
         wait(client, response.json()["job"]["id"])
+
+
+@pytest.mark.parametrize("name", ["npz", "parquet", "mcap"])
+def test_a_log_is_downloaded_in_each_format_bit_for_bit(
+    client: httpx.Client, fitted: dict[str, Any], content: bytes, tmp_path: Path, name: str
+) -> None:
+    answer = client.get(f"/v1/grasp-logs/{fitted['id']}/file", params={"format": name})
+    assert answer.headers["content-type"] == formats.FORMATS[name].content_type
+    assert answer.headers["content-disposition"] == f'attachment; filename="{fitted["id"]}.{name}"'
+    (tmp_path / "log").write_bytes(answer.content)
+    assert formats.identify(tmp_path / "log") == name
+    assert encode(formats.read(tmp_path / "log")) == content
+    assert not list((Path(client.headers["x-data-folder"]) / "spool").iterdir())
+
+
+def test_a_format_that_is_not_written_is_refused(client: httpx.Client, fitted: dict[str, Any]) -> None:
+    answer = client.get(f"/v1/grasp-logs/{fitted['id']}/file", params={"format": "csv"})
+    assert (answer.status_code, answer.json()["allowed"]) == (422, "npz, parquet, mcap")
+    assert client.get("/v1/grasp-logs/nothing/file").json()["type"] == "/problems/unknown-grasp-log"
