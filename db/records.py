@@ -37,6 +37,7 @@ class NewModel:
 class StoredModel:
     """One version of a material's friction model; ``outdated`` where a log behind it was withdrawn since."""
 
+    id: int
     material: str
     version: int
     current: bool
@@ -131,6 +132,16 @@ class NewGraspLog:
     frames: int
     duration: float
     grid: tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class LogFilter:
+    """Which logs are wanted; None: whatever they have there."""
+
+    material_id: int | None = None
+    sensor: str | None = None
+    status: JobStatus | None = None
+    withdrawn: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from service.folder_lock import locked
 from service.gate import Gate
 from service.head_requests import HeadRequests
 from service.jobs import JobPool
+from service.model_cache import ModelCache
 from service.reading import Readers
 from service.routes import curation, grasp_logs, health, jobs, materials
 from service.settings import Settings
@@ -78,7 +79,7 @@ async def running(settings: Settings) -> AsyncIterator[Context]:
         readers = Readers(settings.read_seconds)
         await pool.start()
         try:
-            yield Context(settings, database, blobs, pool, readers)
+            yield Context(settings, database, blobs, pool, readers, ModelCache(settings.lookup_seconds))
         finally:
             await pool.stop()
             await readers.stop()

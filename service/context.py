@@ -8,6 +8,7 @@ from fastapi import Depends, Request
 from db.blobs import BlobStore
 from db.database import Database
 from service.jobs import JobPool
+from service.model_cache import ModelCache
 from service.reading import Readers
 from service.settings import Settings
 
@@ -21,6 +22,7 @@ class Context:
     blobs: BlobStore
     jobs: JobPool
     readers: Readers = field(default_factory=Readers)
+    models: ModelCache = field(default_factory=ModelCache)
 
 
 async def _context(request: Request) -> Context:

@@ -9,7 +9,8 @@ from pydantic.config import JsonDict
 from db.records import Job, JobKind, JobStatus, Material, StoredGraspLog, StoredModel, Withdrawal
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}$"
-FitMethod = Literal["ols", "bayes"]
+ModelMethod = Literal["ols", "robust", "conjugate", "bayes"]
+FitMethod = Literal["ols", "robust", "conjugate", "bayes", "auto"]
 
 _MOMENT = "2026-11-21T08:41:00.123456Z"
 _MODEL: JsonDict = {
@@ -131,7 +132,7 @@ class NewFit(BaseModel):
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"method": "bayes", "seed": 0}]})
 
-    method: Annotated[FitMethod, Field(description="Least squares, or Bayesian by sampling.")] = "ols"
+    method: Annotated[FitMethod, Field(description="`auto` takes the one that the data call for")] = "ols"
     seed: Annotated[int, Field(ge=0, lt=2**32, description="Of the sampler: the same seed gives the same fit.")] = 0
 
 
@@ -197,10 +198,14 @@ class FrictionModelOut(BaseModel):
         )
 
 
+Next = Annotated[str | None, Field(description="The `cursor` of what comes after these; null at the end")]
+
+
 class FrictionModelsOut(BaseModel):
     """Versions of a material's models, newest first."""
 
     items: list[FrictionModelOut]
+    next: Next
 
 
 class MaterialOut(BaseModel):
@@ -231,9 +236,10 @@ class MaterialOut(BaseModel):
 
 
 class MaterialsOut(BaseModel):
-    """All materials, by name."""
+    """Materials in the order that was asked for."""
 
     items: list[MaterialOut]
+    next: Next
 
 
 class FrictionOut(BaseModel):
@@ -394,6 +400,13 @@ def _detection_out(log: StoredGraspLog) -> DetectionOut | None:
         samples=log.samples.count,
         seconds=found.seconds,
     )
+
+
+class GraspLogsOut(BaseModel):
+    """Grasp logs in the order that was asked for."""
+
+    items: list[GraspLogOut]
+    next: Next
 
 
 class MergedOut(BaseModel):

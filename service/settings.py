@@ -48,6 +48,9 @@ class Settings(BaseSettings):
     read_seconds: Annotated[float, Field(gt=0.0, le=3600.0)] = Field(
         default=60.0, description="How long reading a file of another library's format may take, in s."
     )
+    lookup_seconds: Annotated[float, Field(ge=0.0, le=60.0)] = Field(
+        default=1.0, description="How old a model in memory may be before a look-up asks the database again, in s."
+    )
     workers: Annotated[int, Field(ge=1, le=64)] = Field(
         default=1, description="Worker processes that detect and fit; the server process itself never does."
     )

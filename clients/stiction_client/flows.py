@@ -38,6 +38,9 @@ RETRY_PAUSE = 0.2
 FIRST_POLL, POLL_GROWTH, LONGEST_POLL = 0.05, 1.5, 2.0
 """s, -, s: how often a job is asked for, denser at first because most jobs end within a second."""
 
+PAGE = 1000
+"""Entries asked for at once: as many as the service gives."""
+
 MATERIAL_EXISTS = "/problems/material-exists"
 
 
@@ -132,9 +135,19 @@ def material(name: str) -> Flow[Material]:
 
 
 def materials() -> Flow[list[Material]]:
-    """Ask for all materials."""
-    answer = yield from _get("/v1/materials")
-    return _record(lambda record: [Material.from_json(item) for item in record["items"]], answer)
+    """Ask for all materials, page after page."""
+    found: list[Material] = []
+    cursor: str | None = None
+    while True:
+        answer = yield from _get("/v1/materials", _given(limit=PAGE, cursor=cursor))
+        page, cursor = _record(_page_of_materials, answer)
+        found += page
+        if cursor is None:
+            return found
+
+
+def _page_of_materials(record: Mapping[str, Any]) -> tuple[list[Material], str | None]:
+    return [Material.from_json(item) for item in record["items"]], record.get("next")
 
 
 def model(name: str, method: str) -> Flow[FrictionModel]:

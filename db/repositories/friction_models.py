@@ -6,8 +6,11 @@ from dataclasses import fields
 from sqlalchemy import Select, func, select, update
 from sqlalchemy.orm import Session
 
+from db.paging import Window, windowed
 from db.records import NewModel, StoredModel
 from db.tables import FrictionModelRow, MaterialNameRow, MaterialRow
+
+NEWEST_FIRST = Window("id", descending=True)
 
 _PLAIN = tuple(entry.name for entry in fields(NewModel) if entry.name not in {"tangential_velocity", "normal_force"})
 
@@ -43,13 +46,13 @@ def current(session: Session, material: str, method: str) -> StoredModel | None:
     return None if found is None else _record(found[0], found[1])
 
 
-def all_current(session: Session, material_ids: Sequence[int] | None) -> list[StoredModel]:
-    """Current models of some materials, or of all."""
-    query = _models().where(FrictionModelRow.current, MaterialRow.merged_into_id.is_(None))
-    query = query.order_by(FrictionModelRow.method)
-    if material_ids is not None:
-        query = query.where(FrictionModelRow.material_id.in_(material_ids))
-    return [_record(row, material) for row, material in session.execute(query)]
+def all_current(session: Session, material_ids: Sequence[int]) -> dict[int, list[StoredModel]]:
+    """Current models of some materials, by the material's key."""
+    query = _models().where(FrictionModelRow.current, FrictionModelRow.material_id.in_(material_ids))
+    found: dict[int, list[StoredModel]] = {}
+    for row, material in session.execute(query.order_by(FrictionModelRow.method)):
+        found.setdefault(row.material_id, []).append(_record(row, material))
+    return found
 
 
 def current_methods(session: Session, material_ids: Sequence[int]) -> list[str]:
@@ -68,12 +71,22 @@ def retire(session: Session, material_id: int) -> None:
     _change_current(session, material_id, current=False)
 
 
-def versions(session: Session, material_id: int, method: str | None) -> list[StoredModel]:
-    """Every version of a material's models, newest first."""
-    query = _models().where(FrictionModelRow.material_id == material_id).order_by(FrictionModelRow.id.desc())
+def versions(
+    session: Session,
+    material_id: int,
+    method: str | None = None,
+    *,
+    current: bool | None = None,
+    window: Window = NEWEST_FIRST,
+) -> list[StoredModel]:
+    """Versions of a material's models, newest first."""
+    query = _models().where(FrictionModelRow.material_id == material_id)
     if method is not None:
         query = query.where(FrictionModelRow.method == method)
-    return [_record(row, material) for row, material in session.execute(query)]
+    if current is not None:
+        query = query.where(FrictionModelRow.current.is_(current))
+    found = session.execute(windowed(query, window, {"id": FrictionModelRow.id}, FrictionModelRow.id))
+    return [_record(row, material) for row, material in found]
 
 
 def _change_current(session: Session, material_id: int, **values: bool) -> None:
@@ -117,4 +130,4 @@ def _record(row: FrictionModelRow, material: str) -> StoredModel:
         cost_seconds=row.cost_seconds,
         monte_carlo_error=row.monte_carlo_error,
     )
-    return StoredModel(material, row.version, row.current, row.outdated, row.created_at, model)
+    return StoredModel(row.id, material, row.version, row.current, row.outdated, row.created_at, model)

@@ -1,13 +1,15 @@
 """Queries on grasp logs, with their sensors."""
 
 import uuid
+from typing import Any
 
-from sqlalchemy import exists, select, update
+from sqlalchemy import Select, exists, select, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, aliased
 
 from db.errors import AlreadyExists, NotFound
-from db.records import NewGraspLog, StoredGraspLog, Withdrawal
+from db.paging import Window, windowed
+from db.records import LogFilter, NewGraspLog, StoredGraspLog, Withdrawal
 from db.repositories import detections, jobs
 from db.tables import DetectionRow, GraspLogRow, JobRow, MaterialRow, SampleSummaryRow, SensorRow, now
 
@@ -47,36 +49,26 @@ def find_id(session: Session, sha256: str, material_id: int | None, detector: st
 
 def get(session: Session, log_id: str) -> StoredGraspLog:
     """One log with its job, detection and samples, in one query; raises ``NotFound``."""
-    query = (
-        select(GraspLogRow, JobRow, SensorRow.name, MaterialRow.name, DetectionRow, SampleSummaryRow)
-        .join(SensorRow)
-        .join(JobRow, JobRow.grasp_log_id == GraspLogRow.id)
-        .outerjoin(MaterialRow, MaterialRow.id == GraspLogRow.material_id)
-        .outerjoin(DetectionRow, DetectionRow.grasp_log_id == GraspLogRow.id)
-        .outerjoin(SampleSummaryRow, SampleSummaryRow.grasp_log_id == GraspLogRow.id)
-        .where(GraspLogRow.id == log_id)
-    )
-    found = session.execute(query).one_or_none()
+    found = session.execute(_logs().where(GraspLogRow.id == log_id)).one_or_none()
     if found is None:
         raise NotFound("grasp log", log_id)
-    row, job, sensor, material, detection, samples = found
-    return StoredGraspLog(
-        id=row.id,
-        sha256=row.sha256,
-        bytes=row.bytes,
-        format=row.format,
-        detector=row.detector,
-        material=material,
-        sensor=sensor,
-        frames=row.frames,
-        duration=row.duration,
-        grid=(row.grid_rows, row.grid_columns),
-        created_at=row.created_at,
-        withdrawal=_withdrawal(row),
-        job=jobs.record(job, material),
-        detection=detections.detection_record(detection),
-        samples=detections.samples_record(samples),
-    )
+    return _record(*found)
+
+
+def list_all(session: Session, window: Window, wanted: LogFilter) -> list[StoredGraspLog]:
+    """Logs with their jobs, detections and samples, in one query."""
+    query = _logs()
+    if wanted.material_id is not None:
+        query = query.where(GraspLogRow.material_id == wanted.material_id)
+    if wanted.sensor is not None:
+        query = query.where(SensorRow.name == wanted.sensor)
+    if wanted.status is not None:
+        query = query.where(JobRow.status == wanted.status)
+    if wanted.withdrawn is not None:
+        at = GraspLogRow.withdrawn_at
+        query = query.where(at.is_not(None) if wanted.withdrawn else at.is_(None))
+    found = session.execute(windowed(query, window, {"created_at": GraspLogRow.created_at}, GraspLogRow.id))
+    return [_record(*row) for row in found]
 
 
 def material_id(session: Session, log_id: str) -> int | None:
@@ -112,6 +104,44 @@ def move(session: Session, source_id: int, target_id: int) -> None:
     is_there = exists().where(there.material_id == target_id, *same)
     moved = update(GraspLogRow).where(GraspLogRow.material_id == source_id, ~is_there).values(material_id=target_id)
     session.execute(moved.execution_options(synchronize_session=False))
+
+
+def _logs() -> Select[*tuple[Any, ...]]:
+    return (
+        select(GraspLogRow, JobRow, SensorRow.name, MaterialRow.name, DetectionRow, SampleSummaryRow)
+        .join(SensorRow)
+        .join(JobRow, JobRow.grasp_log_id == GraspLogRow.id)
+        .outerjoin(MaterialRow, MaterialRow.id == GraspLogRow.material_id)
+        .outerjoin(DetectionRow, DetectionRow.grasp_log_id == GraspLogRow.id)
+        .outerjoin(SampleSummaryRow, SampleSummaryRow.grasp_log_id == GraspLogRow.id)
+    )
+
+
+def _record(
+    row: GraspLogRow,
+    job: JobRow,
+    sensor: str,
+    material: str | None,
+    detection: DetectionRow | None,
+    samples: SampleSummaryRow | None,
+) -> StoredGraspLog:
+    return StoredGraspLog(
+        id=row.id,
+        sha256=row.sha256,
+        bytes=row.bytes,
+        format=row.format,
+        detector=row.detector,
+        material=material,
+        sensor=sensor,
+        frames=row.frames,
+        duration=row.duration,
+        grid=(row.grid_rows, row.grid_columns),
+        created_at=row.created_at,
+        withdrawal=_withdrawal(row),
+        job=jobs.record(job, material),
+        detection=detections.detection_record(detection),
+        samples=detections.samples_record(samples),
+    )
 
 
 def _locked(session: Session, log_id: str) -> GraspLogRow:

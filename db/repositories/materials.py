@@ -7,9 +7,12 @@ from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from db.errors import AlreadyExists, NotFound
+from db.paging import Window, windowed
 from db.records import Material, StoredModel
 from db.repositories import friction_models, grasp_logs, jobs
 from db.tables import GraspLogRow, MaterialNameRow, MaterialRow
+
+BY_NAME = Window("name")
 
 
 def create(session: Session, name: str, description: str) -> Material:
@@ -38,9 +41,14 @@ def get(session: Session, name: str) -> Material:
     return _with_counts_and_models(session, [find_id(session, name)])[0]
 
 
-def list_all(session: Session) -> list[Material]:
-    """Every material with its current models, by name: three queries however many there are."""
-    return _with_counts_and_models(session, None)
+def list_all(session: Session, window: Window = BY_NAME, search: str | None = None) -> list[Material]:
+    """Materials with their current models, those with ``search`` in a name: four queries however many there are."""
+    query = select(MaterialRow.id).where(MaterialRow.merged_into_id.is_(None))
+    if search is not None:
+        named_so = MaterialNameRow.name.icontains(search, autoescape=True)
+        query = query.where(MaterialRow.id.in_(select(MaterialNameRow.material_id).where(named_so)))
+    columns = {"name": MaterialRow.name, "created_at": MaterialRow.created_at}
+    return _with_counts_and_models(session, list(session.scalars(windowed(query, window, columns, MaterialRow.id))))
 
 
 def still(session: Session, material_id: int) -> int:
@@ -96,27 +104,24 @@ def merge(session: Session, target_id: int, source_id: int) -> None:
     jobs.move_unfinished(session, source_id, target_id)
 
 
-def _with_counts_and_models(session: Session, ids: Sequence[int] | None) -> list[Material]:
+def _with_counts_and_models(session: Session, ids: Sequence[int]) -> list[Material]:
+    """The materials of these keys, in their order."""
     of_it = GraspLogRow.material_id == MaterialRow.id
     counted = select(func.count()).where(of_it)
     counts = (counted.scalar_subquery(), counted.where(GraspLogRow.withdrawn_at.is_not(None)).scalar_subquery())
-    query = select(MaterialRow, *counts).where(MaterialRow.merged_into_id.is_(None)).order_by(MaterialRow.name)
-    if ids is not None:
-        query = query.where(MaterialRow.id.in_(ids))
-    models = friction_models.all_current(session, ids)
-    names = _names(session, ids)
-    return [
-        _record(row, names[row.id], logs, withdrawn, [model for model in models if model.material == row.name])
+    query = select(MaterialRow, *counts).where(MaterialRow.id.in_(ids))
+    models, names = friction_models.all_current(session, ids), _names(session, ids)
+    found = {
+        row.id: _record(row, names[row.id], logs, withdrawn, models.get(row.id, []))
         for row, logs, withdrawn in session.execute(query)
-    ]
+    }
+    return [found[material_id] for material_id in ids]
 
 
-def _names(session: Session, ids: Sequence[int] | None) -> dict[int, list[str]]:
+def _names(session: Session, ids: Sequence[int]) -> dict[int, list[str]]:
     query = select(MaterialNameRow.material_id, MaterialNameRow.name).order_by(MaterialNameRow.name)
-    if ids is not None:
-        query = query.where(MaterialNameRow.material_id.in_(ids))
     names: dict[int, list[str]] = {}
-    for material_id, name in session.execute(query):
+    for material_id, name in session.execute(query.where(MaterialNameRow.material_id.in_(ids))):
         names.setdefault(material_id, []).append(name)
     return names
 

@@ -1,20 +1,21 @@
 """Grasp logs and what was found in them."""
 
 import asyncio
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
-from db.records import StoredGraspLog
-from db.repositories import grasp_logs
+from db.records import JobStatus, LogFilter, StoredGraspLog
+from db.repositories import grasp_logs, materials
 from service import formats
 from service.access import READ, UPLOAD
 from service.context import Context, Given
 from service.formats import writing
 from service.formats.tracked_markers import FRAME_RATE, SCALE
 from service.idempotency import OnceWithoutBody
+from service.paging import USUAL, CursorText, Limit, Page, link_next
 from service.problems import (
     IDEMPOTENCY_KEY_REUSED,
     INVALID_GRASP_LOG,
@@ -29,7 +30,7 @@ from service.problems import (
     Problem,
 )
 from service.routes.common import problems
-from service.schemas import EventsOfOneKind, EventsOut, GraspLogOut, SamplesOut, StickRatioOut
+from service.schemas import EventsOfOneKind, EventsOut, GraspLogOut, GraspLogsOut, SamplesOut, StickRatioOut
 from service.stored_results import EVENT_KINDS, SAMPLE_ARRAYS, decode_history, decode_samples, finite_or_none
 from service.use_cases.export import export
 from service.use_cases.upload import Wish, upload
@@ -124,10 +125,42 @@ async def create_grasp_log(
     return (await upload(context, request.stream(), wish)).response()
 
 
+@router.get(
+    "",
+    dependencies=[READ],
+    summary="List grasp logs",
+    responses=problems(UNKNOWN_MATERIAL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+def list_grasp_logs(
+    context: Given,
+    request: Request,
+    response: Response,
+    material: Annotated[str | None, Query(description="Only those of this material")] = None,
+    sensor: Annotated[str | None, Query(max_length=200, description="Only those of this sensor")] = None,
+    status: Annotated[JobStatus | None, Query(description="Only those whose job is so")] = None,
+    withdrawn: Annotated[bool | None, Query(description="Only those that are withdrawn, or are not")] = None,
+    sort: Annotated[
+        Literal["created_at", "-created_at"], Query(description="By what; `-` for the last ones first")
+    ] = "-created_at",
+    limit: Limit = USUAL,
+    cursor: CursorText = None,
+) -> GraspLogsOut:
+    """Each with its job and, once there, what was found in it."""
+    page = Page(sort, limit, cursor, identity="log_id")
+    with context.database.read() as session:
+        material_id = None if material is None else materials.find_id(session, material)
+        wanted = LogFilter(material_id, sensor, status, withdrawn)
+        found, after = page.cut(grasp_logs.list_all(session, page.window(), wanted))
+    return GraspLogsOut(items=[GraspLogOut.of(each) for each in found], next=link_next(request, response, after))
+
+
 @router.get("/{id}", dependencies=[READ], summary="Look at a grasp log", responses=_FOUND)
 def read_grasp_log(context: Given, id: str) -> GraspLogOut:  # noqa: A002  (the path's own name)
     """With its job and, once there, what was found in it."""
-    return GraspLogOut.of(_find(context, id))
+    log = _find(context, id)
+    if log.job.finished_at is not None:
+        context.models.seen(log.job.finished_at)
+    return GraspLogOut.of(log)
 
 
 @router.get("/{id}/stick-ratio", dependencies=[READ], summary="Look at the stick ratio over time", responses=_RESULTS)

@@ -21,4 +21,7 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 def read_job(context: Given, id: str) -> JobOut:  # noqa: A002  (the path's own name)
     """How far it is, what each stage took, and why it ended as it did."""
     with context.database.read() as session:
-        return JobOut.of(jobs.get(session, id))
+        job = jobs.get(session, id)
+    if job.finished_at is not None:
+        context.models.seen(job.finished_at)
+    return JobOut.of(job)

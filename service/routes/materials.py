@@ -1,14 +1,17 @@
 """Materials, their models and their friction."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 from urllib.parse import quote
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Query, Request, Response
+from starlette.concurrency import run_in_threadpool
 
 from db.repositories import friction_models, materials
 from service.access import READ, UPLOAD
+from service.conditional import NOT_MODIFIED, conditional, tagged
 from service.context import Given
 from service.idempotency import Answer, OnceGiven, answer_once
+from service.paging import USUAL, CursorText, Limit, Page, link_next
 from service.problems import (
     IDEMPOTENCY_KEY_REUSED,
     INVALID_REQUEST,
@@ -21,13 +24,13 @@ from service.problems import (
 )
 from service.routes.common import JsonRoute, problems
 from service.schemas import (
-    FitMethod,
     FrictionModelOut,
     FrictionModelsOut,
     FrictionOut,
     JobOut,
     MaterialOut,
     MaterialsOut,
+    ModelMethod,
     NewFit,
     NewMaterial,
 )
@@ -66,33 +69,55 @@ def create_material(context: Given, new: NewMaterial, once: OnceGiven) -> Respon
         return answer_once(session, once, create).response()
 
 
-@router.get("", dependencies=[READ], summary="List all materials", responses=problems(STORAGE_UNAVAILABLE))
-def list_materials(context: Given) -> MaterialsOut:
-    """By name, each with its current models."""
+@router.get(
+    "",
+    dependencies=[READ],
+    summary="List materials",
+    responses=problems(INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+def list_materials(
+    context: Given,
+    request: Request,
+    response: Response,
+    search: Annotated[str | None, Query(max_length=100, description="Part of a name or an alias")] = None,
+    sort: Annotated[
+        Literal["name", "-name", "created_at", "-created_at"], Query(description="By what; `-` for the last ones first")
+    ] = "name",
+    limit: Limit = USUAL,
+    cursor: CursorText = None,
+) -> MaterialsOut:
+    """Each with its current models."""
+    page = Page(sort, limit, cursor)
     with context.database.read() as session:
-        return MaterialsOut(items=[MaterialOut.of(found) for found in materials.list_all(session)])
+        found, after = page.cut(materials.list_all(session, page.window(), search))
+    return MaterialsOut(items=[MaterialOut.of(each) for each in found], next=link_next(request, response, after))
 
 
 @router.get(
     "/{name}",
     dependencies=[READ],
     summary="Look at one material",
-    responses=problems(UNKNOWN_MATERIAL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+    response_model=MaterialOut,
+    responses=NOT_MODIFIED | problems(UNKNOWN_MATERIAL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
-def read_material(context: Given, name: str) -> MaterialOut:
-    """With the current model of each method."""
+def read_material(context: Given, request: Request, name: str) -> Response:
+    """With the current model of each method. `ETag` and `If-None-Match` save the answer to who has it."""
     with context.database.read() as session:
-        return MaterialOut.of(materials.get(session, name))
+        found = materials.get(session, name)
+    context.models.seen(max((model.created_at for model in found.models), default=found.created_at))
+    return tagged(request, MaterialOut.of(found).model_dump_json())
 
 
 @router.get(
     "/{name}/friction",
     dependencies=[READ],
     summary="Look up the friction coefficient",
-    responses=problems(UNKNOWN_MATERIAL, NO_MODEL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+    response_model=FrictionOut,
+    responses=NOT_MODIFIED | problems(UNKNOWN_MATERIAL, NO_MODEL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
-def read_friction(
+async def read_friction(
     context: Given,
+    request: Request,
     name: str,
     fn: Annotated[float, Finite, Query(le=LARGEST_FORCE, description="Normal force on an element, N", examples=[0.05])],
     v: Annotated[
@@ -107,13 +132,17 @@ def read_friction(
             examples=[0.05],
         ),
     ] = None,
-    method: Annotated[FitMethod, Query(description="Whose current model answers")] = "ols",
-) -> FrictionOut:
+    method: Annotated[ModelMethod, Query(description="Whose current model answers")] = "ols",
+) -> Response:
     """At a tangential velocity and a normal force: the mean, or a quantile that a cautious planner asks for.
 
-    A quantile includes the scatter of μ and the uncertainty of the model.
+    A quantile includes the scatter of μ and the uncertainty of the model. `ETag` and `If-None-Match` save the answer to
+    who has it.
     """
-    return look_up(context, name, method, Question(v, fn, quantile))
+    known = context.models.fresh(name, method)
+    if known is None:
+        known = await run_in_threadpool(context.models.read, context.database, name, method)
+    return conditional(request, known.tag, lambda: look_up(known, Question(v, fn, quantile)).model_dump_json())
 
 
 @router.post(
@@ -132,13 +161,27 @@ def create_fit(context: Given, name: str, wish: NewFit, once: OnceGiven) -> Resp
 @router.get(
     "/{name}/fits",
     dependencies=[READ],
-    summary="List all versions of a material's models",
+    summary="List versions of a material's models",
     responses=problems(UNKNOWN_MATERIAL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
 def list_fits(
-    context: Given, name: str, method: Annotated[FitMethod | None, Query(description="Only those of it")] = None
+    context: Given,
+    request: Request,
+    response: Response,
+    name: str,
+    method: Annotated[ModelMethod | None, Query(description="Only those of it")] = None,
+    current: Annotated[bool | None, Query(description="Only those that are current, or are not")] = None,
+    limit: Limit = USUAL,
+    cursor: CursorText = None,
 ) -> FrictionModelsOut:
     """Newest first."""
+    page = Page("-id", limit, cursor)
     with context.database.read() as session:
-        found = friction_models.versions(session, materials.find_id(session, name), method)
-    return FrictionModelsOut(items=[FrictionModelOut.of(stored) for stored in found])
+        material_id = materials.find_id(session, name)
+        versions = friction_models.versions(session, material_id, method, current=current, window=page.window())
+        found, after = page.cut(versions)
+    if found:
+        context.models.seen(found[0].created_at)
+    return FrictionModelsOut(
+        items=[FrictionModelOut.of(each) for each in found], next=link_next(request, response, after)
+    )

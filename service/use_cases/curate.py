@@ -24,7 +24,9 @@ def change(context: Context, material: str, name: str | None, description: str |
             materials.describe(session, material_id, description)
         if name is not None:
             materials.rename(session, material_id, name)
-        return materials.get(session, name or material)
+        changed = materials.get(session, name or material)
+    context.models.seen()
+    return changed
 
 
 def add_alias(context: Context, material: str, alias: str) -> Material:
@@ -38,6 +40,7 @@ def remove_alias(context: Context, material: str, alias: str) -> None:
     """Free an alias; raises ``NotFound``."""
     with context.database.write() as session:
         materials.remove_alias(session, materials.find_id(session, material), alias)
+    context.models.seen()
 
 
 def merge(context: Context, material: str, source: str) -> tuple[Material, list[Job]]:
@@ -50,7 +53,7 @@ def merge(context: Context, material: str, source: str) -> tuple[Material, list[
         materials.merge(session, target_id, source_id)
         queued = _queue_refits(session, target_id, methods)
         merged = materials.get(session, material)
-    return merged, _submit(context, queued)
+    return merged, _follow_up(context, queued)
 
 
 def withdraw(context: Context, log_id: str, because: str) -> tuple[StoredGraspLog, list[Job]]:
@@ -59,7 +62,7 @@ def withdraw(context: Context, log_id: str, because: str) -> tuple[StoredGraspLo
         is_new = grasp_logs.withdraw(session, log_id, because)
         queued = _refit_without(session, grasp_logs.material_id(session, log_id)) if is_new else []
         log = grasp_logs.get(session, log_id)
-    return log, _submit(context, queued)
+    return log, _follow_up(context, queued)
 
 
 def restore(context: Context, log_id: str) -> tuple[StoredGraspLog, list[Job]]:
@@ -71,7 +74,7 @@ def restore(context: Context, log_id: str) -> tuple[StoredGraspLog, list[Job]]:
         if was_withdrawn and material_id is not None:
             queued = _queue_refits(session, material_id, friction_models.current_methods(session, [material_id]))
         log = grasp_logs.get(session, log_id)
-    return log, _submit(context, queued)
+    return log, _follow_up(context, queued)
 
 
 def _refit_without(session: Session, material_id: int | None) -> list[Job]:
@@ -93,7 +96,9 @@ def _queue_refits(session: Session, material_id: int, methods: Iterable[str]) ->
     return [jobs.get(session, job_id) for job_id in ids]
 
 
-def _submit(context: Context, queued: list[Job]) -> list[Job]:
+def _follow_up(context: Context, queued: list[Job]) -> list[Job]:
+    """Tell those who hold models, and those who make them."""
+    context.models.seen()
     for job in queued:
         context.jobs.submit(job.id)
     return queued

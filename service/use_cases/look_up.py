@@ -2,12 +2,10 @@
 
 from dataclasses import dataclass
 
-from db.records import StoredModel
-from db.repositories import friction_models, materials
-from service.context import Context
-from service.problems import NO_MODEL, Problem
+from service.model_cache import KnownModel
 from service.schemas import FrictionOut
-from service.stored_results import to_friction_model
+
+OUTDATED = "a log behind the model was withdrawn, and the fit without it is not there"
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,24 +17,14 @@ class Question:
     quantile: float | None
 
 
-def look_up(context: Context, material: str, method: str, question: Question) -> FrictionOut:
-    """The answer of the material's current model; raises ``NotFound``, and ``Problem`` where no model is fitted."""
-    with context.database.read() as session:
-        stored = friction_models.current(session, material, method)
-        if stored is None:
-            materials.find_id(session, material)
-            detail = f"material {material!r} has no model fitted by {method!r} yet"
-            raise Problem(NO_MODEL, detail, name="method", value=method, allowed="a method that was fitted")
-    return _answer(stored, question)
-
-
-def _answer(stored: StoredModel, question: Question) -> FrictionOut:
+def look_up(known: KnownModel, question: Question) -> FrictionOut:
+    """The answer of a material's current model."""
     v, f_n = question.tangential_velocity, question.normal_force
-    model = to_friction_model(stored.model)
+    stored, model = known.stored, known.model
     mean = float(model.predict(v, f_n))
     asked = mean if question.quantile is None else float(model.predict(v, f_n, quantile=question.quantile))
     outside = model.extrapolation(v, f_n)
-    outdated = "a log behind the model was withdrawn, and the fit without it is not there" if stored.outdated else None
+    outdated = OUTDATED if stored.outdated else None
     nothing = "the answer is not above 0: nothing is known of the friction there" if asked <= 0.0 else None
     return FrictionOut(
         material=stored.material,

@@ -58,8 +58,11 @@ def test_a_material_comes_with_its_models(ask: Ask, service: Service, answers: S
 
 
 def test_all_materials_are_listed(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
-    materials = ask(service({"items": [answers.material, answers.material]}), "materials")
-    assert [material.name for material in materials] == ["paper", "paper"]
+    server = service(
+        {"items": [answers.material] * 2, "next": "after those"}, {"items": [answers.material], "next": None}
+    )
+    assert [material.name for material in ask(server, "materials")] == ["paper"] * 3
+    assert [request.url.params.get("cursor") for request in server.requests] == [None, "after those"]
 
 
 def test_a_model_is_read_as_the_service_gave_it(ask: Ask, service: Service, answers: SimpleNamespace) -> None:

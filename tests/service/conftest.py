@@ -21,6 +21,7 @@ from db.blobs import BlobStore
 from db.database import Database
 from service.app import create_app
 from service.context import Context
+from service.model_cache import ModelCache
 from service.settings import Settings
 from slipcore import GraspLog
 from slipcore.contact.ramp import RampSchedule, tangential_ramp
@@ -97,10 +98,10 @@ def reach(database: Database, blobs: BlobStore) -> Callable[..., Caller]:
     def client(
         access: str = "auto", server: str = "10.0.0.5", address: str = "10.0.0.9", key: str = "", **settings: Any
     ) -> Caller:
-        chosen = Settings(access=access, **settings)
+        chosen = Settings.model_validate({"access": access, "lookup_seconds": 0.0, **settings})
         app = create_app(chosen)
         jobs: Any = SimpleNamespace(submit=lambda _: None)
-        app.state.context = Context(chosen, database, blobs, jobs)
+        app.state.context = Context(chosen, database, blobs, jobs, models=ModelCache(chosen.lookup_seconds))
         return Caller(app, server, address, {"Authorization": f"Bearer {key}"} if key else {})
 
     return client

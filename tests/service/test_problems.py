@@ -25,7 +25,7 @@ def test_each_type_is_documented_with_its_status_and_nothing_else_is() -> None:
         ("GET", "/v1/nothing", "unknown-route", None),
         ("GET", "/v1/materials/", "unknown-route", None),
         ("DELETE", "/v1/materials", "method-not-allowed", "GET, HEAD, POST"),
-        ("PUT", "/v1/grasp-logs", "method-not-allowed", "POST"),
+        ("PUT", "/v1/grasp-logs", "method-not-allowed", "GET, HEAD, POST"),
         ("POST", "/v1/jobs/1", "method-not-allowed", "GET, HEAD"),
     ],
 )

@@ -46,6 +46,7 @@ def test_the_databases_password_is_not_shown() -> None:
         ("max_upload_bytes", 0),
         ("access", "none"),
         ("idempotency_hours", 0.0),
+        ("lookup_seconds", 61.0),
         ("workers", 0),
         ("workers", 65),
         ("job_attempts", 0),

@@ -62,7 +62,7 @@ def test_the_number_of_queries_does_not_grow_with_the_materials(database: Databa
         with database.read() as session:
             assert len(materials.list_all(session)) == number
         counts.append(len(statements))
-    assert set(counts) == {3}
+    assert set(counts) == {4}
 
 
 def test_a_material_is_found_by_its_aliases_too(database: Database, new_model: Callable[..., NewModel]) -> None:

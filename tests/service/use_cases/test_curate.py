@@ -14,6 +14,7 @@ from db.repositories import grasp_logs, jobs, materials
 from service import pipeline
 from service.context import Context
 from service.problems import Problem
+from service.schemas import FrictionOut
 from service.settings import Settings
 from service.use_cases import curate
 from service.use_cases.look_up import Question, look_up
@@ -57,6 +58,9 @@ class Shop:
         assert job.status == "done", job.reason
         return log_id
 
+    def friction(self, material: str, method: str = "ols") -> FrictionOut:
+        return look_up(self.context.models.read(self.database, material, method), ANYWHERE)
+
     def model(self, material: str, method: str = "ols") -> tuple[int, int, bool]:
         """Version, samples, and whether it is outdated."""
         with self.database.read() as session:
@@ -78,11 +82,11 @@ def test_a_withdrawn_log_leaves_every_fit_and_comes_back(shop: Shop) -> None:
     assert log.withdrawal.because == "wet"
     assert [(job.kind, job.method) for job in queued] == [("fit", "conjugate"), ("fit", "ols")]
     assert shop.model("paper", "conjugate") == (1, both, True)
-    assert "withdrawn" in str(look_up(shop.context, "paper", "ols", ANYWHERE).warning)
+    assert "withdrawn" in str(shop.friction("paper").warning)
     assert [job.status for job in shop.work()] == ["done", "done"]
     assert shop.model("paper", "conjugate") == (2, both // 2, False)
     assert shop.model("paper", "ols") == (2, both // 2, False)
-    assert "withdrawn" not in str(look_up(shop.context, "paper", "ols", ANYWHERE).warning)
+    assert "withdrawn" not in str(shop.friction("paper").warning)
 
     again, queued = curate.withdraw(shop.context, bad, "wet, and dropped")
     assert again.withdrawal is not None
@@ -99,7 +103,7 @@ def test_a_material_without_its_only_log_has_no_model(shop: Shop) -> None:
     log = shop.ingest("paper", 0)
     assert curate.withdraw(shop.context, log, "wrong material")[1] == []
     with pytest.raises(Problem, match="has no model fitted by 'ols'"):
-        look_up(shop.context, "paper", "ols", ANYWHERE)
+        shop.friction("paper")
     curate.restore(shop.context, log)
     shop.work()
     assert shop.model("paper")[0] == 2
@@ -132,7 +136,7 @@ def test_a_merged_material_is_fitted_over_all_its_logs(shop: Shop) -> None:
     assert [job.method for job in queued] == ["conjugate", "ols"]
     assert [job.status for job in shop.work()] == ["done", "done"]
     assert shop.model("papre") == shop.model("paper") == (2, 2 * each, False)
-    assert look_up(shop.context, "papre", "conjugate", ANYWHERE).material == "paper"
+    assert shop.friction("papre", "conjugate").material == "paper"
     with pytest.raises(Problem, match="source is papre; allowed: another material"):
         curate.merge(shop.context, "paper", "papre")
 

@@ -6,11 +6,9 @@ import pytest
 
 import estimators
 import slipcore
-from db.blobs import BlobStore
 from db.database import Database
 from db.repositories import friction_models, jobs, materials
-from service.context import Context
-from service.settings import Settings
+from service.model_cache import ModelCache
 from service.stored_results import to_new_model
 from service.use_cases.look_up import Question, look_up
 from slipcore import GraspLog
@@ -22,7 +20,7 @@ def model(ramp: GraspLog) -> estimators.FrictionModel:
 
 
 @pytest.fixture
-def ask(database: Database, blobs: BlobStore) -> Callable[[estimators.FrictionModel, Question], Any]:
+def ask(database: Database) -> Callable[[estimators.FrictionModel, Question], Any]:
     with database.write() as session:
         material = materials.create(session, "paper", "").id
 
@@ -30,8 +28,7 @@ def ask(database: Database, blobs: BlobStore) -> Callable[[estimators.FrictionMo
         with database.write() as session:
             job = jobs.add(session, "fit", "ols", material_id=material)
             friction_models.add(session, material, job, to_new_model(model))
-        jobless: Any = None
-        return look_up(Context(Settings(), database, blobs, jobless), "paper", "ols", question)
+        return look_up(ModelCache().read(database, "paper", "ols"), question)
 
     return answer
 

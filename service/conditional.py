@@ -1,0 +1,32 @@
+"""Answers that need not be sent again to who has them (RFC 9110, 13.1.2)."""
+
+import hashlib
+from collections.abc import Callable
+from typing import Any
+
+from fastapi import Request, Response
+
+NOT_MODIFIED: dict[int | str, dict[str, Any]] = {
+    304: {"description": "What was asked for is what `If-None-Match` says that the client has"}
+}
+"""Description of a route whose answers carry an ETag."""
+
+KEEP_AND_ASK = "private, no-cache"
+"""Cache-Control: keep it, but ask before it is used again; a proxy keeps nothing, since not everybody may ask."""
+
+
+def conditional(request: Request, tag: str, body: Callable[[], str]) -> Response:
+    """The JSON ``body`` with its tag, or only that it has not changed; then it is not even made."""
+    headers = {"ETag": tag, "Cache-Control": KEEP_AND_ASK}
+    if _is_one_of(tag, request.headers.get("if-none-match", "")):
+        return Response(None, 304, headers)
+    return Response(body(), 200, headers, "application/json")
+
+
+def tagged(request: Request, body: str) -> Response:
+    """The same for a body that has no version of its own."""
+    return conditional(request, f'"{hashlib.blake2b(body.encode(), digest_size=12).hexdigest()}"', lambda: body)
+
+
+def _is_one_of(tag: str, listed: str) -> bool:
+    return any(each.strip().removeprefix("W/") in {tag, "*"} for each in listed.split(","))
