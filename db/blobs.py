@@ -42,6 +42,14 @@ class Spool:
         except OSError as error:
             raise StorageUnavailable(f"blob folder: {error}") from error
 
+    def sync(self) -> None:
+        """Let what was written reach the disk, which ``keep`` then need not wait for."""
+        try:
+            self._file.flush()
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise StorageUnavailable(f"blob folder: {error}") from error
+
     def adopt(self) -> None:
         """Take what another process wrote to ``path`` as what was written here."""
         with self.path.open("rb") as stream:
@@ -55,9 +63,8 @@ class Spool:
 
     def keep(self) -> str:
         """Make it a blob, durably (file, then name, then folder reach the disk), and return its hash."""
+        self.sync()
         try:
-            self._file.flush()
-            os.fsync(self._file.fileno())
             target = self._place(self.sha256)
             _make_folder(target.parent)
             self.path.replace(target)  # atomic; a blob of that name has the same bytes

@@ -214,7 +214,7 @@ def _array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> FloatA
         raise InvalidInput(name, f"not an array ({error})", "an array of real numbers") from error
     if given.dtype.kind not in "iuf":  # text, dates and complex numbers would convert, and mean something else
         raise InvalidInput(name, f"of dtype {given.dtype}", "an array of real numbers")
-    array = np.array(given, dtype=np.float64, order="C")
+    array = np.array(given, dtype=np.float64, order="C", copy=None if _is_immutable(given) else True)
     wanted = "[" + ", ".join("any" if size is None else str(size) for size in shape) + "]"
     matches = array.ndim == len(shape) and all(
         size is None or size == got for size, got in zip(shape, array.shape, strict=True)
@@ -230,6 +230,14 @@ def _array(name: str, value: ArrayLike, shape: tuple[int | None, ...]) -> FloatA
         raise InvalidInput(name, f"{array[index]} at index {list(index)} ({count} in all)", "finite numbers")
     array.flags.writeable = False
     return array
+
+
+def _is_immutable(array: NDArray[Any]) -> bool:
+    """Whether nobody can ever change it: it is a view of bytes, as a file's reader makes it."""
+    base: object = array
+    while isinstance(base, np.ndarray):
+        base = base.base
+    return isinstance(base, bytes)
 
 
 def _optional(name: str, value: ArrayLike | None, shape: tuple[int | None, ...]) -> FloatArray | None:
@@ -277,7 +285,7 @@ def _check_time(time: FloatArray) -> None:
 def _check_magnitude(name: str, array: FloatArray | None, limit: float, unit: str) -> None:
     if array is None:
         return
-    largest = float(np.abs(array).max())
+    largest = max(float(array.max()), -float(array.min()))  # |array| would be another array
     if largest > limit:
         raise InvalidInput(name, f"{largest:.3g} {unit} at its largest", f"at most {limit:g} {unit}")
 

@@ -1,6 +1,8 @@
 """A zip of .npy members, read in memory within bounds; nothing is ever extracted to disk."""
 
+import io
 import lzma
+import struct
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -19,6 +21,8 @@ MAX_DIRECTORY_BYTES = 64 * 1024
 _DAMAGE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, NotImplementedError, RuntimeError, ValueError)
 _END_OF_DIRECTORY, _ZIP64_LOCATOR, _END_BYTES, _LOCATOR_BYTES = b"PK\x05\x06", b"PK\x06\x07", 22, 20
 _ENCRYPTED = 0x1
+_LOCAL_BYTES, _LOCAL_LENGTHS = 30, 26
+"""Bytes of the header before a member, and where in it the lengths of its name and extra field are."""
 
 
 @contextmanager
@@ -37,12 +41,27 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
 def read_member(archive: zipfile.ZipFile, member: str, name: str) -> NDArray[Any]:
     """Read one .npy member as an array; errors call it ``name``."""
     try:
-        with archive.open(member) as stream:
-            return read_array(stream, name, archive.getinfo(member).file_size)
+        entry = archive.getinfo(member)
+        with archive.open(entry) as stream:  # checks the member's own header
+            if entry.compress_type == zipfile.ZIP_STORED:
+                return read_array(io.BytesIO(_stored(archive, entry)), name, entry.file_size)
+            return read_array(stream, name, entry.file_size)
     except InvalidInput:
         raise
     except _DAMAGE as error:
         raise _damaged(error) from error
+
+
+def _stored(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> bytes:
+    """The bytes of a member without compression at once; ``zipfile`` reads them in pieces, three times as slowly."""
+    file = archive.fp
+    assert file is not None
+    file.seek(entry.header_offset + _LOCAL_LENGTHS)
+    file.seek(entry.header_offset + _LOCAL_BYTES + sum(struct.unpack("<HH", file.read(4))))
+    content = file.read(entry.file_size)
+    if zlib.crc32(content) != entry.CRC:
+        raise zipfile.BadZipFile(f"Bad CRC-32 for file {entry.filename!r}")
+    return content
 
 
 def _check_directory(path: Path) -> None:

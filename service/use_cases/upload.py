@@ -101,7 +101,10 @@ async def _read(context: Context, spools: ExitStack, spool: Spool, wish: Wish) -
     name = await asyncio.to_thread(_identify, spool, wish)
     try:
         if formats.FORMATS[name].plain:
-            return spool, await asyncio.to_thread(read_plain, spool.path, name)
+            found, _ = await asyncio.gather(  # the disk is slow while the reader computes
+                asyncio.to_thread(read_plain, spool.path, name), asyncio.to_thread(spool.sync)
+            )
+            return spool, found
         made = spools.enter_context(context.blobs.spool())
         description = await context.readers.convert(spool.path, made.path, name, wish.settings)
         await asyncio.to_thread(made.adopt)

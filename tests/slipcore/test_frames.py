@@ -318,3 +318,12 @@ def test_a_time_that_no_recording_has_is_refused(time: list[float]) -> None:
             displacement=np.zeros((3, 1, 1, 3)),
             element_area=1e-6,
         )
+
+
+def test_a_log_shares_only_what_nobody_can_change(fields: dict[str, Any]) -> None:
+    given = fields["displacement"]
+    assert not np.shares_memory(GraspLog(**fields).displacement, given)
+    given.flags.writeable = False
+    assert not np.shares_memory(GraspLog(**fields).displacement, given)
+    fixed = np.frombuffer(given.tobytes()).reshape(given.shape)
+    assert np.shares_memory(GraspLog(**fields | {"displacement": fixed}).displacement, fixed)
