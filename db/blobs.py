@@ -3,15 +3,18 @@
 import hashlib
 import os
 import re
+import time
 import uuid
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from db.defaults import HASHES_PER_QUERY
+from db.defaults import CACHE_GRACE, HASHES_PER_QUERY, ORPHAN_AGE
 from db.errors import NotFound, StorageUnavailable
+from db.object_store import ObjectStore
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 
@@ -19,10 +22,10 @@ _SHA256 = re.compile(r"[0-9a-f]{64}")
 class Spool:
     """A file under way into the store: hashed while it is written, gone at the end unless kept."""
 
-    def __init__(self, path: Path, place: Callable[[str], Path]) -> None:
+    def __init__(self, path: Path, take_in: Callable[[Path, str], None]) -> None:
         self.path = path
         self.size = 0
-        self._place = place
+        self._take_in = take_in
         self._hash = hashlib.sha256()
         self._file = path.open("xb")
 
@@ -65,10 +68,7 @@ class Spool:
         """Make it a blob, durably (file, then name, then folder reach the disk), and return its hash."""
         self.sync()
         try:
-            target = self._place(self.sha256)
-            _make_folder(target.parent)
-            self.path.replace(target)  # atomic; a blob of that name has the same bytes
-            _sync_folder(target.parent)
+            self._take_in(self.path, self.sha256)
         except OSError as error:
             raise StorageUnavailable(f"blob folder: {error}") from error
         return self.sha256
@@ -88,17 +88,21 @@ class Spool:
 
 
 class BlobStore:
-    """A folder of blobs, ``blobs/ab/ab12…``, with the spool files under way beside them in ``spool``."""
+    """A folder of blobs, ``blobs/ab/ab12…``, with the spool files under way beside them in ``spool``.
 
-    def __init__(self, folder: Path) -> None:
+    With a ``remote`` the blobs are there, and the folder holds those that were used last, ``cache_bytes`` of them.
+    """
+
+    def __init__(self, folder: Path, remote: ObjectStore | None = None, cache_bytes: int = 0) -> None:
         self._blobs, self._spool = folder / "blobs", folder / "spool"
+        self._remote, self._cache_bytes, self._fetched = remote, cache_bytes, cache_bytes
         for part in (self._blobs, self._spool):
             part.mkdir(parents=True, exist_ok=True)
 
     def spool(self) -> Spool:
         """A new file to write to; use it in a ``with`` statement."""
         try:
-            return Spool(self._spool / uuid.uuid4().hex, self._place)
+            return Spool(self._spool / uuid.uuid4().hex, self._take_in)
         except OSError as error:
             raise StorageUnavailable(f"blob folder: {error}") from error
 
@@ -109,43 +113,102 @@ class BlobStore:
             return spool.keep()
 
     def path(self, sha256: str) -> Path:
-        """The file that holds a blob; raises ``NotFound``."""
+        """The file that holds a blob, fetched where it has to be; raises ``NotFound``."""
         path = self._place(sha256)
-        if not path.is_file():
+        if path.is_file():
+            if self._remote is not None:
+                path.touch()  # the cache drops those that were not used for longest
+            return path
+        if self._remote is None:
             raise NotFound("blob", sha256)
+        with self.spool() as spool:
+            self._remote.get(sha256, spool.path)
+            spool.adopt()
+            if spool.sha256 != sha256:
+                raise StorageUnavailable(f"blob store: {sha256} has other bytes than it had")
+            _move(spool.path, path)
+        self._make_room(path.stat().st_size)
         return path
 
     def ping(self) -> None:
-        """Make sure that the folder takes files; raises ``StorageUnavailable``."""
+        """Make sure that the folder takes files, and the remote answers; raises ``StorageUnavailable``."""
         with self.spool() as spool:
             spool.write(b"ready")
             spool.flush()
+        if self._remote is not None:
+            self._remote.ping()
 
     def hashes(self) -> Iterator[str]:
         """Hashes of all blobs, in no order. Files that are not blobs are left out."""
-        for path in self._blobs.glob("??/*"):
-            if _SHA256.fullmatch(path.name):
-                yield path.name
+        return self._local() if self._remote is None else self._remote.hashes()
 
     def sweep(self, referenced: Callable[[list[str]], set[str]]) -> list[str]:
         """Remove spool files and the blobs that nothing refers to; returns the hashes removed.
 
-        ``referenced`` tells which of some hashes are referred to. Only for when nobody writes: at start-up.
+        ``referenced`` tells which of some hashes are referred to. Only for when nobody writes to the folder: at
+        start-up. Of a remote, to which others may write, only objects of some age are removed.
         """
         for path in self._spool.iterdir():
             path.unlink(missing_ok=True)
         removed: list[str] = []
-        remaining = self.hashes()
+        remaining = self._local() if self._remote is None else self._remote.hashes(ORPHAN_AGE)
         while some := list(islice(remaining, HASHES_PER_QUERY)):
             removed += sorted(set(some) - referenced(some))
+        if self._remote is not None:
+            self._remote.delete(removed)
         for sha256 in removed:
-            self._place(sha256).unlink()
+            self._place(sha256).unlink(missing_ok=True)
         return removed
+
+    def _take_in(self, spooled: Path, sha256: str) -> None:
+        """Make a spooled file, which is on the disk already, a blob."""
+        if self._remote is not None:
+            self._remote.put(sha256, spooled)
+        size = spooled.stat().st_size
+        _move(spooled, self._place(sha256))
+        if self._remote is not None:
+            self._make_room(size)
+
+    def _make_room(self, size: int) -> None:
+        """Drop what was not used for longest once the cache may be over its size: looking takes a walk over it."""
+        self._fetched += size
+        if self._fetched * 10 < self._cache_bytes:
+            return
+        self._fetched = 0
+        files = sorted((stat.st_mtime, stat.st_size, path) for path, stat in self._files())
+        total = sum(size for _, size, _ in files)
+        for used, size, path in files:
+            if total <= self._cache_bytes or used > time.time() - CACHE_GRACE:
+                return
+            path.unlink(missing_ok=True)
+            total -= size
+
+    def _files(self) -> Iterator[tuple[Path, os.stat_result]]:
+        for path in self._blobs.glob("??/*"):
+            with suppress(FileNotFoundError):
+                yield path, path.stat()
+
+    def _local(self) -> Iterator[str]:
+        for path in self._blobs.glob("??/*"):
+            if _SHA256.fullmatch(path.name):
+                yield path.name
 
     def _place(self, sha256: str) -> Path:
         if not _SHA256.fullmatch(sha256):
             raise NotFound("blob", sha256)
         return self._blobs / sha256[:2] / sha256
+
+
+def open_blobs(folder: Path, url: str | None = None, cache_bytes: int = 0) -> BlobStore:
+    """The blobs in a folder, or those of the object store at ``url`` with the folder as their cache."""
+    return BlobStore(folder, None if url is None else ObjectStore(url), cache_bytes)
+
+
+def _move(spooled: Path, target: Path) -> None:
+    """Atomic and durable: file, then name, then folder reach the disk; a blob of that name has the same bytes."""
+    _make_folder(target.parent)
+    spooled.replace(target)
+    _sync_folder(target.parent)
 
 
 def _make_folder(folder: Path) -> None:

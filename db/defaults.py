@@ -1,5 +1,7 @@
 """Every default of db, with unit, source and valid range."""
 
+from datetime import timedelta
+
 LOCK_TIMEOUT = 10.0
 """s, above 0; how long a writer waits for another: our transactions last milliseconds, a slow disk's fsync a second."""
 
@@ -26,3 +28,12 @@ HASHES_PER_QUERY = 500
 
 EXPIRED_KEYS_PER_CLAIM = 10
 """Expired idempotency keys that a new one removes, at least 1: more than come in, so that none stay for ever."""
+
+OBJECT_STORE_TIMEOUT = 20.0
+"""s, above 0; how long an object store may take to answer, retries and all, before it counts as away."""
+
+ORPHAN_AGE = timedelta(hours=24)
+"""How long an object to which nothing refers stays: another server may be about to write its row."""
+
+CACHE_GRACE = 600.0
+"""s, above 0; how long a blob that was just used stays in the local cache, however full: somebody may be reading it."""

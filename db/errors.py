@@ -28,14 +28,15 @@ class AlreadyExists(DatabaseError):
 
 
 class DriverMissing(DatabaseError):
-    """The database of this URL needs a driver that is not installed."""
+    """The database or blob store of this URL needs a library that is not installed."""
 
-    def __init__(self, url: str, module: str) -> None:
-        self.url, self.module = url, module
-        super().__init__(url, module)
+    def __init__(self, url: str, module: str, what: str = "database", extra: str = "postgresql") -> None:
+        self.url, self.module, self.what, self.extra = url, module, what, extra
+        super().__init__(url, module, what, extra)
 
     def __str__(self) -> str:
-        return f"database is {self.url}, whose driver {self.module} is not installed (stiction[postgresql] brings one)"
+        brings = f"stiction[{self.extra}] brings one"
+        return f"{self.what} is {self.url}, whose driver {self.module} is not installed ({brings})"
 
 
 class StorageUnavailable(DatabaseError):

@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager, closing
 from fastapi import FastAPI
 
 from db import migrate
-from db.blobs import BlobStore
+from db.blobs import BlobStore, open_blobs
 from db.database import Database
 from db.repositories import blobs as blob_references
 from service import access, gate, openapi, problems
@@ -67,11 +67,11 @@ async def running(settings: Settings) -> AsyncIterator[Context]:
         else:
             migrate.check(database)
         gate.check_start(settings, database)
-        blobs = BlobStore(settings.data_folder)
+        blobs = open_blobs(settings.data_folder, settings.blob_url, settings.blob_cache_bytes)
         _sweep(database, blobs)
         pool = JobPool(
             database,
-            Place(database.url, settings.data_folder),
+            Place(database.url, settings.data_folder, settings.blob_url, settings.blob_cache_bytes),
             workers=settings.workers,
             attempts=settings.job_attempts,
             shutdown_seconds=settings.shutdown_seconds,

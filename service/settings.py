@@ -24,6 +24,13 @@ class Settings(BaseSettings):
         repr=False,  # it may hold a password
         description="SQLAlchemy URL of the database; by default the SQLite file `stiction.sqlite3` in the data folder.",
     )
+    blob_url: str | None = Field(
+        default=None,
+        description="URL of an object store for uploads and results, such as s3://bucket/prefix; else the data folder.",
+    )
+    blob_cache_bytes: Annotated[int, Field(ge=0, le=2**50)] = Field(
+        default=10 * 1024 * MIB, description="Bytes of the object store's blobs that are kept in the data folder, too."
+    )
     migrate_at_start: bool = Field(
         default=True,
         description="Bring the database to this version's schema at start; otherwise an old one stops the start.",
@@ -67,6 +74,13 @@ class Settings(BaseSettings):
     def _shared_by_processes(cls, url: str | None) -> str | None:
         if url is not None and (":memory:" in url or url in {"sqlite://", "sqlite:///"}):
             raise ValueError("a database in memory is not seen by the worker processes; allowed: a file or a server")
+        return url
+
+    @field_validator("blob_url")
+    @classmethod
+    def _kept(cls, url: str | None) -> str | None:
+        if url is not None and ("://" not in url or url.startswith("memory:")):
+            raise ValueError("no URL of a store that keeps anything; allowed: s3://bucket/prefix and others of obstore")
         return url
 
     @property

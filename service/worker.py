@@ -10,7 +10,7 @@ from functools import cache
 from multiprocessing.connection import wait
 from pathlib import Path
 
-from db.blobs import BlobStore
+from db.blobs import BlobStore, open_blobs
 from db.database import Database
 from db.errors import StorageUnavailable
 from db.repositories import jobs
@@ -20,10 +20,12 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a worker finds its work: URL of the database and folder of the blobs."""
+    """Where a worker finds its work: database, folder of the blobs and, where they are in one, the object store."""
 
     database_url: str
     data_folder: Path
+    blob_url: str | None = None
+    blob_cache_bytes: int = 0
 
 
 def start() -> None:
@@ -65,7 +67,7 @@ def run_job(place: Place, job_id: str) -> None:
 
 @cache
 def _stores(place: Place) -> tuple[Database, BlobStore]:
-    return Database(place.database_url), BlobStore(place.data_folder)
+    return Database(place.database_url), open_blobs(place.data_folder, place.blob_url, place.blob_cache_bytes)
 
 
 def _end_with_parent() -> None:

@@ -3,18 +3,25 @@
 import importlib.util
 import itertools
 import os
+import re
 import shutil
 import signal
 import subprocess
 import tempfile
+import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
+import uvicorn
 from sqlalchemy import URL, Engine, NullPool, create_engine, make_url, text
 from sqlalchemy.exc import OperationalError
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route
 
 from db import migrate
 from db.database import Database
@@ -143,3 +150,83 @@ def new_url(engine_name: str, request: pytest.FixtureRequest) -> Iterator[Callab
     yield make
     for url in made:
         server.drop(url)
+
+
+class S3:
+    """What the blob store asks of S3, in memory: whole and multipart uploads, GET, HEAD, list and bulk deletion."""
+
+    def __init__(self) -> None:
+        self.objects: dict[str, bytes] = {}
+        self.is_down = False
+        self._parts: dict[str, dict[int, bytes]] = {}
+
+    async def answer(self, request: Request) -> Response:
+        if self.is_down:
+            return Response(status_code=503)
+        key = request.path_params.get("key", "")
+        body = await request.body()
+        answers = {"PUT": self._put, "GET": self._get, "HEAD": self._get, "DELETE": self._delete, "POST": self._post}
+        return answers[request.method](key, body, request.query_params)
+
+    def _put(self, key: str, body: bytes, query: Mapping[str, str]) -> Response:
+        if "uploadId" in query:
+            self._parts[query["uploadId"]][int(query["partNumber"])] = body
+        else:
+            self.objects[key] = body
+        return Response(headers={"ETag": '"1"'})
+
+    def _get(self, key: str, _body: bytes, query: Mapping[str, str]) -> Response:
+        if not key:
+            return self._list(query.get("prefix", ""))
+        if key not in self.objects:
+            return Response("<Error><Code>NoSuchKey</Code></Error>", 404, media_type="application/xml")
+        headers = {"ETag": '"1"', "Last-Modified": "Sat, 01 Nov 2025 10:00:00 GMT"}
+        return Response(self.objects[key], headers=headers)
+
+    def _list(self, prefix: str) -> Response:
+        entry = "<Contents><Key>{}</Key><LastModified>2025-11-01T10:00:00.000Z</LastModified><Size>{}</Size></Contents>"
+        found = "".join(entry.format(k, len(v)) for k, v in sorted(self.objects.items()) if k.startswith(prefix))
+        page = f"<ListBucketResult><IsTruncated>false</IsTruncated>{found}</ListBucketResult>"
+        return Response(page, media_type="application/xml")
+
+    def _delete(self, key: str, _body: bytes, _query: Mapping[str, str]) -> Response:
+        self.objects.pop(key, None)
+        return Response(status_code=204)
+
+    def _post(self, key: str, body: bytes, query: Mapping[str, str]) -> Response:
+        if "uploads" in query:
+            name = str(len(self._parts))
+            self._parts[name] = {}
+            page = f"<InitiateMultipartUploadResult><UploadId>{name}</UploadId></InitiateMultipartUploadResult>"
+        elif "uploadId" in query:
+            self.objects[key] = b"".join(part for _, part in sorted(self._parts.pop(query["uploadId"]).items()))
+            page = "<CompleteMultipartUploadResult><ETag>1</ETag></CompleteMultipartUploadResult>"
+        else:
+            keys = re.findall(r"<Key>(.*?)</Key>", body.decode())
+            for each in keys:
+                self.objects.pop(each, None)
+            page = f"<DeleteResult>{''.join(f'<Deleted><Key>{each}</Key></Deleted>' for each in keys)}</DeleteResult>"
+        return Response(page, media_type="application/xml")
+
+
+@pytest.fixture
+def s3(monkeypatch: pytest.MonkeyPatch) -> Iterator[S3]:
+    """An S3 on loopback whose one bucket is named ``grasps``; the environment leads there."""
+    server = S3()
+    route = Route("/grasps/{key:path}", server.answer, methods=["GET", "HEAD", "PUT", "POST", "DELETE"])
+    bucket = Route("/grasps", server.answer, methods=["GET", "POST"])
+    app = Starlette(routes=[route, bucket])
+    config = uvicorn.Config(app, port=0, log_level="error", ws="none", lifespan="off")
+    running = uvicorn.Server(config)
+    thread = threading.Thread(target=running.run)
+    thread.start()
+    while not running.started:
+        assert thread.is_alive()
+        time.sleep(0.005)
+    port = running.servers[0].sockets[0].getsockname()[1]
+    monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://127.0.0.1:{port}")
+    for name, value in {"ALLOW_HTTP": "true", "ACCESS_KEY_ID": "a", "SECRET_ACCESS_KEY": "b", "REGION": "x"}.items():
+        monkeypatch.setenv(f"AWS_{name}", value)
+    yield server
+    running.should_exit = True
+    thread.join()

@@ -13,7 +13,7 @@ CLIENT = "clients/stiction_client"
 ALLOWED = {
     "slipcore": {"slipcore", "numpy", "scipy", "numba"},
     "estimators": {"estimators", "slipcore", "numpy", "scipy", "numba", "statsmodels", "emcee", "pandas"},
-    "db": {"db", "migrations", "sqlalchemy", "alembic"},
+    "db": {"db", "migrations", "sqlalchemy", "alembic", "obstore"},
     "migrations": {"migrations", "db", "sqlalchemy", "alembic"},
     CLIENT: {"stiction_client", "httpx", "numpy", "scipy"},
 }

@@ -1,20 +1,25 @@
 import hashlib
 import os
+from datetime import timedelta
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from db.blobs import BlobStore
+from db.blobs import BlobStore, open_blobs
 from db.errors import NotFound, StorageUnavailable
 
 CONTENT = b"tactile"
 SHA256 = hashlib.sha256(CONTENT).hexdigest()
 
 
-@pytest.fixture
-def blobs(tmp_path: Path) -> BlobStore:
-    return BlobStore(tmp_path)
+@pytest.fixture(params=["folder", "s3"])
+def blobs(tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> BlobStore:
+    if request.param == "folder":
+        return BlobStore(tmp_path)
+    request.getfixturevalue("s3")
+    monkeypatch.setattr("db.blobs.ORPHAN_AGE", timedelta(0))
+    return open_blobs(tmp_path, "s3://grasps/lab", 2**30)
 
 
 def files(folder: Path) -> list[str]:

@@ -1,6 +1,7 @@
 import asyncio
 import multiprocessing
 import os
+import shutil
 import signal
 import time
 from collections.abc import Callable
@@ -111,3 +112,19 @@ def test_without_settings_those_of_the_environment_hold(monkeypatch: pytest.Monk
     monkeypatch.setenv("STICTION_PORT", "99999")
     with pytest.raises(ValueError, match="port"):
         create_app()
+
+
+def test_uploads_and_results_are_kept_in_an_object_store(
+    s3: Any, serving: Any, content: bytes, upload: Any, wait: Any, tmp_path: Path
+) -> None:
+    with serving(Settings(data_folder=tmp_path, blob_url="s3://grasps/lab", blob_cache_bytes=0)) as client:
+        client.post("/v1/materials", json={"name": "paper"}).raise_for_status()
+        accepted = upload(client, content, material="paper").json()
+        assert accepted["sha256"] in {key.rpartition("/")[2] for key in s3.objects}
+        assert wait(client, accepted["job"]["id"])["status"] == "done"
+        assert len(s3.objects) == 3  # the log, its history, its samples
+        shutil.rmtree(tmp_path / "blobs")  # but a cache
+        (tmp_path / "blobs").mkdir()
+        log = f"/v1/grasp-logs/{accepted['id']}"
+        assert client.get(f"{log}/file").content == content
+        assert client.get(f"{log}/samples").json()["normal_force"]

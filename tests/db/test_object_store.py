@@ -1,0 +1,92 @@
+import hashlib
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from db.blobs import open_blobs
+from db.errors import DriverMissing, NotFound, StorageUnavailable
+
+URL = "s3://grasps/lab"
+MIB = 2**20
+
+
+def test_another_machine_reads_what_one_has_stored(s3: Any, tmp_path: Path) -> None:
+    """Large blobs go up in parts."""
+    content = os.urandom(12 * MIB)
+    sha256 = open_blobs(tmp_path / "one", URL, MIB).put(content)
+    assert list(s3.objects) == [f"lab/{sha256[:2]}/{sha256}"]
+    other = open_blobs(tmp_path / "other", URL, MIB)
+    assert other.path(sha256).read_bytes() == content
+    assert sha256 == hashlib.sha256(content).hexdigest()
+    s3.is_down = True
+    assert other.path(sha256).read_bytes() == content  # from its cache
+
+
+def test_a_blob_is_not_there_before_the_store_has_it(s3: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("db.object_store.OBJECT_STORE_TIMEOUT", 0.5)
+    blobs = open_blobs(tmp_path, URL, MIB)
+    s3.is_down = True
+    with pytest.raises(StorageUnavailable, match="blob store"):
+        blobs.put(b"tactile")
+    with pytest.raises(StorageUnavailable, match="blob store"):
+        blobs.ping()
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+    s3.is_down = False
+    blobs.ping()
+    assert s3.objects == {}
+
+
+def test_what_comes_back_changed_is_not_taken(s3: Any, tmp_path: Path) -> None:
+    sha256 = open_blobs(tmp_path / "one", URL, MIB).put(b"tactile")
+    s3.objects[f"lab/{sha256[:2]}/{sha256}"] = b"tactilE"
+    other = open_blobs(tmp_path / "other", URL, MIB)
+    with pytest.raises(StorageUnavailable, match="other bytes than it had"):
+        other.path(sha256)
+    assert not [path for path in (tmp_path / "other").rglob("*") if path.is_file()]
+
+
+def test_the_cache_drops_what_was_not_used_for_longest(
+    s3: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("db.blobs.CACHE_GRACE", 0.0)
+    blobs = open_blobs(tmp_path, URL, 250_000)
+    stored = []
+    for number in range(4):
+        stored.append(blobs.put(bytes([number]) * 100_000))
+        time.sleep(0.01)
+        blobs.path(stored[0])
+        time.sleep(0.01)
+    kept = {path.name for path in (tmp_path / "blobs").rglob("*") if path.is_file()}
+    assert kept == {stored[0], stored[3]}
+    assert len(s3.objects) == 4
+    assert blobs.path(stored[1]).stat().st_size == 100_000
+
+
+def test_a_young_object_to_which_nothing_refers_stays(s3: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another server may have stored it and not yet written its row."""
+    from datetime import timedelta
+
+    blobs = open_blobs(tmp_path, URL, MIB)
+    sha256 = blobs.put(b"tactile")
+    monkeypatch.setattr("db.blobs.ORPHAN_AGE", timedelta(days=10_000))
+    assert blobs.sweep(lambda _: set()) == []
+    monkeypatch.setattr("db.blobs.ORPHAN_AGE", timedelta(hours=24))
+    assert blobs.sweep(lambda _: set()) == [sha256]
+    assert s3.objects == {}
+    with pytest.raises(NotFound):
+        blobs.path(sha256)
+
+
+def test_a_missing_library_is_named_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "obstore", None)
+    with pytest.raises(DriverMissing, match=r"blob store is s3://grasps/lab, .* \(stiction\[s3\] brings one\)"):
+        open_blobs(tmp_path, URL)
+
+
+def test_a_url_that_no_store_has_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(StorageUnavailable, match="blob store"):
+        open_blobs(tmp_path, "gopher://grasps")
