@@ -12,6 +12,7 @@ from db.database import Database
 from db.repositories import blobs as blob_references
 from service import access, gate, openapi, problems
 from service.context import Context
+from service.envelope import Envelope
 from service.folder_lock import locked
 from service.gate import Gate
 from service.head_requests import HeadRequests
@@ -40,7 +41,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             app.state.context = context
             yield
 
-    app = FastAPI(
+    app = openapi.DescribedApp(
         title="Stiction",
         description=DESCRIPTION,
         version="1",
@@ -53,8 +54,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     access.check_routes(app)
     app.add_middleware(Gate, settings=chosen)
     app.add_middleware(HeadRequests)
+    app.add_middleware(Envelope)
     problems.install(app)
-    openapi.describe_problems(app)
     return app
 
 

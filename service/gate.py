@@ -1,8 +1,7 @@
 """The gate before all routes: finds out who asks, and turns away who may not."""
 
+import math
 import time
-from collections.abc import Iterator
-from typing import Any
 
 from fastapi import Request
 from starlette.concurrency import run_in_threadpool
@@ -16,7 +15,8 @@ from db.repositories import access_keys
 from service import access, problems
 from service.access import CHALLENGE, EVERYTHING, PUBLIC_PATHS, Access, is_loopback
 from service.context import Context
-from service.problems import INVALID_KEY, KEY_REQUIRED, Problem
+from service.problems import INVALID_KEY, KEY_REQUIRED, TOO_MANY_REQUESTS, Problem
+from service.rate_limit import RateLimit
 from service.settings import Settings
 
 KEPT_SECONDS = 2.0
@@ -69,6 +69,7 @@ class Gate:
         self.app = app
         self._settings = settings
         self._ring = KeyRing()
+        self._rate = RateLimit(settings.rate_limit)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
@@ -77,11 +78,32 @@ class Gate:
             return
         connection = HTTPConnection(scope)
         try:
-            connection.state.access = await self._identify(connection)
+            connection.state.access = await self._admit(connection)
         except Problem as problem:
             await problems.answer(Request({**scope, "type": "http"}), problem)(scope, receive, send)
             return
         await self.app(scope, receive, send)
+
+    async def _admit(self, connection: HTTPConnection) -> Access:
+        """Who asks, and not too often; those on this machine of whom no key is asked may ask at any rate."""
+        address = f"address {connection.client.host if connection.client else ''}"
+        try:
+            admitted = await self._identify(connection)
+        except Problem:
+            self._count(address)  # before it is said what is wrong with the key: nobody tries many
+            raise
+        if admitted.key_id is not None:
+            self._count(admitted.key_id)
+        elif not _is_local(connection.scope):
+            self._count(address)
+        return admitted
+
+    def _count(self, who: str) -> None:
+        seconds = self._rate.wait(who)
+        if seconds > 0.0:
+            headers = {"Retry-After": str(math.ceil(seconds))}
+            detail = f"more than {self._settings.rate_limit:g} requests a second; try again in {seconds:.3f} s"
+            raise Problem(TOO_MANY_REQUESTS, detail, headers=headers)
 
     async def _identify(self, connection: HTTPConnection) -> Access:
         """Who asks; a key that is sent counts even where none is needed."""
@@ -104,13 +126,13 @@ class Gate:
     def _needs_key(self, scope: Scope) -> bool:
         """Without a setting, all but those who are on this machine themselves, behind no proxy."""
         if self._settings.access == "auto":
-            return not all(is_loopback(host) for host in _ends(scope))
+            return not _is_local(scope)
         return self._settings.access == "keys"
 
 
-def _ends(scope: Scope) -> Iterator[Any]:
-    for end in ("server", "client"):
-        yield (scope.get(end) or ("",))[0]
+def _is_local(scope: Scope) -> bool:
+    """Whether both ends of the connection are on this machine, as far as is known."""
+    return all(is_loopback((scope.get(end) or ("",))[0]) for end in ("server", "client"))
 
 
 def _read(database: Database, key_id: str) -> AccessKey | None:

@@ -5,10 +5,10 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
-from service.problems import INSUFFICIENT_SCOPE, INVALID_KEY, KEY_REQUIRED, MEDIA_TYPE
+from service.problems import INSUFFICIENT_SCOPE, INVALID_KEY, KEY_REQUIRED, MEDIA_TYPE, TOO_MANY_REQUESTS
 from service.routes.common import description_of
 
-AT_THE_GATE = (KEY_REQUIRED, INVALID_KEY, INSUFFICIENT_SCOPE)
+AT_THE_GATE = (KEY_REQUIRED, INVALID_KEY, INSUFFICIENT_SCOPE, TOO_MANY_REQUESTS)
 """Problems of every route that needs a key."""
 
 
@@ -17,12 +17,21 @@ def operation_id(route: APIRoute) -> str:
     return route.name
 
 
-def describe_problems(app: FastAPI) -> None:
-    """Say of every error that it is answered as problem details: the framework would say JSON of its own.
+class DescribedApp(FastAPI):
+    """An application whose description says of every error that it is answered as problem details.
 
-    To be called once all routes are there; the description is made once and kept.
+    The framework would say JSON of its own. The description is made when it is first asked for.
     """
-    description = app.openapi()
+
+    def openapi(self) -> dict[str, Any]:
+        """The description of all routes."""
+        if self.openapi_schema is None:
+            _describe_problems(super().openapi())
+        assert self.openapi_schema is not None
+        return self.openapi_schema
+
+
+def _describe_problems(description: dict[str, Any]) -> None:
     for operations in description["paths"].values():
         for operation in operations.values():
             if "security" in operation:

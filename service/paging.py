@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Annotated, Any, TypeVar
+from urllib.parse import quote
 
 from fastapi import Query, Request, Response
 
@@ -88,6 +89,6 @@ class Page:
 def link_next(request: Request, response: Response, cursor: str | None) -> str | None:
     """Say in the headers too where the next page is (RFC 8288)."""
     if cursor is not None:
-        url = request.url.include_query_params(cursor=cursor)
-        response.headers["Link"] = f'<{url.path}?{url.query}>; rel="next"'
+        query = request.url.include_query_params(cursor=cursor).query
+        response.headers["Link"] = f'<{quote(request.url.path)}?{query}>; rel="next"'
     return cursor

@@ -49,11 +49,14 @@ METHOD_NOT_ALLOWED = ProblemType("method-not-allowed", "The route does not take 
 MATERIAL_EXISTS = ProblemType("material-exists", "The material exists already", 409)
 NO_MODEL = ProblemType("no-model", "The material has no fitted model yet", 409)
 NOT_READY = ProblemType("not-ready", "The job has not got there", 409)
+REQUEST_TIMEOUT = ProblemType("request-timeout", "The request came too slowly", 408)
 UPLOAD_TOO_LARGE = ProblemType("upload-too-large", "The body is too large", 413)
 UNSUPPORTED_FORMAT = ProblemType("unsupported-format", "The format is not supported", 415)
 INVALID_GRASP_LOG = ProblemType("invalid-grasp-log", "The grasp log is not valid", 422)
 INVALID_REQUEST = ProblemType("invalid-request", "A value in the request is not allowed", 422)
 IDEMPOTENCY_KEY_REUSED = ProblemType("idempotency-key-reused", "The key stands for another request", 422)
+TOO_MANY_REQUESTS = ProblemType("too-many-requests", "Requests come too often", 429)
+HEADERS_TOO_LARGE = ProblemType("headers-too-large", "The headers are too large", 431)
 INTERNAL_ERROR = ProblemType("internal-error", "The service failed", 500)
 STORAGE_UNAVAILABLE = ProblemType("storage-unavailable", "Database or blob folder cannot be used now", 503)
 
@@ -65,7 +68,7 @@ _UNKNOWN = {
     "grasp log": UNKNOWN_GRASP_LOG,
     "job": UNKNOWN_JOB,
 }
-_BY_STATUS = {404: UNKNOWN_ROUTE, 405: METHOD_NOT_ALLOWED, 413: UPLOAD_TOO_LARGE}
+_BY_STATUS = {404: UNKNOWN_ROUTE, 405: METHOD_NOT_ALLOWED, 408: REQUEST_TIMEOUT, 413: UPLOAD_TOO_LARGE}
 
 
 class Problem(Exception):
@@ -103,7 +106,6 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(StorageUnavailable, _on_storage_unavailable)
     app.add_exception_handler(RequestValidationError, _on_invalid_request)
     app.add_exception_handler(HTTPException, _on_http_exception)
-    app.add_exception_handler(Exception, _on_unexpected)
 
 
 def storage_unavailable(error: StorageUnavailable) -> Problem:
@@ -119,10 +121,17 @@ def answer(request: Request, problem: Problem, **more: object) -> JSONResponse:
         "status": problem.kind.status,
         "detail": problem.detail,
         "instance": request.url.path,
+        "request_id": getattr(request.state, "request_id", None),
     }
     if problem.name is not None:
         content |= {"name": problem.name, "value": problem.value, "allowed": problem.allowed}
     return JSONResponse(content | more, problem.kind.status, problem.headers, MEDIA_TYPE)
+
+
+def unexpected(request: Request, error: Exception) -> JSONResponse:
+    """The answer to an error that nothing else answers; the log tells what it was, the client does not get to know."""
+    logger.error("request %s failed", request.state.request_id, exc_info=error)
+    return answer(request, Problem(INTERNAL_ERROR, "an unexpected error; the server's log has it"))
 
 
 async def _on_problem(request: Request, error: Exception) -> JSONResponse:
@@ -188,8 +197,3 @@ def _allowed_methods(request: Request) -> list[str]:
         if any(route.matches(scope)[0] is Match.FULL for route in router.routes)
     }
     return sorted(taken | {"HEAD"} if "GET" in taken else taken)
-
-
-async def _on_unexpected(request: Request, error: Exception) -> JSONResponse:
-    logger.error("unexpected error", exc_info=error)
-    return answer(request, Problem(INTERNAL_ERROR, "an unexpected error; the server's log has it"))

@@ -531,6 +531,7 @@ class ProblemOut(BaseModel):
                     "status": 422,
                     "detail": "quantile is 1.5; allowed: less than 1",
                     "instance": "/v1/materials/paper/friction",
+                    "request_id": "3f1c9a0e6d2b4a5c8e7f0a1b2c3d4e5f",
                     "name": "quantile",
                     "value": "1.5",
                     "allowed": "less than 1",
@@ -544,6 +545,9 @@ class ProblemOut(BaseModel):
     status: int
     detail: str
     instance: str
+    request_id: Annotated[str | None, Field(description="As in the header `X-Request-ID` and in the server's log")] = (
+        None
+    )
     name: Annotated[str | None, Field(description="What was wrong")] = None
     value: str | None = None
     allowed: str | None = None

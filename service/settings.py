@@ -43,6 +43,12 @@ class Settings(BaseSettings):
         default="auto",
         description="Who must send a key: all but users of this machine (auto), everybody (keys), or nobody (open).",
     )
+    rate_limit: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
+        default=1000.0, description="Requests a second of one key, or of one address without a key; 0: any number."
+    )
+    max_connections: Annotated[int, Field(ge=1, le=100_000)] = Field(
+        default=1000, description="Connections at once; further requests are answered 503."
+    )
     max_upload_bytes: Annotated[int, Field(ge=1, le=2**40)] = Field(
         default=256 * MIB, description="Largest grasp log that is accepted, in bytes."
     )

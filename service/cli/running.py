@@ -17,12 +17,12 @@ def serve(
     """Run the web service until it is told to stop (every setting: docs/settings.md)."""
     import uvicorn
 
-    from service.app import create_app
+    from service.serving import configuration
     from service.settings import Settings
 
     given: dict[str, Any] = {"host": host, "port": port, "data_folder": data_folder, "database_url": database_url}
     settings = Settings(**{name: value for name, value in given.items() if value is not None})
-    server = uvicorn.Server(uvicorn.Config(create_app(settings), host=settings.host, port=settings.port))
+    server = uvicorn.Server(configuration(settings))
     server.run()
     if not server.started:  # its log says why
         raise typer.Exit(FAILURE)

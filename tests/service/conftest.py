@@ -22,6 +22,7 @@ from db.database import Database
 from service.app import create_app
 from service.context import Context
 from service.model_cache import ModelCache
+from service.serving import configuration
 from service.settings import Settings
 from slipcore import GraspLog
 from slipcore.contact.ramp import RampSchedule, tangential_ramp
@@ -36,8 +37,7 @@ Members = dict[str, Any]
 @contextmanager
 def serve(settings: Settings) -> Iterator[httpx.Client]:
     """A real server on a free loopback port, in a thread of this process (its workers are processes)."""
-    config = uvicorn.Config(create_app(settings), port=0, log_level="warning", ws="none")
-    server = uvicorn.Server(config)
+    server = uvicorn.Server(configuration(settings.model_copy(update={"port": 0}), log_level="warning", ws="none"))
     thread = threading.Thread(target=server.run)
     thread.start()
     while not server.started:
@@ -68,7 +68,8 @@ class Caller:
     async def _request(self, method: str, path: str, **more: Any) -> httpx.Response:
         transport = httpx.ASGITransport(self.app, raise_app_exceptions=False, client=(self.address, 50000))
         url = f"http://{self.server}"
-        async with httpx.AsyncClient(transport=transport, base_url=url, headers=self.headers) as client:
+        options: Any = {"transport": transport, "base_url": url, "headers": self.headers, "trust_env": False}
+        async with httpx.AsyncClient(**options) as client:
             return await client.request(method, path, **more)
 
     def open_stream(self, path: str) -> httpx.Response:

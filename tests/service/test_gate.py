@@ -51,9 +51,10 @@ def knock(client: Any, route: str) -> httpx.Response:
 def test_no_route_answers_without_its_scope(reach: Reach, make: Make) -> None:
     keys = {scope: make(scope) for scope in SCOPES}
     clients = {scope: reach(key=key) for scope, key in keys.items()}
+    nobody = reach()
     assert ROUTES
     for route, needed in ROUTES.items():
-        answer = knock(reach(), route)
+        answer = knock(nobody, route)
         assert (answer.status_code, answer.headers["www-authenticate"]) == (401, 'Bearer realm="stiction"'), route
         assert answer.headers["content-type"] == "application/problem+json"
         for scope, client in clients.items():
@@ -192,3 +193,29 @@ def test_a_service_that_others_reach_does_not_start_without_keys(
             check_start(settings, database)
     else:
         check_start(settings, database)
+
+
+@ONLY_SQLITE
+def test_each_key_and_each_address_without_one_has_its_own_rate(reach: Reach, make: Make) -> None:
+    first, second = make(), make()
+    client = reach(rate_limit=2.0)
+    for key in (first, second, "wrong", ""):
+        client.headers = {"Authorization": f"Bearer {key}"} if key else {}
+        answers = [client.get("/v1/materials") for _ in range(4)]
+        refused = answers[-1]
+        assert refused.status_code == 429, key
+        assert (refused.json()["type"], refused.headers["retry-after"]) == ("/problems/too-many-requests", "1")
+        assert (answers[0].status_code == 200) == (key in {first, second})
+    assert client.get("/healthz").status_code == 200
+    client.headers, client.address = {"Authorization": f"Bearer {second}"}, "10.0.0.10"
+    assert client.get("/v1/materials").status_code == 429
+    client.headers = {}
+    assert client.get("/v1/materials").status_code == 401
+
+
+@ONLY_SQLITE
+def test_who_is_on_this_machine_may_ask_at_any_rate(reach: Reach) -> None:
+    client = reach("auto", "127.0.0.1", "127.0.0.1", rate_limit=1.0)
+    assert {client.get("/v1/materials").status_code for _ in range(5)} == {200}
+    client = reach("open", rate_limit=1.0)
+    assert [client.get("/v1/materials").status_code for _ in range(2)] == [200, 429]

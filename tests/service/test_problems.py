@@ -8,6 +8,7 @@ from fastapi import FastAPI
 
 from db.errors import NotFound, StorageUnavailable
 from service import problems
+from service.envelope import Envelope
 from service.problems import PROBLEM_TYPES, Problem
 
 DOCUMENTED = dict(
@@ -44,6 +45,7 @@ def test_what_the_framework_refuses_is_a_problem_too(
 
 async def answer_to(error: Exception) -> httpx.Response:
     app = FastAPI()
+    app.add_middleware(Envelope)
     problems.install(app)
 
     @app.get("/")

@@ -51,6 +51,8 @@ def test_the_databases_password_is_not_shown() -> None:
         ("access", "none"),
         ("idempotency_hours", 0.0),
         ("lookup_seconds", 61.0),
+        ("rate_limit", -1.0),
+        ("max_connections", 0),
         ("workers", 0),
         ("workers", 65),
         ("job_attempts", 0),

@@ -1,0 +1,24 @@
+"""How the application is served: by uvicorn, with bounds on what a connection may do."""
+
+from typing import Any
+
+import uvicorn
+
+from service.app import create_app
+from service.connections import BoundedConnection
+from service.envelope import MOST_HEADER_BYTES
+from service.settings import Settings
+
+
+def configuration(settings: Settings, **options: Any) -> uvicorn.Config:
+    """The server's configuration; ``options`` are further ones of uvicorn."""
+    return uvicorn.Config(
+        create_app(settings),
+        host=settings.host,
+        port=settings.port,
+        http=BoundedConnection,
+        h11_max_incomplete_event_size=MOST_HEADER_BYTES,
+        limit_concurrency=settings.max_connections,
+        server_header=False,
+        **options,
+    )
