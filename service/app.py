@@ -19,7 +19,7 @@ from service.head_requests import HeadRequests
 from service.jobs import JobPool
 from service.model_cache import ModelCache
 from service.reading import Readers
-from service.routes import curation, grasp_logs, health, jobs, materials
+from service.routes import curation, grasp_logs, health, jobs, materials, planning
 from service.settings import Settings
 from service.worker import Place
 
@@ -49,7 +49,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         redirect_slashes=False,
         generate_unique_id_function=openapi.operation_id,
     )
-    for module in (health, materials, grasp_logs, curation, jobs):
+    for module in (health, materials, grasp_logs, curation, planning, jobs):
         app.include_router(module.router)
     access.check_routes(app)
     app.add_middleware(Gate, settings=chosen)

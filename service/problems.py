@@ -48,11 +48,13 @@ UNKNOWN_JOB = ProblemType("unknown-job", "No such job", 404)
 METHOD_NOT_ALLOWED = ProblemType("method-not-allowed", "The route does not take this method", 405)
 MATERIAL_EXISTS = ProblemType("material-exists", "The material exists already", 409)
 NO_MODEL = ProblemType("no-model", "The material has no fitted model yet", 409)
+NO_FEASIBLE_FORCE = ProblemType("no-feasible-force", "No normal force holds the load", 409)
 NOT_READY = ProblemType("not-ready", "The job has not got there", 409)
 REQUEST_TIMEOUT = ProblemType("request-timeout", "The request came too slowly", 408)
 UPLOAD_TOO_LARGE = ProblemType("upload-too-large", "The body is too large", 413)
 UNSUPPORTED_FORMAT = ProblemType("unsupported-format", "The format is not supported", 415)
 INVALID_GRASP_LOG = ProblemType("invalid-grasp-log", "The grasp log is not valid", 422)
+INVALID_SAMPLES = ProblemType("invalid-samples", "The samples tell nothing", 422)
 INVALID_REQUEST = ProblemType("invalid-request", "A value in the request is not allowed", 422)
 IDEMPOTENCY_KEY_REUSED = ProblemType("idempotency-key-reused", "The key stands for another request", 422)
 TOO_MANY_REQUESTS = ProblemType("too-many-requests", "Requests come too often", 429)
@@ -74,7 +76,8 @@ _BY_STATUS = {404: UNKNOWN_ROUTE, 405: METHOD_NOT_ALLOWED, 408: REQUEST_TIMEOUT,
 class Problem(Exception):
     """An answer other than the one that was asked for.
 
-    ``name``, ``value`` and ``allowed`` say what was wrong, where one thing was; ``headers`` are those of the answer.
+    ``name``, ``value`` and ``allowed`` say what was wrong, where one thing was; ``more`` are further members of
+    the answer, ``headers`` its headers.
     """
 
     def __init__(
@@ -86,9 +89,10 @@ class Problem(Exception):
         value: object = None,
         allowed: str | None = None,
         headers: Mapping[str, str] | None = None,
+        more: Mapping[str, object] | None = None,
     ) -> None:
         super().__init__(detail)
-        self.kind, self.detail, self.headers = kind, detail, dict(headers or {})
+        self.kind, self.detail, self.headers, self.more = kind, detail, dict(headers or {}), dict(more or {})
         self.name, self.value, self.allowed = name, None if value is None else str(value), allowed
 
     @classmethod
@@ -113,7 +117,7 @@ def storage_unavailable(error: StorageUnavailable) -> Problem:
     return Problem(STORAGE_UNAVAILABLE, str(error), headers={"Retry-After": "1"})
 
 
-def answer(request: Request, problem: Problem, **more: object) -> JSONResponse:
+def answer(request: Request, problem: Problem) -> JSONResponse:
     """The problem as a response."""
     content: dict[str, Any] = {
         "type": problem.kind.uri,
@@ -125,7 +129,7 @@ def answer(request: Request, problem: Problem, **more: object) -> JSONResponse:
     }
     if problem.name is not None:
         content |= {"name": problem.name, "value": problem.value, "allowed": problem.allowed}
-    return JSONResponse(content | more, problem.kind.status, problem.headers, MEDIA_TYPE)
+    return JSONResponse(content | problem.more, problem.kind.status, problem.headers, MEDIA_TYPE)
 
 
 def unexpected(request: Request, error: Exception) -> JSONResponse:
@@ -163,7 +167,8 @@ async def _on_invalid_request(request: Request, error: Exception) -> JSONRespons
     assert isinstance(error, RequestValidationError)
     wrong = [_wrong_value(entry) for entry in error.errors()]
     listed = [{"name": each.name, "value": each.value, "allowed": each.allowed} for each in wrong]
-    return answer(request, wrong[0], errors=listed)
+    wrong[0].more["errors"] = listed
+    return answer(request, wrong[0])
 
 
 def _wrong_value(entry: dict[str, Any]) -> Problem:

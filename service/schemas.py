@@ -1,9 +1,9 @@
 """What goes over the wire: the shapes of requests and answers, with examples."""
 
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic.config import JsonDict
 
 from db.records import Job, JobKind, JobStatus, Material, StoredGraspLog, StoredModel, Withdrawal
@@ -63,6 +63,16 @@ _DETECTION: JsonDict = {
     "events": {"onset": 181, "end": 40, "touch": 203, "release": 0},
     "samples": 1932,
     "seconds": 0.06,
+}
+_SAMPLES: JsonDict = {
+    "friction_coefficient": [0.41],
+    "tangential_velocity": [0.0012],
+    "normal_force": [0.05],
+    "tangential_force": [0.0205],
+    "time": [2.133],
+    "element": [190],
+    "weight": [0.97],
+    "element_area": 1.0e-6,
 }
 _GRASP_LOG: JsonDict = {
     "id": "7c9e6679742540de944be07fc1f90ae7",
@@ -470,22 +480,7 @@ class EventsOut(BaseModel):
 class SamplesOut(BaseModel):
     """Friction samples of a log, one entry an element and frame."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "friction_coefficient": [0.41],
-                    "tangential_velocity": [0.0012],
-                    "normal_force": [0.05],
-                    "tangential_force": [0.0205],
-                    "time": [2.133],
-                    "element": [190],
-                    "weight": [0.97],
-                    "element_area": 1.0e-6,
-                }
-            ]
-        }
-    )
+    model_config = ConfigDict(json_schema_extra={"examples": [_SAMPLES]})
 
     friction_coefficient: list[float]
     tangential_velocity: Annotated[list[float], Field(description="m/s")]
@@ -495,6 +490,147 @@ class SamplesOut(BaseModel):
     element: Annotated[list[int], Field(description="Row-major index on the lattice")]
     weight: Annotated[list[float], Field(description="Probability that the element did slip")]
     element_area: Annotated[float, Field(description="m²")]
+
+
+LARGEST_FORCE, LARGEST_VELOCITY = 1e4, 1e3
+"""N on one element, as of an uploaded log, and m/s: beyond, a question is a mistake of units."""
+
+_Velocity = Annotated[float, Field(ge=0.0, le=LARGEST_VELOCITY, allow_inf_nan=False)]
+_Force = Annotated[float, Field(ge=0.0, le=LARGEST_FORCE, allow_inf_nan=False)]
+_Area = Annotated[float, Field(gt=1e-12, le=1.0, allow_inf_nan=False, description="m²")]
+
+
+class NewGraspForce(BaseModel):
+    """A contact that must hold."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"material": "paper", "tangential_load": 1.5, "contact_area": 6.0e-5}]},
+    )
+
+    material: str
+    method: Annotated[ModelMethod, Field(description="Whose current model answers")] = "ols"
+    tangential_load: Annotated[float, Field(ge=0.0, le=1e6, description="Of this contact, N")]
+    contact_area: _Area
+    slip_probability: Annotated[float, Field(ge=1e-12, le=0.5, description="The largest that is accepted")] = 1e-3
+    tangential_velocity: Annotated[_Velocity, Field(description="m/s")] = 0.0
+    normal_force_limit: Annotated[
+        float | None, Field(gt=0.0, le=1e6, description="The most that object and gripper bear, N")
+    ] = None
+
+
+class GraspForceOut(BaseModel):
+    """The normal force that holds, N."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "material": "paper",
+                    "method": "ols",
+                    "version": 3,
+                    "normal_force": 4.9,
+                    "feasible_interval": [4.9, 31.2],
+                    "margin": 26.3,
+                    "largest_load": 3.8,
+                    "element_force": 0.081,
+                    "friction_coefficient": 0.306,
+                    "slip_probability": 0.001,
+                    "within_domain": True,
+                    "warning": None,
+                }
+            ]
+        }
+    )
+
+    material: str
+    method: str
+    version: int
+    normal_force: Annotated[float, Field(description="The smallest that holds, N")]
+    feasible_interval: Annotated[tuple[float, float | None], Field(description="N; null: no upper bound")]
+    margin: Annotated[float | None, Field(description="By how much the gripper may press too hard, N; null: any")]
+    largest_load: Annotated[float | None, Field(description="The most that any force holds, N; null: any")]
+    element_force: Annotated[float, Field(description="Normal force of one element then, N")]
+    friction_coefficient: Annotated[float, Field(description="The cautious quantile there")]
+    slip_probability: float
+    within_domain: bool
+    warning: str | None
+
+
+class SamplesIn(BaseModel):
+    """Friction samples of one grasp, as `GET /v1/grasp-logs/{id}/samples` gives them."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [_SAMPLES]})
+
+    friction_coefficient: list[Annotated[float, Field(ge=0.0, le=1e3, allow_inf_nan=False)]]
+    tangential_velocity: list[_Velocity]
+    normal_force: list[_Force]
+    tangential_force: list[_Force]
+    time: list[Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]]
+    element: list[Annotated[int, Field(ge=0, lt=2**31)]]
+    weight: list[Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]]
+    element_area: _Area
+
+    @model_validator(mode="after")
+    def _alike(self) -> Self:
+        lengths = {name: len(value) for name, value in self if isinstance(value, list)}
+        if len(set(lengths.values())) > 1:
+            raise ValueError(f"lists of one length, not {lengths}")
+        return self
+
+
+class NewRecognition(BaseModel):
+    """A grasp whose material is to be told: of a stored log, or of samples that are sent."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={"examples": [{"grasp_log": "7c9e6679742540de944be07fc1f90ae7"}, {"samples": _SAMPLES}]},
+    )
+
+    grasp_log: Annotated[str | None, Field(max_length=32)] = None
+    samples: SamplesIn | None = None
+    materials: Annotated[
+        list[Annotated[str, Field(max_length=100)]] | None,
+        Field(min_length=1, max_length=100, description="Which it may be; without, all that have a model"),
+    ] = None
+    method: Annotated[ModelMethod, Field(description="Whose current models are compared")] = "ols"
+    unknown: Annotated[float, Field(ge=0.0, lt=1.0, description="Probability beforehand that it is none of them")] = (
+        0.05
+    )
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> Self:
+        if (self.grasp_log is None) == (self.samples is None):
+            raise ValueError("either grasp_log or samples")
+        return self
+
+
+class CandidateOut(BaseModel):
+    """A material that it may be."""
+
+    material: str
+    version: Annotated[int, Field(description="Of the model that was compared")]
+    probability: float
+
+
+class RecognitionOut(BaseModel):
+    """How probable each material is, the likeliest first."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "method": "ols",
+                    "candidates": [{"material": "paper", "version": 3, "probability": 0.97}],
+                    "unknown": 0.03,
+                }
+            ]
+        }
+    )
+
+    method: str
+    candidates: list[CandidateOut]
+    unknown: Annotated[float, Field(description="Probability that it is none of them")]
 
 
 class HealthOut(BaseModel):
@@ -552,3 +688,5 @@ class ProblemOut(BaseModel):
     value: str | None = None
     allowed: str | None = None
     errors: list[WrongValue] | None = None
+    largest_load: Annotated[float | None, Field(description="Where no force holds: the most that is held, N")] = None
+    normal_force: Annotated[float | None, Field(description="Where no force holds: that which holds it, N")] = None

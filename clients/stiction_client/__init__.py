@@ -24,7 +24,7 @@ from stiction_client.exports import (
 )
 from stiction_client.model import Cost, Domain, FrictionModel
 from stiction_client.planner import RequiredForce, required_normal_force
-from stiction_client.records import Detection, FrictionAnswer, GraspLogReceipt, Job, Material
+from stiction_client.records import Detection, FrictionAnswer, GraspLogReceipt, Job, Material, Recognition
 
 __all__ = [
     "AsyncFrictionClient",
@@ -47,6 +47,7 @@ __all__ = [
     "NoFeasibleForce",
     "NoModel",
     "ProblemError",
+    "Recognition",
     "RequiredForce",
     "StictionError",
     "UnexpectedAnswer",

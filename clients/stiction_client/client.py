@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -14,7 +14,7 @@ from stiction_client.container import GraspLogLike
 from stiction_client.errors import ConnectionFailed
 from stiction_client.flows import Answer, Ended, Flow, Pause, Request, T
 from stiction_client.model import FrictionModel
-from stiction_client.records import FrictionAnswer, GraspLogReceipt, Job, Material
+from stiction_client.records import FrictionAnswer, GraspLogReceipt, Job, Material, Recognition
 
 TIMEOUT = 30.0
 """s for one request; an upload at the service's size limit takes a second on a local network."""
@@ -105,6 +105,13 @@ class FrictionClient:
     ) -> FrictionAnswer:
         """Friction at velocity ``v`` m/s and ``fn`` N an element: the mean, or a quantile of a new observation."""
         return self._run(flows.friction(name, v, fn, quantile, method))
+
+    def recognise(self, grasp: Any, materials: Sequence[str] | None = None, method: str = "ols") -> Recognition:
+        """Which material a grasp was of: a stored log (its receipt or id), or friction samples as slipcore gives them.
+
+        ``materials``: which it may be, at most 100; without, all that have a model of ``method``.
+        """
+        return self._run(flows.recognise(grasp, materials, method))
 
     def fit(self, name: str, method: str = "ols", seed: int = 0) -> Job:
         """Fit a material over all its grasp logs; follow with ``wait``."""
@@ -205,6 +212,10 @@ class AsyncFrictionClient:
     ) -> FrictionAnswer:
         """As ``FrictionClient.friction``."""
         return await self._run(flows.friction(name, v, fn, quantile, method))
+
+    async def recognise(self, grasp: Any, materials: Sequence[str] | None = None, method: str = "ols") -> Recognition:
+        """As ``FrictionClient.recognise``."""
+        return await self._run(flows.recognise(grasp, materials, method))
 
     async def fit(self, name: str, method: str = "ols", seed: int = 0) -> Job:
         """As ``FrictionClient.fit``."""

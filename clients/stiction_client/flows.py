@@ -6,7 +6,7 @@ clients only carry requests out, one waiting, the other awaiting, so nothing is 
 
 import json
 import time
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 from json import JSONDecodeError
 from pathlib import Path
@@ -15,6 +15,7 @@ from urllib.parse import quote
 from uuid import uuid4
 
 import httpx
+import numpy as np
 
 from stiction_client import container
 from stiction_client.container import GraspLogLike
@@ -27,7 +28,7 @@ from stiction_client.errors import (
     UnexpectedAnswer,
 )
 from stiction_client.model import FrictionModel
-from stiction_client.records import FrictionAnswer, GraspLogReceipt, Job, Material
+from stiction_client.records import FrictionAnswer, GraspLogReceipt, Job, Material, Recognition
 
 ATTEMPTS = 3
 """Times that a request is tried before a broken connection is an error."""
@@ -37,6 +38,16 @@ RETRY_PAUSE = 0.2
 
 FIRST_POLL, POLL_GROWTH, LONGEST_POLL = 0.05, 1.5, 2.0
 """s, -, s: how often a job is asked for, denser at first because most jobs end within a second."""
+
+SAMPLE_ARRAYS = (
+    "friction_coefficient",
+    "tangential_velocity",
+    "normal_force",
+    "tangential_force",
+    "time",
+    "element",
+    "weight",
+)
 
 PAGE = 1000
 """Entries asked for at once: as many as the service gives."""
@@ -168,6 +179,12 @@ def friction(
     return _record(FrictionAnswer.from_json, answer)
 
 
+def recognise(grasp: Any, materials: Sequence[str] | None, method: str) -> Flow[Recognition]:
+    """Ask which material a grasp was of."""
+    body = {**_grasp(grasp), "materials": None if materials is None else list(materials), "method": method}
+    return _record(Recognition.from_json, (yield from _ask(Request("POST", "/v1/recognise", json=body))))
+
+
 def fit(name: str, method: str, seed: int) -> Flow[Job]:
     """Ask for a fit."""
     request = _post_once(f"/v1/materials/{_part(name)}/fits", {"method": method, "seed": seed})
@@ -251,6 +268,18 @@ def _body(log: GraspLogLike | Path | str) -> tuple[bytes, str]:
     if path.is_dir():
         return container.pack_folder(path), container.RECORDING_TYPE
     return path.read_bytes(), "application/octet-stream"
+
+
+def _grasp(grasp: Any) -> dict[str, Any]:
+    """A stored log by its id, or the friction samples of any object that has them."""
+    if isinstance(grasp, GraspLogReceipt | str):
+        return {"grasp_log": grasp if isinstance(grasp, str) else grasp.id}
+    arrays = {name: np.asarray(getattr(grasp, name)) for name in SAMPLE_ARRAYS}
+    for name, array in arrays.items():
+        if not np.isfinite(array).all():
+            raise InvalidArgument(name, "not finite", "finite numbers")
+    lists = {name: array.tolist() for name, array in arrays.items()}
+    return {"samples": lists | {"element_area": float(grasp.element_area)}}
 
 
 def _given(**params: str | float | None) -> dict[str, str | float]:

@@ -142,5 +142,20 @@ class FrictionAnswer:
         return cls(**_values(cls, record))
 
 
+@dataclass(frozen=True, slots=True)
+class Recognition:
+    """How probable it is that a grasp was of each material, the likeliest first; ``unknown``: of none of them."""
+
+    method: str
+    probability: dict[str, float]
+    unknown: float
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "Recognition":
+        """The recognition in the service's answer."""
+        probability = {entry["material"]: float(entry["probability"]) for entry in record["candidates"]}
+        return cls(record["method"], probability, float(record["unknown"]))
+
+
 def _values(kind: type[Any], record: Mapping[str, Any]) -> dict[str, Any]:
     return {entry.name: record[entry.name] for entry in fields(kind)}  # what a newer service adds is passed over

@@ -2,7 +2,7 @@
 
 from dataclasses import asdict, fields
 
-from sqlalchemy import select
+from sqlalchemy import ColumnElement, select
 from sqlalchemy.orm import Session
 
 from db.records import Detection, SampleSummary
@@ -43,6 +43,20 @@ def sample_blobs(session: Session, material_id: int) -> dict[str, str]:
         .order_by(SampleSummaryRow.created_at, GraspLogRow.id)
     )
     return dict(session.execute(query).all())
+
+
+def any_samples(session: Session, material_id: int) -> bool:
+    """Whether some log of a material, not withdrawn, has samples."""
+    query = select(GraspLogRow.id).join(SampleSummaryRow).where(*_that_count(material_id)).limit(1)
+    return session.scalar(query) is not None
+
+
+def _that_count(material_id: int) -> tuple[ColumnElement[bool], ...]:
+    return (
+        GraspLogRow.material_id == material_id,
+        GraspLogRow.withdrawn_at.is_(None),
+        SampleSummaryRow.count > 0,
+    )
 
 
 def detection_record(row: DetectionRow | None) -> Detection | None:

@@ -55,6 +55,13 @@ def all_current(session: Session, material_ids: Sequence[int]) -> dict[int, list
     return found
 
 
+def current_of_all(session: Session, method: str, limit: int) -> list[StoredModel]:
+    """Current models by a method, of at most so many materials."""
+    query = _models().where(FrictionModelRow.current, FrictionModelRow.method == method)
+    query = query.where(MaterialRow.merged_into_id.is_(None)).order_by(MaterialRow.name).limit(limit)
+    return [_record(row, material) for row, material in session.execute(query)]
+
+
 def current_methods(session: Session, material_ids: Sequence[int]) -> list[str]:
     """Methods by which some of these materials have a current model, in alphabetical order."""
     of_them = FrictionModelRow.material_id.in_(material_ids) & FrictionModelRow.current

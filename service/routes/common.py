@@ -31,6 +31,8 @@ def description_of(*kinds: ProblemType) -> dict[int, str]:
 class JsonRoute(APIRoute):
     """A route whose body, if it takes one, is JSON of bounded size: the framework reads all of it into memory."""
 
+    most_bytes = MAX_JSON_BYTES
+
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """The handler with the checks before it."""
         handle = super().get_route_handler()
@@ -41,20 +43,26 @@ class JsonRoute(APIRoute):
             given = request.headers.get("content-type", "")
             if given.partition(";")[0].strip().lower() != "application/json":
                 raise Problem.wrong_value(UNSUPPORTED_FORMAT, "content type", given or "missing", "application/json")
-            return await handle(Request(request.scope, _limited(request.receive)))
+            return await handle(Request(request.scope, _limited(request.receive, self.most_bytes)))
 
         return handle_json
 
 
-def _limited(receive: Receive) -> Receive:
+class LongJsonRoute(JsonRoute):
+    """A route whose body may hold samples: some 7,000 of them."""
+
+    most_bytes = 2**20
+
+
+def _limited(receive: Receive, most: int) -> Receive:
     received = 0
 
     async def receive_some() -> Message:
         nonlocal received
         message = await receive()
         received += len(message.get("body", b""))
-        if received > MAX_JSON_BYTES:
-            raise HTTPException(413, f"the body has more than {MAX_JSON_BYTES} bytes")
+        if received > most:
+            raise HTTPException(413, f"the body has more than {most} bytes")
         return message
 
     return receive_some

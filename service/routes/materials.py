@@ -24,6 +24,8 @@ from service.problems import (
 )
 from service.routes.common import JsonRoute, problems
 from service.schemas import (
+    LARGEST_FORCE,
+    LARGEST_VELOCITY,
     FrictionModelOut,
     FrictionModelsOut,
     FrictionOut,
@@ -42,9 +44,6 @@ router = APIRouter(prefix="/v1/materials", tags=["materials"], route_class=JsonR
 _BODY = (UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, IDEMPOTENCY_KEY_REUSED, STORAGE_UNAVAILABLE)
 
 Finite = Query(allow_inf_nan=False, ge=0.0)
-
-LARGEST_FORCE, LARGEST_VELOCITY = 1e4, 1e3
-"""N on one element, as of an uploaded log, and m/s: beyond, a question is a mistake of units."""
 
 SMALLEST_TAIL = 1e-12
 """As the planner's smallest slip probability; a Student-t quantile further out says nothing of friction."""

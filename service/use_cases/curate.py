@@ -83,14 +83,14 @@ def _refit_without(session: Session, material_id: int | None) -> list[Job]:
         return []
     methods = friction_models.current_methods(session, [material_id])
     friction_models.mark_outdated(session, material_id)
-    if not detections.sample_blobs(session, material_id):
+    if not detections.any_samples(session, material_id):
         friction_models.retire(session, material_id)
         return []
     return _queue_refits(session, material_id, methods)
 
 
 def _queue_refits(session: Session, material_id: int, methods: Iterable[str]) -> list[Job]:
-    if not detections.sample_blobs(session, material_id):
+    if not detections.any_samples(session, material_id):
         return []
     ids = [jobs.add(session, "fit", method, material_id=material_id) for method in sorted({REFITTED, *methods})]
     return [jobs.get(session, job_id) for job_id in ids]

@@ -1,4 +1,5 @@
 import inspect
+import json
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,6 +14,7 @@ from stiction_client import (
     AsyncFrictionClient,
     ConnectionFailed,
     FrictionClient,
+    GraspLogReceipt,
     InvalidArgument,
     JobFailed,
     JobRefused,
@@ -308,3 +310,20 @@ def test_a_name_stays_one_segment_of_the_path(ask: Ask, service: Service, answer
 
 def test_what_a_newer_service_adds_is_passed_over(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
     assert ask(service(answers.job | {"priority": 3}), "job", "j1").id == "j1"
+
+
+def test_a_grasp_is_recognised_by_its_log_or_by_its_samples(
+    ask: Ask, service: Service, answers: SimpleNamespace
+) -> None:
+    told = {"method": "ols", "candidates": [{"material": "paper", "version": 3, "probability": 0.9}], "unknown": 0.1}
+    server = service(told)
+    samples = SimpleNamespace(element_area=1e-6, **{name: np.ones(2) for name in stiction_client.flows.SAMPLE_ARRAYS})
+    receipt = GraspLogReceipt.from_json(answers.grasp_log)
+    for grasp in ("g1", receipt, samples):
+        found = ask(server, "recognise", grasp, materials=["paper"])
+        assert (found.probability, found.unknown) == ({"paper": 0.9}, 0.1)
+    sent = [json.loads(request.content) for request in server.requests]
+    assert sent[0] == sent[1] == {"grasp_log": "g1", "materials": ["paper"], "method": "ols"}
+    assert sent[2]["samples"]["weight"] == [1.0, 1.0]
+    with pytest.raises(InvalidArgument, match="time is not finite"):
+        ask(server, "recognise", SimpleNamespace(**vars(samples) | {"time": np.array([np.nan])}))

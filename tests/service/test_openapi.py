@@ -64,6 +64,7 @@ def test_what_goes_over_the_wire_has_an_example() -> None:
     without = {
         "FrictionModelsOut",
         "MaterialsOut",
+        "CandidateOut",
         "GraspLogsOut",
         "DomainOut",
         "CostOut",

@@ -1,0 +1,111 @@
+from collections.abc import Callable
+from typing import Any
+
+import httpx
+import pytest
+
+from stiction_client import FrictionClient, required_normal_force
+
+Wait = Callable[[httpx.Client, str], dict[str, Any]]
+LOAD = {"material": "fitted", "tangential_load": 0.5, "contact_area": 1e-4}
+
+pytestmark = pytest.mark.usefixtures("fitted")
+
+
+@pytest.mark.parametrize(
+    "more", [{}, {"slip_probability": 0.01, "tangential_velocity": 1e-4, "normal_force_limit": 50.0}]
+)
+def test_the_grasp_force_is_the_planners_own(client: httpx.Client, more: dict[str, float]) -> None:
+    answer = client.post("/v1/grasp-force", json=LOAD | more)
+    assert answer.status_code == 200, answer.text
+    told = answer.json()
+    with FrictionClient(str(client.base_url)) as planner:
+        expected = required_normal_force(planner.model("fitted"), 0.5, contact_area=1e-4, **more)
+    assert told["normal_force"] == expected.normal_force
+    assert told["feasible_interval"][0] == expected.normal_force
+    assert (told["material"], told["method"], told["version"]) == ("fitted", "ols", 1)
+    assert told["friction_coefficient"] == pytest.approx(expected.friction_coefficient)
+
+
+def test_a_load_that_no_force_holds_is_refused_with_the_most_that_is_held(client: httpx.Client) -> None:
+    answer = client.post("/v1/grasp-force", json=LOAD | {"tangential_load": 100.0, "normal_force_limit": 1.0})
+    problem = answer.json()
+    assert (answer.status_code, problem["type"]) == (409, "/problems/no-feasible-force")
+    assert 0.0 < problem["largest_load"] < 1.0
+    assert problem["normal_force"] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "status", "kind"),
+    [
+        ("grasp-force", LOAD | {"material": "felt"}, 404, "unknown-material"),
+        ("grasp-force", LOAD | {"method": "conjugate"}, 409, "no-model"),
+        ("grasp-force", LOAD | {"method": "auto"}, 422, "invalid-request"),
+        ("grasp-force", LOAD | {"contact_area": 0.0}, 422, "invalid-request"),
+        ("grasp-force", LOAD | {"tangential_load": -1.0}, 422, "invalid-request"),
+        ("grasp-force", LOAD | {"slip_probability": 0.6}, 422, "invalid-request"),
+        ("grasp-force", LOAD | {"force": 1.0}, 422, "invalid-request"),
+        ("recognise", {}, 422, "invalid-request"),
+        ("recognise", {"grasp_log": "nothing"}, 404, "unknown-grasp-log"),
+        ("recognise", {"grasp_log": "nothing", "materials": ["felt"]}, 404, "unknown-material"),
+        ("recognise", {"grasp_log": "nothing", "materials": []}, 422, "invalid-request"),
+        ("recognise", {"grasp_log": "nothing", "unknown": 1.0}, 422, "invalid-request"),
+        ("recognise", {"grasp_log": "nothing", "method": "conjugate"}, 409, "no-model"),
+    ],
+)
+def test_a_question_that_cannot_be_is_refused(
+    client: httpx.Client, path: str, body: dict[str, Any], status: int, kind: str
+) -> None:
+    answer = client.post(f"/v1/{path}", json=body)
+    assert (answer.status_code, answer.json()["type"]) == (status, f"/problems/{kind}"), answer.text
+
+
+def test_a_grasp_is_recognised_from_its_log_and_from_its_samples(
+    client: httpx.Client, material: str, fitted: dict[str, Any]
+) -> None:
+    client.put(f"/v1/materials/{material}/aliases/alias%20of%20{material}").raise_for_status()
+    of_log = client.post("/v1/recognise", json={"grasp_log": fitted["id"], "materials": ["fitted", material]})
+    assert of_log.status_code == 200, of_log.text
+    told = of_log.json()
+    (candidate,) = told["candidates"]
+    assert (candidate["material"], candidate["version"]) == ("fitted", 1)
+    assert candidate["probability"] > 0.9
+    assert candidate["probability"] + told["unknown"] == pytest.approx(1.0)
+    few = {
+        name: value[:400] if isinstance(value, list) else value for name, value in samples_of(client, fitted).items()
+    }
+    of_samples = client.post("/v1/recognise", json={"samples": few, "materials": ["fitted", "fitted"]})
+    assert of_samples.json()["candidates"][0]["material"] == "fitted"
+    with FrictionClient(str(client.base_url)) as planner:
+        assert planner.recognise(fitted["id"], ["fitted"]).probability == {"fitted": candidate["probability"]}
+
+
+def test_a_surface_that_is_none_of_them_is_unknown(client: httpx.Client, fitted: dict[str, Any]) -> None:
+    samples = samples_of(client, fitted)
+    slippery = samples | {"friction_coefficient": [value / 4.0 for value in samples["friction_coefficient"]]}
+    told = client.post("/v1/recognise", json={"samples": slippery, "materials": ["fitted"]}).json()
+    assert told["unknown"] > 0.9
+
+
+@pytest.mark.parametrize(
+    ("change", "status", "kind"),
+    [
+        ({"weight": []}, 422, "invalid-request"),
+        ({"normal_force": ["much"]}, 422, "invalid-request"),
+        ({"element_area": 0.0}, 422, "invalid-request"),
+        (None, 422, "invalid-samples"),
+    ],
+)
+def test_samples_that_cannot_be_are_refused(
+    client: httpx.Client, fitted: dict[str, Any], change: dict[str, Any] | None, status: int, kind: str
+) -> None:
+    samples = samples_of(client, fitted)
+    none = {name: [] if isinstance(value, list) else value for name, value in samples.items()}
+    body = {"samples": none if change is None else samples | change, "materials": ["fitted"]}
+    answer = client.post("/v1/recognise", json=body)
+    assert (answer.status_code, answer.json()["type"]) == (status, f"/problems/{kind}"), answer.text
+
+
+def samples_of(client: httpx.Client, log: dict[str, Any]) -> dict[str, Any]:
+    samples: dict[str, Any] = client.get(f"/v1/grasp-logs/{log['id']}/samples").json()
+    return samples
