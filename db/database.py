@@ -25,6 +25,7 @@ from db.defaults import (
 from db.errors import DriverMissing, StorageUnavailable
 
 _BEGIN = "sqlite_begin"
+_DURABLE = "durable"
 _READ_ONLY = "25006"
 """SQLSTATE of a PostgreSQL that takes no writes: a standby that has not been promoted yet."""
 
@@ -43,6 +44,7 @@ class Database:
         self.engine = _engine(make_url(url))
         # a deferred transaction that reads first cannot always be upgraded to writing: take the write lock at once
         self._writing = self.engine.execution_options(**{_BEGIN: "BEGIN IMMEDIATE"})
+        self._noting = self._writing.execution_options(**{_DURABLE: False})
         self._reading = self.engine
         if self.is_sqlite:
             _prepare_sqlite(self.engine, lock_timeout)
@@ -70,10 +72,17 @@ class Database:
             yield session
 
     @contextmanager
-    def write(self) -> Iterator[Session]:
-        """One transaction: committed as a whole at the end, rolled back as a whole on any exception."""
-        with _unavailable_named(), Session(self._writing) as session, session.begin():
-            session.connection()  # SQLite waits for the write lock here, not at the first statement
+    def write(self, *, durable: bool = True) -> Iterator[Session]:
+        """One transaction: committed as a whole at the end, rolled back as a whole on any exception.
+
+        Other processes see it at once either way; one that is not ``durable`` may be forgotten in a power cut, unless a
+        durable one followed, and waits for no disk.
+        """
+        engine = self._writing if durable else self._noting
+        with _unavailable_named(), Session(engine) as session, session.begin():
+            connection = session.connection()  # SQLite waits for the write lock here, not at the first statement
+            if not durable and connection.dialect.name == "postgresql":
+                connection.exec_driver_sql("SET LOCAL synchronous_commit = off")
             yield session
 
     def ping(self) -> None:
@@ -133,11 +142,13 @@ def _prepare_sqlite(engine: Engine, busy_timeout: float) -> None:
         for pragma in (
             f"busy_timeout = {round(busy_timeout * 1000)}",
             "journal_mode = WAL",
-            f"synchronous = {SQLITE_SYNCHRONOUS}",
             "foreign_keys = ON",
         ):
             connection.execute(f"PRAGMA {pragma}")
 
     @event.listens_for(engine, "begin")
     def begin(connection: Connection) -> None:
-        connection.exec_driver_sql(connection.get_execution_options().get(_BEGIN, "BEGIN"))
+        options = connection.get_execution_options()
+        synchronous = SQLITE_SYNCHRONOUS if options.get(_DURABLE, True) else "NORMAL"
+        connection.exec_driver_sql(f"PRAGMA synchronous = {synchronous}")  # inside a transaction it would do nothing
+        connection.exec_driver_sql(options.get(_BEGIN, "BEGIN"))

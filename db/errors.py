@@ -43,5 +43,16 @@ class StorageUnavailable(DatabaseError):
     """The database or the blob folder cannot be used now: locked, full, gone. Worth another try later."""
 
 
+class ClaimLost(DatabaseError):
+    """The job is no longer this runner's to do: it was cancelled, ended, or given to another."""
+
+    def __init__(self, job_id: str) -> None:
+        self.job_id = job_id
+        super().__init__(job_id)
+
+    def __str__(self) -> str:
+        return f"job {self.job_id} is not this runner's any more"
+
+
 class SchemaMismatch(DatabaseError):
     """The database's tables are not those of this version of the code."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 
 from alembic import command
@@ -9,7 +10,8 @@ from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection
+from sqlalchemy import Connection, text
+from sqlalchemy.orm import Session
 
 import migrations
 from db.database import Database
@@ -19,6 +21,7 @@ from db.tables import Base
 
 def upgrade(database: Database, revision: str = "head") -> None:
     """Bring the database up to ``revision``; a new one gets all its tables."""
+    _refuse_newer(current(database))
     with _migrating(database) as config:
         command.upgrade(config, revision)
 
@@ -35,9 +38,18 @@ def current(database: Database) -> str | None:
         return MigrationContext.configure(connection).get_current_revision()
 
 
+@cache
 def head() -> str | None:
     """The newest revision that this version of the code knows."""
-    return ScriptDirectory.from_config(_config()).get_current_head()
+    return _scripts().get_current_head()
+
+
+def require_head(session: Session) -> None:
+    """Make sure, inside a transaction, that the schema is still this version's; raises ``SchemaMismatch``."""
+    found = session.scalar(text("SELECT version_num FROM alembic_version"))
+    if found != head():
+        _refuse_newer(found)
+        raise SchemaMismatch(_difference(found))
 
 
 def check(database: Database) -> None:
@@ -45,14 +57,32 @@ def check(database: Database) -> None:
 
     Raises ``SchemaMismatch`` that says what differs.
     """
-    found, wanted = current(database), head()
-    if found != wanted:
-        raise SchemaMismatch(f"database revision is {found}; allowed: {wanted} (run `stiction db upgrade`)")
+    found = current(database)
+    _refuse_newer(found)
+    if found != head():
+        raise SchemaMismatch(_difference(found))
     with database.connect() as connection:
         context = MigrationContext.configure(connection, opts={"compare_type": True})
         differences = compare_metadata(context, Base.metadata)
     if differences:
         raise SchemaMismatch("tables differ from the code's: " + "; ".join(map(str, differences)))
+
+
+def _difference(found: str | None) -> str:
+    return f"database revision is {found}; allowed: {head()} (run `stiction db upgrade`)"
+
+
+def _refuse_newer(found: str | None) -> None:
+    """A revision that is not known here is one of a newer version: to work on its tables could do harm."""
+    if found is not None and found not in {script.revision for script in _scripts().walk_revisions()}:
+        raise SchemaMismatch(
+            f"database revision is {found}; allowed: at most {head()}, the newest that this version of the code knows "
+            "(run a newer version)"
+        )
+
+
+def _scripts() -> ScriptDirectory:
+    return ScriptDirectory.from_config(_config())
 
 
 def _config() -> Config:

@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Literal
 
 JobKind = Literal["ingest", "fit"]
-JobStatus = Literal["queued", "running", "done", "failed", "refused"]
+JobStatus = Literal["queued", "running", "done", "failed", "refused", "cancelled"]
 Scope = Literal["read", "upload", "admin"]
 
 
@@ -84,6 +84,24 @@ class Job:
 
 
 @dataclass(frozen=True, slots=True)
+class Claim:
+    """A runner's right to do a job. It ends when the job does, is cancelled, or is taken from a runner that is dead."""
+
+    job_id: str
+    runner_id: str
+
+
+@dataclass(frozen=True, slots=True)
+class Runner:
+    """A process that has jobs done: its ``beats`` only grow, for as long as it lives."""
+
+    id: str
+    name: str
+    beats: int
+    started_at: datetime
+
+
+@dataclass(frozen=True, slots=True)
 class Detection:
     """What a detector said of a log, in numbers; the histories are in the blob of hash ``history_blob``.
 
@@ -107,7 +125,8 @@ class Detection:
 class SampleSummary:
     """The friction samples of one log, in numbers; the samples are in the blob of hash ``samples_blob``.
 
-    ``none_because`` says why there are none, where there are none.
+    ``none_because`` says why there are none, where there are none; ``moments`` are their sufficient statistics as the
+    estimators wrote them, None where there are no samples.
     """
 
     count: int
@@ -117,6 +136,16 @@ class SampleSummary:
     tangential_velocity: tuple[float, float] | None
     normal_force: tuple[float, float] | None
     samples_blob: str
+    moments: bytes | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SamplesOfLog:
+    """Where the samples of one log are: in the blob of hash ``samples_blob``, and their ``moments`` where known."""
+
+    grasp_log_id: str
+    samples_blob: str
+    moments: bytes | None
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from sqlalchemy import (
     Dialect,
     ForeignKey,
     Index,
+    LargeBinary,
     MetaData,
     String,
     TypeDecorator,
@@ -144,8 +145,19 @@ class GraspLogRow(Base):
     withdrawn_because: Mapped[str | None]
 
 
+class RunnerRow(Base):
+    """A process that has jobs done. It is dead once its beats stand still, and its row then goes."""
+
+    __tablename__ = "runners"
+
+    id: Mapped[str] = mapped_column(String(32), primary_key=True)
+    name: Mapped[str] = mapped_column(String(300))
+    beats: Mapped[int] = mapped_column(BigInteger, default=0)
+    started_at: Mapped[datetime] = mapped_column(default=now)
+
+
 class JobRow(Base):
-    """A durable job. A grasp log has exactly one, its ingest."""
+    """A durable job. A grasp log has exactly one, its ingest. A running one is claimed by its runner."""
 
     __tablename__ = "jobs"
     __table_args__ = (
@@ -154,12 +166,15 @@ class JobRow(Base):
         CheckConstraint("(kind = 'ingest') = (grasp_log_id IS NOT NULL)", name="ingest_has_log"),
         CheckConstraint("kind = 'ingest' OR material_id IS NOT NULL", name="fit_has_material"),
         CheckConstraint("(status IN ('queued', 'running')) = (finished_at IS NULL)", name="finished_at"),
-        CheckConstraint("status NOT IN ('failed', 'refused') OR reason IS NOT NULL", name="reason"),
+        CheckConstraint("(status = 'running') = (runner_id IS NOT NULL)", name="runner"),
+        CheckConstraint("status NOT IN ('failed', 'refused', 'cancelled') OR reason IS NOT NULL", name="reason"),
+        Index(None, "status", "created_at", "id"),  # the next one is found without a look at the others
     )
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
     kind: Mapped[str] = mapped_column(String(10))
-    status: Mapped[str] = mapped_column(String(10), index=True)
+    status: Mapped[str] = mapped_column(String(10))
+    runner_id: Mapped[str | None] = mapped_column(ForeignKey("runners.id"), index=True)
     stage: Mapped[str | None] = mapped_column(String(30))
     reason: Mapped[str | None]
     seconds: Mapped[dict[str, Any]]
@@ -212,6 +227,7 @@ class SampleSummaryRow(Base):
     normal_force_min: Mapped[float | None]
     normal_force_max: Mapped[float | None]
     samples_blob: Mapped[str] = mapped_column(String(64), index=True)
+    moments: Mapped[bytes | None] = mapped_column(LargeBinary)
     created_at: Mapped[datetime] = mapped_column(default=now)
 
 
@@ -245,7 +261,7 @@ class FrictionModelRow(Base):
     coefficients: Mapped[list[Any]]
     covariance: Mapped[list[Any]]
     scale: Mapped[float]
-    n: Mapped[int]
+    n: Mapped[int] = mapped_column(BigInteger)
     degrees_of_freedom: Mapped[float | None]
     scatter_degrees_of_freedom: Mapped[float | None]
     tangential_velocity_min: Mapped[float]

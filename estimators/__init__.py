@@ -1,7 +1,7 @@
 """Friction samples to friction models (samples → friction_model → material)."""
 
 from estimators.errors import EstimatorError, InvalidSamples, NotConverged, TooFewSamples
-from estimators.fitting import fit
+from estimators.fitting import fit, needs_samples
 from estimators.friction_model import Cost, Domain, FrictionModel
 from estimators.moments import Moments
 from estimators.online import ChangeDetector
@@ -19,6 +19,7 @@ __all__ = [
     "NotConverged",
     "TooFewSamples",
     "fit",
+    "needs_samples",
     "recognise",
     "warm_up",
 ]

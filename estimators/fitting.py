@@ -16,6 +16,15 @@ if TYPE_CHECKING:
 METHODS = ("ols", "robust", "conjugate", "bayes", "auto")
 
 
+def needs_samples(method: str, grasps: int) -> bool:
+    """Whether a ``method``, by default options, fits so many grasps from less than their samples worse than from them.
+
+    Least squares and the Bayesian default take errors to be shared within a grasp, which its moments tell exactly; of
+    a single grasp they look at its elements, which moments do not know.
+    """
+    return method != "conjugate" and (grasps < 2 or method not in {"ols", "bayes"})
+
+
 def fit(
     samples: "FrictionSamples | Moments | Sequence[FrictionSamples] | Sequence[Moments]",
     method: str = "ols",

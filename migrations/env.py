@@ -11,6 +11,7 @@ context.configure(
     target_metadata=Base.metadata,
     render_as_batch=True,  # SQLite alters a table by copying it
     compare_type=True,
+    transactional_ddl=True,  # also on SQLite, where it holds as long as BEGIN is not left to the driver
 )
 with context.begin_transaction():
     if connection.dialect.name == "postgresql":  # several servers may start at once: the others wait, then find it done

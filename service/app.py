@@ -1,8 +1,9 @@
 """The application: stores opened, jobs taken up, routes and problems put together."""
 
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, closing
+from functools import partial
 
 from fastapi import FastAPI
 
@@ -10,13 +11,15 @@ from db import migrate
 from db.blobs import BlobStore, open_blobs
 from db.database import Database
 from db.repositories import blobs as blob_references
+from db.repositories import runners
 from service import access, gate, openapi, problems
 from service.context import Context
 from service.envelope import Envelope
-from service.folder_lock import locked
+from service.folder_lock import shared
 from service.gate import Gate
 from service.head_requests import HeadRequests
-from service.jobs import JobPool
+from service.jobs import JobRunner
+from service.lanes import lanes
 from service.model_cache import ModelCache
 from service.reading import Readers
 from service.routes import curation, grasp_logs, health, jobs, materials, planning
@@ -37,7 +40,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        async with running(chosen) as context:
+        async with running(chosen, check=gate.check_start) as context:
             app.state.context = context
             yield
 
@@ -60,30 +63,57 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
 
 @asynccontextmanager
-async def running(settings: Settings) -> AsyncIterator[Context]:
-    """Open the stores, leave no orphan in them, take up unfinished jobs; at the end, stop in the opposite order."""
-    with locked(settings.data_folder), closing(Database(settings.resolved_database_url)) as database:
-        if settings.migrate_at_start:
-            migrate.upgrade(database)
-        else:
-            migrate.check(database)
-        gate.check_start(settings, database)
+async def running(
+    settings: Settings, check: Callable[[Settings, Database], None] | None = None
+) -> AsyncIterator[Context]:
+    """Open the stores, leave no orphan in them, take up unfinished jobs; at the end, stop in the opposite order.
+
+    ``check`` may raise what stops the start.
+    """
+    with closing(Database(settings.resolved_database_url)) as database:
         blobs = open_blobs(settings.data_folder, settings.blob_url, settings.blob_cache_bytes)
+        with shared(settings.data_folder, partial(_enter, settings, database, blobs, check)):
+            place = Place(database.url, settings.data_folder, settings.blob_url, settings.blob_cache_bytes)
+            runner = JobRunner(
+                database,
+                lanes(place, settings.workers, settings.dask_address),
+                attempts=settings.job_attempts,
+                lease_seconds=settings.lease_seconds,
+                poll_seconds=settings.poll_seconds,
+                shutdown_seconds=settings.shutdown_seconds,
+            )
+            readers = Readers(settings.read_seconds)
+            await runner.start()
+            try:
+                yield Context(settings, database, blobs, runner, readers, ModelCache(settings.lookup_seconds))
+            finally:
+                await runner.stop()
+                await readers.stop()
+
+
+def _enter(
+    settings: Settings,
+    database: Database,
+    blobs: BlobStore,
+    check: Callable[[Settings, Database], None] | None,
+    alone: bool,
+) -> None:
+    if settings.migrate_at_start:
+        migrate.upgrade(database)
+    else:
+        migrate.check(database)
+    if check is not None:
+        check(settings, database)
+    if alone:
+        if database.is_sqlite:  # whoever else worked on it worked in this folder
+            _release_jobs_of_the_dead(database)
         _sweep(database, blobs)
-        pool = JobPool(
-            database,
-            Place(database.url, settings.data_folder, settings.blob_url, settings.blob_cache_bytes),
-            workers=settings.workers,
-            attempts=settings.job_attempts,
-            shutdown_seconds=settings.shutdown_seconds,
-        )
-        readers = Readers(settings.read_seconds)
-        await pool.start()
-        try:
-            yield Context(settings, database, blobs, pool, readers, ModelCache(settings.lookup_seconds))
-        finally:
-            await pool.stop()
-            await readers.stop()
+
+
+def _release_jobs_of_the_dead(database: Database) -> None:
+    with database.write() as session:
+        for dead in runners.list_all(session):
+            runners.remove(session, dead.id)
 
 
 def _sweep(database: Database, blobs: BlobStore) -> None:

@@ -7,7 +7,7 @@ from fastapi import Depends, Request
 
 from db.blobs import BlobStore
 from db.database import Database
-from service.jobs import JobPool
+from service.jobs import JobRunner
 from service.model_cache import ModelCache
 from service.reading import Readers
 from service.settings import Settings
@@ -20,7 +20,7 @@ class Context:
     settings: Settings
     database: Database
     blobs: BlobStore
-    jobs: JobPool
+    jobs: JobRunner
     readers: Readers = field(default_factory=Readers)
     models: ModelCache = field(default_factory=ModelCache)
 

@@ -1,22 +1,32 @@
-"""One server a data folder: sweeping orphans under another one's uploads would lose them."""
+"""Who works in a data folder: any number of processes, which enter one after the other.
+
+Only one that is alone may sweep orphans: under another's uploads it would lose them.
+"""
 
 import fcntl
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 
-class FolderInUse(RuntimeError):
-    """Another server works in this data folder."""
-
-
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Hold the folder for this process; the lock ends with the process, however that ends. Raises ``FolderInUse``."""
+def shared(folder: Path, enter: Callable[[bool], None]) -> Iterator[None]:
+    """Work in the folder, after ``enter`` was called with whether nobody else does.
+
+    The locks end with the process, however that ends.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    with (folder / "server.lock").open("w") as handle:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise FolderInUse(f"data folder is {folder}, in use by another server; allowed: one of its own") from error
+    with (folder / "server.lock").open("w") as work:
+        with (folder / "start.lock").open("w") as start:
+            fcntl.flock(start, fcntl.LOCK_EX)
+            enter(_alone(work.fileno()))
+            fcntl.flock(work, fcntl.LOCK_SH)
         yield
+
+
+def _alone(handle: int) -> bool:
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True

@@ -1,151 +1,245 @@
-"""Durable jobs: rows in the database say what is to be done, worker processes do it.
+"""Durable jobs: rows in the database say what is to be done, runners claim them, worker processes do them.
 
-A job that loses its worker process is given to a new one; a job that was queued or running when the server ended is
-taken up at the next start. No numerics run in the server process.
+Any number of runners, each with worker processes of its own, share one database. A runner lives in a server or by
+itself (``stiction worker``) and runs no numerics. A job that loses its worker process is done by another one; the jobs
+of a runner that is dead, seen by its heartbeat, are done by other runners (docs/jobs.md).
 """
 
 import asyncio
 import logging
-import multiprocessing
-from concurrent.futures import Executor, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+import os
+import socket
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import TypeVar
 
+from sqlalchemy.orm import Session
+
+from db import migrate
 from db.database import Database
-from db.errors import StorageUnavailable
-from db.repositories import jobs
-from service import worker
-from service.worker import Place
+from db.errors import ClaimLost, SchemaMismatch, StorageUnavailable
+from db.records import Claim
+from db.repositories import jobs, runners
+from service.lanes import Lane, WorkerDied
 
 logger = logging.getLogger(__name__)
 
 RETRY_SECONDS = 1.0
-"""s between two tries to reach a database that is locked, full or away, or to start a worker that does not start."""
+"""s between two tries to reach a database that is locked, full or away."""
+
+LOOKS = 5
+"""Looks at another runner's heartbeat, as many in one lease, that must all be the same before it counts as dead."""
+
+Result = TypeVar("Result")
 
 
-class JobPool:
+class Watch:
+    """Which of the other runners are dead: those whose beats stood still in so many looks in a row.
+
+    Looks are counted and not seconds: clocks jump, and while the database was away nobody could beat.
+    """
+
+    def __init__(self, looks: int) -> None:
+        self._looks = looks
+        self._seen: dict[str, tuple[int, int]] = {}
+
+    def look(self, beats: Mapping[str, int]) -> list[str]:
+        """The dead among the runners, given the beats of each."""
+        before = self._seen
+        self._seen = {
+            runner: (count, 1 + before[runner][1] if runner in before and before[runner][0] == count else 0)
+            for runner, count in beats.items()
+        }
+        return [runner for runner, (_, same) in self._seen.items() if same >= self._looks]
+
+
+class JobRunner:
     """Lanes of one worker process each, so that the death of a process is the death of one known job."""
 
     def __init__(
-        self, database: Database, place: Place, *, workers: int, attempts: int, shutdown_seconds: float
+        self,
+        database: Database,
+        lanes: list[Lane],
+        *,
+        attempts: int,
+        lease_seconds: float,
+        poll_seconds: float,
+        shutdown_seconds: float,
     ) -> None:
-        self._database, self._place = database, place
-        self._workers, self._attempts, self._shutdown_seconds = workers, attempts, shutdown_seconds
-        self._queue: asyncio.Queue[str | None] = asyncio.Queue()
-        self._lanes: list[_Lane] = []
-        self._tasks: list[asyncio.Task[None]] = []
+        self._database, self._lanes, self._attempts = database, lanes, attempts
+        self._beat_seconds, self._poll_seconds = lease_seconds / LOOKS, poll_seconds
+        self._shutdown_seconds = shutdown_seconds
+        self._watch = Watch(LOOKS)
+        self._id = ""
+        self._at: set[str] = set()  # jobs in the lanes
+        self._strays: set[str] = set()  # jobs that were ours in the database at the last beat, but in no lane
+        self._warming = len(lanes)
+        self._outdated: SchemaMismatch | None = None
         self._stopping = False
+        self._woken = asyncio.Event()
+
+    @property
+    def missing(self) -> str | None:
+        """Why no jobs are taken yet, or no longer."""
+        if self._outdated is not None:
+            return str(self._outdated)
+        return f"{self._warming} of {len(self._lanes)} workers warm up" if self._warming else None
 
     async def start(self) -> None:
-        """Take up what was left, and begin to work."""
+        """Begin to work."""
         self._loop = asyncio.get_running_loop()
-        with self._database.read() as session:
-            for job_id in jobs.unfinished(session):
-                self._queue.put_nowait(job_id)
-        self._lanes = [_Lane() for _ in range(self._workers)]
-        self._tasks = [asyncio.create_task(self._work(lane)) for lane in self._lanes]
+        if self._lanes:
+            self._id = await asyncio.to_thread(self._register)
+        self._beating = asyncio.create_task(self._beat())
+        self._working = [asyncio.create_task(self._work(lane)) for lane in self._lanes]
 
-    def submit(self, job_id: str) -> None:
-        """Have a stored job done; may be called from any thread."""
-        self._loop.call_soon_threadsafe(self._queue.put_nowait, job_id)
+    def wake(self) -> None:
+        """Look for a job at once, since one has just been stored; may be called from any thread."""
+        self._loop.call_soon_threadsafe(self._woken.set)
+
+    async def until_outdated(self) -> None:
+        """Raise ``SchemaMismatch`` once the schema is not this version's any more."""
+        while self._outdated is None:
+            await asyncio.sleep(self._beat_seconds)
+        raise self._outdated
 
     async def stop(self) -> None:
-        """Let running jobs end within the time allowed, then end their workers; their rows stay for the next start."""
+        """Let running jobs end within the time allowed, then end their workers; others can take the jobs up."""
         self._stopping = True
-        while not self._queue.empty():
-            self._queue.get_nowait()
-        for _ in self._lanes:
-            self._queue.put_nowait(None)
-        _, late = await asyncio.wait(self._tasks, timeout=self._shutdown_seconds)
-        for lane in self._lanes:
-            lane.kill()
-        for task in late:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        self._woken.set()
+        if self._working:
+            _, late = await asyncio.wait(self._working, timeout=self._shutdown_seconds)
+            for lane in self._lanes:
+                lane.kill()
+            for task in late:
+                task.cancel()
+        self._beating.cancel()
+        await asyncio.gather(self._beating, *self._working, return_exceptions=True)
+        if self._lanes:
+            await self._try(lambda: self._remove(self._id))
 
-    async def _work(self, lane: "_Lane") -> None:
+    async def _work(self, lane: Lane) -> None:
         try:
             await lane.hire()
-            while (job_id := await self._queue.get()) is not None:
-                await self._do(lane, job_id)
+            self._warming -= 1
+            while not self._stopping and self._outdated is None:
+                self._woken.clear()
+                claim = await self._try(self._claim)
+                if claim is None:
+                    await self._wait(self._poll_seconds)
+                    continue
+                await self._do(lane, claim)
         finally:
             await lane.close()
 
-    async def _do(self, lane: "_Lane", job_id: str) -> None:
-        try:
-            ended = await self._try(lane, job_id)
-        except StorageUnavailable as error:
-            logger.warning("job %s waits: %s", job_id, error)
-            await asyncio.sleep(RETRY_SECONDS)
-            ended = False
-        except Exception as error:  # a lane outlives whatever one job throws at it
-            logger.exception("job %s failed outside its stages", job_id)
-            await asyncio.to_thread(self._fail, job_id, f"{type(error).__name__}: {error}")
-            ended = True
-        if not ended:
-            self._queue.put_nowait(job_id)
+    async def _wait(self, seconds: float) -> None:
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self._woken.wait(), seconds)
 
-    async def _try(self, lane: "_Lane", job_id: str) -> bool:
-        """Do a job; False if it is to be done again."""
+    async def _try(self, step: Callable[[], Result]) -> Result | None:
+        """A step that needs the database, in a thread; None where it cannot be had now."""
         try:
-            await lane.run(self._place, job_id)
-        except BrokenProcessPool:
+            return await asyncio.to_thread(step)
+        except StorageUnavailable as error:
+            logger.warning("jobs wait: %s", error)
+            await asyncio.sleep(RETRY_SECONDS)
+        except SchemaMismatch as error:
+            logger.error("no more jobs are taken: %s", error)
+            self._outdated = error
+        except Exception:  # the lanes and the heartbeat outlive whatever one step throws
+            logger.exception("a step of runner %s failed", self._id)
+            await asyncio.sleep(RETRY_SECONDS)
+        return None
+
+    def _claim(self) -> Claim | None:
+        with self._database.read() as session:  # does not wait for a writer
+            if not jobs.any_queued(session):
+                return None
+        with self._database.write(durable=False) as session:
+            migrate.require_head(session)
+            claim = jobs.claim(session, self._id)
+        if claim is not None:
+            self._at.add(claim.job_id)
+        return claim
+
+    async def _do(self, lane: Lane, claim: Claim) -> None:
+        try:
+            await lane.run(claim)
+        except WorkerDied:
             if not self._stopping:
                 await lane.hire()
-                return not await asyncio.to_thread(self._count_death, job_id)
-        return True
+                await self._try(lambda: self._count_death(claim))
+        except StorageUnavailable as error:
+            logger.warning("job %s waits: %s", claim.job_id, error)
+            await asyncio.sleep(RETRY_SECONDS)
+        except Exception as error:  # a lane outlives whatever one job throws at it
+            logger.exception("job %s failed outside its stages", claim.job_id)
+            reason = f"{type(error).__name__}: {error}"
+            await self._try(lambda: self._fail(claim, reason))
+        finally:
+            self._at.discard(claim.job_id)  # where it is still ours in the database, it is a stray
 
-    def _fail(self, job_id: str, reason: str) -> None:
+    def _fail(self, claim: Claim, reason: str) -> None:
         try:
             with self._database.write() as session:
-                jobs.finish(session, job_id, "failed", reason=reason)
-        except Exception:
-            logger.exception("job %s could not be marked as failed; the next start takes it up", job_id)
+                jobs.finish(session, claim, "failed", reason=reason)
+        except ClaimLost:
+            pass
 
-    def _count_death(self, job_id: str) -> bool:
-        """Note that the job lost its worker; False if that was once too often."""
-        with self._database.write() as session:
-            before = jobs.get(session, job_id)
-            if before.finished_at is not None:
-                return False
-            job = jobs.count_death(session, job_id)
-            logger.error("job %s lost its worker process, time %d of %d", job_id, job.deaths, self._attempts)
-            if job.deaths < self._attempts:
-                return True
-            reason = f"the worker process died {job.deaths} times, at last in stage {job.stage}"
-            jobs.finish(session, job_id, "failed", reason=reason)
-            return False
+    def _count_death(self, claim: Claim) -> None:
+        """Note that the job lost its worker, and end it if that was once too often."""
+        try:
+            with self._database.write() as session:
+                job = jobs.count_death(session, claim)
+                logger.error("job %s lost its worker process, time %d of %d", job.id, job.deaths, self._attempts)
+                if job.deaths < self._attempts:
+                    jobs.release(session, claim)
+                    return
+                reason = f"the worker process died {job.deaths} times, at last in stage {job.stage}"
+                jobs.finish(session, claim, "failed", reason=reason)
+        except ClaimLost:
+            pass  # it had ended, or nobody wants it any more
 
-
-class _Lane:
-    """One worker process behind the executor interface."""
-
-    def __init__(self) -> None:
-        self._executor: Executor | None = None
-
-    async def hire(self) -> None:
-        """Start a worker process and warm it up, in place of the one before."""
+    async def _beat(self) -> None:
         while True:
-            await self.close()
-            self._executor = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), worker.start)
-            try:
-                await asyncio.get_running_loop().run_in_executor(self._executor, worker.warm_up)
-            except BrokenProcessPool:
-                logger.exception("a worker process did not start")
-                await asyncio.sleep(RETRY_SECONDS)
-            else:
-                return
+            await asyncio.sleep(self._beat_seconds)
+            if await self._try(self._beat_once if self._lanes else self._check_schema):
+                self._woken.set()
 
-    async def run(self, place: Place, job_id: str) -> None:
-        """Do one job; raises ``BrokenProcessPool`` if the worker process dies under it."""
-        await asyncio.get_running_loop().run_in_executor(self._executor, worker.run_job, place, job_id)
+    def _check_schema(self) -> None:
+        with self._database.read() as session:
+            migrate.require_head(session)
 
-    def kill(self) -> None:
-        """End the worker process at once (what ``ProcessPoolExecutor.kill_workers`` does from Python 3.14 on)."""
-        for process in dict(getattr(self._executor, "_processes", None) or {}).values():
-            process.kill()
+    def _beat_once(self) -> bool:
+        """Say that we live, and take the jobs away from runners that do not; True if there are jobs to claim."""
+        with self._database.write(durable=False) as session:
+            alive = runners.beat(session, self._id)
+            beats = {runner.id: runner.beats for runner in runners.list_all(session) if runner.id != self._id}
+            freed = self._free_strays(session)
+        if not alive and not self._stopping:
+            logger.error("runner %s was taken for dead; it goes on under a new name", self._id)
+            self._id = self._register()
+        dead = self._watch.look(beats)
+        for runner in dead:
+            self._remove(runner)
+        return freed or bool(dead)
 
-    async def close(self) -> None:
-        """Let the worker process go once it has nothing to do."""
-        if self._executor is not None:
-            executor, self._executor = self._executor, None
-            await asyncio.to_thread(executor.shutdown, cancel_futures=True)
+    def _free_strays(self, session: Session) -> bool:
+        """Put jobs that the database says are ours, but that no lane does, back: a commit's answer can be lost."""
+        strays = jobs.claimed(session, self._id) - self._at
+        stay = strays & self._strays
+        self._strays = strays
+        for job_id in stay:
+            logger.warning("job %s is queued again: nobody is at it", job_id)
+            jobs.release(session, Claim(job_id, self._id))
+        return bool(stay)
+
+    def _register(self) -> str:
+        with self._database.write(durable=False) as session:
+            return runners.add(session, f"{socket.gethostname()}:{os.getpid()}")
+
+    def _remove(self, runner: str) -> None:
+        with self._database.write() as session:
+            released = runners.remove(session, runner)
+        if released:
+            logger.warning("jobs of runner %s are queued again: %s", runner, ", ".join(released))

@@ -1,23 +1,25 @@
 """The stages in their order: frames → strain → events → slip_state → samples → friction_model → material.
 
 Runs in a worker process. Every step can be done again: what is stored already is not computed twice, and the last
-step stores the model and closes the job in one transaction.
+step stores the model and closes the job in one transaction. Whatever is stored is stored under the job's claim: a
+worker that was taken for dead, or whose job was cancelled, stores nothing.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
 
 import numpy as np
+from sqlalchemy.orm import Session
 
 import estimators
 import slipcore
 from db.blobs import BlobStore
 from db.database import Database
-from db.records import Detection, Job, SampleSummary, StoredGraspLog
+from db.records import Claim, Job, SamplesOfLog, SampleSummary
 from db.repositories import detections, friction_models, grasp_logs, jobs, materials
-from estimators import EstimatorError, FrictionModel
+from estimators import EstimatorError, FrictionModel, Moments
 from service import formats
 from service.stored_results import (
     decode_samples,
@@ -29,6 +31,9 @@ from service.stored_results import (
 )
 from slipcore import FrictionSamples, GraspLog, SlipcoreError, SlipHistory
 
+FITS_BESIDE_OTHERS = 3
+"""Fits of a material whose logs change meanwhile, before the next one makes the other writers wait."""
+
 
 class Refused(Exception):
     """The data do not allow what the job is for; the message says why."""
@@ -36,35 +41,43 @@ class Refused(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """One job under way: the stores, and the seconds of the stages done."""
+    """One job under way: the stores, the claim to it, and the seconds of the stages done."""
 
     database: Database
     blobs: BlobStore
+    claim: Claim
     job: Job
     seconds: dict[str, float] = field(default_factory=dict)
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """Say that the job is in this stage, and take its time."""
-        with self.database.write() as session:
-            jobs.start_stage(session, self.job.id, name, self.seconds)
+        """Say that the job is in this stage, and take its time; raises ``ClaimLost`` where it is not ours any more."""
+        with self.database.write(durable=False) as session:
+            jobs.start_stage(session, self.claim, name, self.seconds)
+        with self.timed(name):
+            yield
+
+    @contextmanager
+    def timed(self, name: str) -> Iterator[None]:
+        """Take the time of a stage."""
         begin = perf_counter()
         yield
         self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - begin
 
 
-def run_job(database: Database, blobs: BlobStore, job_id: str) -> None:
-    """Do a job to its end: done, or refused where the data do not allow it (or no chain of theirs converges)."""
+def run_job(database: Database, blobs: BlobStore, claim: Claim) -> None:
+    """Do a job to its end: done, or refused where the data do not allow it (or no chain of theirs converges).
+
+    Raises ``ClaimLost`` once it is not this runner's any more.
+    """
     with database.read() as session:
-        job = jobs.get(session, job_id)
-    if job.finished_at is not None:
-        return
-    run = Run(database, blobs, job, dict(job.seconds))
+        job = jobs.get(session, claim.job_id)
+    run = Run(database, blobs, claim, job, dict(job.seconds))
     try:
         _take_through_the_stages(run)
     except (Refused, SlipcoreError, EstimatorError) as refusal:
         with database.write() as session:
-            jobs.finish(session, job.id, "refused", reason=str(refusal), seconds=run.seconds)
+            jobs.finish(session, claim, "refused", reason=str(refusal), seconds=run.seconds)
 
 
 def _take_through_the_stages(run: Run) -> None:
@@ -72,7 +85,7 @@ def _take_through_the_stages(run: Run) -> None:
     samples = None if job.grasp_log_id is None else find_samples(run, job.grasp_log_id)
     if job.material is None:  # detection only
         with run.database.write() as session:
-            jobs.finish(session, job.id, "done", seconds=run.seconds)
+            jobs.finish(session, run.claim, "done", seconds=run.seconds)
         return
     if samples is not None and samples.none_because is not None:
         raise Refused(samples.none_because)
@@ -80,7 +93,7 @@ def _take_through_the_stages(run: Run) -> None:
 
 
 def find_samples(run: Run, log_id: str) -> SampleSummary:
-    """Frames → strain → events → slip_state → samples of one log."""
+    """Frames → strain → events → slip_state → samples → moments of one log."""
     with run.database.read() as session:
         stored = grasp_logs.get(session, log_id)
     if stored.samples is not None:
@@ -94,21 +107,31 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         blob = run.blobs.put(encode_history(history))
         detection = summarise_history(history, run.seconds["slip_state"], blob, is_scaled=log.is_scaled)
         summary = summarise_samples(samples, none_because, run.blobs.put(encode_samples(samples)))
-        _store(run.database, stored, detection, summary)
+    with run.database.write() as session:
+        jobs.start_stage(session, run.claim, "samples", run.seconds)  # nobody else has stored them meanwhile
+        detections.add(session, log_id, detection, summary)
     return summary
 
 
 def fit_material(run: Run, material: str) -> None:
-    """Samples of all logs of a material → friction_model → material; raises ``Refused``."""
-    while True:
+    """Moments or samples of all logs of a material → friction_model → material; raises ``Refused``."""
+    _note_missing_moments(run, material)
+    for _ in range(FITS_BESIDE_OTHERS):
         with run.stage("friction_model"):
             with run.database.read() as session:
                 material_id = materials.find_id(session, material)
-                parts = detections.sample_blobs(session, material_id)
+                parts = detections.samples_of_material(session, material_id)
             model = _fit(run, parts)
-        with run.stage("material"):
-            if _store_model(run, material_id, model, parts):
+        with run.database.write() as session:
+            friction_models.lock(session, material_id)
+            if detections.samples_of_material(session, material_id) == parts:
+                _store_model(run, session, material_id, model)
                 return
+    with run.database.write() as session:  # logs come in faster than they are fitted: the other fits wait for this one
+        friction_models.lock(session, material_id)
+        with run.timed("friction_model"):
+            model = _fit(run, detections.samples_of_material(session, material_id))
+        _store_model(run, session, material_id, model)
 
 
 def _collect(log: GraspLog, history: SlipHistory) -> tuple[FrictionSamples, str | None]:
@@ -131,27 +154,38 @@ def _no_samples(log: GraspLog) -> FrictionSamples:
     return FrictionSamples(none, none, none, none, none, none.astype(int), none, log.element_area)
 
 
-def _store(database: Database, log: StoredGraspLog, detection: Detection, samples: SampleSummary) -> None:
-    with database.write() as session:
-        if grasp_logs.get(session, log.id).samples is None:
-            detections.add(session, log.id, detection, samples)
-
-
-def _fit(run: Run, parts: Mapping[str, str]) -> FrictionModel:
+def _fit(run: Run, parts: Sequence[SamplesOfLog]) -> FrictionModel:
+    """From the moments where the method needs no more, else from the samples."""
     if not parts:
         raise Refused("no grasp log of this material has friction samples yet")
-    samples = [decode_samples(run.blobs.path(blob)) for blob in parts.values()]
-    return estimators.fit(samples, method=run.job.method, seed=run.job.seed)
+    method, seed = run.job.method, run.job.seed
+    if estimators.needs_samples(method, len(parts)):
+        return estimators.fit(
+            [decode_samples(run.blobs.path(part.samples_blob)) for part in parts], method=method, seed=seed
+        )
+    return estimators.fit([_moments(run, part) for part in parts], method=method, seed=seed)
 
 
-def _store_model(run: Run, material_id: int, model: FrictionModel, parts: Mapping[str, str]) -> bool:
-    """Store the model and close the job; False if samples came in meanwhile, which the model must not leave out."""
-    begin = perf_counter()
-    with run.database.write() as session:
-        friction_models.lock(session, material_id)
-        if detections.sample_blobs(session, material_id) != parts:
-            return False
+def _moments(run: Run, part: SamplesOfLog) -> Moments:
+    if part.moments is not None:
+        return Moments.from_bytes(part.moments)
+    return Moments.from_samples(decode_samples(run.blobs.path(part.samples_blob)))
+
+
+def _note_missing_moments(run: Run, material: str) -> None:
+    """Of samples that an older version stored without."""
+    with run.database.read() as session:
+        parts = detections.samples_of_material(session, materials.find_id(session, material))
+    for part in parts:
+        if part.moments is None:
+            content = _moments(run, part).to_bytes()
+            with run.database.write(durable=False) as session:
+                detections.set_moments(session, part.grasp_log_id, content)
+
+
+def _store_model(run: Run, session: Session, material_id: int, model: FrictionModel) -> None:
+    """Store the model and close the job, in one transaction with what the model was fitted to."""
+    with run.timed("material"):
+        jobs.start_stage(session, run.claim, "material", run.seconds)  # before the model, which a job may have but once
         version = friction_models.add(session, material_id, run.job.id, to_new_model(model))
-        seconds = run.seconds | {"material": perf_counter() - begin}
-        jobs.finish(session, run.job.id, "done", model_version=version, seconds=seconds)
-    return True
+    jobs.finish(session, run.claim, "done", model_version=version, seconds=run.seconds)

@@ -49,6 +49,7 @@ METHOD_NOT_ALLOWED = ProblemType("method-not-allowed", "The route does not take 
 MATERIAL_EXISTS = ProblemType("material-exists", "The material exists already", 409)
 NO_MODEL = ProblemType("no-model", "The material has no fitted model yet", 409)
 NO_FEASIBLE_FORCE = ProblemType("no-feasible-force", "No normal force holds the load", 409)
+JOB_ENDED = ProblemType("job-ended", "The job has ended", 409)
 NOT_READY = ProblemType("not-ready", "The job has not got there", 409)
 REQUEST_TIMEOUT = ProblemType("request-timeout", "The request came too slowly", 408)
 UPLOAD_TOO_LARGE = ProblemType("upload-too-large", "The body is too large", 413)
@@ -60,6 +61,7 @@ IDEMPOTENCY_KEY_REUSED = ProblemType("idempotency-key-reused", "The key stands f
 TOO_MANY_REQUESTS = ProblemType("too-many-requests", "Requests come too often", 429)
 HEADERS_TOO_LARGE = ProblemType("headers-too-large", "The headers are too large", 431)
 INTERNAL_ERROR = ProblemType("internal-error", "The service failed", 500)
+WORKERS_NOT_READY = ProblemType("workers-not-ready", "The workers take no jobs yet, or no longer", 503)
 STORAGE_UNAVAILABLE = ProblemType("storage-unavailable", "Database or blob folder cannot be used now", 503)
 
 PROBLEM_TYPES = {entry.name: entry for entry in list(globals().values()) if isinstance(entry, ProblemType)}

@@ -50,6 +50,7 @@ _JOB: JsonDict = {
     "seconds": {"frames": 0.01, "slip_state": 0.06, "samples": 0.01, "friction_model": 0.02, "material": 0.01},
     "grasp_log": "7c9e6679742540de944be07fc1f90ae7",
     "material": "paper",
+    "deaths": 0,
     "model_version": 3,
     "created_at": _MOMENT,
     "finished_at": _MOMENT,
@@ -311,7 +312,10 @@ class DetectionOut(BaseModel):
 
 
 class JobOut(BaseModel):
-    """A job; `refused`: the data do not allow it, `failed`: the service could not do it, `reason` says why."""
+    """A job; `refused`: the data do not allow it, `failed`: the service could not do it, `cancelled`: by request.
+
+    `reason` says why.
+    """
 
     model_config = ConfigDict(json_schema_extra={"examples": [_JOB]})
 
@@ -323,6 +327,7 @@ class JobOut(BaseModel):
     seconds: Annotated[dict[str, float], Field(description="Of each stage that is done")]
     grasp_log: str | None
     material: str | None
+    deaths: Annotated[int, Field(description="Worker processes that died under it")]
     model_version: Annotated[int | None, Field(description="The version of the model that it stored")]
     created_at: datetime
     finished_at: datetime | None
@@ -339,6 +344,7 @@ class JobOut(BaseModel):
             seconds=dict(job.seconds),
             grasp_log=job.grasp_log_id,
             material=job.material,
+            deaths=job.deaths,
             model_version=job.model_version,
             created_at=job.created_at,
             finished_at=job.finished_at,
@@ -355,6 +361,12 @@ class WithdrawalOut(BaseModel):
     def of(cls, withdrawal: Withdrawal) -> "WithdrawalOut":
         """The stored withdrawal as an answer."""
         return cls(at=withdrawal.at, reason=withdrawal.because)
+
+
+class JobsOut(BaseModel):
+    """Some jobs, newest first."""
+
+    items: list[JobOut]
 
 
 class GraspLogOut(BaseModel):

@@ -17,7 +17,7 @@ class Settings(BaseSettings):
 
     data_folder: Path = Field(
         default=Path("stiction-data"),
-        description="Folder of the raw uploads, of results and of the SQLite file. One server owns it at a time.",
+        description="Folder of the raw uploads, of results and of the SQLite file. Processes may share it.",
     )
     database_url: str | None = Field(
         default=None,
@@ -64,11 +64,23 @@ class Settings(BaseSettings):
     lookup_seconds: Annotated[float, Field(ge=0.0, le=60.0)] = Field(
         default=1.0, description="How old a model in memory may be before a look-up asks the database again, in s."
     )
-    workers: Annotated[int, Field(ge=1, le=64)] = Field(
-        default=1, description="Worker processes that detect and fit; the server process itself never does."
+    workers: Annotated[int, Field(ge=0, le=64)] = Field(
+        default=1,
+        description="Worker processes that detect and fit; the server process itself never does. 0 leaves the jobs to "
+        "`stiction worker`.",
+    )
+    dask_address: str | None = Field(
+        default=None,
+        description="Address of a Dask scheduler; so many jobs as there are workers then run there and not here.",
     )
     job_attempts: Annotated[int, Field(ge=1, le=10)] = Field(
         default=3, description="How often a job may lose its worker process before it has failed."
+    )
+    lease_seconds: Annotated[float, Field(ge=0.5, le=600.0)] = Field(
+        default=10.0, description="How long a process may be silent, in s, before others take its jobs over."
+    )
+    poll_seconds: Annotated[float, Field(ge=0.01, le=60.0)] = Field(
+        default=0.1, description="How often an idle worker looks for jobs that other processes stored, in s."
     )
     shutdown_seconds: Annotated[float, Field(ge=0.0, le=600.0)] = Field(
         default=10.0,

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from db.records import Detection, NewModel, SampleSummary
+from estimators import Moments
 from estimators.friction_model import Cost, Domain, FrictionModel
 from service.formats.npy import HEADER_LOCK
 from slipcore.frames import FloatArray
@@ -83,6 +84,7 @@ def summarise_samples(samples: FrictionSamples, none_because: str | None, blob: 
         tangential_velocity=_range(samples.tangential_velocity),
         normal_force=_range(samples.normal_force),
         samples_blob=blob,
+        moments=Moments.from_samples(samples).to_bytes() if len(samples) else None,
     )
 
 

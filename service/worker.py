@@ -5,6 +5,7 @@ import multiprocessing
 import os
 import signal
 import threading
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from multiprocessing.connection import wait
@@ -12,7 +13,8 @@ from pathlib import Path
 
 from db.blobs import BlobStore, open_blobs
 from db.database import Database
-from db.errors import StorageUnavailable
+from db.errors import ClaimLost, StorageUnavailable
+from db.records import Claim
 from db.repositories import jobs
 
 logger = logging.getLogger(__name__)
@@ -50,19 +52,21 @@ def warm_up() -> None:
         logger.exception("the %s is not warmed up; its first job will be slow", pipeline.__name__)
 
 
-def run_job(place: Place, job_id: str) -> None:
+def run_job(place: Place, claim: Claim) -> None:
     """Do a job and leave its end in the database; raises ``StorageUnavailable``, for then nobody can write there."""
     from service import pipeline  # imports the numerics, which the server process does without
 
     database, blobs = _stores(place)
     try:
-        pipeline.run_job(database, blobs, job_id)
+        pipeline.run_job(database, blobs, claim)
     except StorageUnavailable:
         raise
+    except ClaimLost as lost:
+        logger.warning("%s; what was done of it stays", lost)
     except Exception as error:
-        logger.exception("job %s failed", job_id)
-        with database.write() as session:
-            jobs.finish(session, job_id, "failed", reason=f"{type(error).__name__}: {error}")
+        logger.exception("job %s failed", claim.job_id)
+        with database.write() as session, suppress(ClaimLost):
+            jobs.finish(session, claim, "failed", reason=f"{type(error).__name__}: {error}")
 
 
 @cache

@@ -4,6 +4,7 @@ from stiction_client.client import AsyncFrictionClient, FrictionClient
 from stiction_client.errors import (
     ConnectionFailed,
     InvalidArgument,
+    JobCancelled,
     JobError,
     JobFailed,
     JobRefused,
@@ -39,6 +40,7 @@ __all__ = [
     "GraspLogReceipt",
     "InvalidArgument",
     "Job",
+    "JobCancelled",
     "JobError",
     "JobFailed",
     "JobRefused",

@@ -121,6 +121,14 @@ class FrictionClient:
         """A job as it stands."""
         return self._run(flows.job(id))
 
+    def jobs(self, status: str | None = None, limit: int = 100) -> list[Job]:
+        """The newest jobs, newest first: of one ``status``, such as "failed", or all."""
+        return self._run(flows.jobs(status, limit))
+
+    def cancel(self, job: Job | GraspLogReceipt | str) -> Job:
+        """End a job that nobody wants any more; ``ProblemError`` where it has ended otherwise."""
+        return self._run(flows.cancel(_job_id(job)))
+
     def wait(self, job: Job | GraspLogReceipt | str, timeout: float = JOB_TIMEOUT) -> Job:
         """Wait until a job has ended and return it, whatever its end; ``JobTimedOut`` after ``timeout`` s.
 
@@ -224,6 +232,14 @@ class AsyncFrictionClient:
     async def job(self, id: str) -> Job:  # noqa: A002 - the API's own name
         """As ``FrictionClient.job``."""
         return await self._run(flows.job(id))
+
+    async def jobs(self, status: str | None = None, limit: int = 100) -> list[Job]:
+        """As ``FrictionClient.jobs``."""
+        return await self._run(flows.jobs(status, limit))
+
+    async def cancel(self, job: Job | GraspLogReceipt | str) -> Job:
+        """As ``FrictionClient.cancel``."""
+        return await self._run(flows.cancel(_job_id(job)))
 
     async def wait(self, job: Job | GraspLogReceipt | str, timeout: float = JOB_TIMEOUT) -> Job:
         """As ``FrictionClient.wait``."""

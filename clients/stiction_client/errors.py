@@ -71,6 +71,10 @@ class JobFailed(JobError):
     """The service broke while it worked on the job."""
 
 
+class JobCancelled(JobError):
+    """Somebody cancelled the job."""
+
+
 class JobTimedOut(JobError):
     """The job had not ended when waiting did; it goes on in the service."""
 

@@ -196,6 +196,18 @@ def job(job_id: str) -> Flow[Job]:
     return _record(Job.from_json, (yield from _get(f"/v1/jobs/{_part(job_id)}")))
 
 
+def jobs(status: str | None, limit: int) -> Flow[list[Job]]:
+    """Ask for the newest jobs."""
+    answer = yield from _get("/v1/jobs", _given(status=status, limit=limit))
+    return _record(lambda record: [Job.from_json(item) for item in record["items"]], answer)
+
+
+def cancel(job_id: str) -> Flow[Job]:
+    """Cancel a job, which is harmless twice."""
+    request = Request("POST", f"/v1/jobs/{_part(job_id)}/cancel")
+    return _record(Job.from_json, (yield from _ask(request)))
+
+
 def wait(job_id: str, timeout: float) -> Flow[Job]:
     """Ask for a job until it has ended."""
     deadline = time.monotonic() + timeout

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from stiction_client.errors import JobFailed, JobRefused
+from stiction_client.errors import JobCancelled, JobFailed, JobRefused
 from stiction_client.model import FrictionModel
 
-ENDED = frozenset({"done", "failed", "refused"})
+ENDED = frozenset({"done", "failed", "refused", "cancelled"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +31,9 @@ class Material:
 class Job:
     """Work that the service does after it has answered.
 
-    ``status``: queued, running, done, refused (the data do not allow it; ``reason`` says why) or failed (the
-    service's own fault); ``seconds`` of each stage; ``grasp_log``, ``material`` and ``model_version`` it is about.
+    ``status``: queued, running, done, refused (the data do not allow it; ``reason`` says why), failed (the service's
+    own fault) or cancelled (by request); ``seconds`` of each stage; ``grasp_log``, ``material`` and ``model_version``
+    it is about.
     """
 
     id: str
@@ -58,11 +59,13 @@ class Job:
         return self.status in ENDED
 
     def raise_for_status(self) -> "Job":
-        """Return the job; raises ``JobRefused`` or ``JobFailed`` where it ended so."""
+        """Return the job; raises ``JobRefused``, ``JobFailed`` or ``JobCancelled`` where it ended so."""
         if self.status == "refused":
             raise JobRefused(self.id, self.reason or "refused")
         if self.status == "failed":
             raise JobFailed(self.id, self.reason or "failed")
+        if self.status == "cancelled":
+            raise JobCancelled(self.id, self.reason or "cancelled")
         return self
 
 

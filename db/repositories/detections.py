@@ -2,10 +2,10 @@
 
 from dataclasses import asdict, fields
 
-from sqlalchemy import ColumnElement, select
+from sqlalchemy import ColumnElement, select, update
 from sqlalchemy.orm import Session
 
-from db.records import Detection, SampleSummary
+from db.records import Detection, SamplesOfLog, SampleSummary
 from db.tables import DetectionRow, GraspLogRow, SampleSummaryRow
 
 
@@ -25,24 +25,31 @@ def add(session: Session, log_id: str, detection: Detection, samples: SampleSumm
             normal_force_min=force[0],
             normal_force_max=force[1],
             samples_blob=samples.samples_blob,
+            moments=samples.moments,
         )
     )
     session.flush()
 
 
-def sample_blobs(session: Session, material_id: int) -> dict[str, str]:
-    """Blobs of samples of a material, by content hash of the log, oldest first.
+def samples_of_material(session: Session, material_id: int) -> list[SamplesOfLog]:
+    """The samples of a material, one entry a grasp, oldest first.
 
     Logs without samples, and withdrawn ones, are left out. A log that went through several detectors is one grasp
     still: its newest samples count.
     """
     query = (
-        select(GraspLogRow.sha256, SampleSummaryRow.samples_blob)
+        select(GraspLogRow.sha256, GraspLogRow.id, SampleSummaryRow.samples_blob, SampleSummaryRow.moments)
         .join(SampleSummaryRow)
-        .where(GraspLogRow.material_id == material_id, GraspLogRow.withdrawn_at.is_(None), SampleSummaryRow.count > 0)
+        .where(*_that_count(material_id))
         .order_by(SampleSummaryRow.created_at, GraspLogRow.id)
     )
-    return dict(session.execute(query).all())
+    found = session.execute(query)
+    return list({sha256: SamplesOfLog(log_id, blob, moments) for sha256, log_id, blob, moments in found}.values())
+
+
+def set_moments(session: Session, log_id: str, moments: bytes) -> None:
+    """Note the moments of a log whose samples an older version stored without."""
+    session.execute(update(SampleSummaryRow).where(SampleSummaryRow.grasp_log_id == log_id).values(moments=moments))
 
 
 def any_samples(session: Session, material_id: int) -> bool:
@@ -78,6 +85,7 @@ def samples_record(row: SampleSummaryRow | None) -> SampleSummary | None:
         tangential_velocity=_range(row.tangential_velocity_min, row.tangential_velocity_max),
         normal_force=_range(row.normal_force_min, row.normal_force_max),
         samples_blob=row.samples_blob,
+        moments=row.moments,
     )
 
 

@@ -1,4 +1,4 @@
-"""Queries on jobs: durable rows that a restarted service takes up again."""
+"""Queries on jobs: durable rows that runners claim. Only the runner that has the claim can change a running job."""
 
 import uuid
 from collections.abc import Mapping
@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from sqlalchemy import select, update
 from sqlalchemy.orm import Session
 
-from db.errors import NotFound
-from db.records import Job, JobKind, JobStatus
+from db.errors import ClaimLost, NotFound
+from db.records import Claim, Job, JobKind, JobStatus
 from db.tables import JobRow, MaterialRow, now
 
 
@@ -45,10 +45,13 @@ def get(session: Session, job_id: str) -> Job:
     return record(*row)
 
 
-def unfinished(session: Session) -> list[str]:
-    """Ids of the jobs that are queued or were running, oldest first."""
-    query = select(JobRow.id).where(JobRow.status.in_(("queued", "running"))).order_by(JobRow.created_at, JobRow.id)
-    return list(session.scalars(query))
+def list_newest(session: Session, status: JobStatus | None, limit: int) -> list[Job]:
+    """Jobs, newest first, those of one status or all."""
+    query = select(JobRow, MaterialRow.name).outerjoin(MaterialRow)
+    if status is not None:
+        query = query.where(JobRow.status == status)
+    found = session.execute(query.order_by(JobRow.created_at.desc(), JobRow.id.desc()).limit(limit))
+    return [record(*row) for row in found]
 
 
 def move_unfinished(session: Session, source_id: int, target_id: int) -> None:
@@ -57,38 +60,89 @@ def move_unfinished(session: Session, source_id: int, target_id: int) -> None:
     session.execute(update(JobRow).where(*of_it).values(material_id=target_id))
 
 
-def start_stage(session: Session, job_id: str, stage: str, seconds: Mapping[str, float]) -> None:
-    """Say that the job runs and in which stage; ``seconds`` are those of the stages done."""
-    _change(session, job_id, status="running", stage=stage, seconds=dict(seconds))
+def any_queued(session: Session) -> bool:
+    """Whether a job waits for a runner."""
+    return session.scalar(select(JobRow.id).where(JobRow.status == "queued").limit(1)) is not None
+
+
+def claim(session: Session, runner_id: str) -> Claim | None:
+    """Give the oldest queued job to a runner, if there is one; runners that claim at once get different ones."""
+    oldest = (
+        select(JobRow.id)
+        .where(JobRow.status == "queued")
+        .order_by(JobRow.created_at, JobRow.id)
+        .limit(1)
+        .with_for_update(skip_locked=True)
+    )
+    job_id = session.scalar(oldest)
+    if job_id is None:
+        return None
+    session.execute(update(JobRow).where(JobRow.id == job_id).values(status="running", runner_id=runner_id))
+    return Claim(job_id, runner_id)
+
+
+def claimed(session: Session, runner_id: str) -> set[str]:
+    """Ids of the jobs that a runner is at."""
+    return set(session.scalars(select(JobRow.id).where(JobRow.runner_id == runner_id)))
+
+
+def start_stage(session: Session, claim: Claim, stage: str, seconds: Mapping[str, float]) -> None:
+    """Say in which stage a job is; ``seconds`` are those of the stages done. Raises ``ClaimLost``.
+
+    Until the end of the transaction nobody can take the job away.
+    """
+    _change_claimed(session, claim, stage=stage, seconds=dict(seconds))
 
 
 def requeue(session: Session, job_id: str) -> None:
-    """Put a job back into the queue, as if it had just been added."""
-    _change(session, job_id, status="queued", stage=None, reason=None, deaths=0, finished_at=None)
+    """Put a job that has ended back into the queue, as if it had just been added; nothing happens to another."""
+    changes = {"status": "queued", "stage": None, "reason": None, "deaths": 0, "finished_at": None}
+    session.execute(update(JobRow).where(JobRow.id == job_id, JobRow.finished_at.is_not(None)).values(**changes))
 
 
-def count_death(session: Session, job_id: str) -> Job:
-    """Count a worker that died under the job and put the job back into the queue."""
-    _change(session, job_id, status="queued", deaths=JobRow.deaths + 1)
+def release(session: Session, claim: Claim) -> None:
+    """Put a job that a runner cannot go on with back into the queue; raises ``ClaimLost``."""
+    _change_claimed(session, claim, status="queued", runner_id=None)
+
+
+def release_all(session: Session, runner_id: str) -> list[str]:
+    """Put every job of a runner back into the queue; returns their ids."""
+    freed = update(JobRow).where(JobRow.runner_id == runner_id).values(status="queued", runner_id=None)
+    return list(session.scalars(freed.returning(JobRow.id)))
+
+
+def count_death(session: Session, claim: Claim) -> Job:
+    """Count a worker process that died under the job; raises ``ClaimLost``."""
+    _change_claimed(session, claim, deaths=JobRow.deaths + 1)
+    return get(session, claim.job_id)
+
+
+def cancel(session: Session, job_id: str, reason: str) -> Job:
+    """End a job that has not ended yet: whoever is at it finds its claim lost. Raises ``NotFound``."""
+    changes = {"status": "cancelled", "reason": reason, "runner_id": None, "finished_at": now()}
+    session.execute(update(JobRow).where(JobRow.id == job_id, JobRow.finished_at.is_(None)).values(**changes))
     return get(session, job_id)
 
 
 def finish(
     session: Session,
-    job_id: str,
+    claim: Claim,
     status: JobStatus,
     *,
     reason: str | None = None,
     model_version: int | None = None,
     seconds: Mapping[str, float] | None = None,
 ) -> None:
-    """Close a job as done, failed or refused; a failed or refused one keeps the stage in which it ended."""
+    """Close a job as done, failed or refused; a failed or refused one keeps the stage in which it ended.
+
+    Raises ``ClaimLost``.
+    """
     changes: dict[str, object] = {"status": status, "reason": reason, "model_version": model_version}
     if status == "done":
         changes["stage"] = None
     if seconds is not None:
         changes["seconds"] = dict(seconds)
-    _change(session, job_id, finished_at=now(), **changes)
+    _change_claimed(session, claim, runner_id=None, finished_at=now(), **changes)
 
 
 def record(row: JobRow, material: str | None) -> Job:
@@ -111,5 +165,7 @@ def record(row: JobRow, material: str | None) -> Job:
     )
 
 
-def _change(session: Session, job_id: str, **values: object) -> None:
-    session.execute(update(JobRow).where(JobRow.id == job_id).values(**values))
+def _change_claimed(session: Session, claim: Claim, **values: object) -> None:
+    mine = (JobRow.id == claim.job_id, JobRow.runner_id == claim.runner_id)
+    if session.scalar(update(JobRow).where(*mine).values(**values).returning(JobRow.id)) is None:
+        raise ClaimLost(claim.job_id)

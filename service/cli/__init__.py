@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import typer
 
-from service.cli import database, keys, local, remote, running, simulation
+from service.cli import database, jobs, keys, local, remote, running, simulation
 from service.cli.exit_codes import exit_code
 
 app = typer.Typer(
@@ -20,6 +20,7 @@ app = typer.Typer(
 for command in (
     running.demo,
     running.serve,
+    running.worker,
     simulation.simulate,
     local.detect,
     local.fit,
@@ -29,6 +30,7 @@ for command in (
     remote.plan,
 ):
     app.command()(command)
+app.add_typer(jobs.app, name="jobs")
 app.add_typer(database.app, name="db")
 app.add_typer(keys.app, name="keys")
 

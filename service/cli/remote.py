@@ -21,8 +21,13 @@ MaterialName = Annotated[str, typer.Argument(help="Name of a material.")]
 Method = Annotated[str, typer.Option("--method", help="Which current model: ols or bayes.")]
 Velocity = Annotated[float, typer.Option("--velocity", help="Tangential velocity of the slip, m/s.")]
 
-CODE_OF_STATUS = {"failed": FAILURE, "refused": INPUT_REFUSED, "rejected": SERVICE_REFUSED}
-"""How an upload ended, as an exit code: our fault, data that allow no fit, a file that the service does not take."""
+CODE_OF_STATUS = {
+    "failed": FAILURE,
+    "refused": INPUT_REFUSED,
+    "rejected": SERVICE_REFUSED,
+    "cancelled": SERVICE_REFUSED,
+}
+"""How an upload ended, as an exit code: our fault, data that allow no fit, not wanted, a file that is not taken."""
 
 DEFAULT_URL = "http://127.0.0.1:8000"
 

@@ -1,31 +1,71 @@
-"""Commands that run a service: serve, demo."""
+"""Commands that run a service: serve, worker, demo."""
 
+import logging
+import signal
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from service.cli.exit_codes import FAILURE
 
+if TYPE_CHECKING:
+    from service.settings import Settings
+
+
+DataFolder = Annotated[Path | None, typer.Option(help="Folder of the raw uploads and the SQLite file.")]
+DatabaseUrl = Annotated[str | None, typer.Option(help="SQLAlchemy URL in place of that SQLite file.")]
+
 
 def serve(
     host: Annotated[str | None, typer.Option(help="Address to listen on.")] = None,
     port: Annotated[int | None, typer.Option(help="Port to listen on.")] = None,
-    data_folder: Annotated[Path | None, typer.Option(help="Folder of the raw uploads and the SQLite file.")] = None,
-    database_url: Annotated[str | None, typer.Option(help="SQLAlchemy URL in place of that SQLite file.")] = None,
+    data_folder: DataFolder = None,
+    database_url: DatabaseUrl = None,
 ) -> None:
     """Run the web service until it is told to stop (every setting: docs/settings.md)."""
     import uvicorn
 
     from service.serving import configuration
-    from service.settings import Settings
 
-    given: dict[str, Any] = {"host": host, "port": port, "data_folder": data_folder, "database_url": database_url}
-    settings = Settings(**{name: value for name, value in given.items() if value is not None})
+    settings = _settings(host=host, port=port, data_folder=data_folder, database_url=database_url)
     server = uvicorn.Server(configuration(settings))
     server.run()
     if not server.started:  # its log says why
         raise typer.Exit(FAILURE)
+
+
+def worker(
+    workers: Annotated[int | None, typer.Option(help="Worker processes, or jobs at once on a Dask cluster.")] = None,
+    data_folder: DataFolder = None,
+    database_url: DatabaseUrl = None,
+) -> None:
+    """Do the jobs of a service, without its web side, until told to stop (every setting: docs/settings.md)."""
+    import asyncio
+
+    settings = _settings(workers=workers, data_folder=data_folder, database_url=database_url)
+    if settings.workers == 0:
+        raise typer.BadParameter("workers is 0; allowed: 1 to 64")
+    logging.basicConfig(level=logging.INFO, format="%(levelname)s: %(message)s")
+    asyncio.run(_work(settings))
+
+
+async def _work(settings: "Settings") -> None:
+    """Take jobs until told to stop; raises ``SchemaMismatch`` once the database is of a newer version."""
+    import asyncio
+
+    from service.app import running
+
+    told = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, told.set)
+    async with running(settings) as context:
+        ends = [asyncio.ensure_future(end) for end in (told.wait(), context.jobs.until_outdated())]
+        done, waiting = await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+        for end in waiting:
+            end.cancel()
+    for end in done:
+        end.result()
 
 
 def demo(
@@ -39,3 +79,10 @@ def demo(
     from service.demo.run import run_demo
 
     run_demo(output, recordings, seed)
+
+
+def _settings(**given: Any) -> "Settings":
+    """Those of the environment, with what was given in their place."""
+    from service.settings import Settings
+
+    return Settings(**{name: value for name, value in given.items() if value is not None})

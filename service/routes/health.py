@@ -3,7 +3,7 @@
 from fastapi import APIRouter
 
 from service.context import Given
-from service.problems import STORAGE_UNAVAILABLE
+from service.problems import STORAGE_UNAVAILABLE, WORKERS_NOT_READY, Problem
 from service.routes.common import problems
 from service.schemas import HealthOut, ReadyOut
 
@@ -16,9 +16,11 @@ async def read_health() -> HealthOut:
     return HealthOut()
 
 
-@router.get("/readyz", summary="Can it take work?", responses=problems(STORAGE_UNAVAILABLE))
+@router.get("/readyz", summary="Can it take work?", responses=problems(STORAGE_UNAVAILABLE, WORKERS_NOT_READY))
 def read_readiness(context: Given) -> ReadyOut:
-    """Tries the database and the blob folder; the problem names what is missing."""
+    """Tries the database and the blob folder, and waits for the workers' warm-up; the problem names what is missing."""
     context.database.ping()
     context.blobs.ping()
+    if context.jobs.missing is not None:
+        raise Problem(WORKERS_NOT_READY, context.jobs.missing)
     return ReadyOut()

@@ -1,15 +1,36 @@
 """Jobs."""
 
-from fastapi import APIRouter
+from typing import Annotated
 
+from fastapi import APIRouter, Query
+
+from db.records import JobStatus
 from db.repositories import jobs
-from service.access import READ
+from service.access import READ, UPLOAD
 from service.context import Given
-from service.problems import INVALID_REQUEST, STORAGE_UNAVAILABLE, UNKNOWN_JOB
+from service.problems import INVALID_REQUEST, JOB_ENDED, STORAGE_UNAVAILABLE, UNKNOWN_JOB
 from service.routes.common import problems
-from service.schemas import JobOut
+from service.schemas import JobOut, JobsOut
+from service.use_cases.cancel import cancel
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+
+MOST_JOBS = 1000
+"""Jobs in one answer."""
+
+
+@router.get("", dependencies=[READ], summary="List jobs", responses=problems(INVALID_REQUEST, STORAGE_UNAVAILABLE))
+def list_jobs(
+    context: Given,
+    status: Annotated[JobStatus | None, Query(description="Only those of it, such as `failed`")] = None,
+    limit: Annotated[int, Query(ge=1, le=MOST_JOBS, description="So many at most")] = 100,
+) -> JobsOut:
+    """Newest first, each with how far it is and why it ended."""
+    with context.database.read() as session:
+        found = jobs.list_newest(session, status, limit)
+    for ended in (job.finished_at for job in found if job.finished_at is not None):
+        context.models.seen(ended)
+    return JobsOut(items=[JobOut.of(job) for job in found])
 
 
 @router.get(
@@ -25,3 +46,14 @@ def read_job(context: Given, id: str) -> JobOut:  # noqa: A002  (the path's own 
     if job.finished_at is not None:
         context.models.seen(job.finished_at)
     return JobOut.of(job)
+
+
+@router.post(
+    "/{id}/cancel",
+    dependencies=[UPLOAD],
+    summary="Cancel a job",
+    responses=problems(UNKNOWN_JOB, JOB_ENDED, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+def cancel_job(context: Given, id: str) -> JobOut:  # noqa: A002
+    """It stores nothing more; a worker that is at it turns to the next one after the stage that it is in."""
+    return JobOut.of(cancel(context, id))

@@ -99,6 +99,6 @@ def _queue_refits(session: Session, material_id: int, methods: Iterable[str]) ->
 def _follow_up(context: Context, queued: list[Job]) -> list[Job]:
     """Tell those who hold models, and those who make them."""
     context.models.seen()
-    for job in queued:
-        context.jobs.submit(job.id)
+    if queued:
+        context.jobs.wake()
     return queued

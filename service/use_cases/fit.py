@@ -8,17 +8,13 @@ from service.schemas import JobOut
 
 def request_fit(context: Context, material: str, method: str, seed: int, once: Once | None) -> Answer:
     """Queue a fit over all samples of a material; raises ``NotFound`` for an unknown one."""
-    queued: list[str] = []
-
     with context.database.write() as session:
 
         def queue() -> Answer:
             material_id = materials.find_id(session, material)
-            queued.append(jobs.add(session, "fit", method, material_id=material_id, seed=seed))
-            job = jobs.get(session, queued[0])
+            job = jobs.get(session, jobs.add(session, "fit", method, material_id=material_id, seed=seed))
             return Answer(202, f"/v1/jobs/{job.id}", JobOut.of(job).model_dump(mode="json"))
 
         answer = answer_once(session, once, queue)
-    for job_id in queued:
-        context.jobs.submit(job_id)
+    context.jobs.wake()
     return answer

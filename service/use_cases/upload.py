@@ -139,26 +139,23 @@ def _sensor_name(name: str) -> str:
 def _store(context: Context, spool: Spool, log: NewGraspLog, once: Once | None) -> Answer:
     """First the blob, durably, then the rows that refer to it."""
     spool.keep()
-    queued: list[str] = []
     with context.database.write() as session:
-        answer = answer_once(session, once, lambda: _accept(session, log, queued))
-    for job_id in queued:
-        context.jobs.submit(job_id)
+        answer = answer_once(session, once, lambda: _accept(session, log))
+    context.jobs.wake()
     return answer
 
 
-def _accept(session: Session, log: NewGraspLog, queued: list[str]) -> Answer:
-    """Store a new log with its job; a known one whose job failed, which is our fault, gets another try."""
+def _accept(session: Session, log: NewGraspLog) -> Answer:
+    """Store a new log with its job; a known one whose job failed, which is our fault, or was cancelled gets another."""
     if log.material_id is not None:  # it may have been merged into another while the log came in
         log = replace(log, material_id=materials.still(session, log.material_id))
     try:
         log_id, status = grasp_logs.add(session, log), 202
-        queued.append(jobs.add(session, "ingest", "ols", material_id=log.material_id, grasp_log_id=log_id))
+        jobs.add(session, "ingest", "ols", material_id=log.material_id, grasp_log_id=log_id)
     except AlreadyExists:
         log_id, status = grasp_logs.find_id(session, log.sha256, log.material_id, log.detector), 200
         job = grasp_logs.get(session, log_id).job
-        if job.status == "failed":
+        if job.status in {"failed", "cancelled"}:
             jobs.requeue(session, job.id)
-            queued.append(job.id)
     body = GraspLogOut.of(grasp_logs.get(session, log_id)).model_dump(mode="json")
     return Answer(status, f"/v1/grasp-logs/{log_id}", body)

@@ -16,6 +16,7 @@ from stiction_client import (
     FrictionClient,
     GraspLogReceipt,
     InvalidArgument,
+    JobCancelled,
     JobFailed,
     JobRefused,
     JobTimedOut,
@@ -209,6 +210,19 @@ def test_the_end_of_a_job_is_an_answer_that_can_be_raised(answers: SimpleNamespa
         stiction_client.Job.from_json(answers.job | {"status": "refused", "reason": "no slip"}).raise_for_status()
     with pytest.raises(JobFailed, match="job j1: failed"):
         stiction_client.Job.from_json(answers.job | {"status": "failed"}).raise_for_status()
+    with pytest.raises(JobCancelled, match="job j1: cancelled"):
+        stiction_client.Job.from_json(answers.job | {"status": "cancelled"}).raise_for_status()
+
+
+def test_jobs_are_listed_and_cancelled(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
+    server = service({"items": [answers.job]}, answers.job | {"status": "cancelled"})
+    assert [job.id for job in ask(server, "jobs", status="failed", limit=5)] == ["j1"]
+    cancelled = ask(server, "cancel", "j1")
+    assert cancelled.ended
+    assert [(request.method, str(request.url.raw_path, "ascii")) for request in server.requests] == [
+        ("GET", "/v1/jobs?status=failed&limit=5"),
+        ("POST", "/v1/jobs/j1/cancel"),
+    ]
 
 
 def test_the_key_is_sent_as_a_bearer_token(ask: Ask, service: Service) -> None:

@@ -10,7 +10,7 @@ from sqlalchemy.exc import StatementError
 
 from db.database import Database
 from db.errors import DriverMissing, StorageUnavailable
-from db.records import NewGraspLog, NewModel
+from db.records import Claim, NewGraspLog, NewModel
 from db.repositories import friction_models, grasp_logs, jobs, materials
 from db.tables import JobRow
 
@@ -223,11 +223,27 @@ def test_a_driver_that_is_not_installed_is_named(monkeypatch: pytest.MonkeyPatch
         Database("postgresql://u:secret@h/d")
 
 
-def test_a_number_that_json_does_not_know_is_refused(database: Database) -> None:
+@pytest.mark.parametrize("durable", [True, False])
+def test_only_a_durable_transaction_waits_for_the_disk(database: Database, durable: bool) -> None:
+    asked = "PRAGMA synchronous" if database.is_sqlite else "SHOW synchronous_commit"
+    with database.write() as session:
+        if not database.is_sqlite:  # the tests' own server makes no promise for power cuts
+            session.execute(text("SET synchronous_commit = on"))
+        full = session.execute(text(asked)).scalar()
+    with database.write(durable=durable) as session:
+        assert (session.execute(text(asked)).scalar() == full) is durable
+        materials.create(session, "paper", "")
+    with database.write() as session:
+        assert session.execute(text(asked)).scalar() == full
+        assert materials.find_id(session, "paper")
+
+
+def test_a_number_that_json_does_not_know_is_refused(database: Database, claim: Callable[[], Claim]) -> None:
     with database.write() as session:
         job = jobs.add(session, "fit", "ols", material_id=materials.create(session, "paper", "").id, seed=2**63 - 1)
+    mine = claim()
     with pytest.raises((StatementError, ValueError), match="not JSON compliant"), database.write() as session:
-        jobs.start_stage(session, job, "frames", {"frames": float("nan")})
+        jobs.start_stage(session, mine, "frames", {"frames": float("nan")})
     with database.read() as session:
         assert (jobs.get(session, job).seed, session.get_one(JobRow, job).seconds) == (2**63 - 1, {})
 

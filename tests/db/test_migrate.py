@@ -12,8 +12,17 @@ from sqlalchemy import inspect, text
 from db import migrate
 from db.database import Database
 from db.errors import SchemaMismatch, StorageUnavailable
-from db.records import Detection, NewGraspLog, NewModel, SampleSummary
-from db.repositories import access_keys, detections, friction_models, grasp_logs, idempotency_keys, jobs, materials
+from db.records import Claim, Detection, NewGraspLog, NewModel, SampleSummary
+from db.repositories import (
+    access_keys,
+    detections,
+    friction_models,
+    grasp_logs,
+    idempotency_keys,
+    jobs,
+    materials,
+    runners,
+)
 from db.tables import Base
 
 ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -30,6 +39,7 @@ def fill(database: Database, log: NewGraspLog, detection: Detection, samples: Sa
         friction_models.add(session, material.id, job, model)
         idempotency_keys.claim(session, "", "once", log.sha256, timedelta(hours=1))
         access_keys.add(session, "0" * 12, "robot", "read", log.sha256)
+        assert jobs.claim(session, runners.add(session, "host:1")) == Claim(job, runners.list_all(session)[0].id)
 
 
 def tables(database: Database) -> set[str]:
@@ -105,6 +115,47 @@ def test_materials_of_before_aliases_are_found_by_name_and_merged_ones_stop_the_
     with pytest.raises(RuntimeError, match="1 materials were merged"):
         migrate.downgrade(empty_database, "0002")
     assert migrate.current(empty_database) == "0003"
+
+
+def test_a_database_of_before_claims_keeps_its_jobs_and_models(
+    database: Database,
+    new_log: Callable[..., NewGraspLog],
+    detection: Detection,
+    samples: SampleSummary,
+    new_model: Callable[..., NewModel],
+) -> None:
+    fill(database, new_log(material_id=1), detection, samples, new_model())
+    with database.write() as session:
+        material = materials.find_id(session, "paper")
+        unwanted = jobs.add(session, "fit", "ols", material_id=material)
+        jobs.cancel(session, unwanted, "no longer wanted")
+        models = friction_models.versions(session, material, None)
+    migrate.downgrade(database, "0004")
+    with database.read() as session:
+        assert set(session.execute(text("SELECT status, reason FROM jobs")).all()) == {
+            ("running", None),  # until an older server takes it up
+            ("failed", "no longer wanted"),
+        }
+    migrate.upgrade(database)
+    migrate.check(database)
+    with database.write() as session:
+        assert sorted(job.status for job in jobs.list_newest(session, None, 9)) == ["failed", "queued"]
+        assert friction_models.versions(session, material, None) == models
+        stored = detections.samples_of_material(session, material)
+        assert [found.moments for found in stored] == [None]
+        detections.set_moments(session, stored[0].grasp_log_id, b"moments")
+        assert detections.samples_of_material(session, material)[0].moments == b"moments"
+
+
+def test_a_database_of_a_newer_version_is_refused_by_name(database: Database) -> None:
+    with database.write() as session:
+        migrate.require_head(session)
+        session.execute(text("UPDATE alembic_version SET version_num = '9999'"))
+    for step in (migrate.check, migrate.upgrade):
+        with pytest.raises(SchemaMismatch, match=r"9999; allowed: at most .*run a newer version"):
+            step(database)
+    with database.read() as session, pytest.raises(SchemaMismatch, match="run a newer version"):
+        migrate.require_head(session)
 
 
 def test_upgrading_again_changes_nothing(database: Database) -> None:

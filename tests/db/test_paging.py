@@ -7,7 +7,7 @@ from sqlalchemy import update
 from db.database import Database
 from db.paging import Window
 from db.records import LogFilter, NewGraspLog, NewModel
-from db.repositories import friction_models, grasp_logs, jobs, materials
+from db.repositories import friction_models, grasp_logs, jobs, materials, runners
 from db.tables import GraspLogRow, MaterialRow, now
 
 NAMES = ("steel", "Paper", "paper", "felt", "zinc")
@@ -77,7 +77,10 @@ def test_logs_are_listed_by_what_is_wanted_of_them(
         paper = materials.create(session, "paper", "").id
         ids = [grasp_logs.add(session, new_log(material)) for material in (paper, None, paper)]
         made = [jobs.add(session, "ingest", "ols", material_id=None, grasp_log_id=log) for log in ids]
-        jobs.finish(session, made[0], "refused", reason="no slip")
+        mine = jobs.claim(session, runners.add(session, "host:1"))
+        assert mine is not None
+        assert mine.job_id == made[0]
+        jobs.finish(session, mine, "refused", reason="no slip")
         grasp_logs.withdraw(session, ids[2], "wet")
         session.execute(update(GraspLogRow).values(created_at=now()))
     with database.read() as session:

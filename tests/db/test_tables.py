@@ -52,10 +52,21 @@ def test_a_row_cannot_refer_to_a_material_that_is_not_there(database: Database) 
         {"kind": "guess"},
         {"status": "failed", "finished_at": datetime.now(UTC)},
         {"status": "done"},
+        {"status": "cancelled", "finished_at": datetime.now(UTC)},
+        {"status": "running"},
         {"kind": "ingest"},
         {"material_id": None},
     ],
-    ids=["status", "kind", "failed without reason", "done without end", "ingest without log", "fit without material"],
+    ids=[
+        "status",
+        "kind",
+        "failed without reason",
+        "done without end",
+        "cancelled without reason",
+        "running without runner",
+        "ingest without log",
+        "fit without material",
+    ],
 )
 def test_the_database_refuses_a_job_that_cannot_be(database: Database, wrong: dict[str, Any]) -> None:
     with database.write() as session:

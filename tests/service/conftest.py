@@ -19,6 +19,8 @@ from fastapi import FastAPI
 from db import migrate
 from db.blobs import BlobStore
 from db.database import Database
+from db.records import Claim
+from db.repositories import jobs, runners
 from service.app import create_app
 from service.context import Context
 from service.model_cache import ModelCache
@@ -44,10 +46,12 @@ def serve(settings: Settings) -> Iterator[httpx.Client]:
         assert thread.is_alive(), "the server did not start"
         time.sleep(0.005)
     port = server.servers[0].sockets[0].getsockname()[1]
-    with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60.0) as client:
-        yield client
-    server.should_exit = True
-    thread.join()
+    try:
+        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60.0) as client:
+            yield client
+    finally:
+        server.should_exit = True
+        thread.join()
 
 
 @dataclass
@@ -119,6 +123,8 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
     folder = tmp_path_factory.mktemp("served")
     with serve(Settings(data_folder=folder, max_upload_bytes=2 * 2**20)) as client:
         client.headers["x-data-folder"] = str(folder)
+        while client.get("/readyz").status_code != httpx.codes.OK:
+            time.sleep(0.01)
         yield client
 
 
@@ -202,6 +208,19 @@ def database(new_url: Callable[..., str], tmp_path: Path) -> Iterator[Database]:
     migrate.upgrade(database)
     yield database
     database.close()
+
+
+@pytest.fixture
+def claim(database: Database) -> Callable[[], Claim]:
+    """Give the oldest queued job to a runner of its own."""
+
+    def make() -> Claim:
+        with database.write() as session:
+            made = jobs.claim(session, runners.add(session, "host:1"))
+        assert made is not None
+        return made
+
+    return make
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@ import multiprocessing
 import os
 import shutil
 import signal
+import threading
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, closing
@@ -11,7 +12,7 @@ from typing import Any
 
 import httpx
 import pytest
-from sqlalchemy import delete
+from sqlalchemy import delete, update
 
 import estimators
 import slipcore
@@ -20,9 +21,9 @@ from db.blobs import BlobStore
 from db.database import Database
 from db.errors import SchemaMismatch
 from db.repositories import jobs
-from db.tables import FrictionModelRow
+from db.tables import FrictionModelRow, JobRow
 from service.app import create_app, running
-from service.folder_lock import FolderInUse
+from service.lanes import ProcessLane
 from service.settings import Settings
 from slipcore.contact.ramp import tangential_ramp
 from stiction_client.container import encode
@@ -37,10 +38,38 @@ async def start_and_stop(settings: Settings) -> None:
         pass
 
 
-def test_a_folder_in_use_stops_the_start(serving: Serving, tmp_path: Path) -> None:
-    settings = Settings(data_folder=tmp_path, shutdown_seconds=0)
-    with serving(settings), pytest.raises(FolderInUse):
-        asyncio.run(start_and_stop(settings))
+def test_two_servers_share_a_folder_and_only_one_that_is_alone_sweeps(
+    serving: Serving, tmp_path: Path, upload: Upload, content: bytes
+) -> None:
+    settings = Settings(data_folder=tmp_path, workers=0)
+    with serving(settings) as client:
+        log = upload(client, content).raise_for_status().json()
+        left = tmp_path / "spool" / "under way"
+        left.write_bytes(b"half an upload")
+        with serving(settings) as other:
+            assert other.get(f"/v1/grasp-logs/{log['id']}").json() == log
+            assert left.exists()
+    asyncio.run(start_and_stop(settings))
+    assert not left.exists()
+
+
+def test_a_server_is_ready_once_its_workers_are_warm(
+    serving: Serving, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    warm = threading.Event()
+
+    async def hire(_: ProcessLane) -> None:
+        await asyncio.to_thread(warm.wait)
+
+    monkeypatch.setattr(ProcessLane, "hire", hire)
+    with serving(Settings(data_folder=tmp_path)) as client:
+        cold = client.get("/readyz")
+        assert (cold.status_code, cold.json()["type"]) == (503, "/problems/workers-not-ready")
+        assert cold.json()["detail"] == "1 of 1 workers warm up"
+        assert client.get("/healthz").status_code == httpx.codes.OK
+        warm.set()
+        while client.get("/readyz").status_code != httpx.codes.OK:
+            time.sleep(0.001)
 
 
 def test_an_old_schema_stops_the_start_where_it_must_not_be_changed(tmp_path: Path) -> None:
@@ -52,7 +81,7 @@ def test_a_start_brings_the_schema_up_and_sweeps_what_nothing_refers_to(serving:
     blobs = BlobStore(tmp_path)
     blobs.put(b"stored, but the server died before its row was")
     (tmp_path / "spool" / "left").write_bytes(b"half an upload")
-    settings = Settings(data_folder=tmp_path, shutdown_seconds=0)
+    settings = Settings(data_folder=tmp_path, workers=0)
     with serving(settings) as client:
         assert client.get("/readyz").status_code == httpx.codes.OK
         assert list(blobs.hashes()) == []
@@ -98,9 +127,10 @@ def test_a_log_whose_job_failed_gets_another_try_when_it_is_sent_again(
     first = upload(client, content, material=material).json()
     assert wait(client, first["job"]["id"])["status"] == "done"
     database = Database(f"sqlite:///{client.headers['x-data-folder']}/stiction.sqlite3")
+    failed = {"status": "failed", "reason": "the worker process died 3 times"}
     with database.write() as session:  # as if the job had failed before it stored its model
         session.execute(delete(FrictionModelRow).where(FrictionModelRow.job_id == first["job"]["id"]))
-        jobs.finish(session, first["job"]["id"], "failed", reason="the worker process died 3 times")
+        session.execute(update(JobRow).where(JobRow.id == first["job"]["id"]).values(failed))
     database.close()
     again = upload(client, content, material=material)
     assert (again.status_code, again.json()["job"]["status"]) == (200, "queued")

@@ -226,6 +226,19 @@ def test_a_setting_out_of_range_is_refused_by_name(run: Run) -> None:
     assert "port" in err
 
 
+def test_a_worker_without_workers_is_wrong_usage(run: Run) -> None:
+    assert run("worker", "--workers", 0)[0] == WRONG_USAGE
+
+
+def test_jobs_are_listed_and_one_that_has_ended_is_not_cancelled(run: Run, url: str, ramps: list[Path]) -> None:
+    run("upload", ramps[0], "--material", "of the jobs", "--create", "--url", url)
+    listed = json.loads(run("jobs", "list", "--status", "done", "--limit", 1, "--url", url, "--json")[1])["jobs"]
+    assert [(job["status"], job["material"]) for job in listed] == [("done", "of the jobs")]
+    assert "of the jobs" in run("jobs", "list", "--url", url)[1]
+    code, _, err = run("jobs", "cancel", listed[0]["id"], "--url", url)
+    assert (code, "cannot be cancelled" in err) == (SERVICE_REFUSED, True)
+
+
 def test_an_argument_that_cannot_be_is_refused_before_anything_is_asked(run: Run, url: str) -> None:
     run("upload", "--help")
     code, _, err = run("lookup", "..", "--url", url)

@@ -1,13 +1,27 @@
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
-from service.folder_lock import FolderInUse, locked
+from service.folder_lock import shared
 
 
-def test_a_folder_has_one_server_at_a_time(tmp_path: Path) -> None:
+def test_a_process_knows_whether_it_is_alone_in_a_folder(tmp_path: Path) -> None:
     folder = tmp_path / "new"
-    with locked(folder), pytest.raises(FolderInUse, match="in use by another server"), locked(folder):
-        raise AssertionError("two servers in one folder")
-    with locked(folder):
+    alone: list[bool] = []
+    with shared(folder, alone.append), shared(folder, alone.append), shared(folder, alone.append):
         assert folder.is_dir()
+    with shared(folder, alone.append):
+        pass
+    assert alone == [True, False, False, True]
+
+
+def test_a_process_that_cannot_enter_leaves_the_folder_to_others(tmp_path: Path) -> None:
+    def fail(_: bool) -> None:
+        raise ValueError
+
+    alone: list[bool] = []
+    with suppress(ValueError), shared(tmp_path, fail):
+        pytest.fail("it did not enter")
+    with shared(tmp_path, alone.append):
+        assert alone == [True]

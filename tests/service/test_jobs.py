@@ -1,22 +1,42 @@
 import asyncio
+import time
 from collections import Counter
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from pathlib import Path
+from typing import Any
 
 import pytest
+from sqlalchemy import text
 
 from db.database import Database
 from db.errors import StorageUnavailable
-from db.records import Job
-from db.repositories import jobs, materials
-from service import worker
-from service.jobs import JobPool
-from service.worker import Place
+from db.records import Claim, Job
+from db.repositories import jobs, materials, runners
+from service.jobs import LOOKS, JobRunner, Watch
+from service.lanes import WorkerDied
 
-Do = Callable[[Place, str], None]
+Do = Callable[[Claim], None]
 ATTEMPTS = 3
+LEASE_SECONDS = 0.1
+
+
+class ThreadLane:
+    """A lane whose worker is a thread that does what it is told to."""
+
+    def __init__(self, do: Do) -> None:
+        self._do = do
+        self.hired = 0
+
+    async def hire(self) -> None:
+        self.hired += 1
+
+    async def run(self, claim: Claim) -> None:
+        await asyncio.to_thread(self._do, claim)
+
+    def kill(self) -> None:
+        pass
+
+    async def close(self) -> None:
+        pass
 
 
 @pytest.fixture
@@ -27,22 +47,26 @@ def queued(database: Database) -> list[str]:
 
 
 @pytest.fixture
-def working(database: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
-    """Run a pool whose workers are threads that ``do``, while ``meanwhile`` goes on."""
-    monkeypatch.setattr("service.jobs.ProcessPoolExecutor", lambda *_: ThreadPoolExecutor(1))
+def working(database: Database, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Let runners ``do`` jobs in threads, while ``meanwhile`` goes on."""
     monkeypatch.setattr("service.jobs.RETRY_SECONDS", 0.001)
-    monkeypatch.setattr(worker, "warm_up", lambda: None)
 
-    def run(do: Do, meanwhile: Callable[[JobPool], object], workers: int = 2) -> None:
-        monkeypatch.setattr(worker, "run_job", do)
-
+    def run(do: Do, meanwhile: Callable[..., object], workers: int = 2, runners: int = 1, **options: Any) -> None:
         async def live() -> None:
-            pool = JobPool(
-                database, Place(database.url, tmp_path), workers=workers, attempts=ATTEMPTS, shutdown_seconds=5.0
-            )
-            await pool.start()
-            await asyncio.to_thread(meanwhile, pool)
-            await pool.stop()
+            given = {
+                "attempts": ATTEMPTS,
+                "lease_seconds": LEASE_SECONDS,
+                "poll_seconds": 0.01,
+                "shutdown_seconds": 5.0,
+            }
+            all_of_them = [
+                JobRunner(database, [ThreadLane(do) for _ in range(workers)], **given | options) for _ in range(runners)
+            ]
+            for runner in all_of_them:
+                await runner.start()
+            await asyncio.to_thread(meanwhile, *all_of_them)
+            for runner in all_of_them:
+                await runner.stop()
 
         asyncio.run(live())
 
@@ -54,57 +78,67 @@ def get(database: Database, job_id: str) -> Job:
         return jobs.get(session, job_id)
 
 
-def finish(database: Database, job_id: str) -> None:
+def finish(database: Database, claim: Claim) -> None:
     with database.write() as session:
-        jobs.finish(session, job_id, "done")
+        jobs.finish(session, claim, "done")
 
 
-def until_finished(database: Database, ids: list[str]) -> Callable[[JobPool], None]:
-    def wait(_: JobPool) -> None:
-        for _ in range(2000):
-            if all(get(database, job_id).finished_at for job_id in ids):
-                return
-            asyncio.run(asyncio.sleep(0.005))
-        raise AssertionError("jobs do not end")
-
-    return wait
+def wait_until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 30.0
+    while not condition():
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.005)
 
 
-def test_jobs_left_from_before_are_taken_up_oldest_first(
-    database: Database, queued: list[str], working: Callable[..., None]
-) -> None:
+def until_finished(database: Database, ids: list[str]) -> Callable[..., None]:
+    return lambda *_: wait_until(lambda: all(get(database, job_id).finished_at for job_id in ids))
+
+
+def test_jobs_are_taken_up_oldest_first(database: Database, queued: list[str], working: Callable[..., None]) -> None:
     with database.write() as session:
-        jobs.start_stage(session, queued[0], "samples", {})
-        jobs.finish(session, queued[1], "failed", reason="bug")
+        jobs.cancel(session, queued[1], "no longer wanted")
     begun: list[str] = []
 
-    def do(_: Place, job_id: str) -> None:
-        begun.append(job_id)
-        finish(database, job_id)
+    def do(claim: Claim) -> None:
+        begun.append(claim.job_id)
+        finish(database, claim)
 
     working(do, until_finished(database, queued), workers=1)
     assert begun == [queued[0], queued[2], queued[3]]
-    assert get(database, queued[1]).status == "failed"
+    assert get(database, queued[1]).status == "cancelled"
 
 
-def test_a_submitted_job_is_done(database: Database, queued: list[str], working: Callable[..., None]) -> None:
+def test_runners_share_the_jobs_and_each_is_done_once(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
     with database.write() as session:
-        extra = jobs.add(session, "fit", "ols", material_id=materials.find_id(session, "paper"))
-        jobs.finish(session, extra, "failed", reason="bug")
-    done: list[str] = []
+        material = materials.find_id(session, "paper")
+        ids = queued + [jobs.add(session, "fit", "ols", material_id=material) for _ in range(20)]
+    done: list[Claim] = []
 
-    def do(_: Place, job_id: str) -> None:
-        done.append(job_id)
-        finish(database, job_id)
+    def do(claim: Claim) -> None:
+        done.append(claim)
+        time.sleep(0.005)
+        finish(database, claim)
 
-    def submit(pool: JobPool) -> None:
+    working(do, until_finished(database, ids), runners=2, lease_seconds=10.0)
+    assert sorted(claim.job_id for claim in done) == sorted(ids)
+    assert len({claim.runner_id for claim in done}) == 2
+    with database.read() as session:
+        assert runners.list_all(session) == []
+
+
+def test_a_job_that_is_stored_is_begun_at_once_when_the_runner_is_woken(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    def store(runner: JobRunner) -> None:
+        until_finished(database, queued)(runner)
         with database.write() as session:
-            jobs.requeue(session, extra)
-        pool.submit(extra)
-        until_finished(database, [*queued, extra])(pool)
+            extra = jobs.add(session, "fit", "ols", material_id=materials.find_id(session, "paper"))
+        runner.wake()
+        until_finished(database, [extra])(runner)
 
-    working(do, submit)
-    assert sorted(done) == sorted([*queued, extra])
+    working(lambda claim: finish(database, claim), store, poll_seconds=60.0, lease_seconds=600.0)
 
 
 def test_a_job_that_loses_its_worker_is_tried_again_and_then_has_failed(
@@ -113,13 +147,13 @@ def test_a_job_that_loses_its_worker_is_tried_again_and_then_has_failed(
     poison, unlucky, *fine = queued
     tries: Counter[str] = Counter()
 
-    def do(_: Place, job_id: str) -> None:
-        tries[job_id] += 1
-        if job_id == poison or (job_id == unlucky and tries[job_id] == 1):
+    def do(claim: Claim) -> None:
+        tries[claim.job_id] += 1
+        if claim.job_id == poison or (claim.job_id == unlucky and tries[claim.job_id] == 1):
             with database.write() as session:
-                jobs.start_stage(session, job_id, "slip_state", {})
-            raise BrokenProcessPool("killed")
-        finish(database, job_id)
+                jobs.start_stage(session, claim, "slip_state", {})
+            raise WorkerDied
+        finish(database, claim)
 
     working(do, until_finished(database, queued))
     assert tries == {poison: ATTEMPTS, unlucky: 2} | dict.fromkeys(fine, 1)
@@ -132,9 +166,9 @@ def test_a_job_that_loses_its_worker_is_tried_again_and_then_has_failed(
 def test_a_worker_that_dies_after_the_end_of_its_job_changes_nothing(
     database: Database, queued: list[str], working: Callable[..., None]
 ) -> None:
-    def do(_: Place, job_id: str) -> None:
-        finish(database, job_id)
-        raise BrokenProcessPool("killed")
+    def do(claim: Claim) -> None:
+        finish(database, claim)
+        raise WorkerDied
 
     working(do, until_finished(database, queued))
     assert {get(database, job_id).status for job_id in queued} == {"done"}
@@ -146,44 +180,114 @@ def test_a_job_waits_for_storage_without_losing_an_attempt(
 ) -> None:
     tries: Counter[str] = Counter()
 
-    def do(_: Place, job_id: str) -> None:
-        tries[job_id] += 1
-        if tries[job_id] <= 2 * ATTEMPTS:
+    def do(claim: Claim) -> None:
+        tries[claim.job_id] += 1
+        if tries[claim.job_id] <= ATTEMPTS:
             raise StorageUnavailable("database is locked")
-        finish(database, job_id)
+        finish(database, claim)
 
     working(do, until_finished(database, queued))
-    assert set(tries.values()) == {2 * ATTEMPTS + 1}
+    assert set(tries.values()) == {ATTEMPTS + 1}
     assert {get(database, job_id).deaths for job_id in queued} == {0}
 
 
-def test_stopping_leaves_what_has_not_begun_for_the_next_start(
+def test_jobs_of_a_runner_that_is_silent_are_done_by_another_one(
+    database: Database, queued: list[str], working: Callable[..., None], claim: Callable[[], Claim]
+) -> None:
+    dead = [claim(), claim()]
+    done: list[str] = []
+
+    def do(claim: Claim) -> None:
+        done.append(claim.job_id)
+        finish(database, claim)
+
+    working(do, until_finished(database, queued))
+    assert sorted(done) == sorted(queued)
+    assert done[-2:] == [lost.job_id for lost in dead]
+    assert {get(database, job_id).deaths for job_id in queued} == {0}
+
+
+def test_a_runner_that_was_taken_for_dead_goes_on_under_a_new_name(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    claims: list[Claim] = []
+
+    def do(claim: Claim) -> None:
+        claims.append(claim)
+        if len(claims) == 1:
+            with database.write() as session:
+                assert runners.remove(session, claim.runner_id) == [claim.job_id]
+        else:
+            finish(database, claim)
+
+    working(do, until_finished(database, queued), workers=1)
+    assert len({claim.runner_id for claim in claims}) == 2
+    assert Counter(claim.job_id for claim in claims) == {queued[0]: 2} | dict.fromkeys(queued[1:], 1)
+
+
+def test_stopping_leaves_what_has_not_begun_to_others(
     database: Database, queued: list[str], working: Callable[..., None]
 ) -> None:
     begun: list[str] = []
 
-    def do(_: Place, job_id: str) -> None:
-        begun.append(job_id)
-        asyncio.run(asyncio.sleep(0.3))
-        finish(database, job_id)
+    def do(claim: Claim) -> None:
+        begun.append(claim.job_id)
+        time.sleep(0.3)
+        finish(database, claim)
 
-    def until_begun(_: JobPool) -> None:
-        while len(begun) < 2:
-            asyncio.run(asyncio.sleep(0.001))
-
-    working(do, until_begun)
+    working(do, lambda _: wait_until(lambda: len(begun) == 2), lease_seconds=10.0)
     assert sorted(begun) == sorted(queued[:2])
     assert [get(database, job_id).status for job_id in queued] == ["done", "done", "queued", "queued"]
+
+
+def test_a_job_that_does_not_end_in_time_is_left_to_others_by_a_stopping_runner(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    begun: list[str] = []
+
+    def do(claim: Claim) -> None:
+        begun.append(claim.job_id)
+        time.sleep(0.3)
+
+    working(do, lambda _: wait_until(lambda: len(begun) == 1), workers=1, shutdown_seconds=0.05)
+    assert {get(database, job_id).status for job_id in queued} == {"queued"}
+    assert {get(database, job_id).deaths for job_id in queued} == {0}
 
 
 def test_a_lane_outlives_what_a_job_throws_at_it(
     database: Database, queued: list[str], working: Callable[..., None]
 ) -> None:
-    def do(_place: Place, job_id: str) -> None:
-        if job_id == queued[0]:
+    def do(claim: Claim) -> None:
+        if claim.job_id == queued[0]:
             raise RuntimeError("database disk image is malformed")
-        finish(database, job_id)
+        finish(database, claim)
 
     working(do, until_finished(database, queued), workers=1)
     assert [get(database, job_id).status for job_id in queued] == ["failed", "done", "done", "done"]
     assert "malformed" in (get(database, queued[0]).reason or "")
+
+
+def test_a_runner_takes_no_jobs_of_a_newer_schema_and_says_so(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    with database.write() as session:
+        session.execute(text("UPDATE alembic_version SET version_num = '9999'"))
+    said: list[str | None] = []
+
+    def note(*runners: JobRunner) -> None:
+        wait_until(lambda: all("newer" in (runner.missing or "") for runner in runners))
+        said.extend(runner.missing for runner in runners)
+
+    working(lambda claim: finish(database, claim), note)
+    working(lambda claim: finish(database, claim), note, workers=0)  # a server without workers
+    assert [reason and "run a newer version" in reason for reason in said] == [True, True]
+    assert {get(database, job_id).status for job_id in queued} == {"queued"}
+
+
+def test_a_runner_is_dead_once_its_beats_stand_still() -> None:
+    watch = Watch(LOOKS)
+    for look in range(LOOKS):
+        assert watch.look({"dead": 7, "alive": look, "slow": look // 2}) == []
+    assert watch.look({"dead": 7, "alive": LOOKS, "slow": LOOKS // 2}) == ["dead"]
+    assert watch.look({"alive": 9, "new": 0}) == []
+    assert watch.look({"dead": 7}) == []  # seen anew

@@ -1,16 +1,21 @@
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
+from sqlalchemy import select, update
 
 import estimators
 import slipcore
 from db.blobs import BlobStore
 from db.database import Database
-from db.records import Detection, Job, Material, NewGraspLog, StoredGraspLog
-from db.repositories import detections, friction_models, grasp_logs, jobs, materials
+from db.errors import ClaimLost
+from db.records import Claim, Detection, Job, Material, NewGraspLog, StoredGraspLog
+from db.repositories import detections, friction_models, grasp_logs, jobs, materials, runners
+from db.tables import JobRow, SampleSummaryRow
+from estimators import Moments
 from service import pipeline
 from service.stored_results import SAMPLE_ARRAYS, encode_samples, summarise_samples
 from slipcore import FrictionSamples, GraspLog
@@ -35,12 +40,24 @@ class Shop:
             log_id = grasp_logs.add(session, log)
             return log_id, jobs.add(session, "ingest", "ols", material_id=self.material_id, grasp_log_id=log_id)
 
-    def fit(self) -> str:
+    def fit(self, method: str = "ols") -> str:
         with self.database.write() as session:
-            return jobs.add(session, "fit", "ols", material_id=self.material_id)
+            return jobs.add(session, "fit", method, material_id=self.material_id)
+
+    def claim(self, job_id: str) -> Claim:
+        """Give a job to a runner of its own; the one that was at it is dead."""
+        with self.database.write() as session:
+            before = session.scalar(select(JobRow.runner_id).where(JobRow.id == job_id))
+            if before is not None:
+                runners.remove(session, before)
+            made = jobs.claim(session, runners.add(session, "host:1"))
+        assert made is not None
+        assert made.job_id == job_id
+        return made
 
     def run(self, job_id: str) -> Job:
-        pipeline.run_job(self.database, self.blobs, job_id)
+        """Have a job done."""
+        pipeline.run_job(self.database, self.blobs, self.claim(job_id))
         with self.database.read() as session:
             return jobs.get(session, job_id)
 
@@ -85,11 +102,37 @@ def test_a_log_goes_through_all_stages(shop: Shop, content: bytes, calls: list[s
 
 
 def test_a_job_that_is_done_is_not_done_again(shop: Shop, content: bytes, calls: list[str]) -> None:
-    _, job_id = shop.ingest(content)
-    done = shop.run(job_id)
+    log_id, job_id = shop.ingest(content)
+    claim = shop.claim(job_id)
+    pipeline.run_job(shop.database, shop.blobs, claim)
+    done = shop.log(log_id)
     calls.clear()
-    assert shop.run(job_id) == done
+    with pytest.raises(ClaimLost):
+        pipeline.run_job(shop.database, shop.blobs, claim)
+    assert shop.log(log_id) == done
     assert calls == []
+
+
+@pytest.mark.parametrize(
+    ("module", "name"), [(slipcore, "detect_slip"), (slipcore, "collect_samples"), (estimators, "fit")]
+)
+def test_a_worker_whose_job_went_to_another_stores_nothing_more(
+    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch, module: ModuleType, name: str
+) -> None:
+    log_id, job_id = shop.ingest(content)
+    claim = shop.claim(job_id)
+    numerics = getattr(module, name)
+
+    def slow(*given: Any, **options: Any) -> Any:
+        monkeypatch.setattr(module, name, numerics)
+        shop.run(job_id)
+        return numerics(*given, **options)
+
+    monkeypatch.setattr(module, name, slow)
+    with pytest.raises(ClaimLost):
+        pipeline.run_job(shop.database, shop.blobs, claim)
+    assert shop.log(log_id).job.status == "done"
+    assert [stored.version for stored in shop.material().models] == [1]
 
 
 @pytest.mark.parametrize(
@@ -129,7 +172,7 @@ def test_a_model_leaves_no_samples_out_that_came_in_while_it_was_fitted(
     fit = estimators.fit
     grasps = []
 
-    def slow_fit(samples: list[FrictionSamples], **options: Any) -> estimators.FrictionModel:
+    def slow_fit(samples: list[Any], **options: Any) -> estimators.FrictionModel:
         grasps.append(len(samples))
         if len(grasps) == 1:
             monkeypatch.setattr(estimators, "fit", fit)
@@ -146,20 +189,67 @@ def test_a_model_leaves_no_samples_out_that_came_in_while_it_was_fitted(
     assert [(stored.version, stored.model.n) for stored in shop.material().models] == [(2, 2 * samples.count)]
 
 
-def test_each_grasp_is_a_part_of_its_own(shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("method", "kind"),
+    [("ols", Moments), ("conjugate", Moments), ("bayes", Moments), ("robust", FrictionSamples)],
+)
+def test_a_fit_reads_moments_where_its_method_needs_no_more_one_part_a_grasp(
+    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch, method: str, kind: type
+) -> None:
+    counts = []
     for suffix in (b"", b"\0"):
-        shop.run(shop.ingest(content + suffix)[1])
-    seen: list[int] = []
+        log_id, job_id = shop.ingest(content + suffix)
+        shop.run(job_id)
+        samples = shop.log(log_id).samples
+        assert samples is not None
+        counts.append(samples.count)
+    seen: list[Moments | FrictionSamples] = []
     fit = estimators.fit
 
-    def noted(samples: list[FrictionSamples], **options: Any) -> estimators.FrictionModel:
-        seen.extend(len(part) for part in samples)
-        return fit(samples, **options)
+    def noted(parts: Any, **options: Any) -> estimators.FrictionModel:
+        seen.extend(parts)
+        return fit(parts, **options)
 
     monkeypatch.setattr(estimators, "fit", noted)
+    if kind is Moments:
+        shop.blobs.sweep(lambda _: set())  # not one sample is read
+    assert shop.run(shop.fit(method)).status == "done"
+    assert [(type(part), part.n if isinstance(part, Moments) else len(part)) for part in seen] == [
+        (kind, count) for count in counts
+    ]
+
+
+def test_moments_that_an_older_version_did_not_store_are_made_up_for(shop: Shop, content: bytes) -> None:
+    for suffix in (b"", b"\0"):
+        shop.run(shop.ingest(content + suffix)[1])
+    with shop.database.write() as session:
+        before = detections.samples_of_material(session, shop.material_id)
+        session.execute(update(SampleSummaryRow).values(moments=None))
     assert shop.run(shop.fit()).status == "done"
-    assert len(seen) == 2
-    assert seen[0] == seen[1] > 0
+    with shop.database.read() as session:
+        assert detections.samples_of_material(session, shop.material_id) == before
+        newest, older, _ = friction_models.versions(session, shop.material_id, "ols")
+    assert newest.model.coefficients == older.model.coefficients
+
+
+def test_a_fit_that_logs_overtake_again_and_again_makes_the_others_wait(
+    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shop.run(shop.ingest(content)[1])
+    fit = estimators.fit
+    overtaken: list[int] = []
+
+    def slow_fit(parts: Any, **options: Any) -> estimators.FrictionModel:
+        if len(overtaken) < pipeline.FITS_BESIDE_OTHERS:
+            overtaken.append(len(parts))
+            monkeypatch.setattr(estimators, "fit", fit)
+            shop.run(shop.ingest(content + b"\0" * len(overtaken))[1])
+            monkeypatch.setattr(estimators, "fit", slow_fit)
+        return fit(parts, **options)
+
+    monkeypatch.setattr(estimators, "fit", slow_fit)
+    assert shop.run(shop.fit()).model_version == 2 + pipeline.FITS_BESIDE_OTHERS
+    assert overtaken == [1, 2, 3]
 
 
 def test_too_few_samples_are_refused_with_the_reason(shop: Shop, content: bytes, ramp: GraspLog) -> None:

@@ -12,7 +12,7 @@ DOCUMENTED = dict(
 )
 
 
-UNSET = {"database_url": "SQLite file", "blob_url": "the data folder"}
+UNSET = {"database_url": "SQLite file", "blob_url": "the data folder", "dask_address": "none"}
 """What holds in place of a setting without a default."""
 
 
@@ -53,7 +53,9 @@ def test_the_databases_password_is_not_shown() -> None:
         ("lookup_seconds", 61.0),
         ("rate_limit", -1.0),
         ("max_connections", 0),
-        ("workers", 0),
+        ("workers", -1),
+        ("lease_seconds", 0.1),
+        ("poll_seconds", 0.0),
         ("workers", 65),
         ("job_attempts", 0),
         ("shutdown_seconds", -1.0),

@@ -106,7 +106,7 @@ def test_samples_of_a_material_are_one_part_a_grasp(
         with database.write() as session:
             detections.add(session, log_id, detection, SampleSummary(count, none_because, 1e-6, None, None, None, blob))
     with database.read() as session:
-        assert detections.sample_blobs(session, paper) == {"a" * 64: "3" * 64, "b" * 64: "2" * 64}
+        assert [found.samples_blob for found in detections.samples_of_material(session, paper)] == ["3" * 64, "2" * 64]
 
 
 def test_the_blobs_that_rows_refer_to_are_known(

@@ -118,7 +118,7 @@ def test_a_merged_material_leaves_its_logs_names_and_unfinished_jobs(
         twice = new_log(paper)
         logs = [grasp_logs.add(session, log) for log in (twice, new_log(papre), new_log(papre, twice.sha256))]
         waiting, done = (jobs.add(session, "fit", "ols", material_id=papre) for _ in range(2))
-        jobs.finish(session, done, "done", model_version=1)
+        jobs.cancel(session, done, "no longer wanted")
         friction_models.add(session, papre, done, new_model())
         materials.merge(session, pepar, papre)
         materials.merge(session, paper, pepar)

@@ -16,7 +16,7 @@ def test_the_process_lives_and_takes_work(client: httpx.Client) -> None:
 def test_readiness_names_what_is_missing(
     serving: Callable[[Settings], AbstractContextManager[httpx.Client]], tmp_path: Path
 ) -> None:
-    with serving(Settings(data_folder=tmp_path, shutdown_seconds=0)) as client:
+    with serving(Settings(data_folder=tmp_path, workers=0)) as client:
         assert client.get("/readyz").status_code == httpx.codes.OK
         shutil.rmtree(tmp_path / "spool")
         response = client.get("/readyz")

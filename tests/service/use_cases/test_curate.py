@@ -9,8 +9,8 @@ import pytest
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import NotFound
-from db.records import Job, NewGraspLog
-from db.repositories import grasp_logs, jobs, materials
+from db.records import Claim, Job, NewGraspLog
+from db.repositories import grasp_logs, jobs, materials, runners
 from service import pipeline
 from service.context import Context
 from service.problems import Problem
@@ -28,19 +28,25 @@ class Shop:
 
     def __init__(self, database: Database, blobs: BlobStore, contents: list[bytes]) -> None:
         self.database, self.blobs, self.contents = database, blobs, contents
-        self.submitted: list[str] = []
-        pool: Any = self
-        self.context = Context(Settings(), database, blobs, pool)
+        runner: Any = self
+        self.context = Context(Settings(), database, blobs, runner)
+        with database.write() as session:
+            self.runner_id = runners.add(session, "host:1")
 
-    def submit(self, job_id: str) -> None:
-        self.submitted.append(job_id)
+    def wake(self) -> None:
+        """The work is done when the test says so."""
+
+    def claim(self) -> Claim | None:
+        with self.database.write() as session:
+            return jobs.claim(session, self.runner_id)
 
     def work(self) -> list[Job]:
-        done, self.submitted = self.submitted, []
-        for job_id in done:
-            pipeline.run_job(self.database, self.blobs, job_id)
-        with self.database.read() as session:
-            return [jobs.get(session, job_id) for job_id in done]
+        done = []
+        while claim := self.claim():
+            pipeline.run_job(self.database, self.blobs, claim)
+            with self.database.read() as session:
+                done.append(jobs.get(session, claim.job_id))
+        return done
 
     def ingest(self, material: str, number: int, method: str = "ols") -> str:
         """A log of the material, with its model fitted."""
@@ -52,8 +58,7 @@ class Shop:
                 material_id = materials.create(session, material, "").id
             log = NewGraspLog(self.blobs.put(content), len(content), "npz", "filter", material_id, "s", 82, 2.7, (8, 8))
             log_id = grasp_logs.add(session, log)
-            job_id = jobs.add(session, "ingest", method, material_id=material_id, grasp_log_id=log_id)
-        self.submit(job_id)
+            jobs.add(session, "ingest", method, material_id=material_id, grasp_log_id=log_id)
         (job,) = self.work()
         assert job.status == "done", job.reason
         return log_id
@@ -121,9 +126,11 @@ def test_a_fit_under_way_does_not_bring_a_withdrawn_log_back(shop: Shop, monkeyp
         return model
 
     with shop.database.write() as session:
-        job = jobs.add(session, "fit", "ols", material_id=materials.find_id(session, "paper"))
+        jobs.add(session, "fit", "ols", material_id=materials.find_id(session, "paper"))
+    claim = shop.claim()
+    assert claim is not None
     monkeypatch.setattr(pipeline, "_fit", withdraw_meanwhile)
-    pipeline.run_job(shop.database, shop.blobs, job)
+    pipeline.run_job(shop.database, shop.blobs, claim)
     assert shop.model("paper") == (3, both // 2, False)
 
 

@@ -1,0 +1,47 @@
+"""Commands on the jobs of a running service: list, cancel."""
+
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from service.cli.output import print_json, print_table
+from service.cli.remote import DEFAULT_URL, Json, Key, Url
+
+app = typer.Typer(help="Look at the jobs of a service, and cancel them.", no_args_is_help=True)
+COLUMNS = ("id", "kind", "status", "stage", "material", "reason", "created_at")
+
+
+@app.command("list")
+def list_jobs(
+    status: Annotated[
+        str | None, typer.Option(help="Only queued, running, done, failed, refused or cancelled ones.")
+    ] = None,
+    limit: Annotated[int, typer.Option(min=1, help="So many at most.")] = 20,
+    url: Url = DEFAULT_URL,
+    key: Key = None,
+    json: Json = False,
+) -> None:
+    """List the newest jobs, with the reason of those that ended badly."""
+    from stiction_client import FrictionClient
+
+    with FrictionClient(url, key=key) as client:
+        found = [asdict(job) for job in client.jobs(status, limit)]
+    if json:
+        print_json({"jobs": found})
+    else:
+        print_table("Jobs", COLUMNS, [["" if job[name] is None else job[name] for name in COLUMNS] for job in found])
+
+
+@app.command()
+def cancel(
+    jobs: Annotated[list[str], typer.Argument(help="Ids of jobs that are queued or running.")],
+    url: Url = DEFAULT_URL,
+    key: Key = None,
+) -> None:
+    """Cancel jobs: they store nothing more."""
+    from stiction_client import FrictionClient
+
+    with FrictionClient(url, key=key) as client:
+        for job in jobs:
+            typer.echo(f"{client.cancel(job).id} is cancelled")

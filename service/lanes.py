@@ -1,0 +1,85 @@
+"""Lanes: where one job at a time is done, behind the executor interface of ``concurrent.futures``."""
+
+import asyncio
+import logging
+import multiprocessing
+from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from typing import Protocol
+
+from db.records import Claim
+from service import worker
+from service.worker import Place
+
+logger = logging.getLogger(__name__)
+
+RETRY_SECONDS = 1.0
+"""s between two tries to start a worker that does not start."""
+
+
+class WorkerDied(Exception):
+    """The worker process ended under its job."""
+
+
+class Lane(Protocol):
+    """One job at a time."""
+
+    async def hire(self) -> None:
+        """Make sure that there is a worker and that it is warm."""
+
+    async def run(self, claim: Claim) -> None:
+        """Do one job; raises ``WorkerDied``, and ``StorageUnavailable``."""
+
+    def kill(self) -> None:
+        """End the worker at once, whatever it does."""
+
+    async def close(self) -> None:
+        """Let the worker go once it has nothing to do."""
+
+
+class ProcessLane:
+    """A worker process of its own on this machine."""
+
+    def __init__(self, place: Place) -> None:
+        self._place = place
+        self._executor: Executor | None = None
+
+    async def hire(self) -> None:
+        """Start a worker process and warm it up, in place of the one before."""
+        while True:
+            await self.close()
+            self._executor = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), worker.start)
+            try:
+                await asyncio.get_running_loop().run_in_executor(self._executor, worker.warm_up)
+            except BrokenProcessPool:
+                logger.exception("a worker process did not start")
+                await asyncio.sleep(RETRY_SECONDS)
+            else:
+                return
+
+    async def run(self, claim: Claim) -> None:
+        """Do one job; raises ``WorkerDied``."""
+        try:
+            await asyncio.get_running_loop().run_in_executor(self._executor, worker.run_job, self._place, claim)
+        except BrokenProcessPool as error:
+            raise WorkerDied from error
+
+    def kill(self) -> None:
+        """End the worker process at once (what ``ProcessPoolExecutor.kill_workers`` does from Python 3.14 on)."""
+        for process in dict(getattr(self._executor, "_processes", None) or {}).values():
+            process.kill()
+
+    async def close(self) -> None:
+        """Let the worker process go once it has nothing to do."""
+        if self._executor is not None:
+            executor, self._executor = self._executor, None
+            await asyncio.to_thread(executor.shutdown, cancel_futures=True)
+
+
+def lanes(place: Place, count: int, dask_address: str | None) -> list[Lane]:
+    """So many lanes: on this machine, or on the workers of a Dask scheduler."""
+    if dask_address is None:
+        return [ProcessLane(place) for _ in range(count)]
+    from service.dask_lane import DaskLane  # an extra, and takes a second to load
+
+    return [DaskLane(place, dask_address) for _ in range(count)]
