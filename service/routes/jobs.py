@@ -6,7 +6,7 @@ from fastapi import APIRouter, Query
 
 from db.records import JobStatus
 from db.repositories import jobs
-from service.access import READ, UPLOAD
+from service.access import ADMIN, READ
 from service.context import Given
 from service.problems import INVALID_REQUEST, JOB_ENDED, STORAGE_UNAVAILABLE, UNKNOWN_JOB
 from service.routes.common import problems
@@ -50,7 +50,7 @@ def read_job(context: Given, id: str) -> JobOut:  # noqa: A002  (the path's own 
 
 @router.post(
     "/{id}/cancel",
-    dependencies=[UPLOAD],
+    dependencies=[ADMIN],
     summary="Cancel a job",
     responses=problems(UNKNOWN_JOB, JOB_ENDED, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
