@@ -1,7 +1,9 @@
 """A zip of .npy members, read in memory within bounds; nothing is ever extracted to disk."""
 
+import errno
 import io
 import lzma
+import os
 import struct
 import zipfile
 import zlib
@@ -29,10 +31,8 @@ _LOCAL_BYTES, _LOCAL_LENGTHS = 30, 26
 def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open a zip whose members are few, plainly named and bounded in size. Raises ``InvalidInput``."""
     _check_directory(path)
-    try:
+    with _sound():
         archive = zipfile.ZipFile(path)
-    except _DAMAGE as error:
-        raise _damaged(error) from error
     with archive:
         _check_members(archive)
         yield archive
@@ -40,15 +40,26 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
 
 def read_member(archive: zipfile.ZipFile, member: str, name: str) -> NDArray[Any]:
     """Read one .npy member as an array; errors call it ``name``."""
-    try:
+    with _sound():
         entry = archive.getinfo(member)
         with archive.open(entry) as stream:  # checks the member's own header
             if entry.compress_type == zipfile.ZIP_STORED:
                 return read_array(io.BytesIO(_stored(archive, entry)), name, entry.file_size)
             return read_array(stream, name, entry.file_size)
+
+
+@contextmanager
+def _sound() -> Iterator[None]:
+    """Answer for ``zipfile``, which meets damage with whatever its parts raise."""
+    try:
+        yield
     except InvalidInput:
         raise
     except _DAMAGE as error:
+        raise _damaged(error) from error
+    except OSError as error:
+        if error.errno != errno.EINVAL:  # a place in the file that cannot be
+            raise
         raise _damaged(error) from error
 
 
@@ -56,6 +67,8 @@ def _stored(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> bytes:
     """The bytes of a member without compression at once; ``zipfile`` reads them in pieces, three times as slowly."""
     file = archive.fp
     assert file is not None
+    if entry.file_size > os.fstat(file.fileno()).st_size:
+        raise zipfile.BadZipFile(f"{entry.file_size} bytes in {entry.filename!r} by its header")
     file.seek(entry.header_offset + _LOCAL_LENGTHS)
     file.seek(entry.header_offset + _LOCAL_BYTES + sum(struct.unpack("<HH", file.read(4))))
     content = file.read(entry.file_size)

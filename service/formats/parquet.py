@@ -78,7 +78,10 @@ class _Columns:
             return as_array(name, self._log[name])
         if field not in self._names:
             return None
-        array = self._read(name, field)[self._rows]
+        array = self._read(name, field)
+        if isinstance(self._rows, np.ndarray) and len(array) != len(self._rows):
+            raise InvalidInput(name, f"of {len(array)} rows", f"{len(self._rows)} rows, as in {EPISODE}")
+        array = array[self._rows]
         return array[0] if once and len(array) else array
 
     def grid(self) -> None:
@@ -176,7 +179,11 @@ def _library() -> Iterator[None]:
     """Answer for a library that meets damaged files with whatever its parts raise."""
     try:
         yield
-    except (InvalidInput, MemoryError):
+    except InvalidInput:
+        raise
+    except pa.ArrowMemoryError as error:  # what a page claims to unpack to is known to the library alone
+        raise InvalidInput("file", f"in need of too much memory ({str(error)[:80]})", "an undamaged file") from error
+    except MemoryError:
         raise
     except (pa.ArrowException, OSError, ValueError, KeyError, TypeError, OverflowError) as error:
         detail = f"{type(error).__name__}: {error}"[:120]

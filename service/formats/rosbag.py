@@ -4,6 +4,7 @@ Of a rosbag2 folder only the storage files are read; ``metadata.yaml`` repeats w
 """
 
 import bz2
+import errno
 import shutil
 import struct
 import tempfile
@@ -150,3 +151,7 @@ def _library(name: str) -> Iterator[None]:
     ) as error:
         detail = f"{type(error).__name__}: {error}"[:120]
         raise InvalidInput("file", f"a truncated or damaged {name} ({detail})", f"a complete {name} file") from error
+    except OSError as error:
+        if error.errno != errno.EINVAL:  # a place in the file that cannot be
+            raise
+        raise InvalidInput("file", f"a damaged {name} ({error})", f"a complete {name} file") from error
