@@ -101,7 +101,7 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
     with run.stage("frames"):
         log = formats.read(run.blobs.path(stored.sha256))
     with run.stage("slip_state"):
-        history = slipcore.detect_slip(log, method=stored.detector)  # strain and events are its inner stages
+        history = slipcore.detect_slip(log, method=stored.detector, lookahead=slipcore.LOOKAHEAD)
     with run.stage("samples"):
         samples, none_because = _collect(log, history)
         blob = run.blobs.put(encode_history(history))

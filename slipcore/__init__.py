@@ -1,6 +1,8 @@
 """Tactile frames to friction samples: numerics only (frames → strain → events → slip_state → samples)."""
 
+from slipcore.batch import Hindsight, collect_history, detect_slip
 from slipcore.defaults import (
+    LOOKAHEAD,
     FilterOptions,
     Option,
     SampleOptions,
@@ -8,7 +10,7 @@ from slipcore.defaults import (
     StrainRateOptions,
     describe_options,
 )
-from slipcore.detector import DetectorState, SlipDetector, collect_history, detect_slip
+from slipcore.detector import DetectorState, SlipDetector
 from slipcore.element_forces import ElementForces, contact_factor, element_forces, stick_ratio
 from slipcore.errors import InvalidInput, NoForces, SlipcoreError, UnknownScale
 from slipcore.frames import Frame, FrictionLaw, GraspLog, GroundTruth
@@ -18,6 +20,7 @@ from slipcore.slip_state import EventList, SlipEvents, SlipHistory, SlipState
 from slipcore.warm_up import warm_up
 
 __all__ = [
+    "LOOKAHEAD",
     "METHODS",
     "DetectorState",
     "ElementForces",
@@ -28,6 +31,7 @@ __all__ = [
     "FrictionSamples",
     "GraspLog",
     "GroundTruth",
+    "Hindsight",
     "InvalidInput",
     "NoForces",
     "Option",

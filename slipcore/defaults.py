@@ -184,7 +184,7 @@ class FilterOptions(ContactOptions):
     """Least rate of indentation that counts."""
     pressing_rate: Annotated[float, Option(0.0, 1e6, "1/s", "within a frame at 30 fps")] = 100.0
     """Rate at which slip then ends."""
-    threshold: Annotated[float, Option(0.01, 0.99, "-", "tuning scenes; the reported probability is ½ there")] = 0.4
+    threshold: Annotated[float, Option(0.01, 0.99, "-", "tuning scenes; the reported probability is ½ there")] = 0.35
     """Least posterior of slip."""
 
 
@@ -269,6 +269,8 @@ class SampleOptions(Options):
 
 
 DEFAULT_METHOD = "filter"
+LOOKAHEAD = 2
+"""Frames after it that a frame of a stored log is decided by; more than two gains little (tuning scenes)."""
 
 Kind = TypeVar("Kind", bound=Options)
 

@@ -1,11 +1,10 @@
 """The slip detector: frames in, slip state out (all stages in order: strain, events, slip state).
 
 ``init`` and ``step`` are pure functions on an immutable state, so that a stream can be cut anywhere and taken up
-again; ``SlipDetector`` holds such a state, and ``detect_slip`` is the fold of ``step`` over a log.
+again; ``SlipDetector`` holds such a state, and ``batch.detect_slip`` is the fold of ``step`` over a log.
 """
 
 import math
-from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -17,7 +16,6 @@ from slipcore.frames import (
     BoolArray,
     FloatArray,
     Frame,
-    GraspLog,
     check_element_area,
     check_frame,
     check_mask,
@@ -29,7 +27,7 @@ from slipcore.kernels.contact import Touch
 from slipcore.kernels.observe import observe
 from slipcore.methods import find_method
 from slipcore.methods.interface import CompiledMethod, Method, Observation, Start
-from slipcore.slip_state import SlipHistory, SlipState, observed_over_time, slip_events
+from slipcore.slip_state import SlipState
 from slipcore.strain import Lattice
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -144,16 +142,8 @@ def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
         noise, touching, slipping = _run(method, setup, memory, frame, after, velocity)
     else:
         after, noise, touching, slipping = _run_by_parts(method, setup, memory, frame, after, velocity)
-    said = SlipState(
-        frame.time,
-        _read_only(after.masks[0]),
-        _read_only(after.masks[1]),
-        _read_only(after.probability),
-        1.0 - slipping / touching if touching else math.nan,
-        _read_only(velocity),
-        0 < touching == slipping,
-    )
-    return DetectorState(setup, after, noise), _masked(said, frame.observed, memory.observed)
+    now = said(frame.time, after.masks[0], after.masks[1], after.probability, velocity, touching, slipping)
+    return DetectorState(setup, after, noise), masked(now, frame.observed, memory.observed)
 
 
 def _run(
@@ -241,11 +231,26 @@ def _run_by_parts(
     return after._replace(other=other), noise, touching, slipping
 
 
-def _masked(said: SlipState, observed: BoolArray | None, before: BoolArray | None) -> SlipState:
+def said(
+    time: float,
+    contact: BoolArray,
+    slip: BoolArray,
+    probability: FloatArray,
+    velocity: FloatArray,
+    touching: int,
+    slipping: int,
+) -> SlipState:
+    """The answer, with the number of elements that touch and of those that slip."""
+    ratio = 1.0 - slipping / touching if touching else math.nan
+    fields = _read_only(contact), _read_only(slip), _read_only(probability), ratio, _read_only(velocity)
+    return SlipState(time, *fields, macro_slip=0 < touching == slipping)
+
+
+def masked(now: SlipState, observed: BoolArray | None, before: BoolArray | None) -> SlipState:
     """The answer without what was not observed; the detector itself goes on with the placeholders."""
     if observed is None:
-        return said
-    return said.masked(observed, observed if before is None else observed & before)
+        return now
+    return now.masked(observed, observed if before is None else observed & before)
 
 
 class SlipDetector:
@@ -288,36 +293,6 @@ class SlipDetector:
         frame = _checked(self.state, time, displacement, force, object_pose, normal, contact, observed)
         self.state, answer = step(self.state, frame)
         return answer
-
-
-def detect_slip(log: GraspLog, method: str = DEFAULT_METHOD, **options: float) -> SlipHistory:
-    """Detect local slip in a whole log: the fold of ``step`` over its frames.
-
-    Raises ``InvalidInput`` as ``init`` does.
-    """
-    state = init(log.position, log.element_area, method, **options)
-    answers = []
-    for frame in log.frames():
-        state, answer = step(state, frame)
-        answers.append(answer)
-    return collect_history(answers, state)
-
-
-def collect_history(answers: Sequence[SlipState], state: DetectorState) -> SlipHistory:
-    """The history that a detector's answers add up to, with the ``state`` that it ended in.
-
-    Raises ``InvalidInput`` when there are none.
-    """
-    if not answers:
-        raise InvalidInput("answers", "empty", "at least one frame's slip state")
-    time, contact, slip, probability, ratio, velocity, macro_slip = (
-        np.array([getattr(answer, name) for answer in answers])
-        for name in ("time", "contact", "slip", "probability", "stick_ratio", "velocity", "macro_slip")
-    )
-    observed = observed_over_time(answers)
-    events = slip_events(time, contact, slip, observed)
-    noise, method = state.noise, state.setup.method
-    return SlipHistory(time, contact, slip, probability, ratio, velocity, macro_slip, events, noise, method, observed)
 
 
 def _checked(

@@ -4,7 +4,8 @@ import time
 
 import numpy as np
 
-from slipcore.detector import SlipDetector
+from slipcore.batch import detect_slip
+from slipcore.frames import GraspLog
 from slipcore.methods import METHODS
 
 
@@ -13,7 +14,10 @@ def warm_up() -> float:
     began = time.perf_counter()
     axis = 1e-3 * np.arange(3.0)
     position = np.stack([*np.meshgrid(axis, axis, indexing="ij"), np.zeros((3, 3))], axis=-1)
-    force = np.broadcast_to([0.0, 0.0, -0.1], position.shape)
+    force = np.broadcast_to([0.0, 0.0, -0.1], (2, *position.shape))
+    log = GraspLog(
+        time=[0.0, 0.1], position=position, displacement=np.zeros(force.shape), force=force, element_area=1e-6
+    )
     for method in METHODS:
-        SlipDetector(position, 1e-6, method).step(0.0, np.zeros(position.shape), force)
+        detect_slip(log, method, lookahead=1)
     return time.perf_counter() - began

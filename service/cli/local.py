@@ -47,12 +47,12 @@ def detect(
 ) -> None:
     """Detect local slip in one grasp log and say what was seen."""
     from service import formats
-    from slipcore import detect_slip
+    from slipcore import LOOKAHEAD, detect_slip
     from slipcore.defaults import DEFAULT_METHOD
 
     grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
     start = perf_counter()
-    history = detect_slip(grasp, method=method or DEFAULT_METHOD)
+    history = detect_slip(grasp, method=method or DEFAULT_METHOD, lookahead=LOOKAHEAD)
     seconds = perf_counter() - start
     if picture is not None:
         from service.report.pictures import save, slip_over_time
@@ -80,13 +80,14 @@ def fit(
     """Fit the stochastic linear friction model to the slip seen in one or more grasp logs."""
     from estimators import fit as fit_model
     from service import formats
-    from slipcore import collect_samples, detect_slip
+    from slipcore import LOOKAHEAD, collect_samples, detect_slip
     from slipcore.defaults import DEFAULT_METHOD
 
     grasps = []
     for path in logs:
         grasp = formats.read(path, mapping=mapping_text(mapping))
-        grasps.append(collect_samples(grasp, detect_slip(grasp, method=detector or DEFAULT_METHOD)))
+        history = detect_slip(grasp, method=detector or DEFAULT_METHOD, lookahead=LOOKAHEAD)
+        grasps.append(collect_samples(grasp, history))
     model = fit_model(grasps, method=method, seed=seed)
     if json:
         print_json(model_record(model))

@@ -10,7 +10,7 @@ from estimators import EstimatorError, fit
 from service.demo.inputs import DemoLog
 from service.report.page import Picture
 from service.report.pictures import posterior, samples_and_model, save, slip_over_time
-from slipcore import FrictionSamples, SlipHistory, collect_samples, detect_slip
+from slipcore import LOOKAHEAD, FrictionSamples, SlipHistory, collect_samples, detect_slip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,7 +26,7 @@ def see(logs: Sequence[DemoLog], progress: Progress) -> list[Seen]:
     """Detect slip in every log and collect its samples."""
     seen = []
     for entry in progress.track(logs, description="detect again, for the pictures"):
-        history = detect_slip(entry.log)
+        history = detect_slip(entry.log, lookahead=LOOKAHEAD)
         seen.append(Seen(entry, history, collect_samples(entry.log, history)))
     return seen
 

@@ -1,8 +1,9 @@
 """One step of method ``filter``: two states an element, stick and slip, on its place on the object and force ratio.
 
-An element's memory is a column of ``elements`` [11, n, m]: its slip probability; where in the object's frame it would
-be if it stuck (x, y m, variance m²) and if it slipped (the same); its force low-passed (normal, tangential N); and the
-force ratio that it slipped at with the weight of that knowledge. What is common to all is ``body`` [14].
+An element's memory is a column of ``elements`` [13, n, m]: its slip probability; where in the object's frame it would
+be if it stuck (x, y m, variance m²) and if it slipped (the same); its force low-passed (normal, tangential N); the
+force ratio that it slipped at with the weight of that knowledge; and how probable it was, before this frame was seen,
+that it began to slip if it stuck and that it stuck again if it slipped. What is common to all is ``body`` [14].
 """
 
 import math
@@ -26,10 +27,11 @@ from slipcore.kernels.pose import (
     pose_at,
 )
 
-PROBABILITY, STICK_X, STICK_Y, STICK_VARIANCE, SLIP_X, SLIP_Y, SLIP_VARIANCE, NORMAL, TANGENTIAL, RATIO, KNOWN = range(
-    11
-)
-ROWS = 11
+ROWS = 13
+(
+    PROBABILITY, STICK_X, STICK_Y, STICK_VARIANCE, SLIP_X, SLIP_Y, SLIP_VARIANCE, NORMAL, TANGENTIAL, RATIO, KNOWN,
+    ONSET, END,
+) = range(ROWS)  # fmt: skip
 POSE, LOADING, FRICTION, FOLLOWS, BODY = 0, 4, 10, 12, 14
 """Where ``body`` holds the pose, the loading, the slipping force ratio (weighted sum, weight), and the share in which
 the surface follows the known motion (the same); and its length."""
@@ -115,7 +117,8 @@ def step_filter(
     next_body[:] = body
     if same(start, end) and not touches_anew(contact, stays):  # a frame that repeats the last tells nothing
         after[:] = elements
-        decide(after, tuning.threshold, slip, probability)
+        after[ONSET] = after[END] = 0.0
+        decide(after[PROBABILITY], tuning.threshold, slip, probability)
         return
     places = gather(elements, stays)
     anchors = anchors_of(elements, places, position, end)
@@ -168,7 +171,7 @@ def step_filter(
         next_body[POSE + value] = pose[value]
     for value in range(6):
         next_body[LOADING + value] = loading[value]
-    decide(after, tuning.threshold, slip, probability)
+    decide(after[PROBABILITY], tuning.threshold, slip, probability)
 
 
 @compiled
@@ -363,7 +366,8 @@ def start_elements(
         for j in range(m):
             if not stays[i, j]:
                 after[STICK_VARIANCE, i, j] = after[SLIP_VARIANCE, i, j] = np.inf
-                after[PROBABILITY, i, j] = 0.0
+                after[PROBABILITY, i, j] = after[ONSET, i, j] = 0.0
+                after[END, i, j] = 1.0
             if contact[i, j] and not stays[i, j]:
                 x, y = place_on_object(pose, position[i, j, 0] + end[i, j, 0], position[i, j, 1] + end[i, j, 1])
                 after[STICK_X, i, j], after[STICK_Y, i, j] = x, y
@@ -411,7 +415,8 @@ def update_element(
     if home:
         rate += tuning.pressing_rate * interval
     end = -math.expm1(-rate)
-    slip = min(max(p * (1.0 - end) + (1.0 - p) * onset, 1e-6), 1.0 - 1e-6)
+    new[ONSET, i, j], new[END, i, j] = onset, end
+    slip = expected(p, onset, end)
     kept_slip, kept_stick = p * (1.0 - end) / slip, (1.0 - p) * (1.0 - onset) / (1.0 - slip)
     ax, ay, pa = old[STICK_X, i, j], old[STICK_Y, i, j], old[STICK_VARIANCE, i, j]
     bx, by, pb = old[SLIP_X, i, j], old[SLIP_Y, i, j], old[SLIP_VARIANCE, i, j]
@@ -443,12 +448,32 @@ def update_element(
 
 
 @compiled
-def decide(elements: FloatArray, threshold: float, slip: BoolArray, probability: FloatArray) -> None:
+def expected(p: float, onset: float, end: float) -> float:
+    """How probable slip is after a step in which a sticking element begins to slip, and a slipping one to stick, so."""
+    return min(max(p * (1.0 - end) + (1.0 - p) * onset, 1e-6), 1.0 - 1e-6)
+
+
+@compiled
+def look_back(before: FloatArray, elements: FloatArray, later: FloatArray, revised: FloatArray) -> None:
+    """Fill ``revised`` [n, m], slip probabilities one frame earlier, from ``later`` ones that know more (Kim, 1994).
+
+    ``before`` and ``elements`` are the memories of the earlier and the later frame.
+    """
+    n, m = later.shape
+    for i in range(n):
+        for j in range(m):
+            p, onset, end = before[PROBABILITY, i, j], elements[ONSET, i, j], elements[END, i, j]
+            slip, known = expected(p, onset, end), later[i, j]
+            revised[i, j] = p * ((1.0 - end) * known / slip + end * (1.0 - known) / (1.0 - slip))
+
+
+@compiled
+def decide(posterior: FloatArray, threshold: float, slip: BoolArray, probability: FloatArray) -> None:
     """Slip above the threshold; the probability is the posterior with its odds shifted to ½ there."""
-    _, n, m = elements.shape
+    n, m = posterior.shape
     odds = (1.0 - threshold) / threshold
     for i in range(n):
         for j in range(m):
-            p = elements[PROBABILITY, i, j]
+            p = posterior[i, j]
             slip[i, j] = p > threshold
             probability[i, j] = p * odds / (1.0 - p + p * odds)

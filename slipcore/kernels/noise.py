@@ -13,24 +13,30 @@ _LEAST, _MEMORY, _TO_SIGMA = NOISE.least_series, NOISE.memory, NOISE.deviation_t
 
 @compiled
 def median(values: FloatArray) -> float:
-    """Upper median of values [k], by Hoare's selection; their order is changed."""
-    low, high, middle = 0, len(values) - 1, len(values) // 2
-    while low < high:
-        pivot, i, j = values[middle], low, high
-        while i <= j:
-            while values[i] < pivot:
-                i += 1
-            while pivot < values[j]:
-                j -= 1
-            if i <= j:
-                values[i], values[j] = values[j], values[i]
-                i += 1
-                j -= 1
-        if j < middle:
-            low = i
-        if middle < i:
-            high = j
-    return float(values[middle])
+    """Upper median of values [k], by selection; their order is changed.
+
+    Partitioned without a branch in the inner loop (Lomuto), which random values would mispredict every other time.
+    """
+    low, high, middle = 0, len(values), len(values) // 2
+    while True:
+        pivot = values[(low + high) // 2]
+        less = low
+        for k in range(low, high):
+            value = values[k]
+            values[k], values[less] = values[less], value
+            less += value < pivot
+        if middle < less:
+            high = less
+        elif less > low:
+            low = less
+        else:  # none is less: put aside all that are not greater
+            for k in range(low, high):
+                value = values[k]
+                values[k], values[less] = values[less], value
+                less += not value > pivot  # true of NaN, too
+            if middle < less:
+                return float(pivot)
+            low = less
 
 
 @compiled

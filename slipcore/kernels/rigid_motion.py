@@ -33,6 +33,8 @@ def fit_motion(position: FloatArray, start: FloatArray, end: FloatArray, weight:
     for i in range(n):
         for j in range(m):
             w = weight[i, j]
+            if w == 0.0:
+                continue
             px, py = position[i, j, 0] + start[i, j, 0], position[i, j, 1] + start[i, j, 1]
             total += w
             x += w * px
@@ -47,6 +49,8 @@ def fit_motion(position: FloatArray, start: FloatArray, end: FloatArray, weight:
     for i in range(n):
         for j in range(m):
             w = weight[i, j]
+            if w == 0.0:
+                continue
             rx, ry = position[i, j, 0] + start[i, j, 0] - x, position[i, j, 1] + start[i, j, 1] - y
             du, dv = end[i, j, 0] - start[i, j, 0] - u, end[i, j, 1] - start[i, j, 1] - v
             spread += w * (rx * rx + ry * ry)

@@ -1,11 +1,15 @@
 """A filter of two states an element, stick and slip, on its place in the object's frame and its force ratio."""
 
+from collections.abc import Sequence
+from itertools import pairwise
+
 import numpy as np
 
 from slipcore.defaults import FilterOptions
-from slipcore.kernels.filter import BODY, ROWS, STICK_VARIANCE, Tuning
+from slipcore.frames import FloatArray
+from slipcore.kernels.filter import BODY, PROBABILITY, ROWS, STICK_VARIANCE, Tuning, decide, look_back
 from slipcore.kernels.run import run_filter
-from slipcore.methods.interface import CompiledMethod, Start
+from slipcore.methods.interface import CompiledMethod, Decision, Start
 from slipcore.strain import Lattice
 
 
@@ -18,4 +22,15 @@ def start(lattice: Lattice, options: FilterOptions) -> Start:
     return Start(np.array([getattr(options, name) for name in Tuning._fields], float), elements, body)
 
 
-METHOD = CompiledMethod(FilterOptions, start, run_filter)
+def revise(own: Sequence[FloatArray], settings: FloatArray) -> Decision:
+    """The decision on the first of these frames in the light of those after it."""
+    posterior = own[-1][PROBABILITY]
+    for before, after in reversed(list(pairwise(own))):
+        known, posterior = posterior, np.empty(posterior.shape)
+        look_back(before, after, known, posterior)
+    slip, probability = np.empty(posterior.shape, bool), np.empty(posterior.shape)
+    decide(posterior, settings[Tuning._fields.index("threshold")], slip, probability)
+    return Decision(slip, probability)
+
+
+METHOD = CompiledMethod(FilterOptions, start, run_filter, revise)

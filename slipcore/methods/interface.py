@@ -1,6 +1,6 @@
 """What a detection method is given, and what it answers."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Generic, NamedTuple, TypeVar
 
 from slipcore.defaults import ContactOptions
@@ -58,8 +58,13 @@ class Start(NamedTuple):
 
 
 class CompiledMethod(NamedTuple, Generic[Options]):
-    """A detection method whose whole step is one of ``kernels.run``."""
+    """A detection method whose whole step is one of ``kernels.run``.
+
+    ``revise``: the decision on a frame from its ``own`` memory and those of the frames after it, and the settings;
+    None for a method that later frames tell nothing.
+    """
 
     options: type[Options]
     start: Callable[[Lattice, Options], Start]
     run: Callable[..., tuple[float, int, int]]
+    revise: Callable[[Sequence[FloatArray], FloatArray], Decision] | None = None

@@ -128,8 +128,11 @@ def test_each_gives_the_exact_answer_on_clean_data(samples: Make, likelihood: st
         estimators.fit(data, method="conjugate"),
     )
     assert model.diagnostics["move"] == "independence"
-    assert np.abs((model.coefficients - exact.coefficients) / exact.standard_errors).max() < 0.6
-    np.testing.assert_allclose(model.standard_errors, exact.standard_errors, rtol=0.25)  # it pays for its caution
+    dearer = model.standard_errors / exact.standard_errors
+    np.testing.assert_allclose(dearer, 1.0, rtol=0.06)  # 4 % at most on twelve such sets
+    # the difference of an estimate from the best one has the difference of their variances (Hausman, 1978)
+    scatter = np.sqrt(np.maximum(dearer**2 - 1.0, 0.0) + 0.05**2)  # Monte-Carlo error 0.02 each, of modes and means
+    assert np.abs((model.coefficients - exact.coefficients) / (scatter * exact.standard_errors)).max() < 3.5
 
 
 def test_coordinates_of_scatter_and_noise_leave_the_prior_as_it_is_stated() -> None:

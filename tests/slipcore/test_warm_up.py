@@ -1,11 +1,15 @@
-from slipcore import SlipDetector, warm_up
+from slipcore import SlipDetector, detect_slip, warm_up
 from slipcore.contact import RampSchedule, tangential_ramp
+from slipcore.kernels.answer import answer
+from slipcore.kernels.filter import decide, look_back
 from slipcore.kernels.run import run_filter
+
+KERNELS = (run_filter, look_back, decide, answer)
 
 
 def test_after_warming_up_no_first_frame_compiles() -> None:
     assert warm_up() >= 0.0
-    compiled = len(run_filter.signatures)
+    compiled = [len(kernel.signatures) for kernel in KERNELS]
     log = tangential_ramp(points=6, pitch=2e-3, schedule=RampSchedule(0.1, 0.1, 0.1, 0.1, 0.1))
     for force, pose in ((True, True), (True, False), (False, True), (False, False)):
         detector = SlipDetector(log.position, log.element_area, "filter")
@@ -13,4 +17,5 @@ def test_after_warming_up_no_first_frame_compiles() -> None:
             detector.step(
                 frame.time, frame.displacement, frame.force if force else None, frame.object_pose if pose else None
             )
-    assert len(run_filter.signatures) == compiled
+        detect_slip(log, lookahead=2)
+    assert [len(kernel.signatures) for kernel in KERNELS] == compiled
