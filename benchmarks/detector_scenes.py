@@ -123,6 +123,11 @@ def _second_tuning() -> list[Scene]:
               _shear(0.7, 2.3, 3.2), force=10.0, friction=0.4, duration=2.5, radius=25e-3),
         scene("press a ball", SphereSurface(40.0), NormalTangentialCoupling(), force=10.0, friction=0.4, duration=1.4,
               poisson_ratio=0.42),
+        scene("bonded gel", FiniteLayer(5e-3), _shear(0.7, 2.3, 3.4), force=9.0, friction=0.45, duration=2.5),
+        scene("bonded gel turns", FiniteLayer(8e-3), LoadPath((0.7, 1.7, 2.5), force_x=(0, 1.5, 1.5),
+              moment=(0, 5e-3, 9e-3)), force=11.0, friction=0.4, duration=2.7, radius=20e-3),
+        scene("bonded gel, squeezed", FiniteLayer(4.5e-3), LoadPath((0.7, 1.5, 2.1, 2.8), force_y=(0, 2.4, 2.4, 3.6),
+              normal_force=(0, 0, 4.0, 4.0)), force=7.0, friction=0.42, duration=2.9, radius=12e-3),
         scene("set down", LoadPath((0.7, 1.4, 2.0, 2.5, 3.1), force_x=(0, 2.9, 2.9, 0.0, 0.0),
               normal_force=(0, 0, 0, 0, -8.7)), force=9.0, friction=0.42, duration=3.1, radius=12e-3),
     ]  # fmt: skip

@@ -127,7 +127,7 @@ def gaussian_part(options: argparse.Namespace) -> list[Row]:
             found = tutorial(data, exact, min(4.0 + n / 4_000, 40.0), goal)
             found["times ours at equal error"] = float(found["seconds to ours at 0.1"]) / float(own[0]["seconds"])
             rows.append({"n": n, "what": "emcee as in its tutorial", **found})
-            if options.peers_python and n <= 2_000:  # beyond, minutes a chain
+            if options.peers_python and n <= 20_000:  # beyond, minutes a chain
                 rows.append({"n": n, "what": "NUTS (NumPyro)", **nuts(data, exact, options.peers_python)})
         rows.append({"n": n, "what": "statsmodels OLS", "seconds": median_seconds(lambda _, d=data: peer_ols(d), 3)})
     return rows
@@ -245,7 +245,7 @@ def natural_errors(draws: np.ndarray, exact: NormalInverseGamma) -> dict[str, fl
 def likelihood_part(options: argparse.Namespace) -> list[Row]:
     """Seconds and errors where no closed form exists, against a run to 0.01 posterior standard deviations."""
     rows: list[Row] = []
-    for n in (200, 20_000) if options.quick else (200, 2_000, 20_000, 200_000):
+    for n in (200, 20_000) if options.quick else (200, 2_000, 20_000, 200_000, 2_000_000):
         data = make(n, 1)
         error = np.random.default_rng(9).standard_t(3, n) - np.random.default_rng(1).standard_normal(n)
         cases: dict[str, object] = {
@@ -272,12 +272,12 @@ def against_long_run(n: int, name: str, data: object, accuracies: tuple[float, .
     def chain(accuracy: float, seed: int) -> Chain:
         return sample(posterior.log_probability, posterior.proposal, accuracy, seed=seed, local=posterior.local)
 
-    long = chain(0.01, 99).flat() if n <= 20_000 else None
+    long, repeats = (chain(0.01, 99).flat() if n <= 20_000 else None), (3 if n <= 200_000 else 1)
     rows: list[Row] = []
     for accuracy in accuracies if long is not None else (0.08,):
         options = {"likelihood": likelihood, "accuracy": accuracy}
-        seconds = median_seconds(lambda seed, o=options: estimators.fit(data, "bayes", seed=seed, **o), 3)
-        chains = [chain(accuracy, seed) for seed in range(3)]
+        seconds = median_seconds(lambda seed, o=options: estimators.fit(data, "bayes", seed=seed, **o), repeats)
+        chains = [chain(accuracy, seed) for seed in range(repeats)]
         size = statistics.median(float(one.effective_sample_size.min()) for one in chains)
         row: Row = {"likelihood": name, "n": n, "accuracy": accuracy, "seconds": seconds, "ess": size}
         if long is not None:

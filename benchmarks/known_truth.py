@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from benchmarks.detector_scenes import PITCH, simulated
 from estimators import EstimatorError, fit
-from slipcore import FrictionSamples, GraspLog, collect_samples, detect_slip
+from slipcore import LOOKAHEAD, FrictionSamples, GraspLog, collect_samples, detect_slip
 from slipcore.contact import tangential_ramp
 from slipcore.contact.boundary_elements import Fidelity
 from slipcore.contact.effects import ObjectMotion, PressureFriction, SensorSampling, VelocityFriction
@@ -27,6 +27,7 @@ FRICTION = (0.25, 0.45, 0.8)
 NORMAL_FORCES = (4.0, 6.0, 9.0, 13.0)
 DETECTORS = ("filter", "strain_rate", "strain_rate_literal")
 ESTIMATORS = ("ols", "bayes")
+LAW_ESTIMATORS = ("auto", *ESTIMATORS)
 MARKER_NOISE, FORCE_NOISE = 1e-6, 2e-3
 LAW = (0.45, 8.0, -0.8)
 """β₀, β₁ s/m and β₂ 1/N of the grasps whose friction depends on velocity and normal force."""
@@ -72,7 +73,7 @@ def ramp_samples(friction: float, detector: str, seed: int) -> list[FrictionSamp
         )
         for force, generator in zip(NORMAL_FORCES, generators, strict=True)
     ]
-    return [collect_samples(log, detect_slip(log, method=detector)) for log in logs]
+    return [collect_samples(log, detect_slip(log, method=detector, lookahead=LOOKAHEAD)) for log in logs]
 
 
 def findings(seeds: int) -> Iterator[Finding]:
@@ -147,7 +148,7 @@ def law_findings(seeds: int, estimators: tuple[str, ...]) -> Iterator[LawFinding
                 seen(log, rng, known_motion=known_motion)
                 for log, rng in zip(grasps, np.random.default_rng(seed).spawn(len(grasps)), strict=True)
             ]
-            samples = [collect_samples(log, detect_slip(log, "filter")) for log in logs]
+            samples = [collect_samples(log, detect_slip(log, "filter", lookahead=LOOKAHEAD)) for log in logs]
             for estimator in estimators:
                 model = fit(samples, method=estimator, seed=seed)
                 low, high = np.array(model.interval(0.95)).T
@@ -239,7 +240,7 @@ def main() -> None:
     (arguments.output / "known_truth.json").write_text(json.dumps([asdict(f) for f in found], indent=1))
     picture(found).savefig(arguments.output / "known_truth.png", dpi=110)
     print(markdown(found))
-    laws = list(law_findings(arguments.law_seeds, ESTIMATORS))
+    laws = list(law_findings(arguments.law_seeds, LAW_ESTIMATORS))
     (arguments.output / "known_law.json").write_text(json.dumps([asdict(f) for f in laws], indent=1))
     print(law_markdown(laws))
 

@@ -10,6 +10,7 @@ from estimators.defaults import AUTOMATIC, REFERENCE
 from estimators.evidence import Evidence
 from estimators.least_squares import solve
 from estimators.observations import Observations
+from estimators.shared_errors import plane, shared_by_elements
 
 FloatArray = NDArray[np.float64]
 
@@ -26,17 +27,24 @@ def choose(evidence: Evidence) -> Choice:
     """The method for these data: noise in f_n first, then outliers, then how samples cluster.
 
     Noisy forces and outliers bias the coefficients, which no standard error makes good; clusters only widen them. Noise
-    in the forces looks like outliers where f_n is small, hence its precedence.
+    in the forces looks like outliers where f_n is small, hence its precedence. But the posteriors take the samples of
+    an element as independent, and where they are not their intervals are far too narrow: a bias of a standard error
+    does less harm.
     """
     observations = evidence.observations
+    shared = 0.0
     if observations is not None:
+        shared = shared_by_elements(evidence)
         noise, bias = force_noise(evidence, observations)
-        if bias > AUTOMATIC.bias:
+        if bias > AUTOMATIC.bias and not shared:
             reason = f"noise of about {noise:.2g} N in the forces shifts beta2 by {bias:.1f} of its standard errors"
             return Choice("bayes", "errors_in_variables", reason)
         part = float(robust.fit(evidence).diagnostics["downweighted"])
         if part > AUTOMATIC.downweighted:
             return Choice("robust", None, f"{part:.1%} of the samples lie far off the plane; normal errors leave 1.1%")
+    if evidence.cluster_kind == "grasp" and shared:
+        reason = f"samples of an element share {shared:.0%} of their errors' variance; grasps are the clusters"
+        return Choice("ols", None, reason)
     if evidence.cluster_kind == "grasp":
         return Choice("bayes", "grasp_effects", f"{evidence.clusters} grasps, which may differ from each other")
     if evidence.clusters < 2:
@@ -57,7 +65,7 @@ def force_noise(evidence: Evidence, observations: Observations) -> tuple[float, 
         return 0.0, 0.0
     linear = solve(evidence.factor, REFERENCE.spans(evidence.element_area))
     beta = linear.coefficients.astype(float)
-    expected = beta[0] + beta[1] * observations.tangential_velocity + beta[2] * f_n
+    expected = plane(linear, observations)
     square = (observations.friction - expected) ** 2
     if not square.max() > 0.0:
         return 0.0, 0.0

@@ -19,6 +19,7 @@ from estimators.likelihoods.posterior import Posterior
 from estimators.likelihoods.student_t import student_t
 from estimators.reporting import Diagnostics, report
 from estimators.sampling import Chain, sample
+from estimators.shared_errors import shared_by_elements
 
 
 class Likelihood(NamedTuple):
@@ -53,7 +54,8 @@ def fit(
 
     Raises ``NotConverged``, which carries the model, where the chain is shorter than 50 autocorrelation times or its
     walkers disagree. A chain that is sound but was stopped by ``seconds`` before ``accuracy`` says so in
-    ``diagnostics["stopped"]`` and in ``cost.monte_carlo_error``.
+    ``diagnostics["stopped"]`` and in ``cost.monte_carlo_error``. ``diagnostics["shared_by_elements"]`` is the part of
+    the errors' variance that samples of an element share; where it is not 0 these intervals are too narrow.
     """
     begin = time.perf_counter()
     name = default_likelihood(evidence) if likelihood is None else likelihood
@@ -66,6 +68,8 @@ def fit(
     summary = posterior.summarise(chain.flat(), np.random.default_rng([seed, 1]))
     diagnostics: Diagnostics = {"likelihood": name, "prior": posterior.prior, "draws": ", ".join(posterior.names)}
     diagnostics |= _convergence(chain, posterior) | sensitivity(evidence, exact_posterior(evidence))
+    if evidence.cluster_kind != "element":
+        diagnostics["shared_by_elements"] = shared_by_elements(evidence)
     model = report(
         evidence,
         "bayes",

@@ -120,3 +120,6 @@ PRIOR = Prior()
 SAMPLING = Sampling()
 MIN_SAMPLES = 4
 """Three coefficients and a scatter need four samples."""
+
+SHARED_LEVEL = 1e-3
+"""0 to 1; level of the test that errors are shared within the elements of a grasp."""

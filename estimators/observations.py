@@ -25,8 +25,9 @@ class Observations:
     """Samples of positive weight, all grasps joined: arrays [k].
 
     ``friction`` μ [-], ``tangential_velocity`` m/s, ``normal_force`` N, ``tangential_force`` N; ``weight`` relative,
-    scaled so that it sums to the effective number of samples (Kish); ``grasp`` and ``cluster``: codes from 0, where a
-    cluster is what errors are taken to be shared in (``cluster_kind``); ``element_area`` m².
+    scaled so that it sums to the effective number of samples (Kish); ``element`` as labelled in its grasp; ``grasp``
+    and ``cluster``: codes from 0, where a cluster is what errors are taken to be shared in (``cluster_kind``);
+    ``element_area`` m².
     """
 
     friction: FloatArray
@@ -34,6 +35,7 @@ class Observations:
     normal_force: FloatArray
     tangential_force: FloatArray
     weight: FloatArray
+    element: IntArray
     grasp: IntArray
     cluster: IntArray
     cluster_kind: str
@@ -61,9 +63,15 @@ class Observations:
             normal_force=self.normal_force[rows],
             tangential_force=self.tangential_force[rows],
             weight=weight,
+            element=self.element[rows],
             grasp=self.grasp[rows],
             cluster=self.cluster[rows],
         )
+
+    def place(self) -> IntArray:
+        """Codes [k] from 0 of the elements of all grasps: the same element of another grasp is another place."""
+        lowest = int(self.element.min())
+        return _codes(self.grasp * (int(self.element.max()) - lowest + 1) + self.element - lowest)
 
     def columns(self) -> FloatArray:
         """Regressors and response (v, f_n, μ), [k, 3]."""
@@ -87,10 +95,13 @@ def observe(samples: "FrictionSamples | Sequence[FrictionSamples]") -> Observati
     weight = weight[used]
     _check_count(weight)
     grasp = np.repeat(np.arange(len(parts)), [len(part) for part in parts])[used]
-    cluster, kind = _clusters(parts, grasp, used)
+    element = _labels([part.element for part in parts])[used]
+    cluster, kind = _clusters(parts, element, grasp, used)
     names = {"friction_coefficient": "friction"}
     columns = {names.get(name, name): value[used] for name, value in values.items()}
-    return Observations(**columns, weight=weight, grasp=grasp, cluster=cluster, cluster_kind=kind, element_area=area)
+    return Observations(
+        **columns, weight=weight, element=element, grasp=grasp, cluster=cluster, cluster_kind=kind, element_area=area
+    )
 
 
 _LOWEST = {
@@ -163,11 +174,17 @@ def _check_count(weight: FloatArray) -> None:
         raise TooFewSamples("samples", f"worth {effective:.3g} by their weights", f"more than {MIN_SAMPLES - 1}")
 
 
-def _clusters(parts: "list[FrictionSamples]", grasp: IntArray, used: NDArray[np.bool_] | slice) -> tuple[IntArray, str]:
+def _labels(arrays: Sequence[NDArray[np.integer]]) -> IntArray:
+    return np.asarray(arrays[0] if len(arrays) == 1 else np.concatenate(arrays), dtype=np.int64)
+
+
+def _clusters(
+    parts: "list[FrictionSamples]", element: IntArray, grasp: IntArray, used: NDArray[np.bool_] | slice
+) -> tuple[IntArray, str]:
     """Codes [k] from 0 of what shares an error: the grasp, else the element, else a stretch of time."""
     if grasp[-1] > grasp[0]:
         return _codes(grasp), "grasp"
-    codes = _codes(np.concatenate([np.asarray(part.element) for part in parts])[used])
+    codes = _codes(element)
     if codes.max() > 0:
         return codes, "element"
     order = np.argsort(joined([part.time for part in parts])[used], kind="stable")

@@ -79,8 +79,8 @@ class ContactOptions(Options):
     contact_pressure: Annotated[float, Option(0.0, 1e6, "Pa", "well under the ~100 kPa of a fingertip's grasp")] = 500.0
     """Least normal force over element area."""
     contact_force_share: Annotated[
-        float, Option(0.0, 0.9, "-", "reconstructed forces ring with 2 % of their peak outside the contact")
-    ] = 0.05
+        float, Option(0.0, 0.9, "-", "forces reconstructed by a sensor ring with 2 % of their peak; tuning scenes")
+    ] = 0.08
     """Least share of the frame's largest normal force."""
     contact_depth: Annotated[float, Option(0.0, 0.05, "m", "above the drift of a sensor at rest")] = 3e-5
     """Least indentation, without forces."""
@@ -91,6 +91,8 @@ class ContactOptions(Options):
     rim_curvature: Annotated[float, Option(0.0, 1.0, "-", "1: not looked at")] = 1.0
     """Without forces, elements where the indentation is hollow by more than this share of its peak (Laplacian times
     pitch squared) lie beyond the contact's rim."""
+    contact_reach: Annotated[float, Option(0.0, 0.99, "-", "bonded gels of 4.5 to 8 mm among the tuning scenes")] = 0.2
+    """Least share of the deepest indentation of elements between those found in contact and the rim."""
     contact_noise: Annotated[float, Option(0.0, 100.0, "standard deviations", "one false touch in 10⁶ frames")] = 5.0
     """Least multiple of the estimated noise of force or indentation."""
     release_share: Annotated[float, Option(0.0, 1.0, "-", "hysteresis against flicker at the edge")] = 0.7
@@ -184,7 +186,7 @@ class FilterOptions(ContactOptions):
     """Least rate of indentation that counts."""
     pressing_rate: Annotated[float, Option(0.0, 1e6, "1/s", "within a frame at 30 fps")] = 100.0
     """Rate at which slip then ends."""
-    threshold: Annotated[float, Option(0.01, 0.99, "-", "tuning scenes; the reported probability is ½ there")] = 0.35
+    threshold: Annotated[float, Option(0.01, 0.99, "-", "tuning scenes; the reported probability is ½ there")] = 0.4
     """Least posterior of slip."""
 
 

@@ -113,8 +113,15 @@ def touch_thresholds(options: ContactOptions, element_area: float) -> tuple[Floa
     """What an element of that area, m², needs to touch, by force and by shape: ``kernels.contact.Touch`` as arrays."""
     least = options.contact_pressure * element_area
     noise, release = options.contact_noise, options.release_share
-    by_force = Touch(least, options.contact_force_share, noise, release, 1.0)
-    by_shape = Touch(options.contact_depth, options.contact_depth_share, noise, release, options.rim_curvature)
+    by_force = Touch(least, options.contact_force_share, noise, release, 1.0, 1.0)
+    by_shape = Touch(
+        options.contact_depth,
+        options.contact_depth_share,
+        noise,
+        release,
+        options.rim_curvature,
+        options.contact_reach,
+    )
     return np.array(by_force), np.array(by_shape)
 
 

@@ -15,9 +15,7 @@ def warm_up() -> float:
     axis = 1e-3 * np.arange(3.0)
     position = np.stack([*np.meshgrid(axis, axis, indexing="ij"), np.zeros((3, 3))], axis=-1)
     force = np.broadcast_to([0.0, 0.0, -0.1], (2, *position.shape))
-    log = GraspLog(
-        time=[0.0, 0.1], position=position, displacement=np.zeros(force.shape), force=force, element_area=1e-6
-    )
+    log = GraspLog(np.array([0.0, 0.1]), position, np.zeros(force.shape), element_area=1e-6, force=force)
     for method in METHODS:
         detect_slip(log, method, lookahead=1)
     return time.perf_counter() - began

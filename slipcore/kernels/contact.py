@@ -15,7 +15,8 @@ _LEAST, _TO_SIGMA = NOISE.least_series, NOISE.deviation_to_sigma
 
 class Touch(NamedTuple):
     """What an element needs to touch: ``least`` N or m, ``share`` of the frame's peak, ``noise`` multiples of it; the
-    share of that under which it is released; and the rim's least hollow, as a share of the peak (1: not looked at).
+    share of that under which it is released; the rim's least hollow, as a share of the peak (1: not looked at); and
+    the share of the peak that is enough inside the rim of a contact.
     """
 
     least: float
@@ -23,10 +24,15 @@ class Touch(NamedTuple):
     noise: float
     release: float
     rim: float
+    reach: float
 
 
 CURVATURE_NOISE = 0.6374
 """Standard deviation of ``curvature`` for white noise of 1 (from the 25 weights of its stencil)."""
+INSIDE_RIM = 0.68
+"""The share of the rim's least hollow up to which an element beside the contact still lies inside (tuning scenes)."""
+CLEAR = 4.0
+"""How many standard deviations that must be for the contact to be followed to its rim: one gap would let it leak."""
 
 
 @compiled
@@ -34,7 +40,7 @@ def find_contact(pressing: FloatArray, sigma: float, before: BoolArray, touch: T
     """Elements pressed (N, or m of indentation, positive inwards) by more than a threshold tied to the frame.
 
     ``sigma``: noise of ``pressing``, NaN where unknown. Elements in contact ``before`` are released only under
-    ``release`` of the threshold. Where the shape is hollow the contact has ended.
+    ``release`` of the threshold. Where the shape is hollow the contact has ended, and up to there it reaches.
     """
     n, m = pressing.shape
     peak = 0.0
@@ -50,11 +56,42 @@ def find_contact(pressing: FloatArray, sigma: float, before: BoolArray, touch: T
             p = pressing[i, j]
             contact[i, j] = p > threshold or (before[i, j] and p > touch.release * threshold)
     if touch.rim < 1.0 and min(n, m) >= 3:
-        hollow = max(2.0 * CURVATURE_NOISE * known, touch.rim * peak)
-        bend = curvature(pressing)
+        noise, bend = CURVATURE_NOISE * known, curvature(pressing)
+        hollow = max(2.0 * noise, touch.rim * peak)
         for i in range(n):
             for j in range(m):
                 contact[i, j] &= bend[i, j] <= hollow
+        inside = INSIDE_RIM * touch.rim * peak
+        if inside > CLEAR * noise:
+            reach_rim(pressing, bend, max(touch.least, touch.noise * known, touch.reach * peak), inside, contact)
+
+
+@compiled
+def reach_rim(pressing: FloatArray, bend: FloatArray, least: float, hollow: float, contact: BoolArray) -> None:
+    """Let the contact reach to where the shape bends by ``hollow``, m, from what was found.
+
+    Elements pressed by ``least`` join that hang together with those found: a bonded gel is so flat at the rim that this
+    lies far under half of the depth.
+    """
+    n, m = contact.shape
+    grows = True
+    while grows:
+        grows = False
+        for i in range(n):
+            for j in range(m):
+                if not contact[i, j] and bend[i, j] <= hollow and pressing[i, j] > least and beside(contact, i, j):
+                    contact[i, j] = grows = True
+
+
+@compiled
+def beside(contact: BoolArray, i: int, j: int) -> bool:
+    """Whether three of the eight neighbours touch: those along a straight edge, more than show through a single gap."""
+    n, m = contact.shape
+    count = 0
+    for a in range(max(i - 1, 0), min(i + 2, n)):
+        for b in range(max(j - 1, 0), min(j + 2, m)):
+            count += contact[a, b]
+    return bool(count - contact[i, j] >= 3)
 
 
 @compiled

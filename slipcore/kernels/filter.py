@@ -122,23 +122,16 @@ def step_filter(
         return
     places = gather(elements, stays)
     anchors = anchors_of(elements, places, position, end)
-    pose, doubt = find_pose(anchors, before, NOT_GIVEN, variance, tuning.least_weight, tuning.rigidity, tuning.outlier)
-    if given.size and given_before.size:
-        known = follow_object(anchors, before, pose, doubt, given_before, given, next_body)
-        pose, doubt = find_pose(anchors, before, known, variance, tuning.least_weight, tuning.rigidity, tuning.outlier)
+    pose, doubt = step_pose(anchors, before, given_before, given, variance, tuning, next_body)
     motion_x, motion_y, noise = object_motion(anchors, before, pose, doubt, tuning.motion_margin)
     change = force_change(places, force_before, force)
     deeper = np.empty(len(places))
     for e in range(len(places)):
         i, j = places[e]
         deeper[e] = start[i, j, 2] - end[i, j, 2]
-    gain = low_pass(interval, tuning.loading_smoothing)
-    loading = Loading(*unpack(body[LOADING : LOADING + 6], 6))
-    loading = step_loading(
-        loading, (anchors.marker_x, anchors.marker_y), (motion_x, motion_y), deeper, change, interval, gain
+    home = presses_home(
+        body, anchors, (motion_x, motion_y), deeper, change, variance, force_sigma, interval, tuning, next_body
     )
-    friction = body[FRICTION] / body[FRICTION + 1] if body[FRICTION + 1] > 0.0 else 0.0
-    home = presses_home(loading, len(places), change.size > 0, friction, variance, force_sigma, interval, gain, tuning)
     readiness = 0.0 if math.isnan(sigma) else 0.02 if home else 1.0  # nothing begins to slip before noise is known
     evidence = np.zeros(len(places))
     follow_forces(
@@ -167,11 +160,27 @@ def step_filter(
             tuning,
             after,
         )
+    decide(after[PROBABILITY], tuning.threshold, slip, probability)
+
+
+@compiled
+def step_pose(
+    anchors: Anchors,
+    before: Pose,
+    given_before: FloatArray,
+    given: FloatArray,
+    variance: float,
+    tuning: Tuning,
+    next_body: FloatArray,
+) -> tuple[Pose, Uncertainty]:
+    """Where the object's surface is now: as what most likely sticks says, or as far as it follows the known motion."""
+    pose, doubt = find_pose(anchors, before, NOT_GIVEN, variance, tuning.least_weight, tuning.rigidity, tuning.outlier)
+    if given.size and given_before.size:
+        known = follow_object(anchors, before, pose, doubt, given_before, given, next_body)
+        pose, doubt = find_pose(anchors, before, known, variance, tuning.least_weight, tuning.rigidity, tuning.outlier)
     for value in range(4):
         next_body[POSE + value] = pose[value]
-    for value in range(6):
-        next_body[LOADING + value] = loading[value]
-    decide(after[PROBABILITY], tuning.threshold, slip, probability)
+    return pose, doubt
 
 
 @compiled
@@ -259,20 +268,31 @@ def force_change(places: FloatArray, before: FloatArray, now: FloatArray) -> Flo
 
 @compiled
 def presses_home(
-    loading: Loading,
-    count: int,
-    by_force: bool,
-    friction: float,
+    body: FloatArray,
+    anchors: Anchors,
+    motion: tuple[FloatArray, FloatArray],
+    deeper: FloatArray,
+    change: FloatArray,
     variance: float,
     force_sigma: float,
     interval: float,
-    gain: float,
     tuning: Tuning,
+    next_body: FloatArray,
 ) -> bool:
-    """Whether everything sticks again because the normal load grows (Mindlin and Deresiewicz)."""
+    """Whether everything sticks again because the normal load grows (Mindlin and Deresiewicz).
+
+    ``deeper`` [k] m and ``change`` of force [3, k] N, empty without forces, since the last frame.
+    """
+    gain = low_pass(interval, tuning.loading_smoothing)
+    loading = Loading(*unpack(body[LOADING : LOADING + 6], 6))
+    loading = step_loading(loading, (anchors.marker_x, anchors.marker_y), motion, deeper, change, interval, gain)
+    for value in range(6):
+        next_body[LOADING + value] = loading[value]
+    count = len(deeper)
     if count == 0:
         return False
-    if by_force:
+    if change.size > 0:
+        friction = body[FRICTION] / body[FRICTION + 1] if body[FRICTION + 1] > 0.0 else 0.0
         slope = tuning.pressing_share * friction if friction > 0.0 else tuning.pressing_slope
         return forces_press_home(loading, count, force_sigma, interval, gain, slope)
     return depth_presses_home(loading, count, variance, interval, gain, tuning.pressing_slope, tuning.pressing_floor)

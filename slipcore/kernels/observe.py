@@ -47,7 +47,7 @@ def observe(
     if known.size:
         contact[:] = known
     else:
-        find_contact(pressing, pressing_noise, before, Touch(*unpack(touch, 5)), contact)
+        find_contact(pressing, pressing_noise, before, Touch(*unpack(touch, 6)), contact)
     for i in range(n):
         for j in range(m):
             stays[i, j] = contact[i, j] and before[i, j]

@@ -1,6 +1,8 @@
 import pickle
+import resource
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -398,3 +400,21 @@ def test_a_step_leaves_its_state_alone(short_ramp: GraspLog) -> None:
     for frame in frames[30:]:
         step(state, frame)
     assert pickle.dumps(state) == stored
+
+
+@pytest.mark.long
+def test_a_million_frames_leave_memory_as_it_was(short_ramp: GraspLog) -> None:
+    detector = SlipDetector(short_ramp.position, short_ramp.element_area)
+    frames, before = list(short_ramp.frames()), 0
+    for k in range(1_000_000):
+        frame = frames[k % len(frames)]
+        detector.step(k / 30.0, frame.displacement, frame.force)
+        if k == 10_000:
+            before = resident()
+    assert resident() - before < 2**20
+
+
+def resident() -> int:
+    """Bytes of memory that this process holds now."""
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * resource.getpagesize()

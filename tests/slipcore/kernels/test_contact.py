@@ -5,9 +5,9 @@ import pytest
 
 from slipcore import detect_slip
 from slipcore.contact import tangential_ramp
-from slipcore.defaults import ContactOptions
+from slipcore.defaults import ContactOptions, FilterOptions
 from slipcore.detector import touch_thresholds
-from slipcore.kernels.contact import CURVATURE_NOISE, Touch, curvature, find_contact, spatial_noise
+from slipcore.kernels.contact import CURVATURE_NOISE, Touch, curvature, find_contact, reach_rim, spatial_noise
 
 OPTIONS = ContactOptions()
 AREA = 1e-6
@@ -32,7 +32,7 @@ def found_contact(pressing: np.ndarray, noise: float, before: np.ndarray | None,
 
 
 def test_the_threshold_is_the_largest_of_pressure_share_and_noise() -> None:
-    pressing = np.array([[1e-1, 6e-3, 4e-3, -1e-1]])
+    pressing = np.array([[1e-1, 9e-3, 7e-3, -1e-1]])
     np.testing.assert_array_equal(contact_from_force(pressing, AREA, np.nan, None, OPTIONS), [[1, 1, 0, 0]])
     np.testing.assert_array_equal(contact_from_force(pressing, AREA, 2e-3, None, OPTIONS), [[1, 0, 0, 0]])
     weak = np.array([[6e-4, 4e-4]])  # 500 Pa on 1 mm² is 0.5 mN
@@ -81,6 +81,31 @@ def test_beyond_the_rim_the_shape_is_hollow() -> None:
     assert np.count_nonzero(found ^ (r <= 1.0)) <= 0.15 * np.count_nonzero(r <= 1.0)
     deeper = contact_from_shape(1e-3 * sunk, np.nan, None, replace(OPTIONS, contact_depth_share=0.3))
     assert np.count_nonzero(deeper) > 1.5 * np.count_nonzero(r <= 1.0)
+
+
+@pytest.mark.parametrize(("noise", "part"), [(0.0, 0.75), (1e-6, 0.75), (2e-5, 0.45)])
+def test_on_a_bonded_gel_the_contact_is_followed_to_its_rim_while_noise_allows(noise: float, part: float) -> None:
+    x, y = np.meshgrid(np.arange(-9.0, 10.0), np.arange(-9.0, 10.0))
+    r = np.hypot(x, y) / 6.0
+    sunk = 4e-4 * np.maximum(1.0 - r**2, 0.0)  # a thin layer sinks in under the object and nowhere else
+    seen = sunk + noise * np.random.default_rng(0).standard_normal(sunk.shape)
+    found = contact_from_shape(seen, noise, None, FilterOptions())
+    assert np.count_nonzero(found & (r < 1.0)) > part * np.count_nonzero(r < 1.0)
+    assert np.count_nonzero(found & (r < 1.0)) < (part + 0.15) * np.count_nonzero(r < 1.0)
+    assert not found[r >= 1.1].any()
+
+
+def test_a_contact_does_not_leak_through_a_single_gap_of_its_rim() -> None:
+    pressing, bend = np.ones((9, 9)), np.zeros((9, 9))
+    bend[5] = 1.0  # the rim, hollow
+    bend[5, 4] = 0.0
+    contact = np.zeros((9, 9), bool)
+    contact[:3] = True
+    reach_rim(pressing, bend, 0.5, 0.5, contact)
+    wanted = np.zeros((9, 9), bool)
+    wanted[:5] = True
+    wanted[5, 4] = True
+    np.testing.assert_array_equal(contact, wanted)
 
 
 def test_the_noise_of_the_curvature_is_that_of_its_stencil() -> None:
