@@ -5,8 +5,21 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
-from service.problems import INSUFFICIENT_SCOPE, INVALID_KEY, KEY_REQUIRED, MEDIA_TYPE, TOO_MANY_REQUESTS
+from service.problems import (
+    BAD_REQUEST,
+    HEADERS_TOO_LARGE,
+    INSUFFICIENT_SCOPE,
+    INVALID_KEY,
+    KEY_REQUIRED,
+    MEDIA_TYPE,
+    REQUEST_TIMEOUT,
+    TOO_MANY_REQUESTS,
+    ProblemType,
+)
 from service.routes.common import description_of
+
+AT_THE_DOOR = (BAD_REQUEST, HEADERS_TOO_LARGE)
+"""Problems of every route, before it is known what is asked."""
 
 AT_THE_GATE = (KEY_REQUIRED, INVALID_KEY, INSUFFICIENT_SCOPE, TOO_MANY_REQUESTS)
 """Problems of every route that needs a key."""
@@ -34,8 +47,9 @@ class DescribedApp(FastAPI):
 def _describe_problems(description: dict[str, Any]) -> None:
     for operations in description["paths"].values():
         for operation in operations.values():
-            if "security" in operation:
-                operation["responses"] |= _turned_away()
+            kinds = AT_THE_DOOR + (AT_THE_GATE if "security" in operation else ())
+            kinds += (REQUEST_TIMEOUT,) if "requestBody" in operation else ()
+            operation["responses"] = _described(*kinds) | operation["responses"]
             for status, response in operation["responses"].items():
                 if int(status) >= 400:
                     response["content"] = {MEDIA_TYPE: response["content"].pop("application/json")}
@@ -43,7 +57,7 @@ def _describe_problems(description: dict[str, Any]) -> None:
         description["components"]["schemas"].pop(name, None)
 
 
-def _turned_away() -> dict[str, Any]:
+def _described(*kinds: ProblemType) -> dict[str, Any]:
     schema = {"application/json": {"schema": {"$ref": "#/components/schemas/ProblemOut"}}}
-    described = description_of(*AT_THE_GATE)
-    return {str(status): {"description": text, "content": dict(schema)} for status, text in described.items()}
+    texts = description_of(*kinds)
+    return {str(status): {"description": text, "content": dict(schema)} for status, text in texts.items()}
