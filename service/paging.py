@@ -48,7 +48,7 @@ def _number(value: Any) -> int:
     return value
 
 
-READERS: Mapping[str, Callable[[Any], Any]] = {"name": _text, "created_at": _moment, "id": _number, "log_id": _text}
+READERS: Mapping[str, Callable[[Any], Any]] = {"name": _text, "created_at": _moment, "id": _number, "hex": _text}
 """What a cursor may hold of an entry, and how it is read back."""
 
 

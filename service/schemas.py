@@ -364,9 +364,10 @@ class WithdrawalOut(BaseModel):
 
 
 class JobsOut(BaseModel):
-    """Some jobs, newest first."""
+    """Jobs in the order that was asked for."""
 
     items: list[JobOut]
+    next: Next
 
 
 class GraspLogOut(BaseModel):

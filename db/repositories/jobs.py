@@ -7,6 +7,7 @@ from sqlalchemy import select, update
 from sqlalchemy.orm import Session
 
 from db.errors import ClaimLost, NotFound
+from db.paging import Window, windowed
 from db.records import Claim, Job, JobKind, JobStatus
 from db.tables import JobRow, MaterialRow, now
 
@@ -45,12 +46,12 @@ def get(session: Session, job_id: str) -> Job:
     return record(*row)
 
 
-def list_newest(session: Session, status: JobStatus | None, limit: int) -> list[Job]:
-    """Jobs, newest first, those of one status or all."""
+def list_all(session: Session, window: Window, status: JobStatus | None = None) -> list[Job]:
+    """Jobs of one status, or all."""
     query = select(JobRow, MaterialRow.name).outerjoin(MaterialRow)
     if status is not None:
         query = query.where(JobRow.status == status)
-    found = session.execute(query.order_by(JobRow.created_at.desc(), JobRow.id.desc()).limit(limit))
+    found = session.execute(windowed(query, window, {"created_at": JobRow.created_at}, JobRow.id))
     return [record(*row) for row in found]
 
 

@@ -146,7 +146,7 @@ def list_grasp_logs(
     cursor: CursorText = None,
 ) -> GraspLogsOut:
     """Each with its job and, once there, what was found in it."""
-    page = Page(sort, limit, cursor, identity="log_id")
+    page = Page(sort, limit, cursor, identity="hex")
     with context.database.read() as session:
         material_id = None if material is None else materials.find_id(session, material)
         wanted = LogFilter(material_id, sensor, status, withdrawn)

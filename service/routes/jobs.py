@@ -1,13 +1,14 @@
 """Jobs."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Request, Response
 
 from db.records import JobStatus
 from db.repositories import jobs
 from service.access import ADMIN, READ
 from service.context import Given
+from service.paging import USUAL, CursorText, Limit, Page, link_next
 from service.problems import INVALID_REQUEST, JOB_ENDED, STORAGE_UNAVAILABLE, UNKNOWN_JOB
 from service.routes.common import problems
 from service.schemas import JobOut, JobsOut
@@ -15,22 +16,26 @@ from service.use_cases.cancel import cancel
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
-MOST_JOBS = 1000
-"""Jobs in one answer."""
-
 
 @router.get("", dependencies=[READ], summary="List jobs", responses=problems(INVALID_REQUEST, STORAGE_UNAVAILABLE))
 def list_jobs(
     context: Given,
+    request: Request,
+    response: Response,
     status: Annotated[JobStatus | None, Query(description="Only those of it, such as `failed`")] = None,
-    limit: Annotated[int, Query(ge=1, le=MOST_JOBS, description="So many at most")] = 100,
+    sort: Annotated[
+        Literal["created_at", "-created_at"], Query(description="By what; `-` for the last ones first")
+    ] = "-created_at",
+    limit: Limit = USUAL,
+    cursor: CursorText = None,
 ) -> JobsOut:
-    """Newest first, each with how far it is and why it ended."""
+    """Each with how far it is and why it ended."""
+    page = Page(sort, limit, cursor, identity="hex")
     with context.database.read() as session:
-        found = jobs.list_newest(session, status, limit)
+        found, after = page.cut(jobs.list_all(session, page.window(), status))
     for ended in (job.finished_at for job in found if job.finished_at is not None):
         context.models.seen(ended)
-    return JobsOut(items=[JobOut.of(job) for job in found])
+    return JobsOut(items=[JobOut.of(job) for job in found], next=link_next(request, response, after))
 
 
 @router.get(

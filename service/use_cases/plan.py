@@ -9,7 +9,7 @@ import numpy as np
 import estimators
 from db.records import StoredModel
 from db.repositories import friction_models, grasp_logs, materials
-from estimators import EstimatorError
+from estimators import EstimatorError, Moments
 from service.context import Context
 from service.problems import INVALID_REQUEST, INVALID_SAMPLES, NO_FEASIBLE_FORCE, NO_MODEL, NOT_READY, Problem
 from service.schemas import (
@@ -93,7 +93,8 @@ def _candidates(context: Context, names: Sequence[str] | None, method: str) -> l
     return found
 
 
-def _samples(context: Context, wish: NewRecognition) -> FrictionSamples:
+def _samples(context: Context, wish: NewRecognition) -> FrictionSamples | Moments:
+    """What is known of the grasp; the moments of a stored one say all that is asked, whatever its length."""
     if wish.samples is not None:
         return _given(wish.samples)
     with context.database.read() as session:
@@ -102,6 +103,8 @@ def _samples(context: Context, wish: NewRecognition) -> FrictionSamples:
         raise Problem(NOT_READY, f"job {log.job.id} is {log.job.status}; its results are not there")
     if log.samples.none_because is not None:
         raise Problem(INVALID_SAMPLES, log.samples.none_because)
+    if log.samples.moments is not None:
+        return Moments.from_bytes(log.samples.moments)
     return decode_samples(context.blobs.path(log.samples.samples_blob))
 
 

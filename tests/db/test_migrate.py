@@ -12,6 +12,7 @@ from sqlalchemy import inspect, text
 from db import migrate
 from db.database import Database
 from db.errors import SchemaMismatch, StorageUnavailable
+from db.paging import Window
 from db.records import Claim, Detection, NewGraspLog, NewModel, SampleSummary
 from db.repositories import (
     access_keys,
@@ -139,7 +140,7 @@ def test_a_database_of_before_claims_keeps_its_jobs_and_models(
     migrate.upgrade(database)
     migrate.check(database)
     with database.write() as session:
-        assert sorted(job.status for job in jobs.list_newest(session, None, 9)) == ["failed", "queued"]
+        assert sorted(job.status for job in jobs.list_all(session, Window("created_at"))) == ["failed", "queued"]
         assert friction_models.versions(session, material, None) == models
         stored = detections.samples_of_material(session, material)
         assert [found.moments for found in stored] == [None]

@@ -6,6 +6,7 @@ import pytest
 
 from db.database import Database
 from db.errors import ClaimLost, NotFound
+from db.paging import Window
 from db.records import Claim
 from db.repositories import jobs, materials, runners
 
@@ -161,8 +162,12 @@ def test_jobs_are_listed_newest_first(database: Database, job: str, claim: Calla
     with database.write() as session:
         newer = [jobs.add(session, "fit", "ols", material_id=materials.find_id(session, "paper")) for _ in range(2)]
         jobs.finish(session, mine, "failed", reason="bug")
-        assert [found.id for found in jobs.list_newest(session, None, 2)] == newer[::-1]
-        assert [(found.id, found.reason) for found in jobs.list_newest(session, "failed", 9)] == [(job, "bug")]
+        assert [found.id for found in jobs.list_all(session, Window("created_at", descending=True, limit=2))] == newer[
+            ::-1
+        ]
+        assert [(found.id, found.reason) for found in jobs.list_all(session, Window("created_at"), "failed")] == [
+            (job, "bug")
+        ]
 
 
 def test_an_unknown_job_is_named(database: Database) -> None:
