@@ -12,7 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from db.defaults import CACHE_GRACE, HASHES_PER_QUERY, ORPHAN_AGE
+from db.defaults import CACHE_GRACE, COPY_BYTES, HASHES_PER_QUERY, ORPHAN_AGE
 from db.errors import NotFound, StorageUnavailable
 from db.object_store import ObjectStore
 
@@ -111,6 +111,16 @@ class BlobStore:
         with self.spool() as spool:
             spool.write(content)
             return spool.keep()
+
+    def take(self, file: Path, sha256: str) -> None:
+        """Store a copy of a file that must have this hash; raises ``StorageUnavailable`` if it has another."""
+        with self.spool() as spool:
+            with file.open("rb") as stream:
+                while chunk := stream.read(COPY_BYTES):
+                    spool.write(chunk)
+            if spool.sha256 != sha256:
+                raise StorageUnavailable(f"{file} has other bytes than it had: its hash is {spool.sha256}")
+            spool.keep()
 
     def path(self, sha256: str) -> Path:
         """The file that holds a blob, fetched where it has to be; raises ``NotFound``."""

@@ -37,3 +37,6 @@ ORPHAN_AGE = timedelta(hours=24)
 
 CACHE_GRACE = 600.0
 """s, above 0; how long a blob that was just used stays in the local cache, however full: somebody may be reading it."""
+
+COPY_BYTES = 2**20
+"""Bytes of a file that are in memory at once while it is copied."""

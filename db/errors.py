@@ -27,6 +27,17 @@ class AlreadyExists(DatabaseError):
         return f"{self.kind} {self.name!r} is stored already"
 
 
+class NotEmpty(DatabaseError):
+    """What is to be filled has something in it already."""
+
+    def __init__(self, what: str, allowed: str) -> None:
+        self.what, self.allowed = what, allowed
+        super().__init__(what, allowed)
+
+    def __str__(self) -> str:
+        return f"{self.what} is there already; allowed: {self.allowed}"
+
+
 class DriverMissing(DatabaseError):
     """The database or blob store of this URL needs a library that is not installed."""
 

@@ -169,6 +169,7 @@ class JobRow(Base):
         CheckConstraint("(status = 'running') = (runner_id IS NOT NULL)", name="runner"),
         CheckConstraint("status NOT IN ('failed', 'refused', 'cancelled') OR reason IS NOT NULL", name="reason"),
         Index(None, "status", "created_at", "id"),  # the next one is found without a look at the others
+        Index(None, "finished_at"),  # and so is what ended since a monitor last asked
     )
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)

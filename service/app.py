@@ -20,9 +20,10 @@ from service.gate import Gate
 from service.head_requests import HeadRequests
 from service.jobs import JobRunner
 from service.lanes import lanes
+from service.metrics import Metering, Metrics
 from service.model_cache import ModelCache
 from service.reading import Readers
-from service.routes import curation, grasp_logs, health, jobs, materials, planning
+from service.routes import curation, grasp_logs, health, jobs, materials, metrics, planning
 from service.settings import Settings
 from service.worker import Place
 
@@ -52,12 +53,14 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         redirect_slashes=False,
         generate_unique_id_function=openapi.operation_id,
     )
-    for module in (health, materials, grasp_logs, curation, planning, jobs):
+    for module in (health, metrics, materials, grasp_logs, curation, planning, jobs):
         app.include_router(module.router)
     access.check_routes(app)
     app.add_middleware(Gate, settings=chosen)
     app.add_middleware(HeadRequests)
     app.add_middleware(Envelope)
+    app.state.metrics = Metrics()
+    app.add_middleware(Metering, metrics=app.state.metrics)
     problems.install(app)
     return app
 

@@ -3,7 +3,7 @@
 import uuid
 from typing import Any
 
-from sqlalchemy import Select, exists, select, update
+from sqlalchemy import Select, exists, func, select, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, aliased
 
@@ -169,3 +169,9 @@ def _sensor_id(session: Session, name: str) -> int:
     except IntegrityError:  # another writer was faster
         return session.execute(query).scalar_one()
     return row.id
+
+
+def count_and_bytes(session: Session) -> tuple[int, int]:
+    """How many logs there are, and the bytes of their uploads."""
+    count, size = session.execute(select(func.count(), func.coalesce(func.sum(GraspLogRow.bytes), 0))).one()
+    return int(count), int(size)

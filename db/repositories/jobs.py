@@ -2,8 +2,9 @@
 
 import uuid
 from collections.abc import Mapping
+from datetime import datetime
 
-from sqlalchemy import select, update
+from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session
 
 from db.errors import ClaimLost, NotFound
@@ -59,6 +60,19 @@ def move_unfinished(session: Session, source_id: int, target_id: int) -> None:
     """Let the jobs that a material still has be about another one."""
     of_it = (JobRow.material_id == source_id, JobRow.status.in_(("queued", "running")))
     session.execute(update(JobRow).where(*of_it).values(material_id=target_id))
+
+
+def count_unfinished(session: Session) -> dict[str, int]:
+    """How many jobs are queued, and how many running."""
+    unfinished = ("queued", "running")
+    query = select(JobRow.status, func.count()).where(JobRow.status.in_(unfinished)).group_by(JobRow.status)
+    return dict.fromkeys(unfinished, 0) | {str(row[0]): int(row[1]) for row in session.execute(query)}
+
+
+def ended_since(session: Session, moment: datetime) -> list[Job]:
+    """Jobs that ended at this moment or later, the first ones first."""
+    query = select(JobRow, MaterialRow.name).outerjoin(MaterialRow).where(JobRow.finished_at >= moment)
+    return [record(*row) for row in session.execute(query.order_by(JobRow.finished_at))]
 
 
 def any_queued(session: Session) -> bool:

@@ -1,15 +1,17 @@
-"""Commands on the database's schema: upgrade, downgrade, current, check."""
+"""Commands on the database: its schema (upgrade, downgrade, current, check), and copies of all that is stored."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
+    from db.blobs import BlobStore
     from db.database import Database
 
-app = typer.Typer(help="Create, upgrade and check the database's schema.", no_args_is_help=True)
+app = typer.Typer(help="Create, upgrade, check, back up and restore what is stored.", no_args_is_help=True)
 Url = Annotated[
     str | None, typer.Option("--database-url", help="SQLAlchemy URL; by default the one that the service uses.")
 ]
@@ -55,6 +57,46 @@ def check(database_url: Url = None) -> None:
     with opened(database_url) as database:
         migrate.check(database)
         typer.echo("the schema is this version's")
+
+
+@app.command()
+def backup(
+    folder: Annotated[Path, typer.Argument(help="Where to; blobs of an earlier backup that are in it are not copied.")],
+    database_url: Url = None,
+) -> None:
+    """Copy everything, rows and blobs, into a folder, as of one moment; the service may run meanwhile."""
+    from db.backup import backup as copy_out
+
+    with opened(database_url) as database:
+        copy_out(database, _blobs(), folder, _tell)
+    typer.echo(f"backed up to {folder}")
+
+
+@app.command()
+def restore(
+    folder: Annotated[Path, typer.Argument(help="A folder that `stiction db backup` made.")],
+    database_url: Url = None,
+) -> None:
+    """Fill an empty database, SQLite or PostgreSQL, and its blob store from a backup."""
+    from db.backup import restore as copy_in
+
+    with opened(database_url) as database:
+        copy_in(folder, database, _blobs(), _tell)
+    typer.echo(f"restored from {folder}")
+
+
+def _blobs() -> "BlobStore":
+    from db.blobs import open_blobs
+    from service.settings import Settings
+
+    settings = Settings()
+    return open_blobs(settings.data_folder, settings.blob_url, settings.blob_cache_bytes)
+
+
+def _tell(what: str, count: int) -> None:
+    """Say on standard error what was copied, blobs once in a while."""
+    if what != "blobs" or count % 100 == 0:
+        typer.echo(f"{what}: {count}", err=True)
 
 
 @contextmanager

@@ -1,0 +1,123 @@
+"""Copies of all that a service keeps: a folder with the rows as a SQLite file and the blobs beside it.
+
+The same from either database and into either, so that a backup is the way from SQLite to PostgreSQL, too.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from itertools import islice
+from pathlib import Path
+
+from sqlalchemy import Table, func, insert, select, text
+from sqlalchemy.orm import Session
+
+from db import migrate
+from db.blobs import BlobStore
+from db.database import Database
+from db.defaults import HASHES_PER_QUERY
+from db.errors import NotEmpty
+from db.repositories import blobs as references
+from db.tables import Base, IdempotencyKeyRow, RunnerRow
+
+FILE = "stiction.sqlite3"
+LEFT_OUT = {RunnerRow.__tablename__, IdempotencyKeyRow.__tablename__}
+"""Tables of what lives for a moment only: a copy has no running processes, and answers no repeated requests."""
+
+ROWS_AT_ONCE = 500
+
+Report = Callable[[str, int], None]
+"""What is told what was copied, and how many of it."""
+
+
+def backup(database: Database, blobs: BlobStore, folder: Path, report: Report) -> None:
+    """Copy everything into a folder, as of one moment of the database; blobs that are there already are kept.
+
+    May run beside the service. Running jobs are copied as queued ones. Raises ``SchemaMismatch``, and ``NotEmpty`` if
+    the folder has another backup.
+    """
+    migrate.check(database)
+    file = folder / FILE
+    if file.exists():
+        raise NotEmpty(f"backup {file}", "a folder without one; blobs of an earlier backup may be in it")
+    folder.mkdir(parents=True, exist_ok=True)
+    unfinished = file.with_suffix(".part")
+    unfinished.unlink(missing_ok=True)
+    with closing(Database(f"sqlite:///{unfinished}")) as copy:
+        migrate.upgrade(copy)
+        _copy_rows(database, copy, report)
+        _copy_blobs(copy, blobs, BlobStore(folder), report)
+    unfinished.replace(file)  # closing took what was ahead of it in the log into the file
+
+
+def restore(folder: Path, database: Database, blobs: BlobStore, report: Report) -> None:
+    """Fill an empty database and blob store from a backup.
+
+    Every blob must have the bytes that it is named for. Raises ``NotEmpty`` for a database that has any rows,
+    ``NotFound`` for a blob that is missing, ``StorageUnavailable`` for one whose bytes have changed.
+    """
+    file = folder / FILE
+    if not file.is_file():
+        raise FileNotFoundError(f"backup {file} is not there")
+    migrate.upgrade(database)
+    _refuse_rows(database)
+    with closing(Database(f"sqlite:///{file}")) as copy:
+        migrate.check(copy)
+        _copy_blobs(copy, BlobStore(folder), blobs, report)
+        _copy_rows(copy, database, report)
+
+
+def _refuse_rows(database: Database) -> None:
+    with database.read() as session:
+        for table in Base.metadata.sorted_tables:
+            count = session.scalar(select(func.count()).select_from(table))
+            if count and table.name not in LEFT_OUT:
+                raise NotEmpty(f"table {table.name} ({count} rows)", "an empty database")
+
+
+def _copy_rows(source: Database, target: Database, report: Report) -> None:
+    with source.read() as reading, target.write() as writing:
+        for table in Base.metadata.sorted_tables:
+            if table.name not in LEFT_OUT:
+                report(table.name, _copy_table(table, reading, writing))
+
+
+def _copy_table(table: Table, reading: Session, writing: Session) -> int:
+    rows = reading.execute(select(table).execution_options(yield_per=ROWS_AT_ONCE)).mappings()
+    count = 0
+    for part in rows.partitions():
+        writing.execute(insert(table), [_settled(table, dict(row)) for row in part])
+        count += len(part)
+    keys = table.primary_key.columns.values()
+    if count and len(keys) == 1 and keys[0].type.python_type is int and _is_postgresql(writing):
+        place = f"pg_get_serial_sequence('{table.name}', '{keys[0].name}')"
+        writing.execute(text(f"SELECT setval({place}, (SELECT max({keys[0].name}) FROM {table.name}))"))
+    return count
+
+
+def _settled(table: Table, row: dict[str, object]) -> dict[str, object]:
+    """The row as it is without runners."""
+    if table.name == "jobs" and row["status"] == "running":
+        return row | {"status": "queued", "runner_id": None}
+    return row
+
+
+def _is_postgresql(session: Session) -> bool:
+    return session.connection().dialect.name == "postgresql"
+
+
+def _copy_blobs(rows: Database, source: BlobStore, target: BlobStore, report: Report) -> None:
+    """Those that the rows refer to and the target has not; rows never refer to a blob that is not stored."""
+    present, count = set(target.hashes()), 0
+    with rows.read() as session:
+        for sha256 in _wanted(session):
+            if sha256 not in present:
+                target.take(source.path(sha256), sha256)
+                count += 1
+                report("blobs", count)
+    report("blobs", count)
+
+
+def _wanted(session: Session) -> Iterator[str]:
+    everything = references.all_referenced(session)
+    while some := list(islice(everything, HASHES_PER_QUERY)):
+        yield from some

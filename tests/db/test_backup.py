@@ -1,0 +1,145 @@
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from sqlalchemy import select
+
+from db import migrate
+from db.backup import FILE, LEFT_OUT, backup, restore
+from db.blobs import BlobStore
+from db.database import Database
+from db.errors import NotEmpty, NotFound, SchemaMismatch, StorageUnavailable
+from db.records import Claim, Detection, NewGraspLog, NewModel, SampleSummary
+from db.repositories import access_keys, detections, friction_models, grasp_logs, jobs, materials, runners
+from db.tables import Base
+
+Rows = dict[str, list[dict[str, object]]]
+
+
+@pytest.fixture
+def blobs(tmp_path: Path) -> BlobStore:
+    return BlobStore(tmp_path / "data")
+
+
+@pytest.fixture
+def filled(
+    database: Database,
+    blobs: BlobStore,
+    new_log: Callable[..., NewGraspLog],
+    new_model: Callable[..., NewModel],
+    detection: Detection,
+    samples: SampleSummary,
+) -> Database:
+    """Two logs of a material: one with everything, one whose job runs."""
+    history, found = blobs.put(b"history"), blobs.put(b"samples")
+    with database.write() as session:
+        material = materials.create(session, "paper", "a box")
+        done, running = (
+            grasp_logs.add(session, new_log(material.id, sha256=blobs.put(content))) for content in (b"one", b"two")
+        )
+        job = jobs.add(session, "ingest", "ols", material_id=material.id, grasp_log_id=done)
+        detections.add(session, done, replace(detection, history_blob=history), replace(samples, samples_blob=found))
+        friction_models.add(session, material.id, job, new_model())
+        owner = runners.add(session, "host:1")
+        claim = jobs.claim(session, owner)
+        assert claim == Claim(job, owner)
+        jobs.finish(session, claim, "done", model_version=1)
+        jobs.add(session, "ingest", "ols", material_id=material.id, grasp_log_id=running)
+        jobs.claim(session, owner)
+        access_keys.add(session, "0" * 12, "robot", "read", history)
+    return database
+
+
+@pytest.fixture
+def other(new_url: Callable[..., str], tmp_path: Path) -> Iterator[Database]:
+    """An empty database of the same kind."""
+    (tmp_path / "other").mkdir()
+    with closing(Database(new_url(tmp_path / "other", empty=True))) as database:
+        yield database
+
+
+def rows(database: Database) -> Rows:
+    with database.read() as session:
+        return {
+            table.name: [dict(row) for row in session.execute(select(table).order_by(*table.primary_key)).mappings()]
+            for table in Base.metadata.sorted_tables
+            if table.name not in LEFT_OUT
+        }
+
+
+def nothing(what: str, count: int) -> None:
+    pass
+
+
+def test_what_was_stored_is_there_again_and_running_jobs_are_queued(
+    filled: Database, blobs: BlobStore, other: Database, tmp_path: Path
+) -> None:
+    told: list[tuple[str, int]] = []
+    backup(filled, blobs, tmp_path / "copy", lambda what, count: told.append((what, count)))
+    assert {("materials", 1), ("grasp_logs", 2), ("jobs", 2), ("blobs", 4)} <= set(told)
+    again = BlobStore(tmp_path / "again")
+    restore(tmp_path / "copy", other, again, nothing)
+    wanted = rows(filled)
+    for job in wanted["jobs"]:
+        job |= {"runner_id": None, "status": "queued" if job["status"] == "running" else job["status"]}
+    assert rows(other) == wanted
+    assert {again.path(sha256).read_bytes() for sha256 in again.hashes()} == {b"one", b"two", b"history", b"samples"}
+
+
+def test_a_restored_database_goes_on_with_new_rows(
+    filled: Database, blobs: BlobStore, other: Database, tmp_path: Path
+) -> None:
+    backup(filled, blobs, tmp_path / "copy", nothing)
+    restore(tmp_path / "copy", other, blobs, nothing)
+    with other.write() as session:
+        assert materials.create(session, "glass", "").id == 2
+        assert jobs.claim(session, runners.add(session, "host:2")) is not None
+
+
+def test_the_next_backup_copies_new_blobs_only(filled: Database, blobs: BlobStore, tmp_path: Path) -> None:
+    told: dict[str, int] = {}
+    backup(filled, blobs, tmp_path / "copy", nothing)
+    with pytest.raises(NotEmpty, match=FILE):
+        backup(filled, blobs, tmp_path / "copy", nothing)
+    (tmp_path / "copy" / FILE).unlink()
+    backup(filled, blobs, tmp_path / "copy", told.__setitem__)
+    assert told["blobs"] == 0
+
+
+def test_a_blob_that_changed_or_went_stops_a_restore_before_any_row(
+    filled: Database, blobs: BlobStore, other: Database, tmp_path: Path
+) -> None:
+    backup(filled, blobs, tmp_path / "copy", nothing)
+    sha256 = next(BlobStore(tmp_path / "copy").hashes())
+    path = BlobStore(tmp_path / "copy").path(sha256)
+    content = path.read_bytes()
+    path.write_bytes(content + b"!")
+    with pytest.raises(StorageUnavailable, match=sha256):
+        restore(tmp_path / "copy", other, BlobStore(tmp_path / "again"), nothing)
+    path.unlink()
+    with pytest.raises(NotFound, match=sha256):
+        restore(tmp_path / "copy", other, BlobStore(tmp_path / "again"), nothing)
+    assert not any(rows(other).values())
+    path.write_bytes(content)
+    restore(tmp_path / "copy", other, BlobStore(tmp_path / "again"), nothing)
+
+
+def test_only_an_empty_database_is_filled_and_only_from_a_backup(
+    filled: Database, blobs: BlobStore, tmp_path: Path
+) -> None:
+    backup(filled, blobs, tmp_path / "copy", nothing)
+    with pytest.raises(NotEmpty, match="rows"):
+        restore(tmp_path / "copy", filled, blobs, nothing)
+    with pytest.raises(FileNotFoundError, match="nowhere"):
+        restore(tmp_path / "nowhere", filled, blobs, nothing)
+
+
+def test_a_database_of_another_version_is_not_backed_up(
+    empty_database: Database, blobs: BlobStore, tmp_path: Path
+) -> None:
+    migrate.upgrade(empty_database, "0001")
+    with pytest.raises(SchemaMismatch, match="0001"):
+        backup(empty_database, blobs, tmp_path / "copy", nothing)
+    assert not (tmp_path / "copy").exists()
