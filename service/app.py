@@ -23,8 +23,9 @@ from service.lanes import lanes
 from service.metrics import Metering, Metrics
 from service.model_cache import ModelCache
 from service.reading import Readers
-from service.routes import curation, grasp_logs, health, jobs, materials, metrics, planning
+from service.routes import curation, grasp_logs, health, jobs, materials, metrics, planning, stream
 from service.settings import Settings
+from service.stream_sessions import Streams
 from service.worker import Place
 
 logger = logging.getLogger(__name__)
@@ -53,7 +54,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         redirect_slashes=False,
         generate_unique_id_function=openapi.operation_id,
     )
-    for module in (health, metrics, materials, grasp_logs, curation, planning, jobs):
+    for module in (health, metrics, materials, grasp_logs, curation, planning, jobs, stream):
         app.include_router(module.router)
     access.check_routes(app)
     app.add_middleware(Gate, settings=chosen)
@@ -85,11 +86,13 @@ async def running(
                 poll_seconds=settings.poll_seconds,
                 shutdown_seconds=settings.shutdown_seconds,
             )
-            readers = Readers(settings.read_seconds)
+            readers, streams = Readers(settings.read_seconds), Streams()
             await runner.start()
             try:
-                yield Context(settings, database, blobs, runner, readers, ModelCache(settings.lookup_seconds))
+                models = ModelCache(settings.lookup_seconds)
+                yield Context(settings, database, blobs, runner, readers, streams, models)
             finally:
+                await streams.stop()
                 await runner.stop()
                 await readers.stop()
 

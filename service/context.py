@@ -11,6 +11,7 @@ from service.jobs import JobRunner
 from service.model_cache import ModelCache
 from service.reading import Readers
 from service.settings import Settings
+from service.stream_sessions import Streams
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +23,7 @@ class Context:
     blobs: BlobStore
     jobs: JobRunner
     readers: Readers = field(default_factory=Readers)
+    streams: Streams = field(default_factory=Streams)
     models: ModelCache = field(default_factory=ModelCache)
 
 

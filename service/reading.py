@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from service import formats
+from service import formats, worker
 from service.formats import writing
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
@@ -24,6 +24,10 @@ from stiction_client import container
 
 MEMORY_BYTES = 2 * 2**30
 """Address space that a reader may take beyond what it has when it starts: eight times what it may read of a file."""
+
+LEAST_SECONDS, SLOWEST = 5.0, 1e6
+"""s that any file may take, and bytes that earn it another; a table of markers, the slowest to read, does 3e6 a second.
+A damaged file can keep a library busy for ever."""
 
 Result = TypeVar("Result")
 Settings = Mapping[str, float | str | None]
@@ -60,22 +64,24 @@ class Readers:
 
     async def convert(self, source: Path, target: Path, name: str, settings: Settings) -> Description:
         """Read a log of format ``name`` and write it to ``target`` as a container; raises ``InvalidInput``."""
-        return await self._do(partial(convert, source, target, name, dict(settings)), name)
+        seconds = min(self._seconds, LEAST_SECONDS + source.stat().st_size / SLOWEST)
+        return await self._do(partial(convert, source, target, name, dict(settings)), name, seconds)
 
     async def write(self, source: Path, target: Path, name: str) -> None:
         """Write a stored log to ``target`` in the format ``name``; raises ``UnsupportedFormat``."""
-        await self._do(partial(rewrite, source, target, name), name)
+        await self._do(partial(rewrite, source, target, name), name, self._seconds)
 
-    async def _do(self, do: Callable[[], Result], name: str) -> Result:
+    async def _do(self, do: Callable[[], Result], name: str, seconds: float) -> Result:
         async with self._one_at_a_time:
             if self._executor is None:
-                self._executor = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _limit_memory)
-            work = asyncio.get_running_loop().run_in_executor(self._executor, do)
+                self._executor = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _start)
+            loop = asyncio.get_running_loop()
             try:
-                return await asyncio.wait_for(work, self._seconds)
+                await loop.run_in_executor(self._executor, os.getpid)  # it has started
+                return await asyncio.wait_for(loop.run_in_executor(self._executor, do), seconds)
             except TimeoutError as error:
                 await self._end()
-                raise InvalidInput("file", f"not read within {self._seconds:g} s", "a smaller file") from error
+                raise InvalidInput("file", f"not read within {seconds:.3g} s", "a smaller or undamaged file") from error
             except BrokenProcessPool as error:
                 await self._end()
                 raise InvalidInput("file", f"such that its {name} reader died of it", "an undamaged file") from error
@@ -110,7 +116,8 @@ def rewrite(source: Path, target: Path, name: str) -> None:
     writing.write(formats.read(source), target, name)
 
 
-def _limit_memory() -> None:
+def _start() -> None:
+    worker.start()
     for name in ("h5py", "pyarrow.parquet", "rosbags.typesys"):  # their libraries take address space of their own
         _import_if_there(name)
     with open("/proc/self/statm", encoding="ascii") as stream:

@@ -9,6 +9,9 @@ from service.connections import BoundedConnection
 from service.envelope import MOST_HEADER_BYTES
 from service.settings import Settings
 
+MOST_MESSAGE_BYTES = 2**20
+"""Of one message of the live stream: a frame of 4096 markers with forces is 200 kB."""
+
 
 def configuration(settings: Settings, **options: Any) -> uvicorn.Config:
     """The server's configuration; ``options`` are further ones of uvicorn."""
@@ -20,5 +23,7 @@ def configuration(settings: Settings, **options: Any) -> uvicorn.Config:
         h11_max_incomplete_event_size=MOST_HEADER_BYTES,
         limit_concurrency=settings.max_connections,
         server_header=False,
+        ws_max_size=MOST_MESSAGE_BYTES,
+        ws_per_message_deflate=False,  # noise does not pack, and packing takes its time
         **options,
     )

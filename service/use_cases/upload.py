@@ -67,6 +67,19 @@ async def upload(context: Context, chunks: AsyncIterator[bytes], wish: Wish) -> 
         return await asyncio.to_thread(_store, context, kept, log, once)
 
 
+async def check_target(context: Context, material: str | None, detector: str) -> None:
+    """Raises ``Problem`` or ``NotFound`` for what a log could not be stored for."""
+    await asyncio.to_thread(_check, context, Wish(material, None, detector, None, None))
+
+
+async def store_made(context: Context, spool: Spool, found: Description, material: str | None, detector: str) -> Answer:
+    """Store a log that the service itself has written to ``spool.path``, and queue its ingest; raises as ``upload``."""
+    wish = Wish(material, None, detector, None, None)
+    material_id = await asyncio.to_thread(_check, context, wish)
+    await asyncio.to_thread(spool.adopt)
+    return await asyncio.to_thread(_store, context, spool, _new_log(spool, found, wish, material_id), None)
+
+
 def _check(context: Context, wish: Wish) -> int | None:
     """What can be told before the bytes are there; returns the material's key."""
     if wish.detector not in METHODS:

@@ -77,7 +77,7 @@ def test_each_route_needs_the_scope_that_is_meant_for_it() -> None:
     """Reading needs read; what adds needs upload; what changes or takes away needs admin."""
     for route, scopes in access.scopes_of_routes(create_app(Settings())).items():
         method, _, path = route.partition(" ")
-        adds = path in {"/v1/materials", "/v1/materials/{name}/fits", "/v1/grasp-logs"}
+        adds = path in {"/v1/materials", "/v1/materials/{name}/fits", "/v1/grasp-logs", "/v1/stream"}
         asks = path in {"/v1/recognise", "/v1/grasp-force"}
         expected = "read" if method == "GET" or asks else "upload" if adds else "admin"
         assert scopes == {expected}, route

@@ -11,6 +11,7 @@ from service.reading import Readers
 from slipcore import GraspLog, InvalidInput
 from stiction_client.container import encode
 
+HOSTILE = Path(__file__).parents[1] / "data/hostile"
 TABLE = b"time,marker,x,y\n" + b"".join(
     b"%d,%d,%d,%d\n" % (k // 900, k % 900, k % 30, k % 900 // 30) for k in range(90_000)
 )
@@ -57,7 +58,7 @@ def test_a_reader_that_takes_too_long_or_too_much_is_ended(tmp_path: Path) -> No
     source.write_bytes(TABLE)
 
     async def hurry(readers: Readers) -> None:
-        with pytest.raises(InvalidInput, match=r"file is not read within 0.01 s; allowed: a smaller file"):
+        with pytest.raises(InvalidInput, match=r"file is not read within 0.01 s; allowed: a smaller"):
             await readers.convert(source, target, "tracked markers", {})
         assert not running(readers)
 
@@ -74,3 +75,16 @@ def test_what_a_reader_refuses_is_told_as_it_is(tmp_path: Path) -> None:
 
     with_readers(60.0, refuse)
     assert not formats.FORMATS["tracked markers"].plain
+
+
+def test_a_file_that_keeps_its_library_busy_for_ever_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Found by mutation; the C library goes round in it and answers to nothing."""
+    monkeypatch.setattr("service.reading.LEAST_SECONDS", 0.5)
+
+    async def read(readers: Readers) -> None:
+        with pytest.raises(InvalidInput, match=r"file is not read within 0.53 s"):
+            await readers.convert(HOSTILE / "endless-hdf5", tmp_path / "target", "hdf5", {})
+
+    with_readers(60.0, read)

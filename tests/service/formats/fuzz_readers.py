@@ -152,9 +152,10 @@ def main(seeds: Path, count: int, first: int, progress: Path) -> dict[str, Any]:
     outcomes: Counter[str] = Counter()
     slowest = 0.0
     case = progress.with_suffix(".case")
+    under_way = os.open(progress, os.O_CREAT | os.O_WRONLY)
     for number in range(first, first + count):
         which = number % len(files)
-        progress.write_text(str(number))
+        os.pwrite(under_way, b"%12d" % number, 0)  # at once: it may be read at any time
         case.write_bytes(mutated(contents[which], number))
         begin = time.perf_counter()
         outcome = attempt(case, names[which], mappings[which])

@@ -1,0 +1,156 @@
+"""A live stream of tactile frames to the service: slip states and friction come back (extra ``stream``)."""
+
+from collections import deque
+from collections.abc import Iterator
+from contextlib import ExitStack
+from types import TracebackType
+from typing import Any, Self
+
+import msgspec
+import numpy as np
+from numpy.typing import ArrayLike
+from websockets.exceptions import ConnectionClosed, InvalidHandshake
+from websockets.sync.client import ClientConnection, connect
+
+from stiction_client.errors import ConnectionFailed, UnexpectedAnswer
+
+ANSWER_TIMEOUT = 30.0
+"""s; the first session of a service starts its detectors' process."""
+
+
+class SlipStream:
+    """One grasp, frame by frame; use it as a context manager.
+
+    ``position`` [n, m, 3] m at rest, ``element_area`` m². With ``keep`` the frames can be stored as a grasp log of
+    ``material`` when they end (``finish``). A connection that breaks is taken up again, with the frames that were not
+    answered. Raises ``ConnectionFailed`` with the service's reason where it refuses.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        position: ArrayLike,
+        element_area: float,
+        *,
+        key: str | None = None,
+        detector: str = "filter",
+        sensor: str = "stream",
+        material: str | None = None,
+        keep: bool = False,
+    ) -> None:
+        rest = np.asarray(position, dtype="<f8")
+        self._url = f"{url.rstrip('/').replace('http', 'ws', 1)}/v1/stream"
+        self._headers = {"Authorization": f"Bearer {key}"} if key else {}
+        self._open = ExitStack()
+        self._session, self._number, self._answered = "", 0, -1
+        self._waiting: deque[tuple[int, bytes]] = deque()
+        opening = {"type": "open", "position": rest.tobytes(), "grid": rest.shape[:2], "element_area": element_area}
+        opening |= {"detector": detector, "sensor": sensor, "material": material, "keep": keep}
+        self._connection = self._connect(opening)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the connection; the session waits a minute for another."""
+        self._open.close()
+
+    def send(
+        self,
+        time: float,
+        displacement: ArrayLike,
+        force: ArrayLike | None = None,
+        object_pose: ArrayLike | None = None,
+        normal: ArrayLike | None = None,
+    ) -> int:
+        """Send a frame (s, m, N; m, m, rad; outward unit normals) and return its number."""
+        frame: dict[str, Any] = {"type": "frame", "number": self._number, "time": float(time)}
+        given = {"displacement": displacement, "force": force, "object_pose": object_pose, "normal": normal}
+        for name, value in given.items():
+            if value is not None:
+                frame[name] = np.asarray(value, dtype="<f8").tobytes()
+        self._waiting.append((self._number, msgspec.msgpack.encode(frame)))
+        self._number += 1
+        self._try(lambda: self._connection.send(self._waiting[-1][1]))
+        return self._number - 1
+
+    def receive(self, timeout: float = ANSWER_TIMEOUT) -> dict[str, Any]:
+        """The next answer: of type "state" (stick_ratio, slip, friction …) or, for a refused frame, "error"."""
+        answer: dict[str, Any] = self._try(lambda: self._read(timeout))
+        self._answered = answer["number"]
+        while self._waiting and self._waiting[0][0] <= self._answered:
+            self._waiting.popleft()
+        return answer
+
+    def step(
+        self,
+        time: float,
+        displacement: ArrayLike,
+        force: ArrayLike | None = None,
+        object_pose: ArrayLike | None = None,
+        normal: ArrayLike | None = None,
+    ) -> dict[str, Any]:
+        """Send a frame and wait for its answer."""
+        number = self.send(time, displacement, force, object_pose, normal)
+        while (answer := self.receive())["number"] != number:
+            pass
+        return answer
+
+    def answers(self) -> Iterator[dict[str, Any]]:
+        """All answers that are due."""
+        while self._waiting:
+            yield self.receive()
+
+    def finish(self, store: bool = False) -> dict[str, Any] | None:
+        """End the session; with ``store``, the stored grasp log with its job. Raises ``ConnectionFailed``."""
+        for _ in self.answers():
+            pass
+        self._connection.send(msgspec.msgpack.encode({"type": "finish", "store": store}))
+        try:
+            log: dict[str, Any] | None = self._read(ANSWER_TIMEOUT)["grasp_log"]
+        except ConnectionClosed as error:
+            raise _refused(error) from error
+        self.close()
+        return log
+
+    def _connect(self, opening: dict[str, Any]) -> ClientConnection:
+        try:
+            opened = connect(self._url, additional_headers=self._headers, compression=None, max_size=2**22)
+            connection = self._open.enter_context(opened)
+            connection.send(msgspec.msgpack.encode(opening))
+            answer = msgspec.msgpack.decode(connection.recv(ANSWER_TIMEOUT, decode=False))
+        except ConnectionClosed as error:
+            raise _refused(error) from error
+        except (OSError, InvalidHandshake) as error:
+            raise ConnectionFailed(f"{self._url}: {error}") from error
+        if answer.get("type") != "opened":
+            raise UnexpectedAnswer(f"{self._url} answered {str(answer)[:80]}")
+        self._session = answer["session"]
+        return connection
+
+    def _try(self, do: Any) -> Any:
+        """Do something; where the connection breaks, again on a new one, after the frames that were not answered."""
+        try:
+            return do()
+        except ConnectionClosed as error:
+            if error.rcvd is not None and error.rcvd.code not in (1001, 1006, 1012):  # the service said why
+                raise _refused(error) from error
+        self.close()
+        self._connection = self._connect({"type": "resume", "session": self._session, "last": self._answered})
+        for _, content in self._waiting:
+            self._connection.send(content)
+        return do()
+
+    def _read(self, timeout: float) -> dict[str, Any]:
+        answer: dict[str, Any] = msgspec.msgpack.decode(self._connection.recv(timeout, decode=False))
+        return answer
+
+
+def _refused(error: ConnectionClosed) -> ConnectionFailed:
+    said = error.rcvd
+    return ConnectionFailed(f"the service ended the stream: {said.reason} ({said.code})" if said else str(error))

@@ -1,0 +1,200 @@
+"""Live detectors, in a worker process: one a session, fed frame by frame. Module-level functions of plain values."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.errors import EstimatorError
+from estimators.moments import Moments
+from service.reading import Description, describe
+from slipcore import Frame, GraspLog, InvalidInput, SlipDetector, SlipState, collect_history, collect_samples
+from stiction_client import container
+
+WINDOW, STRIDE = 45, 30
+"""Frames that friction samples are looked for in, and frames from one look to the next: once a second."""
+
+MAX_KEPT_BYTES = 64 * 2**20
+"""Bytes of frames kept of one session for its log: 12 minutes of a 20×20 sensor with forces at 30 frames a second."""
+
+MAX_MARKERS = 4096
+
+Numbers = bytes | Sequence[Any]
+"""Numbers in a row, row-major: little-endian float32 or float64, or lists nested as they may be."""
+
+
+@dataclass(slots=True)
+class Session:
+    """A running detector with what it saw: the last frames and answers, all frames if they are ``kept``."""
+
+    detector: SlipDetector
+    position: NDArray[np.float64]
+    element_area: float
+    moments: Moments
+    kept: list[Frame] | None
+    frames: list[Frame] = field(default_factory=list)
+    answers: list[SlipState] = field(default_factory=list)
+    taken: int = 0
+    last: tuple[int, dict[str, Any]] = (-1, {})
+    friction: dict[str, Any] | None = None
+
+
+_SESSIONS: dict[str, Session] = {}
+
+
+def open_session(name: str, position: Numbers, grid: tuple[int, int], area: float, method: str, keep: bool) -> None:
+    """Begin a session; raises ``InvalidInput`` for what cannot be a sensor."""
+    rows, columns = grid
+    if not 0 < rows * columns <= MAX_MARKERS or rows < 1:
+        raise InvalidInput("grid", list(grid), f"1 to {MAX_MARKERS} markers")
+    at_rest = _array("position", position, (rows, columns, 3))
+    detector = SlipDetector(at_rest, area, method)
+    _SESSIONS[name] = Session(detector, at_rest, area, Moments.empty(area), [] if keep else None)
+
+
+def step(
+    name: str,
+    number: int,
+    time: float,
+    displacement: Numbers,
+    force: Numbers | None,
+    object_pose: Numbers | None,
+    normal: Numbers | None,
+) -> dict[str, Any]:
+    """Take a frame and answer; the same frame again is answered as before. Raises ``InvalidInput``."""
+    session = _SESSIONS[name]
+    if number == session.last[0]:
+        return session.last[1]
+    shape = session.position.shape
+    frame = Frame(
+        time,
+        _array("displacement", displacement, shape),
+        None if force is None else _array("force", force, shape),
+        None if object_pose is None else _array("object_pose", object_pose, (3,)),
+        None if normal is None else _array("normal", normal, shape),
+    )
+    _keep(session, frame)
+    try:
+        state = session.detector.step(*frame)
+    except InvalidInput:
+        if session.kept:
+            session.kept.pop()
+        raise
+    _look_for_friction(session, frame, state)
+    session.last = (number, _answer(session, number, state))
+    return session.last[1]
+
+
+def finish(name: str, target: Path | None, sensor: str, metadata: dict[str, str]) -> Description | None:
+    """End a session; write its log to ``target``, where one is given. Raises ``InvalidInput`` for too few frames."""
+    session = _SESSIONS.pop(name)
+    if target is None or session.kept is None:
+        return None
+    frames = session.kept
+    if len(frames) < 2:
+        raise InvalidInput("frames", len(frames), "at least 2, for a log")
+    log = _log(session, frames, sensor, metadata)
+    container.write(log, target)
+    return describe("stream", log)
+
+
+def drop(name: str) -> None:
+    """Forget a session."""
+    _SESSIONS.pop(name, None)
+
+
+def _keep(session: Session, frame: Frame) -> None:
+    if session.kept is None:
+        return
+    size = frame.displacement.nbytes * (1 + (frame.force is not None) + (frame.normal is not None))
+    if (len(session.kept) + 1) * size > MAX_KEPT_BYTES:
+        raise InvalidInput(
+            "frames", len(session.kept) + 1, f"{MAX_KEPT_BYTES // size} of this size, where they are kept"
+        )
+    session.kept.append(frame)
+
+
+def _look_for_friction(session: Session, frame: Frame, state: SlipState) -> None:
+    """Once in a while, the samples of the frames since the last look, merged with those before."""
+    if frame.force is None:
+        return
+    session.frames = [*session.frames[1 - WINDOW :], frame]
+    session.answers = [*session.answers[1 - WINDOW :], state]
+    session.taken += 1
+    if session.taken % STRIDE or len(session.frames) < WINDOW:
+        return
+    history = collect_history(session.answers, session.detector.state)
+    samples = collect_samples(_log(session, session.frames, "", {}), history)
+    begin = session.frames[-1 - STRIDE].time  # the last frame of a look has no next one yet, so it is the next look's
+    new = (samples.time >= begin) & (samples.time < session.frames[-1].time)
+    for v, f_n, mu, weight in zip(
+        samples.tangential_velocity[new], samples.normal_force[new], samples.friction_coefficient[new],
+        samples.weight[new], strict=True,
+    ):  # fmt: skip
+        session.moments = session.moments.add(v, f_n, mu, weight)
+    session.friction = _fitted(session.moments)
+
+
+def _fitted(moments: Moments) -> dict[str, Any] | None:
+    try:
+        model = moments.fit()
+    except EstimatorError:  # too few samples yet
+        return None
+    return {
+        "coefficients": model.coefficients.tolist(),
+        "standard_errors": [value if math.isfinite(value) else None for value in model.standard_errors.tolist()],
+        "scale": float(model.scale),
+        "samples": moments.n,
+    }
+
+
+def _answer(session: Session, number: int, state: SlipState) -> dict[str, Any]:
+    return {
+        "type": "state",
+        "number": number,
+        "time": state.time,
+        "stick_ratio": None if math.isnan(state.stick_ratio) else float(state.stick_ratio),
+        "macro_slip": bool(state.macro_slip),
+        "contact": int(state.contact.sum()),
+        "slip": np.flatnonzero(state.slip).tolist(),
+        "friction": session.friction,
+    }
+
+
+def _log(session: Session, frames: Sequence[Frame], sensor: str, metadata: dict[str, str]) -> GraspLog:
+    def stacked(name: str) -> NDArray[np.float64] | None:
+        parts = [getattr(frame, name) for frame in frames]
+        return None if any(part is None for part in parts) else np.stack(parts)
+
+    return GraspLog(
+        time=np.array([frame.time for frame in frames]),
+        position=session.position,
+        displacement=np.stack([frame.displacement for frame in frames]),
+        element_area=session.element_area,
+        force=stacked("force"),
+        object_pose=stacked("object_pose"),
+        normal=stacked("normal"),
+        sensor=sensor or "unknown",
+        metadata=metadata,
+    )
+
+
+def _array(name: str, numbers: Numbers, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    count = math.prod(shape)
+    if isinstance(numbers, bytes):
+        if len(numbers) not in (4 * count, 8 * count):
+            raise InvalidInput(
+                name, f"{len(numbers)} bytes", f"{4 * count} or {8 * count}: {list(shape)} as float32 or 64"
+            )
+        return np.frombuffer(numbers, "<f4" if len(numbers) == 4 * count else "<f8").astype(np.float64).reshape(shape)
+    try:
+        array = np.array(numbers, dtype=np.float64)
+    except (ValueError, TypeError) as error:
+        raise InvalidInput(name, f"no numbers ({str(error)[:60]})", f"numbers of shape {list(shape)}") from error
+    if array.size != count:
+        raise InvalidInput(name, f"of shape {list(array.shape)}", f"shape {list(shape)}")
+    return array.reshape(shape)
