@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,16 @@ from numpy.typing import NDArray
 from estimators.errors import EstimatorError
 from estimators.moments import Moments
 from service.reading import Description, describe
-from slipcore import Frame, GraspLog, InvalidInput, SlipDetector, SlipState, collect_history, collect_samples
+from slipcore import (
+    Frame,
+    FrictionSamples,
+    GraspLog,
+    InvalidInput,
+    SlipDetector,
+    SlipState,
+    collect_history,
+    collect_samples,
+)
 from stiction_client import container
 
 WINDOW, STRIDE = 45, 30
@@ -131,11 +140,9 @@ def _look_for_friction(session: Session, frame: Frame, state: SlipState) -> None
     samples = collect_samples(_log(session, session.frames, "", {}), history)
     begin = session.frames[-1 - STRIDE].time  # the last frame of a look has no next one yet, so it is the next look's
     new = (samples.time >= begin) & (samples.time < session.frames[-1].time)
-    for v, f_n, mu, weight in zip(
-        samples.tangential_velocity[new], samples.normal_force[new], samples.friction_coefficient[new],
-        samples.weight[new], strict=True,
-    ):  # fmt: skip
-        session.moments = session.moments.add(v, f_n, mu, weight)
+    part = {entry.name: getattr(samples, entry.name)[new] for entry in fields(samples) if entry.name != "element_area"}
+    found = FrictionSamples(**part, element_area=samples.element_area)
+    session.moments = session.moments.merge(Moments.from_samples(found))
     session.friction = _fitted(session.moments)
 
 

@@ -19,8 +19,6 @@ from stiction_client import AsyncFrictionClient, Material, ProblemError
 
 ROUTES = access.scopes_of_routes(create_app(Settings()))
 HTTP_ROUTES = {route: scopes for route, scopes in ROUTES.items() if not route.startswith("WS ")}
-    route: scopes for route, scopes in ROUTES.items() if not route.startswith("WS ")
-}  # the stream's: test_stream.py
 ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
 
 Make = Callable[..., str]

@@ -1,0 +1,104 @@
+"""End-to-end latency of the live stream: many sensors at once against a real server.
+
+    python -m benchmarks.stream --connections 20 --rate 30 --seconds 20
+
+Each connection sends frames of a simulated grasp (20×20 markers with forces) at its rate, all out of step, and notes
+how long after its sending a frame is answered. Server, its detectors and these clients share the machine.
+"""
+
+import argparse
+import asyncio
+import json
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from typing import Any
+
+import httpx
+import msgspec
+import numpy as np
+from websockets.asyncio.client import connect
+
+from slipcore import GraspLog
+from slipcore.contact import tangential_ramp
+
+
+async def sensor(url: str, log: GraspLog, rate: float, seconds: float, late: float) -> list[float]:
+    """Latencies of one connection, s."""
+    await asyncio.sleep(late)
+    async with connect(url, compression=None) as stream:
+        opening = {"type": "open", "position": log.position.tobytes(), "grid": log.grid, "element_area": 1e-6}
+        await stream.send(msgspec.msgpack.encode(opening))
+        await stream.recv()
+        sent: dict[int, float] = {}
+        latencies: list[float] = []
+        frames = int(rate * seconds)
+
+        async def listen() -> None:
+            while len(latencies) < frames:
+                answer = msgspec.msgpack.decode(await stream.recv(decode=False))
+                latencies.append(time.perf_counter() - sent[answer["number"]])
+                assert answer["type"] == "state", answer
+
+        listener = asyncio.create_task(listen())
+        begin = time.perf_counter()
+        for k in range(frames):
+            await asyncio.sleep(max(begin + k / rate - time.perf_counter(), 0.0))
+            frame = {"type": "frame", "number": k, "time": k / rate}
+            frame["displacement"] = log.displacement[k % len(log)].astype("<f4").tobytes()
+            frame["force"] = log.force[k % len(log)].astype("<f4").tobytes()
+            sent[k] = time.perf_counter()
+            await stream.send(msgspec.msgpack.encode(frame))
+        await listener
+        await stream.send(msgspec.msgpack.encode({"type": "finish"}))
+    return latencies[int(2 * rate) :]  # the first two seconds compile and warm up
+
+
+async def measure(port: int, connections: int, rate: float, seconds: float) -> dict[str, Any]:
+    """Quantiles of all latencies, ms."""
+    log = tangential_ramp(points=20, pitch=1e-3, marker_noise=1e-6, force_noise=1e-3, seed=1)
+    url = f"ws://127.0.0.1:{port}/v1/stream"
+    lateness = np.linspace(0.0, 1.0 / rate, connections, endpoint=False)
+    parts = await asyncio.gather(*(sensor(url, log, rate, seconds, late) for late in lateness))
+    latencies = 1e3 * np.concatenate(parts)
+    found = {f"p{q:g}_ms": round(float(np.percentile(latencies, q)), 2) for q in (50, 90, 99, 99.9)}
+    return {"connections": connections, "rate": rate, "frames": len(latencies), **found}
+
+
+def main() -> None:
+    """Start a server, load it and print what was measured as JSON."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--connections", type=int, nargs="+", default=[20])
+    parser.add_argument("--rate", type=float, default=30.0)
+    parser.add_argument("--seconds", type=float, default=20.0)
+    chosen = parser.parse_args()
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = int(probe.getsockname()[1])
+    with tempfile.TemporaryDirectory() as folder:
+        settings = {"STICTION_DATA_FOLDER": folder, "STICTION_PORT": str(port)}
+        command = [sys.executable, "-m", "service.cli", "serve"]
+        server = subprocess.Popen(command, env=os.environ | settings, stdout=subprocess.DEVNULL)
+        try:
+            with httpx.Client(base_url=f"http://127.0.0.1:{port}") as client:
+                while not _is_up(client):
+                    time.sleep(0.1)
+            for connections in chosen.connections:
+                print(json.dumps(asyncio.run(measure(port, connections, chosen.rate, chosen.seconds))))
+        finally:
+            server.terminate()
+            server.wait()
+
+
+def _is_up(client: httpx.Client) -> bool:
+    try:
+        return client.get("/readyz").is_success
+    except httpx.TransportError:
+        return False
+
+
+if __name__ == "__main__":
+    main()
