@@ -7,6 +7,7 @@ import re
 import secrets
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import get_args
 
 from fastapi import FastAPI, Security
@@ -70,6 +71,7 @@ def is_key(text: str, stored: AccessKey) -> bool:
     return hmac.compare_digest(digest(text), stored.sha256) and stored.revoked_at is None
 
 
+@lru_cache(maxsize=1024)
 def is_loopback(host: str) -> bool:
     """Whether an address, or a name, is this machine's own and reached from nowhere else."""
     try:

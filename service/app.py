@@ -20,6 +20,7 @@ from service.gate import Gate
 from service.head_requests import HeadRequests
 from service.jobs import JobRunner
 from service.lanes import lanes
+from service.lookups import Lookups
 from service.metrics import Metering, Metrics
 from service.model_cache import ModelCache
 from service.reading import Readers
@@ -57,6 +58,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     for module in (health, metrics, materials, grasp_logs, curation, planning, jobs, stream):
         app.include_router(module.router)
     access.check_routes(app)
+    app.add_middleware(Lookups)
     app.add_middleware(Gate, settings=chosen)
     app.add_middleware(HeadRequests)
     app.add_middleware(Envelope)

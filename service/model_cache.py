@@ -2,7 +2,8 @@
 
 import hashlib
 import time
-from dataclasses import dataclass
+from collections.abc import Hashable
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 
 from db.database import Database
@@ -21,13 +22,17 @@ COMMIT_TIME = timedelta(seconds=1)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KnownModel:
-    """A material's current model as it was at a moment, with the tag that stands for what it answers."""
+    """A material's current model as it was at a moment, with the tag that stands for what it answers.
+
+    ``answers``: those that were given, as JSON, by question.
+    """
 
     stored: StoredModel
     model: FrictionModel
     tag: str
     read_at: datetime
     until: float
+    answers: dict[Hashable, str] = field(default_factory=dict)
 
 
 class ModelCache:

@@ -508,6 +508,9 @@ class SamplesOut(BaseModel):
 LARGEST_FORCE, LARGEST_VELOCITY = 1e4, 1e3
 """N on one element, as of an uploaded log, and m/s: beyond, a question is a mistake of units."""
 
+SMALLEST_TAIL = 1e-12
+"""As the planner's smallest slip probability; a Student-t quantile further out says nothing of friction."""
+
 _Velocity = Annotated[float, Field(ge=0.0, le=LARGEST_VELOCITY, allow_inf_nan=False)]
 _Force = Annotated[float, Field(ge=0.0, le=LARGEST_FORCE, allow_inf_nan=False)]
 _Area = Annotated[float, Field(gt=1e-12, le=1.0, allow_inf_nan=False, description="m²")]

@@ -26,6 +26,7 @@ from service.routes.common import JsonRoute, problems
 from service.schemas import (
     LARGEST_FORCE,
     LARGEST_VELOCITY,
+    SMALLEST_TAIL,
     FrictionModelOut,
     FrictionModelsOut,
     FrictionOut,
@@ -44,9 +45,6 @@ router = APIRouter(prefix="/v1/materials", tags=["materials"], route_class=JsonR
 _BODY = (UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, IDEMPOTENCY_KEY_REUSED, STORAGE_UNAVAILABLE)
 
 Finite = Query(allow_inf_nan=False, ge=0.0)
-
-SMALLEST_TAIL = 1e-12
-"""As the planner's smallest slip probability; a Student-t quantile further out says nothing of friction."""
 
 
 @router.post(

@@ -3,8 +3,10 @@
 import json
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, closing
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +78,8 @@ def test_thousands_of_generated_requests_find_no_failure(
 ) -> None:
     chosen = settings.model_copy(update={"workers": 1})
     with serving(chosen) as client:
+        while client.get("/readyz").status_code != httpx.codes.OK:
+            time.sleep(0.1)
         for name in ("paper", "steel"):
             client.post("/v1/materials", json={"name": name}).raise_for_status()
         logs = [upload(client, content, material=name).json() for name in ("paper", "steel")]
@@ -116,8 +120,12 @@ def hostile_client(reach: Any) -> Iterator[Any]:
     assert [item["name"] for item in client.get("/v1/materials").json()["items"]] == ["paper"]
 
 
-@pytest.mark.parametrize("text", HOSTILE)
-def test_a_path_and_a_query_lead_nowhere_else(hostile_client: Any, text: str) -> None:
+def test_a_path_and_a_query_lead_nowhere_else(hostile_client: Any) -> None:
+    for text in HOSTILE:
+        knock(hostile_client, text)
+
+
+def knock(hostile_client: Any, text: str) -> None:
     paths = (
         "/v1/materials/{}",
         "/v1/materials/{}/fits",
@@ -140,9 +148,9 @@ def test_a_path_and_a_query_lead_nowhere_else(hostile_client: Any, text: str) ->
         assert answer.status_code != 200 or answer.json()["items"] == []
 
 
-@pytest.mark.parametrize("text", ["a\r\nSet-Cookie: b=c", "a\nb", "\x7f", "a" * 20_000, "ü"])
-def test_headers_carry_nothing_through(hostile_client: Any, text: str) -> None:
-    for name in ("X-Request-ID", "Idempotency-Key", "If-None-Match", "Content-Type", "Accept"):
+def test_headers_carry_nothing_through(hostile_client: Any) -> None:
+    names = ("X-Request-ID", "Idempotency-Key", "If-None-Match", "Content-Type", "Accept")
+    for name, text in product(names, ("a\r\nSet-Cookie: b=c", "a\nb", "\x7f", "a" * 20_000, "ü")):
         answer = hostile_client.request("POST", "/v1/materials", content=b"{}", headers={name: text.encode()})
         assert answer.status_code in {400, 415, 422, 431}, name
         assert "set-cookie" not in answer.headers
