@@ -4,10 +4,10 @@ import asyncio
 import re
 import time
 import uuid
+from collections.abc import Iterator, Mapping
 from contextvars import ContextVar
 
 from fastapi import Request
-from starlette.datastructures import Headers, MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -33,7 +33,10 @@ _SWAGGER = (
 PAGE_POLICIES = dict.fromkeys(("/docs", "/docs/oauth2-redirect", "/redoc"), _SWAGGER)
 """Content security policies of the framework's own pages; any other answer needs nothing, or says what it needs."""
 
-_ID = re.compile(r"[A-Za-z0-9._-]{1,128}")
+OF_ALL = ((b"x-content-type-options", b"nosniff"), (b"cache-control", b"no-store"))
+OF_TLS = (b"strict-transport-security", b"max-age=31536000")
+
+_ID = re.compile(rb"[A-Za-z0-9._-]{1,128}")
 
 
 class Envelope:
@@ -50,7 +53,7 @@ class Envelope:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        request_id = _request_id(Headers(scope=scope))
+        request_id = _request_id(scope)
         scope.setdefault("state", {})["request_id"] = request_id
         token = REQUEST_ID.set(request_id)
         try:
@@ -76,24 +79,24 @@ class _Sender:
 
     def __init__(self, scope: Scope, send: Send, request_id: str) -> None:
         self.has_begun = False
-        self._send = send
-        self._headers = {
-            "X-Request-ID": request_id,
-            "X-Content-Type-Options": "nosniff",
-            "Referrer-Policy": "no-referrer",
-            "Content-Security-Policy": PAGE_POLICIES.get(scope["path"], NOTHING),
-            "Cache-Control": "no-store",
-        }
-        if scope["scheme"] == "https":
-            self._headers["Strict-Transport-Security"] = "max-age=31536000"
+        self._scope, self._send, self._request_id = scope, send, request_id
 
     async def __call__(self, message: Message) -> None:
         if message["type"] == "http.response.start":
             self.has_begun = True
-            headers = MutableHeaders(scope=message)
-            for name, value in self._headers.items():
-                headers.setdefault(name, value)
+            said = dict(message["headers"])
+            more = [(name, value) for name, value in self._headers(said) if name not in said]
+            message = {**message, "headers": [*message["headers"], *more]}
         await self._send(message)
+
+    def _headers(self, said: Mapping[bytes, bytes]) -> Iterator[tuple[bytes, bytes]]:
+        yield b"x-request-id", self._request_id.encode()
+        yield from OF_ALL
+        if self._scope["scheme"] == "https":
+            yield OF_TLS
+        if said.get(b"content-type", b"").startswith(b"text/html"):
+            yield b"referrer-policy", b"no-referrer"
+            yield b"content-security-policy", PAGE_POLICIES.get(self._scope["path"], NOTHING).encode()
 
 
 class _Receiver:
@@ -119,10 +122,10 @@ class _Receiver:
         return message
 
 
-def _request_id(headers: Headers) -> str:
+def _request_id(scope: Scope) -> str:
     """The id that the client gave, if it is one that may stand in a log and a header."""
-    given = headers.get("x-request-id", "")
-    return given if _ID.fullmatch(given) else uuid.uuid4().hex
+    given = next((value for name, value in scope["headers"] if name == b"x-request-id"), b"")
+    return given.decode() if _ID.fullmatch(given) else uuid.uuid4().hex
 
 
 def _check(scope: Scope) -> None:

@@ -1,6 +1,7 @@
 """The shortest way to a look-up: what planners ask most often, answered from memory without the framework."""
 
 import re
+from functools import lru_cache
 
 from fastapi import Request, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -53,6 +54,7 @@ def _answer(scope: Scope) -> Response | None:
     return conditional(Request(scope), known.tag, lambda: body)
 
 
+@lru_cache(maxsize=4096)
 def _read(query: str) -> tuple[str, Question] | None:
     """Method and question of a query in its simplest form, None for any other."""
     method, numbers = "ols", dict[str, float]()

@@ -5,6 +5,7 @@ from typing import Any
 import httpx
 import pytest
 from fastapi import APIRouter
+from fastapi.responses import HTMLResponse
 
 from service import envelope
 from service.access import READ
@@ -68,12 +69,19 @@ def test_a_failure_is_told_by_its_id_and_kept_to_the_log(client: Any, caplog: py
 def test_every_answer_has_the_headers_that_protect_it(client: Any, path: str) -> None:
     answer = client.get(path)
     assert answer.headers["x-content-type-options"] == "nosniff"
-    assert answer.headers["referrer-policy"] == "no-referrer"
-    policy = answer.headers["content-security-policy"]
-    assert policy.startswith("default-src 'none'; frame-ancestors 'none'")
-    assert ("script-src" in policy) == (path in {"/docs", "/redoc"})
     assert answer.headers["cache-control"] == "no-store"
     assert "strict-transport-security" not in answer.headers
+    is_page = path in {"/docs", "/redoc"}
+    assert answer.headers.get("referrer-policy") == ("no-referrer" if is_page else None)
+    policy = answer.headers.get("content-security-policy", "")
+    assert policy.startswith("default-src 'none'; frame-ancestors 'none'") == ("script-src" in policy) == is_page
+
+
+def test_a_page_that_says_nothing_of_its_own_may_load_nothing(client: Any) -> None:
+    router = APIRouter()
+    router.get("/v1/page", dependencies=[READ], response_class=HTMLResponse)(lambda: "<p>")
+    client.app.include_router(router)
+    assert client.get("/v1/page").headers["content-security-policy"] == envelope.NOTHING
 
 
 def test_only_over_tls_is_tls_asked_for(client: Any) -> None:
