@@ -2,6 +2,7 @@
 
 import re
 from functools import lru_cache
+from types import SimpleNamespace
 
 from fastapi import Request, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -13,6 +14,9 @@ from service.use_cases.look_up import Question, look_up
 
 MOST_ANSWERS = 1000
 """Answers kept with a model, half a kB each: planners ask the same again and again."""
+
+ROUTE = SimpleNamespace(path="/v1/materials/{name}/friction")
+"""Under which the look-ups are counted, as those that the route itself answers."""
 
 _PATH = re.compile(r"/v1/materials/([A-Za-z0-9][A-Za-z0-9 ._-]{0,99})/friction")
 _METHODS = frozenset({"ols", "robust", "conjugate", "bayes"})
@@ -51,6 +55,7 @@ def _answer(scope: Scope) -> Response | None:
         body = look_up(known, question).model_dump_json()
         if len(known.answers) < MOST_ANSWERS:
             known.answers[question] = body
+    scope["route"] = ROUTE
     return conditional(Request(scope), known.tag, lambda: body)
 
 

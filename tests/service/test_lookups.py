@@ -118,6 +118,19 @@ def test_a_simple_question_does_not_reach_the_route(client: Any, monkeypatch: py
     assert client.request("POST", f"{PATH}fn=0.05").status_code == 405
 
 
+def test_the_shortest_way_is_counted_as_the_route(client: Any) -> None:
+    seen = []
+
+    async def note(scope: Any, receive: Any, send: Any) -> None:
+        await client_app(scope, receive, send)
+        seen.append(scope["route"].path)
+
+    client_app, client.app = client.app, note
+    for _ in range(2):
+        client.get(f"{PATH}fn=0.05")
+    assert seen == [lookups.ROUTE.path] * 2
+
+
 def test_the_answers_kept_are_bounded(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lookups, "MOST_ANSWERS", 3)
     values = [client.get(f"{PATH}fn=0.0{number}").json()["normal_force"] for number in range(10)]
