@@ -1,0 +1,37 @@
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from estimators import Moments, fit, needs_samples
+from slipcore.samples import FrictionSamples
+
+
+@pytest.mark.parametrize("method", ["ols", "conjugate", "bayes"])
+def test_grasps_are_fitted_from_their_moments_as_from_their_samples(
+    samples: Callable[..., FrictionSamples], method: str
+) -> None:
+    """To rounding: a chain of the same seed takes the same steps."""
+    grasps = [samples(200, seed=seed) for seed in range(6)]
+    assert not needs_samples(method, len(grasps))
+    stored = [Moments.from_bytes(Moments.from_samples(grasp).to_bytes()) for grasp in grasps]
+    whole, merged = fit(grasps, method=method, seed=3), fit(stored, method=method, seed=3)
+    spread = np.sqrt(np.diag(whole.covariance))
+    np.testing.assert_allclose((merged.coefficients - whole.coefficients) / spread, 0.0, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(
+        merged.covariance / np.outer(spread, spread), whole.covariance / np.outer(spread, spread), rtol=0.0, atol=1e-9
+    )
+    assert merged.scale == pytest.approx(whole.scale, rel=1e-12)
+    assert (merged.n, merged.domain, merged.degrees_of_freedom) == (
+        whole.n,
+        whole.domain,
+        pytest.approx(whole.degrees_of_freedom, rel=1e-12),
+    )
+
+
+@pytest.mark.parametrize(
+    ("method", "grasps"), [("robust", 5), ("auto", 5), ("ols", 1), ("bayes", 1)], ids=lambda value: str(value)
+)
+def test_what_looks_at_samples_or_at_elements_of_one_grasp_needs_them(method: str, grasps: int) -> None:
+    assert needs_samples(method, grasps)
+    assert not needs_samples("conjugate", grasps)
