@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -68,6 +69,19 @@ async def measure(port: int, connections: int, rate: float, seconds: float) -> d
     return {"connections": connections, "rate": rate, "frames": len(latencies), **found}
 
 
+def cpu_seconds(pid: int) -> float:
+    """Processor time of a process and its children, s."""
+    used = 0.0
+    for status in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = status.read_text().rpartition(")")[2].split()
+        except OSError:  # it has ended
+            continue
+        if pid in (int(status.parent.name), int(fields[1])):
+            used += (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return used
+
+
 def main() -> None:
     """Start a server, load it and print what was measured as JSON."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -87,7 +101,11 @@ def main() -> None:
                 while not _is_up(client):
                     time.sleep(0.1)
             for connections in chosen.connections:
-                print(json.dumps(asyncio.run(measure(port, connections, chosen.rate, chosen.seconds))))
+                before = cpu_seconds(server.pid)
+                found = asyncio.run(measure(port, connections, chosen.rate, chosen.seconds))
+                used = (cpu_seconds(server.pid) - before) / chosen.seconds
+                load = os.getloadavg()[0] / (os.cpu_count() or 1)
+                print(json.dumps(found | {"cores_of_the_service": round(used, 2), "load_per_core": round(load, 2)}))
         finally:
             server.terminate()
             server.wait()

@@ -54,8 +54,8 @@ class Served:
             application = application.app
         return application.state.context.streams
 
-    def connect(self) -> ClientConnection:
-        return connect(f"{self.url.replace('http', 'ws')}/v1/stream", compression=None)
+    def connect(self, headers: dict[str, str] | None = None) -> ClientConnection:
+        return connect(f"{self.url.replace('http', 'ws')}/v1/stream", compression=None, additional_headers=headers)
 
 
 @pytest.fixture(scope="module")
@@ -224,7 +224,9 @@ def test_a_stream_needs_a_key_that_may_upload(ramp: GraspLog, tmp_path: Path) ->
         for key in (None, "nonsense", keys["read"]):
             with pytest.raises(ConnectionFailed, match=r"HTTP 40[13]"):
                 SlipStream(served.url, log.position, log.element_area, key=key)
-        with SlipStream(served.url, log.position, log.element_area, key=keys["upload"]) as live:
-            assert live.step(log.time[0], log.displacement[0])["type"] == "state"
+        with served.connect({"Authorization": f"Bearer {keys['upload']}"}) as socket:
+            socket.send('{"type": "finish"}')
+            with pytest.raises(ConnectionClosed, match="must be of type open or resume"):  # it was let in
+                socket.recv(30.0)
     finally:
         served.stop()
