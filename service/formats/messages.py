@@ -60,6 +60,8 @@ class MessageColumns:
         received_before = self._received.setdefault(topic, [])
         if len(received_before) >= MAX_MESSAGES:
             raise InvalidInput(topic, f"of more than {MAX_MESSAGES} messages", f"at most {MAX_MESSAGES}")
+        if not 0 <= received < 2**63:
+            raise InvalidInput(topic, f"of a message received at {received} ns", "0 to 2⁶³ - 1 ns")
         received_before.append(received)
         message = decode()
         for field in self._fields[topic]:

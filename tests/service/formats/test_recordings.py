@@ -365,3 +365,14 @@ def robot_log_with_normals(log: GraspLog) -> GraspLog:
     normal = np.zeros_like(log.displacement)
     normal[..., 2] = 1.0
     return replace(log, normal=normal)
+
+
+def test_a_message_of_an_impossible_time_is_refused(tmp_path: Path) -> None:
+    with (tmp_path / "log").open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start()
+        channel = writer.register_channel("/stiction/frame", "json", writer.register_schema("a", "jsonschema", b"{}"))
+        writer.add_message(channel, 2**64 - 1, b"{}", 0)
+        writer.finish()
+    with pytest.raises(InvalidInput, match="/stiction/frame is of a message received at 18446744073709551615 ns"):
+        formats.read(tmp_path / "log")
