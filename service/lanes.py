@@ -76,10 +76,6 @@ class ProcessLane:
             await asyncio.to_thread(executor.shutdown, cancel_futures=True)
 
 
-def lanes(place: Place, count: int, dask_address: str | None) -> list[Lane]:
-    """So many lanes: on this machine, or on the workers of a Dask scheduler."""
-    if dask_address is None:
-        return [ProcessLane(place) for _ in range(count)]
-    from service.dask_lane import DaskLane  # an extra, and takes a second to load
-
-    return [DaskLane(place, dask_address) for _ in range(count)]
+def lanes(place: Place, count: int) -> list[Lane]:
+    """So many worker processes on this machine."""
+    return [ProcessLane(place) for _ in range(count)]

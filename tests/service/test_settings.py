@@ -12,7 +12,7 @@ DOCUMENTED = dict(
 )
 
 
-UNSET = {"database_url": "SQLite file", "blob_url": "the data folder", "dask_address": "none"}
+UNSET = {"database_url": "SQLite file", "blob_url": "the data folder"}
 """What holds in place of a setting without a default."""
 
 
