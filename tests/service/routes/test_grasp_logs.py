@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from service import formats
-from slipcore import GraspLog, collect_samples, detect_slip
+from slipcore import LOOKAHEAD, GraspLog, collect_samples, detect_slip
 from stiction_client.container import encode
 
 Upload = Callable[..., httpx.Response]
@@ -26,7 +26,7 @@ def test_an_uploaded_log_is_described(
 
 
 def test_what_was_found_is_what_the_numerics_find(client: httpx.Client, fitted: dict[str, Any], ramp: GraspLog) -> None:
-    history = detect_slip(ramp)
+    history = detect_slip(ramp, lookahead=LOOKAHEAD)
     samples = collect_samples(ramp, history)
     found = fitted["detection"]
     assert (found["method"], found["samples"]) == (history.method, len(samples))
@@ -45,7 +45,7 @@ def test_what_was_found_is_what_the_numerics_find(client: httpx.Client, fitted: 
 
 def test_the_stick_ratio_is_null_without_contact(client: httpx.Client, fitted: dict[str, Any], ramp: GraspLog) -> None:
     answer = client.get(f"/v1/grasp-logs/{fitted['id']}/stick-ratio").json()
-    ratio = detect_slip(ramp).stick_ratio
+    ratio = detect_slip(ramp, lookahead=LOOKAHEAD).stick_ratio
     assert answer["time"] == ramp.time.tolist()
     assert answer["stick_ratio"] == [None if np.isnan(value) else value for value in ratio]
     assert answer["stick_ratio"][0] is None
