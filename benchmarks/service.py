@@ -1,0 +1,256 @@
+"""What the service costs its callers: `python -m benchmarks.service [--output FOLDER] [--page docs/scale.md]`.
+
+Uploads, one after the other, of 200-frame logs of 20×20 elements with forces: seconds to the answer and to the stored
+fit. Then look-ups on 32 connections, beside a bare Starlette route that returns the same bytes by the same uvicorn:
+requests a second, CPU seconds a request of the server, and latencies, alone and while uploads run. Servers, workers
+and these callers share the machine. Writes service.json and service.png.
+"""
+
+import asyncio
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from threading import Event, Thread
+
+import httpx
+import numpy as np
+from matplotlib.figure import Figure
+
+from benchmarks.pages import options, picture_folder, save, write
+from slipcore.contact import RampSchedule, tangential_ramp
+from stiction_client import FrictionClient
+from stiction_client.container import encode
+
+MATERIAL = "benchmark"
+LOOK_UP = f"/v1/materials/{MATERIAL}/friction?v=0.001&fn=0.05&quantile=0.05"
+NPZ = {"content-type": "application/vnd.stiction.grasp-log+npz"}
+CONNECTIONS, REQUESTS, UPLOADS = 32, 6400, 30
+BARE = """
+import sys, uvicorn
+from starlette.applications import Starlette
+from starlette.responses import Response
+from starlette.routing import Route
+body = sys.stdin.buffer.read()
+async def answer(request): return Response(body, media_type="application/json")
+routes = [Route("/v1/materials/{name}/friction", answer)]
+uvicorn.run(Starlette(routes=routes), port=int(sys.argv[1]), http="h11", server_header=False)
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """Look-ups of one server: requests a second, CPU seconds of its process a request, latencies in s."""
+
+    what: str
+    rate: float
+    cpu: float
+    p50: float
+    p99: float
+
+
+@dataclass(frozen=True, slots=True)
+class Uploads:
+    """Seconds to the answer and to the end of the job of each upload with one method."""
+
+    method: str
+    accepted: list[float]
+    fitted: list[float]
+
+
+@contextmanager
+def running(command: list[str], port: int, given: bytes | None = None, **environment: str) -> Iterator[int]:
+    """A server process of its own, once it listens: its id."""
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env=os.environ | environment,
+    )
+    assert process.stdin is not None
+    process.stdin.write(given or b"")
+    process.stdin.close()
+    try:
+        while True:
+            assert process.poll() is None, f"{command} ended"
+            try:
+                socket.create_connection(("127.0.0.1", port), 1.0).close()
+                break
+            except OSError:
+                time.sleep(0.05)
+        yield process.pid
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def free_port() -> int:
+    """One that nothing listens on now."""
+    with socket.create_server(("127.0.0.1", 0)) as found:
+        return int(found.getsockname()[1])
+
+
+def cpu_seconds(process: int) -> float:
+    """Processor time that a process has taken, without its children."""
+    fields = Path(f"/proc/{process}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+async def ask(port: int, header: str, latencies: list[float]) -> None:
+    """One connection's share of the requests, by a client that costs next to nothing."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    request = f"GET {LOOK_UP} HTTP/1.1\r\nHost: benchmark\r\n{header}\r\n".encode()
+    for _ in range(REQUESTS // CONNECTIONS):
+        begin = time.perf_counter()
+        writer.write(request)
+        head = (await reader.readuntil(b"\r\n\r\n")).lower()
+        assert head.startswith((b"http/1.1 200", b"http/1.1 304")), head
+        if b"content-length: " in head:
+            await reader.readexactly(int(head.split(b"content-length: ")[1].split(b"\r\n")[0]))
+        latencies.append(time.perf_counter() - begin)
+    writer.close()
+
+
+def load(what: str, port: int, process: int, header: str = "") -> Load:
+    """All connections at once."""
+
+    async def everybody() -> list[float]:
+        latencies: list[float] = []
+        await asyncio.gather(*(ask(port, header, latencies) for _ in range(CONNECTIONS)))
+        return latencies
+
+    asyncio.run(everybody())
+    cpu, begin = cpu_seconds(process), time.perf_counter()
+    latencies = asyncio.run(everybody())
+    seconds = time.perf_counter() - begin
+    cpu = cpu_seconds(process) - cpu
+    p50, p99 = np.percentile(latencies, [50, 99])
+    return Load(what, len(latencies) / seconds, cpu / len(latencies), float(p50), float(p99))
+
+
+def content(seed: int) -> bytes:
+    """A grasp log of 200 frames of 20×20 elements with forces."""
+    schedule = RampSchedule(rest=0.3, press=1.0, settle=0.4, shear=4.0, hold=0.95)
+    log = tangential_ramp(points=20, schedule=schedule, marker_noise=1e-6, force_noise=2e-3, seed=seed)
+    assert len(log) == 200, len(log)
+    return encode(replace(log, normal=None, truth=None))
+
+
+def uploads(url: str, method: str, count: int, first_seed: int) -> Uploads:
+    """One after the other, each awaited to its stored fit."""
+    accepted, fitted = [], []
+    with httpx.Client(base_url=url, timeout=60.0) as client:
+        for k in range(count):
+            body = content(first_seed + k)
+            begin = time.perf_counter()
+            wish = {"material": MATERIAL, "method": method}
+            answer = client.post("/v1/grasp-logs", params=wish, content=body, headers=NPZ)
+            accepted.append(time.perf_counter() - begin)
+            job = answer.raise_for_status().json()["job"]["id"]
+            while client.get(f"/v1/jobs/{job}").json()["finished_at"] is None:
+                time.sleep(0.002)
+            fitted.append(time.perf_counter() - begin)
+    return Uploads(method, accepted, fitted)
+
+
+def beside(work: Callable[[int], object], measured: Callable[[], Load]) -> Load:
+    """A measurement while other work goes on."""
+    done = Event()
+
+    def go_on() -> None:
+        k = 0
+        while not done.is_set():
+            work(k)
+            k += 1
+
+    thread = Thread(target=go_on)
+    thread.start()
+    try:
+        return measured()
+    finally:
+        done.set()
+        thread.join()
+
+
+def measure() -> tuple[list[Uploads], list[Load]]:
+    """A service with one worker on SQLite, and a bare server beside it."""
+    port, other = free_port(), free_port()
+    url = f"http://127.0.0.1:{port}"
+    with tempfile.TemporaryDirectory() as folder:
+        command = [sys.executable, "-m", "service.cli", "serve", "--port", str(port), "--data-folder", folder]
+        with running(command, port, STICTION_RATE_LIMIT="0") as service:
+            while httpx.get(f"{url}/readyz").status_code != httpx.codes.OK:
+                time.sleep(0.05)
+            FrictionClient(url).create_material(MATERIAL)
+            uploads(url, "ols", 3, first_seed=0)
+            found = [uploads(url, "ols", UPLOADS, 100), uploads(url, "bayes", UPLOADS // 3, 200)]
+            answer = httpx.get(url + LOOK_UP).raise_for_status()
+            with running([sys.executable, "-c", BARE, str(other)], other, answer.content) as bare:
+                tag = f"If-None-Match: {answer.headers['etag']}\r\n"
+                loads = [
+                    load("bare Starlette", other, bare),
+                    load("look-up", port, service),
+                    load("look-up, not modified", port, service, tag),
+                    beside(
+                        lambda k: uploads(url, "ols", 1, first_seed=300 + k),
+                        lambda: load("look-up beside uploads and fits", port, service),
+                    ),
+                ]
+    return found, loads
+
+
+def draw(found: list[Uploads], loads: list[Load]) -> Figure:
+    """Uploads in their order, and latencies of look-ups."""
+    figure = Figure(figsize=(10, 3.6), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    for entry in found:
+        left.plot(1e3 * np.array(entry.fitted), "o-", markersize=3, label=f"to the stored fit, {entry.method}")
+    left.plot(1e3 * np.array(found[0].accepted), "o-", markersize=3, label="to the answer")
+    left.set(xlabel="upload", ylabel="ms", yscale="log", title="200 frames of 20×20 with forces")
+    left.legend(fontsize=8)
+    place = np.arange(len(loads))
+    right.barh(place - 0.2, [1e3 * one.p50 for one in loads], 0.4, label="p50")
+    right.barh(place + 0.2, [1e3 * one.p99 for one in loads], 0.4, label="p99")
+    right.set_yticks(place, [one.what for one in loads], fontsize=8)
+    right.set(xlabel="ms", xscale="log", title=f"{CONNECTIONS} connections")
+    right.legend(fontsize=8)
+    return figure
+
+
+def tables(found: list[Uploads], loads: list[Load]) -> dict[str, str]:
+    """The same as Markdown."""
+    first = ["| upload, fit by | to the answer, median | to the stored fit, median | longest |", "|---|---|---|---|"]
+    first += [
+        f"| {e.method} | {1e3 * np.median(e.accepted):.0f} ms | {1e3 * np.median(e.fitted):.0f} ms "
+        f"| {1e3 * max(e.fitted):.0f} ms |"
+        for e in found
+    ]
+    second = ["| 32 connections | requests/s | CPU a request | p50 | p99 |", "|---|---|---|---|---|"]
+    second += [
+        f"| {e.what} | {e.rate:.0f} | {1e6 * e.cpu:.0f} µs | {1e3 * e.p50:.0f} ms | {1e3 * e.p99:.0f} ms |"
+        for e in loads
+    ]
+    return {"uploads": "\n".join(first), "look-ups": "\n".join(second)}
+
+
+def main() -> None:
+    """Measure, print, write."""
+    arguments = options(__doc__).parse_args()
+    pictures = picture_folder(arguments)
+    found, loads = measure()
+    made = tables(found, loads)
+    print("\n\n".join(made.values()))
+    save(draw(found, loads), pictures / "service.png")
+    numbers = {"uploads": [asdict(entry) for entry in found], "look-ups": [asdict(entry) for entry in loads]}
+    write(numbers, made, arguments, "service.json")
+
+
+if __name__ == "__main__":
+    main()
