@@ -8,7 +8,7 @@ TAC3D := pytac3d==3.3.0.9
 OUTPUT ?= demo-output
 export UV_PYTHON_DOWNLOADS := never
 
-.PHONY: demo test test-long lint types unit setup recordings constraints clean
+.PHONY: demo test test-long coverage lint types unit setup recordings constraints clean
 
 demo: setup recordings  ## run the whole path on real input and write pictures and a report to $(OUTPUT)
 	$(BIN)/stiction demo --output $(OUTPUT) --recordings $(RECORDINGS)
@@ -26,6 +26,9 @@ types: setup
 
 unit: setup recordings
 	@echo "== tests"
+	$(BIN)/pytest -m "not long" -n 2
+
+coverage: setup recordings  ## the tests again, with the lines that none of them runs; takes a third longer
 	$(BIN)/pytest -m "not long" -n 2 --cov --cov-report=term
 
 test-long: setup recordings  ## calibration, fuzz and kill campaigns; results stand in docs/long-tests.md

@@ -3,12 +3,14 @@
 The same from either database and into either, so that a backup is the way from SQLite to PostgreSQL, too.
 """
 
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from itertools import islice
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from sqlalchemy import Table, func, insert, select, text
+from sqlalchemy import URL, Table, func, insert, select, text, update
 from sqlalchemy.orm import Session
 
 from db import migrate
@@ -42,7 +44,7 @@ def backup(database: Database, blobs: BlobStore, folder: Path, report: Report) -
     folder.mkdir(parents=True, exist_ok=True)
     unfinished = file.with_suffix(".part")
     unfinished.unlink(missing_ok=True)
-    with closing(Database(f"sqlite:///{unfinished}")) as copy:
+    with closing(_opened(unfinished)) as copy:
         migrate.upgrade(copy)
         _copy_rows(database, copy, report)
         _copy_blobs(copy, blobs, BlobStore(folder), report)
@@ -60,10 +62,19 @@ def restore(folder: Path, database: Database, blobs: BlobStore, report: Report) 
         raise FileNotFoundError(f"backup {file} is not there")
     migrate.upgrade(database)
     _refuse_rows(database)
-    with closing(Database(f"sqlite:///{file}")) as copy:
+    with TemporaryDirectory() as own, closing(_opened(_copied(file, Path(own)))) as copy:
         migrate.check(copy)
         _copy_blobs(copy, BlobStore(folder), blobs, report)
         _copy_rows(copy, database, report)
+
+
+def _copied(file: Path, folder: Path) -> Path:
+    """To open a SQLite file is to write to its folder, and a backup may be read-only."""
+    return Path(shutil.copyfile(file, folder / FILE))
+
+
+def _opened(file: Path) -> Database:
+    return Database(URL.create("sqlite", database=str(file)))  # a URL in text would read ? and % as its own
 
 
 def _refuse_rows(database: Database) -> None:
@@ -83,11 +94,17 @@ def _copy_rows(source: Database, target: Database, report: Report) -> None:
 
 def _copy_table(table: Table, reading: Session, writing: Session) -> int:
     rows = reading.execute(select(table).execution_options(yield_per=ROWS_AT_ONCE)).mappings()
+    keys = table.primary_key.columns.values()
+    inward = [column for column in table.columns if any(key.column.table is table for key in column.foreign_keys)]
     count = 0
     for part in rows.partitions():
-        writing.execute(insert(table), [_settled(table, dict(row)) for row in part])
+        settled = [_settled(table, dict(row)) for row in part]
+        writing.execute(insert(table), [row | {column.name: None for column in inward} for row in settled])
         count += len(part)
-    keys = table.primary_key.columns.values()
+    for column in inward:  # rows that refer to others of their table do so once all are there
+        for row in reading.execute(select(table).where(column.is_not(None))).mappings():
+            own = [key == row[key.name] for key in keys]
+            writing.execute(update(table).where(*own).values({column.name: row[column.name]}))
     if count and len(keys) == 1 and keys[0].type.python_type is int and _is_postgresql(writing):
         place = f"pg_get_serial_sequence('{table.name}', '{keys[0].name}')"
         writing.execute(text(f"SELECT setval({place}, (SELECT max({keys[0].name}) FROM {table.name}))"))

@@ -39,8 +39,8 @@ class Database:
     ``StorageUnavailable`` wherever the database cannot be reached or is full.
     """
 
-    def __init__(self, url: str, lock_timeout: float = LOCK_TIMEOUT) -> None:
-        self.url = url
+    def __init__(self, url: str | URL, lock_timeout: float = LOCK_TIMEOUT) -> None:
+        self.url = url if isinstance(url, str) else url.render_as_string(hide_password=False)
         self.engine = _engine(make_url(url))
         # a deferred transaction that reads first cannot always be upgraded to writing: take the write lock at once
         self._writing = self.engine.execution_options(**{_BEGIN: "BEGIN IMMEDIATE"})

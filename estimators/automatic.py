@@ -40,7 +40,7 @@ def choose(evidence: Evidence) -> Choice:
             reason = f"noise of about {noise:.2g} N in the forces shifts beta2 by {bias:.1f} of its standard errors"
             return Choice("bayes", "errors_in_variables", reason)
         part = float(robust.fit(evidence).diagnostics["downweighted"])
-        if part > AUTOMATIC.downweighted:
+        if part > AUTOMATIC.downweighted and part * len(observations) >= AUTOMATIC.least_outliers:
             return Choice("robust", None, f"{part:.1%} of the samples lie far off the plane; normal errors leave 1.1%")
     if evidence.cluster_kind == "grasp" and shared:
         reason = f"samples of an element share {shared:.0%} of their errors' variance; grasps are the clusters"

@@ -106,6 +106,8 @@ class Automatic:
 
     downweighted: float = 0.03
     """0.011 to 1; part of the samples that Tukey's loss gives less than half weight (normal errors: 0.011)."""
+    least_outliers: float = 3.0
+    """> 0; so many samples that lie far off show more than chance in few samples."""
     bias: float = 0.5
     """> 0; bias of β₂ by noise in the forces, in its standard errors, from which it is taken out."""
     significance: float = 3.0

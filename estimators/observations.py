@@ -70,8 +70,8 @@ class Observations:
 
     def place(self) -> IntArray:
         """Codes [k] from 0 of the elements of all grasps: the same element of another grasp is another place."""
-        lowest = int(self.element.min())
-        return _codes(self.grasp * (int(self.element.max()) - lowest + 1) + self.element - lowest)
+        element = _codes(self.element)
+        return _codes(self.grasp * (int(element.max()) + 1) + element)
 
     def columns(self) -> FloatArray:
         """Regressors and response (v, f_n, μ), [k, 3]."""

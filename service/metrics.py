@@ -73,7 +73,7 @@ class Metrics:
         for job in jobs.ended_since(session, self._horizon):
             if job.id not in self._counted and job.finished_at is not None:
                 self._count(job, job.finished_at)
-        newest = max(self._counted.values(), default=self._horizon)
+        newest = min(max(self._counted.values(), default=self._horizon), now())  # a host's clock may be ahead
         self._horizon = max(self._horizon, newest - OVERLAP)
         self._counted = {key: moment for key, moment in self._counted.items() if moment >= self._horizon}
 

@@ -16,6 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+from db.errors import StorageUnavailable
 from service import formats, worker
 from service.formats import writing
 from slipcore.errors import InvalidInput
@@ -73,18 +74,29 @@ class Readers:
 
     async def _do(self, do: Callable[[], Result], name: str, seconds: float) -> Result:
         async with self._one_at_a_time:
-            if self._executor is None:
-                self._executor = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _start)
             loop = asyncio.get_running_loop()
             try:
-                await loop.run_in_executor(self._executor, os.getpid)  # it has started
-                return await asyncio.wait_for(loop.run_in_executor(self._executor, do), seconds)
+                executor = await self._started()
+                return await asyncio.wait_for(loop.run_in_executor(executor, do), seconds)
             except TimeoutError as error:
                 await self._end()
                 raise InvalidInput("file", f"not read within {seconds:.3g} s", "a smaller or undamaged file") from error
             except BrokenProcessPool as error:
                 await self._end()
                 raise InvalidInput("file", f"such that its {name} reader died of it", "an undamaged file") from error
+
+    async def _started(self) -> ProcessPoolExecutor:
+        """The process, once it runs: a new one in place of one that was lost between two files."""
+        for _ in range(2):
+            if self._executor is None:
+                self._executor = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _start)
+            try:
+                await asyncio.get_running_loop().run_in_executor(self._executor, os.getpid)
+            except BrokenProcessPool:
+                await self._end()
+            else:
+                return self._executor
+        raise StorageUnavailable("the process that reads uploads does not start")
 
     async def stop(self) -> None:
         """End the process, whatever it is doing."""

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from slipcore.defaults import DEFAULT_METHOD
+from slipcore.defaults import DEFAULT_METHOD, MOST_LOOKAHEAD
 from slipcore.detector import DetectorState, init, masked, said, step
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
@@ -38,8 +38,9 @@ class Hindsight:
     """
 
     def __init__(self, start: DetectorState, lookahead: int) -> None:
-        if not isinstance(lookahead, int | np.integer) or lookahead < 0:
-            raise InvalidInput("lookahead", lookahead, "a whole number of frames, 0 or more")
+        whole = isinstance(lookahead, int | np.integer) and not isinstance(lookahead, bool)
+        if not whole or not 0 <= lookahead <= MOST_LOOKAHEAD:
+            raise InvalidInput("lookahead", lookahead, f"a whole number of frames, 0 to {MOST_LOOKAHEAD}")
         method = find_method(start.setup.method)
         self._revise = method.revise if lookahead and isinstance(method, CompiledMethod) else None
         self._lookahead = lookahead

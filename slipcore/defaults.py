@@ -136,7 +136,7 @@ class FilterOptions(ContactOptions):
     """Factor on the estimated marker noise."""
     unknown_noise: Annotated[float, Option(0.0, 1e-2, "m", "the noisiest of the scenes; never underestimate")] = 1e-5
     """Marker noise while it cannot be estimated yet."""
-    displacement_floor: Annotated[float, Option(0.0, 1e-3, "m", "no camera tracks a marker better")] = 3.5e-08
+    displacement_floor: Annotated[float, Option(1e-12, 1e-3, "m", "no camera tracks a marker better")] = 3.5e-08
     """Least standard deviation of a marker coordinate."""
     rigidity: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.012
     """How far a stuck element may stray from the object's motion, as a share of it."""
@@ -273,6 +273,8 @@ class SampleOptions(Options):
 DEFAULT_METHOD = "filter"
 LOOKAHEAD = 2
 """Frames after it that a frame of a stored log is decided by; more than two gains little (tuning scenes)."""
+MOST_LOOKAHEAD = 100
+"""Frames; each one costs time and memory, and what lies further ahead tells nothing."""
 
 Kind = TypeVar("Kind", bound=Options)
 

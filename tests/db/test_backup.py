@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from sqlalchemy import select
+from sqlalchemy import select, update
 
 from db import migrate
 from db.backup import FILE, LEFT_OUT, backup, restore
@@ -13,7 +13,7 @@ from db.database import Database
 from db.errors import NotEmpty, NotFound, SchemaMismatch, StorageUnavailable
 from db.records import Claim, Detection, NewGraspLog, NewModel, SampleSummary
 from db.repositories import access_keys, detections, friction_models, grasp_logs, jobs, materials, runners
-from db.tables import Base
+from db.tables import Base, MaterialRow
 
 Rows = dict[str, list[dict[str, object]]]
 
@@ -36,6 +36,8 @@ def filled(
     history, found = blobs.put(b"history"), blobs.put(b"samples")
     with database.write() as session:
         material = materials.create(session, "paper", "a box")
+        merged, last = materials.create(session, "card", ""), materials.create(session, "board", "")
+        session.execute(update(MaterialRow).where(MaterialRow.id == merged.id).values(merged_into_id=last.id))
         done, running = (
             grasp_logs.add(session, new_log(material.id, sha256=blobs.put(content))) for content in (b"one", b"two")
         )
@@ -77,10 +79,11 @@ def test_what_was_stored_is_there_again_and_running_jobs_are_queued(
     filled: Database, blobs: BlobStore, other: Database, tmp_path: Path
 ) -> None:
     told: list[tuple[str, int]] = []
-    backup(filled, blobs, tmp_path / "copy", lambda what, count: told.append((what, count)))
-    assert {("materials", 1), ("grasp_logs", 2), ("jobs", 2), ("blobs", 4)} <= set(told)
+    folder = tmp_path / "a copy of 100%25? #1"
+    backup(filled, blobs, folder, lambda what, count: told.append((what, count)))
+    assert {("materials", 3), ("grasp_logs", 2), ("jobs", 2), ("blobs", 4)} <= set(told)
     again = BlobStore(tmp_path / "again")
-    restore(tmp_path / "copy", other, again, nothing)
+    restore(folder, other, again, nothing)
     wanted = rows(filled)
     for job in wanted["jobs"]:
         job |= {"runner_id": None, "status": "queued" if job["status"] == "running" else job["status"]}
@@ -94,7 +97,7 @@ def test_a_restored_database_goes_on_with_new_rows(
     backup(filled, blobs, tmp_path / "copy", nothing)
     restore(tmp_path / "copy", other, blobs, nothing)
     with other.write() as session:
-        assert materials.create(session, "glass", "").id == 2
+        assert materials.create(session, "glass", "").id == 4
         assert jobs.claim(session, runners.add(session, "host:2")) is not None
 
 

@@ -42,3 +42,14 @@ def test_independent_errors_are_hardly_ever_taken_for_shared_ones(samples: Make)
     one_each = samples(15, seed=3)
     alone = gather(replace(one_each, element=np.arange(15)))
     assert shared_by_elements(alone) == 0.0
+
+
+def test_labels_of_elements_may_be_any_whole_numbers(samples: Make) -> None:
+    plain = places_that_differ(samples, 0)
+    far = [replace(part, element=(part.element.astype(np.int64) - 10) * 2**58) for part in plain]
+    assert shared_by_elements(gather(far)) == pytest.approx(shared_by_elements(gather(plain)), rel=1e-12)
+
+
+@pytest.mark.parametrize("n", [4, 5])
+def test_few_samples_are_no_evidence_of_outliers(samples: Make, n: int) -> None:
+    assert all(choose(gather(samples(n, seed=seed))).method == "ols" for seed in range(10))

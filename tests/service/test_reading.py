@@ -1,4 +1,5 @@
 import asyncio
+import os
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -34,15 +35,15 @@ def running(readers: Readers) -> list[Any]:
 
 def test_a_reader_that_dies_takes_only_its_file_with_it(ramp: GraspLog, tmp_path: Path) -> None:
     source, other, target = (tmp_path / name for name in ("source", "other", "target"))
-    source.write_bytes(TABLE)
+    os.mkfifo(source)  # the reader waits for its bytes
     parquet.write(ramp, other)
 
     async def lose_one(readers: Readers) -> Any:
         lost = asyncio.ensure_future(readers.convert(source, target, "tracked markers", {}))
-        while not (processes := running(readers)):
-            await asyncio.sleep(0.01)
         waiting = asyncio.ensure_future(readers.convert(other, target, "parquet", {}))
-        for process in processes:
+        while not is_read(source):
+            await asyncio.sleep(0.01)
+        for process in running(readers):
             process.kill()
         with pytest.raises(InvalidInput, match="such that its tracked markers reader died of it"):
             await lost
@@ -51,6 +52,29 @@ def test_a_reader_that_dies_takes_only_its_file_with_it(ramp: GraspLog, tmp_path
     described = with_readers(60.0, lose_one)
     assert (described.format, described.frames, described.grid) == ("parquet", len(ramp), ramp.grid)
     assert target.read_bytes() == encode(ramp)
+
+
+def is_read(pipe: Path) -> bool:
+    """Whether somebody has opened the pipe to read it."""
+    try:
+        os.close(os.open(pipe, os.O_WRONLY | os.O_NONBLOCK))
+    except OSError:
+        return False
+    return True
+
+
+def test_a_reader_that_was_lost_between_two_files_is_no_fault_of_the_second(ramp: GraspLog, tmp_path: Path) -> None:
+    source, target = tmp_path / "source", tmp_path / "target"
+    parquet.write(ramp, source)
+
+    async def lose_between(readers: Readers) -> Any:
+        await readers.convert(source, target, "parquet", {})
+        for process in running(readers):
+            process.kill()
+            process.join()
+        return await readers.convert(source, target, "parquet", {})
+
+    assert with_readers(60.0, lose_between).frames == len(ramp)
 
 
 def test_a_reader_that_takes_too_long_or_too_much_is_ended(tmp_path: Path) -> None:

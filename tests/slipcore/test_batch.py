@@ -97,7 +97,7 @@ def test_two_frames_of_lookahead_find_more_of_the_slip(name: str, scene: Scene, 
 
 
 def test_more_lookahead_than_frames_is_all_there_is(short_ramp: GraspLog) -> None:
-    history = detect_slip(short_ramp, lookahead=10_000)
+    history = detect_slip(short_ramp, lookahead=100)
     assert len(history.time) == len(short_ramp)
     assert ((history.probability >= 0.0) & (history.probability <= 1.0)).all()
 
@@ -109,7 +109,7 @@ def test_what_was_not_observed_stays_unsaid_in_hindsight(short_ramp: GraspLog) -
     assert not np.isfinite(history.velocity[1:]).all(axis=-1)[~(observed[1:] & observed[:-1])].any()
 
 
-@pytest.mark.parametrize("lookahead", [-1, 1.5, "2", None])
+@pytest.mark.parametrize("lookahead", [-1, 101, 1.5, True, "2", None])
 def test_a_lookahead_that_is_no_number_of_frames_is_refused(short_ramp: GraspLog, lookahead: object) -> None:
     with pytest.raises(InvalidInput, match="lookahead"):
         detect_slip(short_ramp, lookahead=lookahead)

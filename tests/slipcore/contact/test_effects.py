@@ -152,9 +152,10 @@ def test_an_absent_effect_adds_nothing_to_the_plan_and_allocates_nothing(name: s
         part, other = getattr(plan.problem, entry.name), getattr(without.problem, entry.name)
         assert len(part) == len(other) if isinstance(part, tuple) else part == other
     allocated()  # what is made once for all
-    least, least_without = (
-        min(allocated(*more) for _ in range(3)) for more in ((effect,), ())
-    )  # less what was not yet freed
+    pairs = [
+        (allocated(effect), allocated()) for _ in range(3)
+    ]  # the least, since what is not yet freed comes and goes
+    least, least_without = (min(sizes) for sizes in zip(*pairs, strict=True))
     assert least <= least_without + FIELD // 2
 
 
