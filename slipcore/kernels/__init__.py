@@ -5,6 +5,7 @@ writes is handed to it as its last arguments, and nothing else is written to.
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -16,8 +17,9 @@ def forget_stale_kernels(folder: Path) -> None:
     """Delete cached kernels older than any source here: numba only looks at the file that a kernel itself is in."""
     newest = max(source.stat().st_mtime for source in (*folder.glob("*.py"), folder.parent / "defaults.py"))
     for cached in (folder / "__pycache__").glob("*.nb[ic]"):
-        if cached.stat().st_mtime < newest:
-            cached.unlink(missing_ok=True)
+        with suppress(FileNotFoundError):  # another process that starts now forgets them, too
+            if cached.stat().st_mtime < newest:
+                cached.unlink()
 
 
 forget_stale_kernels(Path(__file__).parent)
