@@ -125,10 +125,7 @@ def step_filter(
     pose, doubt = step_pose(anchors, before, given_before, given, variance, tuning, next_body)
     motion_x, motion_y, noise = object_motion(anchors, before, pose, doubt, tuning.motion_margin)
     change = force_change(places, force_before, force)
-    deeper = np.empty(len(places))
-    for e in range(len(places)):
-        i, j = places[e]
-        deeper[e] = start[i, j, 2] - end[i, j, 2]
+    deeper = sunk(places, start, end)
     home = presses_home(
         body, anchors, (motion_x, motion_y), deeper, change, variance, force_sigma, interval, tuning, next_body
     )
@@ -146,20 +143,9 @@ def step_filter(
         seen = place_on_object(pose, anchors.marker_x[e], anchors.marker_y[e])
         motion = (motion_x[e], motion_y[e])
         update_element(
-            elements,
-            i,
-            j,
-            motion,
-            noise[e],
-            readiness * near,
-            home,
-            evidence[e],
-            seen,
-            variance,
-            interval,
-            tuning,
-            after,
-        )
+            elements, i, j, motion, noise[e], readiness * near, home, evidence[e], seen, variance, interval,
+            tuning, after,
+        )  # fmt: skip
     decide(after[PROBABILITY], tuning.threshold, slip, probability)
 
 
@@ -251,6 +237,16 @@ def anchors_of(elements: FloatArray, places: FloatArray, position: FloatArray, e
         rows[3, e], rows[4, e] = position[i, j, 0] + end[i, j, 0], position[i, j, 1] + end[i, j, 1]
         rows[5, e] = 1.0 - elements[PROBABILITY, i, j]
     return Anchors(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5])
+
+
+@compiled
+def sunk(places: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """How much deeper these places are at the end than at the start, [k] m."""
+    deeper = np.empty(len(places))
+    for e in range(len(places)):
+        i, j = places[e]
+        deeper[e] = start[i, j, 2] - end[i, j, 2]
+    return deeper
 
 
 @compiled
