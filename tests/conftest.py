@@ -25,6 +25,8 @@ from starlette.routing import Route
 
 from db import migrate
 from db.database import Database
+from db.records import Claim
+from db.repositories import jobs, runners
 
 UNPRIVILEGED = "nobody" if os.geteuid() == 0 else None
 """PostgreSQL refuses to run as root."""
@@ -230,3 +232,16 @@ def s3(monkeypatch: pytest.MonkeyPatch) -> Iterator[S3]:
     yield server
     running.should_exit = True
     thread.join()
+
+
+@pytest.fixture
+def claim(database: Database) -> Callable[[], Claim]:
+    """Give the oldest queued job to a runner of its own."""
+
+    def make() -> Claim:
+        with database.write() as session:
+            made = jobs.claim(session, runners.add(session, "host:1"))
+        assert made is not None
+        return made
+
+    return make

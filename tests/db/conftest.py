@@ -7,8 +7,7 @@ from sqlalchemy import event
 
 from db import migrate
 from db.database import Database
-from db.records import Claim, Detection, NewGraspLog, NewModel, SampleSummary
-from db.repositories import jobs, runners
+from db.records import Detection, NewGraspLog, NewModel, SampleSummary
 
 HASH = "{:064x}"
 
@@ -72,19 +71,6 @@ def detection() -> Detection:
 @pytest.fixture
 def samples() -> SampleSummary:
     return SampleSummary(120, None, 1e-6, 0.41, (0.0, 0.01), (0.01, 0.09), HASH.format(1002), b"moments")
-
-
-@pytest.fixture
-def claim(database: Database) -> Callable[[], Claim]:
-    """Give the oldest queued job to a runner of its own."""
-
-    def make() -> Claim:
-        with database.write() as session:
-            made = jobs.claim(session, runners.add(session, "host:1"))
-        assert made is not None
-        return made
-
-    return make
 
 
 @pytest.fixture

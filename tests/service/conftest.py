@@ -19,8 +19,6 @@ from fastapi import FastAPI
 from db import migrate
 from db.blobs import BlobStore
 from db.database import Database
-from db.records import Claim
-from db.repositories import jobs, runners
 from service.app import create_app
 from service.context import Context
 from service.model_cache import ModelCache
@@ -208,19 +206,6 @@ def database(new_url: Callable[..., str], tmp_path: Path) -> Iterator[Database]:
     migrate.upgrade(database)
     yield database
     database.close()
-
-
-@pytest.fixture
-def claim(database: Database) -> Callable[[], Claim]:
-    """Give the oldest queued job to a runner of its own."""
-
-    def make() -> Claim:
-        with database.write() as session:
-            made = jobs.claim(session, runners.add(session, "host:1"))
-        assert made is not None
-        return made
-
-    return make
 
 
 @pytest.fixture
