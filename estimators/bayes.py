@@ -55,7 +55,8 @@ def fit(
     Raises ``NotConverged``, which carries the model, where the chain is shorter than 50 autocorrelation times or its
     walkers disagree. A chain that is sound but was stopped by ``seconds`` before ``accuracy`` says so in
     ``diagnostics["stopped"]`` and in ``cost.monte_carlo_error``. ``diagnostics["shared_by_elements"]`` is the part of
-    the errors' variance that samples of an element share; where it is not 0 these intervals are too narrow.
+    the errors' variance that samples of an element share; where it is not 0 these intervals are too narrow. Moments
+    know of no elements, and nothing is said of it then.
     """
     begin = time.perf_counter()
     name = default_likelihood(evidence) if likelihood is None else likelihood
@@ -68,7 +69,7 @@ def fit(
     summary = posterior.summarise(chain.flat(), np.random.default_rng([seed, 1]))
     diagnostics: Diagnostics = {"likelihood": name, "prior": posterior.prior, "draws": ", ".join(posterior.names)}
     diagnostics |= _convergence(chain, posterior) | sensitivity(evidence, exact_posterior(evidence))
-    if evidence.cluster_kind != "element":
+    if evidence.observations is not None and evidence.cluster_kind != "element":  # moments cannot tell
         diagnostics["shared_by_elements"] = shared_by_elements(evidence)
     model = report(
         evidence,

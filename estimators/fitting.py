@@ -54,6 +54,8 @@ def fit(
     for name, value in (("accuracy", accuracy), ("seconds", seconds)):
         if value is not None and not value > 0.0:
             raise InvalidSamples(name, value, "above 0")
+    if likelihood is not None and method != "bayes":
+        raise InvalidSamples("likelihood", likelihood, f'none with method "{method}", only with "bayes"')
     evidence = gather(samples)
     if method != "auto":
         return _fit(evidence, method, accuracy, seconds, seed, likelihood, loss)

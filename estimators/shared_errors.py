@@ -16,7 +16,7 @@ def shared_by_elements(evidence: Evidence) -> float:
     """The part of the errors' variance within a grasp that is the same for all samples of an element; 0 if none shows.
 
     Intraclass correlation of the residuals, by analysis of variance: elements within grasps against samples within
-    elements (Searle et al., 1992, ch. 3), where its F test rejects. Moments do not know of elements: 0.
+    elements (Searle et al., 1992, ch. 3), where its F test rejects. 0 for moments, too, which know of no elements.
     """
     observations = evidence.observations
     if observations is None:

@@ -31,6 +31,8 @@ def test_errors_shared_within_elements_lead_to_clusters_and_the_share_is_told(sa
     assert np.mean(shares) == pytest.approx(0.5, abs=4 * np.std(shares) / np.sqrt(10))
     told = estimators.fit(places_that_differ(samples, 0), method="bayes").diagnostics["shared_by_elements"]
     assert told == pytest.approx(shares[0], rel=1e-12)
+    moments = [estimators.Moments.from_samples(part) for part in places_that_differ(samples, 0)]
+    assert "shared_by_elements" not in estimators.fit(moments, method="bayes").diagnostics
     model = estimators.fit(places_that_differ(samples, 0), method="auto")
     assert model.method == "ols"
     assert str(model.diagnostics["chosen_because"]).startswith("samples of an element share 5")
@@ -53,3 +55,9 @@ def test_labels_of_elements_may_be_any_whole_numbers(samples: Make) -> None:
 @pytest.mark.parametrize("n", [4, 5])
 def test_few_samples_are_no_evidence_of_outliers(samples: Make, n: int) -> None:
     assert all(choose(gather(samples(n, seed=seed))).method == "ols" for seed in range(10))
+
+
+@pytest.mark.parametrize("method", ["ols", "robust", "conjugate", "auto"])
+def test_a_likelihood_for_a_method_that_has_none_is_refused(samples: Make, method: str) -> None:
+    with pytest.raises(estimators.InvalidSamples, match="student_t"):
+        estimators.fit(samples(50), method=method, likelihood="student_t")
