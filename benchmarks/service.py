@@ -1,9 +1,10 @@
 """What the service costs its callers: `python -m benchmarks.service [--output FOLDER] [--page docs/scale.md]`.
 
 Uploads, one after the other, of 200-frame logs of 20×20 elements with forces: seconds to the answer and to the stored
-fit. Then look-ups on 32 connections, beside a bare Starlette route that returns the same bytes by the same uvicorn:
-requests a second, CPU seconds a request of the server, and latencies, alone and while uploads run. Servers, workers
-and these callers share the machine. Writes service.json and service.png.
+fit by least squares; then Bayesian fits of the same material, asked for one after the other. Then look-ups on 32
+connections, beside a bare Starlette route that returns the same bytes by the same uvicorn: requests a second, CPU
+seconds a request of the server, and latencies, alone and while uploads run. Servers, workers and these callers share
+the machine. Writes service.json and service.png.
 """
 
 import asyncio
@@ -18,6 +19,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from threading import Event, Thread
+from typing import Any
 
 import httpx
 import numpy as np
@@ -56,10 +58,10 @@ class Load:
 
 
 @dataclass(frozen=True, slots=True)
-class Uploads:
-    """Seconds to the answer and to the end of the job of each upload with one method."""
+class Requests:
+    """Seconds to the answer, and to the end of the job, of requests of one kind."""
 
-    method: str
+    what: str
     accepted: list[float]
     fitted: list[float]
 
@@ -143,21 +145,39 @@ def content(seed: int) -> bytes:
     return encode(replace(log, normal=None, truth=None))
 
 
-def uploads(url: str, method: str, count: int, first_seed: int) -> Uploads:
-    """One after the other, each awaited to its stored fit."""
+def uploads(url: str, count: int, first_seed: int) -> Requests:
+    """Grasp logs one after the other, each awaited to its stored fit."""
+
+    def ask(client: httpx.Client, body: bytes) -> str:
+        answer = client.post("/v1/grasp-logs", params={"material": MATERIAL}, content=body, headers=NPZ)
+        return str(answer.raise_for_status().json()["job"]["id"])
+
+    return requests(url, "upload, then fit by ols", ask, [content(first_seed + k) for k in range(count)])
+
+
+def fits(url: str, count: int) -> Requests:
+    """Bayesian fits of the material, each with another seed."""
+
+    def ask(client: httpx.Client, seed: int) -> str:
+        answer = client.post(f"/v1/materials/{MATERIAL}/fits", json={"method": "bayes", "seed": seed})
+        return str(answer.raise_for_status().json()["id"])
+
+    return requests(url, "fit by bayes", ask, list(range(count)))
+
+
+def requests(url: str, what: str, ask: Callable[[httpx.Client, Any], str], bodies: list[Any]) -> Requests:
+    """What ``ask`` sends, and the job that it tells, one after the other."""
     accepted, fitted = [], []
     with httpx.Client(base_url=url, timeout=60.0) as client:
-        for k in range(count):
-            body = content(first_seed + k)
+        for body in bodies:
             begin = time.perf_counter()
-            wish = {"material": MATERIAL, "method": method}
-            answer = client.post("/v1/grasp-logs", params=wish, content=body, headers=NPZ)
+            job = ask(client, body)
             accepted.append(time.perf_counter() - begin)
-            job = answer.raise_for_status().json()["job"]["id"]
-            while client.get(f"/v1/jobs/{job}").json()["finished_at"] is None:
+            while (state := client.get(f"/v1/jobs/{job}").json())["finished_at"] is None:
                 time.sleep(0.002)
+            assert state["status"] == "done", state
             fitted.append(time.perf_counter() - begin)
-    return Uploads(method, accepted, fitted)
+    return Requests(what, accepted, fitted)
 
 
 def beside(work: Callable[[int], object], measured: Callable[[], Load]) -> Load:
@@ -179,7 +199,7 @@ def beside(work: Callable[[int], object], measured: Callable[[], Load]) -> Load:
         thread.join()
 
 
-def measure() -> tuple[list[Uploads], list[Load]]:
+def measure() -> tuple[list[Requests], list[Load]]:
     """A service with one worker on SQLite, and a bare server beside it."""
     port, other = free_port(), free_port()
     url = f"http://127.0.0.1:{port}"
@@ -189,8 +209,8 @@ def measure() -> tuple[list[Uploads], list[Load]]:
             while httpx.get(f"{url}/readyz").status_code != httpx.codes.OK:
                 time.sleep(0.05)
             FrictionClient(url).create_material(MATERIAL)
-            uploads(url, "ols", 3, first_seed=0)
-            found = [uploads(url, "ols", UPLOADS, 100), uploads(url, "bayes", UPLOADS // 3, 200)]
+            uploads(url, 3, first_seed=0)
+            found = [uploads(url, UPLOADS, first_seed=100), fits(url, UPLOADS // 3)]
             answer = httpx.get(url + LOOK_UP).raise_for_status()
             with running([sys.executable, "-c", BARE, str(other)], other, answer.content) as bare:
                 tag = f"If-None-Match: {answer.headers['etag']}\r\n"
@@ -199,21 +219,21 @@ def measure() -> tuple[list[Uploads], list[Load]]:
                     load("look-up", port, service),
                     load("look-up, not modified", port, service, tag),
                     beside(
-                        lambda k: uploads(url, "ols", 1, first_seed=300 + k),
+                        lambda k: uploads(url, 1, first_seed=300 + k),
                         lambda: load("look-up beside uploads and fits", port, service),
                     ),
                 ]
     return found, loads
 
 
-def draw(found: list[Uploads], loads: list[Load]) -> Figure:
+def draw(found: list[Requests], loads: list[Load]) -> Figure:
     """Uploads in their order, and latencies of look-ups."""
     figure = Figure(figsize=(10, 3.6), layout="constrained")
     left, right = figure.subplots(1, 2)
     for entry in found:
-        left.plot(1e3 * np.array(entry.fitted), "o-", markersize=3, label=f"to the stored fit, {entry.method}")
-    left.plot(1e3 * np.array(found[0].accepted), "o-", markersize=3, label="to the answer")
-    left.set(xlabel="upload", ylabel="ms", yscale="log", title="200 frames of 20×20 with forces")
+        left.plot(1e3 * np.array(entry.fitted), "o-", markersize=3, label=f"{entry.what}: to the stored fit")
+    left.plot(1e3 * np.array(found[0].accepted), "o-", markersize=3, label="upload: to the answer")
+    left.set(xlabel="request", ylabel="ms", yscale="log", title="200 frames of 20×20 with forces")
     left.legend(fontsize=8)
     place = np.arange(len(loads))
     right.barh(place - 0.2, [1e3 * one.p50 for one in loads], 0.4, label="p50")
@@ -224,11 +244,11 @@ def draw(found: list[Uploads], loads: list[Load]) -> Figure:
     return figure
 
 
-def tables(found: list[Uploads], loads: list[Load]) -> dict[str, str]:
+def tables(found: list[Requests], loads: list[Load]) -> dict[str, str]:
     """The same as Markdown."""
-    first = ["| upload, fit by | to the answer, median | to the stored fit, median | longest |", "|---|---|---|---|"]
+    first = ["| request | to the answer, median | to the stored fit, median | longest |", "|---|---|---|---|"]
     first += [
-        f"| {e.method} | {1e3 * np.median(e.accepted):.0f} ms | {1e3 * np.median(e.fitted):.0f} ms "
+        f"| {e.what} | {1e3 * np.median(e.accepted):.0f} ms | {1e3 * np.median(e.fitted):.0f} ms "
         f"| {1e3 * max(e.fitted):.0f} ms |"
         for e in found
     ]
