@@ -1,23 +1,21 @@
 """Feed mutated files to the readers, in a process whose memory is limited: run by ``test_fuzz.py``.
 
-    python fuzz_readers.py SEEDS COUNT FIRST PROGRESS
+    python fuzz_readers.py SEEDS COUNT FIRST JOURNAL
 
 SEEDS is a folder of files and, beside a file that needs one, its mapping with the suffix ``.mapping``. Cases FIRST to
 FIRST + COUNT go through all of them in turn; each is made of its number alone, so that any can be had again:
-``python fuzz_readers.py SEEDS 1 NUMBER PROGRESS`` leaves it in PROGRESS with the suffix ``.case``. PROGRESS tells the
-case under way, should the process die of it. What was found is printed as JSON.
+``python fuzz_readers.py SEEDS 1 NUMBER JOURNAL`` leaves it in JOURNAL with the suffix ``.case``. JOURNAL gets a line a
+case once it is done, so that it tells the case under way, should the process die of it: what came of it, s, and bytes
+by which the process has grown at most.
 """
 
-import json
 import os
 import random
 import resource
 import signal
 import sys
 import time
-from collections import Counter
 from pathlib import Path
-from typing import Any
 
 from service import formats
 from service.formats import hdf5, mcap, npy, parquet, rosbag
@@ -56,9 +54,7 @@ def mutated(content: bytes, number: int) -> bytes:
     for _ in range(chance.choice((1, 1, 1, 2, 3, 4))):
         if not data:
             break
-        chance.choice((flip, flip, overwrite, overwrite, number_at, number_at, number_at, cut, drop, copy, token))(
-            data, chance
-        )
+        chance.choice(CHANGES)(data, chance)
     return bytes(data)
 
 
@@ -110,8 +106,7 @@ CHANGES = (flip, flip, overwrite, overwrite, number_at, number_at, number_at, cu
 
 def attempt(path: Path, name: str, mapping: str | None) -> str:
     """What a reader makes of a file: "log", "refused", or what is wrong with the reader."""
-    begin = time.perf_counter()
-    signal.setitimer(signal.ITIMER_REAL, LIMIT_SECONDS)
+    signal.setitimer(signal.ITIMER_PROF, LIMIT_SECONDS)  # of computing: the machine may be busy
     try:
         formats.read(path, formats.FORMATS[name].content_type, mapping=mapping)
         outcome = "log"
@@ -120,12 +115,12 @@ def attempt(path: Path, name: str, mapping: str | None) -> str:
     except MemoryError:
         outcome = "memory"
     except Hang:
-        return "hang"
+        outcome = "hang"
     except Exception as error:
-        return f"crash: {type(error).__name__}: {error}"[:200]
+        outcome = f"crash: {type(error).__name__}: {error}"[:200]
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-    return outcome if time.perf_counter() - begin < LIMIT_SECONDS else "hang"
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+    return outcome
 
 
 def hang(*_: object) -> None:
@@ -138,34 +133,27 @@ def limit_memory() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (now + MEMORY, now + MEMORY))
 
 
-def main(seeds: Path, count: int, first: int, progress: Path) -> dict[str, Any]:
+def main(seeds: Path, count: int, first: int, journal: Path) -> None:
     files = sorted(path for path in seeds.iterdir() if path.suffix != ".mapping")
     contents = [path.read_bytes() for path in files]
     names = [formats.identify(path) for path in files]
     mappings = [p.read_text() if (p := path.with_suffix(".mapping")).exists() else None for path in files]
     for path, name, mapping in zip(files, names, mappings, strict=True):
         formats.read(path, formats.FORMATS[name].content_type, mapping=mapping)  # libraries are imported and warm
-    signal.signal(signal.SIGALRM, hang)
+    signal.signal(signal.SIGPROF, hang)
     limit_memory()
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    found: list[tuple[int, str, str]] = []
-    outcomes: Counter[str] = Counter()
-    slowest = 0.0
-    case = progress.with_suffix(".case")
-    under_way = os.open(progress, os.O_CREAT | os.O_WRONLY)
-    for number in range(first, first + count):
-        which = number % len(files)
-        os.pwrite(under_way, b"%12d" % number, 0)  # at once: it may be read at any time
-        case.write_bytes(mutated(contents[which], number))
-        begin = time.perf_counter()
-        outcome = attempt(case, names[which], mappings[which])
-        slowest = max(slowest, time.perf_counter() - begin)
-        outcomes[outcome.partition(":")[0]] += 1
-        if outcome not in ("log", "refused"):
-            found.append((number, files[which].name, outcome))
-    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-    return {"outcomes": outcomes, "found": found[:200], "slowest": slowest, "grown": 1024 * grown}
+    case = journal.with_suffix(".case")
+    with journal.open("wb", buffering=0) as lines:
+        for number in range(first, first + count):
+            which = number % len(files)
+            case.write_bytes(mutated(contents[which], number))
+            begin = time.process_time()
+            outcome = " ".join(attempt(case, names[which], mappings[which]).split())
+            seconds = time.process_time() - begin
+            grown = 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+            lines.write(f"{outcome}\t{seconds}\t{grown}\n".encode())
 
 
 if __name__ == "__main__":
-    sys.stdout.write(json.dumps(main(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4]))))
+    main(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4]))
