@@ -67,6 +67,10 @@ class Envelope:
             await self.app(scope, _Receiver(receive).receive, send)
         except Problem as problem:
             await problems.answer(Request(scope), problem)(scope, receive, send)
+        except asyncio.CancelledError:  # the server waits for its requests no longer
+            if send.has_begun:
+                raise
+            await problems.answer(Request(scope), problems.stopping())(scope, receive, send)
         except Exception as error:
             answer = problems.unexpected(Request(scope), error)
             if send.has_begun:

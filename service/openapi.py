@@ -13,12 +13,13 @@ from service.problems import (
     KEY_REQUIRED,
     MEDIA_TYPE,
     REQUEST_TIMEOUT,
+    STOPPING,
     TOO_MANY_REQUESTS,
     ProblemType,
 )
 from service.routes.common import description_of
 
-AT_THE_DOOR = (BAD_REQUEST, HEADERS_TOO_LARGE)
+AT_THE_DOOR = (BAD_REQUEST, HEADERS_TOO_LARGE, STOPPING)
 """Problems of every route, before it is known what is asked."""
 
 AT_THE_GATE = (KEY_REQUIRED, INVALID_KEY, INSUFFICIENT_SCOPE, TOO_MANY_REQUESTS)

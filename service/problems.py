@@ -61,6 +61,7 @@ IDEMPOTENCY_KEY_REUSED = ProblemType("idempotency-key-reused", "The key stands f
 TOO_MANY_REQUESTS = ProblemType("too-many-requests", "Requests come too often", 429)
 HEADERS_TOO_LARGE = ProblemType("headers-too-large", "The headers are too large", 431)
 INTERNAL_ERROR = ProblemType("internal-error", "The service failed", 500)
+STOPPING = ProblemType("stopping", "The server stops", 503)
 WORKERS_NOT_READY = ProblemType("workers-not-ready", "The workers take no jobs yet, or no longer", 503)
 STORAGE_UNAVAILABLE = ProblemType("storage-unavailable", "Database or blob folder cannot be used now", 503)
 
@@ -117,6 +118,11 @@ def install(app: FastAPI) -> None:
 def storage_unavailable(error: StorageUnavailable) -> Problem:
     """That the stores cannot be used now, with the time to try again."""
     return Problem(STORAGE_UNAVAILABLE, str(error), headers={"Retry-After": "1"})
+
+
+def stopping() -> Problem:
+    """That the server stops before it is done with the request."""
+    return Problem(STOPPING, "not done before the server stopped", headers={"Retry-After": "1"})
 
 
 def answer(request: Request, problem: Problem) -> JSONResponse:

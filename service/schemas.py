@@ -563,7 +563,9 @@ class GraspForceOut(BaseModel):
     method: str
     version: int
     normal_force: Annotated[float, Field(description="The smallest that holds, N")]
-    feasible_interval: Annotated[tuple[float, float | None], Field(description="N; null: no upper bound")]
+    feasible_interval: Annotated[
+        list[float | None], Field(min_length=2, max_length=2, description="N; second null: no upper bound")
+    ]
     margin: Annotated[float | None, Field(description="By how much the gripper may press too hard, N; null: any")]
     largest_load: Annotated[float | None, Field(description="The most that any force holds, N; null: any")]
     element_force: Annotated[float, Field(description="Normal force of one element then, N")]

@@ -1,5 +1,6 @@
 """How the application is served: by uvicorn, with bounds on what a connection may do."""
 
+import math
 from typing import Any
 
 import uvicorn
@@ -23,6 +24,7 @@ def configuration(settings: Settings, **options: Any) -> uvicorn.Config:
         h11_max_incomplete_event_size=MOST_HEADER_BYTES,
         limit_concurrency=settings.max_connections,
         server_header=False,
+        timeout_graceful_shutdown=max(1, math.ceil(settings.shutdown_seconds)),  # without it, clients hold the end up
         ws_max_size=MOST_MESSAGE_BYTES,
         ws_per_message_deflate=False,  # noise does not pack, and packing takes its time
         **options,

@@ -51,7 +51,7 @@ def grasp_force(context: Context, wish: NewGraspForce) -> GraspForceOut:
         raise Problem.wrong_value(INVALID_REQUEST, error.name, error.value, error.allowed) from error
     low, high = answer.feasible_interval
     told = asdict(answer) | {
-        "feasible_interval": (low, _finite(high)),
+        "feasible_interval": [low, _finite(high)],
         "margin": _finite(answer.margin),
         "largest_load": _finite(answer.largest_load),
         "warning": "; ".join(filter(None, (answer.warning, OUTDATED if known.stored.outdated else None))) or None,
