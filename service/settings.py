@@ -80,8 +80,8 @@ class Settings(BaseSettings):
     )
     shutdown_seconds: Annotated[float, Field(ge=0.0, le=600.0)] = Field(
         default=10.0,
-        description="How long a stopping server waits for requests and then for running jobs, in s; the next start takes "
-        "up the rest.",
+        description="How long a stopping server waits for requests and then for running jobs, in s; the next start "
+        "takes up the rest.",
     )
 
     @field_validator("database_url")
