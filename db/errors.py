@@ -39,7 +39,7 @@ class NotEmpty(DatabaseError):
 
 
 class DriverMissing(DatabaseError):
-    """The database or blob store of this URL needs a library that is not installed."""
+    """The database, blob store or cluster of this URL needs a library that is not installed."""
 
     def __init__(self, url: str, module: str, what: str = "database", extra: str = "postgresql") -> None:
         self.url, self.module, self.what, self.extra = url, module, what, extra

@@ -82,7 +82,7 @@ async def running(
             place = Place(database.url, settings.data_folder, settings.blob_url, settings.blob_cache_bytes)
             runner = JobRunner(
                 database,
-                lanes(place, settings.workers),
+                lanes(place, settings.workers, settings.dask_address),
                 attempts=settings.job_attempts,
                 lease_seconds=settings.lease_seconds,
                 poll_seconds=settings.poll_seconds,

@@ -74,6 +74,7 @@ class JobRunner:
         self._at: set[str] = set()  # jobs in the lanes
         self._strays: set[str] = set()  # jobs that were ours in the database at the last beat, but in no lane
         self._warming = len(lanes)
+        self._hiring: set[asyncio.Task[None]] = set()
         self._outdated: SchemaMismatch | None = None
         self._stopping = False
         self._woken = asyncio.Event()
@@ -83,7 +84,10 @@ class JobRunner:
         """Why no jobs are taken yet, or no longer."""
         if self._outdated is not None:
             return str(self._outdated)
-        return f"{self._warming} of {len(self._lanes)} workers warm up" if self._warming else None
+        missing = next(filter(None, (lane.missing for lane in self._lanes)), None)
+        if self._warming:
+            return f"{self._warming} of {len(self._lanes)} workers warm up" + (f": {missing}" if missing else "")
+        return missing
 
     async def start(self) -> None:
         """Begin to work."""
@@ -107,6 +111,8 @@ class JobRunner:
         """Let running jobs end within the time allowed, then end their workers; others can take the jobs up."""
         self._stopping = True
         self._woken.set()
+        for task in self._hiring:  # no job waits for a worker that is not there yet
+            task.cancel()
         if self._working:
             _, late = await asyncio.wait(self._working, timeout=self._shutdown_seconds)
             for lane in self._lanes:
@@ -120,7 +126,7 @@ class JobRunner:
 
     async def _work(self, lane: Lane) -> None:
         try:
-            await lane.hire()
+            await self._hire(lane)
             self._warming -= 1
             while not self._stopping and self._outdated is None:
                 self._woken.clear()
@@ -131,6 +137,12 @@ class JobRunner:
                 await self._do(lane, claim)
         finally:
             await lane.close()
+
+    async def _hire(self, lane: Lane) -> None:
+        hiring = asyncio.create_task(lane.hire())
+        self._hiring.add(hiring)
+        hiring.add_done_callback(self._hiring.discard)
+        await hiring
 
     async def _wait(self, seconds: float) -> None:
         with suppress(TimeoutError):
@@ -167,8 +179,8 @@ class JobRunner:
             await lane.run(claim)
         except WorkerDied:
             if not self._stopping:
-                await lane.hire()
-                await self._try(lambda: self._count_death(claim))
+                await self._try(lambda: self._count_death(claim))  # at once: another lane may take the job up
+                await self._hire(lane)
         except StorageUnavailable as error:
             logger.warning("job %s waits: %s", claim.job_id, error)
             await asyncio.sleep(RETRY_SECONDS)

@@ -7,6 +7,7 @@ from concurrent.futures import Executor, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Protocol
 
+from db.errors import DriverMissing
 from db.records import Claim
 from service import worker
 from service.worker import Place
@@ -22,7 +23,12 @@ class WorkerDied(Exception):
 
 
 class Lane(Protocol):
-    """One job at a time."""
+    """One job at a time.
+
+    ``missing``: what it waits for before it can do jobs, where that is not just a process's start.
+    """
+
+    missing: str | None
 
     async def hire(self) -> None:
         """Make sure that there is a worker and that it is warm."""
@@ -43,6 +49,7 @@ class ProcessLane:
     def __init__(self, place: Place) -> None:
         self._place = place
         self._executor: Executor | None = None
+        self.missing: str | None = None
 
     async def hire(self) -> None:
         """Start a worker process and warm it up, in place of the one before."""
@@ -76,6 +83,15 @@ class ProcessLane:
             await asyncio.to_thread(executor.shutdown, cancel_futures=True)
 
 
-def lanes(place: Place, count: int) -> list[Lane]:
-    """So many worker processes on this machine."""
-    return [ProcessLane(place) for _ in range(count)]
+def lanes(place: Place, count: int, dask_address: str | None) -> list[Lane]:
+    """So many worker processes on this machine, or jobs at once on the workers of a Dask scheduler.
+
+    Raises ``DriverMissing`` for the latter without the library.
+    """
+    if dask_address is None:
+        return [ProcessLane(place) for _ in range(count)]
+    try:
+        from service.dask_lane import DaskLane  # an extra, and takes a second to load
+    except ModuleNotFoundError as error:
+        raise DriverMissing(dask_address, error.name or str(error), "Dask cluster", "dask") from error
+    return [DaskLane(place, dask_address) for _ in range(count)]

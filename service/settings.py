@@ -69,6 +69,10 @@ class Settings(BaseSettings):
         description="Worker processes that detect and fit; the server process itself never does. 0 leaves the jobs to "
         "`stiction worker`.",
     )
+    dask_address: Annotated[str, Field(pattern=r"^(tcp|tls|ws|wss)://.+:\d+$")] | None = Field(
+        default=None,
+        description="Address of a Dask scheduler; so many jobs as there are workers then run there and not here.",
+    )
     job_attempts: Annotated[int, Field(ge=1, le=10)] = Field(
         default=3, description="How often a job may lose its worker process before it has failed."
     )

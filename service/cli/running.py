@@ -36,7 +36,7 @@ def serve(
 
 
 def worker(
-    workers: Annotated[int | None, typer.Option(help="Worker processes.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Worker processes, or jobs at once on a Dask cluster.")] = None,
     data_folder: DataFolder = None,
     database_url: DatabaseUrl = None,
 ) -> None:

@@ -87,7 +87,7 @@ def test_thousands_of_generated_requests_find_no_failure(
         for log in logs:
             wait(client, log["job"]["id"])
         known = {"name": ["paper", "steel"], "id": [log["id"] for log in logs] + [log["job"]["id"] for log in logs]}
-        report = fuzz(client, chosen, "-n", "60", "--seed", seed, known=known)
+        report = fuzz(client, chosen, "-n", "80", "--seed", seed, known=known)
         assert client.get("/readyz").status_code == httpx.codes.OK
     assert report["test_cases"]["generated"] >= 2500
     print(json.dumps(report["test_cases"] | {"seconds": report["running_time"]}))  # noqa: T201  (for docs/long-tests.md)

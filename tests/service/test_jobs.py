@@ -25,6 +25,7 @@ class ThreadLane:
     def __init__(self, do: Do) -> None:
         self._do = do
         self.hired = 0
+        self.missing = None
 
     async def hire(self) -> None:
         self.hired += 1

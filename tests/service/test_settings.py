@@ -12,7 +12,7 @@ DOCUMENTED = dict(
 )
 
 
-UNSET = {"database_url": "SQLite file", "blob_url": "the data folder"}
+UNSET = {"database_url": "SQLite file", "blob_url": "the data folder", "dask_address": "none"}
 """What holds in place of a setting without a default."""
 
 
@@ -61,6 +61,7 @@ def test_the_databases_password_is_not_shown() -> None:
         ("shutdown_seconds", -1.0),
         ("database_url", "sqlite://"),
         ("database_url", "sqlite:///:memory:"),
+        ("dask_address", "10.0.0.5:8786"),
         ("data_foldre", "typo"),
     ],
 )
