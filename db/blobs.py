@@ -6,7 +6,7 @@ import re
 import time
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from itertools import islice
 from pathlib import Path
 from types import TracebackType
@@ -17,6 +17,15 @@ from db.errors import NotFound, StorageUnavailable
 from db.object_store import ObjectStore
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
+
+
+@contextmanager
+def disk_errors_named() -> Iterator[None]:
+    """Raise ``StorageUnavailable`` where the disk is full, broken or gone."""
+    try:
+        yield
+    except OSError as error:
+        raise StorageUnavailable(f"blob folder: {error}") from error
 
 
 class Spool:
@@ -31,27 +40,21 @@ class Spool:
 
     def write(self, chunk: bytes) -> None:
         """Append a chunk; raises ``StorageUnavailable`` on a full or broken disk."""
-        try:
+        with disk_errors_named():
             self._file.write(chunk)
-        except OSError as error:
-            raise StorageUnavailable(f"blob folder: {error}") from error
         self._hash.update(chunk)
         self.size += len(chunk)
 
     def flush(self) -> None:
         """Let readers of ``path`` see all that was written."""
-        try:
+        with disk_errors_named():
             self._file.flush()
-        except OSError as error:
-            raise StorageUnavailable(f"blob folder: {error}") from error
 
     def sync(self) -> None:
         """Let what was written reach the disk, which ``keep`` then need not wait for."""
-        try:
+        with disk_errors_named():
             self._file.flush()
             os.fsync(self._file.fileno())
-        except OSError as error:
-            raise StorageUnavailable(f"blob folder: {error}") from error
 
     def adopt(self) -> None:
         """Take what another process wrote to ``path`` as what was written here."""
@@ -67,10 +70,8 @@ class Spool:
     def keep(self) -> str:
         """Make it a blob, durably (file, then name, then folder reach the disk), and return its hash."""
         self.sync()
-        try:
+        with disk_errors_named():
             self._take_in(self.path, self.sha256)
-        except OSError as error:
-            raise StorageUnavailable(f"blob folder: {error}") from error
         return self.sha256
 
     def __enter__(self) -> Self:
@@ -80,9 +81,8 @@ class Spool:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         try:
-            self._file.close()  # what is still buffered may find the disk full once more
-        except OSError as fault:
-            raise StorageUnavailable(f"blob folder: {fault}") from fault
+            with disk_errors_named():
+                self._file.close()  # what is still buffered may find the disk full once more
         finally:
             self.path.unlink(missing_ok=True)
 
@@ -101,10 +101,8 @@ class BlobStore:
 
     def spool(self) -> Spool:
         """A new file to write to; use it in a ``with`` statement."""
-        try:
+        with disk_errors_named():
             return Spool(self._spool / uuid.uuid4().hex, self._take_in)
-        except OSError as error:
-            raise StorageUnavailable(f"blob folder: {error}") from error
 
     def put(self, content: bytes) -> str:
         """Store bytes and return their hash."""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from db.blobs import disk_errors_named
 from estimators.errors import EstimatorError
 from estimators.moments import Moments
 from service.reading import Description, describe
@@ -98,16 +99,15 @@ def step(
     return session.last[1]
 
 
-def finish(name: str, target: Path | None, sensor: str, metadata: dict[str, str]) -> Description | None:
-    """End a session; write its log to ``target``, where one is given. Raises ``InvalidInput`` for too few frames."""
-    session = _SESSIONS.pop(name)
-    if target is None or session.kept is None:
-        return None
-    frames = session.kept
+def write(name: str, target: Path, sensor: str) -> Description:
+    """Write a session's log to ``target``; raises ``InvalidInput`` for too few frames, ``StorageUnavailable``."""
+    session = _SESSIONS[name]
+    frames = session.kept or []
     if len(frames) < 2:
         raise InvalidInput("frames", len(frames), "at least 2, for a log")
-    log = _log(session, frames, sensor, metadata)
-    container.write(log, target)
+    log = _log(session, frames, sensor, {"session": name})
+    with disk_errors_named():
+        container.write(log, target)
     return describe("stream", log)
 
 

@@ -16,6 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+from db.blobs import disk_errors_named
 from db.errors import StorageUnavailable
 from service import formats, worker
 from service.formats import writing
@@ -115,7 +116,8 @@ def convert(source: Path, target: Path, name: str, settings: Settings) -> Descri
     """In the reader's process: a log of format ``name`` as a container at ``target``."""
     try:
         log = formats.read(source, formats.FORMATS[name].content_type, **settings)
-        container.write(log, target)
+        with disk_errors_named():
+            container.write(log, target)
     except MemoryError as error:
         raise InvalidInput(
             "file", f"in need of more than {MEMORY_BYTES} bytes", "a smaller or undamaged file"
@@ -125,7 +127,9 @@ def convert(source: Path, target: Path, name: str, settings: Settings) -> Descri
 
 def rewrite(source: Path, target: Path, name: str) -> None:
     """In the reader's process: a stored log in the format ``name`` at ``target``."""
-    writing.write(formats.read(source), target, name)
+    log = formats.read(source)
+    with disk_errors_named():
+        writing.write(log, target, name)
 
 
 def _start() -> None:

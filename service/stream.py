@@ -1,6 +1,7 @@
 """The live stream: frames in, slip states out, of a session whose detector lives in a worker process."""
 
 import asyncio
+import logging
 import time
 from collections.abc import Callable
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from db.errors import NotFound
+from db.errors import NotFound, StorageUnavailable
 from service import live
 from service.context import Context
 from service.problems import Problem
@@ -20,6 +21,7 @@ from service.stream_sessions import (
     PATIENCE,
     REFUSED,
     SLOW_READER,
+    STORAGE_AWAY,
     End,
     Finish,
     FrameIn,
@@ -30,6 +32,8 @@ from service.stream_sessions import (
 )
 from service.use_cases.upload import check_target, store_made
 from slipcore.errors import InvalidInput
+
+logger = logging.getLogger(__name__)
 
 MOST_WAITING_IN, MOST_WAITING_OUT = 8, 64
 """Messages of one connection between network and detector: beyond the first the client waits, beyond the second it is
@@ -47,6 +51,9 @@ async def serve(socket: WebSocket, context: Context, key_id: str | None) -> None
         await _close(socket, REFUSED, f"{error.name} is {error.value}; allowed: {error.allowed}")
     except (Problem, NotFound) as problem:
         await _close(socket, REFUSED, str(problem))
+    except StorageUnavailable as error:
+        logger.warning("a stream waits: %s", error)
+        await _close(socket, STORAGE_AWAY, str(error))
     except WebSocketDisconnect:
         return
 
@@ -122,6 +129,7 @@ class _Connection:
                 while not self._outgoing.empty():
                     await self._send(self._outgoing.get_nowait())
                 await self._send(answer)
+                await self._streams.end(session)
                 raise End(FINISHED, "finished")
             else:
                 raise End(NOT_UNDERSTOOD, "the session is open already")
@@ -151,18 +159,14 @@ class _Connection:
             raise End(SLOW_READER, f"{MOST_WAITING_OUT} answers wait to be read") from None
 
     async def _finish(self, session: Session, message: Finish) -> dict[str, Any]:
-        """Store the kept frames through the same door as an upload."""
-        opening = session.opening
-        self._streams.close(session)
+        """Store the kept frames through the same door as an upload; until the answer is there it may be said again."""
         if not message.store:
-            await self._streams.call(live.finish, session.id, None, "", {})
             return {"type": "finished", "grasp_log": None}
+        opening = session.opening
         if not opening.keep:
             raise End(REFUSED, "store needs keep, said when the session was opened")
         with self._context.blobs.spool() as spool:
-            told = {"session": session.id}
-            found = await self._streams.call(live.finish, session.id, spool.path, opening.sensor, told)
-            assert found is not None  # a path was given, and the frames were kept
+            found = await self._streams.call(live.write, session.id, spool.path, opening.sensor)
             answer = await store_made(self._context, spool, found, opening.material, opening.detector)
         return {"type": "finished", "grasp_log": answer.body}
 

@@ -23,7 +23,7 @@ ANSWERS_KEPT = 256
 """Answers that a client who comes back may have missed."""
 
 FINISHED, NOT_UNDERSTOOD, DETECTOR_LOST = 1000, 1003, 1011
-UNKNOWN_SESSION, SLOW_READER, IN_USE, REFUSED, TOO_MANY = 4404, 4408, 4409, 4422, 4429
+UNKNOWN_SESSION, SLOW_READER, IN_USE, REFUSED, TOO_MANY, STORAGE_AWAY = 4404, 4408, 4409, 4422, 4429, 4503
 
 Result = TypeVar("Result")
 Numbers = bytes | list[Any]
@@ -120,9 +120,10 @@ class Streams:
             raise End(IN_USE, "the session has a connection already")
         return session
 
-    def close(self, session: Session) -> None:
-        """Forget a session that has ended."""
+    async def end(self, session: Session) -> None:
+        """Forget a session."""
         self._sessions.pop(session.id, None)
+        await self.call(live.drop, session.id)
 
     async def call(self, do: Callable[..., Result], *arguments: Any) -> Result:
         """Do something in the worker; raises ``End`` where it died, and all detectors with it."""
@@ -145,5 +146,4 @@ class Streams:
     async def _forget_the_lost(self) -> None:
         latest = time.monotonic() - PATIENCE
         for session in [each for each in self._sessions.values() if not each.connected and each.left < latest]:
-            self.close(session)
-            await self.call(live.drop, session.id)
+            await self.end(session)

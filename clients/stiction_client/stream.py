@@ -14,6 +14,9 @@ from websockets.sync.client import ClientConnection, connect
 
 from stiction_client.errors import ConnectionFailed, UnexpectedAnswer
 
+RESUMABLE = (1001, 1006, 1012, 4503)
+"""Codes of a connection after whose end its session goes on: the server stops or cannot store now."""
+
 ANSWER_TIMEOUT = 30.0
 """s; the first session of a service starts its detectors' process."""
 
@@ -107,16 +110,19 @@ class SlipStream:
             yield self.receive()
 
     def finish(self, store: bool = False) -> dict[str, Any] | None:
-        """End the session; with ``store``, the stored grasp log with its job. Raises ``ConnectionFailed``."""
+        """End the session; with ``store``, the stored grasp log with its job.
+
+        Raises ``ConnectionFailed``. Where that is because nothing can be stored now (4503), it may be tried again.
+        """
         for _ in self.answers():
             pass
-        self._connection.send(msgspec.msgpack.encode({"type": "finish", "store": store}))
-        try:
-            log: dict[str, Any] | None = self._read(ANSWER_TIMEOUT)["grasp_log"]
-        except ConnectionClosed as error:
-            raise _refused(error) from error
+        log: dict[str, Any] | None = self._try(lambda: self._finish(store))["grasp_log"]
         self.close()
         return log
+
+    def _finish(self, store: bool) -> dict[str, Any]:
+        self._connection.send(msgspec.msgpack.encode({"type": "finish", "store": store}))
+        return self._read(ANSWER_TIMEOUT)
 
     def _connect(self, opening: dict[str, Any]) -> ClientConnection:
         try:
@@ -138,13 +144,16 @@ class SlipStream:
         try:
             return do()
         except ConnectionClosed as error:
-            if error.rcvd is not None and error.rcvd.code not in (1001, 1006, 1012):  # the service said why
+            if error.rcvd is not None and error.rcvd.code not in RESUMABLE:  # the service said why
                 raise _refused(error) from error
         self.close()
         self._connection = self._connect({"type": "resume", "session": self._session, "last": self._answered})
         for _, content in self._waiting:
             self._connection.send(content)
-        return do()
+        try:
+            return do()
+        except ConnectionClosed as error:
+            raise _refused(error) from error
 
     def _read(self, timeout: float) -> dict[str, Any]:
         answer: dict[str, Any] = msgspec.msgpack.decode(self._connection.recv(timeout, decode=False))

@@ -6,9 +6,10 @@ from typing import Any
 
 import pytest
 
+from db.errors import StorageUnavailable
 from service import formats
 from service.formats import parquet
-from service.reading import Readers
+from service.reading import Readers, convert, rewrite
 from slipcore import GraspLog, InvalidInput
 from stiction_client.container import encode
 
@@ -112,3 +113,11 @@ def test_a_file_that_keeps_its_library_busy_for_ever_is_refused(
             await readers.convert(HOSTILE / "endless-hdf5", tmp_path / "target", "hdf5", {})
 
     with_readers(60.0, read)
+
+
+@pytest.mark.parametrize("name", ["npz", "parquet", "mcap"])
+def test_a_disk_that_takes_nothing_is_not_the_files_fault(content: bytes, tmp_path: Path, name: str) -> None:
+    source, target = tmp_path / "source", tmp_path / "gone" / "target"
+    source.write_bytes(content)
+    with pytest.raises(StorageUnavailable, match="blob folder: "):
+        convert(source, target, "npz", {}) if name == "npz" else rewrite(source, target, name)
