@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 import uvicorn
@@ -36,12 +37,39 @@ FAST = ("listen_addresses=", "fsync=off", "full_page_writes=off", "synchronous_c
 
 
 class PostgreSQL:
-    """A running server, and the databases made in it."""
+    """A server, and the databases made in it."""
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, command: list[Any], options: Mapping[str, Any]) -> None:
+        self._folder, self._command, self._options = folder, command, options
         self._numbers = itertools.count(1)
         self.engine = self._engine("postgres")
+        self.start()
+
+    def start(self) -> None:
+        """Let the server run, and wait until it answers."""
+        with (self._folder / "log").open("ab") as log:
+            self._process = subprocess.Popen(self._command, stdout=log, stderr=log, **self._options)
+        while not self.is_up():
+            assert self._process.poll() is None, (self._folder / "log").read_text()
+            time.sleep(0.02)
+
+    def stop(self, how: signal.Signals) -> None:
+        """End it as ``pg_ctl stop`` does: SIGINT ends its connections (fast), SIGQUIT its processes (immediate)."""
+        self._process.send_signal(how)
+        self._process.wait()
+
+    @contextmanager
+    def stopped(self, how: signal.Signals) -> Iterator[None]:
+        """Do without it for a while."""
+        self.stop(how)
+        try:
+            yield
+        finally:
+            self.start()
+
+    def keep_commits(self, url: str) -> None:
+        """Let what is committed in a database outlive the server's processes, also when these just end."""
+        self._run(f"ALTER DATABASE {make_url(url).database} SET synchronous_commit = on")
 
     def url(self, database: str) -> URL:
         return URL.create("postgresql", "postgres", database=database, query={"host": str(self._folder)})
@@ -91,22 +119,16 @@ def running_postgresql(programs: Path) -> Iterator[PostgreSQL]:
         if UNPRIVILEGED is not None:
             shutil.chown(folder, UNPRIVILEGED)
         data = folder / "data"
-        as_user = {"user": UNPRIVILEGED, "cwd": folder} if UNPRIVILEGED is not None else {"cwd": folder}
+        as_user: dict[str, Any] = {"cwd": folder} | ({} if UNPRIVILEGED is None else {"user": UNPRIVILEGED})
         initdb = [bin_folder / "initdb", "--no-sync", "--auth=trust", "-U", "postgres", "-E", "UTF8", "--no-locale"]
         with (folder / "log").open("wb") as log:
-            subprocess.run([*initdb, "-D", data], check=True, stdout=log, stderr=log, **as_user)  # type: ignore[call-overload]
-            options = [part for option in FAST for part in ("-c", option)]
-            command = [bin_folder / "postgres", "-D", data, "-k", folder, *options]
-            process = subprocess.Popen(command, stdout=log, stderr=log, **as_user)  # type: ignore[call-overload]
-        server = PostgreSQL(folder)
+            subprocess.run([*initdb, "-D", data], check=True, stdout=log, stderr=log, **as_user)
+        options = [part for option in FAST for part in ("-c", option)]
+        server = PostgreSQL(folder, [bin_folder / "postgres", "-D", data, "-k", folder, *options], as_user)
         try:
-            while not server.is_up():
-                assert process.poll() is None, (folder / "log").read_text()
-                time.sleep(0.02)
             yield server
         finally:
-            process.send_signal(signal.SIGQUIT)  # nothing in it is to be kept
-            process.wait()
+            server.stop(signal.SIGQUIT)  # nothing in it is to be kept
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
