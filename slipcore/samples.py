@@ -11,9 +11,10 @@ from slipcore.defaults import SampleOptions, choose_options
 from slipcore.element_forces import ElementForces, element_forces
 from slipcore.errors import InvalidInput, NoForces, UnknownScale
 from slipcore.frames import BoolArray, FloatArray, GraspLog
+from slipcore.kernels.surface import surface_normals
 from slipcore.noise import estimate_noise
 from slipcore.slip_state import SlipHistory
-from slipcore.strain import Lattice, lattice_steps, surface_normal
+from slipcore.strain import Lattice
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -140,7 +141,10 @@ def normals_of(log: GraspLog) -> FloatArray:
     if log.normal is not None:
         return log.normal
     lattice = Lattice.at_rest(log.position)
-    return np.stack([surface_normal(lattice, lattice_steps(u)) for u in log.displacement])
+    normals = np.empty_like(log.displacement)
+    for displacement, normal in zip(log.displacement, normals, strict=True):
+        surface_normals(lattice.steps, lattice.orientation, displacement, normal)
+    return normals
 
 
 def _check_same(log: GraspLog, history: SlipHistory) -> None:
