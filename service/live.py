@@ -1,8 +1,9 @@
 """Live detectors, in a worker process: one a session, fed frame by frame. Module-level functions of plain values."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from estimators.errors import EstimatorError
 from estimators.moments import Moments
 from service.reading import Description, describe
 from slipcore import (
+    DetectorState,
     Frame,
     FrictionSamples,
     GraspLog,
@@ -48,12 +50,16 @@ class Session:
     kept: list[Frame] | None
     frames: list[Frame] = field(default_factory=list)
     answers: list[SlipState] = field(default_factory=list)
-    taken: int = 0
+    until_look: int = WINDOW
+    looked_until: float = -math.inf
     last: tuple[int, dict[str, Any]] = (-1, {})
     friction: dict[str, Any] | None = None
 
 
 _SESSIONS: dict[str, Session] = {}
+
+_LOOKS: dict[str, Callable[[], None]] = {}
+"""Looks for friction, by session, that wait until no frame does."""
 
 
 def open_session(name: str, position: Numbers, grid: tuple[int, int], area: float, method: str, keep: bool) -> None:
@@ -94,7 +100,7 @@ def step(
         if session.kept:
             session.kept.pop()
         raise
-    _look_for_friction(session, frame, state)
+    _plan_look(name, session, frame, state)
     session.last = (number, _answer(session, number, state))
     return session.last[1]
 
@@ -114,6 +120,14 @@ def write(name: str, target: Path, sensor: str) -> Description:
 def drop(name: str) -> None:
     """Forget a session."""
     _SESSIONS.pop(name, None)
+    _LOOKS.pop(name, None)
+
+
+def look() -> bool:
+    """Do one of the looks for friction that wait; whether more of them do."""
+    if _LOOKS:
+        _LOOKS.pop(next(iter(_LOOKS)))()
+    return bool(_LOOKS)
 
 
 def _keep(session: Session, frame: Frame) -> None:
@@ -127,19 +141,26 @@ def _keep(session: Session, frame: Frame) -> None:
     session.kept.append(frame)
 
 
-def _look_for_friction(session: Session, frame: Frame, state: SlipState) -> None:
-    """Once in a while, the samples of the frames since the last look, merged with those before."""
+def _plan_look(name: str, session: Session, frame: Frame, state: SlipState) -> None:
+    """Once in a while, let the last frames be looked at; at once only where the look before still waits."""
     if frame.force is None:
         return
     session.frames = [*session.frames[1 - WINDOW :], frame]
     session.answers = [*session.answers[1 - WINDOW :], state]
-    session.taken += 1
-    if session.taken % STRIDE or len(session.frames) < WINDOW:
-        return
-    history = collect_history(session.answers, session.detector.state)
-    samples = collect_samples(_log(session, session.frames, "", {}), history)
-    begin = session.frames[-1 - STRIDE].time  # the last frame of a look has no next one yet, so it is the next look's
-    new = (samples.time >= begin) & (samples.time < session.frames[-1].time)
+    session.until_look -= 1
+    if session.until_look == 0:
+        session.until_look = STRIDE
+        if name in _LOOKS:
+            _LOOKS.pop(name)()
+        _LOOKS[name] = partial(_find_friction, session, session.frames, session.answers, session.detector.state)
+
+
+def _find_friction(session: Session, frames: list[Frame], answers: list[SlipState], state: DetectorState) -> None:
+    """The samples since the last look, merged with those before."""
+    samples = collect_samples(_log(session, frames, "", {}), collect_history(answers, state))
+    end = frames[-1].time  # which has no next frame yet, so it is the next look's
+    new = (samples.time >= session.looked_until) & (samples.time < end)
+    session.looked_until = end
     part = {entry.name: getattr(samples, entry.name)[new] for entry in fields(samples) if entry.name != "element_area"}
     found = FrictionSamples(**part, element_area=samples.element_area)
     session.moments = session.moments.merge(Moments.from_samples(found))

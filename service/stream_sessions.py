@@ -1,19 +1,17 @@
 """Sessions of the live stream: what is said in one, and the worker process that has their detectors."""
 
 import asyncio
-import multiprocessing
 import time
 import uuid
 from collections import deque
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import msgspec
 
-from service import live, worker
+from service import live
+from service.side_process import ProcessEnded, SideProcess
 
 MOST_SESSIONS = 200
 PATIENCE = 60.0
@@ -95,7 +93,8 @@ class Streams:
     """All sessions, and the worker process of their detectors, started with the first of them."""
 
     def __init__(self) -> None:
-        self._executor: ProcessPoolExecutor | None = None
+        self._process: SideProcess | None = None
+        self._starting = asyncio.Lock()
         self._sessions: dict[str, Session] = {}
 
     async def open(self, opening: Open, key_id: str | None) -> Session:
@@ -127,21 +126,24 @@ class Streams:
 
     async def call(self, do: Callable[..., Result], *arguments: Any) -> Result:
         """Do something in the worker; raises ``End`` where it died, and all detectors with it."""
-        if self._executor is None:
-            self._executor = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), worker.start)
         try:
-            return await asyncio.get_running_loop().run_in_executor(self._executor, do, *arguments)
-        except (BrokenProcessPool, KeyError) as error:
-            if isinstance(error, BrokenProcessPool):
-                self._executor = None
+            return await (await self._started()).call(do, *arguments)
+        except (ProcessEnded, KeyError) as error:
+            if isinstance(error, ProcessEnded):
+                self._process = None
                 self._sessions.clear()
             raise End(DETECTOR_LOST, "the detector's process ended; open a new session") from error
 
+    async def _started(self) -> SideProcess:
+        async with self._starting:
+            if self._process is None:
+                self._process = await SideProcess.start(live.look)
+            return self._process
+
     async def stop(self) -> None:
         """End the worker."""
-        if self._executor is not None:
-            executor, self._executor = self._executor, None
-            await asyncio.to_thread(executor.shutdown, cancel_futures=True)
+        if self._process is not None:
+            await self._process.stop()
 
     async def _forget_the_lost(self) -> None:
         latest = time.monotonic() - PATIENCE

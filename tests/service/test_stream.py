@@ -189,8 +189,7 @@ def send_all(socket: ClientConnection, frames: list[dict[str, Any]]) -> None:
 def test_a_session_is_told_that_its_detector_is_lost(served: Served, ramp: GraspLog) -> None:
     live = SlipStream(served.url, ramp.position, ramp.element_area)
     live.step(ramp.time[0], ramp.displacement[0])
-    for process in served.streams._executor._processes.values():
-        os.kill(process.pid, signal.SIGKILL)
+    os.kill(served.streams._process._process.pid, signal.SIGKILL)
     with pytest.raises(ConnectionFailed, match=r"detector's process ended; open a new session \(1011\)"):
         [live.step(ramp.time[k], ramp.displacement[k]) for k in range(1, 20)]
     with SlipStream(served.url, ramp.position, ramp.element_area) as again:
