@@ -55,7 +55,7 @@ class ProcessLane:
         """Start a worker process and warm it up, in place of the one before."""
         while True:
             await self.close()
-            self._executor = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), worker.start)
+            self._executor = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), worker.start_behind)
             try:
                 await asyncio.get_running_loop().run_in_executor(self._executor, worker.warm_up)
             except BrokenProcessPool:

@@ -50,6 +50,7 @@ def _answer(scope: Scope) -> Response | None:
     known = context.models.fresh(found[1], method)
     if known is None:
         return None
+    context.models.renew(context.database, known, found[1], method)
     body = known.answers.get(question)
     if body is None:
         body = look_up(known, question).model_dump_json()

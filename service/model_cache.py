@@ -1,10 +1,12 @@
 """Current models kept in memory, so that a look-up asks no database."""
 
+import asyncio
 import hashlib
 import time
 from collections.abc import Hashable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
+from typing import NamedTuple
 
 from db.database import Database
 from db.records import StoredModel
@@ -35,6 +37,11 @@ class KnownModel:
     answers: dict[Hashable, str] = field(default_factory=dict)
 
 
+class _Reading(NamedTuple):
+    began_at: datetime
+    task: asyncio.Task[KnownModel]
+
+
 class ModelCache:
     """Models by a material's name and a method, each believed for ``seconds`` after it was read.
 
@@ -44,7 +51,39 @@ class ModelCache:
     def __init__(self, seconds: float = 0.0) -> None:
         self._seconds = seconds
         self._known: dict[tuple[str, str], KnownModel] = {}
+        self._readings: dict[tuple[str, str], _Reading] = {}
         self._changed_at = datetime.min.replace(tzinfo=UTC)
+
+    async def get(self, database: Database, material: str, method: str) -> KnownModel:
+        """The model in memory or in the database, read once for all who ask meanwhile; raises as ``read``.
+
+        In memory it is read anew once it is half as old as it may get: who asks all the time never waits.
+        """
+        known = self.fresh(material, method)
+        if known is None:
+            return await asyncio.shield(self._read_once(database, material, method))
+        self.renew(database, known, material, method)
+        return known
+
+    def renew(self, database: Database, known: KnownModel, material: str, method: str) -> None:
+        """Begin to read a model anew that is half as old as it may get."""
+        if known.until - time.monotonic() < 0.5 * self._seconds:
+            self._read_once(database, material, method)
+
+    def _read_once(self, database: Database, material: str, method: str) -> asyncio.Task[KnownModel]:
+        key = material, method
+        reading = self._readings.get(key)
+        if reading is None or reading.began_at <= self._changed_at or self._seconds == 0.0:
+            task = asyncio.create_task(asyncio.to_thread(self.read, database, material, method))
+            reading = self._readings[key] = _Reading(datetime.now(UTC), task)
+            task.add_done_callback(lambda _: self._forget(key, reading))
+        return reading.task
+
+    def _forget(self, key: tuple[str, str], reading: _Reading) -> None:
+        if self._readings.get(key) is reading:
+            del self._readings[key]
+        if not reading.task.cancelled():
+            reading.task.exception()  # whoever waited was told; who renews need not be
 
     def fresh(self, material: str, method: str) -> KnownModel | None:
         """The model in memory, if it may still be believed."""
@@ -62,7 +101,11 @@ class ModelCache:
                 materials.find_id(session, material)
                 detail = f"material {material!r} has no model fitted by {method!r} yet"
                 raise Problem(NO_MODEL, detail, name="method", value=method, allowed="a method that was fitted")
-        known = KnownModel(stored, to_friction_model(stored.model), _tag(stored), read_at, until)
+        known = self._known.get((material, method))
+        if known is not None and known.tag == _tag(stored):  # with its answers
+            known = replace(known, read_at=read_at, until=until)
+        else:
+            known = KnownModel(stored, to_friction_model(stored.model), _tag(stored), read_at, until)
         if len(self._known) >= MOST:
             self._known.clear()
         self._known[material, method] = known

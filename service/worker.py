@@ -19,6 +19,9 @@ from db.repositories import jobs
 
 logger = logging.getLogger(__name__)
 
+NICENESS = 5
+"""Of the processes that do jobs: on a busy machine the server gets three times as much of a core as each of them."""
+
 
 @dataclass(frozen=True, slots=True)
 class Place:
@@ -35,6 +38,12 @@ def start() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def start_behind() -> None:
+    """Prepare a process whose work can wait while somebody waits for an answer."""
+    os.nice(NICENESS)
+    start()
 
 
 def warm_up() -> None:

@@ -4,7 +4,6 @@ from typing import Annotated, Literal
 from urllib.parse import quote
 
 from fastapi import APIRouter, Query, Request, Response
-from starlette.concurrency import run_in_threadpool
 
 from db.repositories import friction_models, materials
 from service.access import READ, UPLOAD
@@ -136,9 +135,7 @@ async def read_friction(
     A quantile includes the scatter of μ and the uncertainty of the model. `ETag` and `If-None-Match` save the answer to
     who has it.
     """
-    known = context.models.fresh(name, method)
-    if known is None:
-        known = await run_in_threadpool(context.models.read, context.database, name, method)
+    known = await context.models.get(context.database, name, method)
     return conditional(request, known.tag, lambda: look_up(known, Question(v, fn, quantile)).model_dump_json())
 
 

@@ -19,6 +19,8 @@ from fastapi import FastAPI
 from db import migrate
 from db.blobs import BlobStore
 from db.database import Database
+from db.records import NewModel
+from db.repositories import friction_models, jobs, materials
 from service.app import create_app
 from service.context import Context
 from service.model_cache import ModelCache
@@ -211,3 +213,27 @@ def database(new_url: Callable[..., str], tmp_path: Path) -> Iterator[Database]:
 @pytest.fixture
 def blobs(tmp_path: Path) -> BlobStore:
     return BlobStore(tmp_path)
+
+
+@pytest.fixture
+def new_model() -> NewModel:
+    zero = ((1e-4, 0.0, 0.0), (0.0, 1e-4, 0.0), (0.0, 0.0, 1e-4))
+    numbers: dict[str, Any] = {"degrees_of_freedom": 9.0, "scatter_degrees_of_freedom": None, "element_area": 1e-6}
+    ranges: dict[str, Any] = {"tangential_velocity": (0.0, 0.01), "normal_force": (0.0, 0.1)}
+    costs: dict[str, Any] = {"diagnostics": {}, "cost_seconds": 0.0, "monte_carlo_error": 0.0}
+    return NewModel("ols", (0.4, 0.0, 0.0), zero, 0.02, 9, identifiable=(True,) * 3, **numbers, **ranges, **costs)
+
+
+@pytest.fixture
+def store(database: Database, new_model: NewModel) -> Callable[[], None]:
+    """Store a version of the model as another process does: this one is not told."""
+
+    def add() -> None:
+        with database.write() as session:
+            found = materials.list_all(session)
+            material = found[0].id if found else materials.create(session, "paper", "").id
+            job = jobs.add(session, "fit", "ols", material_id=material)
+            friction_models.add(session, material, job, new_model)
+
+    add()
+    return add

@@ -1,6 +1,5 @@
 import time
 from collections.abc import Callable
-from datetime import UTC, datetime, timedelta
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,37 +8,11 @@ from sqlalchemy import event
 
 from db.database import Database
 from db.paging import Window
-from db.records import NewModel
-from db.repositories import friction_models, jobs, materials
+from db.repositories import jobs
 from service import model_cache
-from service.model_cache import ModelCache
 from service.use_cases import curate
 
 PATHS = ("/v1/materials/paper", "/v1/materials/paper/friction?fn=0.05")
-
-
-@pytest.fixture
-def new_model() -> NewModel:
-    zero = ((1e-4, 0.0, 0.0), (0.0, 1e-4, 0.0), (0.0, 0.0, 1e-4))
-    numbers: dict[str, Any] = {"degrees_of_freedom": 9.0, "scatter_degrees_of_freedom": None, "element_area": 1e-6}
-    ranges: dict[str, Any] = {"tangential_velocity": (0.0, 0.01), "normal_force": (0.0, 0.1)}
-    costs: dict[str, Any] = {"diagnostics": {}, "cost_seconds": 0.0, "monte_carlo_error": 0.0}
-    return NewModel("ols", (0.4, 0.0, 0.0), zero, 0.02, 9, identifiable=(True,) * 3, **numbers, **ranges, **costs)
-
-
-@pytest.fixture
-def store(database: Database, new_model: NewModel) -> Callable[[], None]:
-    """Store a version of the model as another process does: this one is not told."""
-
-    def add() -> None:
-        with database.write() as session:
-            found = materials.list_all(session)
-            material = found[0].id if found else materials.create(session, "paper", "").id
-            job = jobs.add(session, "fit", "ols", material_id=material)
-            friction_models.add(session, material, job, new_model)
-
-    add()
-    return add
 
 
 def version(client: Any) -> int:
@@ -100,21 +73,6 @@ def test_who_has_seen_a_new_model_looks_it_up_at_once(
     assert version(client) == 1
     assert client.get(path.format(job=job)).status_code == 200
     assert version(client) == 2
-
-
-@pytest.mark.usefixtures("store")
-def test_a_model_read_while_the_next_one_was_committed_is_read_anew(database: Database) -> None:
-    cache = ModelCache(60.0)
-    written = datetime.now(UTC) - timedelta(milliseconds=50)
-    cache.read(database, "paper", "ols")
-    cache.seen(written - timedelta(hours=1))
-    assert cache.fresh("paper", "ols") is not None
-    cache.seen(written)
-    assert cache.fresh("paper", "ols") is None
-    cache.read(database, "paper", "ols")
-    cache.seen(datetime.now(UTC) + timedelta(hours=1))  # a clock that runs ahead
-    cache.read(database, "paper", "ols")
-    assert cache.fresh("paper", "ols") is not None
 
 
 @pytest.mark.usefixtures("store")
