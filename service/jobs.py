@@ -12,6 +12,7 @@ import socket
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import TypeVar
+from weakref import WeakValueDictionary
 
 from sqlalchemy.orm import Session
 
@@ -78,6 +79,7 @@ class JobRunner:
         self._outdated: SchemaMismatch | None = None
         self._stopping = False
         self._woken = asyncio.Event()
+        self._endings: WeakValueDictionary[str, asyncio.Event] = WeakValueDictionary()  # of jobs that somebody awaits
 
     @property
     def missing(self) -> str | None:
@@ -100,6 +102,10 @@ class JobRunner:
     def wake(self) -> None:
         """Look for a job at once, since one has just been stored; may be called from any thread."""
         self._loop.call_soon_threadsafe(self._woken.set)
+
+    def ending(self, job_id: str) -> asyncio.Event:
+        """Set once a lane of this runner has done with the job; jobs of other runners end unheard."""
+        return self._endings.setdefault(job_id, asyncio.Event())
 
     async def until_outdated(self) -> None:
         """Raise ``SchemaMismatch`` once the schema is not this version's any more."""
@@ -190,6 +196,8 @@ class JobRunner:
             await self._try(lambda: self._fail(claim, reason))
         finally:
             self._at.discard(claim.job_id)  # where it is still ours in the database, it is a stray
+            if (ending := self._endings.pop(claim.job_id, None)) is not None:
+                ending.set()
 
     def _fail(self, claim: Claim, reason: str) -> None:
         try:

@@ -209,16 +209,20 @@ def cancel(job_id: str) -> Flow[Job]:
 
 
 def wait(job_id: str, timeout: float) -> Flow[Job]:
-    """Ask for a job until it has ended."""
+    """Ask for a job until it has ended; the service keeps its answer back that long, unless it is an older one."""
     deadline = time.monotonic() + timeout
     pause = FIRST_POLL
-    while not (current := (yield from job(job_id))).ended:
-        left = deadline - time.monotonic()
-        if left <= 0.0:
+    while True:
+        asked = time.monotonic()
+        patience = {"wait": min(max(deadline - asked, 0.0), LONGEST_POLL)}
+        current = _record(Job.from_json, (yield from _get(f"/v1/jobs/{_part(job_id)}", patience)))
+        now = time.monotonic()
+        if current.ended:
+            return current
+        if now >= deadline:
             raise JobTimedOut(job_id, f"still {current.status} after {timeout:g} s")
-        yield Pause(min(pause, left))
+        yield Pause(max(min(pause, deadline - now) - (now - asked), 0.0))
         pause = min(pause * POLL_GROWTH, LONGEST_POLL)
-    return current
 
 
 def _get(path: str, params: Mapping[str, str | float] | None = None) -> Flow[Any]:

@@ -12,6 +12,7 @@ from service.paging import USUAL, CursorText, Limit, Page, link_next
 from service.problems import INVALID_REQUEST, JOB_ENDED, STORAGE_UNAVAILABLE, UNKNOWN_JOB
 from service.routes.common import problems
 from service.schemas import JobOut, JobsOut
+from service.use_cases.await_job import MOST_SECONDS, await_job
 from service.use_cases.cancel import cancel
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
@@ -44,13 +45,17 @@ def list_jobs(
     summary="Look at a job",
     responses=problems(UNKNOWN_JOB, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
-def read_job(context: Given, id: str) -> JobOut:  # noqa: A002  (the path's own name)
-    """How far it is, what each stage took, and why it ended as it did."""
-    with context.database.read() as session:
-        job = jobs.get(session, id)
-    if job.finished_at is not None:
-        context.models.seen(job.finished_at)
-    return JobOut.of(job)
+async def read_job(
+    context: Given,
+    id: str,  # noqa: A002  (the path's own name)
+    wait: Annotated[float, Query(ge=0.0, le=MOST_SECONDS, description="s to wait for its end", examples=[10.0])] = 0.0,
+) -> JobOut:
+    """How far it is, what each stage took, and why it ended as it did.
+
+    With `wait` the answer comes at the job's end, or after so many seconds: who wants its result asks once, not again
+    and again.
+    """
+    return JobOut.of(await await_job(context, id, wait))
 
 
 @router.post(

@@ -43,17 +43,23 @@ def check_encoding(encoding: str) -> str:
 
 
 async def receive(spool: Spool, chunks: AsyncIterator[bytes], limit: int) -> None:
-    """Write a body to ``spool`` as it comes: a client is read no faster than the disk takes it."""
-    waiting = bytearray()
+    """Write a body to ``spool`` as it comes, a chunk while the next is received: no faster than the disk takes it."""
+    size, waiting, writing = 0, bytearray(), None
     try:
         async for chunk in chunks:
-            check_size(spool.size + len(waiting) + len(chunk), limit)
+            size += len(chunk)
+            check_size(size, limit)
             waiting += chunk
             if len(waiting) >= CHUNK_BYTES:
-                await asyncio.to_thread(spool.write, bytes(waiting))
+                if writing is not None:
+                    await writing
+                writing = asyncio.create_task(asyncio.to_thread(spool.write, bytes(waiting)))
                 waiting.clear()
     except ClientDisconnect as error:
-        raise Problem(UPLOAD_INTERRUPTED, f"the connection ended after {spool.size + len(waiting)} bytes") from error
+        raise Problem(UPLOAD_INTERRUPTED, f"the connection ended after {size} bytes") from error
+    finally:
+        if writing is not None:
+            await writing
     await asyncio.to_thread(spool.write, bytes(waiting))
 
 

@@ -95,7 +95,9 @@ def recent_median(recent: FloatArray) -> float:
 def noise_of_series(time: FloatArray, series: FloatArray) -> float:
     """Noise of recorded series [t, axes, k]: the median of the last estimates; NaN for fewer than 3 frames."""
     recent = np.zeros(1 + _MEMORY)
-    for t in range(2, len(time)):
+    for t in range(len(time) - 1, 1, -1):
+        if recent[0] == _MEMORY:
+            break
         share = (time[t - 1] - time[t - 2]) / (time[t] - time[t - 2])
         remember(recent, noise_of_three(series[t - 2], series[t - 1], series[t], share))
     return recent_median(recent)

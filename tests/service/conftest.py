@@ -105,7 +105,7 @@ def reach(database: Database, blobs: BlobStore) -> Callable[..., Caller]:
     ) -> Caller:
         chosen = Settings.model_validate({"access": access, "lookup_seconds": 0.0, **settings})
         app = create_app(chosen)
-        jobs: Any = SimpleNamespace(wake=lambda: None)
+        jobs: Any = SimpleNamespace(wake=lambda: None, ending=lambda _: asyncio.Event())
         app.state.context = Context(chosen, database, blobs, jobs, models=ModelCache(chosen.lookup_seconds))
         return Caller(app, server, address, {"Authorization": f"Bearer {key}"} if key else {})
 

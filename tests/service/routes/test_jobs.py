@@ -1,4 +1,6 @@
+import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
@@ -35,6 +37,32 @@ def test_an_unknown_job_is_named(client: httpx.Client) -> None:
     assert response.status_code == httpx.codes.NOT_FOUND
     assert response.json()["type"] == "/problems/unknown-job"
     assert response.json()["value"] == "nothing"
+
+
+def test_who_waits_for_a_job_is_answered_at_its_end(client: httpx.Client, upload: Any, content: bytes) -> None:
+    client.post("/v1/materials", json={"name": "awaited"}).raise_for_status()
+    job = upload(client, content, material="awaited").json()["job"]
+    assert job["status"] == "queued"
+    begin = time.monotonic()
+    while (found := client.get(f"/v1/jobs/{job['id']}", params={"wait": 10.0}).json())["finished_at"] is None:
+        assert time.monotonic() - begin < 60.0
+    assert found["status"] == "done"
+    assert client.get("/v1/materials/awaited").json()["models"]["ols"]["version"] == 1
+
+
+def test_who_waits_is_answered_in_time_and_of_an_end_elsewhere(idle: httpx.Client) -> None:
+    job = idle.post("/v1/materials/paper/fits", json={"method": "ols"}).json()["id"]
+    begin = time.monotonic()
+    assert idle.get(f"/v1/jobs/{job}", params={"wait": 0.4}).json()["status"] == "queued"
+    assert 0.4 <= time.monotonic() - begin < 5.0
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(idle.get, f"/v1/jobs/{job}", params={"wait": 10.0})
+        time.sleep(0.1)
+        idle.post(f"/v1/jobs/{job}/cancel").raise_for_status()
+        assert waiting.result(9.0).json()["status"] == "cancelled"
+    for wrong in (-1, 10.5, "nan", "x"):
+        assert idle.get(f"/v1/jobs/{job}", params={"wait": wrong}).json()["type"] == "/problems/invalid-request", wrong
+    assert idle.get("/v1/jobs/nothing", params={"wait": 5}).status_code == httpx.codes.NOT_FOUND
 
 
 def test_jobs_are_listed_newest_first_by_status(idle: httpx.Client) -> None:
