@@ -157,11 +157,31 @@ def engine_name(request: pytest.FixtureRequest) -> str:
     return name
 
 
+@pytest.fixture(scope="session")
+def sqlite_template(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file at the newest revision: a copy takes a millisecond, the migrations 150."""
+    path = tmp_path_factory.mktemp("template") / "stiction.sqlite3"
+    with closing(Database(f"sqlite:///{path}")) as database:
+        migrate.upgrade(database)
+    return path
+
+
 @pytest.fixture
 def new_url(engine_name: str, request: pytest.FixtureRequest) -> Iterator[Callable[..., str]]:
-    """Makes a database in a folder (PostgreSQL: in the server), dropped after the test, and returns its URL."""
+    """Makes a database in a folder (PostgreSQL: in the server), dropped after the test, and returns its URL.
+
+    It is at the newest revision, or ``empty``.
+    """
     if engine_name == "sqlite":
-        yield lambda folder, **_: f"sqlite:///{folder / 'stiction.sqlite3'}"
+        file: Path = request.getfixturevalue("sqlite_template")
+
+        def copy(folder: Path, *, empty: bool = False) -> str:
+            path = folder / file.name
+            if not empty:
+                shutil.copyfile(file, path)
+            return f"sqlite:///{path}"
+
+        yield copy
         return
     server: PostgreSQL = request.getfixturevalue("postgresql")
     template: str = request.getfixturevalue("template")

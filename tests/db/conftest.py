@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 from sqlalchemy import event
 
-from db import migrate
 from db.database import Database
 from db.records import Detection, NewGraspLog, NewModel, SampleSummary
 
@@ -22,9 +21,6 @@ def empty_database(new_url: Callable[..., str], tmp_path: Path) -> Iterator[Data
 @pytest.fixture
 def database(new_url: Callable[..., str], tmp_path: Path) -> Iterator[Database]:
     database = Database(new_url(tmp_path), lock_timeout=0.2)
-    if database.is_sqlite:  # elsewhere a copy of a migrated one
-        migrate.upgrade(database)
-        database.close()  # what the tests see are connections of its own making, not the migration's
     yield database
     database.close()
 

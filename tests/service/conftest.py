@@ -16,7 +16,6 @@ import pytest
 import uvicorn
 from fastapi import FastAPI
 
-from db import migrate
 from db.blobs import BlobStore
 from db.database import Database
 from db.records import NewModel
@@ -205,7 +204,6 @@ def fitted(
 @pytest.fixture
 def database(new_url: Callable[..., str], tmp_path: Path) -> Iterator[Database]:
     database = Database(new_url(tmp_path))
-    migrate.upgrade(database)
     yield database
     database.close()
 
