@@ -3,8 +3,8 @@
 Uploads, one after the other, of 200-frame logs of 20×20 elements with forces: seconds to the answer and to the stored
 fit by least squares; then Bayesian fits of the same material, asked for one after the other. Then look-ups on 32
 connections, beside a bare Starlette route that returns the same bytes by the same uvicorn: requests a second, CPU
-seconds a request of the server, and latencies, alone and while uploads run. Servers, workers and these callers share
-the machine. Writes service.json and service.png.
+seconds a request of the server, and latencies, alone, while uploads run, and where each asks the database. Servers,
+workers and these callers share the machine. Writes service.json and service.png.
 """
 
 import asyncio
@@ -26,6 +26,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.pages import options, picture_folder, save, write
+from benchmarks.postgresql import running_postgresql
 from slipcore.contact import RampSchedule, tangential_ramp
 from stiction_client import FrictionClient
 from stiction_client.container import encode
@@ -33,7 +34,7 @@ from stiction_client.container import encode
 MATERIAL = "benchmark"
 LOOK_UP = f"/v1/materials/{MATERIAL}/friction?v=0.001&fn=0.05&quantile=0.05"
 NPZ = {"content-type": "application/vnd.stiction.grasp-log+npz"}
-CONNECTIONS, REQUESTS, UPLOADS = 32, 6400, 30
+CONNECTIONS, REQUESTS, UNCACHED, UPLOADS = 32, 6400, 960, 30
 BARE = """
 import sys, uvicorn
 from starlette.applications import Starlette
@@ -105,11 +106,11 @@ def cpu_seconds(process: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-async def ask(port: int, header: str, latencies: list[float]) -> None:
-    """One connection's share of the requests, by a client that costs next to nothing."""
+async def ask(port: int, header: str, count: int, latencies: list[float]) -> None:
+    """So many requests on one connection, by a client that costs next to nothing."""
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
     request = f"GET {LOOK_UP} HTTP/1.1\r\nHost: benchmark\r\n{header}\r\n".encode()
-    for _ in range(REQUESTS // CONNECTIONS):
+    for _ in range(count):
         begin = time.perf_counter()
         writer.write(request)
         head = (await reader.readuntil(b"\r\n\r\n")).lower()
@@ -120,12 +121,12 @@ async def ask(port: int, header: str, latencies: list[float]) -> None:
     writer.close()
 
 
-def load(what: str, port: int, process: int, header: str = "") -> Load:
+def load(what: str, port: int, process: int, header: str = "", requests: int = REQUESTS) -> Load:
     """All connections at once."""
 
     async def everybody() -> list[float]:
         latencies: list[float] = []
-        await asyncio.gather(*(ask(port, header, latencies) for _ in range(CONNECTIONS)))
+        await asyncio.gather(*(ask(port, header, requests // CONNECTIONS, latencies) for _ in range(CONNECTIONS)))
         return latencies
 
     asyncio.run(everybody())
@@ -199,31 +200,52 @@ def beside(work: Callable[[int], object], measured: Callable[[], Load]) -> Load:
         thread.join()
 
 
-def measure() -> tuple[list[Requests], list[Load]]:
-    """A service with one worker on SQLite, and a bare server beside it."""
-    port, other = free_port(), free_port()
+@contextmanager
+def serving(**settings: str) -> Iterator[tuple[str, int, int]]:
+    """A service with one worker that is ready and knows the material: its URL, port and process."""
+    port = free_port()
     url = f"http://127.0.0.1:{port}"
     with tempfile.TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "service.cli", "serve", "--port", str(port), "--data-folder", folder]
-        with running(command, port, STICTION_RATE_LIMIT="0") as service:
+        with running(command, port, STICTION_RATE_LIMIT="0", **settings) as process:
             while httpx.get(f"{url}/readyz").status_code != httpx.codes.OK:
                 time.sleep(0.05)
             FrictionClient(url).create_material(MATERIAL)
             uploads(url, 3, first_seed=0)
-            found = [uploads(url, UPLOADS, first_seed=100), fits(url, UPLOADS // 3)]
-            answer = httpx.get(url + LOOK_UP).raise_for_status()
-            with running([sys.executable, "-c", BARE, str(other)], other, answer.content) as bare:
-                tag = f"If-None-Match: {answer.headers['etag']}\r\n"
-                loads = [
-                    load("bare Starlette", other, bare),
-                    load("look-up", port, service),
-                    load("look-up, not modified", port, service, tag),
-                    beside(
-                        lambda k: uploads(url, 1, first_seed=300 + k),
-                        lambda: load("look-up beside uploads and fits", port, service),
-                    ),
-                ]
+            yield url, port, process
+
+
+def measure() -> tuple[list[Requests], list[Load]]:
+    """A service on SQLite with a bare server beside it; then services that ask the database each time."""
+    with serving() as (url, port, process):
+        found = [uploads(url, UPLOADS, first_seed=100), fits(url, UPLOADS // 3)]
+        loads = looked_up(url, port, process)
+    uncached = {"STICTION_LOOKUP_SECONDS": "0"}
+    with serving(**uncached) as (_, port, process):
+        loads.append(load("look-up, asking SQLite", port, process, requests=UNCACHED))
+    with (
+        running_postgresql() as server,
+        serving(STICTION_DATABASE_URL=server.create(), **uncached) as (_, port, process),
+    ):
+        loads.append(load("look-up, asking PostgreSQL", port, process, requests=UNCACHED))
     return found, loads
+
+
+def looked_up(url: str, port: int, process: int) -> list[Load]:
+    """Look-ups of a model in memory, and of the same bytes from a bare route."""
+    answer = httpx.get(url + LOOK_UP).raise_for_status()
+    tag = f"If-None-Match: {answer.headers['etag']}\r\n"
+    other = free_port()
+    with running([sys.executable, "-c", BARE, str(other)], other, answer.content) as bare:
+        return [
+            load("bare Starlette", other, bare),
+            load("look-up", port, process),
+            load("look-up, not modified", port, process, tag),
+            beside(
+                lambda k: uploads(url, 1, first_seed=300 + k),
+                lambda: load("look-up beside uploads and fits", port, process),
+            ),
+        ]
 
 
 def draw(found: list[Requests], loads: list[Load]) -> Figure:
