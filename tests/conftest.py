@@ -1,9 +1,11 @@
 """A real PostgreSQL server, and a store like S3, for whoever asks for them."""
 
 import re
+import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -14,6 +16,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from benchmarks.postgresql import NoPrograms, PostgreSQL, running_postgresql
+from db import migrate
 from db.database import Database
 from db.records import Claim
 from db.repositories import jobs, runners
