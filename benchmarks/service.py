@@ -1,10 +1,11 @@
 """What the service costs its callers: `python -m benchmarks.service [--output FOLDER] [--page docs/scale.md]`.
 
 Uploads, one after the other, of 200-frame logs of 20×20 elements with forces: seconds to the answer and to the stored
-fit by least squares; then Bayesian fits of the same material, asked for one after the other. Then look-ups on 32
-connections, beside a bare Starlette route that returns the same bytes by the same uvicorn: requests a second, CPU
-seconds a request of the server, and latencies, alone, while uploads run, and where each asks the database. Servers,
-workers and these callers share the machine. Writes service.json and service.png.
+fit by least squares; then fits of the same material, asked for one after the other: by `bayes`, and by `conjugate`,
+which is a job with next to nothing to compute. Then look-ups on 32 connections, beside a bare Starlette route that
+returns the same bytes by the same uvicorn: requests a second, CPU seconds a request of the server, and latencies,
+alone, while uploads run, and where each asks the database. Servers, workers and these callers share the machine.
+Writes service.json and service.png.
 """
 
 import asyncio
@@ -156,14 +157,14 @@ def uploads(url: str, count: int, first_seed: int) -> Requests:
     return requests(url, "upload, then fit by ols", ask, [content(first_seed + k) for k in range(count)])
 
 
-def fits(url: str, count: int) -> Requests:
-    """Bayesian fits of the material, each with another seed."""
+def fits(url: str, method: str, count: int, where: str = "") -> Requests:
+    """Fits of the material, each with another seed."""
 
     def ask(client: httpx.Client, seed: int) -> str:
-        answer = client.post(f"/v1/materials/{MATERIAL}/fits", json={"method": "bayes", "seed": seed})
+        answer = client.post(f"/v1/materials/{MATERIAL}/fits", json={"method": method, "seed": seed})
         return str(answer.raise_for_status().json()["id"])
 
-    return requests(url, "fit by bayes", ask, list(range(count)))
+    return requests(url, f"fit by {method}{where}", ask, list(range(count)))
 
 
 def requests(url: str, what: str, ask: Callable[[httpx.Client, Any], str], bodies: list[Any]) -> Requests:
@@ -218,15 +219,20 @@ def serving(**settings: str) -> Iterator[tuple[str, int, int]]:
 def measure() -> tuple[list[Requests], list[Load]]:
     """A service on SQLite with a bare server beside it; then services that ask the database each time."""
     with serving() as (url, port, process):
-        found = [uploads(url, UPLOADS, first_seed=100), fits(url, UPLOADS // 3)]
+        found = [
+            uploads(url, UPLOADS, first_seed=100),
+            fits(url, "bayes", UPLOADS // 3),
+            fits(url, "conjugate", UPLOADS),
+        ]
         loads = looked_up(url, port, process)
     uncached = {"STICTION_LOOKUP_SECONDS": "0"}
     with serving(**uncached) as (_, port, process):
         loads.append(load("look-up, asking SQLite", port, process, requests=UNCACHED))
     with (
         running_postgresql() as server,
-        serving(STICTION_DATABASE_URL=server.create(), **uncached) as (_, port, process),
+        serving(STICTION_DATABASE_URL=server.create(), **uncached) as (url, port, process),
     ):
+        found.append(fits(url, "conjugate", UPLOADS, where=" on PostgreSQL"))
         loads.append(load("look-up, asking PostgreSQL", port, process, requests=UNCACHED))
     return found, loads
 
