@@ -1,4 +1,4 @@
-"""MCAP recordings of ROS 2, ROS 1 or JSON messages (docs/formats.md)."""
+"""MCAP recordings of messages of ROS 2, ROS 1, Protocol Buffers or JSON (docs/formats.md)."""
 
 import struct
 from collections.abc import Iterator
@@ -11,6 +11,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import Writer
 
 from service.formats import mapping as mappings
+from service.formats import protobuf
 from service.formats.assemble import assemble
 from service.formats.mapping import FieldMapping
 from service.formats.messages import Decode, MessageColumns, decode_json, with_defaults
@@ -101,10 +102,13 @@ def _parts(record: McapRecord, unpacker: Unpacker) -> list[McapRecord]:
 def _deserializer(channel: Channel, schema: Schema | None) -> Deserialize:
     if channel.message_encoding == "json":
         return decode_json
-    ros1 = _ROS.get((channel.message_encoding, schema.encoding if schema else ""))
+    encodings = channel.message_encoding, schema.encoding if schema else "no"
+    if schema is not None and encodings == ("protobuf", "protobuf"):
+        return protobuf.deserializer(schema.name, schema.data)
+    ros1 = _ROS.get(encodings)
     if schema is None or ros1 is None:
-        value = f"{channel.message_encoding} messages of {schema.encoding if schema else 'no'} schema"
-        raise InvalidInput(channel.topic, value[:100], "json; cdr with ros2msg; ros1 with ros1msg")
+        value = f"{encodings[0]} messages of {encodings[1]} schema"
+        raise InvalidInput(channel.topic, value[:100], "json; cdr with ros2msg; ros1 with ros1msg; protobuf")
     return deserializer(schema.name, schema.data.decode("utf-8", "replace"), ros1=ros1)
 
 

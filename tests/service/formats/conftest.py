@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, text_format, timestamp_pb2
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer as Bag1
 from rosbags.rosbag2 import StoragePlugin
@@ -222,6 +223,53 @@ def write_json_mcap(log: GraspLog, path: Path, mapping: str = "", **options: Any
     return path
 
 
+TACTILE_PROTO = """
+name: "tactile.proto" package: "lab" dependency: "google/protobuf/timestamp.proto" syntax: "proto3"
+message_type {
+  name: "Vector"
+  field { name: "x" number: 1 type: TYPE_DOUBLE label: LABEL_OPTIONAL }
+  field { name: "y" number: 2 type: TYPE_DOUBLE label: LABEL_OPTIONAL }
+  field { name: "z" number: 3 type: TYPE_DOUBLE label: LABEL_OPTIONAL }
+}
+message_type {
+  name: "Marker"
+  field { name: "moved" number: 1 type: TYPE_MESSAGE type_name: ".lab.Vector" label: LABEL_OPTIONAL }
+  field { name: "force" number: 2 type: TYPE_FLOAT label: LABEL_REPEATED }
+}
+message_type {
+  name: "Tactile"
+  field { name: "stamp" number: 1 type: TYPE_MESSAGE type_name: ".google.protobuf.Timestamp" label: LABEL_OPTIONAL }
+  field { name: "markers" number: 2 type: TYPE_MESSAGE type_name: ".lab.Marker" label: LABEL_REPEATED }
+}
+"""
+
+
+def write_protobuf_mcap(log: GraspLog, path: Path) -> Path:
+    """An MCAP of one message a frame, with a message a marker in it."""
+    types = descriptor_pb2.FileDescriptorSet()
+    timestamp_pb2.DESCRIPTOR.CopyToProto(types.file.add())
+    text_format.Parse(TACTILE_PROTO, types.file.add())
+    pool = descriptor_pool.DescriptorPool()
+    for file in types.file:
+        pool.Add(file)
+    tactile = message_factory.GetMessageClass(pool.FindMessageTypeByName("lab.Tactile"))
+    with path.open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start()
+        schema = writer.register_schema("lab.Tactile", "protobuf", types.SerializeToString())
+        channel = writer.register_channel("/tactile", "protobuf", schema)
+        for k, time in enumerate(log.time):
+            moment = START + round(time * 1e9)
+            message: Any = tactile()
+            message.stamp.seconds, message.stamp.nanos = divmod(moment, 10**9)
+            for moved, force in zip(log.displacement[k].reshape(-1, 3), log.force[k].reshape(-1, 3), strict=True):
+                marker = message.markers.add(force=force)
+                marker.moved.x, marker.moved.y, marker.moved.z = moved
+            writer.add_message(channel, moment + 2_000_000, message.SerializeToString(), moment)
+        writer.finish()
+    return path
+
+
 def write_hdf5(log: GraspLog, path: Path) -> Path:
     with h5py.File(path, "w") as file:
         for name in ("time", "position", "displacement", "force", "normal", "object_pose"):
@@ -257,6 +305,6 @@ def write_json(log: GraspLog, path: Path) -> Path:
 def write() -> SimpleNamespace:
     """Writers of a log, each by its format's own library."""
     return SimpleNamespace(
-        bag1=write_bag1, bag2=write_bag2, json_mcap=write_json_mcap, hdf5=write_hdf5, lerobot=write_lerobot,
-        json=write_json, mapping=ROBOT_MAPPING,
+        bag1=write_bag1, bag2=write_bag2, json_mcap=write_json_mcap, protobuf_mcap=write_protobuf_mcap,
+        hdf5=write_hdf5, lerobot=write_lerobot, json=write_json, mapping=ROBOT_MAPPING,
     )  # fmt: skip

@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from mcap.reader import make_reader
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer as Bag1
@@ -75,6 +76,49 @@ def test_an_mcap_of_json_is_read_by_the_mapping_in_it(
     assert back.metadata["element_area"] == "mean of the cells between the markers"
     unchunked = write.json_mcap(robot_log, tmp_path / "plain", mapping, use_chunking=False)
     assert_same(formats.read(unchunked), back, rtol=0.0)
+
+
+PROTOBUF = {
+    "topic": "/tactile", "grid": [3, 4], "pitch": 1e-3, "time": "stamp", "force": "markers.force",
+    "displacement": ["markers.moved.x", "markers.moved.y", "markers.moved.z"],
+}  # fmt: skip
+
+
+def test_an_mcap_of_protocol_buffers_is_read(robot_log: GraspLog, write: SimpleNamespace, tmp_path: Path) -> None:
+    back = formats.read(write.protobuf_mcap(robot_log, tmp_path / "log"), mapping=json.dumps(PROTOBUF))
+    assert back.force is not None
+    np.testing.assert_allclose(back.force, robot_log.force, rtol=1e-7, atol=0.0)  # float32 in the message
+    np.testing.assert_array_equal(back.displacement, robot_log.displacement)
+    np.testing.assert_allclose(back.time, robot_log.time, rtol=0.0, atol=1e-9)
+    for wrong, told in (("markers.nothing", "force is not there"), ("stamp.nothing", "force is not there")):
+        with pytest.raises(InvalidInput, match=told):
+            formats.read(tmp_path / "log", mapping=json.dumps(PROTOBUF | {"force": wrong}))
+
+
+@pytest.mark.parametrize(
+    ("definition", "content", "told"),
+    [
+        (b"\xff\xff\xff", b"", "definition of lab.Tactile is not readable"),
+        (b"", b"", "definition of lab.Tactile is not readable"),
+        (b"\n" * (2**20 + 1), b"", "is 1048577 bytes; allowed: at most 1048576"),
+        (None, b"\xff\xff", r"/tactile is a message that does not fit its type \(DecodeError"),
+    ],
+    ids=["garbage", "nothing", "too large", "message"],
+)
+def test_damaged_protocol_buffers_are_refused_by_name(
+    robot_log: GraspLog, write: SimpleNamespace, tmp_path: Path, definition: bytes | None, content: bytes, told: str
+) -> None:
+    sound = write.protobuf_mcap(robot_log, tmp_path / "sound")
+    with sound.open("rb") as stream:
+        (schema,) = make_reader(stream).get_summary().schemas.values()
+    with (tmp_path / "log").open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start()
+        number = writer.register_schema("lab.Tactile", "protobuf", schema.data if definition is None else definition)
+        writer.add_message(writer.register_channel("/tactile", "protobuf", number), 1, content, 1)
+        writer.finish()
+    with pytest.raises(InvalidInput, match=told):
+        formats.read(tmp_path / "log", mapping=json.dumps(PROTOBUF))
 
 
 def test_the_uploads_mapping_goes_before_the_files(robot_log: GraspLog, write: SimpleNamespace, tmp_path: Path) -> None:
@@ -348,6 +392,7 @@ def test_any_cut_of_a_recording_is_refused_by_name(robot_log: GraspLog, write: S
         (write.bag1(robot_log, tmp_path / "bag1"), mapping),
         (next(bag2.glob("*.db3")), mapping),
         (write.json_mcap(robot_log, tmp_path / "mcap", "{}"), None),
+        (write.protobuf_mcap(robot_log, tmp_path / "protobuf"), json.dumps(PROTOBUF)),
         (write.hdf5(robot_log_with_normals(robot_log), tmp_path / "hdf5"), None),
         (write.lerobot(robot_log, tmp_path / "lerobot"), None),
         (write.json(robot_log, tmp_path / "json"), None),
