@@ -117,11 +117,20 @@ def serving() -> Callable[[Settings], AbstractContextManager[httpx.Client]]:
 
 
 @pytest.fixture(scope="session")
-def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx.Client]:
-    """A client of one server that all tests share: each makes materials of its own."""
+def served(engine_name: str, request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Settings:
+    """The settings of the server that all tests share, on each database."""
+    url = None
+    if engine_name == "postgresql":
+        url = request.getfixturevalue("postgresql").create(request.getfixturevalue("template"))
     folder = tmp_path_factory.mktemp("served")
-    with serve(Settings(data_folder=folder, max_upload_bytes=2 * 2**20)) as client:
-        client.headers["x-data-folder"] = str(folder)
+    return Settings(data_folder=folder, database_url=url, max_upload_bytes=2 * 2**20)
+
+
+@pytest.fixture(scope="session")
+def client(served: Settings) -> Iterator[httpx.Client]:
+    """A client of one server that all tests share: each makes materials of its own."""
+    with serve(served) as client:
+        client.headers["x-data-folder"] = str(served.data_folder)
         while client.get("/readyz").status_code != httpx.codes.OK:
             time.sleep(0.01)
         yield client

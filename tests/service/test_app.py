@@ -92,7 +92,7 @@ def test_a_start_brings_the_schema_up_and_sweeps_what_nothing_refers_to(serving:
 
 
 def test_a_job_whose_worker_is_killed_is_done_by_the_next_one(
-    client: httpx.Client, material: str, upload: Upload, wait: Wait
+    client: httpx.Client, served: Settings, material: str, upload: Upload, wait: Wait
 ) -> None:
     content = encode(tangential_ramp(points=12, marker_noise=1e-6))
     wait(client, upload(client, content).json()["job"]["id"])  # the worker is warm
@@ -105,8 +105,7 @@ def test_a_job_whose_worker_is_killed_is_done_by_the_next_one(
     done = wait(client, job)
     assert (done["status"], done["model_version"]) == ("done", 1)
     assert len(client.get(f"/v1/materials/{material}/fits").json()["items"]) == 1
-    url = f"sqlite:///{client.headers['x-data-folder']}/stiction.sqlite3"
-    with closing(Database(url)) as database, database.read() as session:
+    with closing(Database(served.resolved_database_url)) as database, database.read() as session:
         assert jobs.get(session, job).deaths == 1
 
 
@@ -122,11 +121,11 @@ def test_no_numerics_run_in_the_server_process(
 
 
 def test_a_log_whose_job_failed_gets_another_try_when_it_is_sent_again(
-    client: httpx.Client, material: str, content: bytes, upload: Upload, wait: Wait
+    client: httpx.Client, served: Settings, material: str, content: bytes, upload: Upload, wait: Wait
 ) -> None:
     first = upload(client, content, material=material).json()
     assert wait(client, first["job"]["id"])["status"] == "done"
-    database = Database(f"sqlite:///{client.headers['x-data-folder']}/stiction.sqlite3")
+    database = Database(served.resolved_database_url)
     failed = {"status": "failed", "reason": "the worker process died 3 times"}
     with database.write() as session:  # as if the job had failed before it stored its model
         session.execute(delete(FrictionModelRow).where(FrictionModelRow.job_id == first["job"]["id"]))
