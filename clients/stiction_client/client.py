@@ -272,6 +272,9 @@ def _options(url: str, key: str | None, timeout: float) -> dict[str, Any]:
 def _http_request(http: httpx.Client | httpx.AsyncClient, request: Request) -> httpx.Request:
     given = {"Content-Type": request.content_type, "Idempotency-Key": request.idempotency_key}
     headers = {name: value for name, value in given.items() if value is not None}
+    limits = http.timeout.as_dict()
+    if limits["read"] is not None:
+        limits["read"] += request.patience
     return http.build_request(
         request.method,
         request.path,
@@ -279,6 +282,7 @@ def _http_request(http: httpx.Client | httpx.AsyncClient, request: Request) -> h
         json=request.json,
         content=request.content,
         headers=headers,
+        timeout=httpx.Timeout(**limits),
     )
 
 

@@ -57,7 +57,10 @@ MATERIAL_EXISTS = "/problems/material-exists"
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One HTTP request, which may be sent again: it is harmless twice, or done once under its ``idempotency_key``."""
+    """One HTTP request, which may be sent again: it is harmless twice, or done once under its ``idempotency_key``.
+
+    ``patience``: s for which the service is asked to keep its answer back.
+    """
 
     method: str
     path: str
@@ -66,6 +69,7 @@ class Request:
     content: bytes | None = None
     content_type: str | None = None
     idempotency_key: str | None = None
+    patience: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,8 +218,9 @@ def wait(job_id: str, timeout: float) -> Flow[Job]:
     pause = FIRST_POLL
     while True:
         asked = time.monotonic()
-        patience = {"wait": min(max(deadline - asked, 0.0), LONGEST_POLL)}
-        current = _record(Job.from_json, (yield from _get(f"/v1/jobs/{_part(job_id)}", patience)))
+        patience = min(max(deadline - asked, 0.0), LONGEST_POLL)
+        request = Request("GET", f"/v1/jobs/{_part(job_id)}", {"wait": patience}, patience=patience)
+        current = _record(Job.from_json, (yield from _ask(request)))
         now = time.monotonic()
         if current.ended:
             return current

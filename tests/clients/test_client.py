@@ -340,3 +340,19 @@ def test_a_grasp_is_recognised_by_its_log_or_by_its_samples(
     assert sent[2]["samples"]["weight"] == [1.0, 1.0]
     with pytest.raises(InvalidArgument, match="time is not finite"):
         ask(server, "recognise", SimpleNamespace(**vars(samples) | {"time": np.array([np.nan])}))
+
+
+def test_who_waits_for_a_job_is_given_the_time_for_it(answers: SimpleNamespace) -> None:
+    asked: list[httpx.Request] = []
+
+    def answer(request: httpx.Request) -> httpx.Response:
+        asked.append(request)
+        return httpx.Response(200, json=answers.job)
+
+    transport = httpx.MockTransport(answer)
+    with stiction_client.FrictionClient("http://service", timeout=0.5, transport=transport) as client:
+        client.wait("j1", timeout=1.0)
+        client.job("j1")
+    wait = float(asked[0].url.params["wait"])
+    assert wait == pytest.approx(1.0, rel=0, abs=0.1)
+    assert [each.extensions["timeout"]["read"] for each in asked] == [0.5 + wait, 0.5]
