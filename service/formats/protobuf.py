@@ -23,6 +23,8 @@ class Fields(Mapping[str, Any]):
         value = getattr(self._message, name)
         if field.message_type is None:
             return list(value) if field.is_repeated else value
+        if field.message_type.GetOptions().map_entry:
+            return {str(key): _plain(each) if isinstance(each, Message) else each for key, each in value.items()}
         if field.is_repeated:
             return [_plain(each) for each in value]
         if not self._message.HasField(name):
@@ -58,6 +60,7 @@ def deserializer(name: str, definition: bytes) -> Callable[[bytes], Fields]:
 
 def _plain(message: Message) -> Mapping[str, Any]:
     """A moment as ROS says it, so that it is known as one; any other message by its fields."""
-    if message.DESCRIPTOR.full_name == "google.protobuf.Timestamp":
-        return {"sec": message.seconds, "nanosec": message.nanos}
-    return Fields(message)
+    fields = Fields(message)
+    if message.DESCRIPTOR.full_name == "google.protobuf.Timestamp":  # so the recording calls it: anything may be in it
+        return {"sec": fields["seconds"], "nanosec": fields["nanos"]}
+    return fields

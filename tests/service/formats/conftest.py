@@ -244,7 +244,7 @@ message_type {
 """
 
 
-def write_protobuf_mcap(log: GraspLog, path: Path) -> Path:
+def write_protobuf_mcap(log: GraspLog, path: Path, **options: Any) -> Path:
     """An MCAP of one message a frame, with a message a marker in it."""
     types = descriptor_pb2.FileDescriptorSet()
     timestamp_pb2.DESCRIPTOR.CopyToProto(types.file.add())
@@ -254,7 +254,7 @@ def write_protobuf_mcap(log: GraspLog, path: Path) -> Path:
         pool.Add(file)
     tactile = message_factory.GetMessageClass(pool.FindMessageTypeByName("lab.Tactile"))
     with path.open("wb") as stream:
-        writer = McapWriter(stream)
+        writer = McapWriter(stream, **options)
         writer.start()
         schema = writer.register_schema("lab.Tactile", "protobuf", types.SerializeToString())
         channel = writer.register_channel("/tactile", "protobuf", schema)

@@ -58,11 +58,14 @@ def seeds(
     mcap.write(log, folder / "mcap")
     write.json_mcap(robot_log, folder / "json_mcap", compression=CompressionType.LZ4)
     write.json_mcap(robot_log, folder / "plain_mcap", use_chunking=False)
+    write.protobuf_mcap(robot_log, folder / "protobuf_mcap", use_chunking=False)
     write.hdf5(log, folder / "hdf5")
     parquet.write(log, folder / "parquet")
     write.lerobot(robot_log, folder / "lerobot")
     write.json(log, folder / "json")
     given = {"lerobot": {"episode": 0, "pitch": 1e-3}}
+    moved = {"displacement": [f"markers.moved.{axis}" for axis in "xyz"], "force": "markers.force"}
+    given["protobuf_mcap"] = {"topic": "/tactile", "grid": [3, 4], "pitch": 1e-3, "time": "stamp", **moved}
     plain = {"topic": "/tactile", "displacement": "displacement", "position": "rest"}
     given |= dict.fromkeys(("bag1", "bag1plain", "bag2", "bagmcap"), write.mapping)
     given |= dict.fromkeys(("json_mcap", "plain_mcap"), plain)

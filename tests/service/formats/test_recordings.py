@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, text_format
 from mcap.reader import make_reader
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
@@ -20,7 +21,7 @@ from rosbags.rosbag1 import Writer as Bag1
 from rosbags.rosbag2 import StoragePlugin
 
 from service import formats
-from service.formats import mcap, parquet, unpack
+from service.formats import mcap, parquet, protobuf, unpack
 from slipcore import GraspLog, InvalidInput
 from stiction_client import container
 
@@ -119,6 +120,51 @@ def test_damaged_protocol_buffers_are_refused_by_name(
         writer.finish()
     with pytest.raises(InvalidInput, match=told):
         formats.read(tmp_path / "log", mapping=json.dumps(PROTOBUF))
+
+
+def test_a_timestamp_that_is_none_is_refused_by_name(
+    robot_log: GraspLog, write: SimpleNamespace, tmp_path: Path
+) -> None:
+    path = write.protobuf_mcap(robot_log, tmp_path / "log", use_chunking=False)
+    path.write_bytes(path.read_bytes().replace(b"seconds", b"sec_nds"))
+    with pytest.raises(InvalidInput, match="stamp is not there"):
+        formats.read(path, mapping=json.dumps(PROTOBUF))
+
+
+MAPS = """
+name: "maps.proto" package: "lab" syntax: "proto3"
+message_type {
+  name: "Point"
+  field { name: "x" number: 1 type: TYPE_DOUBLE label: LABEL_REPEATED }
+}
+message_type {
+  name: "Tactile"
+  nested_type {
+    name: "FingersEntry" options { map_entry: true }
+    field { name: "key" number: 1 type: TYPE_STRING label: LABEL_OPTIONAL }
+    field { name: "value" number: 2 type: TYPE_MESSAGE type_name: ".lab.Point" label: LABEL_OPTIONAL }
+  }
+  nested_type {
+    name: "CountsEntry" options { map_entry: true }
+    field { name: "key" number: 1 type: TYPE_INT32 label: LABEL_OPTIONAL }
+    field { name: "value" number: 2 type: TYPE_DOUBLE label: LABEL_OPTIONAL }
+  }
+  field { name: "fingers" number: 1 type: TYPE_MESSAGE type_name: ".lab.Tactile.FingersEntry" label: LABEL_REPEATED }
+  field { name: "counts" number: 2 type: TYPE_MESSAGE type_name: ".lab.Tactile.CountsEntry" label: LABEL_REPEATED }
+}
+"""
+
+
+def test_a_map_of_protocol_buffers_is_one_of_names() -> None:
+    types = descriptor_pb2.FileDescriptorSet()
+    text_format.Parse(MAPS, types.file.add())
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(types.file[0])
+    sent: Any = message_factory.GetMessageClass(pool.FindMessageTypeByName("lab.Tactile"))(counts={7: 2.0})
+    sent.fingers["left"].x.append(0.5)
+    message = protobuf.deserializer("lab.Tactile", types.SerializeToString())(sent.SerializeToString())
+    assert message["fingers"]["left"]["x"] == [0.5]
+    assert message["counts"] == {"7": 2.0}
 
 
 def test_the_uploads_mapping_goes_before_the_files(robot_log: GraspLog, write: SimpleNamespace, tmp_path: Path) -> None:
