@@ -93,9 +93,9 @@ def _read(recording: Recording, name: str, origin: Origin) -> NDArray[Any] | Non
 
 def as_array(name: str, value: Any) -> NDArray[Any]:
     """Numbers, truth values or text, nested as they may be; null is NaN among numbers. Raises ``InvalidInput``."""
-    if isinstance(value, dict):
-        return np.array(json.dumps(value))
     try:
+        if isinstance(value, dict):
+            return np.array(json.dumps(value))
         array = np.asarray(value)
         if array.dtype == object:
             array = np.asarray(value, dtype=np.float64)

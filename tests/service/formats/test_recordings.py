@@ -22,6 +22,7 @@ from rosbags.rosbag2 import StoragePlugin
 
 from service import formats
 from service.formats import mcap, parquet, protobuf, unpack
+from service.formats.assemble import as_array
 from slipcore import GraspLog, InvalidInput
 from stiction_client import container
 
@@ -127,7 +128,7 @@ def test_a_timestamp_that_is_none_is_refused_by_name(
 ) -> None:
     path = write.protobuf_mcap(robot_log, tmp_path / "log", use_chunking=False)
     path.write_bytes(path.read_bytes().replace(b"seconds", b"sec_nds"))
-    with pytest.raises(InvalidInput, match="stamp is not there"):
+    with pytest.raises(InvalidInput, match=r"time is not there \(stamp of /tactile\)"):
         formats.read(path, mapping=json.dumps(PROTOBUF))
 
 
@@ -165,6 +166,8 @@ def test_a_map_of_protocol_buffers_is_one_of_names() -> None:
     message = protobuf.deserializer("lab.Tactile", types.SerializeToString())(sent.SerializeToString())
     assert message["fingers"]["left"]["x"] == [0.5]
     assert message["counts"] == {"7": 2.0}
+    with pytest.raises(InvalidInput, match="fingers is not an array"):
+        as_array("fingers", message["fingers"])
 
 
 def test_the_uploads_mapping_goes_before_the_files(robot_log: GraspLog, write: SimpleNamespace, tmp_path: Path) -> None:
