@@ -22,7 +22,7 @@ from db.defaults import (
     SQLITE_POOL_OVERFLOW,
     SQLITE_SYNCHRONOUS,
 )
-from db.errors import DriverMissing, StorageUnavailable
+from db.errors import DriverMissing, InvalidUrl, StorageUnavailable
 
 _BEGIN = "sqlite_begin"
 _DURABLE = "durable"
@@ -35,8 +35,8 @@ class Database:
 
     ``url`` is any SQLAlchemy URL. SQLite, embedded, gets write-ahead logging and foreign keys, and has one writer at a
     time; PostgreSQL has many, which wait for each other only where they lock the same row. A writer waits
-    ``lock_timeout`` seconds at most. Raises ``DriverMissing`` for a URL whose driver is not installed, and
-    ``StorageUnavailable`` wherever the database cannot be reached or is full.
+    ``lock_timeout`` seconds at most. Raises ``InvalidUrl``, ``DriverMissing`` for a URL whose driver is not installed,
+    and ``StorageUnavailable`` wherever the database cannot be reached or is full.
     """
 
     def __init__(self, url: str | URL, lock_timeout: float = LOCK_TIMEOUT) -> None:
@@ -114,13 +114,16 @@ def _says_unavailable(error: DBAPIError) -> bool:
 
 
 def _engine(url: URL) -> Engine:
+    if "@" in (url.host or ""):  # what follows the first one would be told to everybody as a host that is not found
+        raise InvalidUrl("database URL has an @ in its user or password; allowed: %40")
     options: dict[str, Any] = {"pool_size": POOL_SIZE, "max_overflow": SQLITE_POOL_OVERFLOW}
     if url.get_backend_name() != "sqlite":  # a server may have restarted since a connection was last used
         options |= {"max_overflow": POSTGRESQL_POOL_OVERFLOW, "pool_pre_ping": True}
     if url.get_backend_name() == "postgresql":
         options["connect_args"] = {"connect_timeout": url.query.get("connect_timeout", CONNECT_TIMEOUT)}
-    try:  # JSON knows no NaN: SQLite would take it, PostgreSQL would not
-        return create_engine(url, json_serializer=partial(json.dumps, allow_nan=False), **options)
+    options["json_serializer"] = partial(json.dumps, allow_nan=False)  # SQLite would take NaN, PostgreSQL would not
+    try:
+        return create_engine(url, hide_parameters=True, **options)  # errors are logged; what callers sent is not
     except ModuleNotFoundError as error:
         raise DriverMissing(url.render_as_string(hide_password=True), error.name or str(error)) from error
 

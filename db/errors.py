@@ -50,6 +50,10 @@ class DriverMissing(DatabaseError):
         return f"{self.what} is {self.url}, whose driver {self.module} is not installed ({brings})"
 
 
+class InvalidUrl(DatabaseError):
+    """The URL of the database is none."""
+
+
 class StorageUnavailable(DatabaseError):
     """The database or the blob folder cannot be used now: locked, full, gone. Worth another try later."""
 

@@ -5,17 +5,14 @@ import re
 import time
 import uuid
 from collections.abc import Iterator, Mapping
-from contextvars import ContextVar
 
 from fastapi import Request
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service import problems
+from service.logs import ABOUT
 from service.problems import BAD_REQUEST, HEADERS_TOO_LARGE, Problem
-
-REQUEST_ID: ContextVar[str | None] = ContextVar("request_id", default=None)
-"""Of the request that is served here, for whoever writes a log."""
 
 MOST_HEADER_BYTES = 16 * 1024
 """Of one request; what servers usually take."""
@@ -55,11 +52,11 @@ class Envelope:
             return
         request_id = _request_id(scope)
         scope.setdefault("state", {})["request_id"] = request_id
-        token = REQUEST_ID.set(request_id)
+        token = ABOUT.set({"request_id": request_id})
         try:
             await self._serve(scope, receive, _Sender(scope, send, request_id))
         finally:
-            REQUEST_ID.reset(token)
+            ABOUT.reset(token)
 
     async def _serve(self, scope: Scope, receive: Receive, send: "_Sender") -> None:
         try:

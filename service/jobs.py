@@ -21,6 +21,7 @@ from db.database import Database
 from db.errors import ClaimLost, SchemaMismatch, StorageUnavailable
 from db.records import Claim
 from db.repositories import jobs, runners
+from service import logs
 from service.lanes import Lane, WorkerDied
 
 logger = logging.getLogger(__name__)
@@ -140,7 +141,8 @@ class JobRunner:
                 if claim is None:
                     await self._wait(self._poll_seconds)
                     continue
-                await self._do(lane, claim)
+                with logs.about(job=claim.job_id):
+                    await self._do(lane, claim)
         finally:
             await lane.close()
 

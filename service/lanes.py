@@ -2,8 +2,7 @@
 
 import asyncio
 import logging
-import multiprocessing
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Protocol
 
@@ -55,7 +54,7 @@ class ProcessLane:
         """Start a worker process and warm it up, in place of the one before."""
         while True:
             await self.close()
-            self._executor = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), worker.start_behind)
+            self._executor = worker.process(worker.give_way)
             try:
                 await asyncio.get_running_loop().run_in_executor(self._executor, worker.warm_up)
             except BrokenProcessPool:

@@ -1,5 +1,6 @@
 """What a running service tells of itself at ``/metrics``, in the text format of Prometheus."""
 
+import logging
 import threading
 import time
 from datetime import datetime, timedelta
@@ -12,6 +13,9 @@ from db.database import Database
 from db.records import Job
 from db.repositories import grasp_logs, jobs
 from db.tables import now
+from service import logs
+
+logger = logging.getLogger(__name__)
 
 REQUEST_BUCKETS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0)
 STAGE_BUCKETS = (0.001, 0.005, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 60.0)
@@ -85,7 +89,11 @@ class Metrics:
 
 
 class Metering:
-    """Times every request, by its route's path and not by its own: the names of materials are not to be labels."""
+    """Times every request for the figures and for the log.
+
+    Both know it by its route's path and not by its own: names of materials are not to be labels, and what somebody
+    wrote into an address is not to be logged.
+    """
 
     def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
         self.app, self._metrics = app, metrics
@@ -95,12 +103,12 @@ class Metering:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        begin, status = time.perf_counter(), "none"
+        begin, status = time.perf_counter(), 0
 
         async def noting(message: Message) -> None:
             nonlocal status
             if message["type"] == "http.response.start":
-                status = str(message["status"])
+                status = message["status"]
             await send(message)
 
         try:
@@ -108,4 +116,11 @@ class Metering:
         finally:
             route = getattr(scope.get("route"), "path", "none")
             method = scope["method"] if scope["method"] in METHODS else "other"
-            self._metrics.requests.labels(method, route, status).observe(time.perf_counter() - begin)
+            seconds = time.perf_counter() - begin
+            self._metrics.requests.labels(method, route, str(status or "none")).observe(seconds)
+            if logger.isEnabledFor(logging.INFO):
+                request_id = scope.get("state", {}).get("request_id")
+                told = logs.of(
+                    request_id=request_id, method=method, route=route, status=status, seconds=round(seconds, 6)
+                )
+                logger.info("answered", extra=told)

@@ -5,6 +5,7 @@ step stores the model and closes the job in one transaction. Whatever is stored 
 worker that was taken for dead, or whose job was cancelled, stores nothing.
 """
 
+import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -20,7 +21,7 @@ from db.database import Database
 from db.records import Claim, Job, SamplesOfLog, SampleSummary
 from db.repositories import detections, friction_models, grasp_logs, jobs, materials
 from estimators import EstimatorError, FrictionModel, Moments
-from service import formats
+from service import formats, logs
 from service.stored_results import (
     decode_samples,
     encode_history,
@@ -30,6 +31,8 @@ from service.stored_results import (
     to_new_model,
 )
 from slipcore import FrictionSamples, GraspLog, SlipcoreError, SlipHistory
+
+logger = logging.getLogger(__name__)
 
 FITS_BESIDE_OTHERS = 3
 """Fits of a material whose logs change meanwhile, before the next one makes the other writers wait."""
@@ -49,9 +52,15 @@ class Run:
     job: Job
     seconds: dict[str, float] = field(default_factory=dict)
 
+    @property
+    def total(self) -> float:
+        """Seconds of all stages done."""
+        return round(sum(self.seconds.values()), 6)
+
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Say that the job is in this stage, and take its time; raises ``ClaimLost`` where it is not ours any more."""
+        logs.note(stage=name)
         with self.database.write(durable=False) as session:
             jobs.start_stage(session, self.claim, name, self.seconds)
         with self.timed(name):
@@ -73,11 +82,15 @@ def run_job(database: Database, blobs: BlobStore, claim: Claim) -> None:
     with database.read() as session:
         job = jobs.get(session, claim.job_id)
     run = Run(database, blobs, claim, job, dict(job.seconds))
+    logs.note(kind=job.kind)
     try:
         _take_through_the_stages(run)
     except (Refused, SlipcoreError, EstimatorError) as refusal:
         with database.write() as session:
             jobs.finish(session, claim, "refused", reason=str(refusal), seconds=run.seconds)
+        logger.info("job refused: %s", refusal, extra=logs.of(seconds=run.total))
+    else:
+        logger.info("job done", extra=logs.of(seconds=run.total))
 
 
 def _take_through_the_stages(run: Run) -> None:

@@ -142,7 +142,7 @@ def answer(request: Request, problem: Problem) -> JSONResponse:
 
 def unexpected(request: Request, error: Exception) -> JSONResponse:
     """The answer to an error that nothing else answers; the log tells what it was, the client does not get to know."""
-    logger.error("request %s failed", request.state.request_id, exc_info=error)
+    logger.error("request failed", exc_info=error)
     return answer(request, Problem(INTERNAL_ERROR, "an unexpected error; the server's log has it"))
 
 

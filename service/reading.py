@@ -5,7 +5,6 @@ that process with it. What comes out is a Stiction container, so that nothing af
 """
 
 import asyncio
-import multiprocessing
 import os
 import resource
 from collections.abc import Callable, Mapping
@@ -90,7 +89,7 @@ class Readers:
         """The process, once it runs: a new one in place of one that was lost between two files."""
         for _ in range(2):
             if self._executor is None:
-                self._executor = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), _start)
+                self._executor = worker.process(_bound)
             try:
                 await asyncio.get_running_loop().run_in_executor(self._executor, os.getpid)
             except BrokenProcessPool:
@@ -132,8 +131,8 @@ def rewrite(source: Path, target: Path, name: str) -> None:
         writing.write(log, target, name)
 
 
-def _start() -> None:
-    worker.start()
+def _bound() -> None:
+    """Bound the memory of this process."""
     for name in ("h5py", "pyarrow.parquet", "rosbags.typesys"):  # their libraries take address space of their own
         _import_if_there(name)
     with open("/proc/self/statm", encoding="ascii") as stream:

@@ -25,6 +25,8 @@ def configuration(settings: Settings, **options: Any) -> uvicorn.Config:
         limit_concurrency=settings.max_connections,
         server_header=False,
         timeout_graceful_shutdown=max(1, math.ceil(settings.shutdown_seconds)),  # without it, clients hold the end up
+        log_config=None,  # ours (service.logs), and so is the record of each request (service.metrics)
+        access_log=False,
         ws_max_size=MOST_MESSAGE_BYTES,
         ws_per_message_deflate=False,  # noise does not pack, and packing takes its time
         **options,

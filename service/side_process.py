@@ -16,7 +16,7 @@ from contextlib import suppress
 from multiprocessing.context import SpawnProcess
 from typing import Any, TypeVar
 
-from service import worker
+from service import logs, worker
 
 LENGTH = struct.Struct("<Q")
 """In front of every message: its bytes."""
@@ -43,7 +43,9 @@ class SideProcess:
     async def start(cls, chore: Callable[[], bool]) -> "SideProcess":
         """``chore`` is done there while nothing is asked, again and again until it says that nothing is left to do."""
         ours, theirs = socket.socketpair()
-        process = multiprocessing.get_context("spawn").Process(target=_work, args=(theirs, chore), daemon=True)
+        process = multiprocessing.get_context("spawn").Process(
+            target=_work, args=(theirs, chore, logs.current()), daemon=True
+        )
         with theirs:
             await asyncio.to_thread(process.start)
         return cls(process, *await asyncio.open_connection(sock=ours))
@@ -86,9 +88,9 @@ class SideProcess:
                 answer.set_exception(ProcessEnded())
 
 
-def _work(line: socket.socket, chore: Callable[[], bool]) -> None:
+def _work(line: socket.socket, chore: Callable[[], bool], chosen: logs.Logs | None) -> None:
     """What the process does until nobody is at the other end."""
-    worker.start()
+    worker.start(chosen)
     with line, suppress(EOFError, ConnectionError):
         is_left = False
         while True:

@@ -5,6 +5,8 @@ import multiprocessing
 import os
 import signal
 import threading
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
@@ -16,6 +18,7 @@ from db.database import Database
 from db.errors import ClaimLost, StorageUnavailable
 from db.records import Claim
 from db.repositories import jobs
+from service import logs
 
 logger = logging.getLogger(__name__)
 
@@ -33,17 +36,24 @@ class Place:
     blob_cache_bytes: int = 0
 
 
-def start() -> None:
+def process(prepare: Callable[[], None] | None = None) -> ProcessPoolExecutor:
+    """One process for numerics, or for what else the server keeps out of its own; it begins with ``prepare``."""
+    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), start, (logs.current(), prepare))
+
+
+def start(chosen: logs.Logs | None, prepare: Callable[[], None] | None = None) -> None:
     """Prepare the process: it ends when the server tells it to or is gone, not by a Ctrl-C meant for the server."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
+    logs.configure(chosen)
+    if prepare is not None:
+        prepare()
 
 
-def start_behind() -> None:
+def give_way() -> None:
     """Prepare a process whose work can wait while somebody waits for an answer."""
     os.nice(NICENESS)
-    start()
 
 
 def warm_up() -> None:
@@ -63,6 +73,11 @@ def warm_up() -> None:
 
 def run_job(place: Place, claim: Claim) -> None:
     """Do a job and leave its end in the database; raises ``StorageUnavailable``, for then nobody can write there."""
+    with logs.about(job=claim.job_id):
+        _run(place, claim)
+
+
+def _run(place: Place, claim: Claim) -> None:
     from service import pipeline  # imports the numerics, which the server process does without
 
     database, blobs = _stores(place)
@@ -73,7 +88,7 @@ def run_job(place: Place, claim: Claim) -> None:
     except ClaimLost as lost:
         logger.warning("%s; what was done of it stays", lost)
     except Exception as error:
-        logger.exception("job %s failed", claim.job_id)
+        logger.exception("job failed")
         with database.write() as session, suppress(ClaimLost):
             jobs.finish(session, claim, "failed", reason=f"{type(error).__name__}: {error}")
 

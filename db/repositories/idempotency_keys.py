@@ -27,13 +27,15 @@ def claim(session: Session, owner: str, key: str, fingerprint: str, lifetime: ti
         with session.begin_nested():
             row = {"owner": owner, "key": key, "fingerprint": fingerprint, "answer": {}}
             session.execute(insert(IdempotencyKeyRow).values(**row))
-    except IntegrityError as error:
-        earlier = session.execute(select(IdempotencyKeyRow.fingerprint, IdempotencyKeyRow.answer).where(*of_it)).one()
-        if earlier.fingerprint != fingerprint:
-            raise AlreadyExists("idempotency key", key) from error
-        answer: dict[str, Any] = earlier.answer
-        return answer
-    return None
+    except IntegrityError:  # tells the key, so nothing is raised from it: what fails below may be logged
+        pass
+    else:
+        return None
+    earlier = session.execute(select(IdempotencyKeyRow.fingerprint, IdempotencyKeyRow.answer).where(*of_it)).one()
+    if earlier.fingerprint != fingerprint:
+        raise AlreadyExists("idempotency key", key)
+    answer: dict[str, Any] = earlier.answer
+    return answer
 
 
 def keep(session: Session, owner: str, key: str, answer: Mapping[str, Any]) -> None:

@@ -1,6 +1,5 @@
 """Commands that run a service: serve, worker, demo."""
 
-import logging
 import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -29,6 +28,7 @@ def serve(
     from service.serving import configuration
 
     settings = _settings(host=host, port=port, data_folder=data_folder, database_url=database_url)
+    _configure_logs(settings)
     server = uvicorn.Server(configuration(settings))
     server.run()
     if not server.started:  # its log says why
@@ -46,7 +46,7 @@ def worker(
     settings = _settings(workers=workers, data_folder=data_folder, database_url=database_url)
     if settings.workers == 0:
         raise typer.BadParameter("workers is 0; allowed: 1 to 64")
-    logging.basicConfig(level=logging.INFO, format="%(levelname)s: %(message)s")
+    _configure_logs(settings)
     asyncio.run(_work(settings))
 
 
@@ -79,6 +79,12 @@ def demo(
     from service.demo.run import run_demo
 
     run_demo(output, recordings, seed)
+
+
+def _configure_logs(settings: "Settings") -> None:
+    from service import logs
+
+    logs.configure(logs.Logs(settings.log_format, settings.log_level))
 
 
 def _settings(**given: Any) -> "Settings":

@@ -8,6 +8,7 @@ from db.records import Job, Material, StoredGraspLog
 from db.repositories import detections, friction_models, grasp_logs, jobs, materials
 from service.context import Context
 from service.problems import INVALID_REQUEST, Problem
+from service.queueing import queue
 
 REFITTED = "ols"
 """The method by which a material is fitted even if it has no model yet, as after an upload."""
@@ -92,7 +93,7 @@ def _refit_without(session: Session, material_id: int | None) -> list[Job]:
 def _queue_refits(session: Session, material_id: int, methods: Iterable[str]) -> list[Job]:
     if not detections.any_samples(session, material_id):
         return []
-    ids = [jobs.add(session, "fit", method, material_id=material_id) for method in sorted({REFITTED, *methods})]
+    ids = [queue(session, "fit", method, material_id=material_id) for method in sorted({REFITTED, *methods})]
     return [jobs.get(session, job_id) for job_id in ids]
 
 

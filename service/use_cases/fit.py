@@ -3,6 +3,7 @@
 from db.repositories import jobs, materials
 from service.context import Context
 from service.idempotency import Answer, Once, answer_once
+from service.queueing import queue
 from service.schemas import JobOut
 
 
@@ -10,11 +11,11 @@ def request_fit(context: Context, material: str, method: str, seed: int, once: O
     """Queue a fit over all samples of a material; raises ``NotFound`` for an unknown one."""
     with context.database.write() as session:
 
-        def queue() -> Answer:
+        def ask() -> Answer:
             material_id = materials.find_id(session, material)
-            job = jobs.get(session, jobs.add(session, "fit", method, material_id=material_id, seed=seed))
+            job = jobs.get(session, queue(session, "fit", method, material_id=material_id, seed=seed))
             return Answer(202, f"/v1/jobs/{job.id}", JobOut.of(job).model_dump(mode="json"))
 
-        answer = answer_once(session, once, queue)
+        answer = answer_once(session, once, ask)
     context.jobs.wake()
     return answer

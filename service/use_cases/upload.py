@@ -20,6 +20,7 @@ from service.problems import (
     UNSUPPORTED_FORMAT,
     Problem,
 )
+from service.queueing import queue
 from service.reading import Description, Settings, read_plain
 from service.schemas import GraspLogOut
 from service.use_cases.receive import check_encoding, check_size, receive, unpack
@@ -164,7 +165,7 @@ def _accept(session: Session, log: NewGraspLog) -> Answer:
         log = replace(log, material_id=materials.still(session, log.material_id))
     try:
         log_id, status = grasp_logs.add(session, log), 202
-        jobs.add(session, "ingest", "ols", material_id=log.material_id, grasp_log_id=log_id)
+        queue(session, "ingest", "ols", material_id=log.material_id, grasp_log_id=log_id)
     except AlreadyExists:
         log_id, status = grasp_logs.find_id(session, log.sha256, log.material_id, log.detector), 200
         job = grasp_logs.get(session, log_id).job

@@ -9,7 +9,7 @@ from fastapi.responses import HTMLResponse
 
 from service import envelope
 from service.access import READ
-from service.envelope import REQUEST_ID
+from service.logs import ABOUT
 
 Reach = Any
 pytestmark = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -25,8 +25,8 @@ def client(reach: Reach) -> Any:
         raise RuntimeError("a secret path")
 
     @router.get("/v1/told", dependencies=[READ])
-    def told() -> str | None:
-        return REQUEST_ID.get()
+    def told() -> object:
+        return ABOUT.get()["request_id"]
 
     client.app.include_router(router)
     return client
@@ -37,7 +37,7 @@ def test_an_id_that_was_given_is_kept_and_told(client: Any, given: str) -> None:
     answer = client.get("/v1/told", headers={"X-Request-ID": given})
     assert (answer.headers["x-request-id"], answer.json()) == (given, given)
     assert client.get("/v1/nothing", headers={"X-Request-ID": given}).json()["request_id"] == given
-    assert REQUEST_ID.get() is None
+    assert not ABOUT.get()
 
 
 @pytest.mark.parametrize("given", ["", "a b", "x" * 129, "a\tb", 'a"b', "ü".encode(), "<script>"])
@@ -59,7 +59,7 @@ def test_a_failure_is_told_by_its_id_and_kept_to_the_log(client: Any, caplog: py
         "request_id": "failing",
     }
     (record,) = [each for each in caplog.records if each.levelno >= logging.ERROR]
-    assert record.getMessage() == "request failing failed"
+    assert record.getMessage() == "request failed"
     assert "a secret path" in caplog.text
 
 
