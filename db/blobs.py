@@ -5,7 +5,7 @@ import os
 import re
 import time
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import islice
 from pathlib import Path
@@ -138,6 +138,18 @@ class BlobStore:
         self._make_room(path.stat().st_size)
         return path
 
+    def has(self, sha256: str) -> bool:
+        """Whether a blob is stored."""
+        return self._place(sha256).is_file() if self._remote is None else self._remote.has(sha256)
+
+    def remove(self, hashes: Iterable[str]) -> None:
+        """Delete blobs to which nothing refers; those that aren't there are no error."""
+        gone = list(hashes)
+        if self._remote is not None:
+            self._remote.delete(gone)
+        for sha256 in gone:
+            self._place(sha256).unlink(missing_ok=True)
+
     def ping(self) -> None:
         """Make sure that the folder takes files, and the remote answers; raises ``StorageUnavailable``."""
         with self.spool() as spool:
@@ -162,10 +174,7 @@ class BlobStore:
         remaining = self._local() if self._remote is None else self._remote.hashes(ORPHAN_AGE)
         while some := list(islice(remaining, HASHES_PER_QUERY)):
             removed += sorted(set(some) - referenced(some))
-        if self._remote is not None:
-            self._remote.delete(removed)
-        for sha256 in removed:
-            self._place(sha256).unlink(missing_ok=True)
+        self.remove(removed)
         return removed
 
     def _take_in(self, spooled: Path, sha256: str) -> None:

@@ -46,6 +46,10 @@ class ObjectStore:
             for chunk in self._obstore.get(self._store, _key(sha256)).stream():
                 target.write(chunk)
 
+    def has(self, sha256: str) -> bool:
+        """Whether a blob is there."""
+        return self._is_there(_key(sha256))
+
     def hashes(self, older_than: timedelta = timedelta(0)) -> Iterator[str]:
         """Hashes of all blobs that have been there for so long."""
         latest = datetime.now(UTC) - older_than
@@ -65,11 +69,15 @@ class ObjectStore:
 
     def ping(self) -> None:
         """Make sure that the store answers; raises ``StorageUnavailable``."""
+        self._is_there("ready")
+
+    def _is_there(self, key: str) -> bool:
         with _answered("blob store"):
             try:
-                self._obstore.head(self._store, "ready")
+                self._obstore.head(self._store, key)
             except FileNotFoundError:
-                return
+                return False
+        return True
 
 
 def _is_plain_http() -> bool:

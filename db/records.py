@@ -183,7 +183,10 @@ class Withdrawal:
 
 @dataclass(frozen=True, slots=True)
 class StoredGraspLog:
-    """A grasp log with its ingest job and, once there, what detection and sampling found."""
+    """A grasp log with its ingest job and, once there, what detection and sampling found.
+
+    ``has_file``: whether its bytes are still there.
+    """
 
     id: str
     sha256: str
@@ -196,6 +199,7 @@ class StoredGraspLog:
     duration: float
     grid: tuple[int, int]
     created_at: datetime
+    has_file: bool
     withdrawal: Withdrawal | None
     job: Job
     detection: Detection | None

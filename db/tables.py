@@ -107,7 +107,10 @@ class SensorRow(Base):
 
 
 class GraspLogRow(Base):
-    """A grasp log; its bytes are the blob of hash ``sha256``. The same content, material and detector is one log."""
+    """A grasp log; its bytes are the blob of hash ``sha256``. The same content, material and detector is one log.
+
+    ``file_state`` is NULL while the blob is there, since ``file_since``.
+    """
 
     __tablename__ = "grasp_logs"
     __table_args__ = (
@@ -127,6 +130,8 @@ class GraspLogRow(Base):
         CheckConstraint("(withdrawn_at IS NULL) = (withdrawn_because IS NULL)", name="withdrawn"),
         Index(None, "created_at", "id"),
         Index(None, "material_id", "created_at", "id"),
+        _one_of("file_state", ("leaving", "gone")),
+        Index(None, "file_state", "file_since"),  # what has been there for longest, and what is to be deleted
     )
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
@@ -143,6 +148,8 @@ class GraspLogRow(Base):
     created_at: Mapped[datetime] = mapped_column(default=now)
     withdrawn_at: Mapped[datetime | None]
     withdrawn_because: Mapped[str | None]
+    file_state: Mapped[str | None] = mapped_column(String(10))
+    file_since: Mapped[datetime] = mapped_column(default=now)
 
 
 class RunnerRow(Base):
@@ -170,6 +177,7 @@ class JobRow(Base):
         CheckConstraint("status NOT IN ('failed', 'refused', 'cancelled') OR reason IS NOT NULL", name="reason"),
         Index(None, "status", "created_at", "id"),  # the next one is found without a look at the others
         Index(None, "finished_at"),  # and so is what ended since a monitor last asked
+        Index(None, "created_at", "id"),
     )
 
     id: Mapped[str] = mapped_column(String(32), primary_key=True)
@@ -185,6 +193,7 @@ class JobRow(Base):
     seed: Mapped[int] = mapped_column(BigInteger)
     deaths: Mapped[int] = mapped_column(default=0)
     model_version: Mapped[int | None]
+    trace: Mapped[str | None] = mapped_column(String(55))
     created_at: Mapped[datetime] = mapped_column(default=now)
     finished_at: Mapped[datetime | None]
 

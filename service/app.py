@@ -24,6 +24,7 @@ from service.lookups import Lookups
 from service.metrics import Metering, Metrics
 from service.model_cache import ModelCache
 from service.reading import Readers
+from service.retention import Retention
 from service.routes import curation, grasp_logs, health, jobs, materials, metrics, planning, stream
 from service.settings import Settings
 from service.stream_sessions import Streams
@@ -90,10 +91,13 @@ async def running(
             )
             readers, streams = Readers(settings.read_seconds), Streams()
             await runner.start()
+            retention = Retention(database, blobs, settings.keep_uploads_days, lambda: runner.leads)
+            retention.start()
             try:
                 models = ModelCache(settings.lookup_seconds)
                 yield Context(settings, database, blobs, runner, readers, streams, models)
             finally:
+                await retention.stop()
                 await streams.stop()
                 await runner.stop()
                 await readers.stop()

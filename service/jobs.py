@@ -78,7 +78,7 @@ class JobRunner:
         self._warming = len(lanes)
         self._hiring: set[asyncio.Task[None]] = set()
         self._outdated: SchemaMismatch | None = None
-        self._stopping = False
+        self._stopping = self._leads = False
         self._woken = asyncio.Event()
         self._endings: WeakValueDictionary[str, asyncio.Event] = WeakValueDictionary()  # of jobs that somebody awaits
 
@@ -91,6 +91,11 @@ class JobRunner:
         if self._warming:
             return f"{self._warming} of {len(self._lanes)} workers warm up" + (f": {missing}" if missing else "")
         return missing
+
+    @property
+    def leads(self) -> bool:
+        """Whether this is the one that does what only one is to do: the oldest runner, as of the last beat."""
+        return self._leads
 
     async def start(self) -> None:
         """Begin to work."""
@@ -236,8 +241,10 @@ class JobRunner:
         """Say that we live, and take the jobs away from runners that do not; True if there are jobs to claim."""
         with self._database.write(durable=False) as session:
             alive = runners.beat(session, self._id)
-            beats = {runner.id: runner.beats for runner in runners.list_all(session) if runner.id != self._id}
+            living = runners.list_all(session)
+            beats = {runner.id: runner.beats for runner in living if runner.id != self._id}
             freed = self._free_strays(session)
+        self._leads = alive and living[0].id == self._id
         if not alive and not self._stopping:
             logger.error("runner %s was taken for dead; it goes on under a new name", self._id)
             self._id = self._register()

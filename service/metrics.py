@@ -56,7 +56,10 @@ class Metrics:
         )
         self._unfinished = Gauge("stiction_jobs", "Jobs that have not ended.", ("status",), registry=self.registry)
         self._logs = Gauge("stiction_grasp_logs", "Grasp logs that are stored.", registry=self.registry)
-        self._bytes = Gauge("stiction_upload_bytes", "Bytes of their uploads.", registry=self.registry)
+        self._deleted = Gauge(
+            "stiction_deleted_uploads", "Grasp logs whose uploads were old and are deleted.", registry=self.registry
+        )
+        self._bytes = Gauge("stiction_upload_bytes", "Bytes of the uploads of the others.", registry=self.registry)
         self._lock = threading.Lock()
         self._horizon = now()
         self._counted: dict[str, datetime] = {}
@@ -66,8 +69,9 @@ class Metrics:
         with self._lock:
             with database.read() as session:
                 self._follow_jobs(session)
-                count, size = grasp_logs.count_and_bytes(session)
+                count, deleted, size = grasp_logs.count_and_bytes(session)
             self._logs.set(count)
+            self._deleted.set(deleted)
             self._bytes.set(size)
             return generate_latest(self.registry)
 

@@ -86,6 +86,7 @@ _GRASP_LOG: JsonDict = {
     "duration": 8.3,
     "grid": [20, 20],
     "created_at": _MOMENT,
+    "has_file": True,
     "withdrawal": None,
     "job": _JOB,
     "detection": _DETECTION,
@@ -385,6 +386,7 @@ class GraspLogOut(BaseModel):
     duration: Annotated[float, Field(description="s")]
     grid: Annotated[tuple[int, int], Field(description="Markers along the two axes")]
     created_at: datetime
+    has_file: Annotated[bool, Field(description="Whether the upload can still be downloaded")]
     withdrawal: WithdrawalOut | None
     job: JobOut
     detection: DetectionOut | None
@@ -403,6 +405,7 @@ class GraspLogOut(BaseModel):
             duration=log.duration,
             grid=log.grid,
             created_at=log.created_at,
+            has_file=log.has_file,
             withdrawal=WithdrawalOut.of(log.withdrawal) if log.withdrawal else None,
             job=JobOut.of(log.job),
             detection=_detection_out(log),

@@ -33,6 +33,10 @@ class Settings(BaseSettings):
     blob_cache_bytes: Annotated[int, Field(ge=0, le=2**50)] = Field(
         default=10 * 1024 * MIB, description="Bytes of the object store's blobs that are kept in the data folder, too."
     )
+    keep_uploads_days: Annotated[float, Field(gt=0.0, le=36500.0)] | None = Field(
+        default=None,
+        description="Days after which uploads are deleted; what was found in them stays. Default: never.",
+    )
     migrate_at_start: bool = Field(
         default=True,
         description="Bring the database to this version's schema at start; otherwise an old one stops the start.",

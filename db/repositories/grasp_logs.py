@@ -137,6 +137,7 @@ def _record(
         duration=row.duration,
         grid=(row.grid_rows, row.grid_columns),
         created_at=row.created_at,
+        has_file=row.file_state is None,
         withdrawal=_withdrawal(row),
         job=jobs.record(job, material),
         detection=detections.detection_record(detection),
@@ -171,7 +172,9 @@ def _sensor_id(session: Session, name: str) -> int:
     return row.id
 
 
-def count_and_bytes(session: Session) -> tuple[int, int]:
-    """How many logs there are, and the bytes of their uploads."""
-    count, size = session.execute(select(func.count(), func.coalesce(func.sum(GraspLogRow.bytes), 0))).one()
-    return int(count), int(size)
+def count_and_bytes(session: Session) -> tuple[int, int, int]:
+    """How many logs there are, how many of them without a file, and the bytes of the files of the others."""
+    is_there = GraspLogRow.file_state.is_(None)
+    size = func.coalesce(func.sum(GraspLogRow.bytes).filter(is_there), 0)
+    found = session.execute(select(func.count(), func.count().filter(~is_there), size)).one()
+    return int(found[0]), int(found[1]), int(found[2])

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import typer
 
-from service.cli import database, jobs, keys, local, remote, running, simulation
+from service.cli import blobs, database, jobs, keys, local, remote, running, simulation
 from service.cli.exit_codes import exit_code
 
 app = typer.Typer(
@@ -32,6 +32,7 @@ for command in (
     app.command()(command)
 app.add_typer(jobs.app, name="jobs")
 app.add_typer(database.app, name="db")
+app.add_typer(blobs.app, name="blobs")
 app.add_typer(keys.app, name="keys")
 
 

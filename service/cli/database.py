@@ -68,7 +68,7 @@ def backup(
     from db.backup import backup as copy_out
 
     with opened(database_url) as database:
-        copy_out(database, _blobs(), folder, _tell)
+        copy_out(database, opened_blobs(), folder, _tell)
     typer.echo(f"backed up to {folder}")
 
 
@@ -81,11 +81,12 @@ def restore(
     from db.backup import restore as copy_in
 
     with opened(database_url) as database:
-        copy_in(folder, database, _blobs(), _tell)
+        copy_in(folder, database, opened_blobs(), _tell)
     typer.echo(f"restored from {folder}")
 
 
-def _blobs() -> "BlobStore":
+def opened_blobs() -> "BlobStore":
+    """The service's own blob store."""
     from db.blobs import open_blobs
     from service.settings import Settings
 

@@ -17,6 +17,7 @@ from service.formats.tracked_markers import FRAME_RATE, SCALE
 from service.idempotency import OnceWithoutBody
 from service.paging import USUAL, CursorText, Limit, Page, link_next
 from service.problems import (
+    FILE_DELETED,
     IDEMPOTENCY_KEY_REUSED,
     INVALID_GRASP_LOG,
     INVALID_REQUEST,
@@ -201,7 +202,8 @@ def read_samples(context: Given, id: str) -> SamplesOut:  # noqa: A002
     dependencies=[READ],
     summary="Download a grasp log",
     response_class=FileResponse,
-    responses=_FILE | problems(UNKNOWN_GRASP_LOG, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+    responses=_FILE
+    | problems(UNKNOWN_GRASP_LOG, FILE_DELETED, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
 async def read_file(
     context: Given,

@@ -8,7 +8,7 @@ from pathlib import Path
 from db.records import StoredGraspLog
 from service import formats
 from service.context import Context
-from service.problems import UNSUPPORTED_FORMAT, Problem
+from service.problems import FILE_DELETED, UNSUPPORTED_FORMAT, Problem
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +20,9 @@ class LogFile:
 
 
 async def export(context: Context, log: StoredGraspLog, name: str) -> LogFile:
-    """The log as a file of format ``name``; raises ``Problem`` where the service lacks that format's library."""
+    """The log as a file of format ``name``; raises ``Problem`` where there is none, or no library of that format."""
+    if not log.has_file:
+        raise Problem(FILE_DELETED, f"the file of grasp log {log.id} was deleted, as old uploads are here")
     source = await asyncio.to_thread(context.blobs.path, log.sha256)
     with ExitStack() as spools:
         if name == "npz" and await asyncio.to_thread(formats.identify, source) == "npz":

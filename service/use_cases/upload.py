@@ -8,9 +8,9 @@ from dataclasses import dataclass, field, replace
 from sqlalchemy.orm import Session
 
 from db.blobs import Spool
-from db.errors import AlreadyExists
+from db.errors import AlreadyExists, StorageUnavailable
 from db.records import NewGraspLog
-from db.repositories import grasp_logs, jobs, materials
+from db.repositories import grasp_logs, jobs, materials, uploads
 from service import formats
 from service.context import Context
 from service.idempotency import Answer, Once, answer_once
@@ -154,6 +154,9 @@ def _store(context: Context, spool: Spool, log: NewGraspLog, once: Once | None) 
     """First the blob, durably, then the rows that refer to it."""
     spool.keep()
     with context.database.write() as session:
+        uploads.lock(session, [log.sha256])
+        if uploads.bring_back(session, log.sha256) and not context.blobs.has(log.sha256):
+            raise StorageUnavailable("the file was old and about to be deleted when it came in again")
         answer = answer_once(session, once, lambda: _accept(session, log))
     context.jobs.wake()
     return answer

@@ -2,6 +2,7 @@ import json
 import logging
 import os
 import re
+import time
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -92,10 +93,19 @@ def log(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[Callable[
     levels, handlers = {name: logger.level for name, logger in loggers.items()}, loggers[""].handlers[:]
     loggers[""].handlers.clear()  # those of pytest, which would be closed
     logs.configure(Logs("json", "debug"))
-    path = tmp_path / "log"  # standard error is another one in each phase of a test, but for other processes
+    path, others = (
+        tmp_path / "log",
+        tmp_path / "other.log",
+    )  # standard error is another one in each phase of a test, but for other processes
     with path.open("w", encoding="utf-8", buffering=1) as stream:
         cast(logging.StreamHandler[Any], loggers[""].handlers[0]).setStream(stream)
-        yield lambda: [read(line) for line in (path.read_text() + capfd.readouterr().err).splitlines()]
+
+        def lines() -> list[dict[str, Any]]:
+            with others.open("a", encoding="utf-8") as file:
+                file.write(capfd.readouterr().err)
+            return [read(line) for line in (path.read_text() + others.read_text()).splitlines()]
+
+        yield lines
     logging.captureWarnings(False)
     loggers[""].handlers[:] = handlers
     for name, level in levels.items():
@@ -142,6 +152,10 @@ def test_server_and_worker_log_one_story_without_secrets(
         session.execute(text("DROP TABLE idempotency_keys"))
     assert client.post("/v1/materials", json={"name": "felt"}).status_code in {500, 503}
 
+    deadline = time.monotonic() + 10.0  # the worker tells of the end of a job after that of the job
+    while not any(line["message"] == "job done" for line in log()):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
     lines = log()
     assert not [secret for secret in (KEY[22:], "hush-", "secret alloy") if secret in json.dumps(lines)]
     answered = [line for line in lines if line["message"] == "answered"]

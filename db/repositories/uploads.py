@@ -1,0 +1,85 @@
+"""Queries on the files of grasp logs: which may go, and which have.
+
+A file goes in two steps, since row and blob cannot change at once: its logs are marked as ``leaving``, then the blob is
+deleted and they are ``gone``. Whoever dies in between leaves the second step to the next one. What is done to one
+content is done by one at a time (``lock``): an upload that brings a file back, and a step that takes it away.
+"""
+
+from collections.abc import Collection, Iterable
+from datetime import datetime
+
+from sqlalchemy import ColumnElement, Select, and_, exists, func, select, text, update
+from sqlalchemy.orm import Session, aliased
+
+from db.repositories import blobs
+from db.tables import GraspLogRow, JobRow, now
+
+DONE_WITH = ("done", "refused", "cancelled")
+"""Ends of a job that will not read its file again; one that failed may be looked into."""
+
+
+def lock(session: Session, hashes: Collection[str]) -> None:
+    """Wait for others who are about the same contents, until the end of the transaction (SQLite has one writer)."""
+    if session.connection().dialect.name == "postgresql":
+        for key in sorted(int.from_bytes(bytes.fromhex(sha256[:16]), signed=True) for sha256 in hashes):
+            session.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": key})
+
+
+def bring_back(session: Session, sha256: str) -> bool:
+    """Let every log of this content, which is locked and stored again, have its file; False if none had lost it."""
+    lost = (GraspLogRow.sha256 == sha256, GraspLogRow.file_state.is_not(None))
+    if session.scalar(select(GraspLogRow.id).where(*lost).limit(1)) is None:
+        return False
+    session.execute(update(GraspLogRow).where(*lost).values(file_state=None, file_since=now()))
+    return True
+
+
+def count_old(session: Session, before: datetime) -> tuple[int, int]:
+    """How many files may go, those older than ``before`` that nothing needs, and their bytes."""
+    files = _old(before).add_columns(GraspLogRow.bytes).distinct().subquery()
+    count, size = session.execute(select(func.count(), func.coalesce(func.sum(files.c.bytes), 0))).one()
+    return int(count), int(size)
+
+
+def mark(session: Session, before: datetime, most: int) -> int:
+    """Mark the logs of so many files that may go, oldest first, as ``leaving``; returns how many files these are."""
+    oldest = _old(before).group_by(GraspLogRow.sha256).order_by(func.min(GraspLogRow.file_since)).limit(most)
+    hashes = list(session.scalars(oldest))
+    marked = update(GraspLogRow).where(GraspLogRow.sha256.in_(hashes), _may_go(GraspLogRow, before))
+    session.execute(marked.values(file_state="leaving").execution_options(synchronize_session=False))
+    return len(hashes)
+
+
+def leaving(session: Session, most: int) -> list[str]:
+    """Hashes of files that are marked."""
+    query = select(GraspLogRow.sha256).where(GraspLogRow.file_state == "leaving").distinct().limit(most)
+    return list(session.scalars(query))
+
+
+def spare_needed(session: Session, hashes: Collection[str]) -> list[str]:
+    """Those of the marked, and locked, files that may go still; a log that came since keeps its file."""
+    needed = blobs.referenced(session, list(hashes))
+    _set_state(session, needed, None)
+    return sorted(set(hashes) - needed)
+
+
+def note_gone(session: Session, hashes: Iterable[str]) -> None:
+    """That the marked files are deleted."""
+    _set_state(session, hashes, "gone")
+
+
+def _set_state(session: Session, hashes: Iterable[str], state: str | None) -> None:
+    marked = (GraspLogRow.sha256.in_(list(hashes)), GraspLogRow.file_state == "leaving")
+    session.execute(update(GraspLogRow).where(*marked).values(file_state=state))
+
+
+def _old(before: datetime) -> Select[str]:
+    """Hashes of files all of whose logs may do without."""
+    other = aliased(GraspLogRow)
+    needs_it = (other.sha256 == GraspLogRow.sha256, other.file_state.is_(None), ~_may_go(other, before))
+    return select(GraspLogRow.sha256).where(_may_go(GraspLogRow, before), ~exists().where(*needs_it))
+
+
+def _may_go(log: type[GraspLogRow], before: datetime) -> ColumnElement[bool]:
+    ended = exists().where(JobRow.grasp_log_id == log.id, JobRow.status.in_(DONE_WITH))
+    return and_(log.file_state.is_(None), log.file_since < before, ended)

@@ -1,0 +1,88 @@
+"""Delete uploads once they are old: what was found in them stays, and fits need no more than that."""
+
+import asyncio
+import logging
+import threading
+from collections.abc import Callable
+from datetime import datetime, timedelta
+
+from db.blobs import BlobStore
+from db.database import Database
+from db.errors import StorageUnavailable
+from db.repositories import uploads
+from db.tables import now
+
+logger = logging.getLogger(__name__)
+
+LOOK_SECONDS = 60.0
+"""s between two looks for uploads that have grown old."""
+
+FILES_AT_ONCE = 100
+"""Files deleted in one transaction: others who write to SQLite wait for it."""
+
+
+def prune(database: Database, blobs: BlobStore, before: datetime, stop: Callable[[], bool] = lambda: False) -> int:
+    """Delete the files of all logs older than ``before`` whose jobs have ended; returns how many.
+
+    Ends early once ``stop`` says so. May run at any number of places at once, and be killed at any moment.
+    """
+    deleted = 0
+    while not stop():
+        with database.write(durable=False) as session:
+            marked = uploads.mark(session, before, FILES_AT_ONCE)
+        count = _delete_marked(database, blobs)
+        deleted += count
+        if not marked and not count:
+            break
+    return deleted
+
+
+def _delete_marked(database: Database, blobs: BlobStore) -> int:
+    """The files that were marked, by us or by one who died since."""
+    with database.read() as session:
+        marked = uploads.leaving(session, FILES_AT_ONCE)
+    if not marked:
+        return 0
+    with database.write(durable=False) as session:
+        uploads.lock(session, marked)
+        free = uploads.spare_needed(session, marked)
+        blobs.remove(free)
+        uploads.note_gone(session, free)
+    return len(free)
+
+
+class Retention:
+    """Prunes now and then, in whichever process ``leads`` the others."""
+
+    def __init__(self, database: Database, blobs: BlobStore, days: float | None, leads: Callable[[], bool]) -> None:
+        self._database, self._blobs, self._leads = database, blobs, leads
+        self._age = None if days is None else timedelta(days=days)
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._go_on, name="retention", daemon=True)
+
+    def start(self) -> None:
+        """Begin, where uploads are to be kept for some days only."""
+        if self._age is not None:
+            self._thread.start()
+
+    async def stop(self) -> None:
+        """End after the files that are being deleted."""
+        self._stopping.set()
+        if self._thread.ident is not None:
+            await asyncio.to_thread(self._thread.join)
+
+    def _go_on(self) -> None:
+        while not self._stopping.wait(LOOK_SECONDS):
+            if self._age is not None and self._leads():
+                self._prune(self._age)
+
+    def _prune(self, age: timedelta) -> None:
+        try:
+            deleted = prune(self._database, self._blobs, now() - age, self._stopping.is_set)
+        except StorageUnavailable as error:
+            logger.warning("uploads are not looked through: %s", error)
+        except Exception:
+            logger.exception("uploads are not looked through")
+        else:
+            if deleted:
+                logger.info("deleted %d uploads older than %s", deleted, age)
