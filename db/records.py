@@ -79,6 +79,7 @@ class Job:
     seed: int
     deaths: int
     model_version: int | None
+    trace: str | None
     created_at: datetime
     finished_at: datetime | None
 

@@ -12,7 +12,7 @@ from db.blobs import BlobStore, open_blobs
 from db.database import Database
 from db.repositories import blobs as blob_references
 from db.repositories import runners
-from service import access, gate, openapi, problems
+from service import access, gate, openapi, problems, traces
 from service.context import Context
 from service.envelope import Envelope
 from service.folder_lock import shared
@@ -32,6 +32,9 @@ from service.worker import Place
 
 logger = logging.getLogger(__name__)
 
+UNTRACED = access.PUBLIC_PATHS | {"/metrics"}
+"""Paths of which a monitor asks all the time."""
+
 DESCRIPTION = """Friction of what a robot holds, identified from the micro-slips of a grasp that still holds.
 
 Upload grasp logs of a material, wait for their jobs, and look up the friction coefficient. SI units throughout.
@@ -40,7 +43,7 @@ Errors are problem details (RFC 9457) with stable types."""
 
 def create_app(settings: Settings | None = None) -> FastAPI:
     """The web service as an ASGI application; without ``settings``, those of the environment."""
-    chosen = settings or Settings()
+    chosen, provider = settings or Settings(), traces.start()
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -54,6 +57,15 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         version="1",
         lifespan=lifespan,
         redirect_slashes=False,
+        telemetry={
+            "tracing": provider is not None,
+            "tracer_provider": provider,
+            "metrics": False,
+            "logs": False,
+            "operation_spans": False,
+            "auto_configure": False,
+            "exclude": lambda scope: scope["path"] in UNTRACED,
+        },
         generate_unique_id_function=openapi.operation_id,
     )
     for module in (health, metrics, materials, grasp_logs, curation, planning, jobs, stream):

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from fastapi import Request, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from service import traces
 from service.conditional import conditional
 from service.context import Context
 from service.schemas import LARGEST_FORCE, LARGEST_VELOCITY, SMALLEST_TAIL
@@ -57,6 +58,7 @@ def _answer(scope: Scope) -> Response | None:
         if len(known.answers) < MOST_ANSWERS:
             known.answers[question] = body
     scope["route"] = ROUTE
+    traces.name_request("GET", ROUTE.path)
     return conditional(Request(scope), known.tag, lambda: body)
 
 

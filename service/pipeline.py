@@ -21,7 +21,7 @@ from db.database import Database
 from db.records import Claim, Job, SamplesOfLog, SampleSummary
 from db.repositories import detections, friction_models, grasp_logs, jobs, materials
 from estimators import EstimatorError, FrictionModel, Moments
-from service import formats, logs
+from service import formats, logs, traces
 from service.stored_results import (
     decode_samples,
     encode_history,
@@ -63,7 +63,7 @@ class Run:
         logs.note(stage=name)
         with self.database.write(durable=False) as session:
             jobs.start_stage(session, self.claim, name, self.seconds)
-        with self.timed(name):
+        with self.timed(name), traces.span(name):
             yield
 
     @contextmanager
@@ -84,7 +84,8 @@ def run_job(database: Database, blobs: BlobStore, claim: Claim) -> None:
     run = Run(database, blobs, claim, job, dict(job.seconds))
     logs.note(kind=job.kind)
     try:
-        _take_through_the_stages(run)
+        with traces.span(job.kind, job.trace, job=job.id):
+            _take_through_the_stages(run)
     except (Refused, SlipcoreError, EstimatorError) as refusal:
         with database.write() as session:
             jobs.finish(session, claim, "refused", reason=str(refusal), seconds=run.seconds)

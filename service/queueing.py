@@ -6,7 +6,7 @@ from sqlalchemy.orm import Session
 
 from db.records import JobKind
 from db.repositories import jobs
-from service import logs
+from service import logs, traces
 
 logger = logging.getLogger(__name__)
 
@@ -21,6 +21,14 @@ def queue(
     seed: int = 0,
 ) -> str:
     """Store a job and return its id; the log then has it beside the id of the request that asks for it."""
-    job_id = jobs.add(session, kind, method, material_id=material_id, grasp_log_id=grasp_log_id, seed=seed)
+    job_id = jobs.add(
+        session,
+        kind,
+        method,
+        material_id=material_id,
+        grasp_log_id=grasp_log_id,
+        seed=seed,
+        trace=traces.place(),
+    )
     logger.info("job queued", extra=logs.of(job=job_id, kind=kind))
     return job_id

@@ -21,8 +21,9 @@ def add(
     material_id: int | None,
     grasp_log_id: str | None = None,
     seed: int = 0,
+    trace: str | None = None,
 ) -> str:
-    """Store a queued job and return its id."""
+    """Store a queued job and return its id; ``trace`` tells where in a trace it was asked for (W3C traceparent)."""
     row = JobRow(
         id=uuid.uuid4().hex,
         kind=kind,
@@ -32,6 +33,7 @@ def add(
         grasp_log_id=grasp_log_id,
         seed=seed,
         seconds={},
+        trace=trace,
     )
     session.add(row)
     session.flush()
@@ -175,6 +177,7 @@ def record(row: JobRow, material: str | None) -> Job:
         seed=row.seed,
         deaths=row.deaths,
         model_version=row.model_version,
+        trace=row.trace,
         created_at=row.created_at,
         finished_at=row.finished_at,
     )
