@@ -110,7 +110,7 @@ def cpu_seconds(process: int) -> float:
 async def ask(port: int, header: str, count: int, latencies: list[float]) -> None:
     """So many requests on one connection, by a client that costs next to nothing."""
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
-    request = f"GET {LOOK_UP} HTTP/1.1\r\nHost: benchmark\r\n{header}\r\n".encode()
+    request = f"GET {LOOK_UP} HTTP/1.1\r\nHost: localhost\r\n{header}\r\n".encode()
     for _ in range(count):
         begin = time.perf_counter()
         writer.write(request)

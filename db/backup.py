@@ -68,6 +68,17 @@ def restore(folder: Path, database: Database, blobs: BlobStore, report: Report) 
         _copy_rows(copy, database, report)
 
 
+def damaged(database: Database, blobs: BlobStore, *, deep: bool) -> Iterator[str]:
+    """What is wrong with the blobs that rows refer to, a line each: missing, or (``deep``) not the bytes of before."""
+    present = set(blobs.hashes())
+    with database.read() as session:
+        for sha256 in _wanted(session):
+            if sha256 not in present:
+                yield f"blob {sha256} is missing"
+            elif deep and not blobs.is_intact(sha256):
+                yield f"blob {sha256} has other bytes than it had"
+
+
 def _copied(file: Path, folder: Path) -> Path:
     """To open a SQLite file is to write to its folder, and a backup may be read-only."""
     return Path(shutil.copyfile(file, folder / FILE))

@@ -142,6 +142,11 @@ class BlobStore:
         """Whether a blob is stored."""
         return self._place(sha256).is_file() if self._remote is None else self._remote.has(sha256)
 
+    def is_intact(self, sha256: str) -> bool:
+        """Whether a blob, read as a whole, has the bytes that it is named for."""
+        with self.path(sha256).open("rb") as stream:
+            return hashlib.file_digest(stream, hashlib.sha256).hexdigest() == sha256
+
     def remove(self, hashes: Iterable[str]) -> None:
         """Delete blobs to which nothing refers; those that aren't there are no error."""
         gone = list(hashes)

@@ -1,6 +1,7 @@
 """The gate before all routes: finds out who asks, and turns away who may not."""
 
 import math
+import re
 import time
 
 from fastapi import Request
@@ -15,7 +16,7 @@ from db.repositories import access_keys
 from service import access, problems
 from service.access import CHALLENGE, EVERYTHING, PUBLIC_PATHS, Access, is_loopback
 from service.context import Context
-from service.problems import INVALID_KEY, KEY_REQUIRED, TOO_MANY_REQUESTS, Problem
+from service.problems import INVALID_KEY, KEY_REQUIRED, MISDIRECTED_REQUEST, TOO_MANY_REQUESTS, Problem
 from service.rate_limit import RateLimit
 from service.settings import Settings
 
@@ -112,6 +113,7 @@ class Gate:
             if self._needs_key(connection.scope):
                 detail = f"send an access key: Authorization: Bearer KEY; got {kind or 'no such header'}"
                 raise Problem(KEY_REQUIRED, detail, headers={"WWW-Authenticate": CHALLENGE})
+            _check_host(connection)
             return EVERYTHING
         context: Context = connection.app.state.context
         try:
@@ -128,6 +130,18 @@ class Gate:
         if self._settings.access == "auto":
             return not _is_local(scope)
         return self._settings.access == "keys"
+
+
+def _check_host(connection: HTTPConnection) -> None:
+    """Refuse a request that needs no key, since it comes from this machine, but is meant for another one.
+
+    A page of that name has been made to lead here, and a browser on this machine now asks for it (DNS rebinding).
+    """
+    host = connection.headers.get("host", "localhost")
+    name = host.rpartition(":")[0] if re.search(r":\d*$", host) else host
+    if _is_local(connection.scope) and not is_loopback(name.strip("[]").lower()):
+        allowed = "localhost or a loopback address; a proxy sends X-Forwarded-For or a key"
+        raise Problem.wrong_value(MISDIRECTED_REQUEST, "Host", host, allowed)
 
 
 def _is_local(scope: Scope) -> bool:

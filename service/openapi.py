@@ -12,6 +12,7 @@ from service.problems import (
     INVALID_KEY,
     KEY_REQUIRED,
     MEDIA_TYPE,
+    MISDIRECTED_REQUEST,
     REQUEST_TIMEOUT,
     STOPPING,
     TOO_MANY_REQUESTS,
@@ -22,7 +23,7 @@ from service.routes.common import description_of
 AT_THE_DOOR = (BAD_REQUEST, HEADERS_TOO_LARGE, STOPPING)
 """Problems of every route, before it is known what is asked."""
 
-AT_THE_GATE = (KEY_REQUIRED, INVALID_KEY, INSUFFICIENT_SCOPE, TOO_MANY_REQUESTS)
+AT_THE_GATE = (KEY_REQUIRED, INVALID_KEY, INSUFFICIENT_SCOPE, MISDIRECTED_REQUEST, TOO_MANY_REQUESTS)
 """Problems of every route that needs a key."""
 
 

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from service.cli.exit_codes import INPUT_REFUSED
+
 if TYPE_CHECKING:
     from db.blobs import BlobStore
     from db.database import Database
@@ -22,7 +24,7 @@ def upgrade(database_url: Url = None) -> None:
     """Bring the database to this version's schema; a new one gets all its tables."""
     from db import migrate
 
-    with opened(database_url) as database:
+    with opened(database_url, may_be_new=True) as database:
         migrate.upgrade(database)
         typer.echo(f"at revision {migrate.current(database)}")
 
@@ -50,13 +52,26 @@ def current(database_url: Url = None) -> None:
 
 
 @app.command()
-def check(database_url: Url = None) -> None:
-    """Make sure that the database's schema is this version's; exit code 3 and the difference if not."""
+def check(
+    database_url: Url = None,
+    deep: Annotated[
+        bool, typer.Option("--deep", help="Read every file, too: its bytes must be those of before.")
+    ] = False,
+) -> None:
+    """Make sure that the schema is this version's and every file that rows refer to is there; exit code 3 if not."""
     from db import migrate
+    from db.backup import damaged
 
     with opened(database_url) as database:
         migrate.check(database)
         typer.echo("the schema is this version's")
+        is_whole = True
+        for line in damaged(database, opened_blobs(), deep=deep):
+            typer.echo(line, err=True)
+            is_whole = False
+    if not is_whole:
+        raise typer.Exit(INPUT_REFUSED)
+    typer.echo("every file is there" + (", and as it was" if deep else ""))
 
 
 @app.command()
@@ -80,7 +95,7 @@ def restore(
     """Fill an empty database, SQLite or PostgreSQL, and its blob store from a backup."""
     from db.backup import restore as copy_in
 
-    with opened(database_url) as database:
+    with opened(database_url, may_be_new=True) as database:
         copy_in(folder, database, opened_blobs(), _tell)
     typer.echo(f"restored from {folder}")
 
@@ -101,16 +116,24 @@ def _tell(what: str, count: int) -> None:
 
 
 @contextmanager
-def opened(url: str | None) -> Iterator["Database"]:
-    """The database at this URL, or the service's own."""
+def opened(url: str | None, *, may_be_new: bool = False) -> Iterator["Database"]:
+    """The database at this URL, or the service's own; raises ``NotFound`` for a file that isn't there.
+
+    SQLite would make one: in a folder that was named wrongly, a command should not leave a database behind.
+    """
     from db.database import Database
+    from db.errors import NotFound
     from service.settings import Settings
 
     if url is None:
         settings = Settings()
-        settings.data_folder.mkdir(parents=True, exist_ok=True)
+        if may_be_new:
+            settings.data_folder.mkdir(parents=True, exist_ok=True)
         url = settings.resolved_database_url
     database = Database(url)
+    file = database.engine.url.database
+    if database.is_sqlite and not may_be_new and not Path(file or "").is_file():
+        raise NotFound("database", str(file))
     try:
         yield database
     finally:

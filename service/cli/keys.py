@@ -32,7 +32,7 @@ def create(
     if not 0 < len(name) <= 100 or not name.isprintable():
         raise typer.BadParameter(f"name is {name!r}; allowed: 1 to 100 printable characters")
     key_id, text = new_key()
-    with opened(database_url) as database:
+    with opened(database_url, may_be_new=True) as database:
         _prepare(database)
         with database.write() as session:
             stored = access_keys.add(session, key_id, name, scope, digest(text))

@@ -3,16 +3,22 @@
 import itertools
 import json
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from db.blobs import BlobStore
+from db.database import Database
+from db.records import NewGraspLog
+from db.repositories import grasp_logs
 from service import formats
 from service.cli import app, main
 from service.cli.exit_codes import INPUT_REFUSED, NOT_FEASIBLE, SERVICE_REFUSED
 from service.cli.output import plain
 from service.demo.server import running_server
+from service.settings import Settings
 from slipcore.contact import tangential_ramp
 from slipcore.contact.ramp import RampSchedule
 from stiction_client import container
@@ -252,11 +258,49 @@ def test_an_unknown_material_is_named(run: Run, url: str) -> None:
     assert "unobtainium" in err
 
 
-def test_db_upgrade_makes_a_database_that_check_approves_of(run: Run, tmp_path: Path) -> None:
+def test_db_upgrade_makes_a_database_that_check_approves_of(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("STICTION_DATA_FOLDER", str(tmp_path))
     database = f"sqlite:///{tmp_path / 'stiction.sqlite'}"
     assert run("db", "check", "--database-url", database)[0] != 0
     assert run("db", "upgrade", "--database-url", database)[0] == 0
     assert run("db", "check", "--database-url", database)[0] == 0
+
+
+@pytest.mark.parametrize(
+    "command",
+    [("db", "backup", "copy"), ("db", "check"), ("db", "current"), ("db", "downgrade", "0001"), ("blobs", "prune")],
+    ids=lambda command: command[1],
+)
+def test_a_command_in_the_wrong_folder_leaves_nothing_there(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: tuple[str, ...]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("STICTION_DATA_FOLDER", str(tmp_path / "wrong"))
+    monkeypatch.setenv("STICTION_KEEP_UPLOADS_DAYS", "1")
+    code, _, err = run(*command)
+    assert code == INPUT_REFUSED
+    assert f"no database '{tmp_path / 'wrong' / 'stiction.sqlite3'}' is stored" in err
+    assert not list(tmp_path.iterdir())
+
+
+def test_check_tells_files_that_are_missing_or_changed(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("STICTION_DATA_FOLDER", str(tmp_path))
+    assert run("db", "upgrade")[0] == 0
+    blobs = BlobStore(tmp_path)
+    kept, changed, lost = (blobs.put(name) for name in (b"kept", b"changed", b"lost"))
+    with closing(Database(Settings().resolved_database_url)) as database, database.write() as session:
+        for sha256 in (kept, changed, lost):
+            grasp_logs.add(session, NewGraspLog(sha256, 4, "npz", "filter", None, "s", 2, 1.0, (1, 1)))
+    assert run("db", "check", "--deep")[0] == 0
+    blobs.path(changed).write_bytes(b"Changed")
+    blobs.remove([lost])
+    code, _, err = run("db", "check")
+    assert (code, err) == (INPUT_REFUSED, f"blob {lost} is missing\n")
+    assert f"blob {changed} has other bytes than it had\n" in run("db", "check", "--deep")[2]
 
 
 def test_json_holds_no_number_that_json_does_not_know() -> None:

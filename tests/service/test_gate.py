@@ -131,6 +131,43 @@ def test_who_must_send_a_key(reach: Reach, mode: str, server: str, address: str,
 
 
 @ONLY_SQLITE
+@pytest.mark.parametrize("mode", ["auto", "open"])
+@pytest.mark.parametrize(
+    ("host", "status"),
+    [
+        ("127.0.0.1:8000", 200),
+        ("localhost", 200),
+        ("LOCALHOST:8000", 200),
+        ("[::1]:8000", 200),
+        ("[::1]", 200),
+        ("evil.example", 421),
+        ("evil.example:8000", 421),
+        ("localhost.evil.example", 421),
+        ("127.0.0.1.evil.example", 421),
+        ("192.168.0.7:8000", 421),
+        ("", 421),
+    ],
+)
+def test_a_page_that_has_its_name_lead_here_learns_nothing(
+    reach: Reach, make: Make, mode: str, host: str, status: int
+) -> None:
+    local = reach(mode, server="127.0.0.1", address="127.0.0.1")
+    answer = local.get("/v1/materials", headers={"Host": host})
+    assert answer.status_code == status
+    assert status == 200 or answer.json()["type"] == "/problems/misdirected-request"
+    local.headers["Authorization"] = f"Bearer {make()}"
+    assert local.get("/v1/materials", headers={"Host": host}).status_code == httpx.codes.OK
+    assert reach("open").get("/v1/materials", headers={"Host": host}).status_code == httpx.codes.OK  # behind a proxy
+
+
+@ONLY_SQLITE
+def test_a_stream_of_such_a_page_is_not_opened(reach: Reach) -> None:
+    local = reach(server="127.0.0.1", address="127.0.0.1")
+    local.headers["Host"] = "evil.example"
+    assert local.open_stream("/v1/stream").status_code == 421
+
+
+@ONLY_SQLITE
 def test_a_key_that_is_sent_counts_where_none_is_needed(reach: Reach, make: Make) -> None:
     assert reach("open", key=make("read")).request("POST", "/v1/materials", json={"name": "felt"}).status_code == 403
     assert reach("open", key="wrong").get("/v1/materials").status_code == 401

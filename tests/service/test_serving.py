@@ -22,7 +22,9 @@ def ask(address: tuple[str, int], request: bytes) -> socket.socket:
 
 
 def upload(length: int, body: bytes) -> bytes:
-    head = f"POST /v1/grasp-logs HTTP/1.1\r\nHost: a\r\nContent-Type: {HDF5}\r\nContent-Length: {length}\r\n\r\n"
+    head = (
+        f"POST /v1/grasp-logs HTTP/1.1\r\nHost: localhost\r\nContent-Type: {HDF5}\r\nContent-Length: {length}\r\n\r\n"
+    )
     return head.encode() + body
 
 
@@ -35,7 +37,7 @@ def a_body_that_does_not_come(address: tuple[str, int]) -> socket.socket:
 
 
 def answers_that_nobody_reads(address: tuple[str, int]) -> socket.socket:
-    return ask(address, b"GET /openapi.json HTTP/1.1\r\nHost: a\r\n\r\n" * 100)
+    return ask(address, b"GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n" * 100)
 
 
 @pytest.mark.parametrize(

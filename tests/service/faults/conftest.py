@@ -102,7 +102,7 @@ class Server:
     def begin_upload(self, content: bytes, sent: int) -> socket.socket:
         """Send the first bytes of an upload only."""
         connection = socket.create_connection(("127.0.0.1", self.port))
-        head = f"POST /v1/grasp-logs?material=paper HTTP/1.1\r\nHost: x\r\nContent-Type: {NPZ}\r\n"
+        head = f"POST /v1/grasp-logs?material=paper HTTP/1.1\r\nHost: localhost\r\nContent-Type: {NPZ}\r\n"
         connection.sendall(f"{head}Content-Length: {len(content)}\r\n\r\n".encode() + content[:sent])
         return connection
 

@@ -224,10 +224,8 @@ def test_an_upload_over_the_limit_is_refused_while_it_streams(client: httpx.Clie
 def test_an_upload_that_breaks_off_leaves_nothing(client: httpx.Client, content: bytes) -> None:
     before = stored_files(client)
     with socket.create_connection((client.base_url.host, client.base_url.port or 0)) as connection:
-        head = (
-            f"POST /v1/grasp-logs HTTP/1.1\r\nHost: x\r\nContent-Type: {NPZ}\r\nContent-Length: {len(content)}\r\n\r\n"
-        )
-        connection.sendall(head.encode() + content[: len(content) // 2])
+        head = f"POST /v1/grasp-logs HTTP/1.1\r\nHost: localhost\r\nContent-Type: {NPZ}\r\n"
+        connection.sendall(f"{head}Content-Length: {len(content)}\r\n\r\n".encode() + content[: len(content) // 2])
         wait_until(lambda: len(stored_files(client)) == len(before) + 1)
     wait_until(lambda: stored_files(client) == before)
 
