@@ -12,7 +12,12 @@ DOCUMENTED = dict(
 )
 
 
-UNSET = {"database_url": "SQLite file", "blob_url": "the data folder", "dask_address": "none"}
+UNSET = {
+    "keep_uploads_days": "for ever",
+    "database_url": "SQLite file",
+    "blob_url": "the data folder",
+    "dask_address": "none",
+}
 """What holds in place of a setting without a default."""
 
 
@@ -58,6 +63,10 @@ def test_the_databases_password_is_not_shown() -> None:
         ("poll_seconds", 0.0),
         ("workers", 65),
         ("job_attempts", 0),
+        ("keep_uploads_days", 0.0),
+        ("keep_uploads_days", 36501.0),
+        ("log_format", "xml"),
+        ("log_level", "trace"),
         ("shutdown_seconds", -1.0),
         ("database_url", "sqlite://"),
         ("database_url", "sqlite:///:memory:"),
