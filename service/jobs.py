@@ -182,7 +182,7 @@ class JobRunner:
                 return None
         with self._database.write(durable=False) as session:
             migrate.require_head(session)
-            claim = jobs.claim(session, self._id)
+            claim = jobs.claim(session, self._id, besides=self._at)
         if claim is not None:
             self._at.add(claim.job_id)
         return claim

@@ -1,7 +1,7 @@
 """Queries on jobs: durable rows that runners claim. Only the runner that has the claim can change a running job."""
 
 import uuid
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from datetime import datetime
 
 from sqlalchemy import func, select, update
@@ -82,11 +82,14 @@ def any_queued(session: Session) -> bool:
     return session.scalar(select(JobRow.id).where(JobRow.status == "queued").limit(1)) is not None
 
 
-def claim(session: Session, runner_id: str) -> Claim | None:
-    """Give the oldest queued job to a runner, if there is one; runners that claim at once get different ones."""
+def claim(session: Session, runner_id: str, besides: Collection[str] = ()) -> Claim | None:
+    """Give the oldest queued job to a runner, if there is one; runners that claim at once get different ones.
+
+    ``besides``: jobs that the runner is still at, whatever a database that crashed remembers of its claims.
+    """
     oldest = (
         select(JobRow.id)
-        .where(JobRow.status == "queued")
+        .where(JobRow.status == "queued", JobRow.id.not_in(besides))
         .order_by(JobRow.created_at, JobRow.id)
         .limit(1)
         .with_for_update(skip_locked=True)

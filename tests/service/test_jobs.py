@@ -5,12 +5,13 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from sqlalchemy import text
+from sqlalchemy import text, update
 
 from db.database import Database
-from db.errors import StorageUnavailable
+from db.errors import ClaimLost, StorageUnavailable
 from db.records import Claim, Job
 from db.repositories import jobs, materials, runners
+from db.tables import JobRow
 from service.jobs import LOOKS, JobRunner, Watch
 from service.lanes import WorkerDied
 
@@ -190,6 +191,31 @@ def test_a_job_waits_for_storage_without_losing_an_attempt(
     working(do, until_finished(database, queued))
     assert set(tries.values()) == {ATTEMPTS + 1}
     assert {get(database, job_id).deaths for job_id in queued} == {0}
+
+
+def test_a_job_is_not_begun_twice_at_once_by_a_runner_whose_claim_the_database_has_forgotten(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    """As PostgreSQL does in a crash: that a job was claimed waits for no disk."""
+    tries: Counter[str] = Counter()
+    tries_meanwhile = []
+
+    def do(claim: Claim) -> None:
+        tries[claim.job_id] += 1
+        if sum(tries.values()) > 1:
+            finish(database, claim)
+            return
+        with database.write() as session:
+            session.execute(update(JobRow).where(JobRow.id == claim.job_id).values(status="queued", runner_id=None))
+        wait_until(lambda: all(get(database, other).finished_at for other in queued if other != claim.job_id))
+        time.sleep(0.1)
+        tries_meanwhile.append(tries[claim.job_id])
+        with database.write() as session, pytest.raises(ClaimLost):
+            jobs.start_stage(session, claim, "samples", {})
+
+    working(do, until_finished(database, queued))
+    assert tries_meanwhile == [1]
+    assert {get(database, job_id).status for job_id in queued} == {"done"}
 
 
 def test_jobs_of_a_runner_that_is_silent_are_done_by_another_one(
