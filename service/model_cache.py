@@ -2,10 +2,11 @@
 
 import asyncio
 import hashlib
+import math
 import time
+from collections import OrderedDict
 from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime, timedelta
 from typing import NamedTuple
 
 from db.database import Database
@@ -18,27 +19,28 @@ from service.stored_results import to_friction_model
 MOST = 10_000
 """Models kept, each about 2 kB; when there are more, all are read anew."""
 
-COMMIT_TIME = timedelta(seconds=1)
-"""From the moment that a process writes into a row until others see the row, at most, and what clocks differ by."""
+MOST_CHANGES = 10_000
+"""Changes remembered, 1 MB; one that was forgotten is taken for a new one, which costs a look at the database."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KnownModel:
     """A material's current model as it was at a moment, with the tag that stands for what it answers.
 
-    ``answers``: those that were given, as JSON, by question.
+    ``read_at`` and ``until`` are s of the clock that nobody sets; ``answers`` are those that were given, as JSON, by
+    question.
     """
 
     stored: StoredModel
     model: FrictionModel
     tag: str
-    read_at: datetime
+    read_at: float
     until: float
     answers: dict[Hashable, str] = field(default_factory=dict)
 
 
 class _Reading(NamedTuple):
-    began_at: datetime
+    began_at: float
     task: asyncio.Task[KnownModel]
 
 
@@ -52,7 +54,8 @@ class ModelCache:
         self._seconds = seconds
         self._known: dict[tuple[str, str], KnownModel] = {}
         self._readings: dict[tuple[str, str], _Reading] = {}
-        self._changed_at = datetime.min.replace(tzinfo=UTC)
+        self._changed_at = -math.inf
+        self._changes: OrderedDict[Hashable, None] = OrderedDict()
 
     async def get(self, database: Database, material: str, method: str) -> KnownModel:
         """The model in memory or in the database, read once for all who ask meanwhile; raises as ``read``.
@@ -75,7 +78,7 @@ class ModelCache:
         reading = self._readings.get(key)
         if reading is None or reading.began_at <= self._changed_at or self._seconds == 0.0:
             task = asyncio.create_task(asyncio.to_thread(self.read, database, material, method))
-            reading = self._readings[key] = _Reading(datetime.now(UTC), task)
+            reading = self._readings[key] = _Reading(time.monotonic(), task)
             task.add_done_callback(lambda _: self._forget(key, reading))
         return reading.task
 
@@ -94,7 +97,8 @@ class ModelCache:
 
     def read(self, database: Database, material: str, method: str) -> KnownModel:
         """The model in the database; raises ``NotFound``, and ``Problem`` where the material has none."""
-        read_at, until = datetime.now(UTC), time.monotonic() + self._seconds
+        read_at = time.monotonic()
+        until = read_at + self._seconds
         with database.read() as session:
             stored = friction_models.current(session, material, method)
             if stored is None:
@@ -111,15 +115,19 @@ class ModelCache:
         self._known[material, method] = known
         return known
 
-    def seen(self, changed_at: datetime | None = None) -> None:
-        """That models, or names of materials, changed at a moment (now), as can be seen in the database by now.
+    def seen(self, *changes: Hashable) -> None:
+        """That models, or names of materials, changed, as can be seen in the database by now.
 
-        What was read before, or might have been read before the change was committed, is read anew.
+        ``changes`` are what tells so, such as jobs that have ended: none of them counts a second time. They are told
+        apart by what they are and not by when they were, since clocks differ and are set.
         """
-        visible = datetime.now(UTC)
-        if changed_at is not None:
-            visible = min(visible, changed_at + COMMIT_TIME)
-        self._changed_at = max(self._changed_at, visible)
+        new = set(changes).difference(self._changes)
+        if changes and not new:
+            return
+        self._changes.update(dict.fromkeys(new))
+        while len(self._changes) > MOST_CHANGES:
+            self._changes.popitem(last=False)
+        self._changed_at = time.monotonic()
 
 
 def _tag(stored: StoredModel) -> str:

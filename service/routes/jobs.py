@@ -34,8 +34,8 @@ def list_jobs(
     page = Page(sort, limit, cursor, identity="hex")
     with context.database.read() as session:
         found, after = page.cut(jobs.list_all(session, page.window(), status))
-    for ended in (job.finished_at for job in found if job.finished_at is not None):
-        context.models.seen(ended)
+    if ended := [(job.id, job.finished_at) for job in found if job.finished_at is not None]:
+        context.models.seen(*ended)
     return JobsOut(items=[JobOut.of(job) for job in found], next=link_next(request, response, after))
 
 

@@ -100,7 +100,7 @@ def read_material(context: Given, request: Request, name: str) -> Response:
     """With the current model of each method. `ETag` and `If-None-Match` save the answer to who has it."""
     with context.database.read() as session:
         found = materials.get(session, name)
-    context.models.seen(max((model.created_at for model in found.models), default=found.created_at))
+    context.models.seen((found.id, found.name), *((model.id, model.outdated) for model in found.models))
     return tagged(request, MaterialOut.of(found).model_dump_json())
 
 
@@ -175,7 +175,7 @@ def list_fits(
         versions = friction_models.versions(session, material_id, method, current=current, window=page.window())
         found, after = page.cut(versions)
     if found:
-        context.models.seen(found[0].created_at)
+        context.models.seen((found[0].id, found[0].outdated))
     return FrictionModelsOut(
         items=[FrictionModelOut.of(each) for each in found], next=link_next(request, response, after)
     )

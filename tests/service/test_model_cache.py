@@ -4,12 +4,12 @@ import asyncio
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from datetime import UTC, datetime, timedelta
 
 import pytest
 
 from db.database import Database
 from db.errors import NotFound
+from service import model_cache
 from service.model_cache import KnownModel, ModelCache
 
 pytestmark = [
@@ -92,15 +92,16 @@ def test_who_waits_is_told_what_is_wrong_and_a_renewal_is_not(database: Database
     asyncio.run(run())
 
 
-def test_a_model_read_while_the_next_one_was_committed_is_read_anew(database: Database) -> None:
+def test_a_change_counts_once_whenever_it_was(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model_cache, "MOST_CHANGES", 3)
     cache = ModelCache(60.0)
-    written = datetime.now(UTC) - timedelta(milliseconds=50)
-    cache.read(database, "paper", "ols")
-    cache.seen(written - timedelta(hours=1))
-    assert cache.fresh("paper", "ols") is not None
-    cache.seen(written)
-    assert cache.fresh("paper", "ols") is None
-    cache.read(database, "paper", "ols")
-    cache.seen(datetime.now(UTC) + timedelta(hours=1))  # a clock that runs ahead
-    cache.read(database, "paper", "ols")
-    assert cache.fresh("paper", "ols") is not None
+
+    def forgets(*changes: str) -> bool:
+        cache.read(database, "paper", "ols")
+        assert cache.fresh("paper", "ols") is not None
+        cache.seen(*changes)
+        return cache.fresh("paper", "ols") is None
+
+    assert [forgets("a"), forgets("a"), forgets("b", "a"), forgets("a", "b")] == [True, False, True, False]
+    assert [forgets(), forgets()] == [True, True]
+    assert [forgets("c", "d"), forgets("b", "c", "d"), forgets("a")] == [True, False, True]
