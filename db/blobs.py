@@ -176,7 +176,7 @@ class BlobStore:
         for path in self._spool.iterdir():
             path.unlink(missing_ok=True)
         removed: list[str] = []
-        remaining = self._local() if self._remote is None else self._remote.hashes(ORPHAN_AGE)
+        remaining = self._local() if self._remote is None else self._remote.hashes(self._remote.now() - ORPHAN_AGE)
         while some := list(islice(remaining, HASHES_PER_QUERY)):
             removed += sorted(set(some) - referenced(some))
         self.remove(removed)
@@ -199,8 +199,9 @@ class BlobStore:
         self._fetched = 0
         files = sorted((stat.st_mtime, stat.st_size, path) for path, stat in self._files())
         total = sum(size for _, size, _ in files)
+        latest = min(time.time(), max((used for used, _, _ in files), default=0.0))  # clocks may be set ahead
         for used, size, path in files:
-            if total <= self._cache_bytes or used > time.time() - CACHE_GRACE:
+            if total <= self._cache_bytes or used > latest - CACHE_GRACE:
                 return
             path.unlink(missing_ok=True)
             total -= size

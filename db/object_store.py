@@ -4,7 +4,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from db.defaults import OBJECT_STORE_TIMEOUT
 from db.errors import DriverMissing, NotFound, StorageUnavailable
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
+_CLOCK = "clock"
 
 
 class ObjectStore:
@@ -50,14 +51,21 @@ class ObjectStore:
         """Whether a blob is there."""
         return self._is_there(_key(sha256))
 
-    def hashes(self, older_than: timedelta = timedelta(0)) -> Iterator[str]:
-        """Hashes of all blobs that have been there for so long."""
-        latest = datetime.now(UTC) - older_than
+    def now(self) -> datetime:
+        """The present moment by the store's own clock, whatever this machine's says."""
+        with _answered("blob store"):
+            self._obstore.put(self._store, _CLOCK, b"")
+            written: datetime = self._obstore.head(self._store, _CLOCK)["last_modified"]
+            self._obstore.delete(self._store, _CLOCK)
+        return written
+
+    def hashes(self, before: datetime | None = None) -> Iterator[str]:
+        """Hashes of all blobs, or of those that were stored before a moment of the store's clock."""
         with _answered("blob store"):
             for page in self._obstore.list(self._store):
                 for entry in page:
                     name = entry["path"].rpartition("/")[2]
-                    if _SHA256.fullmatch(name) and entry["last_modified"] <= latest:
+                    if _SHA256.fullmatch(name) and (before is None or entry["last_modified"] < before):
                         yield name
 
     def delete(self, hashes: Iterable[str]) -> None:

@@ -2,7 +2,9 @@ import hashlib
 import os
 import sys
 import time
+from datetime import timedelta
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -66,13 +68,21 @@ def test_the_cache_drops_what_was_not_used_for_longest(
     assert blobs.path(stored[1]).stat().st_size == 100_000
 
 
-def test_a_young_object_to_which_nothing_refers_stays(s3: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another server may have stored it and not yet written its row."""
-    from datetime import timedelta
+def test_what_was_just_used_stays_in_the_cache_where_the_clock_was_set_ahead(
+    s3: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert s3.objects == {}
+    monkeypatch.setattr("db.blobs.time", SimpleNamespace(time=lambda: time.time() + 86400.0))
+    blobs = open_blobs(tmp_path, URL, 250_000)
+    stored = [blobs.put(bytes([number]) * 100_000) for number in range(4)]
+    assert sorted(path.name for path in (tmp_path / "blobs").glob("??/*")) == sorted(stored)
 
+
+def test_a_young_object_to_which_nothing_refers_stays(s3: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another server may have stored it and not yet written its row. Two days are two days of the store's clock."""
     blobs = open_blobs(tmp_path, URL, MIB)
     sha256 = blobs.put(b"tactile")
-    monkeypatch.setattr("db.blobs.ORPHAN_AGE", timedelta(days=10_000))
+    monkeypatch.setattr("db.blobs.ORPHAN_AGE", timedelta(days=3))
     assert blobs.sweep(lambda _: set()) == []
     monkeypatch.setattr("db.blobs.ORPHAN_AGE", timedelta(hours=24))
     assert blobs.sweep(lambda _: set()) == [sha256]
