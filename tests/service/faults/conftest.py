@@ -4,6 +4,7 @@ import hashlib
 import multiprocessing
 import os
 import runpy
+import site
 import socket
 import sys
 import threading
@@ -70,6 +71,8 @@ def run_module(command: tuple[str, ...], environment: dict[str, str], log: Path)
         for output in (1, 2):
             os.dup2(stream.fileno(), output)
     os.environ.update(environment)
+    sys.path[:0] = environment.get("PYTHONPATH", "").split(os.pathsep)
+    site.execsitecustomize()  # as at the start of an interpreter
     sys.argv[:] = command
     runpy.run_module(command[0], run_name="__main__", alter_sys=True)
 
@@ -91,9 +94,11 @@ class Server:
         self.url = f"http://127.0.0.1:{self.port}"
         self.client = httpx.Client(base_url=self.url, timeout=PATIENCE)
 
-    def upload(self, content: bytes, **headers: str) -> httpx.Response:
+    def upload(self, content: bytes, client: httpx.Client | None = None, **headers: str) -> httpx.Response:
+        """The answer; threads need clients of their own."""
         headers |= {"content-type": NPZ}
-        return self.client.post("/v1/grasp-logs", params={"material": "paper"}, content=content, headers=headers)
+        asked: dict[str, Any] = {"params": {"material": "paper"}, "content": content, "headers": headers}
+        return (client or self.client).post("/v1/grasp-logs", **asked)
 
     def accept(self, content: bytes) -> str:
         """Upload, and return the log's id."""
@@ -129,7 +134,7 @@ class Fleet:
         self.workers: list[BaseProcess] = []
         self._context = multiprocessing.get_context("forkserver")
         self._context.set_forkserver_preload(["service.cli", "service.cli.running", "service.serving"])
-        self._environment = {
+        self.environment = {
             "STICTION_DATA_FOLDER": str(folder),
             "STICTION_DATABASE_URL": database_url,
             "STICTION_LEASE_SECONDS": "2",
@@ -155,7 +160,7 @@ class Fleet:
         wait_until(is_ready, "the server to be ready")
 
     def _start(self, *command: str, workers: int) -> BaseProcess:
-        environment = self._environment | {"STICTION_WORKERS": str(workers)}
+        environment = self.environment | {"STICTION_WORKERS": str(workers)}
         process = self._context.Process(target=run_module, args=(command, environment, self.log))
         process.start()
         return process

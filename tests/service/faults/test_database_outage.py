@@ -34,7 +34,7 @@ READ = (
     "/metrics",
     "/readyz",
 )
-OUTAGES = 40
+OUTAGES = 20
 
 pytestmark = pytest.mark.parametrize("engine_name", ["postgresql"], indirect=True)
 
