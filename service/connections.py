@@ -1,4 +1,7 @@
-"""HTTP connections that cannot be kept waiting: who is slow with a request's headers is let go."""
+"""HTTP connections that cannot be kept waiting: who is slow with a request's headers is let go.
+
+So is who goes on with a body after its answer.
+"""
 
 import asyncio
 import json
@@ -10,7 +13,10 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from service.problems import BAD_REQUEST, MEDIA_TYPE
 
 HEADER_SECONDS = 10.0
-"""s from the first byte of a request, or from the connection, to the end of its headers."""
+"""s from the first byte of a request, or from the connection, to the end of its headers.
+
+As long may a body go on that was answered before it was whole: nobody reads it.
+"""
 
 
 class BoundedConnection(H11Protocol):
@@ -26,9 +32,10 @@ class BoundedConnection(H11Protocol):
         self._wait_for_headers()
 
     def data_received(self, data: bytes) -> None:
-        """Go on waiting unless the headers are there."""
+        """Go on waiting unless the headers are there, and the body while it is read."""
         super().data_received(data)
-        if self.conn.their_state is h11.IDLE and not self.transport.is_closing():
+        is_answered = self.conn.our_state is h11.DONE and self.conn.their_state is h11.SEND_BODY
+        if (self.conn.their_state is h11.IDLE or is_answered) and not self.transport.is_closing():
             if self._header_timer is None:
                 self._wait_for_headers()
         else:

@@ -19,9 +19,9 @@ Connect = Callable[[], socket.socket]
 
 
 async def hello(scope: Scope, receive: Receive, send: Send) -> None:
-    """Answers when it has the whole body."""
+    """Answers when it has the whole body, or early."""
     assert scope["type"] == "http"
-    while (await receive()).get("more_body"):
+    while scope["path"] != "/early" and (await receive()).get("more_body"):
         pass
     await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"5")]})
     await send({"type": "http.response.body", "body": b"hello"})
@@ -74,6 +74,16 @@ def test_who_does_not_finish_his_headers_is_let_go(connect: Connect, sent: bytes
     began, connection = time.monotonic(), connect()
     connection.sendall(sent)
     assert rest(connection) == b""
+    assert PATIENCE * 0.9 < time.monotonic() - began < 5.0
+
+
+def test_who_goes_on_with_a_body_after_its_answer_is_let_go(connect: Connect) -> None:
+    connection = connect()
+    connection.sendall(b"POST /early HTTP/1.1\r\nHost: a\r\nContent-Length: 1000\r\n\r\n")
+    assert connection.recv(65536).startswith(b"HTTP/1.1 200")
+    began = time.monotonic()
+    connection.sendall(b"x")  # which ends the server's own clock for idle connections
+    rest(connection)
     assert PATIENCE * 0.9 < time.monotonic() - began < 5.0
 
 
