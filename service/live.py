@@ -1,9 +1,10 @@
 """Live detectors, in a worker process: one a session, fed frame by frame. Module-level functions of plain values."""
 
+import logging
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, fields
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,8 @@ from slipcore import (
     collect_samples,
 )
 from stiction_client import container
+
+logger = logging.getLogger(__name__)
 
 WINDOW, STRIDE = 45, 30
 """Frames that friction samples are looked for in, and frames from one look to the next: once a second."""
@@ -51,6 +54,7 @@ class Session:
     frames: list[Frame] = field(default_factory=list)
     answers: list[SlipState] = field(default_factory=list)
     until_look: int = WINDOW
+    look: Future[None] | None = None
     looked_until: float = -math.inf
     last: tuple[int, dict[str, Any]] = (-1, {})
     friction: dict[str, Any] | None = None
@@ -58,8 +62,8 @@ class Session:
 
 _SESSIONS: dict[str, Session] = {}
 
-_LOOKS: dict[str, Callable[[], None]] = {}
-"""Looks for friction, by session, that wait until no frame does."""
+_LOOKS = ThreadPoolExecutor(1)
+"""Does the looks for friction, so that frames need not wait for them."""
 
 
 def open_session(name: str, position: Numbers, grid: tuple[int, int], area: float, method: str, keep: bool) -> None:
@@ -100,7 +104,7 @@ def step(
         if session.kept:
             session.kept.pop()
         raise
-    _plan_look(name, session, frame, state)
+    _plan_look(session, frame, state)
     session.last = (number, _answer(session, number, state))
     return session.last[1]
 
@@ -120,14 +124,6 @@ def write(name: str, target: Path, sensor: str) -> Description:
 def drop(name: str) -> None:
     """Forget a session."""
     _SESSIONS.pop(name, None)
-    _LOOKS.pop(name, None)
-
-
-def look() -> bool:
-    """Do one of the looks for friction that wait; whether more of them do."""
-    if _LOOKS:
-        _LOOKS.pop(next(iter(_LOOKS)))()
-    return bool(_LOOKS)
 
 
 def _keep(session: Session, frame: Frame) -> None:
@@ -141,8 +137,8 @@ def _keep(session: Session, frame: Frame) -> None:
     session.kept.append(frame)
 
 
-def _plan_look(name: str, session: Session, frame: Frame, state: SlipState) -> None:
-    """Once in a while, let the last frames be looked at; at once only where the look before still waits."""
+def _plan_look(session: Session, frame: Frame, state: SlipState) -> None:
+    """Once in a while, let the last frames be looked at."""
     if frame.force is None:
         return
     session.frames = [*session.frames[1 - WINDOW :], frame]
@@ -150,9 +146,17 @@ def _plan_look(name: str, session: Session, frame: Frame, state: SlipState) -> N
     session.until_look -= 1
     if session.until_look == 0:
         session.until_look = STRIDE
-        if name in _LOOKS:
-            _LOOKS.pop(name)()
-        _LOOKS[name] = partial(_find_friction, session, session.frames, session.answers, session.detector.state)
+        if session.look is not None:
+            wait([session.look])  # where there is so much to do that it is not done yet, frames have to wait, too
+        given = session.frames, session.answers, session.detector.state
+        session.look = _LOOKS.submit(_look, session, *given)
+
+
+def _look(session: Session, frames: list[Frame], answers: list[SlipState], state: DetectorState) -> None:
+    try:
+        _find_friction(session, frames, answers, state)
+    except Exception:  # costs the stream this second's friction, and nothing else
+        logger.exception("a look for friction failed")
 
 
 def _find_friction(session: Session, frames: list[Frame], answers: list[SlipState], state: DetectorState) -> None:

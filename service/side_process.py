@@ -1,15 +1,15 @@
-"""A process beside the server that does calls one after the other, and chores while there are none.
+"""A process beside the server that does calls one after the other.
 
-An executor of ``concurrent.futures`` does the former with two threads and two queues in the server, which for a call of
+An executor of ``concurrent.futures`` does that with two threads and two queues in the server, which for a call of
 a tenth of a millisecond cost more than the call. Here it is one message each way, over a socket of the event loop.
 """
 
 import asyncio
 import multiprocessing
 import pickle
-import select
 import socket
 import struct
+import sys
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
@@ -20,6 +20,9 @@ from service import logs, worker
 
 LENGTH = struct.Struct("<Q")
 """In front of every message: its bytes."""
+
+SWITCH_SECONDS = 0.0005
+"""s that a call may have to wait for another thread of the process to let go of the interpreter."""
 
 LAST_SECONDS = 10.0
 """s that a call under way may still take once the process is to end."""
@@ -40,12 +43,11 @@ class SideProcess:
         self._reading = asyncio.create_task(self._read())
 
     @classmethod
-    async def start(cls, chore: Callable[[], bool]) -> "SideProcess":
-        """``chore`` is done there while nothing is asked, again and again until it says that nothing is left to do."""
+    async def start(cls) -> "SideProcess":
+        """A new process."""
         ours, theirs = socket.socketpair()
-        process = multiprocessing.get_context("spawn").Process(
-            target=_work, args=(theirs, chore, logs.current()), daemon=True
-        )
+        context = multiprocessing.get_context("spawn")
+        process = context.Process(target=_work, args=(theirs, logs.current()), daemon=True)
         with theirs:
             await asyncio.to_thread(process.start)
         return cls(process, *await asyncio.open_connection(sock=ours))
@@ -88,19 +90,15 @@ class SideProcess:
                 answer.set_exception(ProcessEnded())
 
 
-def _work(line: socket.socket, chore: Callable[[], bool], chosen: logs.Logs | None) -> None:
+def _work(line: socket.socket, chosen: logs.Logs | None) -> None:
     """What the process does until nobody is at the other end."""
     worker.start(chosen)
+    sys.setswitchinterval(SWITCH_SECONDS)
     with line, suppress(EOFError, ConnectionError):
-        is_left = False
         while True:
-            if is_left and not select.select([line], [], [], 0.0)[0]:
-                is_left = chore()
-                continue
             do, arguments = _receive(line)
             content = pickle.dumps(_outcome(do, arguments), pickle.HIGHEST_PROTOCOL)
             line.sendall(LENGTH.pack(len(content)) + content)
-            is_left = True
 
 
 def _outcome(do: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[Any, Exception | None]:

@@ -137,7 +137,7 @@ class Streams:
     async def _started(self) -> SideProcess:
         async with self._starting:
             if self._process is None:
-                self._process = await SideProcess.start(live.look)
+                self._process = await SideProcess.start()
             return self._process
 
     async def stop(self) -> None:

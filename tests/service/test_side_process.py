@@ -10,22 +10,10 @@ import pytest
 
 from service.side_process import ProcessEnded, SideProcess
 
-_CHORES = [3]
-
-
-def count_down() -> bool:
-    """A chore of three parts."""
-    _CHORES[0] -= _CHORES[0] > 0
-    return _CHORES[0] > 0
-
-
-def chores_left() -> int:
-    return _CHORES[0]
-
 
 @asynccontextmanager
 async def running() -> AsyncIterator[SideProcess]:
-    process = await SideProcess.start(count_down)
+    process = await SideProcess.start()
     yield process
     await process.stop()
 
@@ -60,15 +48,6 @@ def test_who_waits_no_longer_takes_nobody_elses_answer() -> None:
         await asyncio.sleep(0)
         first.cancel()
         assert await second == 2
-
-    with_process(body)
-
-
-def test_chores_are_done_to_their_end_while_nobody_asks() -> None:
-    async def body(process: SideProcess) -> None:
-        await process.call(os.getpid)  # there is nothing left to do before the first call
-        while await process.call(chores_left):
-            await asyncio.sleep(0.01)
 
     with_process(body)
 
