@@ -121,7 +121,7 @@ class ModelCache:
         ``changes`` are what tells so, such as jobs that have ended: none of them counts a second time. They are told
         apart by what they are and not by when they were, since clocks differ and are set.
         """
-        new = set(changes).difference(self._changes)
+        new = [each for each in changes if each not in self._changes]  # not by a set, which would walk over all of them
         if changes and not new:
             return
         self._changes.update(dict.fromkeys(new))
