@@ -188,12 +188,13 @@ class JobRunner:
         return claim
 
     async def _do(self, lane: Lane, claim: Claim) -> None:
+        is_lost = False
         try:
             await lane.run(claim)
         except WorkerDied:
-            if not self._stopping:
-                await self._try(lambda: self._count_death(claim))  # at once: another lane may take the job up
-                await self._hire(lane)
+            is_lost = not self._stopping
+            if is_lost:
+                await self._try(lambda: self._count_death(claim))
         except StorageUnavailable as error:
             logger.warning("job %s waits: %s", claim.job_id, error)
             await asyncio.sleep(RETRY_SECONDS)
@@ -205,6 +206,8 @@ class JobRunner:
             self._at.discard(claim.job_id)  # where it is still ours in the database, it is a stray
             if (ending := self._endings.pop(claim.job_id, None)) is not None:
                 ending.set()
+        if is_lost and not self._stopping:  # only now: meanwhile another lane may take the job up
+            await self._hire(lane)
 
     def _fail(self, claim: Claim, reason: str) -> None:
         try:

@@ -318,3 +318,25 @@ def test_a_runner_is_dead_once_its_beats_stand_still() -> None:
     assert watch.look({"dead": 7, "alive": LOOKS, "slow": LOOKS // 2}) == ["dead"]
     assert watch.look({"alive": 9, "new": 0}) == []
     assert watch.look({"dead": 7}) == []  # seen anew
+
+
+def test_a_job_that_lost_its_worker_does_not_wait_for_the_next_one(
+    database: Database, queued: list[str], working: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A Dask scheduler may be away for long."""
+    lost: list[ThreadLane] = []
+
+    async def hire(lane: ThreadLane) -> None:
+        while lane in lost:
+            await asyncio.sleep(0.01)
+
+    async def run(lane: ThreadLane, claim: Claim) -> None:
+        if not lost:
+            lost.append(lane)
+            raise WorkerDied
+        await asyncio.to_thread(finish, database, claim)
+
+    monkeypatch.setattr(ThreadLane, "hire", hire)
+    monkeypatch.setattr(ThreadLane, "run", run)
+    working(finish, until_finished(database, queued), lease_seconds=10.0)
+    assert sorted(get(database, job_id).deaths for job_id in queued) == [0, 0, 0, 1]
