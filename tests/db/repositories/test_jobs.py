@@ -3,11 +3,12 @@ from concurrent.futures import ThreadPoolExecutor
 from threading import Barrier
 
 import pytest
+from sqlalchemy import event
 
 from db.database import Database
 from db.errors import ClaimLost, NotFound
 from db.paging import Window
-from db.records import Claim
+from db.records import Claim, JobStatus
 from db.repositories import jobs, materials, runners
 
 
@@ -173,3 +174,20 @@ def test_jobs_are_listed_newest_first(database: Database, job: str, claim: Calla
 def test_an_unknown_job_is_named(database: Database) -> None:
     with database.read() as session, pytest.raises(NotFound, match="no job 'x' is stored"):
         jobs.get(session, "x")
+
+
+@pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+@pytest.mark.parametrize("status", [None, "failed"])
+def test_the_newest_jobs_are_found_without_sorting_all(database: Database, status: JobStatus | None) -> None:
+    asked: list[tuple[str, tuple[object, ...]]] = []
+
+    def note(_connection: object, _cursor: object, statement: str, values: tuple[object, ...], *_rest: object) -> None:
+        asked.append((statement, values))
+
+    event.listen(database.engine, "before_cursor_execute", note)
+    with database.read() as session:
+        jobs.list_all(session, Window("created_at", descending=True, limit=20), status)
+        statement, values = asked[-1]
+        plan = session.connection().exec_driver_sql(f"EXPLAIN QUERY PLAN {statement}", values).all()
+    assert "TEMP B-TREE" not in str(plan)
+    assert "USING INDEX ix_jobs_" in str(plan)
