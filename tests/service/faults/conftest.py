@@ -12,6 +12,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from multiprocessing import resource_tracker
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 from sqlalchemy import Select, func, select, text
 from sqlalchemy.orm import Session
@@ -284,12 +286,14 @@ def fleet(tmp_path: Path, new_url: Callable[..., str], new_fleet: Callable[[Path
 
 @pytest.fixture(scope="session")
 def contents() -> Callable[[int], list[bytes]]:
-    """So many different logs."""
+    """So many logs of one grasp, each with noise of its own."""
+    grasp = tangential_ramp(points=8, pitch=1.5e-3, schedule=SHORT)
+    assert grasp.force is not None
+    displacement, force = grasp.displacement, grasp.force
 
-    def make(count: int) -> list[bytes]:
-        noise: dict[str, Any] = {"marker_noise": 1e-7, "force_noise": 1e-6}
-        return [
-            encode(tangential_ramp(points=8, pitch=1.5e-3, schedule=SHORT, seed=seed, **noise)) for seed in range(count)
-        ]
+    def noisy(seed: int) -> bytes:
+        rng = np.random.default_rng(seed)
+        moved = displacement + rng.normal(0.0, 1e-7, displacement.shape)
+        return encode(replace(grasp, displacement=moved, force=force + rng.normal(0.0, 1e-6, force.shape)))
 
-    return make
+    return lambda count: [noisy(seed) for seed in range(count)]

@@ -95,7 +95,7 @@ def serve_under_load(fleet: Any, load: Load, outages: Iterable[Callable[[], None
             outage()
             for server in fleet.servers:
                 fleet.wait_until(server.is_ready, "the server to have its database back")
-    assert set(load.uploads) == {(202, None), AWAY}
+    assert {(202, None), AWAY} <= set(load.uploads) <= {(202, None), (200, None), AWAY}  # 200: its answer was lost
     assert set(load.reads) == {(200, None), AWAY, (409, "/problems/no-model")}
     fleet.wait_until(fleet.all_ended, "all jobs to end")
     with fleet.database.read() as session:
@@ -154,7 +154,7 @@ def test_a_database_that_comes_and_goes_under_load_loses_nothing(
             time.sleep(seconds)
 
     outages = [partial(is_away, how, rng.uniform(0.0, 3.0)) for how in (IMMEDIATE, FAST) * (OUTAGES // 2)]
-    load = Load(list(fleet.servers), contents(1000)[1:])
+    load = Load(list(fleet.servers), contents(400)[1:])
     accepted = serve_under_load(fleet, load, outages)
     logger.info("uploads: %s; reads: %s", load.uploads, load.reads)
     fleet.check_complete(first + accepted)
