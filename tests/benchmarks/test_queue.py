@@ -15,7 +15,7 @@ from benchmarks.queue import (
     simulate,
 )
 
-COUNT = 100_000
+COUNT = 60_000
 COSTS = Costs(ingest=0.1, fit=0.01, fit_per_log=0.001)
 
 
