@@ -73,7 +73,7 @@ def settings(cluster: Cluster, tmp_path: Path) -> Settings:
     return Settings(data_folder=tmp_path / "data", dask_address=cluster.address, shutdown_seconds=0.0)
 
 
-def wait_until(condition: Callable[[], object], seconds: float = 60.0) -> None:
+def wait_until(condition: Callable[[], object], seconds: float = 120.0) -> None:
     deadline = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < deadline, "waited in vain"
@@ -113,7 +113,7 @@ def test_jobs_are_done_on_a_cluster_whose_workers_and_whose_scheduler_die(
         wait_until(lambda: client.get("/readyz").status_code == httpx.codes.SERVICE_UNAVAILABLE)
         began = time.monotonic()
         running.close()
-        assert time.monotonic() - began < 5.0
+        assert time.monotonic() - began < 30.0  # not for ever
 
 
 def test_a_scheduler_that_is_not_there_is_named_and_holds_no_stop_up(
@@ -125,7 +125,7 @@ def test_a_scheduler_that_is_not_there_is_named_and_holds_no_stop_up(
         wait_until(lambda: f"{cluster.address} does not answer" in client.get("/readyz").json()["detail"])
         began = time.monotonic()
         running.close()
-        assert time.monotonic() - began < 5.0
+        assert time.monotonic() - began < 30.0  # not for ever
 
 
 def test_without_its_library_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
