@@ -230,7 +230,7 @@ def test_jobs_of_a_runner_that_is_silent_are_done_by_another_one(
 
     working(do, until_finished(database, queued))
     assert sorted(done) == sorted(queued)
-    assert done[-2:] == [lost.job_id for lost in dead]
+    assert set(done[-2:]) == {lost.job_id for lost in dead}  # each in a lane, at once
     assert {get(database, job_id).deaths for job_id in queued} == {0}
 
 
