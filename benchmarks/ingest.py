@@ -94,8 +94,8 @@ def upload(client: httpx.Client, body: bytes, material: str) -> str:
 
 def finish(client: httpx.Client, job: str) -> None:
     """Wait for its end."""
-    while (state := client.get(f"/v1/jobs/{job}").raise_for_status().json())["finished_at"] is None:
-        time.sleep(0.01)
+    while (state := client.get(f"/v1/jobs/{job}?wait=10").raise_for_status().json())["finished_at"] is None:
+        pass
     assert state["status"] == "done", state
 
 
