@@ -256,13 +256,13 @@ def looked_up(url: str, port: int, process: int) -> list[Load]:
 
 def draw(found: list[Requests], loads: list[Load]) -> Figure:
     """Uploads in their order, and latencies of look-ups."""
-    figure = Figure(figsize=(10, 3.6), layout="constrained")
+    figure = Figure(figsize=(10, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2)
     for entry in found:
         left.plot(1e3 * np.array(entry.fitted), "o-", markersize=3, label=f"{entry.what}: to the stored fit")
     left.plot(1e3 * np.array(found[0].accepted), "o-", markersize=3, label="upload: to the answer")
     left.set(xlabel="request", ylabel="ms", yscale="log", title="200 frames of 20×20 with forces")
-    left.legend(fontsize=8)
+    left.legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.15), ncols=2)
     place = np.arange(len(loads))
     right.barh(place - 0.2, [1e3 * one.p50 for one in loads], 0.4, label="p50")
     right.barh(place + 0.2, [1e3 * one.p99 for one in loads], 0.4, label="p99")

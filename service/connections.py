@@ -8,9 +8,10 @@ import json
 from typing import Any
 
 import h11
+from starlette.types import Receive, Scope, Send
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from service.problems import BAD_REQUEST, MEDIA_TYPE
+from service.problems import BAD_REQUEST, MEDIA_TYPE, TOO_MANY_CONNECTIONS, ProblemType
 
 HEADER_SECONDS = 10.0
 """s from the first byte of a request, or from the connection, to the end of its headers.
@@ -25,6 +26,8 @@ class BoundedConnection(H11Protocol):
     def __init__(self, *given: Any, **options: Any) -> None:
         super().__init__(*given, **options)
         self._header_timer: asyncio.TimerHandle | None = None
+        self._served = self.app
+        self._most, self.limit_concurrency = self.limit_concurrency, None  # its own refusal is plain text
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Begin to wait for a request."""
@@ -33,6 +36,8 @@ class BoundedConnection(H11Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Go on waiting unless the headers are there, and the body while it is read."""
+        is_full = self._most is not None and max(len(self.connections) - 1, len(self.tasks)) >= self._most
+        self.app = _refuse if is_full else self._served
         super().data_received(data)
         is_answered = self.conn.our_state is h11.DONE and self.conn.their_state is h11.SEND_BODY
         if (self.conn.their_state is h11.IDLE or is_answered) and not self.transport.is_closing():
@@ -53,15 +58,9 @@ class BoundedConnection(H11Protocol):
 
     def send_400_response(self, msg: str) -> None:
         """Refuse what is not HTTP, and close."""
-        kind = BAD_REQUEST
-        problem = {"type": kind.uri, "title": kind.title, "status": kind.status, "detail": msg, "instance": "/"}
-        content = json.dumps(problem).encode()
-        headers = [("content-type", MEDIA_TYPE), ("content-length", str(len(content))), ("connection", "close")]
-        for event in (
-            h11.Response(status_code=kind.status, headers=headers),
-            h11.Data(data=content),
-            h11.EndOfMessage(),
-        ):
+        content = _problem(BAD_REQUEST, msg)
+        response = h11.Response(status_code=BAD_REQUEST.status, headers=_headers(content))
+        for event in (response, h11.Data(data=content), h11.EndOfMessage()):
             self.transport.write(self.conn.send(event) or b"")
         self.transport.close()
 
@@ -72,3 +71,21 @@ class BoundedConnection(H11Protocol):
         if self._header_timer is not None:
             self._header_timer.cancel()
             self._header_timer = None
+
+
+async def _refuse(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001
+    """Answer a request for which there is no room, before anything else of the service sees it."""
+    content = _problem(TOO_MANY_CONNECTIONS, "as many connections are open as may be; try again later", scope["path"])
+    headers = [*_headers(content), (b"retry-after", b"1")]
+    await send({"type": "http.response.start", "status": TOO_MANY_CONNECTIONS.status, "headers": headers})
+    await send({"type": "http.response.body", "body": content})
+
+
+def _problem(kind: ProblemType, detail: str, instance: str = "/") -> bytes:
+    problem = {"type": kind.uri, "title": kind.title, "status": kind.status, "detail": detail, "instance": instance}
+    return json.dumps(problem).encode()
+
+
+def _headers(content: bytes) -> list[tuple[bytes, bytes]]:
+    length = str(len(content)).encode()
+    return [(b"content-type", MEDIA_TYPE.encode()), (b"content-length", length), (b"connection", b"close")]

@@ -87,7 +87,9 @@ class Metrics:
 
     def _count(self, job: Job, finished_at: datetime) -> None:
         self._counted[job.id] = finished_at
-        self._jobs.labels(job.kind, job.status).observe((finished_at - job.created_at).total_seconds())
+        self._jobs.labels(job.kind, job.status).observe(
+            max((finished_at - job.created_at).total_seconds(), 0.0)  # a clock may have been set back meanwhile
+        )
         for stage, seconds in job.seconds.items():
             self._stages.labels(job.kind, stage).observe(seconds)
 

@@ -15,12 +15,13 @@ from service.problems import (
     MISDIRECTED_REQUEST,
     REQUEST_TIMEOUT,
     STOPPING,
+    TOO_MANY_CONNECTIONS,
     TOO_MANY_REQUESTS,
     ProblemType,
 )
 from service.routes.common import description_of
 
-AT_THE_DOOR = (BAD_REQUEST, HEADERS_TOO_LARGE, STOPPING)
+AT_THE_DOOR = (BAD_REQUEST, HEADERS_TOO_LARGE, STOPPING, TOO_MANY_CONNECTIONS)
 """Problems of every route, before it is known what is asked."""
 
 AT_THE_GATE = (KEY_REQUIRED, INVALID_KEY, INSUFFICIENT_SCOPE, MISDIRECTED_REQUEST, TOO_MANY_REQUESTS)

@@ -63,6 +63,7 @@ IDEMPOTENCY_KEY_REUSED = ProblemType("idempotency-key-reused", "The key stands f
 TOO_MANY_REQUESTS = ProblemType("too-many-requests", "Requests come too often", 429)
 HEADERS_TOO_LARGE = ProblemType("headers-too-large", "The headers are too large", 431)
 INTERNAL_ERROR = ProblemType("internal-error", "The service failed", 500)
+TOO_MANY_CONNECTIONS = ProblemType("too-many-connections", "Too many connections", 503)
 STOPPING = ProblemType("stopping", "The server stops", 503)
 WORKERS_NOT_READY = ProblemType("workers-not-ready", "The workers take no jobs yet, or no longer", 503)
 STORAGE_UNAVAILABLE = ProblemType("storage-unavailable", "Database or blob folder cannot be used now", 503)

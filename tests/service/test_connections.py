@@ -1,5 +1,6 @@
 """Real sockets, since what is tested stands between the network and the application."""
 
+import json
 import socket
 import threading
 import time
@@ -15,6 +16,7 @@ from service.connections import BoundedConnection
 from service.envelope import MOST_HEADER_BYTES
 
 PATIENCE = 0.2
+MOST = 60
 Connect = Callable[[], socket.socket]
 
 
@@ -38,6 +40,7 @@ def connect(monkeypatch: pytest.MonkeyPatch) -> Iterator[Connect]:
             log_level="critical",
             http=BoundedConnection,
             h11_max_incomplete_event_size=MOST_HEADER_BYTES,
+            limit_concurrency=MOST,
             ws="none",
         )
     )
@@ -153,3 +156,19 @@ def test_what_is_not_http_is_a_problem_and_ends_the_connection(connect: Connect,
     assert head.startswith((b"HTTP/1.1 400", b"HTTP/1.1 501"))
     assert b"application/problem+json" in head
     assert b'"type": "/problems/bad-request"' in body
+
+
+def test_whoever_comes_when_all_connections_are_taken_is_told_so(connect: Connect) -> None:
+    others = [connect() for _ in range(MOST)]
+    connection = connect()
+    connection.sendall(b"GET /hello HTTP/1.1\r\nHost: a\r\n\r\n")
+    head, _, body = rest(connection).partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.1 503")
+    assert b"retry-after: 1" in head.lower()
+    assert json.loads(body).items() >= {"type": "/problems/too-many-connections", "instance": "/hello"}.items()
+    for other in others:
+        other.close()
+    time.sleep(PATIENCE)
+    again = connect()
+    again.sendall(b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n")
+    assert rest(again).endswith(b"hello")
