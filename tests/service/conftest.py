@@ -123,7 +123,7 @@ def served(engine_name: str, request: pytest.FixtureRequest, tmp_path_factory: p
     if engine_name == "postgresql":
         url = request.getfixturevalue("postgresql").create(request.getfixturevalue("template"))
     folder = tmp_path_factory.mktemp("served")
-    return Settings(data_folder=folder, database_url=url, max_upload_bytes=2 * 2**20)
+    return Settings(data_folder=folder, database_url=url, max_upload_bytes=2 * 2**20, poll_seconds=5.0)
 
 
 @pytest.fixture(scope="session")

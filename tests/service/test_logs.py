@@ -84,18 +84,30 @@ def read(line: str) -> dict[str, Any]:
     return found
 
 
+SERVERS = ("uvicorn", "uvicorn.error", "uvicorn.access")
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_going_on() -> Iterator[None]:
+    """What other tests have begun in this process is no matter of these."""
+    token = logs.ABOUT.set({})
+    yield
+    logs.ABOUT.reset(token)
+
+
 @pytest.fixture
 def log(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[Callable[[], list[dict[str, Any]]]]:
     """Let this process, and those that it starts, log JSON, and read what they did."""
-    loggers = {name: logging.getLogger(name) for name in ("", "service", "db", "uvicorn")}
-    levels, handlers = {name: logger.level for name, logger in loggers.items()}, loggers[""].handlers[:]
-    loggers[""].handlers.clear()  # those of pytest, which would be closed
+    loggers = {name: logging.getLogger(name) for name in ("", "service", "db", *SERVERS)}
+    before = {name: (logger.level, logger.handlers[:], logger.propagate) for name, logger in loggers.items()}
+    for logger in loggers.values():  # those of pytest would be closed, and those of other tests' servers hide theirs
+        logger.handlers.clear()
+        logger.propagate = True
+        logger.setLevel(logging.NOTSET)
     logs.configure(Logs("json", "debug"))
-    path, others = (
-        tmp_path / "log",
-        tmp_path / "other.log",
-    )  # standard error is another one in each phase of a test, but for other processes
+    path, others = tmp_path / "log", tmp_path / "other.log"
     with path.open("w", encoding="utf-8", buffering=1) as stream:
+        # standard error is another one in each phase of a test, but for other processes
         cast(logging.StreamHandler[Any], loggers[""].handlers[0]).setStream(stream)
 
         def lines() -> list[dict[str, Any]]:
@@ -105,9 +117,9 @@ def log(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[Callable[
 
         yield lines
     logging.captureWarnings(False)
-    loggers[""].handlers[:] = handlers
-    for name, level in levels.items():
+    for name, (level, handlers, propagate) in before.items():
         loggers[name].setLevel(level)
+        loggers[name].handlers[:], loggers[name].propagate = handlers, propagate
     logs._chosen = None
 
 

@@ -55,7 +55,7 @@ def test_a_program_gets_the_key_as_json_and_read_is_the_least(run) -> None:  # t
 @pytest.mark.parametrize(
     ("arguments", "code", "word"),
     [
-        (("revoke", "0123456789ab"), 3, "no access key '0123456789ab' is stored"),
+        (("revoke", "0123456789ab"), 3, "no database "),
         (("create", "x", "--scope", "root"), 2, "root"),
         (("create", ""), 2, "1 to 100 printable characters"),
         (("create", "a\nb"), 2, "1 to 100 printable characters"),
@@ -65,3 +65,9 @@ def test_what_cannot_be_is_refused(run, arguments: tuple[str, ...], code: int, w
     ended, shown = run(*arguments)
     assert ended == code
     assert word in " ".join(shown.split())
+
+
+def test_a_key_that_is_not_there_is_named(run) -> None:  # type: ignore[no-untyped-def]
+    run("create", "other")
+    ended, shown = run("revoke", "0123456789ab")
+    assert (ended, " ".join(shown.split())) == (3, "stiction: no access key '0123456789ab' is stored")
