@@ -56,6 +56,16 @@ class BoundedConnection(H11Protocol):
         self._stop_waiting()
         super().connection_lost(exc)
 
+    def shutdown(self) -> None:
+        """End after the answer under way; one that nobody reads is given up before the server's own patience ends."""
+        super().shutdown()
+        if self.config.timeout_graceful_shutdown is not None:
+            self.loop.call_later(0.9 * self.config.timeout_graceful_shutdown, self._give_up)
+
+    def _give_up(self) -> None:
+        if self.transport.get_write_buffer_size() > 0:
+            self.transport.abort()
+
     def send_400_response(self, msg: str) -> None:
         """Refuse what is not HTTP, and close."""
         content = _problem(BAD_REQUEST, msg)

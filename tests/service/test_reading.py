@@ -42,12 +42,13 @@ def test_a_reader_that_dies_takes_only_its_file_with_it(ramp: GraspLog, tmp_path
     async def lose_one(readers: Readers) -> Any:
         lost = asyncio.ensure_future(readers.convert(source, target, "tracked markers", {}))
         waiting = asyncio.ensure_future(readers.convert(other, target, "parquet", {}))
-        while not is_read(source):
+        while (pipe := opened(source)) is None:
             await asyncio.sleep(0.01)
         for process in running(readers):
             process.kill()
         with pytest.raises(InvalidInput, match="such that its tracked markers reader died of it"):
             await lost
+        os.close(pipe)
         return await waiting
 
     described = with_readers(60.0, lose_one)
@@ -55,13 +56,12 @@ def test_a_reader_that_dies_takes_only_its_file_with_it(ramp: GraspLog, tmp_path
     assert target.read_bytes() == encode(ramp)
 
 
-def is_read(pipe: Path) -> bool:
-    """Whether somebody has opened the pipe to read it."""
+def opened(pipe: Path) -> int | None:
+    """The pipe's other end, once somebody reads it: it has no bytes, and no end."""
     try:
-        os.close(os.open(pipe, os.O_WRONLY | os.O_NONBLOCK))
+        return os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
     except OSError:
-        return False
-    return True
+        return None
 
 
 def test_a_reader_that_was_lost_between_two_files_is_no_fault_of_the_second(ramp: GraspLog, tmp_path: Path) -> None:
