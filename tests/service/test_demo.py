@@ -24,6 +24,7 @@ def pictures_of(page: str) -> list[str]:
     return re.findall(r'<img src="([^"]+)"', page)
 
 
+@pytest.mark.long  # the demo once more, half a minute
 def test_demo_without_recordings_says_so_and_goes_on(tmp_path: Path) -> None:
     printed = demo(tmp_path / "out", "--recordings", str(tmp_path / "absent"))
     assert "left out" in printed

@@ -139,6 +139,7 @@ def test_a_process_logs_what_was_chosen_and_libraries_only_warn(log: Log) -> Non
     ]
 
 
+@pytest.mark.parametrize("engine_name", ["sqlite", pytest.param("postgresql", marks=pytest.mark.long)], indirect=True)
 def test_server_and_worker_log_one_story_without_secrets(
     tmp_path: Path, database: Database, serving: Any, log: Log, content: bytes, upload: Any, wait: Any
 ) -> None:
