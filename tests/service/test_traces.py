@@ -56,7 +56,6 @@ def attributes(span: Any) -> dict[str, str]:
     return {each.key: each.value.string_value for each in span.attributes}
 
 
-@pytest.mark.parametrize("engine_name", ["sqlite", "postgresql"], indirect=True)
 @pytest.mark.parametrize("engine_name", ["postgresql", pytest.param("sqlite", marks=pytest.mark.long)], indirect=True)
 def test_an_upload_is_one_trace_from_its_request_to_its_model(
     tmp_path: Path,
