@@ -20,7 +20,8 @@ MOST = 10_000
 """Models kept, each about 2 kB; when there are more, all are read anew."""
 
 MOST_CHANGES = 2_000
-"""Changes remembered, 270 bytes each, more than a page lists at once; one that was forgotten is taken for a new one, which costs a look at the database."""
+"""Changes remembered, 270 bytes each, more than a page lists at once; one that was forgotten is taken for a new one,
+which costs a look at the database."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -126,10 +126,11 @@ class Streams:
 
     async def call(self, do: Callable[..., Result], *arguments: Any) -> Result:
         """Do something in the worker; raises ``End`` where it died, and all detectors with it."""
+        process = await self._started()
         try:
-            return await (await self._started()).call(do, *arguments)
+            return await process.call(do, *arguments)
         except (ProcessEnded, KeyError) as error:
-            if isinstance(error, ProcessEnded):
+            if isinstance(error, ProcessEnded) and process is self._process:  # and not the next one, which others began
                 self._process = None
                 self._sessions.clear()
             raise End(DETECTOR_LOST, "the detector's process ended; open a new session") from error
