@@ -47,6 +47,11 @@ class Cluster:
         with Client(self.address, set_as_default=False) as client:
             return any(client.processing().values())
 
+    def is_idle(self) -> bool:
+        """Whether the results of all that was done have been fetched from the workers, too."""
+        with Client(self.address, set_as_default=False) as client:
+            return not client.who_has()
+
     def _start(self, what: str, *options: str) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-m", f"distributed.cli.dask_{what}", *options, "--no-dashboard"]
         path = os.pathsep.join((str(ROOT), str(ROOT / "clients")))
@@ -97,6 +102,7 @@ def test_jobs_are_done_on_a_cluster_whose_workers_and_whose_scheduler_die(
         job = upload(client, content, material="paper").json()["job"]["id"]
         assert wait(client, job)["model_version"] == 1
 
+        wait_until(cluster.is_idle)
         first.send_signal(signal.SIGSTOP)  # so that it dies with the job and not after it
         job = client.post("/v1/materials/paper/fits", json={"method": "ols"}).json()["id"]
         wait_until(cluster.has_work)
@@ -105,6 +111,7 @@ def test_jobs_are_done_on_a_cluster_whose_workers_and_whose_scheduler_die(
         assert wait(client, job)["status"] == "done"
         assert deaths(settings, job) == 0
 
+        wait_until(cluster.is_idle)
         second.send_signal(signal.SIGSTOP)
         job = client.post("/v1/materials/paper/fits", json={"method": "ols"}).json()["id"]
         wait_until(cluster.has_work)
