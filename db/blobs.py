@@ -38,7 +38,7 @@ class Spool:
         self._hash = hashlib.sha256()
         self._file = path.open("xb")
 
-    def write(self, chunk: bytes) -> None:
+    def write(self, chunk: bytes | bytearray) -> None:
         """Append a chunk; raises ``StorageUnavailable`` on a full or broken disk."""
         with disk_errors_named():
             self._file.write(chunk)

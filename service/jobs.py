@@ -29,6 +29,9 @@ logger = logging.getLogger(__name__)
 RETRY_SECONDS = 1.0
 """s between two tries to reach a database that is locked, full or away."""
 
+WAKE_SECONDS = 0.003
+"""s from a job's storing to the look for it, for the answer goes first: both take the interpreter."""
+
 LOOKS = 5
 """Looks at another runner's heartbeat, as many in one lease, that must all be the same before it counts as dead."""
 
@@ -106,8 +109,8 @@ class JobRunner:
         self._working = [asyncio.create_task(self._work(lane)) for lane in self._lanes]
 
     def wake(self) -> None:
-        """Look for a job at once, since one has just been stored; may be called from any thread."""
-        self._loop.call_soon_threadsafe(self._woken.set)
+        """Look for a job soon, since one has just been stored; may be called from any thread."""
+        self._loop.call_soon_threadsafe(self._loop.call_later, WAKE_SECONDS, self._woken.set)
 
     def ending(self, job_id: str) -> asyncio.Event:
         """Set once a lane of this runner has done with the job; jobs of other runners end unheard."""

@@ -18,7 +18,7 @@ from db.database import Database
 from db.errors import ClaimLost, StorageUnavailable
 from db.records import Claim
 from db.repositories import jobs
-from service import logs, traces
+from service import freed_memory, logs, traces
 
 logger = logging.getLogger(__name__)
 
@@ -47,6 +47,7 @@ def start(chosen: logs.Logs | None, prepare: Callable[[], None] | None = None) -
         signal.signal(number, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     logs.configure(chosen)
+    freed_memory.keep()
     traces.start()
     if prepare is not None:
         prepare()

@@ -28,7 +28,7 @@ def serve(
     from service.serving import configuration
 
     settings = _settings(host=host, port=port, data_folder=data_folder, database_url=database_url)
-    _configure_logs(settings)
+    _prepare(settings)
     server = uvicorn.Server(configuration(settings))
     server.run()
     if not server.started:  # its log says why
@@ -46,7 +46,7 @@ def worker(
     settings = _settings(workers=workers, data_folder=data_folder, database_url=database_url)
     if settings.workers == 0:
         raise typer.BadParameter("workers is 0; allowed: 1 to 64")
-    _configure_logs(settings)
+    _prepare(settings)
     asyncio.run(_work(settings))
 
 
@@ -81,10 +81,11 @@ def demo(
     run_demo(output, recordings, seed)
 
 
-def _configure_logs(settings: "Settings") -> None:
-    from service import logs
+def _prepare(settings: "Settings") -> None:
+    from service import freed_memory, logs
 
     logs.configure(logs.Logs(settings.log_format, settings.log_level))
+    freed_memory.keep()
 
 
 def _settings(**given: Any) -> "Settings":

@@ -1,10 +1,10 @@
 """A zip of .npy members, read in memory within bounds; nothing is ever extracted to disk."""
 
 import errno
-import io
 import lzma
 import os
 import struct
+import sys
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -43,9 +43,39 @@ def read_member(archive: zipfile.ZipFile, member: str, name: str) -> NDArray[Any
     with _sound():
         entry = archive.getinfo(member)
         with archive.open(entry) as stream:  # checks the member's own header
-            if entry.compress_type == zipfile.ZIP_STORED:
-                return read_array(io.BytesIO(_stored(archive, entry)), name, entry.file_size)
-            return read_array(stream, name, entry.file_size)
+            if entry.compress_type != zipfile.ZIP_STORED:
+                return read_array(stream, name, entry.file_size)
+        stored = _Stored(archive, entry)
+        array = read_array(stored, name, entry.file_size)
+        stored.check()
+        return array
+
+
+class _Stored:
+    """A member without compression, as a stream: ``zipfile`` reads it in pieces, three times as slowly."""
+
+    def __init__(self, archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> None:
+        assert archive.fp is not None
+        self._file, self._entry, self._read, self._crc = archive.fp, entry, 0, 0
+        if entry.file_size > os.fstat(self._file.fileno()).st_size:
+            raise zipfile.BadZipFile(f"{entry.file_size} bytes in {entry.filename!r} by its header")
+        self._file.seek(entry.header_offset + _LOCAL_LENGTHS)
+        self._file.seek(entry.header_offset + _LOCAL_BYTES + sum(struct.unpack("<HH", self._file.read(4))))
+
+    def read(self, size: int = sys.maxsize, /) -> bytes:
+        """The next bytes, fewer at the member's end."""
+        content = self._file.read(min(size, self._entry.file_size - self._read))
+        self._read, self._crc = self._read + len(content), zlib.crc32(content, self._crc)
+        return content
+
+    def tell(self) -> int:
+        """Bytes that were read."""
+        return self._read
+
+    def check(self) -> None:
+        """Raises ``BadZipFile`` unless what was read is what was written."""
+        if self._crc != self._entry.CRC:
+            raise zipfile.BadZipFile(f"Bad CRC-32 for file {self._entry.filename!r}")
 
 
 @contextmanager
@@ -61,20 +91,6 @@ def _sound() -> Iterator[None]:
         if error.errno != errno.EINVAL:  # a place in the file that cannot be
             raise
         raise _damaged(error) from error
-
-
-def _stored(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> bytes:
-    """The bytes of a member without compression at once; ``zipfile`` reads them in pieces, three times as slowly."""
-    file = archive.fp
-    assert file is not None
-    if entry.file_size > os.fstat(file.fileno()).st_size:
-        raise zipfile.BadZipFile(f"{entry.file_size} bytes in {entry.filename!r} by its header")
-    file.seek(entry.header_offset + _LOCAL_LENGTHS)
-    file.seek(entry.header_offset + _LOCAL_BYTES + sum(struct.unpack("<HH", file.read(4))))
-    content = file.read(entry.file_size)
-    if zlib.crc32(content) != entry.CRC:
-        raise zipfile.BadZipFile(f"Bad CRC-32 for file {entry.filename!r}")
-    return content
 
 
 def _check_directory(path: Path) -> None:

@@ -2,7 +2,7 @@
 
 import math
 import threading
-from typing import IO, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,17 @@ _HEADER_READERS = {
 }
 
 
-def read_array(stream: IO[bytes], name: str, size: int) -> NDArray[Any]:
+class Readable(Protocol):
+    """What is read of a stream."""
+
+    def read(self, size: int = ..., /) -> bytes:
+        """So many bytes, fewer at its end."""
+
+    def tell(self) -> int:
+        """How many were read."""
+
+
+def read_array(stream: Readable, name: str, size: int) -> NDArray[Any]:
     """Read one array of numbers, booleans or text from a .npy of ``size`` bytes.
 
     What the header claims is checked against ``size`` and the limit before any memory is taken; pickled objects are
@@ -46,7 +56,7 @@ HEADER_LOCK = threading.Lock()
 """numpy parses a header by building a syntax tree, which CPython 3.11 does not do safely in several threads at once."""
 
 
-def _header(stream: IO[bytes], name: str) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+def _header(stream: Readable, name: str) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     try:
         version = np.lib.format.read_magic(stream)
         with HEADER_LOCK:

@@ -53,14 +53,13 @@ async def receive(spool: Spool, chunks: AsyncIterator[bytes], limit: int) -> Non
             if len(waiting) >= CHUNK_BYTES:
                 if writing is not None:
                     await writing
-                writing = asyncio.create_task(asyncio.to_thread(spool.write, bytes(waiting)))
-                waiting.clear()
+                writing, waiting = asyncio.create_task(asyncio.to_thread(spool.write, waiting)), bytearray()
     except ClientDisconnect as error:
         raise Problem(UPLOAD_INTERRUPTED, f"the connection ended after {size} bytes") from error
     finally:
         if writing is not None:
             await writing
-    await asyncio.to_thread(spool.write, bytes(waiting))
+    await asyncio.to_thread(spool.write, waiting)
 
 
 def unpack(packed: Spool, spool: Spool, encoding: str, limit: int, expansion: int) -> None:
