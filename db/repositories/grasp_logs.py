@@ -1,9 +1,8 @@
 """Queries on grasp logs, with their sensors."""
 
 import uuid
-from typing import Any
 
-from sqlalchemy import Select, exists, func, select, update
+from sqlalchemy import exists, func, select, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, aliased
 
@@ -12,6 +11,16 @@ from db.paging import Window, windowed
 from db.records import LogFilter, NewGraspLog, StoredGraspLog, Withdrawal
 from db.repositories import detections, jobs
 from db.tables import DetectionRow, GraspLogRow, JobRow, MaterialRow, SampleSummaryRow, SensorRow, now
+
+_WHOLE = (
+    select(GraspLogRow, JobRow, SensorRow.name, MaterialRow.name, DetectionRow, SampleSummaryRow)
+    .join(SensorRow)
+    .join(JobRow, JobRow.grasp_log_id == GraspLogRow.id)
+    .outerjoin(MaterialRow, MaterialRow.id == GraspLogRow.material_id)
+    .outerjoin(DetectionRow, DetectionRow.grasp_log_id == GraspLogRow.id)
+    .outerjoin(SampleSummaryRow, SampleSummaryRow.grasp_log_id == GraspLogRow.id)
+)
+"""Logs with their jobs, sensors, materials, detections and samples; made once, for that takes longer than asking."""
 
 
 def add(session: Session, log: NewGraspLog) -> str:
@@ -49,7 +58,7 @@ def find_id(session: Session, sha256: str, material_id: int | None, detector: st
 
 def get(session: Session, log_id: str) -> StoredGraspLog:
     """One log with its job, detection and samples, in one query; raises ``NotFound``."""
-    found = session.execute(_logs().where(GraspLogRow.id == log_id)).one_or_none()
+    found = session.execute(_WHOLE.where(GraspLogRow.id == log_id)).one_or_none()
     if found is None:
         raise NotFound("grasp log", log_id)
     return _record(*found)
@@ -57,7 +66,7 @@ def get(session: Session, log_id: str) -> StoredGraspLog:
 
 def list_all(session: Session, window: Window, wanted: LogFilter) -> list[StoredGraspLog]:
     """Logs with their jobs, detections and samples, in one query."""
-    query = _logs()
+    query = _WHOLE
     if wanted.material_id is not None:
         query = query.where(GraspLogRow.material_id == wanted.material_id)
     if wanted.sensor is not None:
@@ -104,17 +113,6 @@ def move(session: Session, source_id: int, target_id: int) -> None:
     is_there = exists().where(there.material_id == target_id, *same)
     moved = update(GraspLogRow).where(GraspLogRow.material_id == source_id, ~is_there).values(material_id=target_id)
     session.execute(moved.execution_options(synchronize_session=False))
-
-
-def _logs() -> Select[*tuple[Any, ...]]:
-    return (
-        select(GraspLogRow, JobRow, SensorRow.name, MaterialRow.name, DetectionRow, SampleSummaryRow)
-        .join(SensorRow)
-        .join(JobRow, JobRow.grasp_log_id == GraspLogRow.id)
-        .outerjoin(MaterialRow, MaterialRow.id == GraspLogRow.material_id)
-        .outerjoin(DetectionRow, DetectionRow.grasp_log_id == GraspLogRow.id)
-        .outerjoin(SampleSummaryRow, SampleSummaryRow.grasp_log_id == GraspLogRow.id)
-    )
 
 
 def _record(

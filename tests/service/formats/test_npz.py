@@ -173,6 +173,16 @@ def test_a_member_that_unpacks_to_more_than_its_directory_claims_is_refused(log:
         npz.read(path)
 
 
+@pytest.mark.parametrize("method", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
+def test_a_number_that_changed_on_its_way_is_found(log: GraspLog, zip_of: ZipOf, method: int) -> None:
+    path = zip_of(members(log), method)
+    content = bytearray(path.read_bytes())
+    content[content.index(b"force.npy") + 800] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(InvalidInput, match=r"Bad CRC-32 for file 'force\.npy'"):
+        npz.read(path)
+
+
 def test_a_huge_table_of_contents_is_refused_before_it_is_read(tmp_path: Path) -> None:
     path = tmp_path / "log.npz"
     with zipfile.ZipFile(path, "w") as archive:
