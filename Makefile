@@ -42,7 +42,9 @@ $(VENV)/.installed: pyproject.toml clients/pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt uv
 	$(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/python --constraint constraints.txt --editable ./clients --editable '.[test]'
-	@$(BIN)/python -c 'import estimators, slipcore; print(f"compiled the kernels in {slipcore.warm_up() + estimators.warm_up():.1f} s")'
+	@echo "   compiling the kernels"
+	@$(BIN)/python -c 'import slipcore; slipcore.warm_up()' & compiling=$$!; \
+	    $(BIN)/python -c 'import estimators; estimators.warm_up()' && wait $$compiling
 	@touch $@
 
 recordings: $(CACHE)/tac3d.tried

@@ -165,7 +165,7 @@ def draw(rates: list[Sustained], memories: list[Memory]) -> Figure:
     for one in memories:
         right.plot(one.uploads, np.array(one.resident) / MIB, label=one.process)
     right.set(xlabel="uploads", ylabel="resident MiB", ylim=(0.0, None), title="memory")
-    right.legend()
+    right.legend(loc="center right")
     return figure
 
 
