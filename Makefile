@@ -32,7 +32,7 @@ coverage: setup recordings  ## the tests again, with the lines that none of them
 	$(BIN)/pytest -m "not long" -n 2 --cov --cov-report=term
 
 test-long: setup recordings  ## calibration, fuzz and kill campaigns; results stand in docs/long-tests.md
-	$(BIN)/pytest -m long
+	$(BIN)/pytest -m long -n 2 --dist worksteal --durations=0
 
 setup: $(VENV)/.installed
 
