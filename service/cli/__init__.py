@@ -22,6 +22,7 @@ for command in (
     running.serve,
     running.worker,
     simulation.simulate,
+    simulation.campaign,
     local.detect,
     local.fit,
     local.convert,

@@ -1,14 +1,27 @@
 """Signs of life of a command that takes longer than a moment."""
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from time import perf_counter
+from typing import TypeVar
 
 import typer
 
 MOMENT = 1.0
 """Seconds after which a user wants to know that something is going on."""
+
+
+Thing = TypeVar("Thing")
+
+
+def counted(things: Iterable[Thing], total: int, name: str) -> Iterator[Thing]:
+    """The same things, with how many of them there are said on standard error."""
+    typer.echo(f"0 of {total} {name}", err=True, nl=False)
+    for count, thing in enumerate(things, 1):
+        typer.echo(f"\r{count} of {total} {name}", err=True, nl=False)
+        yield thing
+    typer.echo(err=True)
 
 
 @contextmanager

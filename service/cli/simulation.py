@@ -1,18 +1,30 @@
-"""The command that simulates a grasp."""
+"""The commands that simulate grasps."""
 
+import os
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from service.cli.exit_codes import INPUT_REFUSED
 from service.cli.local import Picture
 from service.cli.output import print_json, print_table
-from service.cli.progress import patience
+from service.cli.progress import counted, patience
 
 if TYPE_CHECKING:
+    from service.campaign import Outcome
     from slipcore import GraspLog
     from slipcore.contact import Scene
+
+Accuracy = Annotated[
+    float | None, typer.Option(help="Largest error of stick ratio (absolute), displacement and force (relative).")
+]
+Seconds = Annotated[float | None, typer.Option(help="Time to spend on a log, s.")]
+Tier = Annotated[
+    str | None, typer.Option(help='"closed form", "beams" or "boundary elements", in place of the cheapest.')
+]
 
 
 def simulate(
@@ -20,13 +32,9 @@ def simulate(
     explain: Annotated[
         bool, typer.Option("--explain", help="Say what each effect costs and changes, in place of simulating.")
     ] = False,
-    accuracy: Annotated[
-        float | None, typer.Option(help="Largest error of stick ratio (absolute), displacement and force (relative).")
-    ] = None,
-    seconds: Annotated[float | None, typer.Option(help="Time to spend, s.")] = None,
-    tier: Annotated[
-        str | None, typer.Option(help='"closed form", "beams" or "boundary elements", in place of the cheapest.')
-    ] = None,
+    accuracy: Accuracy = None,
+    seconds: Seconds = None,
+    tier: Tier = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of random fields and of noise.")] = 0,
     output: Annotated[Path | None, typer.Option(help="Write the grasp log with its truth to this NPZ.")] = None,
     picture: Picture = None,
@@ -52,6 +60,44 @@ def simulate(
 
         save(truth_over_time(log, wanted.name), picture)
     _print(log, wanted.name, json)
+
+
+def campaign(
+    scenes: Annotated[list[str], typer.Argument(help="Scene files (TOML), or names of scenes of the library.")],
+    output: Annotated[Path, typer.Option(help="Folder of the logs; those that it holds already are not made again.")],
+    seeds: Annotated[int, typer.Option(min=1, help="Logs of each scene, with seeds from 0 on.")] = 1,
+    accuracy: Accuracy = None,
+    seconds: Seconds = None,
+    tier: Tier = None,
+    processes: Annotated[
+        int | None, typer.Option(min=1, help="Processes of this machine; as many as it has cores if not said.")
+    ] = None,
+    dask_address: Annotated[
+        str | None,
+        typer.Option(envvar="STICTION_DASK_ADDRESS", help="A Dask scheduler, whose workers do it in their place."),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")] = False,
+) -> None:
+    """Simulate many grasps, each scene with many seeds, on all cores or on a Dask cluster."""
+    from service.campaign import Promise, run, workers
+    from slipcore.contact import Scene
+
+    wanted = [Scene.from_toml(scene) for scene in scenes]
+    with workers(processes or os.cpu_count() or 1, dask_address) as executor:
+        outcomes = run(executor, wanted, range(seeds), output, Promise(accuracy, seconds, tier))
+        made = list(counted(outcomes, len(wanted) * seeds, "logs"))
+    _print_campaign(made, output, json)
+    if any(outcome.refused for outcome in made):
+        raise typer.Exit(INPUT_REFUSED)
+
+
+def _print_campaign(made: "Iterable[Outcome]", folder: Path, json: bool) -> None:
+    rows = sorted(made, key=lambda outcome: (outcome.scene, outcome.seed))
+    if json:
+        print_json({"logs": [asdict(outcome) | {"path": str(outcome.path)} for outcome in rows]})
+    else:
+        cells = [(outcome.scene, outcome.seed, outcome.refused or outcome.path.name) for outcome in rows]
+        print_table(str(folder), ("scene", "seed", "log"), cells)
 
 
 def _explain(scene: "Scene", seed: int, json: bool) -> None:

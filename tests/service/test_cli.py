@@ -132,6 +132,22 @@ def test_simulate_takes_the_tier_that_is_named_and_refuses_one_that_is_not(run: 
     assert "boundary elements" in err
 
 
+def test_a_campaign_fills_a_folder_and_says_what_was_refused(run: Run, tmp_path: Path) -> None:
+    press, pull = tmp_path / "press.toml", tmp_path / "pull.toml"
+    press.write_text('name = "my press"\n[[effect]]\nkind = "SensorSampling"\nframe_rate = 3.0\n', encoding="utf-8")
+    pull.write_text('name = "pull"\n[[effect]]\nkind = "TangentialLoad"\nforce = [100.0, 0.0]\n', encoding="utf-8")
+    folder = tmp_path / "logs"
+    code, out, err = run("campaign", press, "--seeds", 2, "--processes", 1, "--output", folder, "--json")
+    assert code == 0
+    assert "2 of 2 logs" in err
+    assert [Path(log["path"]).name for log in json.loads(out)["logs"]] == ["my_press-0.npz", "my_press-1.npz"]
+    assert run("detect", folder / "my_press-1.npz")[0] == 0
+    code, out, _ = run("campaign", press, pull, "--processes", 1, "--output", folder)
+    assert code == INPUT_REFUSED
+    assert "tangential load" in out
+    assert "my_press-0.npz" in out
+
+
 def test_simulate_explains_a_scene(run: Run) -> None:
     code, out, _ = run("simulate", "lifting_15N", "--explain")
     assert code == 0

@@ -18,9 +18,12 @@ from distributed import Client
 from db.database import Database
 from db.errors import DriverMissing
 from db.repositories import jobs
+from service import campaign
 from service.lanes import lanes
 from service.settings import Settings
 from service.worker import Place
+from slipcore.contact import Scene
+from slipcore.errors import InvalidInput
 
 ROOT = Path(__file__).parents[2]
 Serving = Callable[[Settings], AbstractContextManager[httpx.Client]]
@@ -121,6 +124,23 @@ def test_jobs_are_done_on_a_cluster_whose_workers_and_whose_scheduler_die(
         began = time.monotonic()
         running.close()
         assert time.monotonic() - began < 30.0  # not for ever
+
+
+def test_a_campaign_runs_on_a_cluster(cluster: Cluster, tmp_path: Path) -> None:
+    cluster.start_scheduler()
+    cluster.start_worker()
+    sampling = {"kind": "SensorSampling", "frame_rate": 3.0, "points": [4, 4]}
+    scene = Scene.from_mapping({"name": "press", "effect": [sampling]})
+    with campaign.workers(1, cluster.address) as executor:
+        made = list(campaign.run(executor, [scene], range(2), tmp_path / "logs", campaign.Promise()))
+    assert [outcome.refused for outcome in made] == [None, None]
+    assert {path.name for path in (tmp_path / "logs").glob("*.npz")} == {"press-0.npz", "press-1.npz"}
+
+
+def test_a_campaign_names_a_scheduler_that_is_not_there(cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(campaign, "CONNECT_SECONDS", 0.5)
+    with pytest.raises(InvalidInput, match=r"Dask address is .*; allowed: one at which a scheduler answers"):
+        campaign.workers(1, cluster.address).__enter__()
 
 
 def test_a_scheduler_that_is_not_there_is_named_and_holds_no_stop_up(
