@@ -44,7 +44,7 @@ $(VENV)/.installed: pyproject.toml clients/pyproject.toml constraints.txt
 	$(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/python --constraint constraints.txt --editable ./clients --editable '.[test]'
 	@echo "   compiling the kernels"
 	@$(BIN)/python -c 'import slipcore; slipcore.warm_up()' & compiling=$$!; \
-	    $(BIN)/python -c 'import estimators; estimators.warm_up()' && wait $$compiling
+	    $(BIN)/python -c 'import estimators; estimators.warm_up()'; status=$$?; wait $$compiling && exit $$status
 	@touch $@
 
 recordings: $(CACHE)/tac3d.tried

@@ -20,7 +20,7 @@ As long may a body go on that was answered before it was whole: nobody reads it.
 """
 
 RECEIVED_BYTES = 512 * 1024
-"""Taken from a socket at once at most. With asyncio's own 256 KiB a body of 4 MB takes twice the server's time."""
+"""Taken from a socket at once at most. With asyncio's own 256 KiB a body of 4 MB takes 11 ms to receive, not 7."""
 
 
 class BoundedConnection(H11Protocol):

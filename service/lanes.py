@@ -57,6 +57,9 @@ class ProcessLane:
             self._executor = worker.process(worker.give_way)
             try:
                 await asyncio.get_running_loop().run_in_executor(self._executor, worker.warm_up)
+            except asyncio.CancelledError:  # nobody waits for what it compiles
+                self.kill()
+                raise
             except BrokenProcessPool:
                 logger.exception("a worker process did not start")
                 await asyncio.sleep(RETRY_SECONDS)

@@ -4,7 +4,6 @@ import errno
 import lzma
 import os
 import struct
-import sys
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -62,9 +61,10 @@ class _Stored:
         self._file.seek(entry.header_offset + _LOCAL_LENGTHS)
         self._file.seek(entry.header_offset + _LOCAL_BYTES + sum(struct.unpack("<HH", self._file.read(4))))
 
-    def read(self, size: int = sys.maxsize, /) -> bytes:
+    def read(self, size: int = -1, /) -> bytes:
         """The next bytes, fewer at the member's end."""
-        content = self._file.read(min(size, self._entry.file_size - self._read))
+        left = self._entry.file_size - self._read
+        content = self._file.read(left if size < 0 else min(size, left))
         self._read, self._crc = self._read + len(content), zlib.crc32(content, self._crc)
         return content
 

@@ -61,11 +61,11 @@ def _header(stream: Readable, name: str) -> tuple[tuple[int, ...], bool, np.dtyp
         version = np.lib.format.read_magic(stream)
         with HEADER_LOCK:
             shape, fortran_order, dtype = _HEADER_READERS[version](stream, max_header_size=MAX_HEADER_BYTES)
-    except (OSError, MemoryError, SystemError):
+    except (OSError, SystemError):
         raise  # the machine's fault, not the file's
-    except Exception as error:  # numpy's parser answers hostile bytes with whatever its parts raise
+    except Exception as error:  # numpy's parser answers hostile bytes with whatever its parts raise, even MemoryError
         detail = str(error).splitlines()[0][:100] if str(error) else type(error).__name__
         raise InvalidInput(name, f"not a .npy array ({detail})", "the .npy format, version 1.0 or 2.0") from error
-    if any(length < 0 for length in shape) or len(shape) > 8:
+    if any(isinstance(length, bool) or length < 0 for length in shape) or len(shape) > 8:
         raise InvalidInput(name, f"of shape {list(shape)}"[:100], "at most 8 axes, none negative")
     return shape, fortran_order, dtype

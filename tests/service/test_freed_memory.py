@@ -1,3 +1,4 @@
+import os
 import platform
 import subprocess
 import sys
@@ -27,15 +28,16 @@ thread.join()
 """
 
 
-def page_faults(prepare: str) -> list[int]:
+def page_faults(prepare: str, **variables: str) -> list[int]:
     """Of the main thread and another one, once both have taken as much memory before."""
     command = [sys.executable, "-c", TOUCH.format(prepare=prepare)]
-    return [int(line) for line in subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()]
+    done = subprocess.run(command, check=True, capture_output=True, text=True, env=os.environ | variables)
+    return [int(line) for line in done.stdout.split()]
 
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another C library, which is left as it is")
 def test_memory_that_was_freed_is_there_when_it_is_needed_again() -> None:
-    given_back, kept = page_faults(""), page_faults("freed_memory.keep()")
-    for before, after in zip(given_back, kept, strict=True):
-        assert before > 20_000  # 20 times 12 MB in pages of 4 KiB are 60,000
-        assert after < 2_000
+    many = 20_000  # 20 times 12 MB in pages of 4 KiB are 60,000
+    assert min(page_faults("")) > many
+    assert max(page_faults("freed_memory.keep()")) < 0.1 * many
+    assert min(page_faults("freed_memory.keep()", MALLOC_ARENA_MAX="4")) > many  # as the operator has it

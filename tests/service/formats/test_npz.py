@@ -141,6 +141,8 @@ def header(shape: str, descr: str = "'<f8'") -> bytes:
         (header("(99999999999999,)", "'<U0'"), "time is of dtype <U0"),
         (header("(1,)", "'|O'") + bytes(8), "time is of dtype object"),
         (header("(1,)", "'<q9'"), "not a .npy array"),
+        (header("(True,)") + bytes(8), "at most 8 axes"),
+        (header("(" + "-" * 9000 + "1,)") + bytes(8), "not a .npy array"),
         (b"\x93NUMPY\x09\x00", "not a .npy array"),
         (b"\x93NUMPY\x01\x00\xff\xff" + b"(" * 65535, "not a .npy array"),
         (b"", "not a .npy array"),
