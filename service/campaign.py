@@ -8,11 +8,12 @@ import hashlib
 import json
 import multiprocessing
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from db.errors import DriverMissing
 from service import logs, worker
@@ -58,8 +59,7 @@ def workers(processes: int, dask_address: str | None = None) -> Iterator[Executo
     try:
         yield pool
     except BaseException:  # nobody waits for what is under way
-        for process in dict(getattr(pool, "_processes", None) or {}).values():
-            process.kill()
+        worker.kill(pool)
         raise
     finally:
         pool.shutdown(cancel_futures=True)
@@ -106,9 +106,7 @@ def _kept(done: Future[GraspLog], outcome: Outcome) -> Outcome:
         return replace(outcome, refused=str(error))
     except Exception as error:  # its process died, or the cluster did
         return replace(outcome, refused=f"{type(error).__name__}: {error}")
-    partial = outcome.path.with_suffix(".part")
-    container.write(log, partial)
-    partial.replace(outcome.path)
+    _write_whole(outcome.path, lambda path: container.write(log, path))
     return outcome
 
 
@@ -120,14 +118,28 @@ def _write_plan(folder: Path, scenes: Sequence[Scene], promise: Promise) -> None
             raise InvalidInput("scenes", f"{name!r} twice", "scenes of different names")
     folder.mkdir(parents=True, exist_ok=True)
     path, asked = folder / PLAN, asdict(promise)
-    known = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"scenes": {}, "promise": asked}
+    known = _read_plan(path) if path.exists() else {"scenes": {}, "promise": asked}
     if known["promise"] != asked:
         raise InvalidInput(f"campaign in {folder}", _told(asked), f"{_told(known['promise'])}, or another folder")
     for scene in scenes:
         digest = hashlib.sha256(repr(scene).encode()).hexdigest()
         if known["scenes"].setdefault(_file_name(scene), digest) != digest:
             raise InvalidInput("scene", f"another {scene.name!r} than that in {folder}", "the same, or another folder")
-    path.write_text(json.dumps(known, indent=2), encoding="utf-8")
+    _write_whole(path, lambda path: path.write_text(json.dumps(known, indent=2), encoding="utf-8"))
+
+
+def _read_plan(path: Path) -> dict[str, dict[str, Any]]:
+    try:
+        known = json.loads(path.read_text(encoding="utf-8"))
+        return {name: dict(known[name]) for name in ("scenes", "promise")}
+    except (ValueError, KeyError, TypeError) as error:
+        raise InvalidInput("campaign", f"{path}, damaged or of something else", "a folder of its own") from error
+
+
+def _write_whole(path: Path, write: Callable[[Path], object]) -> None:
+    partial = path.with_suffix(".part")
+    write(partial)
+    partial.replace(path)
 
 
 def _file_name(scene: Scene) -> str:

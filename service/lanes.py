@@ -74,9 +74,8 @@ class ProcessLane:
             raise WorkerDied from error
 
     def kill(self) -> None:
-        """End the worker process at once (what ``ProcessPoolExecutor.kill_workers`` does from Python 3.14 on)."""
-        for process in dict(getattr(self._executor, "_processes", None) or {}).values():
-            process.kill()
+        """End the worker process at once."""
+        worker.kill(self._executor)
 
     async def close(self) -> None:
         """Let the worker process go once it has nothing to do."""

@@ -106,8 +106,7 @@ class Readers:
         if self._executor is None:
             return
         executor, self._executor = self._executor, None
-        for process in dict(getattr(executor, "_processes", None) or {}).values():
-            process.kill()
+        worker.kill(executor)
         await asyncio.to_thread(executor.shutdown, cancel_futures=True)
 
 

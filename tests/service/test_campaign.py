@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service import campaign, formats
+from service import campaign, formats, worker
 from service.campaign import Promise
 from slipcore.contact import Scene
 from slipcore.errors import InvalidInput
@@ -67,7 +67,7 @@ def test_what_is_refused_is_told_and_the_others_go_on(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a_press-0.npz", "campaign.json"]
 
 
-def test_a_process_that_dies_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_fails_otherwise_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def die(*_: Any, **__: Any) -> None:
         raise MemoryError("all of it")
 
@@ -85,6 +85,27 @@ def test_a_folder_holds_one_campaign(tmp_path: Path) -> None:
         list(campaign.run(Here(), [scene(friction=0.5)], [0], tmp_path, QUICK))
     list(campaign.run(Here(), [scene("More")], [0], tmp_path, QUICK))
     assert (tmp_path / "more-0.npz").exists()
+
+
+@pytest.mark.parametrize("content", ["", "[1]", '{"scenes": {}}', '{"scenes": 1, "promise": 2}'])
+def test_a_plan_that_is_none_is_refused_and_stays(tmp_path: Path, content: str) -> None:
+    (tmp_path / "campaign.json").write_text(content, encoding="utf-8")
+    with pytest.raises(InvalidInput, match="damaged or of something else"):
+        list(campaign.run(Here(), [scene()], [0], tmp_path, QUICK))
+    assert (tmp_path / "campaign.json").read_text(encoding="utf-8") == content
+
+
+def test_a_process_that_dies_is_told_and_its_log_made_the_next_time(tmp_path: Path) -> None:
+    with campaign.workers(1) as executor:
+        outcomes = campaign.run(executor, [scene()], range(12), tmp_path, QUICK)
+        first = next(outcomes)
+        worker.kill(executor)
+        made = [first, *outcomes]
+    refused = [outcome for outcome in made if outcome.refused]
+    assert first.refused is None
+    assert "BrokenProcessPool" in {str(outcome.refused).partition(":")[0] for outcome in refused}
+    assert len(list(tmp_path.glob("*.npz"))) == 12 - len(refused)
+    assert not any(outcome.refused for outcome in campaign.run(Here(), [scene()], range(12), tmp_path, QUICK))
 
 
 def test_two_scenes_of_one_file_name_are_refused(tmp_path: Path) -> None:

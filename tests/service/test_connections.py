@@ -1,5 +1,6 @@
 """Real sockets, since what is tested stands between the network and the application."""
 
+import asyncio
 import json
 import socket
 import threading
@@ -156,6 +157,21 @@ def test_what_is_not_http_is_a_problem_and_ends_the_connection(connect: Connect,
     assert head.startswith((b"HTTP/1.1 400", b"HTTP/1.1 501"))
     assert b"application/problem+json" in head
     assert b'"type": "/problems/bad-request"' in body
+
+
+def test_a_socket_is_read_in_large_pieces(connect: Connect, monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes: list[int] = []
+    begin = BoundedConnection.connection_made
+
+    def look(self: BoundedConnection, transport: asyncio.Transport) -> None:
+        begin(self, transport)
+        sizes.append(transport.max_size)  # type: ignore[attr-defined]  # which asyncio reads, and could rename
+
+    monkeypatch.setattr(BoundedConnection, "connection_made", look)
+    connection = connect()
+    connection.sendall(b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n")
+    assert rest(connection).endswith(b"hello")
+    assert sizes == [connections.RECEIVED_BYTES]
 
 
 def test_whoever_comes_when_all_connections_are_taken_is_told_so(connect: Connect) -> None:

@@ -139,8 +139,9 @@ def test_a_campaign_runs_on_a_cluster(cluster: Cluster, tmp_path: Path) -> None:
 
 def test_a_campaign_names_a_scheduler_that_is_not_there(cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(campaign, "CONNECT_SECONDS", 0.5)
-    with pytest.raises(InvalidInput, match=r"Dask address is .*; allowed: one at which a scheduler answers"):
-        campaign.workers(1, cluster.address).__enter__()
+    named = pytest.raises(InvalidInput, match=r"Dask address is .*; allowed: one at which a scheduler answers")
+    with named, campaign.workers(1, cluster.address):
+        pass
 
 
 def test_a_scheduler_that_is_not_there_is_named_and_holds_no_stop_up(
@@ -160,3 +161,5 @@ def test_without_its_library_the_extra_is_named(tmp_path: Path, monkeypatch: pyt
     monkeypatch.delitem(sys.modules, "service.dask_lane", raising=False)
     with pytest.raises(DriverMissing, match=r"Dask cluster is tcp://a:1, .* \(stiction\[dask\] brings one\)"):
         lanes(Place("sqlite:///x", tmp_path), 1, "tcp://a:1")
+    with pytest.raises(DriverMissing, match=r"Dask cluster is tcp://a:1, "), campaign.workers(1, "tcp://a:1"):
+        pass
