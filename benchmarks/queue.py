@@ -22,7 +22,7 @@ import estimators
 import slipcore
 from benchmarks.pages import options, picture_folder, save, table, write
 from estimators import Moments
-from service.pipeline import FITS_BESIDE_OTHERS
+from service.jobs.pipeline import FITS_BESIDE_OTHERS
 from slipcore.contact import RampSchedule, tangential_ramp
 
 Array = NDArray[np.float64]

@@ -12,23 +12,24 @@ from db.blobs import BlobStore, open_blobs
 from db.database import Database
 from db.repositories import blobs as blob_references
 from db.repositories import runners
-from service import access, gate, openapi, problems, traces
 from service.context import Context
-from service.envelope import Envelope
-from service.folder_lock import shared
-from service.gate import Gate
-from service.head_requests import HeadRequests
-from service.jobs import JobRunner
-from service.lanes import lanes
-from service.lookups import Lookups
-from service.metrics import Metering, Metrics
-from service.model_cache import ModelCache
-from service.reading import Readers
-from service.retention import Retention
-from service.routes import curation, grasp_logs, health, jobs, materials, metrics, planning, stream
+from service.domain.model_cache import ModelCache
+from service.formats.reading import Readers
+from service.http import access, gate, openapi, problems
+from service.http.envelope import Envelope
+from service.http.gate import Gate
+from service.http.head_requests import HeadRequests
+from service.http.lookups import Lookups
+from service.http.routes import curation, grasp_logs, health, jobs, materials, metrics, planning, stream
+from service.jobs.lanes import lanes
+from service.jobs.retention import Retention
+from service.jobs.runner import JobRunner
+from service.jobs.worker import Place
+from service.observability import traces
+from service.observability.metrics import Metering, Metrics
+from service.processes.folder_lock import shared
 from service.settings import Settings
-from service.stream_sessions import Streams
-from service.worker import Place
+from service.stream.sessions import Streams
 
 logger = logging.getLogger(__name__)
 

@@ -7,11 +7,11 @@ from fastapi import Depends, Request
 
 from db.blobs import BlobStore
 from db.database import Database
-from service.jobs import JobRunner
-from service.model_cache import ModelCache
-from service.reading import Readers
+from service.domain.model_cache import ModelCache
+from service.formats.reading import Readers
+from service.jobs.runner import JobRunner
 from service.settings import Settings
-from service.stream_sessions import Streams
+from service.stream.sessions import Streams
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ def prune(
     from db import migrate
     from db.repositories import uploads
     from db.tables import now
-    from service.retention import prune as delete_old
+    from service.jobs.retention import prune as delete_old
 
     before = now() - _age(older_than)
     with opened(database_url) as database:

@@ -27,7 +27,7 @@ def create(
 ) -> None:
     """Make a key and print it: this once, for only its digest is stored."""
     from db.repositories import access_keys
-    from service.access import digest, new_key
+    from service.http.access import digest, new_key
 
     if not 0 < len(name) <= 100 or not name.isprintable():
         raise typer.BadParameter(f"name is {name!r}; allowed: 1 to 100 printable characters")

@@ -25,7 +25,7 @@ def serve(
     """Run the web service until it is told to stop (every setting: docs/settings.md)."""
     import uvicorn
 
-    from service.serving import configuration
+    from service.http.serving import configuration
 
     settings = _settings(host=host, port=port, data_folder=data_folder, database_url=database_url)
     _prepare(settings)
@@ -82,7 +82,8 @@ def demo(
 
 
 def _prepare(settings: "Settings") -> None:
-    from service import freed_memory, logs
+    from service.observability import logs
+    from service.processes import freed_memory
 
     logs.configure(logs.Logs(settings.log_format, settings.log_level))
     freed_memory.keep()

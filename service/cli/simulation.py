@@ -14,7 +14,7 @@ from service.cli.output import print_json, print_table
 from service.cli.progress import counted, patience
 
 if TYPE_CHECKING:
-    from service.campaign import Outcome
+    from service.jobs.campaign import Outcome
     from slipcore import GraspLog
     from slipcore.contact import Scene
 
@@ -79,7 +79,7 @@ def campaign(
     json: Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")] = False,
 ) -> None:
     """Simulate many grasps, each scene with many seeds, on all cores or on a Dask cluster."""
-    from service.campaign import Promise, run, workers
+    from service.jobs.campaign import Promise, run, workers
     from slipcore.contact import Scene
 
     wanted = [Scene.from_toml(scene) for scene in scenes]

@@ -22,8 +22,9 @@ from db.records import NewModel
 from db.repositories import friction_models, jobs, materials
 from service.app import create_app
 from service.context import Context
-from service.model_cache import ModelCache
-from service.serving import configuration
+from service.domain.model_cache import ModelCache
+from service.http.serving import configuration
+from service.observability import logs
 from service.settings import Settings
 from slipcore import GraspLog
 from slipcore.contact.ramp import RampSchedule, tangential_ramp
@@ -93,6 +94,13 @@ class Caller:
         if sent[0]["type"] == "websocket.accept":
             return httpx.Response(101)
         return httpx.Response(sent[0]["status"], headers=sent[0]["headers"], content=sent[1]["body"])
+
+
+@pytest.fixture(autouse=True)
+def own_log_fields() -> Iterator[None]:
+    """Jobs that a test does in its own process note fields for the log, which are no other test's."""
+    with logs.about():
+        yield
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ import pytest
 
 from db.database import Database
 from db.repositories import access_keys
-from service import access
+from service.http import access
 from service.settings import Settings
 
 CHECKS = (

@@ -1,0 +1,18 @@
+"""Cancel a job that nobody wants any more."""
+
+from db.records import Job
+from db.repositories import jobs
+from service.context import Context
+from service.http.problems import JOB_ENDED, Problem
+
+REASON = "cancelled by request"
+
+
+def cancel(context: Context, job_id: str) -> Job:
+    """End a job before its time, or find it cancelled; raises ``NotFound``, and ``Problem`` if it ended otherwise."""
+    with context.database.write() as session:
+        job = jobs.cancel(session, job_id, REASON)
+    if job.status != "cancelled":
+        detail = f"job {job_id} is {job.status}: it cannot be cancelled any more"
+        raise Problem(JOB_ENDED, detail, name="status", value=job.status, allowed="queued or running")
+    return job

@@ -1,0 +1,105 @@
+"""Put right what was stored: names of materials, two that are one, logs that should not count."""
+
+from collections.abc import Iterable
+
+from sqlalchemy.orm import Session
+
+from db.records import Job, Material, StoredGraspLog
+from db.repositories import detections, friction_models, grasp_logs, jobs, materials
+from service.context import Context
+from service.http.problems import INVALID_REQUEST, Problem
+from service.jobs.queueing import queue
+
+REFITTED = "ols"
+"""The method by which a material is fitted even if it has no model yet, as after an upload."""
+
+
+def change(context: Context, material: str, name: str | None, description: str | None) -> Material:
+    """Rename a material, its old name becoming an alias, or change its description.
+
+    Raises ``NotFound``, and ``AlreadyExists`` for a name that another material has.
+    """
+    with context.database.write() as session:
+        material_id = materials.find_id(session, material)
+        if description is not None:
+            materials.describe(session, material_id, description)
+        if name is not None:
+            materials.rename(session, material_id, name)
+        changed = materials.get(session, name or material)
+    context.models.seen()
+    return changed
+
+
+def add_alias(context: Context, material: str, alias: str) -> Material:
+    """Let a material be found by one more name; raises ``NotFound`` and ``AlreadyExists``."""
+    with context.database.write() as session:
+        materials.add_alias(session, materials.find_id(session, material), alias)
+        return materials.get(session, material)
+
+
+def remove_alias(context: Context, material: str, alias: str) -> None:
+    """Free an alias; raises ``NotFound``."""
+    with context.database.write() as session:
+        materials.remove_alias(session, materials.find_id(session, material), alias)
+    context.models.seen()
+
+
+def merge(context: Context, material: str, source: str) -> tuple[Material, list[Job]]:
+    """Put what is known of ``source`` to ``material`` and refit it; raises ``NotFound``."""
+    with context.database.write() as session:
+        target_id, source_id = (materials.find_id(session, name) for name in (material, source))
+        if target_id == source_id:
+            raise Problem.wrong_value(INVALID_REQUEST, "source", source, "another material than the one in the path")
+        methods = friction_models.current_methods(session, [target_id, source_id])
+        materials.merge(session, target_id, source_id)
+        queued = _queue_refits(session, target_id, methods)
+        merged = materials.get(session, material)
+    return merged, _follow_up(context, queued)
+
+
+def withdraw(context: Context, log_id: str, because: str) -> tuple[StoredGraspLog, list[Job]]:
+    """Take a log out of its material's fits, and fit again without it; raises ``NotFound``."""
+    with context.database.write() as session:
+        is_new = grasp_logs.withdraw(session, log_id, because)
+        queued = _refit_without(session, grasp_logs.material_id(session, log_id)) if is_new else []
+        log = grasp_logs.get(session, log_id)
+    return log, _follow_up(context, queued)
+
+
+def restore(context: Context, log_id: str) -> tuple[StoredGraspLog, list[Job]]:
+    """Put a withdrawn log back into its material's fits, and fit again with it; raises ``NotFound``."""
+    with context.database.write() as session:
+        was_withdrawn = grasp_logs.restore(session, log_id)
+        material_id = grasp_logs.material_id(session, log_id)
+        queued: list[Job] = []
+        if was_withdrawn and material_id is not None:
+            queued = _queue_refits(session, material_id, friction_models.current_methods(session, [material_id]))
+        log = grasp_logs.get(session, log_id)
+    return log, _follow_up(context, queued)
+
+
+def _refit_without(session: Session, material_id: int | None) -> list[Job]:
+    """Until the refits are there the models say that they are outdated; without any samples left there is none."""
+    if material_id is None:
+        return []
+    methods = friction_models.current_methods(session, [material_id])
+    friction_models.mark_outdated(session, material_id)
+    if not detections.any_samples(session, material_id):
+        friction_models.retire(session, material_id)
+        return []
+    return _queue_refits(session, material_id, methods)
+
+
+def _queue_refits(session: Session, material_id: int, methods: Iterable[str]) -> list[Job]:
+    if not detections.any_samples(session, material_id):
+        return []
+    ids = [queue(session, "fit", method, material_id=material_id) for method in sorted({REFITTED, *methods})]
+    return [jobs.get(session, job_id) for job_id in ids]
+
+
+def _follow_up(context: Context, queued: list[Job]) -> list[Job]:
+    """Tell those who hold models, and those who make them."""
+    context.models.seen()
+    if queued:
+        context.jobs.wake()
+    return queued

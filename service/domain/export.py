@@ -1,0 +1,35 @@
+"""Hand a stored log out as a file: as it is kept where that is asked for, or written anew in a reader's process."""
+
+import asyncio
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from db.records import StoredGraspLog
+from service import formats
+from service.context import Context
+from service.http.problems import FILE_DELETED, UNSUPPORTED_FORMAT, Problem
+
+
+@dataclass(frozen=True, slots=True)
+class LogFile:
+    """A file to be sent; ``close`` it after that."""
+
+    path: Path
+    close: ExitStack
+
+
+async def export(context: Context, log: StoredGraspLog, name: str) -> LogFile:
+    """The log as a file of format ``name``; raises ``Problem`` where there is none, or no library of that format."""
+    if not log.has_file:
+        raise Problem(FILE_DELETED, f"the file of grasp log {log.id} was deleted, as old uploads are here")
+    source = await asyncio.to_thread(context.blobs.path, log.sha256)
+    with ExitStack() as spools:
+        if name == "npz" and await asyncio.to_thread(formats.identify, source) == "npz":
+            return LogFile(source, spools.pop_all())
+        spool = spools.enter_context(context.blobs.spool())
+        try:
+            await context.readers.write(source, spool.path, name)
+        except formats.UnsupportedFormat as error:
+            raise Problem.wrong_value(UNSUPPORTED_FORMAT, error.name, error.value, error.allowed) from error
+        return LogFile(spool.path, spools.pop_all())

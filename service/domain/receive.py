@@ -1,0 +1,78 @@
+"""Take in a body: streamed to disk as it comes, unpacked where it was packed on its way, bounded all along."""
+
+import asyncio
+import gzip
+import sys
+import zlib
+from collections.abc import AsyncIterator
+
+from starlette.requests import ClientDisconnect
+
+from db.blobs import Spool
+from service.http.problems import INVALID_REQUEST, UNSUPPORTED_FORMAT, UPLOAD_INTERRUPTED, UPLOAD_TOO_LARGE, Problem
+
+if sys.version_info >= (3, 14):
+    from compression import zstd
+else:
+    from backports import zstd
+
+CHUNK_BYTES = 2**20
+"""Bytes gathered before a thread hashes and writes them: about a millisecond of work."""
+
+UNPACKERS: dict[str, type[gzip.GzipFile] | type[zstd.ZstdFile]] = {"gzip": gzip.GzipFile, "zstd": zstd.ZstdFile}
+"""Content encodings that are undone; ``identity`` is none."""
+
+EXPANSION_FROM = 16 * CHUNK_BYTES
+"""Bytes unpacked before their ratio to the packed ones counts: a small log of zeros is no attack."""
+
+
+def check_size(size: int, limit: int) -> None:
+    """Raises ``Problem`` for a body over the limit."""
+    if size > limit:
+        raise Problem.wrong_value(UPLOAD_TOO_LARGE, "body", f"{size} bytes or more", f"at most {limit} bytes")
+
+
+def check_encoding(encoding: str) -> str:
+    """The content encoding, empty where there is none; raises ``Problem`` for one that isn't known."""
+    name = encoding.strip().lower()
+    if name in ("", "identity"):
+        return ""
+    if name not in UNPACKERS:
+        raise Problem.wrong_value(UNSUPPORTED_FORMAT, "content encoding", encoding, f"{', '.join(UNPACKERS)} or none")
+    return name
+
+
+async def receive(spool: Spool, chunks: AsyncIterator[bytes], limit: int) -> None:
+    """Write a body to ``spool`` as it comes, a chunk while the next is received: no faster than the disk takes it."""
+    size, waiting, writing = 0, bytearray(), None
+    try:
+        async for chunk in chunks:
+            size += len(chunk)
+            check_size(size, limit)
+            waiting += chunk
+            if len(waiting) >= CHUNK_BYTES:
+                if writing is not None:
+                    await writing
+                writing, waiting = asyncio.create_task(asyncio.to_thread(spool.write, waiting)), bytearray()
+    except ClientDisconnect as error:
+        raise Problem(UPLOAD_INTERRUPTED, f"the connection ended after {size} bytes") from error
+    finally:
+        if writing is not None:
+            await writing
+    await asyncio.to_thread(spool.write, waiting)
+
+
+def unpack(packed: Spool, spool: Spool, encoding: str, limit: int, expansion: int) -> None:
+    """Undo a content encoding, a chunk at a time; raises ``Problem`` for a bomb or a damaged stream."""
+    packed.flush()
+    try:
+        with UNPACKERS[encoding](packed.path) as stream:
+            while chunk := stream.read(CHUNK_BYTES):
+                check_size(spool.size + len(chunk), limit)
+                spool.write(chunk)
+                if spool.size > max(EXPANSION_FROM, expansion * packed.size):
+                    value = f"{packed.size} bytes that unpack to {spool.size} or more"
+                    raise Problem.wrong_value(UPLOAD_TOO_LARGE, "body", value, f"at most {expansion} times as many")
+    except (EOFError, gzip.BadGzipFile, zlib.error, zstd.ZstdError) as error:
+        value = f"not a complete {encoding} stream ({str(error)[:80]})"
+        raise Problem.wrong_value(INVALID_REQUEST, "body", value, f"{encoding}, as content-encoding says") from error

@@ -1,0 +1,178 @@
+"""Take in a grasp log: stream it to disk, look whether it is one, store it with its ingest job."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import ExitStack
+from dataclasses import dataclass, field, replace
+
+from sqlalchemy.orm import Session
+
+from db.blobs import Spool
+from db.errors import AlreadyExists, StorageUnavailable
+from db.records import NewGraspLog
+from db.repositories import grasp_logs, jobs, materials, uploads
+from service import formats
+from service.context import Context
+from service.domain.receive import check_encoding, check_size, receive, unpack
+from service.formats.reading import Description, Settings, read_plain
+from service.http.idempotency import Answer, Once, answer_once
+from service.http.problems import (
+    INVALID_GRASP_LOG,
+    INVALID_REQUEST,
+    UNSUPPORTED_FORMAT,
+    Problem,
+)
+from service.http.schemas import GraspLogOut
+from service.jobs.queueing import queue
+from slipcore.errors import InvalidInput
+from slipcore.methods import METHODS
+
+LONGEST_SENSOR_NAME = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What the uploader says of a log: its material, sensor and detector, type and encoding of its bytes, and the
+    settings that its format needs (``formats.read``).
+    """
+
+    material: str | None
+    sensor: str | None
+    detector: str
+    content_type: str | None
+    content_length: int | None
+    content_encoding: str = ""
+    settings: Settings = field(default_factory=dict)
+    once: Once | None = None
+
+
+async def upload(context: Context, chunks: AsyncIterator[bytes], wish: Wish) -> Answer:
+    """Store a log and queue its ingest.
+
+    Raises ``Problem`` for what cannot be taken, ``NotFound`` for an unknown material. Nothing stays of a log that is
+    not taken.
+    """
+    limit, expansion = context.settings.max_upload_bytes, context.settings.max_expansion
+    check_size(wish.content_length or 0, limit)
+    encoding = check_encoding(wish.content_encoding)
+    material_id = await asyncio.to_thread(_check, context, wish)
+    with ExitStack() as spools:
+        body = spool = spools.enter_context(context.blobs.spool())
+        await receive(body, chunks, limit)
+        if encoding:
+            spool = spools.enter_context(context.blobs.spool())
+            await asyncio.to_thread(unpack, body, spool, encoding, limit, expansion)
+        kept, description = await _read(context, spools, spool, wish)
+        log = _new_log(kept, description, wish, material_id)
+        once = wish.once and wish.once.about(body.sha256)
+        return await asyncio.to_thread(_store, context, kept, log, once)
+
+
+async def check_target(context: Context, material: str | None, detector: str) -> None:
+    """Raises ``Problem`` or ``NotFound`` for what a log could not be stored for."""
+    await asyncio.to_thread(_check, context, Wish(material, None, detector, None, None))
+
+
+async def store_made(context: Context, spool: Spool, found: Description, material: str | None, detector: str) -> Answer:
+    """Store a log that the service itself has written to ``spool.path``, and queue its ingest; raises as ``upload``."""
+    wish = Wish(material, None, detector, None, None)
+    material_id = await asyncio.to_thread(_check, context, wish)
+    await asyncio.to_thread(spool.adopt)
+    return await asyncio.to_thread(_store, context, spool, _new_log(spool, found, wish, material_id), None)
+
+
+def _check(context: Context, wish: Wish) -> int | None:
+    """What can be told before the bytes are there; returns the material's key."""
+    if wish.detector not in METHODS:
+        raise Problem.wrong_value(INVALID_REQUEST, "detector", wish.detector, ", ".join(METHODS))
+    try:
+        formats.parse_mapping(wish.settings)
+    except InvalidInput as error:
+        raise Problem.wrong_value(INVALID_REQUEST, error.name, error.value, error.allowed) from error
+    if wish.material is None:
+        return None
+    with context.database.read() as session:
+        return materials.find_id(session, wish.material)
+
+
+def _identify(spool: Spool, wish: Wish) -> str:
+    """The body's format, which must take what was said beside it."""
+    spool.flush()
+    try:
+        name = formats.identify(spool.path, wish.content_type)
+        formats.check_settings(name, wish.settings)
+    except formats.UnsupportedFormat as error:
+        raise Problem.wrong_value(UNSUPPORTED_FORMAT, error.name, error.value, error.allowed) from error
+    except formats.UnusedSetting as error:
+        raise Problem.wrong_value(INVALID_REQUEST, error.name, error.value, error.allowed) from error
+    except InvalidInput as error:
+        raise Problem.wrong_value(INVALID_GRASP_LOG, error.name, error.value, error.allowed) from error
+    return name
+
+
+async def _read(context: Context, spools: ExitStack, spool: Spool, wish: Wish) -> tuple[Spool, Description]:
+    """What is to be stored, the body or a container made of it, with its description."""
+    name = await asyncio.to_thread(_identify, spool, wish)
+    try:
+        if formats.FORMATS[name].plain:
+            found, _ = await asyncio.gather(  # the disk is slow while the reader computes
+                asyncio.to_thread(read_plain, spool.path, name), asyncio.to_thread(spool.sync)
+            )
+            return spool, found
+        made = spools.enter_context(context.blobs.spool())
+        description = await context.readers.convert(spool.path, made.path, name, wish.settings)
+        await asyncio.to_thread(made.adopt)
+    except formats.UnsupportedFormat as error:
+        raise Problem.wrong_value(UNSUPPORTED_FORMAT, error.name, error.value, error.allowed) from error
+    except InvalidInput as error:
+        raise Problem.wrong_value(INVALID_GRASP_LOG, error.name, error.value, error.allowed) from error
+    return made, description
+
+
+def _new_log(spool: Spool, found: Description, wish: Wish, material_id: int | None) -> NewGraspLog:
+    return NewGraspLog(
+        sha256=spool.sha256,
+        bytes=spool.size,
+        format=found.format,
+        detector=wish.detector,
+        material_id=material_id,
+        sensor=_sensor_name(wish.sensor or found.sensor),
+        frames=found.frames,
+        duration=found.duration,
+        grid=found.grid,
+    )
+
+
+def _sensor_name(name: str) -> str:
+    if not 0 < len(name) <= LONGEST_SENSOR_NAME or not name.isprintable():
+        allowed = f"1 to {LONGEST_SENSOR_NAME} printable characters"
+        raise Problem.wrong_value(INVALID_GRASP_LOG, "sensor", repr(name), allowed)
+    return name
+
+
+def _store(context: Context, spool: Spool, log: NewGraspLog, once: Once | None) -> Answer:
+    """First the blob, durably, then the rows that refer to it."""
+    spool.keep()
+    with context.database.write() as session:
+        uploads.lock(session, [log.sha256])
+        if uploads.bring_back(session, log.sha256) and not context.blobs.has(log.sha256):
+            raise StorageUnavailable("the file was old and about to be deleted when it came in again")
+        answer = answer_once(session, once, lambda: _accept(session, log))
+    context.jobs.wake()
+    return answer
+
+
+def _accept(session: Session, log: NewGraspLog) -> Answer:
+    """Store a new log with its job; a known one whose job failed, which is our fault, or was cancelled gets another."""
+    if log.material_id is not None:  # it may have been merged into another while the log came in
+        log = replace(log, material_id=materials.still(session, log.material_id))
+    try:
+        log_id, status = grasp_logs.add(session, log), 202
+        queue(session, "ingest", "ols", material_id=log.material_id, grasp_log_id=log_id)
+    except AlreadyExists:
+        log_id, status = grasp_logs.find_id(session, log.sha256, log.material_id, log.detector), 200
+        job = grasp_logs.get(session, log_id).job
+        if job.status in {"failed", "cancelled"}:
+            jobs.requeue(session, job.id)
+    body = GraspLogOut.of(grasp_logs.get(session, log_id)).model_dump(mode="json")
+    return Answer(status, f"/v1/grasp-logs/{log_id}", body)

@@ -1,0 +1,126 @@
+"""Access keys: how one is made and known again, what it may do, and what a route needs."""
+
+import hashlib
+import hmac
+import ipaddress
+import re
+import secrets
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import get_args
+
+from fastapi import FastAPI, Security
+from fastapi.dependencies.models import Dependant
+from fastapi.openapi.models import HTTPBearer
+from fastapi.routing import iter_route_contexts
+from fastapi.security import SecurityScopes
+from fastapi.security.base import SecurityBase
+from starlette.requests import HTTPConnection
+
+from db.records import AccessKey, Scope
+from service.http.problems import INSUFFICIENT_SCOPE, Problem
+
+SCOPES: tuple[Scope, ...] = get_args(Scope)
+"""What keys are for; each scope implies those before it."""
+
+CHALLENGE = 'Bearer realm="stiction"'
+PUBLIC_PATHS = frozenset({"/healthz", "/readyz", "/openapi.json", "/docs", "/docs/oauth2-redirect", "/redoc"})
+"""What anybody may see: whether the service lives, and its description, which is the same everywhere."""
+
+_KEY = re.compile(r"stiction_([0-9a-f]{12})_[0-9a-f]{64}")
+
+
+@dataclass(frozen=True, slots=True)
+class Access:
+    """What a request may do; ``key_id`` is None where no key is asked for."""
+
+    key_id: str | None
+    scope: Scope
+
+    def allows(self, scope: str) -> bool:
+        """Whether this scope is the needed one, or implies it."""
+        return SCOPES.index(self.scope) >= [*SCOPES].index(scope)  # type: ignore[arg-type]
+
+
+EVERYTHING = Access(None, "admin")
+
+
+def new_key() -> tuple[str, str]:
+    """A new key's public id and its text, which is to be shown once."""
+    key_id = secrets.token_hex(6)
+    return key_id, f"stiction_{key_id}_{secrets.token_hex(32)}"
+
+
+def key_id(text: str) -> str | None:
+    """The public part of a key; None for what is no key."""
+    found = _KEY.fullmatch(text)
+    return found[1] if found else None
+
+
+def digest(text: str) -> str:
+    """What is stored of a key.
+
+    256 random bits cannot be guessed, however fast the hash, so a slow one as for passwords would only cost time.
+    """
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def is_key(text: str, stored: AccessKey) -> bool:
+    """Whether ``text`` is this key and it is not revoked; takes as long wherever they differ."""
+    return hmac.compare_digest(digest(text), stored.sha256) and stored.revoked_at is None
+
+
+@lru_cache(maxsize=1024)
+def is_loopback(host: str) -> bool:
+    """Whether an address, or a name, is this machine's own and reached from nowhere else."""
+    try:
+        address = ipaddress.ip_address(host)
+    except ValueError:
+        return host == "localhost"
+    return (getattr(address, "ipv4_mapped", None) or address).is_loopback
+
+
+class Needs(SecurityBase):
+    """The dependency of a route on a scope; the gate before it has found out who asks."""
+
+    scheme_name = "accessKey"
+    model = HTTPBearer(description="A key of `stiction keys create`; its scope is read, upload or admin.")
+
+    async def __call__(self, connection: HTTPConnection, needed: SecurityScopes) -> None:
+        """Raise ``Problem`` unless the request has every scope of the route."""
+        access: Access = connection.state.access
+        for scope in needed.scopes:
+            if not access.allows(scope):
+                headers = {"WWW-Authenticate": f'{CHALLENGE}, error="insufficient_scope", scope="{scope}"'}
+                detail = f"the key has scope {access.scope}; this needs {scope}"
+                raise Problem(INSUFFICIENT_SCOPE, detail, headers=headers)
+
+
+_needs = Needs()
+READ, UPLOAD, ADMIN = (Security(_needs, scopes=[scope]) for scope in SCOPES)
+"""What a route puts into its ``dependencies``."""
+
+
+def scopes_of_routes(app: FastAPI) -> dict[str, set[str]]:
+    """The scopes that each route needs, by method and path; none for one that nobody may leave so."""
+    return {
+        f"{'/'.join(sorted(route.methods or {'WS'}))} {route.path}": set(_scopes(getattr(route, "dependant", None)))
+        for route in iter_route_contexts(app.routes)
+        if route.path not in PUBLIC_PATHS
+    }
+
+
+def check_routes(app: FastAPI) -> None:
+    """Make sure that every route says what scope it needs; raises ``RuntimeError`` with those that do not."""
+    silent = [route for route, scopes in scopes_of_routes(app).items() if not scopes & set(SCOPES)]
+    if silent:
+        raise RuntimeError(f"scope of {', '.join(silent)} is not said; allowed: READ, UPLOAD, ADMIN, or a public path")
+
+
+def _scopes(dependant: Dependant | None) -> Iterator[str]:
+    if dependant is not None:
+        if isinstance(dependant.call, Needs):
+            yield from dependant.own_oauth_scopes or ()
+        for part in dependant.dependencies:
+            yield from _scopes(part)

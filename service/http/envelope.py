@@ -1,0 +1,137 @@
+"""What surrounds every request: its id, the bounds of what is read of it, and the headers of its answer."""
+
+import asyncio
+import re
+import time
+import uuid
+from collections.abc import Iterator, Mapping
+
+from fastapi import Request
+from starlette.exceptions import HTTPException
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service.http import problems
+from service.http.problems import BAD_REQUEST, HEADERS_TOO_LARGE, Problem
+from service.observability.logs import ABOUT
+
+MOST_HEADER_BYTES = 16 * 1024
+"""Of one request; what servers usually take."""
+
+BODY_SECONDS, SLOWEST_BODY = 20.0, 10_000.0
+"""s that a client may keep us waiting for its body, and bytes that earn it another second."""
+
+NOTHING = "default-src 'none'; frame-ancestors 'none'; base-uri 'none'"
+_SWAGGER = (
+    "default-src 'none'; frame-ancestors 'none'; base-uri 'none'; connect-src 'self'; worker-src blob:; "
+    "script-src 'unsafe-inline' https://cdn.jsdelivr.net; img-src data: https://fastapi.tiangolo.com "
+    "https://cdn.redoc.ly; style-src 'unsafe-inline' https://cdn.jsdelivr.net https://fonts.googleapis.com; "
+    "font-src https://fonts.gstatic.com"
+)
+PAGE_POLICIES = dict.fromkeys(("/docs", "/docs/oauth2-redirect", "/redoc"), _SWAGGER)
+"""Content security policies of the framework's own pages; any other answer needs nothing, or says what it needs."""
+
+OF_ALL = ((b"x-content-type-options", b"nosniff"), (b"cache-control", b"no-store"))
+OF_TLS = (b"strict-transport-security", b"max-age=31536000")
+
+_ID = re.compile(rb"[A-Za-z0-9._-]{1,128}")
+
+
+class Envelope:
+    """Gives each request an id, bounds its headers and the patience with its body, and completes its answer's headers.
+
+    An error that nothing else answers is answered here.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one connection."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        request_id = _request_id(scope)
+        scope.setdefault("state", {})["request_id"] = request_id
+        token = ABOUT.set({"request_id": request_id})
+        try:
+            await self._serve(scope, receive, _Sender(scope, send, request_id))
+        finally:
+            ABOUT.reset(token)
+
+    async def _serve(self, scope: Scope, receive: Receive, send: "_Sender") -> None:
+        try:
+            _check(scope)
+            await self.app(scope, _Receiver(receive).receive, send)
+        except Problem as problem:
+            await problems.answer(Request(scope), problem)(scope, receive, send)
+        except asyncio.CancelledError:  # the server waits for its requests no longer
+            if send.has_begun:
+                raise
+            await problems.answer(Request(scope), problems.stopping())(scope, receive, send)
+        except Exception as error:
+            answer = problems.unexpected(Request(scope), error)
+            if send.has_begun:
+                raise
+            await answer(scope, receive, send)
+
+
+class _Sender:
+    """Sends an answer with the headers that every one has, unless it says something else itself."""
+
+    def __init__(self, scope: Scope, send: Send, request_id: str) -> None:
+        self.has_begun = False
+        self._scope, self._send, self._request_id = scope, send, request_id
+
+    async def __call__(self, message: Message) -> None:
+        if message["type"] == "http.response.start":
+            self.has_begun = True
+            said = dict(message["headers"])
+            more = [(name, value) for name, value in self._headers(said) if name not in said]
+            message = {**message, "headers": [*message["headers"], *more]}
+        await self._send(message)
+
+    def _headers(self, said: Mapping[bytes, bytes]) -> Iterator[tuple[bytes, bytes]]:
+        yield b"x-request-id", self._request_id.encode()
+        yield from OF_ALL
+        if self._scope["scheme"] == "https":
+            yield OF_TLS
+        if said.get(b"content-type", b"").startswith(b"text/html"):
+            yield b"referrer-policy", b"no-referrer"
+            yield b"content-security-policy", PAGE_POLICIES.get(self._scope["path"], NOTHING).encode()
+
+
+class _Receiver:
+    """Receives a body, and loses patience with one that comes too slowly."""
+
+    def __init__(self, receive: Receive) -> None:
+        self._receive = receive
+        self._left = BODY_SECONDS
+        self._is_whole = False
+
+    async def receive(self) -> Message:
+        """The next message; raises ``HTTPException`` where it does not come in time."""
+        if self._is_whole:  # what comes now is the end of the connection, which may take its time
+            return await self._receive()
+        began = time.monotonic()
+        try:
+            async with asyncio.timeout(self._left):
+                message = await self._receive()
+        except TimeoutError as error:
+            raise HTTPException(408, "the body came too slowly", {"Connection": "close"}) from error
+        self._left += len(message.get("body", b"")) / SLOWEST_BODY - (time.monotonic() - began)
+        self._is_whole = not message.get("more_body", False)
+        return message
+
+
+def _request_id(scope: Scope) -> str:
+    """The id that the client gave, if it is one that may stand in a log and a header."""
+    given = next((value for name, value in scope["headers"] if name == b"x-request-id"), b"")
+    return given.decode() if _ID.fullmatch(given) else uuid.uuid4().hex
+
+
+def _check(scope: Scope) -> None:
+    size = sum(len(name) + len(value) for name, value in scope["headers"])
+    if size > MOST_HEADER_BYTES:
+        raise Problem.wrong_value(HEADERS_TOO_LARGE, "headers", f"{size} bytes", f"at most {MOST_HEADER_BYTES} bytes")
+    if "\0" in scope["path"] or b"%00" in scope["query_string"]:
+        raise Problem.wrong_value(BAD_REQUEST, "address", "one with a NUL character", "text")

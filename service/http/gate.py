@@ -1,0 +1,157 @@
+"""The gate before all routes: finds out who asks, and turns away who may not."""
+
+import math
+import re
+import time
+
+from fastapi import Request
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import HTTPConnection
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from db.database import Database
+from db.errors import NotFound, StorageUnavailable
+from db.records import AccessKey
+from db.repositories import access_keys
+from service.context import Context
+from service.http import access, problems
+from service.http.access import CHALLENGE, EVERYTHING, PUBLIC_PATHS, Access, is_loopback
+from service.http.problems import INVALID_KEY, KEY_REQUIRED, MISDIRECTED_REQUEST, TOO_MANY_REQUESTS, Problem
+from service.http.rate_limit import RateLimit
+from service.settings import Settings
+
+KEPT_SECONDS = 2.0
+"""s that a key read from the database is believed: so long a revoked one may still work."""
+
+MOST_KEPT = 10_000
+"""Keys; more than a fleet has."""
+
+
+class NoKeys(RuntimeError):
+    """The service would ask everybody for a key, and there is none."""
+
+
+def check_start(settings: Settings, database: Database) -> None:
+    """Refuse to listen where others can reach the service, unless there are keys; raises ``NoKeys``."""
+    if settings.access == "open" or (settings.access == "auto" and is_loopback(settings.host)):
+        return
+    with database.read() as session:
+        if not access_keys.any_valid(session):
+            what = f"host is {settings.host}, access is {settings.access}, and there are no keys"
+            raise NoKeys(f"{what}; allowed: make one with `stiction keys create`, or set STICTION_ACCESS=open")
+
+
+class KeyRing:
+    """Keys of the database, each read once every few seconds at most."""
+
+    def __init__(self) -> None:
+        self._kept: dict[str, tuple[AccessKey, float]] = {}
+
+    async def find(self, database: Database, text: str) -> AccessKey | None:
+        """The key with this text, if it is a valid one."""
+        key_id = access.key_id(text)
+        if key_id is None:
+            return None
+        known, until = self._kept.get(key_id, (None, 0.0))
+        if known is None or time.monotonic() > until:
+            known = await run_in_threadpool(_read, database, key_id)
+            if known is None:
+                return None
+            if len(self._kept) >= MOST_KEPT:
+                self._kept.clear()
+            self._kept[key_id] = (known, time.monotonic() + KEPT_SECONDS)
+        return known if access.is_key(text, known) else None
+
+
+class Gate:
+    """Tells the routes who asks (``request.state.access``); answers by itself who has no key where one is needed."""
+
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+        self.app = app
+        self._settings = settings
+        self._ring = KeyRing()
+        self._rate = RateLimit(settings.rate_limit)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one connection."""
+        if scope["type"] not in {"http", "websocket"} or scope["path"] in PUBLIC_PATHS:
+            await self.app(scope, receive, send)
+            return
+        connection = HTTPConnection(scope)
+        try:
+            connection.state.access = await self._admit(connection)
+        except Problem as problem:
+            await problems.answer(Request({**scope, "type": "http"}), problem)(scope, receive, send)
+            return
+        await self.app(scope, receive, send)
+
+    async def _admit(self, connection: HTTPConnection) -> Access:
+        """Who asks, and not too often; those on this machine of whom no key is asked may ask at any rate."""
+        address = f"address {connection.client.host if connection.client else ''}"
+        try:
+            admitted = await self._identify(connection)
+        except Problem:
+            self._count(address)  # before it is said what is wrong with the key: nobody tries many
+            raise
+        if admitted.key_id is not None:
+            self._count(admitted.key_id)
+        elif not _is_local(connection.scope):
+            self._count(address)
+        return admitted
+
+    def _count(self, who: str) -> None:
+        seconds = self._rate.wait(who)
+        if seconds > 0.0:
+            headers = {"Retry-After": str(math.ceil(seconds))}
+            detail = f"more than {self._settings.rate_limit:g} requests a second; try again in {seconds:.3f} s"
+            raise Problem(TOO_MANY_REQUESTS, detail, headers=headers)
+
+    async def _identify(self, connection: HTTPConnection) -> Access:
+        """Who asks; a key that is sent counts even where none is needed."""
+        kind, _, text = connection.headers.get("authorization", "").partition(" ")
+        if kind.lower() != "bearer":
+            if self._needs_key(connection.scope):
+                detail = f"send an access key: Authorization: Bearer KEY; got {kind or 'no such header'}"
+                raise Problem(KEY_REQUIRED, detail, headers={"WWW-Authenticate": CHALLENGE})
+            _check_host(connection)
+            return EVERYTHING
+        context: Context = connection.app.state.context
+        try:
+            found = await self._ring.find(context.database, text.strip())
+        except StorageUnavailable as error:
+            raise problems.storage_unavailable(error) from error
+        if found is None:
+            headers = {"WWW-Authenticate": f'{CHALLENGE}, error="invalid_token"'}
+            raise Problem(INVALID_KEY, "the access key is unknown, revoked or garbled", headers=headers)
+        return Access(found.id, found.scope)
+
+    def _needs_key(self, scope: Scope) -> bool:
+        """Without a setting, all but those who are on this machine themselves, behind no proxy."""
+        if self._settings.access == "auto":
+            return not _is_local(scope)
+        return self._settings.access == "keys"
+
+
+def _check_host(connection: HTTPConnection) -> None:
+    """Refuse a request that needs no key, since it comes from this machine, but is meant for another one.
+
+    A page of that name has been made to lead here, and a browser on this machine now asks for it (DNS rebinding).
+    """
+    host = connection.headers.get("host", "localhost")
+    name = host.rpartition(":")[0] if re.search(r":\d*$", host) else host
+    if _is_local(connection.scope) and not is_loopback(name.strip("[]").lower()):
+        allowed = "localhost or a loopback address; a proxy sends X-Forwarded-For or a key"
+        raise Problem.wrong_value(MISDIRECTED_REQUEST, "Host", host, allowed)
+
+
+def _is_local(scope: Scope) -> bool:
+    """Whether both ends of the connection are on this machine, as far as is known."""
+    return all(is_loopback((scope.get(end) or ("",))[0]) for end in ("server", "client"))
+
+
+def _read(database: Database, key_id: str) -> AccessKey | None:
+    with database.read() as session:
+        try:
+            return access_keys.get(session, key_id)
+        except NotFound:
+            return None

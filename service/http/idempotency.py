@@ -1,0 +1,101 @@
+"""Requests that are to be done once, however often they come: the header ``Idempotency-Key``."""
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from datetime import timedelta
+from typing import Annotated, Any
+
+from fastapi import Depends, Header, Request
+from fastapi.responses import JSONResponse
+from sqlalchemy.orm import Session
+
+from db.errors import AlreadyExists
+from db.repositories import idempotency_keys
+from service.context import Given
+from service.http.access import Access
+from service.http.problems import IDEMPOTENCY_KEY_REUSED, Problem
+
+LONGEST_KEY = 200
+
+KeyHeader = Annotated[
+    str | None,
+    Header(
+        alias="Idempotency-Key",
+        description="Anything of your own, such as a UUID: the same request under the same key is done once",
+        pattern=rf"^[!-~]{{1,{LONGEST_KEY}}}$",
+    ),
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A status, a place and a JSON body."""
+
+    status: int
+    location: str
+    body: dict[str, Any]
+
+    def response(self) -> JSONResponse:
+        """The answer over the wire."""
+        return JSONResponse(self.body, self.status, {"Location": self.location} if self.location else {})
+
+
+@dataclass(frozen=True, slots=True)
+class Once:
+    """A request's key, whose it is, how long it counts, and what is asked under it, as a digest."""
+
+    owner: str
+    key: str
+    lifetime: timedelta
+    fingerprint: str
+
+    def about(self, body_digest: str) -> "Once":
+        """The same with a body that was not there yet."""
+        return replace(self, fingerprint=_digest(self.fingerprint.encode(), body_digest.encode()))
+
+
+def answer_once(session: Session, once: Once | None, make: Callable[[], Answer]) -> Answer:
+    """The answer that ``make`` gives in this transaction, or the one that it gave under the same key.
+
+    Raises ``Problem`` for a key under which something else was asked.
+    """
+    if once is None:
+        return make()
+    try:
+        earlier = idempotency_keys.claim(session, once.owner, once.key, once.fingerprint, once.lifetime)
+    except AlreadyExists as error:
+        allowed = "another key, or the very request that was sent under it"
+        raise Problem.wrong_value(IDEMPOTENCY_KEY_REUSED, "Idempotency-Key", once.key, allowed) from error
+    if earlier is not None:
+        return Answer(**earlier)
+    answer = make()
+    idempotency_keys.keep(session, once.owner, once.key, asdict(answer))
+    return answer
+
+
+async def _once_without_body(context: Given, request: Request, key: KeyHeader = None) -> Once | None:
+    if key is None:
+        return None
+    access: Access = request.state.access
+    asked = (request.method, request.url.path, request.url.query)
+    lifetime = timedelta(hours=context.settings.idempotency_hours)
+    return Once(access.key_id or "", key, lifetime, _digest(*(part.encode() for part in asked)))
+
+
+async def _once(request: Request, once: Annotated[Once | None, Depends(_once_without_body)]) -> Once | None:
+    return None if once is None else once.about(_digest(await request.body()))
+
+
+OnceWithoutBody = Annotated[Once | None, Depends(_once_without_body)]
+"""What a route takes that reads its body by itself."""
+
+OnceGiven = Annotated[Once | None, Depends(_once)]
+"""What a route takes whose body is read already."""
+
+
+def _digest(*parts: bytes) -> str:
+    hashed = hashlib.sha256()
+    for part in parts:
+        hashed.update(len(part).to_bytes(8, "big") + part)
+    return hashed.hexdigest()

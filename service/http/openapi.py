@@ -1,0 +1,66 @@
+"""The application's own description, OpenAPI."""
+
+from typing import Any
+
+from fastapi import FastAPI
+from fastapi.routing import APIRoute
+
+from service.http.problems import (
+    BAD_REQUEST,
+    HEADERS_TOO_LARGE,
+    INSUFFICIENT_SCOPE,
+    INVALID_KEY,
+    KEY_REQUIRED,
+    MEDIA_TYPE,
+    MISDIRECTED_REQUEST,
+    REQUEST_TIMEOUT,
+    STOPPING,
+    TOO_MANY_CONNECTIONS,
+    TOO_MANY_REQUESTS,
+    ProblemType,
+)
+from service.http.routes.common import description_of
+
+AT_THE_DOOR = (BAD_REQUEST, HEADERS_TOO_LARGE, STOPPING, TOO_MANY_CONNECTIONS)
+"""Problems of every route, before it is known what is asked."""
+
+AT_THE_GATE = (KEY_REQUIRED, INVALID_KEY, INSUFFICIENT_SCOPE, MISDIRECTED_REQUEST, TOO_MANY_REQUESTS)
+"""Problems of every route that needs a key."""
+
+
+def operation_id(route: APIRoute) -> str:
+    """The route's function names the operation, and so the functions of generated clients."""
+    return route.name
+
+
+class DescribedApp(FastAPI):
+    """An application whose description says of every error that it is answered as problem details.
+
+    The framework would say JSON of its own. The description is made when it is first asked for.
+    """
+
+    def openapi(self) -> dict[str, Any]:
+        """The description of all routes."""
+        if self.openapi_schema is None:
+            _describe_problems(super().openapi())
+        assert self.openapi_schema is not None
+        return self.openapi_schema
+
+
+def _describe_problems(description: dict[str, Any]) -> None:
+    for operations in description["paths"].values():
+        for operation in operations.values():
+            kinds = AT_THE_DOOR + (AT_THE_GATE if "security" in operation else ())
+            kinds += (REQUEST_TIMEOUT,) if "requestBody" in operation else ()
+            operation["responses"] = _described(*kinds) | operation["responses"]
+            for status, response in operation["responses"].items():
+                if int(status) >= 400:
+                    response["content"] = {MEDIA_TYPE: response["content"].pop("application/json")}
+    for name in ("HTTPValidationError", "ValidationError"):
+        description["components"]["schemas"].pop(name, None)
+
+
+def _described(*kinds: ProblemType) -> dict[str, Any]:
+    schema = {"application/json": {"schema": {"$ref": "#/components/schemas/ProblemOut"}}}
+    texts = description_of(*kinds)
+    return {str(status): {"description": text, "content": dict(schema)} for status, text in texts.items()}

@@ -1,0 +1,68 @@
+"""What the routes share: how their errors are described, and what a JSON body may be."""
+
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+from starlette.exceptions import HTTPException
+from starlette.types import Message, Receive
+
+from service.http.problems import UNSUPPORTED_FORMAT, Problem, ProblemType
+from service.http.schemas import ProblemOut
+
+MAX_JSON_BYTES = 64 * 1024
+"""Bytes of a JSON body; the longest description is 10,000 characters."""
+
+
+def problems(*kinds: ProblemType) -> dict[int | str, dict[str, Any]]:
+    """Description of the problems that a route may answer with, by status, as the framework takes it."""
+    return {status: {"description": text, "model": ProblemOut} for status, text in description_of(*kinds).items()}
+
+
+def description_of(*kinds: ProblemType) -> dict[int, str]:
+    """What is said of problems, by status."""
+    by_status: dict[int, list[str]] = {}
+    for kind in sorted(kinds, key=lambda kind: kind.status):
+        by_status.setdefault(kind.status, []).append(f"{kind.title} (`{kind.uri}`)")
+    return {status: "; ".join(texts) for status, texts in by_status.items()}
+
+
+class JsonRoute(APIRoute):
+    """A route whose body, if it takes one, is JSON of bounded size: the framework reads all of it into memory."""
+
+    most_bytes = MAX_JSON_BYTES
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """The handler with the checks before it."""
+        handle = super().get_route_handler()
+        if self.body_field is None:
+            return handle
+
+        async def handle_json(request: Request) -> Response:
+            given = request.headers.get("content-type", "")
+            if given.partition(";")[0].strip().lower() != "application/json":
+                raise Problem.wrong_value(UNSUPPORTED_FORMAT, "content type", given or "missing", "application/json")
+            return await handle(Request(request.scope, _limited(request.receive, self.most_bytes)))
+
+        return handle_json
+
+
+class LongJsonRoute(JsonRoute):
+    """A route whose body may hold samples: some 7,000 of them."""
+
+    most_bytes = 2**20
+
+
+def _limited(receive: Receive, most: int) -> Receive:
+    received = 0
+
+    async def receive_some() -> Message:
+        nonlocal received
+        message = await receive()
+        received += len(message.get("body", b""))
+        if received > most:
+            raise HTTPException(413, f"the body has more than {most} bytes")
+        return message
+
+    return receive_some

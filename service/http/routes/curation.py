@@ -1,0 +1,119 @@
+"""Routes of whoever keeps the materials in order: names, merges, withdrawn logs."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Response
+
+from service.context import Given
+from service.domain import curate
+from service.http.access import ADMIN
+from service.http.problems import (
+    INVALID_REQUEST,
+    MATERIAL_EXISTS,
+    STORAGE_UNAVAILABLE,
+    UNKNOWN_ALIAS,
+    UNKNOWN_GRASP_LOG,
+    UNKNOWN_MATERIAL,
+    UNSUPPORTED_FORMAT,
+    UPLOAD_TOO_LARGE,
+)
+from service.http.routes.common import JsonRoute, problems
+from service.http.schemas import (
+    NAME_PATTERN,
+    GraspLogOut,
+    JobOut,
+    MaterialChange,
+    MaterialOut,
+    MergedOut,
+    NewMerge,
+    NewWithdrawal,
+    WithdrawnOut,
+)
+
+router = APIRouter(prefix="/v1", route_class=JsonRoute)
+
+Alias = Annotated[str, Path(pattern=NAME_PATTERN, description="1 to 100 letters, digits, spaces and `._-`.")]
+_BODY = (UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILABLE)
+
+
+@router.patch(
+    "/materials/{name}",
+    tags=["materials"],
+    dependencies=[ADMIN],
+    summary="Rename or describe a material",
+    responses=problems(UNKNOWN_MATERIAL, MATERIAL_EXISTS, *_BODY),
+)
+def change_material(context: Given, name: str, wish: MaterialChange) -> MaterialOut:
+    """The old name becomes an alias, so that whoever knows it still finds the material."""
+    return MaterialOut.of(curate.change(context, name, wish.name, wish.description))
+
+
+@router.put(
+    "/materials/{name}/aliases/{alias}",
+    tags=["materials"],
+    dependencies=[ADMIN],
+    summary="Give a material one more name",
+    responses=problems(UNKNOWN_MATERIAL, MATERIAL_EXISTS, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+def add_alias(context: Given, name: str, alias: Alias) -> MaterialOut:
+    """Every route finds the material by any of its names."""
+    return MaterialOut.of(curate.add_alias(context, name, alias))
+
+
+@router.delete(
+    "/materials/{name}/aliases/{alias}",
+    tags=["materials"],
+    dependencies=[ADMIN],
+    summary="Take an alias away",
+    status_code=204,
+    responses=problems(UNKNOWN_MATERIAL, UNKNOWN_ALIAS, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+def remove_alias(context: Given, name: str, alias: Alias) -> Response:
+    """The name is free then; a material's own name is no alias."""
+    curate.remove_alias(context, name, alias)
+    return Response(status_code=204)
+
+
+@router.post(
+    "/materials/{name}/merges",
+    tags=["materials"],
+    dependencies=[ADMIN],
+    summary="Merge another material into this one",
+    responses=problems(UNKNOWN_MATERIAL, *_BODY),
+)
+def merge_materials(context: Given, name: str, wish: NewMerge) -> MergedOut:
+    """Its logs and names move here, for good, and the fits are made again over all logs.
+
+    A log that both have, by content and detector, counts once.
+    """
+    material, jobs = curate.merge(context, name, wish.source)
+    return MergedOut(material=MaterialOut.of(material), jobs=[JobOut.of(job) for job in jobs])
+
+
+@router.put(
+    "/grasp-logs/{id}/withdrawal",
+    tags=["grasp logs"],
+    dependencies=[ADMIN],
+    summary="Withdraw a grasp log",
+    responses=problems(UNKNOWN_GRASP_LOG, *_BODY),
+)
+def withdraw_grasp_log(context: Given, id: str, wish: NewWithdrawal) -> WithdrawnOut:  # noqa: A002  (the path's own name)
+    """It is kept, but counts in no fit from then on; its material's models are fitted again without it.
+
+    Until then those models are marked as outdated; where no samples are left, the material has none.
+    """
+    log, jobs = curate.withdraw(context, id, wish.reason)
+    return WithdrawnOut(grasp_log=GraspLogOut.of(log), jobs=[JobOut.of(job) for job in jobs])
+
+
+@router.delete(
+    "/grasp-logs/{id}/withdrawal",
+    tags=["grasp logs"],
+    dependencies=[ADMIN],
+    summary="Take a withdrawal back",
+    responses=problems(UNKNOWN_GRASP_LOG, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+def restore_grasp_log(context: Given, id: str) -> WithdrawnOut:  # noqa: A002
+    """The log counts again, and its material's models are fitted again with it."""
+    log, jobs = curate.restore(context, id)
+    return WithdrawnOut(grasp_log=GraspLogOut.of(log), jobs=[JobOut.of(job) for job in jobs])

@@ -1,0 +1,235 @@
+"""Grasp logs and what was found in them."""
+
+import asyncio
+from typing import Annotated, Any, Literal, TypeVar
+
+from fastapi import APIRouter, Query, Request, Response
+from fastapi.responses import FileResponse
+from starlette.background import BackgroundTask
+
+from db.records import JobStatus, LogFilter, StoredGraspLog
+from db.repositories import grasp_logs, materials
+from service import formats
+from service.context import Context, Given
+from service.domain.export import export
+from service.domain.stored_results import EVENT_KINDS, SAMPLE_ARRAYS, decode_history, decode_samples, finite_or_none
+from service.domain.upload import Wish, upload
+from service.formats import writing
+from service.formats.tracked_markers import FRAME_RATE, SCALE
+from service.http.access import READ, UPLOAD
+from service.http.idempotency import OnceWithoutBody
+from service.http.paging import USUAL, CursorText, Limit, Page, link_next
+from service.http.problems import (
+    FILE_DELETED,
+    IDEMPOTENCY_KEY_REUSED,
+    INVALID_GRASP_LOG,
+    INVALID_REQUEST,
+    NOT_READY,
+    STORAGE_UNAVAILABLE,
+    UNKNOWN_GRASP_LOG,
+    UNKNOWN_MATERIAL,
+    UNSUPPORTED_FORMAT,
+    UPLOAD_INTERRUPTED,
+    UPLOAD_TOO_LARGE,
+    Problem,
+)
+from service.http.routes.common import problems
+from service.http.schemas import EventsOfOneKind, EventsOut, GraspLogOut, GraspLogsOut, SamplesOut, StickRatioOut
+from slipcore.defaults import DEFAULT_METHOD
+from slipcore.methods import METHODS
+
+router = APIRouter(prefix="/v1/grasp-logs", tags=["grasp logs"])
+
+Found = TypeVar("Found")
+
+_BINARY = {"schema": {"type": "string", "format": "binary"}}
+_BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "description": "The file itself, as it is (docs/formats.md)",
+        "content": dict.fromkeys((*formats.CONTENT_TYPES, *formats.UNSPECIFIC_TYPES), _BINARY),
+    }
+}
+_ALREADY_THERE: dict[int | str, dict[str, Any]] = {
+    200: {"model": GraspLogOut, "description": "The same content, material and detector is stored already"}
+}
+_FILE: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "The log as a file",
+        "content": {formats.FORMATS[name].content_type: _BINARY for name in writing.SUFFIXES},
+    }
+}
+_FOUND = problems(UNKNOWN_GRASP_LOG, INVALID_REQUEST, STORAGE_UNAVAILABLE)
+_RESULTS = problems(UNKNOWN_GRASP_LOG, NOT_READY, INVALID_REQUEST, STORAGE_UNAVAILABLE)
+
+
+@router.post(
+    "",
+    dependencies=[UPLOAD],
+    summary="Upload a grasp log",
+    status_code=202,
+    response_model=GraspLogOut,
+    openapi_extra=_BODY,
+    responses=_ALREADY_THERE
+    | problems(
+        UPLOAD_INTERRUPTED,
+        UNKNOWN_MATERIAL,
+        UPLOAD_TOO_LARGE,
+        UNSUPPORTED_FORMAT,
+        INVALID_GRASP_LOG,
+        INVALID_REQUEST,
+        IDEMPOTENCY_KEY_REUSED,
+        STORAGE_UNAVAILABLE,
+    ),
+)
+async def create_grasp_log(
+    context: Given,
+    request: Request,
+    once: OnceWithoutBody,
+    material: Annotated[
+        str | None, Query(description="What was held; without it slip is only detected", examples=["paper"])
+    ] = None,
+    sensor: Annotated[str | None, Query(description="In place of the sensor that the log names")] = None,
+    detector: Annotated[
+        str, Query(description="Method of detection", json_schema_extra={"enum": list(METHODS)})
+    ] = DEFAULT_METHOD,
+    scale: Annotated[
+        float | None, Query(description="Of tracked markers: m per pixel", ge=SCALE[0], le=SCALE[1])
+    ] = None,
+    frame_rate: Annotated[
+        float | None,
+        Query(description="Of tracked markers whose file counts frames: 1/s", ge=FRAME_RATE[0], le=FRAME_RATE[1]),
+    ] = None,
+    mapping: Annotated[
+        str | None,
+        Query(
+            description="Of formats with topics, fields or columns: which of them is what, as JSON (docs/formats.md)",
+            examples=['{"topic": "/tactile", "displacement": {"field": "markers", "unit": "mm"}, "grid": [20, 20]}'],
+        ),
+    ] = None,
+) -> Response:
+    """Stored once it is answered; slip, samples and, with a material, its refit follow in the job.
+
+    The body is streamed to disk, up to the largest size that is set; `Content-Encoding` may be gzip or zstd.
+    """
+    length = request.headers.get("content-length", "")
+    wish = Wish(
+        material,
+        sensor,
+        detector,
+        request.headers.get("content-type"),
+        int(length) if length.isdecimal() else None,
+        ",".join(request.headers.getlist("content-encoding")),
+        {"scale": scale, "frame_rate": frame_rate, "mapping": mapping},
+        once,
+    )
+    return (await upload(context, request.stream(), wish)).response()
+
+
+@router.get(
+    "",
+    dependencies=[READ],
+    summary="List grasp logs",
+    responses=problems(UNKNOWN_MATERIAL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+def list_grasp_logs(
+    context: Given,
+    request: Request,
+    response: Response,
+    material: Annotated[str | None, Query(description="Only those of this material")] = None,
+    sensor: Annotated[str | None, Query(max_length=200, description="Only those of this sensor")] = None,
+    status: Annotated[JobStatus | None, Query(description="Only those whose job is so")] = None,
+    withdrawn: Annotated[bool | None, Query(description="Only those that are withdrawn, or are not")] = None,
+    sort: Annotated[
+        Literal["created_at", "-created_at"], Query(description="By what; `-` for the last ones first")
+    ] = "-created_at",
+    limit: Limit = USUAL,
+    cursor: CursorText = None,
+) -> GraspLogsOut:
+    """Each with its job and, once there, what was found in it."""
+    page = Page(sort, limit, cursor, identity="hex")
+    with context.database.read() as session:
+        material_id = None if material is None else materials.find_id(session, material)
+        wanted = LogFilter(material_id, sensor, status, withdrawn)
+        found, after = page.cut(grasp_logs.list_all(session, page.window(), wanted))
+    return GraspLogsOut(items=[GraspLogOut.of(each) for each in found], next=link_next(request, response, after))
+
+
+@router.get("/{id}", dependencies=[READ], summary="Look at a grasp log", responses=_FOUND)
+def read_grasp_log(context: Given, id: str) -> GraspLogOut:  # noqa: A002  (the path's own name)
+    """With its job and, once there, what was found in it."""
+    log = _find(context, id)
+    if log.job.finished_at is not None:
+        context.models.seen((log.job.id, log.job.finished_at))
+    return GraspLogOut.of(log)
+
+
+@router.get("/{id}/stick-ratio", dependencies=[READ], summary="Look at the stick ratio over time", responses=_RESULTS)
+def read_stick_ratio(context: Given, id: str) -> StickRatioOut:  # noqa: A002
+    """One value a frame."""
+    log = _find(context, id)
+    history = decode_history(context.blobs.path(_ready(log.detection, log).history_blob))
+    return StickRatioOut(
+        time=history.time.tolist(), stick_ratio=[finite_or_none(value) for value in history.stick_ratio.tolist()]
+    )
+
+
+@router.get("/{id}/events", dependencies=[READ], summary="Look at slip and contact events", responses=_RESULTS)
+def read_events(context: Given, id: str) -> EventsOut:  # noqa: A002
+    """Of each element."""
+    log = _find(context, id)
+    events = decode_history(context.blobs.path(_ready(log.detection, log).history_blob)).events
+    of_kind = {kind: getattr(events, kind) for kind in EVENT_KINDS}
+    return EventsOut(
+        **{
+            kind: EventsOfOneKind(element=found.element.tolist(), time=found.time.tolist())
+            for kind, found in of_kind.items()
+        }
+    )
+
+
+@router.get("/{id}/samples", dependencies=[READ], summary="Look at the friction samples", responses=_RESULTS)
+def read_samples(context: Given, id: str) -> SamplesOut:  # noqa: A002
+    """One entry an element and frame; empty where no slip gave one."""
+    log = _find(context, id)
+    samples = decode_samples(context.blobs.path(_ready(log.samples, log).samples_blob))
+    arrays = {name: getattr(samples, name).tolist() for name in SAMPLE_ARRAYS}
+    return SamplesOut(**arrays, element_area=samples.element_area)
+
+
+@router.get(
+    "/{id}/file",
+    dependencies=[READ],
+    summary="Download a grasp log",
+    response_class=FileResponse,
+    responses=_FILE
+    | problems(UNKNOWN_GRASP_LOG, FILE_DELETED, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+async def read_file(
+    context: Given,
+    id: str,  # noqa: A002
+    format: Annotated[  # noqa: A002
+        str, Query(description="Of the file", json_schema_extra={"enum": list(writing.SUFFIXES)})
+    ] = "npz",
+) -> FileResponse:
+    """As it was uploaded, or as NPZ, Parquet or MCAP made of it: each is read back bit for bit."""
+    if format not in writing.SUFFIXES:
+        raise Problem.wrong_value(INVALID_REQUEST, "format", format, ", ".join(writing.SUFFIXES))
+    file = await export(context, await asyncio.to_thread(_find, context, id), format)
+    return FileResponse(
+        file.path,
+        media_type=formats.FORMATS[format].content_type,
+        filename=f"{id}{writing.SUFFIXES[format]}",
+        background=BackgroundTask(file.close.close),
+    )
+
+
+def _find(context: Context, log_id: str) -> StoredGraspLog:
+    with context.database.read() as session:
+        return grasp_logs.get(session, log_id)
+
+
+def _ready(found: Found | None, log: StoredGraspLog) -> Found:
+    if found is None:
+        raise Problem(NOT_READY, f"job {log.job.id} is {log.job.status}; its results are not there")
+    return found

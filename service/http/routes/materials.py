@@ -1,0 +1,181 @@
+"""Materials, their models and their friction."""
+
+from typing import Annotated, Literal
+from urllib.parse import quote
+
+from fastapi import APIRouter, Query, Request, Response
+
+from db.repositories import friction_models, materials
+from service.context import Given
+from service.domain.fit import request_fit
+from service.domain.look_up import Question, look_up
+from service.http.access import READ, UPLOAD
+from service.http.conditional import NOT_MODIFIED, conditional, tagged
+from service.http.idempotency import Answer, OnceGiven, answer_once
+from service.http.paging import USUAL, CursorText, Limit, Page, link_next
+from service.http.problems import (
+    IDEMPOTENCY_KEY_REUSED,
+    INVALID_REQUEST,
+    MATERIAL_EXISTS,
+    NO_MODEL,
+    STORAGE_UNAVAILABLE,
+    UNKNOWN_MATERIAL,
+    UNSUPPORTED_FORMAT,
+    UPLOAD_TOO_LARGE,
+)
+from service.http.routes.common import JsonRoute, problems
+from service.http.schemas import (
+    LARGEST_FORCE,
+    LARGEST_VELOCITY,
+    SMALLEST_TAIL,
+    FrictionModelOut,
+    FrictionModelsOut,
+    FrictionOut,
+    JobOut,
+    MaterialOut,
+    MaterialsOut,
+    ModelMethod,
+    NewFit,
+    NewMaterial,
+)
+
+router = APIRouter(prefix="/v1/materials", tags=["materials"], route_class=JsonRoute)
+
+_BODY = (UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, IDEMPOTENCY_KEY_REUSED, STORAGE_UNAVAILABLE)
+
+Finite = Query(allow_inf_nan=False, ge=0.0)
+
+
+@router.post(
+    "",
+    dependencies=[UPLOAD],
+    summary="Make a material known",
+    status_code=201,
+    response_model=MaterialOut,
+    responses=problems(MATERIAL_EXISTS, *_BODY),
+)
+def create_material(context: Given, new: NewMaterial, once: OnceGiven) -> Response:
+    """Logs can be uploaded for it from then on."""
+    with context.database.write() as session:
+
+        def create() -> Answer:
+            made = MaterialOut.of(materials.create(session, new.name, new.description))
+            return Answer(201, f"/v1/materials/{quote(new.name)}", made.model_dump(mode="json"))
+
+        return answer_once(session, once, create).response()
+
+
+@router.get(
+    "",
+    dependencies=[READ],
+    summary="List materials",
+    responses=problems(INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+def list_materials(
+    context: Given,
+    request: Request,
+    response: Response,
+    search: Annotated[str | None, Query(max_length=100, description="Part of a name or an alias")] = None,
+    sort: Annotated[
+        Literal["name", "-name", "created_at", "-created_at"], Query(description="By what; `-` for the last ones first")
+    ] = "name",
+    limit: Limit = USUAL,
+    cursor: CursorText = None,
+) -> MaterialsOut:
+    """Each with its current models."""
+    page = Page(sort, limit, cursor)
+    with context.database.read() as session:
+        found, after = page.cut(materials.list_all(session, page.window(), search))
+    return MaterialsOut(items=[MaterialOut.of(each) for each in found], next=link_next(request, response, after))
+
+
+@router.get(
+    "/{name}",
+    dependencies=[READ],
+    summary="Look at one material",
+    response_model=MaterialOut,
+    responses=NOT_MODIFIED | problems(UNKNOWN_MATERIAL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+def read_material(context: Given, request: Request, name: str) -> Response:
+    """With the current model of each method. `ETag` and `If-None-Match` save the answer to who has it."""
+    with context.database.read() as session:
+        found = materials.get(session, name)
+    context.models.seen((found.id, found.name), *((model.id, model.outdated) for model in found.models))
+    return tagged(request, MaterialOut.of(found).model_dump_json())
+
+
+@router.get(
+    "/{name}/friction",
+    dependencies=[READ],
+    summary="Look up the friction coefficient",
+    response_model=FrictionOut,
+    responses=NOT_MODIFIED | problems(UNKNOWN_MATERIAL, NO_MODEL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+async def read_friction(
+    context: Given,
+    request: Request,
+    name: str,
+    fn: Annotated[float, Finite, Query(le=LARGEST_FORCE, description="Normal force on an element, N", examples=[0.05])],
+    v: Annotated[
+        float, Finite, Query(le=LARGEST_VELOCITY, description="Tangential velocity, m/s", examples=[0.0])
+    ] = 0.0,
+    quantile: Annotated[
+        float | None,
+        Query(
+            ge=SMALLEST_TAIL,
+            le=1.0 - SMALLEST_TAIL,
+            description="Of a new observation of μ; the mean without",
+            examples=[0.05],
+        ),
+    ] = None,
+    method: Annotated[ModelMethod, Query(description="Whose current model answers")] = "ols",
+) -> Response:
+    """At a tangential velocity and a normal force: the mean, or a quantile that a cautious planner asks for.
+
+    A quantile includes the scatter of μ and the uncertainty of the model. `ETag` and `If-None-Match` save the answer to
+    who has it.
+    """
+    known = await context.models.get(context.database, name, method)
+    return conditional(request, known.tag, lambda: look_up(known, Question(v, fn, quantile)).model_dump_json())
+
+
+@router.post(
+    "/{name}/fits",
+    dependencies=[UPLOAD],
+    summary="Fit a material's model",
+    status_code=202,
+    response_model=JobOut,
+    responses=problems(UNKNOWN_MATERIAL, *_BODY),
+)
+def create_fit(context: Given, name: str, wish: NewFit, once: OnceGiven) -> Response:
+    """Over the samples of all its logs. Answers at once; the job at `Location` tells how it went."""
+    return request_fit(context, name, wish.method, wish.seed, once).response()
+
+
+@router.get(
+    "/{name}/fits",
+    dependencies=[READ],
+    summary="List versions of a material's models",
+    responses=problems(UNKNOWN_MATERIAL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+def list_fits(
+    context: Given,
+    request: Request,
+    response: Response,
+    name: str,
+    method: Annotated[ModelMethod | None, Query(description="Only those of it")] = None,
+    current: Annotated[bool | None, Query(description="Only those that are current, or are not")] = None,
+    limit: Limit = USUAL,
+    cursor: CursorText = None,
+) -> FrictionModelsOut:
+    """Newest first."""
+    page = Page("-id", limit, cursor)
+    with context.database.read() as session:
+        material_id = materials.find_id(session, name)
+        versions = friction_models.versions(session, material_id, method, current=current, window=page.window())
+        found, after = page.cut(versions)
+    if found:
+        context.models.seen((found[0].id, found[0].outdated))
+    return FrictionModelsOut(
+        items=[FrictionModelOut.of(each) for each in found], next=link_next(request, response, after)
+    )

@@ -1,0 +1,35 @@
+"""Figures for a monitor."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Request, Response
+from prometheus_client import CONTENT_TYPE_LATEST
+
+from service.context import Given
+from service.http.access import READ
+from service.http.problems import STORAGE_UNAVAILABLE
+from service.http.routes.common import problems
+from service.observability.metrics import Metrics
+
+router = APIRouter(tags=["health"])
+
+_TEXT: dict[int | str, dict[str, Any]] = {
+    200: {"content": {"text/plain": {}}, "description": "In the text format of Prometheus."}
+}
+
+
+async def _metrics(request: Request) -> Metrics:
+    metrics: Metrics = request.app.state.metrics
+    return metrics
+
+
+@router.get(
+    "/metrics",
+    dependencies=[READ],
+    summary="Figures for a monitor",
+    response_class=Response,
+    responses=problems(STORAGE_UNAVAILABLE) | _TEXT,
+)
+def read_metrics(context: Given, metrics: Annotated[Metrics, Depends(_metrics)]) -> Response:
+    """Requests, jobs and their stages, and what is stored (docs/operations.md)."""
+    return Response(metrics.expose(context.database), media_type=CONTENT_TYPE_LATEST)

@@ -1,0 +1,53 @@
+"""What a planner asks beyond a look-up: which material this is, how hard to grip. Questions, though sent by POST."""
+
+from fastapi import APIRouter
+
+from service.context import Given
+from service.domain import plan
+from service.http.access import READ
+from service.http.problems import (
+    INVALID_REQUEST,
+    INVALID_SAMPLES,
+    NO_FEASIBLE_FORCE,
+    NO_MODEL,
+    NOT_READY,
+    STORAGE_UNAVAILABLE,
+    UNKNOWN_GRASP_LOG,
+    UNKNOWN_MATERIAL,
+    UNSUPPORTED_FORMAT,
+    UPLOAD_TOO_LARGE,
+)
+from service.http.routes.common import LongJsonRoute, problems
+from service.http.schemas import GraspForceOut, NewGraspForce, NewRecognition, RecognitionOut
+
+router = APIRouter(prefix="/v1", tags=["planning"], route_class=LongJsonRoute)
+
+_ALWAYS = (UNKNOWN_MATERIAL, NO_MODEL, UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILABLE)
+
+
+@router.post(
+    "/grasp-force",
+    dependencies=[READ],
+    summary="Ask how hard to grip",
+    responses=problems(NO_FEASIBLE_FORCE, *_ALWAYS),
+)
+def find_grasp_force(context: Given, wish: NewGraspForce) -> GraspForceOut:
+    """The smallest normal force at which a contact that bears the load slips no more often than accepted.
+
+    The model's uncertainty is in it. A planner that asks often gets the model once and evaluates it by itself.
+    """
+    return plan.grasp_force(context, wish)
+
+
+@router.post(
+    "/recognise",
+    dependencies=[READ],
+    summary="Ask which material this is",
+    responses=problems(UNKNOWN_GRASP_LOG, NOT_READY, INVALID_SAMPLES, *_ALWAYS),
+)
+def recognise_material(context: Given, wish: NewRecognition) -> RecognitionOut:
+    """From the friction samples of one grasp: a stored log's, or those that are sent.
+
+    "unknown" is the probability that it is none of the materials compared.
+    """
+    return plan.recognise(context, wish)

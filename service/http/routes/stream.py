@@ -1,0 +1,18 @@
+"""The live stream."""
+
+from fastapi import APIRouter, WebSocket
+
+from service.context import Context
+from service.http.access import UPLOAD, Access
+from service.stream import connection
+
+router = APIRouter()
+
+
+@router.websocket("/v1/stream", dependencies=[UPLOAD])
+async def live_stream(socket: WebSocket) -> None:
+    """Frames in, slip states out (docs/stream.md)."""
+    context: Context = socket.app.state.context
+    access: Access = socket.state.access
+    await socket.accept()
+    await connection.serve(socket, context, access.key_id)

@@ -1,0 +1,33 @@
+"""How the application is served: by uvicorn, with bounds on what a connection may do."""
+
+import math
+from typing import Any
+
+import uvicorn
+
+from service.app import create_app
+from service.http.connections import BoundedConnection
+from service.http.envelope import MOST_HEADER_BYTES
+from service.settings import Settings
+
+MOST_MESSAGE_BYTES = 2**20
+"""Of one message of the live stream: a frame of 4096 markers with forces is 200 kB."""
+
+
+def configuration(settings: Settings, **options: Any) -> uvicorn.Config:
+    """The server's configuration; ``options`` are further ones of uvicorn."""
+    return uvicorn.Config(
+        create_app(settings),
+        host=settings.host,
+        port=settings.port,
+        http=BoundedConnection,
+        h11_max_incomplete_event_size=MOST_HEADER_BYTES,
+        limit_concurrency=settings.max_connections,
+        server_header=False,
+        timeout_graceful_shutdown=max(1, math.ceil(settings.shutdown_seconds)),  # without it, clients hold the end up
+        log_config=None,  # ours, service.observability: its logs, and in its metrics the record of each request
+        access_log=False,
+        ws_max_size=MOST_MESSAGE_BYTES,
+        ws_per_message_deflate=False,  # noise does not pack, and packing takes its time
+        **options,
+    )

@@ -1,0 +1,1 @@
+"""Durable jobs: their queue, who runs them, and what they do."""

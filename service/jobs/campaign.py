@@ -1,0 +1,151 @@
+"""Simulate scenes with many seeds each, on the processors of this machine or on the workers of a Dask cluster.
+
+A folder holds a campaign: ``campaign.json`` tells what is simulated, and how; beside it stands one log for each scene
+and seed, written whole or not at all. Whoever starts it again gets what is missing.
+"""
+
+import hashlib
+import json
+import multiprocessing
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from db.errors import DriverMissing
+from service.observability import logs
+from service.processes import spawned
+from slipcore.contact import Scene, simulate
+from slipcore.errors import InvalidInput, SlipcoreError
+from slipcore.frames import GraspLog
+from stiction_client import container
+
+PLAN = "campaign.json"
+CONNECT_SECONDS = 10.0
+"""s that a Dask scheduler may take to answer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Promise:
+    """What each log is simulated to, as ``slipcore.contact.simulate`` takes it: ``seconds`` in s."""
+
+    accuracy: float | None = None
+    seconds: float | None = None
+    tier: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """One log that is made, or why it could not be."""
+
+    scene: str
+    seed: int
+    path: Path
+    refused: str | None = None
+
+
+@contextmanager
+def workers(processes: int, dask_address: str | None = None) -> Iterator[Executor]:
+    """So many processes of this machine, or all workers of a Dask scheduler.
+
+    Raises ``DriverMissing`` without the library, ``InvalidInput`` for an address at which no scheduler answers.
+    """
+    if dask_address is not None:
+        yield from _cluster(dask_address)
+        return
+    pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), spawned.start, (logs.current(),))
+    try:
+        yield pool
+    except BaseException:  # nobody waits for what is under way
+        spawned.kill(pool)
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _cluster(address: str) -> Iterator[Executor]:
+    try:
+        from distributed import Client
+    except ModuleNotFoundError as error:
+        raise DriverMissing(address, error.name or str(error), "Dask cluster", "dask") from error
+    try:
+        client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        raise InvalidInput("Dask address", address, "one at which a scheduler answers") from error
+    with client:
+        yield client.get_executor(pure=False)  # type: ignore[no-untyped-call]
+
+
+def run(
+    executor: Executor, scenes: Sequence[Scene], seeds: Sequence[int], folder: Path, promise: Promise
+) -> Iterator[Outcome]:
+    """Simulate each scene with each seed that the folder lacks; what is there comes first, the others as they are made.
+
+    Raises ``InvalidInput`` for two scenes of one name, and for a folder that holds another campaign.
+    """
+    _write_plan(folder, scenes, promise)
+    under_way: dict[Future[GraspLog], Outcome] = {}
+    for scene in scenes:
+        for seed in seeds:
+            outcome = Outcome(scene.name, seed, folder / f"{_file_name(scene)}-{seed}.npz")
+            if outcome.path.exists():
+                yield outcome
+            else:
+                under_way[executor.submit(simulate, scene, seed=seed, **asdict(promise))] = outcome
+    for done in as_completed(list(under_way)):
+        yield _kept(done, under_way.pop(done))
+
+
+def _kept(done: Future[GraspLog], outcome: Outcome) -> Outcome:
+    """The log, once it is written; what was refused is told, and the others go on."""
+    try:
+        log = done.result()
+    except SlipcoreError as error:
+        return replace(outcome, refused=str(error))
+    except Exception as error:  # its process died, or the cluster did
+        return replace(outcome, refused=f"{type(error).__name__}: {error}")
+    _write_whole(outcome.path, lambda path: container.write(log, path))
+    return outcome
+
+
+def _write_plan(folder: Path, scenes: Sequence[Scene], promise: Promise) -> None:
+    """Tell what the folder holds; more scenes may come to it, but none may change."""
+    names = [_file_name(scene) for scene in scenes]
+    for name in names:
+        if names.count(name) > 1:
+            raise InvalidInput("scenes", f"{name!r} twice", "scenes of different names")
+    folder.mkdir(parents=True, exist_ok=True)
+    path, asked = folder / PLAN, asdict(promise)
+    known = _read_plan(path) if path.exists() else {"scenes": {}, "promise": asked}
+    if known["promise"] != asked:
+        raise InvalidInput(f"campaign in {folder}", _told(asked), f"{_told(known['promise'])}, or another folder")
+    for scene in scenes:
+        digest = hashlib.sha256(repr(scene).encode()).hexdigest()
+        if known["scenes"].setdefault(_file_name(scene), digest) != digest:
+            raise InvalidInput("scene", f"another {scene.name!r} than that in {folder}", "the same, or another folder")
+    _write_whole(path, lambda path: path.write_text(json.dumps(known, indent=2), encoding="utf-8"))
+
+
+def _read_plan(path: Path) -> dict[str, dict[str, Any]]:
+    try:
+        known = json.loads(path.read_text(encoding="utf-8"))
+        return {name: dict(known[name]) for name in ("scenes", "promise")}
+    except (ValueError, KeyError, TypeError) as error:
+        raise InvalidInput("campaign", f"{path}, damaged or of something else", "a folder of its own") from error
+
+
+def _write_whole(path: Path, write: Callable[[Path], object]) -> None:
+    partial = path.with_suffix(".part")
+    write(partial)
+    partial.replace(path)
+
+
+def _file_name(scene: Scene) -> str:
+    return re.sub(r"\W+", "_", scene.name.strip().lower()) or "scene"
+
+
+def _told(promise: Mapping[str, object]) -> str:
+    return ", ".join(f"{name} {value}" for name, value in promise.items() if value is not None) or "no accuracy"

@@ -1,0 +1,99 @@
+"""Lanes: where one job at a time is done, behind the executor interface of ``concurrent.futures``."""
+
+import asyncio
+import logging
+from concurrent.futures import Executor
+from concurrent.futures.process import BrokenProcessPool
+from typing import Protocol
+
+from db.errors import DriverMissing
+from db.records import Claim
+from service.jobs import worker
+from service.jobs.worker import Place
+from service.processes import spawned
+
+logger = logging.getLogger(__name__)
+
+RETRY_SECONDS = 1.0
+"""s between two tries to start a worker that does not start."""
+
+
+class WorkerDied(Exception):
+    """The worker process ended under its job."""
+
+
+class Lane(Protocol):
+    """One job at a time.
+
+    ``missing``: what it waits for before it can do jobs, where that is not just a process's start.
+    """
+
+    missing: str | None
+
+    async def hire(self) -> None:
+        """Make sure that there is a worker and that it is warm."""
+
+    async def run(self, claim: Claim) -> None:
+        """Do one job; raises ``WorkerDied``, and ``StorageUnavailable``."""
+
+    def kill(self) -> None:
+        """End the worker at once, whatever it does."""
+
+    async def close(self) -> None:
+        """Let the worker go once it has nothing to do."""
+
+
+class ProcessLane:
+    """A worker process of its own on this machine."""
+
+    def __init__(self, place: Place) -> None:
+        self._place = place
+        self._executor: Executor | None = None
+        self.missing: str | None = None
+
+    async def hire(self) -> None:
+        """Start a worker process and warm it up, in place of the one before."""
+        while True:
+            await self.close()
+            self._executor = spawned.process(spawned.give_way)
+            try:
+                await asyncio.get_running_loop().run_in_executor(self._executor, worker.warm_up)
+            except asyncio.CancelledError:  # nobody waits for what it compiles
+                self.kill()
+                raise
+            except BrokenProcessPool:
+                logger.exception("a worker process did not start")
+                await asyncio.sleep(RETRY_SECONDS)
+            else:
+                return
+
+    async def run(self, claim: Claim) -> None:
+        """Do one job; raises ``WorkerDied``."""
+        try:
+            await asyncio.get_running_loop().run_in_executor(self._executor, worker.run_job, self._place, claim)
+        except BrokenProcessPool as error:
+            raise WorkerDied from error
+
+    def kill(self) -> None:
+        """End the worker process at once."""
+        spawned.kill(self._executor)
+
+    async def close(self) -> None:
+        """Let the worker process go once it has nothing to do."""
+        if self._executor is not None:
+            executor, self._executor = self._executor, None
+            await asyncio.to_thread(executor.shutdown, cancel_futures=True)
+
+
+def lanes(place: Place, count: int, dask_address: str | None) -> list[Lane]:
+    """So many worker processes on this machine, or jobs at once on the workers of a Dask scheduler.
+
+    Raises ``DriverMissing`` for the latter without the library.
+    """
+    if dask_address is None:
+        return [ProcessLane(place) for _ in range(count)]
+    try:
+        from service.jobs.dask_lane import DaskLane  # an extra, and takes a second to load
+    except ModuleNotFoundError as error:
+        raise DriverMissing(dask_address, error.name or str(error), "Dask cluster", "dask") from error
+    return [DaskLane(place, dask_address) for _ in range(count)]

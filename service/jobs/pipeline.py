@@ -1,0 +1,206 @@
+"""The stages in their order: frames → strain → events → slip_state → samples → friction_model → material.
+
+Runs in a worker process. Every step can be done again: what is stored already is not computed twice, and the last
+step stores the model and closes the job in one transaction. Whatever is stored is stored under the job's claim: a
+worker that was taken for dead, or whose job was cancelled, stores nothing.
+"""
+
+import logging
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from time import perf_counter
+
+import numpy as np
+from sqlalchemy.orm import Session
+
+import estimators
+import slipcore
+from db.blobs import BlobStore
+from db.database import Database
+from db.records import Claim, Job, SamplesOfLog, SampleSummary
+from db.repositories import detections, friction_models, grasp_logs, jobs, materials
+from estimators import EstimatorError, FrictionModel, Moments
+from service import formats
+from service.domain.stored_results import (
+    decode_samples,
+    encode_history,
+    encode_samples,
+    summarise_history,
+    summarise_samples,
+    to_new_model,
+)
+from service.observability import logs, traces
+from slipcore import FrictionSamples, GraspLog, SlipcoreError, SlipHistory
+
+logger = logging.getLogger(__name__)
+
+FITS_BESIDE_OTHERS = 3
+"""Fits of a material whose logs change meanwhile, before the next one makes the other writers wait."""
+
+
+class Refused(Exception):
+    """The data do not allow what the job is for; the message says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One job under way: the stores, the claim to it, and the seconds of the stages done."""
+
+    database: Database
+    blobs: BlobStore
+    claim: Claim
+    job: Job
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def total(self) -> float:
+        """Seconds of all stages done."""
+        return round(sum(self.seconds.values()), 6)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Say that the job is in this stage, and take its time; raises ``ClaimLost`` where it is not ours any more."""
+        logs.note(stage=name)
+        with self.database.write(durable=False) as session:
+            jobs.start_stage(session, self.claim, name, self.seconds)
+        with self.timed(name), traces.span(name):
+            yield
+
+    @contextmanager
+    def timed(self, name: str) -> Iterator[None]:
+        """Take the time of a stage."""
+        begin = perf_counter()
+        yield
+        self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - begin
+
+
+def run_job(database: Database, blobs: BlobStore, claim: Claim) -> None:
+    """Do a job to its end: done, or refused where the data do not allow it (or no chain of theirs converges).
+
+    Raises ``ClaimLost`` once it is not this runner's any more.
+    """
+    with database.read() as session:
+        job = jobs.get(session, claim.job_id)
+    run = Run(database, blobs, claim, job, dict(job.seconds))
+    logs.note(kind=job.kind)
+    try:
+        with traces.span(job.kind, job.trace, job=job.id):
+            _take_through_the_stages(run)
+    except (Refused, SlipcoreError, EstimatorError) as refusal:
+        with database.write() as session:
+            jobs.finish(session, claim, "refused", reason=str(refusal), seconds=run.seconds)
+        logger.info("job refused: %s", refusal, extra=logs.of(seconds=run.total))
+    else:
+        logger.info("job done", extra=logs.of(seconds=run.total))
+
+
+def _take_through_the_stages(run: Run) -> None:
+    job = run.job
+    samples = None if job.grasp_log_id is None else find_samples(run, job.grasp_log_id)
+    if job.material is None:  # detection only
+        with run.database.write() as session:
+            jobs.finish(session, run.claim, "done", seconds=run.seconds)
+        return
+    if samples is not None and samples.none_because is not None:
+        raise Refused(samples.none_because)
+    fit_material(run, job.material)
+
+
+def find_samples(run: Run, log_id: str) -> SampleSummary:
+    """Frames → strain → events → slip_state → samples → moments of one log."""
+    with run.database.read() as session:
+        stored = grasp_logs.get(session, log_id)
+    if stored.samples is not None:
+        return stored.samples
+    with run.stage("frames"):
+        log = formats.read(run.blobs.path(stored.sha256))
+    with run.stage("slip_state"):
+        history = slipcore.detect_slip(log, method=stored.detector, lookahead=slipcore.LOOKAHEAD)
+    with run.stage("samples"):
+        samples, none_because = _collect(log, history)
+        blob = run.blobs.put(encode_history(history))
+        detection = summarise_history(history, run.seconds["slip_state"], blob, is_scaled=log.is_scaled)
+        summary = summarise_samples(samples, none_because, run.blobs.put(encode_samples(samples)))
+    with run.database.write() as session:
+        jobs.start_stage(session, run.claim, "samples", run.seconds)  # nobody else has stored them meanwhile
+        detections.add(session, log_id, detection, summary)
+    return summary
+
+
+def fit_material(run: Run, material: str) -> None:
+    """Moments or samples of all logs of a material → friction_model → material; raises ``Refused``."""
+    _note_missing_moments(run, material)
+    for _ in range(FITS_BESIDE_OTHERS):
+        with run.stage("friction_model"):
+            with run.database.read() as session:
+                material_id = materials.find_id(session, material)
+                parts = detections.samples_of_material(session, material_id)
+            model = _fit(run, parts)
+        with run.database.write() as session:
+            friction_models.lock(session, material_id)
+            if detections.samples_of_material(session, material_id) == parts:
+                _store_model(run, session, material_id, model)
+                return
+    with run.database.write() as session:  # logs come in faster than they are fitted: the other fits wait for this one
+        friction_models.lock(session, material_id)
+        with run.timed("friction_model"):
+            model = _fit(run, detections.samples_of_material(session, material_id))
+        _store_model(run, session, material_id, model)
+
+
+def _collect(log: GraspLog, history: SlipHistory) -> tuple[FrictionSamples, str | None]:
+    """The samples, and if there are none, why."""
+    if not log.is_scaled:
+        return _no_samples(log), "the log's scale is unknown; friction needs velocities in m/s, not pixels a second"
+    if log.force is None:
+        return _no_samples(log), "the log has no forces; friction is tangential over normal force"
+    if not history.contact.any():
+        return _no_samples(log), f"no element was in contact in any of the {len(log)} frames"
+    samples = slipcore.collect_samples(log, history)
+    if len(samples) == 0:
+        slipping = int(history.slip.sum())
+        return samples, f"no slip gave a friction sample ({slipping} slipping elements in {len(log)} frames)"
+    return samples, None
+
+
+def _no_samples(log: GraspLog) -> FrictionSamples:
+    none = np.empty(0)
+    return FrictionSamples(none, none, none, none, none, none.astype(int), none, log.element_area)
+
+
+def _fit(run: Run, parts: Sequence[SamplesOfLog]) -> FrictionModel:
+    """From the moments where the method needs no more, else from the samples."""
+    if not parts:
+        raise Refused("no grasp log of this material has friction samples yet")
+    method, seed = run.job.method, run.job.seed
+    if estimators.needs_samples(method, len(parts)):
+        return estimators.fit(
+            [decode_samples(run.blobs.path(part.samples_blob)) for part in parts], method=method, seed=seed
+        )
+    return estimators.fit([_moments(run, part) for part in parts], method=method, seed=seed)
+
+
+def _moments(run: Run, part: SamplesOfLog) -> Moments:
+    if part.moments is not None:
+        return Moments.from_bytes(part.moments)
+    return Moments.from_samples(decode_samples(run.blobs.path(part.samples_blob)))
+
+
+def _note_missing_moments(run: Run, material: str) -> None:
+    """Of samples that an older version stored without."""
+    with run.database.read() as session:
+        parts = detections.samples_of_material(session, materials.find_id(session, material))
+    for part in parts:
+        if part.moments is None:
+            content = _moments(run, part).to_bytes()
+            with run.database.write(durable=False) as session:
+                detections.set_moments(session, part.grasp_log_id, content)
+
+
+def _store_model(run: Run, session: Session, material_id: int, model: FrictionModel) -> None:
+    """Store the model and close the job, in one transaction with what the model was fitted to."""
+    with run.timed("material"):
+        jobs.start_stage(session, run.claim, "material", run.seconds)  # before the model, which a job may have but once
+        version = friction_models.add(session, material_id, run.job.id, to_new_model(model))
+    jobs.finish(session, run.claim, "done", model_version=version, seconds=run.seconds)

@@ -1,0 +1,280 @@
+"""Durable jobs: rows in the database say what is to be done, runners claim them, worker processes do them.
+
+Any number of runners, each with worker processes of its own, share one database. A runner lives in a server or by
+itself (``stiction worker``) and runs no numerics. A job that loses its worker process is done by another one; the jobs
+of a runner that is dead, seen by its heartbeat, are done by other runners (docs/jobs.md).
+"""
+
+import asyncio
+import logging
+import os
+import socket
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import TypeVar
+from weakref import WeakValueDictionary
+
+from sqlalchemy.orm import Session
+
+from db import migrate
+from db.database import Database
+from db.errors import ClaimLost, SchemaMismatch, StorageUnavailable
+from db.records import Claim
+from db.repositories import jobs, runners
+from service.jobs.lanes import Lane, WorkerDied
+from service.observability import logs
+
+logger = logging.getLogger(__name__)
+
+RETRY_SECONDS = 1.0
+"""s between two tries to reach a database that is locked, full or away."""
+
+WAKE_SECONDS = 0.003
+"""s from a job's storing to the look for it, for the answer goes first: both take the interpreter."""
+
+LOOKS = 5
+"""Looks at another runner's heartbeat, as many in one lease, that must all be the same before it counts as dead."""
+
+Result = TypeVar("Result")
+
+
+class Watch:
+    """Which of the other runners are dead: those whose beats stood still in so many looks in a row.
+
+    Looks are counted and not seconds: clocks jump, and while the database was away nobody could beat.
+    """
+
+    def __init__(self, looks: int) -> None:
+        self._looks = looks
+        self._seen: dict[str, tuple[int, int]] = {}
+
+    def look(self, beats: Mapping[str, int]) -> list[str]:
+        """The dead among the runners, given the beats of each."""
+        before = self._seen
+        self._seen = {
+            runner: (count, 1 + before[runner][1] if runner in before and before[runner][0] == count else 0)
+            for runner, count in beats.items()
+        }
+        return [runner for runner, (_, same) in self._seen.items() if same >= self._looks]
+
+
+class JobRunner:
+    """Lanes of one worker process each, so that the death of a process is the death of one known job."""
+
+    def __init__(
+        self,
+        database: Database,
+        lanes: list[Lane],
+        *,
+        attempts: int,
+        lease_seconds: float,
+        poll_seconds: float,
+        shutdown_seconds: float,
+    ) -> None:
+        self._database, self._lanes, self._attempts = database, lanes, attempts
+        self._beat_seconds, self._poll_seconds = lease_seconds / LOOKS, poll_seconds
+        self._shutdown_seconds = shutdown_seconds
+        self._watch = Watch(LOOKS)
+        self._id = ""
+        self._at: set[str] = set()  # jobs in the lanes
+        self._strays: set[str] = set()  # jobs that were ours in the database at the last beat, but in no lane
+        self._warming = len(lanes)
+        self._hiring: set[asyncio.Task[None]] = set()
+        self._outdated: SchemaMismatch | None = None
+        self._stopping = self._leads = False
+        self._woken = asyncio.Event()
+        self._endings: WeakValueDictionary[str, asyncio.Event] = WeakValueDictionary()  # of jobs that somebody awaits
+
+    @property
+    def missing(self) -> str | None:
+        """Why no jobs are taken yet, or no longer."""
+        if self._outdated is not None:
+            return str(self._outdated)
+        missing = next(filter(None, (lane.missing for lane in self._lanes)), None)
+        if self._warming:
+            return f"{self._warming} of {len(self._lanes)} workers warm up" + (f": {missing}" if missing else "")
+        return missing
+
+    @property
+    def leads(self) -> bool:
+        """Whether this is the one that does what only one is to do: the oldest runner, as of the last beat."""
+        return self._leads
+
+    async def start(self) -> None:
+        """Begin to work."""
+        self._loop = asyncio.get_running_loop()
+        if self._lanes:
+            self._id = await asyncio.to_thread(self._register)
+        self._beating = asyncio.create_task(self._beat())
+        self._working = [asyncio.create_task(self._work(lane)) for lane in self._lanes]
+
+    def wake(self) -> None:
+        """Look for a job soon, since one has just been stored; may be called from any thread."""
+        self._loop.call_soon_threadsafe(self._loop.call_later, WAKE_SECONDS, self._woken.set)
+
+    def ending(self, job_id: str) -> asyncio.Event:
+        """Set once a lane of this runner has done with the job; jobs of other runners end unheard."""
+        return self._endings.setdefault(job_id, asyncio.Event())
+
+    async def until_outdated(self) -> None:
+        """Raise ``SchemaMismatch`` once the schema is not this version's any more."""
+        while self._outdated is None:
+            await asyncio.sleep(self._beat_seconds)
+        raise self._outdated
+
+    async def stop(self) -> None:
+        """Let running jobs end within the time allowed, then end their workers; others can take the jobs up."""
+        self._stopping = True
+        self._woken.set()
+        for task in self._hiring:  # no job waits for a worker that is not there yet
+            task.cancel()
+        if self._working:
+            _, late = await asyncio.wait(self._working, timeout=self._shutdown_seconds)
+            for lane in self._lanes:
+                lane.kill()
+            for task in late:
+                task.cancel()
+        self._beating.cancel()
+        await asyncio.gather(self._beating, *self._working, return_exceptions=True)
+        if self._lanes:
+            await self._try(lambda: self._remove(self._id))
+
+    async def _work(self, lane: Lane) -> None:
+        try:
+            await self._hire(lane)
+            self._warming -= 1
+            while not self._stopping and self._outdated is None:
+                self._woken.clear()
+                claim = await self._try(self._claim)
+                if claim is None:
+                    await self._wait(self._poll_seconds)
+                    continue
+                with logs.about(job=claim.job_id):
+                    await self._do(lane, claim)
+        finally:
+            await lane.close()
+
+    async def _hire(self, lane: Lane) -> None:
+        hiring = asyncio.create_task(lane.hire())
+        self._hiring.add(hiring)
+        hiring.add_done_callback(self._hiring.discard)
+        await hiring
+
+    async def _wait(self, seconds: float) -> None:
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self._woken.wait(), seconds)
+
+    async def _try(self, step: Callable[[], Result]) -> Result | None:
+        """A step that needs the database, in a thread; None where it cannot be had now."""
+        try:
+            return await asyncio.to_thread(step)
+        except StorageUnavailable as error:
+            logger.warning("jobs wait: %s", error)
+            await asyncio.sleep(RETRY_SECONDS)
+        except SchemaMismatch as error:
+            logger.error("no more jobs are taken: %s", error)
+            self._outdated = error
+        except Exception:  # the lanes and the heartbeat outlive whatever one step throws
+            logger.exception("a step of runner %s failed", self._id)
+            await asyncio.sleep(RETRY_SECONDS)
+        return None
+
+    def _claim(self) -> Claim | None:
+        with self._database.read() as session:  # does not wait for a writer
+            if not jobs.any_queued(session):
+                return None
+        with self._database.write(durable=False) as session:
+            migrate.require_head(session)
+            claim = jobs.claim(session, self._id, besides=self._at)
+        if claim is not None:
+            self._at.add(claim.job_id)
+        return claim
+
+    async def _do(self, lane: Lane, claim: Claim) -> None:
+        is_lost = False
+        try:
+            await lane.run(claim)
+        except WorkerDied:
+            is_lost = not self._stopping
+            if is_lost:
+                await self._try(lambda: self._count_death(claim))
+        except StorageUnavailable as error:
+            logger.warning("job %s waits: %s", claim.job_id, error)
+            await asyncio.sleep(RETRY_SECONDS)
+        except Exception as error:  # a lane outlives whatever one job throws at it
+            logger.exception("job %s failed outside its stages", claim.job_id)
+            reason = f"{type(error).__name__}: {error}"
+            await self._try(lambda: self._fail(claim, reason))
+        finally:
+            self._at.discard(claim.job_id)  # where it is still ours in the database, it is a stray
+            if (ending := self._endings.pop(claim.job_id, None)) is not None:
+                ending.set()
+        if is_lost and not self._stopping:  # only now: meanwhile another lane may take the job up
+            await self._hire(lane)
+
+    def _fail(self, claim: Claim, reason: str) -> None:
+        try:
+            with self._database.write() as session:
+                jobs.finish(session, claim, "failed", reason=reason)
+        except ClaimLost:
+            pass
+
+    def _count_death(self, claim: Claim) -> None:
+        """Note that the job lost its worker, and end it if that was once too often."""
+        try:
+            with self._database.write() as session:
+                job = jobs.count_death(session, claim)
+                logger.error("job %s lost its worker process, time %d of %d", job.id, job.deaths, self._attempts)
+                if job.deaths < self._attempts:
+                    jobs.release(session, claim)
+                    return
+                reason = f"the worker process died {job.deaths} times, at last in stage {job.stage}"
+                jobs.finish(session, claim, "failed", reason=reason)
+        except ClaimLost:
+            pass  # it had ended, or nobody wants it any more
+
+    async def _beat(self) -> None:
+        while True:
+            await asyncio.sleep(self._beat_seconds)
+            if await self._try(self._beat_once if self._lanes else self._check_schema):
+                self._woken.set()
+
+    def _check_schema(self) -> None:
+        with self._database.read() as session:
+            migrate.require_head(session)
+
+    def _beat_once(self) -> bool:
+        """Say that we live, and take the jobs away from runners that do not; True if there are jobs to claim."""
+        with self._database.write(durable=False) as session:
+            alive = runners.beat(session, self._id)
+            living = runners.list_all(session)
+            beats = {runner.id: runner.beats for runner in living if runner.id != self._id}
+            freed = self._free_strays(session)
+        self._leads = alive and living[0].id == self._id
+        if not alive and not self._stopping:
+            logger.error("runner %s was taken for dead; it goes on under a new name", self._id)
+            self._id = self._register()
+        dead = self._watch.look(beats)
+        for runner in dead:
+            self._remove(runner)
+        return freed or bool(dead)
+
+    def _free_strays(self, session: Session) -> bool:
+        """Put jobs that the database says are ours, but that no lane does, back: a commit's answer can be lost."""
+        strays = jobs.claimed(session, self._id) - self._at
+        stay = strays & self._strays
+        self._strays = strays
+        for job_id in stay:
+            logger.warning("job %s is queued again: nobody is at it", job_id)
+            jobs.release(session, Claim(job_id, self._id))
+        return bool(stay)
+
+    def _register(self) -> str:
+        with self._database.write(durable=False) as session:
+            return runners.add(session, f"{socket.gethostname()}:{os.getpid()}")
+
+    def _remove(self, runner: str) -> None:
+        with self._database.write() as session:
+            released = runners.remove(session, runner)
+        if released:
+            logger.warning("jobs of runner %s are queued again: %s", runner, ", ".join(released))

@@ -1,0 +1,68 @@
+"""What runs in a worker process: module-level functions that take plain values."""
+
+import logging
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from db.blobs import BlobStore, open_blobs
+from db.database import Database
+from db.errors import ClaimLost, StorageUnavailable
+from db.records import Claim
+from db.repositories import jobs
+from service.observability import logs
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a worker finds its work: database, folder of the blobs and, where they are in one, the object store."""
+
+    database_url: str
+    data_folder: Path
+    blob_url: str | None = None
+    blob_cache_bytes: int = 0
+
+
+def warm_up() -> None:
+    """Import and try all that a first job would wait for."""
+    import estimators
+    import slipcore
+    from service.jobs import pipeline
+    from slipcore.contact import ramp
+
+    try:
+        log = ramp.tangential_ramp(points=8, pitch=1.5e-3)
+        estimators.fit(slipcore.collect_samples(log, slipcore.detect_slip(log)), method="ols")
+        estimators.warm_up()
+    except Exception:
+        logger.exception("the %s is not warmed up; its first job will be slow", pipeline.__name__)
+
+
+def run_job(place: Place, claim: Claim) -> None:
+    """Do a job and leave its end in the database; raises ``StorageUnavailable``, for then nobody can write there."""
+    with logs.about(job=claim.job_id):
+        _run(place, claim)
+
+
+def _run(place: Place, claim: Claim) -> None:
+    from service.jobs import pipeline  # imports the numerics, which the server process does without
+
+    database, blobs = _stores(place)
+    try:
+        pipeline.run_job(database, blobs, claim)
+    except StorageUnavailable:
+        raise
+    except ClaimLost as lost:
+        logger.warning("%s; what was done of it stays", lost)
+    except Exception as error:
+        logger.exception("job failed")
+        with database.write() as session, suppress(ClaimLost):
+            jobs.finish(session, claim, "failed", reason=f"{type(error).__name__}: {error}")
+
+
+@cache
+def _stores(place: Place) -> tuple[Database, BlobStore]:
+    return Database(place.database_url), open_blobs(place.data_folder, place.blob_url, place.blob_cache_bytes)

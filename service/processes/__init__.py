@@ -1,0 +1,1 @@
+"""What processes share: starting and ending them, their memory, their folder."""

@@ -1,0 +1,193 @@
+"""The live stream: frames in, slip states out, of a session whose detector lives in a worker process."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from db.errors import NotFound, StorageUnavailable
+from service.context import Context
+from service.domain.upload import check_target, store_made
+from service.http.problems import Problem
+from service.stream import live
+from service.stream.sessions import (
+    DECODE_BINARY,
+    DECODE_TEXT,
+    FINISHED,
+    NOT_UNDERSTOOD,
+    PATIENCE,
+    REFUSED,
+    SLOW_READER,
+    STORAGE_AWAY,
+    End,
+    Finish,
+    FrameIn,
+    Incoming,
+    Open,
+    Resume,
+    Session,
+)
+from slipcore.errors import InvalidInput
+
+logger = logging.getLogger(__name__)
+
+MOST_WAITING_IN, MOST_WAITING_OUT = 8, 64
+"""Messages of one connection between network and detector: beyond the first the client waits, beyond the second it is
+dropped, for it does not read."""
+
+
+async def serve(socket: WebSocket, context: Context, key_id: str | None) -> None:
+    """One connection from its first message to its end."""
+    connection = _Connection(socket, context, key_id)
+    try:
+        await connection.run()
+    except End as end:
+        await _close(socket, end.code, end.reason)
+    except InvalidInput as error:
+        await _close(socket, REFUSED, f"{error.name} is {error.value}; allowed: {error.allowed}")
+    except (Problem, NotFound) as problem:
+        await _close(socket, REFUSED, str(problem))
+    except StorageUnavailable as error:
+        logger.warning("a stream waits: %s", error)
+        await _close(socket, STORAGE_AWAY, str(error))
+    except WebSocketDisconnect:
+        return
+
+
+async def _close(socket: WebSocket, code: int, reason: str) -> None:
+    try:
+        await socket.close(code, reason.encode()[:120].decode(errors="ignore"))  # what a close frame holds
+    except RuntimeError:  # it is closed already
+        return
+
+
+class _Connection:
+    def __init__(self, socket: WebSocket, context: Context, key_id: str | None) -> None:
+        self._socket, self._context, self._key_id = socket, context, key_id
+        self._streams = context.streams
+        self._incoming: asyncio.Queue[Incoming] = asyncio.Queue(MOST_WAITING_IN)
+        self._outgoing: asyncio.Queue[dict[str, Any]] = asyncio.Queue(MOST_WAITING_OUT)
+        self._encode: Callable[[Any], bytes] = msgspec.msgpack.encode
+        self._is_text = False
+
+    async def run(self) -> None:
+        try:
+            first = await asyncio.wait_for(self._receive(), PATIENCE)
+        except TimeoutError as error:
+            raise End(NOT_UNDERSTOOD, f"nothing was said for {PATIENCE:g} s") from error
+        session = await self._begin(first)
+        session.connected = True
+        try:
+            await self._carry(session)
+        finally:
+            session.connected, session.left = False, time.monotonic()
+
+    async def _begin(self, first: Incoming) -> Session:
+        if isinstance(first, Open):
+            await check_target(self._context, first.material, first.detector)
+            session, missed = await self._streams.open(first, self._key_id), []
+        elif isinstance(first, Resume):
+            session = self._streams.find(first.session, self._key_id)
+            missed = [answer for answer in session.recent if answer["number"] > first.last]
+        else:
+            raise End(NOT_UNDERSTOOD, "the first message must be of type open or resume")
+        await self._send({"type": "opened", "session": session.id, "next": session.next})
+        for answer in missed:
+            await self._send(answer)
+        return session
+
+    async def _carry(self, session: Session) -> None:
+        """Read, work and write at once until one of them ends."""
+        tasks = [asyncio.create_task(part) for part in (self._read(), self._work(session), self._write())]
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            done.pop().result()
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _read(self) -> None:
+        while True:
+            await self._incoming.put(await self._receive())
+
+    async def _write(self) -> None:
+        while True:
+            await self._send(await self._outgoing.get())
+
+    async def _work(self, session: Session) -> None:
+        while True:
+            message = await self._incoming.get()
+            if isinstance(message, FrameIn):
+                await self._step(session, message)
+            elif isinstance(message, Finish):
+                answer = await self._finish(session, message)
+                while not self._outgoing.empty():
+                    await self._send(self._outgoing.get_nowait())
+                await self._send(answer)
+                await self._streams.end(session)
+                raise End(FINISHED, "finished")
+            else:
+                raise End(NOT_UNDERSTOOD, "the session is open already")
+
+    async def _step(self, session: Session, frame: FrameIn) -> None:
+        if frame.number < session.next:  # sent again after a reconnect
+            return
+        try:
+            answer = await self._streams.call(
+                live.step,
+                session.id,
+                frame.number,
+                frame.time,
+                frame.displacement,
+                frame.force,
+                frame.object_pose,
+                frame.normal,
+            )
+        except InvalidInput as error:
+            answer = {"type": "error", "number": frame.number}
+            answer |= {"name": error.name, "value": str(error.value), "allowed": error.allowed}
+        session.next = frame.number + 1
+        session.recent.append(answer)
+        try:
+            self._outgoing.put_nowait(answer)
+        except asyncio.QueueFull:
+            raise End(SLOW_READER, f"{MOST_WAITING_OUT} answers wait to be read") from None
+
+    async def _finish(self, session: Session, message: Finish) -> dict[str, Any]:
+        """Store the kept frames through the same door as an upload; until the answer is there it may be said again."""
+        if not message.store:
+            return {"type": "finished", "grasp_log": None}
+        opening = session.opening
+        if not opening.keep:
+            raise End(REFUSED, "store needs keep, said when the session was opened")
+        with self._context.blobs.spool() as spool:
+            found = await self._streams.call(live.write, session.id, spool.path, opening.sensor)
+            answer = await store_made(self._context, spool, found, opening.material, opening.detector)
+        return {"type": "finished", "grasp_log": answer.body}
+
+    async def _receive(self) -> Incoming:
+        event = await self._socket.receive()
+        if event["type"] == "websocket.disconnect":
+            raise WebSocketDisconnect(event.get("code", 1000))
+        text, content = event.get("text"), event.get("bytes")
+        try:
+            if text is not None:
+                self._is_text, self._encode = True, msgspec.json.encode
+                message: Incoming = DECODE_TEXT(text)
+            else:
+                message = DECODE_BINARY(content or b"")
+        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+            raise End(NOT_UNDERSTOOD, str(error)) from error
+        return message
+
+    async def _send(self, answer: dict[str, Any]) -> None:
+        content = self._encode(answer)
+        if self._is_text:
+            await self._socket.send_text(content.decode())
+        else:
+            await self._socket.send_bytes(content)

@@ -1,0 +1,232 @@
+"""Live detectors, in a worker process: one a session, fed frame by frame. Module-level functions of plain values."""
+
+import logging
+import math
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from db.blobs import disk_errors_named
+from estimators.errors import EstimatorError
+from estimators.moments import Moments
+from service.formats.reading import Description, describe
+from slipcore import (
+    DetectorState,
+    Frame,
+    FrictionSamples,
+    GraspLog,
+    InvalidInput,
+    SlipDetector,
+    SlipState,
+    collect_history,
+    collect_samples,
+)
+from stiction_client import container
+
+logger = logging.getLogger(__name__)
+
+WINDOW, STRIDE = 45, 30
+"""Frames that friction samples are looked for in, and frames from one look to the next: once a second."""
+
+MAX_KEPT_BYTES = 64 * 2**20
+"""Bytes of frames kept of one session for its log: 12 minutes of a 20×20 sensor with forces at 30 frames a second."""
+
+MAX_MARKERS = 4096
+
+Numbers = bytes | Sequence[Any]
+"""Numbers in a row, row-major: little-endian float32 or float64, or lists nested as they may be."""
+
+
+@dataclass(slots=True)
+class Session:
+    """A running detector with what it saw: the last frames and answers, all frames if they are ``kept``."""
+
+    detector: SlipDetector
+    position: NDArray[np.float64]
+    element_area: float
+    moments: Moments
+    kept: list[Frame] | None
+    frames: list[Frame] = field(default_factory=list)
+    answers: list[SlipState] = field(default_factory=list)
+    until_look: int = WINDOW
+    look: Future[None] | None = None
+    looked_until: float = -math.inf
+    last: tuple[int, dict[str, Any]] = (-1, {})
+    friction: dict[str, Any] | None = None
+
+
+_SESSIONS: dict[str, Session] = {}
+
+_LOOKS = ThreadPoolExecutor(1)
+"""Does the looks for friction, so that frames need not wait for them."""
+
+
+def open_session(name: str, position: Numbers, grid: tuple[int, int], area: float, method: str, keep: bool) -> None:
+    """Begin a session; raises ``InvalidInput`` for what cannot be a sensor."""
+    rows, columns = grid
+    if not 0 < rows * columns <= MAX_MARKERS or rows < 1:
+        raise InvalidInput("grid", list(grid), f"1 to {MAX_MARKERS} markers")
+    at_rest = _array("position", position, (rows, columns, 3))
+    detector = SlipDetector(at_rest, area, method)
+    _SESSIONS[name] = Session(detector, at_rest, area, Moments.empty(area), [] if keep else None)
+
+
+def step(
+    name: str,
+    number: int,
+    time: float,
+    displacement: Numbers,
+    force: Numbers | None,
+    object_pose: Numbers | None,
+    normal: Numbers | None,
+) -> dict[str, Any]:
+    """Take a frame and answer; the same frame again is answered as before. Raises ``InvalidInput``."""
+    session = _SESSIONS[name]
+    if number == session.last[0]:
+        return session.last[1]
+    shape = session.position.shape
+    frame = Frame(
+        time,
+        _array("displacement", displacement, shape),
+        None if force is None else _array("force", force, shape),
+        None if object_pose is None else _array("object_pose", object_pose, (3,)),
+        None if normal is None else _array("normal", normal, shape),
+    )
+    _keep(session, frame)
+    try:
+        state = session.detector.step(*frame)
+    except InvalidInput:
+        if session.kept:
+            session.kept.pop()
+        raise
+    _plan_look(session, frame, state)
+    session.last = (number, _answer(session, number, state))
+    return session.last[1]
+
+
+def write(name: str, target: Path, sensor: str) -> Description:
+    """Write a session's log to ``target``; raises ``InvalidInput`` for too few frames, ``StorageUnavailable``."""
+    session = _SESSIONS[name]
+    frames = session.kept or []
+    if len(frames) < 2:
+        raise InvalidInput("frames", len(frames), "at least 2, for a log")
+    log = _log(session, frames, sensor, {"session": name})
+    with disk_errors_named():
+        container.write(log, target)
+    return describe("stream", log)
+
+
+def drop(name: str) -> None:
+    """Forget a session."""
+    _SESSIONS.pop(name, None)
+
+
+def _keep(session: Session, frame: Frame) -> None:
+    if session.kept is None:
+        return
+    size = frame.displacement.nbytes * (1 + (frame.force is not None) + (frame.normal is not None))
+    if (len(session.kept) + 1) * size > MAX_KEPT_BYTES:
+        raise InvalidInput(
+            "frames", len(session.kept) + 1, f"{MAX_KEPT_BYTES // size} of this size, where they are kept"
+        )
+    session.kept.append(frame)
+
+
+def _plan_look(session: Session, frame: Frame, state: SlipState) -> None:
+    """Once in a while, let the last frames be looked at."""
+    if frame.force is None:
+        return
+    session.frames = [*session.frames[1 - WINDOW :], frame]
+    session.answers = [*session.answers[1 - WINDOW :], state]
+    session.until_look -= 1
+    if session.until_look == 0:
+        session.until_look = STRIDE
+        if session.look is not None:
+            wait([session.look])  # where there is so much to do that it is not done yet, frames have to wait, too
+        given = session.frames, session.answers, session.detector.state
+        session.look = _LOOKS.submit(_look, session, *given)
+
+
+def _look(session: Session, frames: list[Frame], answers: list[SlipState], state: DetectorState) -> None:
+    try:
+        _find_friction(session, frames, answers, state)
+    except Exception:  # costs the stream this second's friction, and nothing else
+        logger.exception("a look for friction failed")
+
+
+def _find_friction(session: Session, frames: list[Frame], answers: list[SlipState], state: DetectorState) -> None:
+    """The samples since the last look, merged with those before."""
+    samples = collect_samples(_log(session, frames, "", {}), collect_history(answers, state))
+    end = frames[-1].time  # which has no next frame yet, so it is the next look's
+    new = (samples.time >= session.looked_until) & (samples.time < end)
+    session.looked_until = end
+    part = {entry.name: getattr(samples, entry.name)[new] for entry in fields(samples) if entry.name != "element_area"}
+    found = FrictionSamples(**part, element_area=samples.element_area)
+    session.moments = session.moments.merge(Moments.from_samples(found))
+    session.friction = _fitted(session.moments)
+
+
+def _fitted(moments: Moments) -> dict[str, Any] | None:
+    try:
+        model = moments.fit()
+    except EstimatorError:  # too few samples yet
+        return None
+    return {
+        "coefficients": model.coefficients.tolist(),
+        "standard_errors": [value if math.isfinite(value) else None for value in model.standard_errors.tolist()],
+        "scale": float(model.scale),
+        "samples": moments.n,
+    }
+
+
+def _answer(session: Session, number: int, state: SlipState) -> dict[str, Any]:
+    return {
+        "type": "state",
+        "number": number,
+        "time": state.time,
+        "stick_ratio": None if math.isnan(state.stick_ratio) else float(state.stick_ratio),
+        "macro_slip": bool(state.macro_slip),
+        "contact": int(state.contact.sum()),
+        "slip": np.flatnonzero(state.slip).tolist(),
+        "friction": session.friction,
+    }
+
+
+def _log(session: Session, frames: Sequence[Frame], sensor: str, metadata: dict[str, str]) -> GraspLog:
+    def stacked(name: str) -> NDArray[np.float64] | None:
+        parts = [getattr(frame, name) for frame in frames]
+        return None if any(part is None for part in parts) else np.stack(parts)
+
+    return GraspLog(
+        time=np.array([frame.time for frame in frames]),
+        position=session.position,
+        displacement=np.stack([frame.displacement for frame in frames]),
+        element_area=session.element_area,
+        force=stacked("force"),
+        object_pose=stacked("object_pose"),
+        normal=stacked("normal"),
+        sensor=sensor or "unknown",
+        metadata=metadata,
+    )
+
+
+def _array(name: str, numbers: Numbers, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    count = math.prod(shape)
+    if isinstance(numbers, bytes):
+        if len(numbers) not in (4 * count, 8 * count):
+            raise InvalidInput(
+                name, f"{len(numbers)} bytes", f"{4 * count} or {8 * count}: {list(shape)} as float32 or 64"
+            )
+        return np.frombuffer(numbers, "<f4" if len(numbers) == 4 * count else "<f8").astype(np.float64).reshape(shape)
+    try:
+        array = np.array(numbers, dtype=np.float64)
+    except (ValueError, TypeError) as error:
+        raise InvalidInput(name, f"no numbers ({str(error)[:60]})", f"numbers of shape {list(shape)}") from error
+    if array.size != count:
+        raise InvalidInput(name, f"of shape {list(array.shape)}", f"shape {list(shape)}")
+    return array.reshape(shape)

@@ -1,0 +1,177 @@
+from collections.abc import Callable
+from contextlib import closing
+from threading import Thread
+from typing import Any
+
+import numpy as np
+import pytest
+
+from db.blobs import BlobStore
+from db.database import Database
+from db.errors import NotFound
+from db.records import Claim, Job, NewGraspLog
+from db.repositories import grasp_logs, jobs, materials, runners
+from service.context import Context
+from service.domain import curate
+from service.domain.look_up import Question, look_up
+from service.http.problems import Problem
+from service.http.schemas import FrictionOut
+from service.jobs import pipeline
+from service.settings import Settings
+
+Repack = Callable[..., bytes]
+ANYWHERE = Question(0.0, 0.1, None)
+
+
+class Shop:
+    """The stores, and a worker that does jobs at once when it is told to."""
+
+    def __init__(self, database: Database, blobs: BlobStore, contents: list[bytes]) -> None:
+        self.database, self.blobs, self.contents = database, blobs, contents
+        runner: Any = self
+        self.context = Context(Settings(), database, blobs, runner)
+        with database.write() as session:
+            self.runner_id = runners.add(session, "host:1")
+
+    def wake(self) -> None:
+        """The work is done when the test says so."""
+
+    def claim(self) -> Claim | None:
+        with self.database.write() as session:
+            return jobs.claim(session, self.runner_id)
+
+    def work(self) -> list[Job]:
+        done = []
+        while claim := self.claim():
+            pipeline.run_job(self.database, self.blobs, claim)
+            with self.database.read() as session:
+                done.append(jobs.get(session, claim.job_id))
+        return done
+
+    def ingest(self, material: str, number: int, method: str = "ols") -> str:
+        """A log of the material, with its model fitted."""
+        content = self.contents[number]
+        with self.database.write() as session:
+            try:
+                material_id = materials.find_id(session, material)
+            except NotFound:
+                material_id = materials.create(session, material, "").id
+            log = NewGraspLog(self.blobs.put(content), len(content), "npz", "filter", material_id, "s", 82, 2.7, (8, 8))
+            log_id = grasp_logs.add(session, log)
+            jobs.add(session, "ingest", method, material_id=material_id, grasp_log_id=log_id)
+        (job,) = self.work()
+        assert job.status == "done", job.reason
+        return log_id
+
+    def friction(self, material: str, method: str = "ols") -> FrictionOut:
+        return look_up(self.context.models.read(self.database, material, method), ANYWHERE)
+
+    def model(self, material: str, method: str = "ols") -> tuple[int, int, bool]:
+        """Version, samples, and whether it is outdated."""
+        with self.database.read() as session:
+            (found,) = [each for each in materials.get(session, material).models if each.model.method == method]
+        return found.version, found.model.n, found.outdated
+
+
+@pytest.fixture
+def shop(database: Database, blobs: BlobStore, members: dict[str, Any], repack: Repack) -> Shop:
+    contents = [repack(members | {"sensor": np.str_(f"finger {number}")}) for number in range(3)]
+    return Shop(database, blobs, contents)
+
+
+def test_a_withdrawn_log_leaves_every_fit_and_comes_back(shop: Shop) -> None:
+    good, bad = shop.ingest("paper", 0), shop.ingest("paper", 1, method="conjugate")
+    both = shop.model("paper", "conjugate")[1]
+    log, queued = curate.withdraw(shop.context, bad, "wet")
+    assert log.withdrawal is not None
+    assert log.withdrawal.because == "wet"
+    assert [(job.kind, job.method) for job in queued] == [("fit", "conjugate"), ("fit", "ols")]
+    assert shop.model("paper", "conjugate") == (1, both, True)
+    assert "withdrawn" in str(shop.friction("paper").warning)
+    assert [job.status for job in shop.work()] == ["done", "done"]
+    assert shop.model("paper", "conjugate") == (2, both // 2, False)
+    assert shop.model("paper", "ols") == (2, both // 2, False)
+    assert "withdrawn" not in str(shop.friction("paper").warning)
+
+    again, queued = curate.withdraw(shop.context, bad, "wet, and dropped")
+    assert again.withdrawal is not None
+    assert (again.withdrawal.at, again.withdrawal.because) == (log.withdrawal.at, "wet, and dropped")
+    assert queued == []
+    back, queued = curate.restore(shop.context, bad)
+    assert back.withdrawal is None
+    assert len(queued) == len(shop.work()) == 2
+    assert shop.model("paper", "ols") == (3, both, False)
+    assert curate.restore(shop.context, good)[1] == []
+
+
+def test_a_material_without_its_only_log_has_no_model(shop: Shop) -> None:
+    log = shop.ingest("paper", 0)
+    assert curate.withdraw(shop.context, log, "wrong material")[1] == []
+    with pytest.raises(Problem, match="has no model fitted by 'ols'"):
+        shop.friction("paper")
+    curate.restore(shop.context, log)
+    shop.work()
+    assert shop.model("paper")[0] == 2
+
+
+def test_a_fit_under_way_does_not_bring_a_withdrawn_log_back(shop: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
+    shop.ingest("paper", 0)
+    bad, fit = shop.ingest("paper", 1), pipeline._fit
+    both, withdrawn = shop.model("paper")[1], []
+
+    def withdraw_meanwhile(*given: Any) -> Any:
+        model = fit(*given)
+        if not withdrawn:
+            withdrawn.append(curate.withdraw(shop.context, bad, "late"))
+        return model
+
+    with shop.database.write() as session:
+        jobs.add(session, "fit", "ols", material_id=materials.find_id(session, "paper"))
+    claim = shop.claim()
+    assert claim is not None
+    monkeypatch.setattr(pipeline, "_fit", withdraw_meanwhile)
+    pipeline.run_job(shop.database, shop.blobs, claim)
+    assert shop.model("paper") == (3, both // 2, False)
+
+
+def test_a_merged_material_is_fitted_over_all_its_logs(shop: Shop) -> None:
+    shop.ingest("paper", 0)
+    shop.ingest("papre", 1, method="conjugate")
+    each = shop.model("paper")[1]
+    merged, queued = curate.merge(shop.context, "paper", "papre")
+    assert (merged.name, merged.aliases, merged.grasp_logs) == ("paper", ("papre",), 2)
+    assert [job.method for job in queued] == ["conjugate", "ols"]
+    assert [job.status for job in shop.work()] == ["done", "done"]
+    assert shop.model("papre") == shop.model("paper") == (2, 2 * each, False)
+    assert shop.friction("papre", "conjugate").material == "paper"
+    with pytest.raises(Problem, match="source is papre; allowed: another material"):
+        curate.merge(shop.context, "paper", "papre")
+
+
+def test_two_merges_against_each_other_leave_one_material(shop: Shop) -> None:
+    shop.ingest("a", 0)
+    shop.ingest("b", 1)
+    ends: list[object] = []
+
+    def merge(target: str, source: str) -> None:
+        with closing(Database(shop.database.url)) as own:
+            try:
+                ends.append(curate.merge(Context(Settings(), own, shop.blobs, shop.context.jobs), target, source))
+            except (Problem, NotFound) as refused:
+                ends.append(refused)
+
+    threads = [Thread(target=merge, args=names) for names in (("a", "b"), ("b", "a"))]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert sum(isinstance(end, tuple) for end in ends) == 1
+    with shop.database.read() as session:
+        (left,) = materials.list_all(session)
+    assert left.grasp_logs == 2
+    assert materials_of(shop) == {left.id}
+
+
+def materials_of(shop: Shop) -> set[int]:
+    with shop.database.read() as session:
+        return {materials.find_id(session, name) for name in ("a", "b")}

@@ -1,0 +1,70 @@
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+import estimators
+import slipcore
+from db.database import Database
+from db.repositories import friction_models, jobs, materials
+from service.domain.look_up import Question, look_up
+from service.domain.model_cache import ModelCache
+from service.domain.stored_results import to_new_model
+from slipcore import GraspLog
+
+
+@pytest.fixture
+def model(ramp: GraspLog) -> estimators.FrictionModel:
+    return estimators.fit(slipcore.collect_samples(ramp, slipcore.detect_slip(ramp)))
+
+
+@pytest.fixture
+def ask(database: Database) -> Callable[[estimators.FrictionModel, Question], Any]:
+    with database.write() as session:
+        material = materials.create(session, "paper", "").id
+
+    def answer(model: estimators.FrictionModel, question: Question) -> Any:
+        with database.write() as session:
+            job = jobs.add(session, "fit", "ols", material_id=material)
+            friction_models.add(session, material, job, to_new_model(model))
+        return look_up(ModelCache().read(database, "paper", "ols"), question)
+
+    return answer
+
+
+def test_the_answer_is_the_models(ask: Callable[..., Any], model: estimators.FrictionModel) -> None:
+    f_n = sum(model.domain.normal_force) / 2.0
+    answer = ask(model, Question(1e-5, f_n, 0.05))
+    assert answer.mean == float(model.predict(1e-5, f_n))
+    assert answer.friction_coefficient == float(model.predict(1e-5, f_n, quantile=0.05))
+    assert (answer.within_domain, answer.warning, answer.version) == (True, None, 1)
+
+
+def test_slower_than_the_samples_is_inside_and_faster_is_not(
+    ask: Callable[..., Any], model: estimators.FrictionModel
+) -> None:
+    low, high = model.domain.tangential_velocity
+    f_n = model.domain.normal_force[1]
+    assert low > 0.0
+    assert ask(model, Question(0.0, f_n, None)).within_domain
+    assert ask(model, Question(high, f_n, None)).within_domain
+    assert not ask(model, Question(1.001 * high, f_n, None)).within_domain
+
+
+@pytest.mark.parametrize("edge", [0, 1])
+def test_forces_beyond_the_samples_are_outside_on_both_sides(
+    ask: Callable[..., Any], model: estimators.FrictionModel, edge: int
+) -> None:
+    bound = model.domain.normal_force[edge]
+    answer = ask(model, Question(0.0, bound * (0.999 if edge == 0 else 1.001), None))
+    assert ask(model, Question(0.0, bound, None)).within_domain
+    assert not answer.within_domain
+    assert "normal force" in answer.warning
+
+
+def test_an_answer_that_is_no_friction_warns(ask: Callable[..., Any], model: estimators.FrictionModel) -> None:
+    answer = ask(replace(model, scale=10.0), Question(0.0, model.domain.normal_force[1], 0.05))
+    assert answer.friction_coefficient < 0.0
+    assert answer.within_domain
+    assert "not above 0" in answer.warning

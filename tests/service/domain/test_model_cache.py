@@ -1,0 +1,107 @@
+"""Models in memory, read by many at once."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from db.database import Database
+from db.errors import NotFound
+from service.domain import model_cache
+from service.domain.model_cache import KnownModel, ModelCache
+
+pytestmark = [
+    pytest.mark.usefixtures("store"),
+    pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True),
+]
+
+
+@pytest.fixture
+def read(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The materials that were read from the database."""
+    names: list[str] = []
+    original = ModelCache.read
+
+    def noting(cache: ModelCache, database: Database, material: str, method: str) -> KnownModel:
+        names.append(material)
+        return original(cache, database, material, method)
+
+    monkeypatch.setattr(ModelCache, "read", noting)
+    return names
+
+
+def test_a_model_is_read_once_for_all_who_ask_at_once(database: Database, read: list[str]) -> None:
+    async def ask(cache: ModelCache) -> None:
+        found = await asyncio.gather(*(cache.get(database, "paper", "ols") for _ in range(20)))
+        assert len(set(map(id, found))) == 1
+
+    asyncio.run(ask(ModelCache(60.0)))
+    assert read == ["paper"]
+    asyncio.run(ask_each(ModelCache(0.0), database))
+    assert len(read) == 1 + 3
+
+
+async def ask_each(cache: ModelCache, database: Database) -> None:
+    await asyncio.gather(*(cache.get(database, "paper", "ols") for _ in range(3)))
+
+
+def test_a_change_that_is_known_of_is_not_missed_by_joining_a_reading_begun_before(
+    database: Database, store: Callable[[], None]
+) -> None:
+    async def run() -> None:
+        cache = ModelCache(60.0)
+        before = asyncio.create_task(cache.get(database, "paper", "ols"))
+        await asyncio.sleep(0)
+        store()
+        cache.seen()
+        assert (await cache.get(database, "paper", "ols")).stored.version == 2
+        await before
+
+    asyncio.run(run())
+
+
+def test_who_asks_all_the_time_never_waits_and_keeps_the_answers(database: Database, read: list[str]) -> None:
+    async def run() -> None:
+        cache = ModelCache(0.4)
+        (await cache.get(database, "paper", "ols")).answers["question"] = "answer"
+        end = time.monotonic() + 1.0
+        while time.monotonic() < end:
+            known = cache.fresh("paper", "ols")
+            assert known is not None
+            assert known.answers == {"question": "answer"}
+            cache.renew(database, known, "paper", "ols")
+            await asyncio.sleep(0.01)
+
+    asyncio.run(run())
+    assert 3 <= len(read) <= 7
+
+
+def test_who_waits_is_told_what_is_wrong_and_a_renewal_is_not(database: Database) -> None:
+    async def run() -> None:
+        cache = ModelCache(60.0)
+        found = await asyncio.gather(*(cache.get(database, "x", "ols") for _ in range(3)), return_exceptions=True)
+        assert [type(each) for each in found] == [NotFound] * 3
+        known = await cache.get(database, "paper", "ols")
+        database.close()
+        cache.renew(database, replace(known, until=0.0), "nothing", "ols")
+        await asyncio.sleep(0.1)
+        assert cache.fresh("paper", "ols") is known
+
+    asyncio.run(run())
+
+
+def test_a_change_counts_once_whenever_it_was(database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(model_cache, "MOST_CHANGES", 3)
+    cache = ModelCache(60.0)
+
+    def forgets(*changes: str) -> bool:
+        cache.read(database, "paper", "ols")
+        assert cache.fresh("paper", "ols") is not None
+        cache.seen(*changes)
+        return cache.fresh("paper", "ols") is None
+
+    assert [forgets("a"), forgets("a"), forgets("b", "a"), forgets("a", "b")] == [True, False, True, False]
+    assert [forgets(), forgets()] == [True, True]
+    assert [forgets("c", "d"), forgets("b", "c", "d"), forgets("a")] == [True, False, True]

@@ -1,0 +1,87 @@
+import math
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import estimators
+import slipcore
+from service.domain import stored_results
+from slipcore import FrictionSamples, GraspLog, SlipHistory
+
+
+@pytest.fixture(scope="module")
+def history(ramp: GraspLog) -> SlipHistory:
+    return slipcore.detect_slip(ramp)
+
+
+@pytest.fixture(scope="module")
+def samples(ramp: GraspLog, history: SlipHistory) -> FrictionSamples:
+    return slipcore.collect_samples(ramp, history)
+
+
+def test_samples_come_back_to_the_last_bit(samples: FrictionSamples, tmp_path: Path) -> None:
+    path = tmp_path / "samples"
+    path.write_bytes(stored_results.encode_samples(samples))
+    found = stored_results.decode_samples(path)
+    assert len(samples) > 0
+    for entry in fields(FrictionSamples):
+        stored, original = getattr(found, entry.name), getattr(samples, entry.name)
+        np.testing.assert_array_equal(stored, original)
+        assert np.asarray(stored).dtype == np.asarray(original).dtype
+
+
+def test_a_history_comes_back_to_the_last_bit(history: SlipHistory, tmp_path: Path) -> None:
+    path = tmp_path / "history"
+    path.write_bytes(stored_results.encode_history(history))
+    found = stored_results.decode_history(path)
+    np.testing.assert_array_equal(found.time, history.time)
+    np.testing.assert_array_equal(found.stick_ratio, history.stick_ratio)
+    for kind in stored_results.EVENT_KINDS:
+        np.testing.assert_array_equal(getattr(found.events, kind).element, getattr(history.events, kind).element)
+        np.testing.assert_array_equal(getattr(found.events, kind).time, getattr(history.events, kind).time)
+
+
+def test_the_same_results_are_the_same_bytes(samples: FrictionSamples, history: SlipHistory) -> None:
+    assert stored_results.encode_samples(samples) == stored_results.encode_samples(samples)
+    assert stored_results.encode_history(history) == stored_results.encode_history(history)
+
+
+def test_a_history_is_summed_up(history: SlipHistory) -> None:
+    found = stored_results.summarise_history(history, 0.25, "0" * 64)
+    assert found.contact_frames == int(history.contact.any(axis=(1, 2)).sum())
+    assert found.stick_ratio_min == np.nanmin(history.stick_ratio)
+    assert found.macro_slip_frames == int(history.macro_slip.sum())
+    assert (found.onsets, found.touches) == (len(history.events.onset), len(history.events.touch))
+    assert (found.method, found.seconds, found.history_blob) == (history.method, 0.25, "0" * 64)
+
+
+def test_a_history_without_contact_has_no_numbers_for_it(history: SlipHistory) -> None:
+    assert stored_results.summarise_history(history, 0.0, "", is_scaled=False).noise is None
+    nothing = replace(history, stick_ratio=np.full(len(history.time), np.nan), noise=math.nan)
+    found = stored_results.summarise_history(nothing, 0.0, "")
+    assert (found.contact_frames, found.stick_ratio_min, found.noise) == (0, None, None)
+
+
+def test_samples_are_summed_up(samples: FrictionSamples) -> None:
+    found = stored_results.summarise_samples(samples, None, "0" * 64)
+    assert found.count == len(samples)
+    assert found.friction_coefficient_mean == samples.friction_coefficient.mean()
+    assert found.tangential_velocity == (samples.tangential_velocity.min(), samples.tangential_velocity.max())
+    assert found.normal_force == (samples.normal_force.min(), samples.normal_force.max())
+
+
+@pytest.mark.parametrize("degrees_of_freedom", [12.5, math.inf])
+def test_a_stored_model_predicts_as_the_fitted_one(samples: FrictionSamples, degrees_of_freedom: float) -> None:
+    fitted = replace(estimators.fit(samples), degrees_of_freedom=degrees_of_freedom)
+    found = stored_results.to_friction_model(stored_results.to_new_model(fitted))
+    v, f_n = 1e-3, 0.05
+    assert found.predict(v, f_n) == fitted.predict(v, f_n)
+    assert found.predict(v, f_n, quantile=0.05) == fitted.predict(v, f_n, quantile=0.05)
+    assert math.isfinite(float(found.predict(v, f_n, quantile=0.05)))
+
+
+def test_diagnostics_that_json_cannot_say_are_left_empty(samples: FrictionSamples) -> None:
+    fitted = replace(estimators.fit(samples), diagnostics={"rhat": math.nan, "why": "short", "n": 3.0})
+    assert stored_results.to_new_model(fitted).diagnostics == {"rhat": None, "why": "short", "n": 3.0}

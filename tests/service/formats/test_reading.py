@@ -1,0 +1,123 @@
+import asyncio
+import os
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from db.errors import StorageUnavailable
+from service import formats
+from service.formats import parquet
+from service.formats.reading import Readers, convert, rewrite
+from slipcore import GraspLog, InvalidInput
+from stiction_client.container import encode
+
+HOSTILE = Path(__file__).parents[2] / "data/hostile"
+TABLE = b"time,marker,x,y\n" + b"".join(
+    b"%d,%d,%d,%d\n" % (k // 900, k % 900, k % 30, k % 900 // 30) for k in range(90_000)
+)
+
+
+def with_readers(seconds: float, do: Callable[[Readers], Awaitable[Any]]) -> Any:
+    async def run() -> Any:
+        readers = Readers(seconds)
+        try:
+            return await do(readers)
+        finally:
+            await readers.stop()
+
+    return asyncio.run(run())
+
+
+def running(readers: Readers) -> list[Any]:
+    return list(dict(getattr(readers._executor, "_processes", None) or {}).values())
+
+
+def test_a_reader_that_dies_takes_only_its_file_with_it(ramp: GraspLog, tmp_path: Path) -> None:
+    source, other, target = (tmp_path / name for name in ("source", "other", "target"))
+    os.mkfifo(source)  # the reader waits for its bytes
+    parquet.write(ramp, other)
+
+    async def lose_one(readers: Readers) -> Any:
+        lost = asyncio.ensure_future(readers.convert(source, target, "tracked markers", {}))
+        waiting = asyncio.ensure_future(readers.convert(other, target, "parquet", {}))
+        while (pipe := opened(source)) is None:
+            await asyncio.sleep(0.01)
+        for process in running(readers):
+            process.kill()
+        with pytest.raises(InvalidInput, match="such that its tracked markers reader died of it"):
+            await lost
+        os.close(pipe)
+        return await waiting
+
+    described = with_readers(60.0, lose_one)
+    assert (described.format, described.frames, described.grid) == ("parquet", len(ramp), ramp.grid)
+    assert target.read_bytes() == encode(ramp)
+
+
+def opened(pipe: Path) -> int | None:
+    """The pipe's other end, once somebody reads it: it has no bytes, and no end."""
+    try:
+        return os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
+    except OSError:
+        return None
+
+
+def test_a_reader_that_was_lost_between_two_files_is_no_fault_of_the_second(ramp: GraspLog, tmp_path: Path) -> None:
+    source, target = tmp_path / "source", tmp_path / "target"
+    parquet.write(ramp, source)
+
+    async def lose_between(readers: Readers) -> Any:
+        await readers.convert(source, target, "parquet", {})
+        for process in running(readers):
+            process.kill()
+            process.join()
+        return await readers.convert(source, target, "parquet", {})
+
+    assert with_readers(60.0, lose_between).frames == len(ramp)
+
+
+def test_a_reader_that_takes_too_long_or_too_much_is_ended(tmp_path: Path) -> None:
+    source, target = tmp_path / "source", tmp_path / "target"
+    source.write_bytes(TABLE)
+
+    async def hurry(readers: Readers) -> None:
+        with pytest.raises(InvalidInput, match=r"file is not read within 0.01 s; allowed: a smaller"):
+            await readers.convert(source, target, "tracked markers", {})
+        assert not running(readers)
+
+    with_readers(0.01, hurry)
+
+
+def test_what_a_reader_refuses_is_told_as_it_is(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_bytes(b"time,marker,x,y\n0,1,2\n")
+
+    async def refuse(readers: Readers) -> None:
+        with pytest.raises(InvalidInput, match="line 2 is of 3 cells"):
+            await readers.convert(source, tmp_path / "target", "tracked markers", {})
+
+    with_readers(60.0, refuse)
+    assert not formats.FORMATS["tracked markers"].plain
+
+
+def test_a_file_that_keeps_its_library_busy_for_ever_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Found by mutation; the C library goes round in it and answers to nothing."""
+    monkeypatch.setattr("service.formats.reading.LEAST_SECONDS", 0.5)
+
+    async def read(readers: Readers) -> None:
+        with pytest.raises(InvalidInput, match=r"file is not read within 0.53 s"):
+            await readers.convert(HOSTILE / "endless-hdf5", tmp_path / "target", "hdf5", {})
+
+    with_readers(60.0, read)
+
+
+@pytest.mark.parametrize("name", ["npz", "parquet", "mcap"])
+def test_a_disk_that_takes_nothing_is_not_the_files_fault(content: bytes, tmp_path: Path, name: str) -> None:
+    source, target = tmp_path / "source", tmp_path / "gone" / "target"
+    source.write_bytes(content)
+    with pytest.raises(StorageUnavailable, match="blob folder: "):
+        convert(source, target, "npz", {}) if name == "npz" else rewrite(source, target, name)

@@ -1,0 +1,85 @@
+import time
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from sqlalchemy import event
+
+from db.database import Database
+from db.paging import Window
+from db.repositories import jobs
+from service.domain import curate, model_cache
+
+PATHS = ("/v1/materials/paper", "/v1/materials/paper/friction?fn=0.05")
+
+
+def version(client: Any) -> int:
+    return int(client.get(PATHS[1]).json()["version"])
+
+
+@pytest.mark.usefixtures("store")
+@pytest.mark.parametrize("path", PATHS)
+def test_what_has_not_changed_is_not_sent_again(reach: Any, path: str, store: Callable[[], None]) -> None:
+    client = reach("open")
+    first = client.get(path)
+    tag = first.headers["etag"]
+    assert first.headers["cache-control"] == "private, no-cache"
+    for sent in (tag, f"W/{tag}", f'"other", {tag}', "*"):
+        again = client.get(path, headers={"If-None-Match": sent})
+        assert (again.status_code, again.content, again.headers["etag"]) == (304, b"", tag)
+    for sent in ('"other"', tag.strip('"'), ""):
+        assert client.get(path, headers={"If-None-Match": sent}).content == first.content
+    store()
+    new = client.get(path, headers={"If-None-Match": tag})
+    assert (new.status_code, new.headers["etag"] == tag) == (200, False)
+
+
+@pytest.mark.usefixtures("store")
+def test_a_tag_stands_for_one_material_and_its_name(reach: Any) -> None:
+    client = reach("open")
+    tag = client.get(PATHS[1]).headers["etag"]
+    client.request("PATCH", PATHS[0], json={"name": "steel"})
+    renamed = client.get(PATHS[1], headers={"If-None-Match": tag})
+    assert renamed.json()["material"] == "steel"
+
+
+@pytest.mark.usefixtures("store")
+def test_a_look_up_asks_the_database_once_in_a_while(
+    reach: Any, database: Database, store: Callable[[], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    client, seen = reach("open", lookup_seconds=60.0), list[str]()
+    event.listen(database.engine, "before_cursor_execute", lambda *given: seen.append(given[2]))
+    assert [version(client) for _ in range(3)] == [1, 1, 1]
+    assert len([statement for statement in seen if "friction_models" in statement]) == 1
+    store()
+    assert version(client) == 1
+    monkeypatch.setattr(model_cache, "time", SimpleNamespace(monotonic=lambda: time.monotonic() + 61.0))
+    assert version(client) == 2
+
+
+@pytest.mark.usefixtures("store")
+@pytest.mark.parametrize("path", ["/v1/jobs/{job}", "/v1/materials/paper", "/v1/materials/paper/fits"])
+def test_who_has_seen_a_new_model_looks_it_up_at_once(
+    reach: Any, database: Database, store: Callable[[], None], path: str
+) -> None:
+    client = reach("open", lookup_seconds=60.0)
+    assert version(client) == 1
+    store()
+    with database.write() as session:
+        job = jobs.list_all(session, Window("created_at", descending=True), "queued")[0].id
+        jobs.cancel(session, job, "ended, however it did")
+    assert version(client) == 1
+    assert client.get(path.format(job=job)).status_code == 200
+    assert version(client) == 2
+
+
+@pytest.mark.usefixtures("store")
+def test_a_name_that_is_freed_or_changed_is_forgotten(reach: Any) -> None:
+    client = reach("open", lookup_seconds=60.0)
+    context = client.app.state.context
+    assert version(client) == 1
+    curate.change(context, "paper", "steel", None)
+    assert client.get(PATHS[1]).json()["material"] == "steel"
+    curate.remove_alias(context, "steel", "paper")
+    assert client.get(PATHS[1]).json()["type"] == "/problems/unknown-material"

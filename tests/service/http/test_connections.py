@@ -1,0 +1,190 @@
+"""Real sockets, since what is tested stands between the network and the application."""
+
+import asyncio
+import json
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+
+import pytest
+import uvicorn
+from starlette.types import Receive, Scope, Send
+
+from service.http import connections
+from service.http.connections import BoundedConnection
+from service.http.envelope import MOST_HEADER_BYTES
+
+PATIENCE = 0.2
+MOST = 60
+Connect = Callable[[], socket.socket]
+
+
+async def hello(scope: Scope, receive: Receive, send: Send) -> None:
+    """Answers when it has the whole body, or early."""
+    assert scope["type"] == "http"
+    while scope["path"] != "/early" and (await receive()).get("more_body"):
+        pass
+    await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"5")]})
+    await send({"type": "http.response.body", "body": b"hello"})
+
+
+@pytest.fixture
+def connect(monkeypatch: pytest.MonkeyPatch) -> Iterator[Connect]:
+    monkeypatch.setattr(connections, "HEADER_SECONDS", PATIENCE)
+    server = uvicorn.Server(
+        uvicorn.Config(
+            hello,
+            port=0,
+            lifespan="off",
+            log_level="critical",
+            http=BoundedConnection,
+            h11_max_incomplete_event_size=MOST_HEADER_BYTES,
+            limit_concurrency=MOST,
+            ws="none",
+        )
+    )
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    while not server.started:
+        time.sleep(0.005)
+    opened: list[socket.socket] = []
+
+    def open_one() -> socket.socket:
+        opened.append(socket.create_connection(server.servers[0].sockets[0].getsockname(), timeout=10.0))
+        return opened[-1]
+
+    yield open_one
+    for each in opened:
+        each.close()
+    server.should_exit = True
+    thread.join()
+
+
+def rest(connection: socket.socket) -> bytes:
+    """Everything until the server closes."""
+    received = b""
+    try:
+        while part := connection.recv(65536):
+            received += part
+    except ConnectionResetError:
+        pass
+    return received
+
+
+@pytest.mark.parametrize("sent", [b"", b"G", b"GET / HTTP/1.1\r\nHost: a\r\n"])
+def test_who_does_not_finish_his_headers_is_let_go(connect: Connect, sent: bytes) -> None:
+    began, connection = time.monotonic(), connect()
+    connection.sendall(sent)
+    assert rest(connection) == b""
+    assert PATIENCE * 0.9 < time.monotonic() - began < 5.0
+
+
+def test_who_goes_on_with_a_body_after_its_answer_is_let_go(connect: Connect) -> None:
+    connection = connect()
+    connection.sendall(b"POST /early HTTP/1.1\r\nHost: a\r\nContent-Length: 1000\r\n\r\n")
+    assert connection.recv(65536).startswith(b"HTTP/1.1 200")
+    began = time.monotonic()
+    connection.sendall(b"x")  # which ends the server's own clock for idle connections
+    rest(connection)
+    assert PATIENCE * 0.9 < time.monotonic() - began < 5.0
+
+
+def test_who_trickles_headers_is_let_go_all_the_same(connect: Connect) -> None:
+    began, connection = time.monotonic(), connect()
+    connection.sendall(b"GET / HTTP/1.1\r\nHost: a\r\n")
+    with suppress(OSError):
+        while time.monotonic() - began < 5.0:
+            connection.sendall(b"X: y\r\n")
+            time.sleep(PATIENCE / 10.0)
+    assert time.monotonic() - began < 3.0
+
+
+def test_many_slow_ones_keep_nobody_waiting_and_are_all_gone_in_the_end(connect: Connect) -> None:
+    slow = [connect() for _ in range(50)]
+    for each in slow:
+        each.sendall(b"POST / HTTP/1.1\r\n")
+    quick = connect()
+    began = time.monotonic()
+    quick.sendall(b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n")
+    assert rest(quick).endswith(b"hello")
+    assert time.monotonic() - began < 2.0
+    assert all(rest(each) == b"" for each in slow)
+
+
+def test_a_request_may_take_its_time_once_its_headers_are_there(connect: Connect) -> None:
+    connection = connect()
+    connection.sendall(b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 2\r\nConnection: close\r\n\r\nx")
+    time.sleep(2.0 * PATIENCE)
+    connection.sendall(b"y")
+    assert rest(connection).endswith(b"hello")
+
+
+def test_the_clock_starts_anew_for_the_next_request_of_a_connection(connect: Connect) -> None:
+    connection = connect()
+    request = b"GET / HTTP/1.1\r\nHost: a\r\n\r\n"
+    for _ in range(2):
+        connection.sendall(request)
+        answer = b""
+        while not answer.endswith(b"hello"):
+            answer += connection.recv(65536)
+        time.sleep(2.0 * PATIENCE)  # idle between requests is what keep-alive is for
+    connection.sendall(request[:10])
+    began = time.monotonic()
+    assert rest(connection) == b""
+    assert time.monotonic() - began < 5.0
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        b"nonsense\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: a\r\nX: " + b"x" * (2 * MOST_HEADER_BYTES),
+        b"GET /\xff HTTP/1.1\r\nHost: a\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: a\r\nX-Request-ID: a\rSet-Cookie: b\r\n\r\n",
+        b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 1\r\nContent-Length: 2\r\n\r\nxx",
+        b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: -1\r\n\r\n",
+        b"POST / HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: gzip, chunked\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n",
+    ],
+    ids=lambda sent: sent[:40].decode(errors="replace"),
+)
+def test_what_is_not_http_is_a_problem_and_ends_the_connection(connect: Connect, sent: bytes) -> None:
+    connection = connect()
+    connection.sendall(sent)
+    head, _, body = rest(connection).partition(b"\r\n\r\n")
+    assert head.startswith((b"HTTP/1.1 400", b"HTTP/1.1 501"))
+    assert b"application/problem+json" in head
+    assert b'"type": "/problems/bad-request"' in body
+
+
+def test_a_socket_is_read_in_large_pieces(connect: Connect, monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes: list[int] = []
+    begin = BoundedConnection.connection_made
+
+    def look(self: BoundedConnection, transport: asyncio.Transport) -> None:
+        begin(self, transport)
+        sizes.append(transport.max_size)  # type: ignore[attr-defined]  # which asyncio reads, and could rename
+
+    monkeypatch.setattr(BoundedConnection, "connection_made", look)
+    connection = connect()
+    connection.sendall(b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n")
+    assert rest(connection).endswith(b"hello")
+    assert sizes == [connections.RECEIVED_BYTES]
+
+
+def test_whoever_comes_when_all_connections_are_taken_is_told_so(connect: Connect) -> None:
+    others = [connect() for _ in range(MOST)]
+    connection = connect()
+    connection.sendall(b"GET /hello HTTP/1.1\r\nHost: a\r\n\r\n")
+    head, _, body = rest(connection).partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.1 503")
+    assert b"retry-after: 1" in head.lower()
+    assert json.loads(body).items() >= {"type": "/problems/too-many-connections", "instance": "/hello"}.items()
+    for other in others:
+        other.close()
+    time.sleep(PATIENCE)
+    again = connect()
+    again.sendall(b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n")
+    assert rest(again).endswith(b"hello")

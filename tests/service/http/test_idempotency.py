@@ -1,0 +1,132 @@
+import multiprocessing
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from datetime import timedelta
+from typing import Any
+
+import httpx
+import pytest
+from sqlalchemy import func, select
+
+from db.blobs import BlobStore
+from db.database import Database
+from db.records import NewGraspLog
+from db.repositories import grasp_logs, jobs, materials
+from db.tables import GraspLogRow, IdempotencyKeyRow, JobRow, MaterialRow
+from service.http.idempotency import Answer, Once, answer_once
+
+Reach = Callable[..., Any]
+NPZ = {"Content-Type": "application/vnd.stiction.grasp-log+npz"}
+
+
+def send(client: Any, path: str, key: str | None = "k", **more: Any) -> httpx.Response:
+    headers = more.pop("headers", {}) | ({"Idempotency-Key": key} if key is not None else {})
+    answer: httpx.Response = client.request("POST", path, headers=headers, **more)
+    return answer
+
+
+def count(database: Database, table: Any) -> int:
+    with database.read() as session:
+        return session.scalar(select(func.count()).select_from(table)) or 0
+
+
+@pytest.fixture
+def client(reach: Reach) -> Any:
+    return reach("open")
+
+
+def test_a_fit_is_queued_once_under_one_key(client: Any, database: Database) -> None:
+    made = send(client, "/v1/materials", json={"name": "paper"})
+    again = send(client, "/v1/materials", json={"name": "paper"})
+    assert (again.status_code, again.content) == (made.status_code, made.content) == (201, made.content)
+    assert again.headers["location"] == "/v1/materials/paper"
+    asked = [send(client, "/v1/materials/paper/fits", "f", json={"seed": 1}) for _ in range(3)]
+    assert {(answer.status_code, answer.content, answer.headers["location"]) for answer in asked} == {
+        (202, asked[0].content, f"/v1/jobs/{asked[0].json()['id']}")
+    }
+    assert count(database, JobRow) == 1
+    send(client, "/v1/materials/paper/fits", None, json={"seed": 1})
+    assert count(database, JobRow) == 2
+
+
+@pytest.mark.parametrize(
+    ("path", "more"),
+    [
+        ("/v1/materials", {"json": {"name": "steel"}}),
+        ("/v1/materials?x=1", {"json": {"name": "paper"}}),
+        ("/v1/materials/paper/fits", {"json": {}}),
+        ("/v1/grasp-logs", {"content": b"no log", "headers": NPZ}),
+    ],
+)
+def test_a_key_stands_for_one_request(client: Any, database: Database, path: str, more: Any, content: bytes) -> None:
+    send(client, "/v1/materials", json={"name": "paper"})
+    if "content" in more:
+        more = more | {"content": content}
+    refused = send(client, path, **more)
+    assert (refused.status_code, refused.json()["type"]) == (422, "/problems/idempotency-key-reused")
+    assert refused.json()["value"] == "k"
+    assert (count(database, MaterialRow), count(database, JobRow), count(database, GraspLogRow)) == (1, 0, 0)
+
+
+def test_what_was_refused_may_be_mended_under_its_key(client: Any, database: Database) -> None:
+    assert send(client, "/v1/materials/paper/fits", json={}).status_code == 404
+    assert count(database, IdempotencyKeyRow) == 0
+    assert send(client, "/v1/materials", json={"name": "paper"}).status_code == 201
+
+
+@pytest.mark.parametrize("key", ["", " ", "a b", "x" * 201, "ü".encode()])
+def test_a_key_that_cannot_be_is_refused_by_name(client: Any, key: Any) -> None:
+    answer = send(client, "/v1/materials", key, json={"name": "paper"})
+    assert (answer.status_code, answer.json()["name"]) == (422, "Idempotency-Key")
+
+
+def test_identical_uploads_at_once_under_one_key_get_one_answer(
+    client: Any, database: Database, content: bytes
+) -> None:
+    together = threading.Barrier(4)
+
+    def upload(_: int) -> httpx.Response:
+        together.wait()
+        return send(client, "/v1/grasp-logs", content=content, headers=NPZ)
+
+    with ThreadPoolExecutor(4) as threads:
+        answers = list(threads.map(upload, range(4)))
+    assert {(answer.status_code, answer.content) for answer in answers} == {(202, answers[0].content)}
+    assert (count(database, GraspLogRow), count(database, JobRow)) == (1, 1)
+    other = send(client, "/v1/grasp-logs?detector=strain_rate", content=content, headers=NPZ)
+    assert other.json()["type"] == "/problems/idempotency-key-reused"
+    assert count(database, GraspLogRow) == 1
+
+
+def store(url: str, together: Any, once: Once | None, answers: Any) -> None:
+    """One process of several that store the same log at once."""
+    with closing(Database(url)) as database:
+        together.wait()
+        with database.write() as session:
+            answers.put(answer_once(session, once, lambda: add(session)))
+
+
+def add(session: Any) -> Answer:
+    log = NewGraspLog("0" * 64, 10, "npz", "filter", materials.find_id(session, "paper"), "sensor", 9, 0.3, (8, 8))
+    log_id = grasp_logs.add(session, log)
+    job = jobs.add(session, "ingest", "ols", material_id=log.material_id, grasp_log_id=log_id)
+    return Answer(202, f"/v1/grasp-logs/{log_id}", {"job": job})
+
+
+def test_processes_that_ask_the_same_at_once_do_it_once(database: Database, blobs: BlobStore) -> None:
+    assert blobs  # the database's folder
+    with database.write() as session:
+        materials.create(session, "paper", "")
+    context = multiprocessing.get_context("fork")
+    together, answers = context.Barrier(3), context.Queue()
+    once = Once("", "k", timedelta(hours=1), "0" * 64)
+    processes = [context.Process(target=store, args=(database.url, together, once, answers)) for _ in range(3)]
+    for process in processes:
+        process.start()
+    given = [answers.get(timeout=60) for _ in processes]
+    for process in processes:
+        process.join()
+    assert given[0] == given[1] == given[2]
+    assert (count(database, GraspLogRow), count(database, JobRow)) == (1, 1)

@@ -1,0 +1,82 @@
+import base64
+import json
+from typing import Any
+
+import pytest
+
+from service.http.paging import Page
+from service.http.problems import Problem
+
+Reach = Any
+ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+
+
+@pytest.fixture
+def client(reach: Reach) -> Any:
+    client = reach("open")
+    for name in "abcde":
+        client.request("POST", "/v1/materials", json={"name": name})
+    return client
+
+
+@pytest.mark.parametrize("sort", ["name", "-name", "created_at", "-created_at"])
+def test_next_leads_through_the_list_by_body_and_by_header(client: Any, sort: str) -> None:
+    path, names = f"/v1/materials?limit=2&sort={sort}", ""
+    while path:
+        answer = client.get(path)
+        assert answer.status_code == 200, answer.text
+        names += "".join(item["name"] for item in answer.json()["items"])
+        if len(names) == 2:
+            client.request("POST", "/v1/materials", json={"name": "0" if sort == "name" else "z"})
+        link, after = answer.links.get("next"), answer.json()["next"]
+        assert (link is None) == (after is None)
+        path = link["url"] if link else ""
+    expected = "edcba" if sort.startswith("-") else "abcde"
+    assert names == {"-name": expected, "created_at": expected + "z"}.get(sort, expected)
+
+
+def encoded(*held: object) -> str:
+    return base64.urlsafe_b64encode(json.dumps(held).encode()).decode()
+
+
+@pytest.mark.parametrize(
+    ("sort", "cursor"),
+    [
+        ("name", "?"),
+        ("name", "ü"),
+        ("name", base64.urlsafe_b64encode(b"\xff").decode()),
+        ("name", encoded("name", "a")),
+        ("name", encoded("-name", "a", 1)),
+        ("name", encoded("name", 1, 1)),
+        ("name", encoded("name", "a\0", 1)),
+        ("name", encoded("name", "a", "1")),
+        ("name", encoded("name", "a", True)),
+        ("name", encoded("name", "a", -1)),
+        ("name", encoded("name", "a", 2**31)),
+        ("created_at", encoded("created_at", "2026-01-01T00:00:00", 1)),
+        ("created_at", encoded("created_at", "yesterday", 1)),
+        ("created_at", encoded("created_at", None, 1)),
+        ("-id", encoded("-id", 1e300, 1)),
+        ("name", base64.urlsafe_b64encode(b"5").decode()),
+        ("name", base64.urlsafe_b64encode(b"[" * 700).decode()),
+    ],
+)
+def test_a_cursor_that_no_answer_gave_is_refused(sort: str, cursor: str) -> None:
+    with pytest.raises(Problem, match=f"cursor is .*; allowed: `next` of an answer sorted by {sort}"):
+        Page(sort, 10, cursor).window()
+
+
+@ONLY_SQLITE
+@pytest.mark.parametrize(
+    ("query", "name"),
+    [
+        ("limit=0", "limit"),
+        ("limit=1001", "limit"),
+        ("sort=colour", "sort"),
+        ("cursor=x", "cursor"),
+        ("search=" + "x" * 101, "search"),
+    ],
+)
+def test_a_wish_that_cannot_be_is_refused_by_name(reach: Reach, query: str, name: str) -> None:
+    answer = reach("open").get(f"/v1/materials?{query}")
+    assert (answer.status_code, answer.json()["name"]) == (422, name)

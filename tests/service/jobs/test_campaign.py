@@ -1,0 +1,116 @@
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from service import formats
+from service.jobs import campaign
+from service.jobs.campaign import Promise
+from service.processes import spawned
+from slipcore.contact import Scene
+from slipcore.errors import InvalidInput
+
+QUICK = Promise()
+
+
+class Here(Executor):
+    """Does what it is told at once, and remembers the seeds."""
+
+    def __init__(self) -> None:
+        self.seeds: list[int] = []
+
+    def submit(self, do: Callable[..., Any], /, *given: Any, **options: Any) -> Future[Any]:
+        self.seeds.append(options["seed"])
+        done: Future[Any] = Future()
+        try:
+            done.set_result(do(*given, **options))
+        except Exception as error:
+            done.set_exception(error)
+        return done
+
+
+def scene(name: str = "A press", friction: float = 0.4, **more: Any) -> Scene:
+    noise = {"kind": "MarkerNoise", "scale": 1e-6}
+    sampling = {"kind": "SensorSampling", "frame_rate": 3.0, "points": [4, 4]}
+    return Scene.from_mapping({"name": name, "friction": friction, "effect": [sampling, noise], **more})
+
+
+def test_each_scene_is_simulated_with_each_seed(tmp_path: Path) -> None:
+    scenes = [scene(), scene("Another: press", friction=0.7)]
+    made = list(campaign.run(Here(), scenes, range(2), tmp_path, QUICK))
+    assert {outcome.path.name for outcome in made} == {
+        "a_press-0.npz", "a_press-1.npz", "another_press-0.npz", "another_press-1.npz",
+    }  # fmt: skip
+    assert not any(outcome.refused for outcome in made)
+    first, second = (formats.read(tmp_path / f"another_press-{seed}.npz") for seed in range(2))
+    assert first.truth is not None
+    assert first.truth.friction.coefficients[0] == 0.7
+    assert not np.array_equal(first.displacement, second.displacement)  # noise of its own
+
+
+def test_what_is_there_is_not_made_again(tmp_path: Path) -> None:
+    list(campaign.run(Here(), [scene()], range(2), tmp_path, QUICK))
+    (tmp_path / "a_press-1.npz").unlink()
+    again = Here()
+    made = list(campaign.run(again, [scene()], range(3), tmp_path, QUICK))
+    assert again.seeds == [1, 2]
+    assert sorted(outcome.seed for outcome in made) == [0, 1, 2]
+
+
+def test_what_is_refused_is_told_and_the_others_go_on(tmp_path: Path) -> None:
+    pull = {"kind": "TangentialLoad", "force": [100.0, 0.0]}
+    bad = Scene.from_mapping({"name": "Too strong", "effect": [pull]})
+    made = {outcome.scene: outcome for outcome in campaign.run(Here(), [bad, scene()], [0], tmp_path, QUICK)}
+    assert "tangential load" in str(made["Too strong"].refused)
+    assert made["A press"].refused is None
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a_press-0.npz", "campaign.json"]
+
+
+def test_what_fails_otherwise_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def die(*_: Any, **__: Any) -> None:
+        raise MemoryError("all of it")
+
+    monkeypatch.setattr(campaign, "simulate", die)
+    (outcome,) = campaign.run(Here(), [scene()], [0], tmp_path, QUICK)
+    assert outcome.refused == "MemoryError: all of it"
+    assert not outcome.path.exists()
+
+
+def test_a_folder_holds_one_campaign(tmp_path: Path) -> None:
+    list(campaign.run(Here(), [scene()], [0], tmp_path, QUICK))
+    with pytest.raises(InvalidInput, match=r"is accuracy 0\.1; allowed: no accuracy, or another folder"):
+        list(campaign.run(Here(), [scene()], [0], tmp_path, Promise(accuracy=0.1)))
+    with pytest.raises(InvalidInput, match="another 'A press' than that in"):
+        list(campaign.run(Here(), [scene(friction=0.5)], [0], tmp_path, QUICK))
+    list(campaign.run(Here(), [scene("More")], [0], tmp_path, QUICK))
+    assert (tmp_path / "more-0.npz").exists()
+
+
+@pytest.mark.parametrize("content", ["", "[1]", '{"scenes": {}}', '{"scenes": 1, "promise": 2}'])
+def test_a_plan_that_is_none_is_refused_and_stays(tmp_path: Path, content: str) -> None:
+    (tmp_path / "campaign.json").write_text(content, encoding="utf-8")
+    with pytest.raises(InvalidInput, match="damaged or of something else"):
+        list(campaign.run(Here(), [scene()], [0], tmp_path, QUICK))
+    assert (tmp_path / "campaign.json").read_text(encoding="utf-8") == content
+
+
+def test_a_process_that_dies_is_told_and_its_log_made_the_next_time(tmp_path: Path) -> None:
+    with campaign.workers(1) as executor:
+        outcomes = campaign.run(executor, [scene()], range(12), tmp_path, QUICK)
+        first = next(outcomes)
+        spawned.kill(executor)
+        made = [first, *outcomes]
+    refused = [outcome for outcome in made if outcome.refused]
+    assert first.refused is None
+    assert "BrokenProcessPool" in {str(outcome.refused).partition(":")[0] for outcome in refused}
+    assert len(list(tmp_path.glob("*.npz"))) == 12 - len(refused)
+    assert not any(outcome.refused for outcome in campaign.run(Here(), [scene()], range(12), tmp_path, QUICK))
+
+
+def test_two_scenes_of_one_file_name_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match="'a_press' twice"):
+        list(campaign.run(Here(), [scene(), scene("a press")], [0], tmp_path, QUICK))
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,290 @@
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from sqlalchemy import select, update
+
+import estimators
+import slipcore
+from db.blobs import BlobStore
+from db.database import Database
+from db.errors import ClaimLost
+from db.records import Claim, Detection, Job, Material, NewGraspLog, StoredGraspLog
+from db.repositories import detections, friction_models, grasp_logs, jobs, materials, runners
+from db.tables import JobRow, SampleSummaryRow
+from estimators import Moments
+from service.domain.stored_results import SAMPLE_ARRAYS, encode_samples, summarise_samples
+from service.jobs import pipeline
+from slipcore import FrictionSamples, GraspLog
+from stiction_client.container import encode
+
+NOTHING_DETECTED = Detection("strain_rate", None, None, 0, 0, 0, 0, 0, 0, 0.1, "0" * 64)
+
+
+class Shop:
+    """The stores, with short words for what the tests do."""
+
+    def __init__(self, database: Database, blobs: BlobStore) -> None:
+        self.database, self.blobs = database, blobs
+        with database.write() as session:
+            self.material_id = materials.create(session, "paper", "").id
+
+    def ingest(self, content: bytes) -> tuple[str, str]:
+        """A stored log of paper with its queued job."""
+        sha256 = self.blobs.put(content)
+        log = NewGraspLog(sha256, len(content), "npz", "strain_rate", self.material_id, "s", 82, 2.7, (8, 8))
+        with self.database.write() as session:
+            log_id = grasp_logs.add(session, log)
+            return log_id, jobs.add(session, "ingest", "ols", material_id=self.material_id, grasp_log_id=log_id)
+
+    def fit(self, method: str = "ols") -> str:
+        with self.database.write() as session:
+            return jobs.add(session, "fit", method, material_id=self.material_id)
+
+    def claim(self, job_id: str) -> Claim:
+        """Give a job to a runner of its own; the one that was at it is dead."""
+        with self.database.write() as session:
+            before = session.scalar(select(JobRow.runner_id).where(JobRow.id == job_id))
+            if before is not None:
+                runners.remove(session, before)
+            made = jobs.claim(session, runners.add(session, "host:1"))
+        assert made is not None
+        assert made.job_id == job_id
+        return made
+
+    def run(self, job_id: str) -> Job:
+        """Have a job done."""
+        pipeline.run_job(self.database, self.blobs, self.claim(job_id))
+        with self.database.read() as session:
+            return jobs.get(session, job_id)
+
+    def log(self, log_id: str) -> StoredGraspLog:
+        with self.database.read() as session:
+            return grasp_logs.get(session, log_id)
+
+    def material(self) -> Material:
+        with self.database.read() as session:
+            return materials.get(session, "paper")
+
+
+@pytest.fixture
+def shop(database: Database, blobs: BlobStore) -> Shop:
+    return Shop(database, blobs)
+
+
+@pytest.fixture
+def calls(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+    """Names of the numerics that were called."""
+    made: list[str] = []
+    for module, name in ((slipcore, "detect_slip"), (slipcore, "collect_samples"), (estimators, "fit")):
+        original: Callable[..., Any] = getattr(module, name)
+
+        def noted(*given: Any, _name: str = name, _original: Callable[..., Any] = original, **options: Any) -> Any:
+            made.append(_name)
+            return _original(*given, **options)
+
+        monkeypatch.setattr(module, name, noted)
+    return made
+
+
+def test_a_log_goes_through_all_stages(shop: Shop, content: bytes, calls: list[str]) -> None:
+    log_id, job_id = shop.ingest(content)
+    job = shop.run(job_id)
+    assert (job.status, job.model_version) == ("done", 1)
+    assert list(job.seconds) == ["frames", "slip_state", "samples", "friction_model", "material"]
+    assert calls == ["detect_slip", "collect_samples", "fit"]
+    found = shop.log(log_id)
+    assert found.samples is not None
+    assert [stored.model.n for stored in shop.material().models] == [found.samples.count]
+
+
+def test_a_job_that_is_done_is_not_done_again(shop: Shop, content: bytes, calls: list[str]) -> None:
+    log_id, job_id = shop.ingest(content)
+    claim = shop.claim(job_id)
+    pipeline.run_job(shop.database, shop.blobs, claim)
+    done = shop.log(log_id)
+    calls.clear()
+    with pytest.raises(ClaimLost):
+        pipeline.run_job(shop.database, shop.blobs, claim)
+    assert shop.log(log_id) == done
+    assert calls == []
+
+
+@pytest.mark.parametrize(
+    ("module", "name"), [(slipcore, "detect_slip"), (slipcore, "collect_samples"), (estimators, "fit")]
+)
+def test_a_worker_whose_job_went_to_another_stores_nothing_more(
+    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch, module: ModuleType, name: str
+) -> None:
+    log_id, job_id = shop.ingest(content)
+    claim = shop.claim(job_id)
+    numerics = getattr(module, name)
+
+    def slow(*given: Any, **options: Any) -> Any:
+        monkeypatch.setattr(module, name, numerics)
+        shop.run(job_id)
+        return numerics(*given, **options)
+
+    monkeypatch.setattr(module, name, slow)
+    with pytest.raises(ClaimLost):
+        pipeline.run_job(shop.database, shop.blobs, claim)
+    assert shop.log(log_id).job.status == "done"
+    assert [stored.version for stored in shop.material().models] == [1]
+
+
+@pytest.mark.parametrize(
+    ("dies_in", "left_to_do"),
+    [
+        ("detections.add", ["detect_slip", "collect_samples", "fit"]),
+        ("friction_models.add", ["fit"]),
+        ("jobs.finish", ["fit"]),
+    ],
+)
+def test_a_job_that_was_interrupted_goes_on_where_it_was(
+    shop: Shop, content: bytes, calls: list[str], monkeypatch: pytest.MonkeyPatch, dies_in: str, left_to_do: list[str]
+) -> None:
+    log_id, job_id = shop.ingest(content)
+
+    def die(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(f"service.jobs.pipeline.{dies_in}", die)
+        with pytest.raises(KeyboardInterrupt):
+            shop.run(job_id)
+    assert shop.material().models == ()
+    calls.clear()
+    job = shop.run(job_id)
+    assert (job.status, job.model_version) == ("done", 1)
+    assert list(job.seconds) == ["frames", "slip_state", "samples", "friction_model", "material"]
+    assert calls == left_to_do
+    assert shop.log(log_id).samples is not None
+
+
+def test_a_model_leaves_no_samples_out_that_came_in_while_it_was_fitted(
+    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else a fit that began earlier and ended later would make an older picture the current one."""
+    log_id, first = shop.ingest(content)
+    fit = estimators.fit
+    grasps = []
+
+    def slow_fit(samples: list[Any], **options: Any) -> estimators.FrictionModel:
+        grasps.append(len(samples))
+        if len(grasps) == 1:
+            monkeypatch.setattr(estimators, "fit", fit)
+            _, second = shop.ingest(content + b"\0")  # a zip may be followed by bytes, so this is other content
+            assert shop.run(second).model_version == 1
+            monkeypatch.setattr(estimators, "fit", slow_fit)
+        return fit(samples, **options)
+
+    monkeypatch.setattr(estimators, "fit", slow_fit)
+    assert shop.run(first).model_version == 2
+    assert grasps == [1, 2]
+    samples = shop.log(log_id).samples
+    assert samples is not None
+    assert [(stored.version, stored.model.n) for stored in shop.material().models] == [(2, 2 * samples.count)]
+
+
+@pytest.mark.parametrize(
+    ("method", "kind"),
+    [("ols", Moments), ("conjugate", Moments), ("bayes", Moments), ("robust", FrictionSamples)],
+)
+def test_a_fit_reads_moments_where_its_method_needs_no_more_one_part_a_grasp(
+    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch, method: str, kind: type
+) -> None:
+    counts = []
+    for suffix in (b"", b"\0"):
+        log_id, job_id = shop.ingest(content + suffix)
+        shop.run(job_id)
+        samples = shop.log(log_id).samples
+        assert samples is not None
+        counts.append(samples.count)
+    seen: list[Moments | FrictionSamples] = []
+    fit = estimators.fit
+
+    def noted(parts: Any, **options: Any) -> estimators.FrictionModel:
+        seen.extend(parts)
+        return fit(parts, **options)
+
+    monkeypatch.setattr(estimators, "fit", noted)
+    if kind is Moments:
+        shop.blobs.sweep(lambda _: set())  # not one sample is read
+    assert shop.run(shop.fit(method)).status == "done"
+    assert [(type(part), part.n if isinstance(part, Moments) else len(part)) for part in seen] == [
+        (kind, count) for count in counts
+    ]
+
+
+def test_moments_that_an_older_version_did_not_store_are_made_up_for(shop: Shop, content: bytes) -> None:
+    for suffix in (b"", b"\0"):
+        shop.run(shop.ingest(content + suffix)[1])
+    with shop.database.write() as session:
+        before = detections.samples_of_material(session, shop.material_id)
+        session.execute(update(SampleSummaryRow).values(moments=None))
+    assert shop.run(shop.fit()).status == "done"
+    with shop.database.read() as session:
+        assert detections.samples_of_material(session, shop.material_id) == before
+        newest, older, _ = friction_models.versions(session, shop.material_id, "ols")
+    assert newest.model.coefficients == older.model.coefficients
+
+
+def test_a_fit_that_logs_overtake_again_and_again_makes_the_others_wait(
+    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shop.run(shop.ingest(content)[1])
+    fit = estimators.fit
+    overtaken: list[int] = []
+
+    def slow_fit(parts: Any, **options: Any) -> estimators.FrictionModel:
+        if len(overtaken) < pipeline.FITS_BESIDE_OTHERS:
+            overtaken.append(len(parts))
+            monkeypatch.setattr(estimators, "fit", fit)
+            shop.run(shop.ingest(content + b"\0" * len(overtaken))[1])
+            monkeypatch.setattr(estimators, "fit", slow_fit)
+        return fit(parts, **options)
+
+    monkeypatch.setattr(estimators, "fit", slow_fit)
+    assert shop.run(shop.fit()).model_version == 2 + pipeline.FITS_BESIDE_OTHERS
+    assert overtaken == [1, 2, 3]
+
+
+def test_too_few_samples_are_refused_with_the_reason(shop: Shop, content: bytes, ramp: GraspLog) -> None:
+    log_id, ingest = shop.ingest(content)
+    samples = slipcore.collect_samples(ramp, slipcore.detect_slip(ramp))
+    two = replace(samples, **{name: getattr(samples, name)[:2] for name in SAMPLE_ARRAYS})
+    summary = summarise_samples(two, None, shop.blobs.put(encode_samples(two)))
+    with shop.database.write() as session:
+        detections.add(session, log_id, NOTHING_DETECTED, summary)
+    job = shop.run(ingest)
+    assert (job.status, job.stage) == ("refused", "friction_model")
+    assert job.reason is not None
+    assert "2" in job.reason
+    assert "allowed" in job.reason
+    assert shop.material().models == ()
+
+
+def test_a_lattice_on_which_no_strain_can_be_told_is_refused_with_the_reason(shop: Shop, ramp: GraspLog) -> None:
+    assert ramp.force is not None
+    row = GraspLog(
+        time=ramp.time,
+        position=ramp.position[:1],
+        displacement=ramp.displacement[:, :1],
+        element_area=ramp.element_area,
+        force=ramp.force[:, :1],
+    )
+    job = shop.run(shop.ingest(encode(row))[1])
+    assert job.status == "refused"
+    assert "position is 1 ×" in (job.reason or "")
+
+
+def test_a_repeated_fit_is_a_version_of_its_own(shop: Shop, content: bytes) -> None:
+    shop.run(shop.ingest(content)[1])
+    assert shop.run(shop.fit()).model_version == 2
+    with shop.database.read() as session:
+        first, second = friction_models.versions(session, shop.material_id, "ols")[::-1]
+    np.testing.assert_array_equal(first.model.coefficients, second.model.coefficients)
+    assert (first.current, second.current) == (False, True)

@@ -1,0 +1,342 @@
+import asyncio
+import time
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from sqlalchemy import text, update
+
+from db.database import Database
+from db.errors import ClaimLost, StorageUnavailable
+from db.records import Claim, Job
+from db.repositories import jobs, materials, runners
+from db.tables import JobRow
+from service.jobs.lanes import WorkerDied
+from service.jobs.runner import LOOKS, JobRunner, Watch
+
+Do = Callable[[Claim], None]
+ATTEMPTS = 3
+LEASE_SECONDS = 0.1
+
+
+class ThreadLane:
+    """A lane whose worker is a thread that does what it is told to."""
+
+    def __init__(self, do: Do) -> None:
+        self._do = do
+        self.hired = 0
+        self.missing = None
+
+    async def hire(self) -> None:
+        self.hired += 1
+
+    async def run(self, claim: Claim) -> None:
+        await asyncio.to_thread(self._do, claim)
+
+    def kill(self) -> None:
+        pass
+
+    async def close(self) -> None:
+        pass
+
+
+@pytest.fixture
+def queued(database: Database) -> list[str]:
+    with database.write() as session:
+        material = materials.create(session, "paper", "")
+        return [jobs.add(session, "fit", "ols", material_id=material.id) for _ in range(4)]
+
+
+@pytest.fixture
+def working(database: Database, monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Let runners ``do`` jobs in threads, while ``meanwhile`` goes on."""
+    monkeypatch.setattr("service.jobs.runner.RETRY_SECONDS", 0.001)
+
+    def run(do: Do, meanwhile: Callable[..., object], workers: int = 2, runners: int = 1, **options: Any) -> None:
+        async def live() -> None:
+            given = {
+                "attempts": ATTEMPTS,
+                "lease_seconds": LEASE_SECONDS,
+                "poll_seconds": 0.01,
+                "shutdown_seconds": 5.0,
+            }
+            all_of_them = [
+                JobRunner(database, [ThreadLane(do) for _ in range(workers)], **given | options) for _ in range(runners)
+            ]
+            for runner in all_of_them:
+                await runner.start()
+            await asyncio.to_thread(meanwhile, *all_of_them)
+            for runner in all_of_them:
+                await runner.stop()
+
+        asyncio.run(live())
+
+    return run
+
+
+def get(database: Database, job_id: str) -> Job:
+    with database.read() as session:
+        return jobs.get(session, job_id)
+
+
+def finish(database: Database, claim: Claim) -> None:
+    with database.write() as session:
+        jobs.finish(session, claim, "done")
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 30.0
+    while not condition():
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.005)
+
+
+def until_finished(database: Database, ids: list[str]) -> Callable[..., None]:
+    return lambda *_: wait_until(lambda: all(get(database, job_id).finished_at for job_id in ids))
+
+
+def test_jobs_are_taken_up_oldest_first(database: Database, queued: list[str], working: Callable[..., None]) -> None:
+    with database.write() as session:
+        jobs.cancel(session, queued[1], "no longer wanted")
+    begun: list[str] = []
+
+    def do(claim: Claim) -> None:
+        begun.append(claim.job_id)
+        finish(database, claim)
+
+    working(do, until_finished(database, queued), workers=1)
+    assert begun == [queued[0], queued[2], queued[3]]
+    assert get(database, queued[1]).status == "cancelled"
+
+
+def test_runners_share_the_jobs_and_each_is_done_once(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    with database.write() as session:
+        material = materials.find_id(session, "paper")
+        ids = queued + [jobs.add(session, "fit", "ols", material_id=material) for _ in range(20)]
+    done: list[Claim] = []
+
+    def do(claim: Claim) -> None:
+        done.append(claim)
+        time.sleep(0.005)
+        finish(database, claim)
+
+    working(do, until_finished(database, ids), runners=2, lease_seconds=10.0)
+    assert sorted(claim.job_id for claim in done) == sorted(ids)
+    assert len({claim.runner_id for claim in done}) == 2
+    with database.read() as session:
+        assert runners.list_all(session) == []
+
+
+def test_a_job_that_is_stored_is_begun_at_once_when_the_runner_is_woken(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    def store(runner: JobRunner) -> None:
+        until_finished(database, queued)(runner)
+        with database.write() as session:
+            extra = jobs.add(session, "fit", "ols", material_id=materials.find_id(session, "paper"))
+        runner.wake()
+        until_finished(database, [extra])(runner)
+
+    working(lambda claim: finish(database, claim), store, poll_seconds=60.0, lease_seconds=600.0)
+
+
+def test_a_job_that_loses_its_worker_is_tried_again_and_then_has_failed(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    poison, unlucky, *fine = queued
+    tries: Counter[str] = Counter()
+
+    def do(claim: Claim) -> None:
+        tries[claim.job_id] += 1
+        if claim.job_id == poison or (claim.job_id == unlucky and tries[claim.job_id] == 1):
+            with database.write() as session:
+                jobs.start_stage(session, claim, "slip_state", {})
+            raise WorkerDied
+        finish(database, claim)
+
+    working(do, until_finished(database, queued))
+    assert tries == {poison: ATTEMPTS, unlucky: 2} | dict.fromkeys(fine, 1)
+    failed = get(database, poison)
+    assert (failed.status, failed.deaths, failed.stage) == ("failed", ATTEMPTS, "slip_state")
+    assert failed.reason == "the worker process died 3 times, at last in stage slip_state"
+    assert (get(database, unlucky).status, get(database, unlucky).deaths) == ("done", 1)
+
+
+def test_a_worker_that_dies_after_the_end_of_its_job_changes_nothing(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    def do(claim: Claim) -> None:
+        finish(database, claim)
+        raise WorkerDied
+
+    working(do, until_finished(database, queued))
+    assert {get(database, job_id).status for job_id in queued} == {"done"}
+    assert {get(database, job_id).deaths for job_id in queued} == {0}
+
+
+def test_a_job_waits_for_storage_without_losing_an_attempt(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    tries: Counter[str] = Counter()
+
+    def do(claim: Claim) -> None:
+        tries[claim.job_id] += 1
+        if tries[claim.job_id] <= ATTEMPTS:
+            raise StorageUnavailable("database is locked")
+        finish(database, claim)
+
+    working(do, until_finished(database, queued))
+    assert set(tries.values()) == {ATTEMPTS + 1}
+    assert {get(database, job_id).deaths for job_id in queued} == {0}
+
+
+def test_a_job_is_not_begun_twice_at_once_by_a_runner_whose_claim_the_database_has_forgotten(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    """As PostgreSQL does in a crash: that a job was claimed waits for no disk."""
+    tries: Counter[str] = Counter()
+    tries_meanwhile = []
+
+    def do(claim: Claim) -> None:
+        tries[claim.job_id] += 1
+        if sum(tries.values()) > 1:
+            finish(database, claim)
+            return
+        with database.write() as session:
+            session.execute(update(JobRow).where(JobRow.id == claim.job_id).values(status="queued", runner_id=None))
+        wait_until(lambda: all(get(database, other).finished_at for other in queued if other != claim.job_id))
+        time.sleep(0.1)
+        tries_meanwhile.append(tries[claim.job_id])
+        with database.write() as session, pytest.raises(ClaimLost):
+            jobs.start_stage(session, claim, "samples", {})
+
+    working(do, until_finished(database, queued))
+    assert tries_meanwhile == [1]
+    assert {get(database, job_id).status for job_id in queued} == {"done"}
+
+
+def test_jobs_of_a_runner_that_is_silent_are_done_by_another_one(
+    database: Database, queued: list[str], working: Callable[..., None], claim: Callable[[], Claim]
+) -> None:
+    dead = [claim(), claim()]
+    done: list[str] = []
+
+    def do(claim: Claim) -> None:
+        done.append(claim.job_id)
+        finish(database, claim)
+
+    working(do, until_finished(database, queued))
+    assert sorted(done) == sorted(queued)
+    assert set(done[-2:]) == {lost.job_id for lost in dead}  # each in a lane, at once
+    assert {get(database, job_id).deaths for job_id in queued} == {0}
+
+
+def test_a_runner_that_was_taken_for_dead_goes_on_under_a_new_name(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    claims: list[Claim] = []
+
+    def do(claim: Claim) -> None:
+        claims.append(claim)
+        if len(claims) == 1:
+            with database.write() as session:
+                assert runners.remove(session, claim.runner_id) == [claim.job_id]
+        else:
+            finish(database, claim)
+
+    working(do, until_finished(database, queued), workers=1)
+    assert len({claim.runner_id for claim in claims}) == 2
+    assert Counter(claim.job_id for claim in claims) == {queued[0]: 2} | dict.fromkeys(queued[1:], 1)
+
+
+def test_stopping_leaves_what_has_not_begun_to_others(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    begun: list[str] = []
+
+    def do(claim: Claim) -> None:
+        begun.append(claim.job_id)
+        time.sleep(0.3)
+        finish(database, claim)
+
+    working(do, lambda _: wait_until(lambda: len(begun) == 2), lease_seconds=10.0)
+    assert sorted(begun) == sorted(queued[:2])
+    assert [get(database, job_id).status for job_id in queued] == ["done", "done", "queued", "queued"]
+
+
+def test_a_job_that_does_not_end_in_time_is_left_to_others_by_a_stopping_runner(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    begun: list[str] = []
+
+    def do(claim: Claim) -> None:
+        begun.append(claim.job_id)
+        time.sleep(0.3)
+
+    working(do, lambda _: wait_until(lambda: len(begun) == 1), workers=1, shutdown_seconds=0.05)
+    assert {get(database, job_id).status for job_id in queued} == {"queued"}
+    assert {get(database, job_id).deaths for job_id in queued} == {0}
+
+
+def test_a_lane_outlives_what_a_job_throws_at_it(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    def do(claim: Claim) -> None:
+        if claim.job_id == queued[0]:
+            raise RuntimeError("database disk image is malformed")
+        finish(database, claim)
+
+    working(do, until_finished(database, queued), workers=1)
+    assert [get(database, job_id).status for job_id in queued] == ["failed", "done", "done", "done"]
+    assert "malformed" in (get(database, queued[0]).reason or "")
+
+
+def test_a_runner_takes_no_jobs_of_a_newer_schema_and_says_so(
+    database: Database, queued: list[str], working: Callable[..., None]
+) -> None:
+    with database.write() as session:
+        session.execute(text("UPDATE alembic_version SET version_num = '9999'"))
+    said: list[str | None] = []
+
+    def note(*runners: JobRunner) -> None:
+        wait_until(lambda: all("newer" in (runner.missing or "") for runner in runners))
+        said.extend(runner.missing for runner in runners)
+
+    working(lambda claim: finish(database, claim), note)
+    working(lambda claim: finish(database, claim), note, workers=0)  # a server without workers
+    assert [reason and "run a newer version" in reason for reason in said] == [True, True]
+    assert {get(database, job_id).status for job_id in queued} == {"queued"}
+
+
+def test_a_runner_is_dead_once_its_beats_stand_still() -> None:
+    watch = Watch(LOOKS)
+    for look in range(LOOKS):
+        assert watch.look({"dead": 7, "alive": look, "slow": look // 2}) == []
+    assert watch.look({"dead": 7, "alive": LOOKS, "slow": LOOKS // 2}) == ["dead"]
+    assert watch.look({"alive": 9, "new": 0}) == []
+    assert watch.look({"dead": 7}) == []  # seen anew
+
+
+def test_a_job_that_lost_its_worker_does_not_wait_for_the_next_one(
+    database: Database, queued: list[str], working: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A Dask scheduler may be away for long."""
+    lost: list[ThreadLane] = []
+
+    async def hire(lane: ThreadLane) -> None:
+        while lane in lost:
+            await asyncio.sleep(0.01)
+
+    async def run(lane: ThreadLane, claim: Claim) -> None:
+        if not lost:
+            lost.append(lane)
+            raise WorkerDied
+        await asyncio.to_thread(finish, database, claim)
+
+    monkeypatch.setattr(ThreadLane, "hire", hire)
+    monkeypatch.setattr(ThreadLane, "run", run)
+    working(finish, until_finished(database, queued), lease_seconds=10.0)
+    assert sorted(get(database, job_id).deaths for job_id in queued) == [0, 0, 0, 1]

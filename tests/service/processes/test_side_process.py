@@ -1,0 +1,64 @@
+"""Calls to the process beside the server."""
+
+import asyncio
+import os
+import time
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+
+import pytest
+
+from service.processes.side_process import ProcessEnded, SideProcess
+
+
+@asynccontextmanager
+async def running() -> AsyncIterator[SideProcess]:
+    process = await SideProcess.start()
+    yield process
+    await process.stop()
+
+
+def with_process(body: Callable[[SideProcess], Awaitable[None]]) -> None:
+    async def run() -> None:
+        async with running() as process:
+            await body(process)
+
+    asyncio.run(run())
+
+
+def test_calls_are_answered_in_their_order_with_results_or_errors() -> None:
+    async def body(process: SideProcess) -> None:
+        found = await asyncio.gather(
+            process.call(os.getpid),
+            process.call(int, "x"),
+            process.call(len, bytes(3_000_000)),
+            process.call(bytes, 3_000_000),
+            return_exceptions=True,
+        )
+        assert found[0] != os.getpid()
+        assert isinstance(found[1], ValueError)
+        assert found[2:] == [3_000_000, bytes(3_000_000)]
+
+    with_process(body)
+
+
+def test_who_waits_no_longer_takes_nobody_elses_answer() -> None:
+    async def body(process: SideProcess) -> None:
+        first, second = (asyncio.create_task(process.call(len, "x" * k)) for k in (1, 2))
+        await asyncio.sleep(0)
+        first.cancel()
+        assert await second == 2
+
+    with_process(body)
+
+
+def test_a_process_that_ends_is_told_to_all_who_wait_and_who_come_later() -> None:
+    async def body(process: SideProcess) -> None:
+        answers = [process.call(time.sleep, 0.0), process.call(os._exit, 1), process.call(time.sleep, 0.0)]
+        first, *lost = await asyncio.gather(*answers, return_exceptions=True)
+        assert first is None
+        assert [type(each) for each in lost] == [ProcessEnded, ProcessEnded]
+        with pytest.raises(ProcessEnded):
+            await process.call(os.getpid)
+
+    with_process(body)

@@ -1,0 +1,232 @@
+"""The live stream over a real server."""
+
+import asyncio
+import json
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import httpx
+import msgspec
+import numpy as np
+import pytest
+import uvicorn
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+
+from db import migrate
+from db.database import Database
+from db.repositories import access_keys
+from service.http import access
+from service.http.serving import configuration
+from service.settings import Settings
+from service.stream import connection as stream
+from slipcore import GraspLog, detect_slip
+from stiction_client.errors import ConnectionFailed
+from stiction_client.stream import SlipStream
+
+
+class Served:
+    """A server with live streams, its address and its application."""
+
+    def __init__(self, folder: Path, **settings: Any) -> None:
+        self.config = configuration(Settings(data_folder=folder, port=0, **settings), log_level="warning")
+        self.server = uvicorn.Server(self.config)
+        self.thread = threading.Thread(target=self.server.run)
+        self.thread.start()
+        while not self.server.started:
+            assert self.thread.is_alive()
+            time.sleep(0.005)
+        self.url = f"http://127.0.0.1:{self.server.servers[0].sockets[0].getsockname()[1]}"
+
+    def stop(self) -> None:
+        self.server.should_exit = True
+        self.thread.join()
+
+    @property
+    def streams(self) -> Any:
+        application: Any = self.config.loaded_app
+        while not hasattr(application, "state"):
+            application = application.app
+        return application.state.context.streams
+
+    def connect(self, headers: dict[str, str] | None = None) -> ClientConnection:
+        return connect(f"{self.url.replace('http', 'ws')}/v1/stream", compression=None, additional_headers=headers)
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    served = Served(tmp_path_factory.mktemp("streams"))
+    yield served
+    served.stop()
+
+
+def opening(log: GraspLog, **said: Any) -> dict[str, Any]:
+    position = log.position.tolist()
+    return {"type": "open", "position": position, "grid": log.grid, "element_area": log.element_area} | said
+
+
+def ask(socket: ClientConnection, message: dict[str, Any]) -> dict[str, Any]:
+    """One message in JSON, and its answer."""
+    socket.send(json.dumps(message))
+    answer: dict[str, Any] = json.loads(socket.recv(30.0))
+    return answer
+
+
+def frame(log: GraspLog, k: int, **changes: Any) -> dict[str, Any]:
+    found = {"type": "frame", "number": k, "time": log.time[k], "displacement": log.displacement[k].tolist()}
+    return found | {"force": log.force[k].tolist()} | changes  # type: ignore[index]
+
+
+def parts(log: GraspLog, k: int) -> list[np.ndarray | None]:
+    arrays = (log.displacement, log.force, log.object_pose, log.normal)
+    return [None if array is None else array[k] for array in arrays]
+
+
+def test_the_streams_answers_are_the_batchs(served: Served, ramp: GraspLog, wait: Any) -> None:
+    history = detect_slip(ramp)
+    with httpx.Client(base_url=served.url) as client:
+        client.post("/v1/materials", json={"name": "streamed"}).raise_for_status()
+        with SlipStream(served.url, ramp.position, ramp.element_area, material="streamed", keep=True) as live:
+            for k, time_ in enumerate(ramp.time):
+                live.send(time_, *parts(ramp, k))
+                if k % 10 == 9:
+                    answers = list(live.answers())
+                    assert [answer["number"] for answer in answers] == list(range(k - 9, k + 1))
+                    for answer in answers:
+                        assert answer["slip"] == np.flatnonzero(history.slip[answer["number"]]).tolist()
+            log = live.finish(store=True)
+        assert log is not None
+        assert (log["format"], log["frames"], log["material"]) == ("stream", len(ramp), "streamed")
+        assert wait(client, log["job"]["id"])["status"] == "done"
+        assert client.get("/v1/materials/streamed").json()["models"]["ols"]["n"] > 0
+
+
+def test_json_is_for_trials_and_a_wrong_frame_is_answered_by_name(served: Served, ramp: GraspLog) -> None:
+    with served.connect() as socket:
+        assert ask(socket, opening(ramp))["next"] == 0
+        assert ask(socket, frame(ramp, 0))["stick_ratio"] is None
+        wrong = ask(socket, frame(ramp, 1, displacement=[[1, 2]]))
+        assert (wrong["type"], wrong["number"], wrong["name"]) == ("error", 1, "displacement")
+        late = ask(socket, frame(ramp, 2, time=-1.0))
+        assert (late["type"], late["name"]) == ("error", "time")
+        assert ask(socket, frame(ramp, 3))["type"] == "state"
+        assert ask(socket, {"type": "finish"}) == {"type": "finished", "grasp_log": None}
+
+
+def test_a_session_goes_on_after_a_reconnect(served: Served, ramp: GraspLog) -> None:
+    history = detect_slip(ramp)
+    live = SlipStream(served.url, ramp.position, ramp.element_area)
+    numbers, slip = [], []
+    for k, time_ in enumerate(ramp.time):
+        live.send(time_, *parts(ramp, k))
+        if k in (20, 45):
+            live._connection.socket.close()  # no farewell, and a frame that was not answered
+            time.sleep(0.2)
+        answer = live.receive() if k not in (20, 45) else None
+        if answer:
+            numbers.append(answer["number"])
+            slip.append(answer["slip"])
+    for answer in live.answers():
+        numbers.append(answer["number"])
+        slip.append(answer["slip"])
+    live.finish()
+    assert numbers == list(range(len(ramp)))
+    assert slip == [np.flatnonzero(each).tolist() for each in history.slip]
+
+
+@pytest.mark.parametrize(
+    ("message", "code", "reason"),
+    [
+        (b"\xc1", 1003, ""),
+        ('{"type": "frame"}', 1003, "missing required field"),
+        ('{"type": "resume", "session": "x"}', 4404, "no such session"),
+        ('{"type": "finish"}', 1003, "must be of type open or resume"),
+        ({"grid": [0, 1]}, 4422, "grid is [0, 1]"),
+        ({"grid": [100, 100]}, 4422, "1 to 4096 markers"),
+        ({"element_area": 1.0}, 4422, "element_area is 1 m²"),
+        ({"material": "nothing"}, 4422, "no material 'nothing'"),
+        ({"detector": "guess"}, 4422, "detector is guess"),
+    ],
+)
+def test_what_cannot_be_is_closed_with_a_reason(
+    served: Served, ramp: GraspLog, message: Any, code: int, reason: str
+) -> None:
+    with served.connect() as socket:
+        socket.send(json.dumps(opening(ramp, **message)) if isinstance(message, dict) else message)
+        with pytest.raises(ConnectionClosed) as closed:
+            socket.recv(30.0)
+    assert closed.value.rcvd is not None
+    assert closed.value.rcvd.code == code
+    assert reason in closed.value.rcvd.reason
+
+
+def test_a_reader_that_does_not_read_is_dropped(
+    served: Served, ramp: GraspLog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def stuck(_: Any) -> None:
+        await asyncio.sleep(3600.0)
+
+    monkeypatch.setattr(stream._Connection, "_write", stuck)
+    with served.connect() as socket:
+        ask(socket, opening(ramp))
+        with pytest.raises(ConnectionClosed) as closed:
+            send_all(socket, [frame(ramp, k % len(ramp), number=k) for k in range(1000)])
+    assert closed.value.rcvd is not None
+    assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (4408, "64 answers wait to be read")
+
+
+def send_all(socket: ClientConnection, frames: list[dict[str, Any]]) -> None:
+    for each in frames:
+        socket.send(json.dumps(each))
+        time.sleep(0.002)
+
+
+def test_a_session_is_told_that_its_detector_is_lost(served: Served, ramp: GraspLog) -> None:
+    live = SlipStream(served.url, ramp.position, ramp.element_area)
+    live.step(ramp.time[0], ramp.displacement[0])
+    os.kill(served.streams._process._process.pid, signal.SIGKILL)
+    with pytest.raises(ConnectionFailed, match=r"detector's process ended; open a new session \(1011\)"):
+        [live.step(ramp.time[k], ramp.displacement[k]) for k in range(1, 20)]
+    with SlipStream(served.url, ramp.position, ramp.element_area) as again:
+        assert again.step(ramp.time[0], ramp.displacement[0])["type"] == "state"
+
+
+def test_a_session_belongs_to_one_connection_at_a_time(served: Served, ramp: GraspLog) -> None:
+    with served.connect() as first, served.connect() as second:
+        session = ask(first, opening(ramp))["session"]
+        second.send(msgspec.json.encode({"type": "resume", "session": session}).decode())
+        with pytest.raises(ConnectionClosed, match="has a connection already"):
+            second.recv(30.0)
+
+
+def test_a_service_that_is_not_there_is_named(ramp: GraspLog) -> None:
+    with pytest.raises(ConnectionFailed, match=r"ws://127\.0\.0\.1:9/v1/stream: "):
+        SlipStream("http://127.0.0.1:9", ramp.position, ramp.element_area)
+
+
+def test_a_stream_needs_a_key_that_may_upload(ramp: GraspLog, tmp_path: Path) -> None:
+    url, log = f"sqlite:///{tmp_path / 'stiction.sqlite3'}", ramp
+    with closing(Database(url)) as database:
+        migrate.upgrade(database)
+        keys = {}
+        for scope in ("read", "upload"):
+            key_id, keys[scope] = access.new_key()
+            with database.write() as session:
+                access_keys.add(session, key_id, scope, scope, access.digest(keys[scope]))
+    served = Served(tmp_path, access="keys")
+    try:
+        for key in (None, "nonsense", keys["read"]):
+            with pytest.raises(ConnectionFailed, match=r"HTTP 40[13]"):
+                SlipStream(served.url, log.position, log.element_area, key=key)
+        with served.connect({"Authorization": f"Bearer {keys['upload']}"}) as socket:
+            socket.send('{"type": "finish"}')
+            with pytest.raises(ConnectionClosed, match="must be of type open or resume"):  # it was let in
+                socket.recv(30.0)
+    finally:
+        served.stop()
