@@ -93,7 +93,8 @@ def test_an_upload_is_one_trace_from_its_request_to_its_model(
 
 def test_without_a_collector_nothing_is_imported_for_one() -> None:
     """Neither by the server nor by its workers."""
-    code = "import sys; from service import app; from service.jobs import pipeline; from service.observability import traces; app.create_app(); traces.start()"
+    code = "import sys; from service import app; from service.jobs import pipeline; "
+    code += "from service.observability import traces; app.create_app(); traces.start()"
     code += "; print([name for name in sys.modules if name.startswith(('opentelemetry.sdk', 'opentelemetry.exp'))])"
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout == "[]\n"
