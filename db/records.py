@@ -3,11 +3,31 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
-from typing import Literal
+from typing import Any, Literal
 
 JobKind = Literal["ingest", "fit"]
 JobStatus = Literal["queued", "running", "done", "failed", "refused", "cancelled"]
 Scope = Literal["read", "upload", "admin"]
+AuditAction = Literal[
+    "material.created",
+    "material.changed",
+    "material.merged",
+    "alias.added",
+    "alias.removed",
+    "owner.added",
+    "owner.removed",
+    "grasp_log.uploaded",
+    "grasp_log.withdrawn",
+    "grasp_log.restored",
+    "fit.requested",
+    "job.cancelled",
+    "key.created",
+    "key.revoked",
+    "uploads.deleted",
+    "audit.deleted",
+    "blob.damaged",
+]
+"""What is recorded of changes: the kind of thing, and what was done to it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,3 +237,36 @@ class AccessKey:
     sha256: str = field(repr=False)
     created_at: datetime
     revoked_at: datetime | None
+
+
+@dataclass(frozen=True, slots=True)
+class Actor:
+    """Who makes a change: ``key:ID``, ``anybody`` where no key is asked for, ``command:USER`` or ``service``.
+
+    ``address`` is the network address, ``request_id`` the request's, where there is one.
+    """
+
+    name: str
+    address: str | None = None
+    request_id: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AuditEntry:
+    """That ``actor`` did ``action`` to ``subject``: a name of a material, or the id of a log, a job or a key."""
+
+    id: int
+    at: datetime
+    actor: Actor
+    action: AuditAction
+    subject: str
+    details: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class AuditFilter:
+    """Which entries are wanted; None: whatever they have there."""
+
+    actor: str | None = None
+    action: str | None = None
+    subject: str | None = None

@@ -16,6 +16,7 @@ from db.paging import Window
 from db.records import Claim, Detection, NewGraspLog, NewModel, SampleSummary
 from db.repositories import (
     access_keys,
+    audit,
     detections,
     friction_models,
     grasp_logs,
@@ -40,6 +41,7 @@ def fill(database: Database, log: NewGraspLog, detection: Detection, samples: Sa
         friction_models.add(session, material.id, job, model)
         idempotency_keys.claim(session, "", "once", log.sha256, timedelta(hours=1))
         access_keys.add(session, "0" * 12, "robot", "read", log.sha256)
+        audit.add(session, audit.SERVICE, "material.created", "paper")
         assert jobs.claim(session, runners.add(session, "host:1")) == Claim(job, runners.list_all(session)[0].id)
 
 

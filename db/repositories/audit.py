@@ -1,0 +1,49 @@
+"""The audit trail: entries are added in the transaction of the change that they tell of, and never changed."""
+
+from collections.abc import Mapping
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import delete, func, select
+from sqlalchemy.orm import Session
+
+from db.paging import Window, windowed
+from db.records import Actor, AuditAction, AuditEntry, AuditFilter
+from db.tables import AuditEntryRow
+
+SERVICE = Actor("service")
+"""Who does what nobody asked for: retention, and what a check of the stored files finds."""
+
+
+def add(
+    session: Session, actor: Actor, action: AuditAction, subject: str, details: Mapping[str, Any] | None = None
+) -> None:
+    """Record a change of this transaction; ``details`` is what JSON can hold."""
+    where = {"address": actor.address, "request_id": actor.request_id}
+    session.add(AuditEntryRow(actor=actor.name, action=action, subject=subject, details=dict(details or {}), **where))
+
+
+def list_all(session: Session, window: Window, wanted: AuditFilter) -> list[AuditEntry]:
+    """Entries by ``id``, which is their order."""
+    query = select(AuditEntryRow)
+    for name in ("actor", "action", "subject"):
+        if (value := getattr(wanted, name)) is not None:
+            query = query.where(getattr(AuditEntryRow, name) == value)
+    return [
+        _record(row) for row in session.scalars(windowed(query, window, {"id": AuditEntryRow.id}, AuditEntryRow.id))
+    ]
+
+
+def delete_before(session: Session, moment: datetime) -> int:
+    """Delete the entries from before a moment, at least 30 days ago, and record that; returns how many."""
+    old = AuditEntryRow.at < moment
+    count = int(session.scalar(select(func.count()).where(old)) or 0)
+    if count:
+        session.execute(delete(AuditEntryRow).where(old))
+        add(session, SERVICE, "audit.deleted", "audit", {"before": moment.isoformat(), "entries": count})
+    return count
+
+
+def _record(row: AuditEntryRow) -> AuditEntry:
+    actor = Actor(row.actor, row.address, row.request_id)
+    return AuditEntry(row.id, row.at, actor, row.action, row.subject, row.details)  # type: ignore[arg-type]
