@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 
 import estimators
 from benchmarks.estimators import SIGMA, TRUTH, Row, heteroscedastic, make, outliers, with_friction
-from estimators import ols
+from estimators.methods import ols
 from slipcore.samples import FrictionSamples
 
 N, ELEMENTS, GRASPS = 400, 20, 8

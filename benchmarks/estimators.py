@@ -34,12 +34,12 @@ from scipy import stats
 
 import estimators
 from benchmarks.nist import digits_table
-from estimators.bayes import LIKELIHOODS
-from estimators.conjugate import NormalInverseGamma, exact_posterior
-from estimators.ensemble import IndependenceMove, VectorisedSampler
-from estimators.evidence import gather
 from estimators.likelihoods.gaussian import gaussian
-from estimators.sampling import Chain, autocorrelation_time, sample
+from estimators.linear.fit_data import gather
+from estimators.linear.normal_inverse_gamma import NormalInverseGamma, exact_posterior
+from estimators.methods.bayes import LIKELIHOODS
+from estimators.sampling.chain import Chain, autocorrelation_time, sample
+from estimators.sampling.ensemble import IndependenceMove, VectorisedSampler
 from slipcore.samples import FrictionSamples
 
 TRUTH, SIGMA, AREA = np.array([0.4, 2.0, -0.8]), 0.02, 1e-6

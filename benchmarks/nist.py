@@ -8,7 +8,7 @@ import mpmath
 import numpy as np
 import scipy.linalg
 
-from estimators.least_squares import factorise, solve
+from estimators.linear.least_squares import factorise, solve
 
 FOLDER = Path(__file__).parents[2] / "shared" / "data" / "strd"
 DEGREE = {"filip": 10, "norris": 1, "pontius": 2} | {f"wampler{k}": 5 for k in range(1, 6)}

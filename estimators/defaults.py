@@ -55,7 +55,7 @@ class Prior:
 
 
 @dataclass(frozen=True, slots=True)
-class Sampling:
+class ChainSettings:
     """How a posterior is sampled, and when the sampling stops."""
 
     walkers: tuple[int, int] = (16, 440)
@@ -119,7 +119,7 @@ RECOGNITION = Recognition()
 REFERENCE = Reference()
 IDENTIFIABILITY = Identifiability()
 PRIOR = Prior()
-SAMPLING = Sampling()
+SAMPLING = ChainSettings()
 MIN_SAMPLES = 4
 """Three coefficients and a scatter need four samples."""
 

@@ -1,10 +1,5 @@
 """The exceptions of estimators: one small tree."""
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from estimators.friction_model import FrictionModel
-
 
 class EstimatorError(Exception):
     """Whatever an estimator refuses to do."""
@@ -23,14 +18,3 @@ class InvalidSamples(EstimatorError, ValueError):
 
 class TooFewSamples(InvalidSamples):
     """Not enough (distinct) samples to fit the model: no slip was seen, or hardly any."""
-
-
-class NotConverged(EstimatorError):
-    """An iteration or a chain stopped before it could be trusted; ``model`` carries what it had reached."""
-
-    def __init__(self, reason: str, model: "FrictionModel") -> None:
-        self.reason, self.model = reason, model
-        super().__init__(reason, model)
-
-    def __str__(self) -> str:
-        return f"not converged: {self.reason}"

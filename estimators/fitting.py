@@ -1,17 +1,11 @@
 """The one entrance: samples in, friction model out."""
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from estimators import conjugate, ols, robust
 from estimators.errors import InvalidSamples
-from estimators.evidence import Evidence, gather
 from estimators.friction_model import FrictionModel
-
-if TYPE_CHECKING:
-    from estimators.moments import Moments
-    from slipcore.samples import FrictionSamples
+from estimators.linear.fit_data import FitData, GraspData, gather
+from estimators.methods import conjugate, ols, robust
 
 METHODS = ("ols", "robust", "conjugate", "bayes", "auto")
 
@@ -26,7 +20,7 @@ def needs_samples(method: str, grasps: int) -> bool:
 
 
 def fit(
-    samples: "FrictionSamples | Moments | Sequence[FrictionSamples] | Sequence[Moments]",
+    samples: GraspData,
     method: str = "ols",
     accuracy: float | None = None,
     seconds: float | None = None,
@@ -56,18 +50,18 @@ def fit(
             raise InvalidSamples(name, value, "above 0")
     if likelihood is not None and method != "bayes":
         raise InvalidSamples("likelihood", likelihood, f'none with method "{method}", only with "bayes"')
-    evidence = gather(samples)
+    data = gather(samples)
     if method != "auto":
-        return _fit(evidence, method, accuracy, seconds, seed, likelihood, loss)
-    from estimators.automatic import choose
+        return _fit(data, method, accuracy, seconds, seed, likelihood, loss)
+    from estimators.methods.automatic import choose
 
-    choice = choose(evidence)
-    model = _fit(evidence, choice.method, accuracy, seconds, seed, choice.likelihood, loss)
+    choice = choose(data)
+    model = _fit(data, choice.method, accuracy, seconds, seed, choice.likelihood, loss)
     return replace(model, diagnostics={**model.diagnostics, "chosen_because": choice.reason})
 
 
 def _fit(
-    evidence: Evidence,
+    data: FitData,
     method: str,
     accuracy: float | None,
     seconds: float | None,
@@ -76,11 +70,11 @@ def _fit(
     loss: str,
 ) -> FrictionModel:
     if method == "ols":
-        return ols.fit(evidence)
+        return ols.fit(data)
     if method == "robust":
-        return robust.fit(evidence, loss, seed)
+        return robust.fit(data, loss, seed)
     if method == "conjugate":
-        return conjugate.fit(evidence)
-    from estimators import bayes  # emcee takes a second to load
+        return conjugate.fit(data)
+    from estimators.methods import bayes  # emcee takes a second to load
 
-    return bayes.fit(evidence, likelihood, accuracy, seconds, seed)
+    return bayes.fit(data, likelihood, accuracy, seconds, seed)

@@ -1,5 +1,6 @@
 """Friction as it is learnt, and whether the surface has changed: moments that fade, and a sequential test."""
 
+import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,15 +40,21 @@ class ChangeDetector:
             raise InvalidSamples("reset_after", self.reset_after, "at least 1")
 
     @property
-    def evidence(self) -> float:
-        """How many times likelier the deviations are under some constant shift than under none."""
+    def e_value(self) -> float:
+        """How many times likelier the deviations are under some constant shift than under none, mixed over λ."""
         precision = 1.0 / self.spread**2 + self.count
         return float(np.exp(min(0.5 * self.total**2 / precision - 0.5 * np.log(precision * self.spread**2), 700.0)))
 
     @property
+    def evidence(self) -> float:
+        """The e-value by its former name; deprecated."""
+        warnings.warn("ChangeDetector.evidence is now e_value", DeprecationWarning, stacklevel=2)
+        return self.e_value
+
+    @property
     def changed(self) -> bool:
-        """Whether the evidence has passed 1/``alarm``."""
-        return self.evidence >= 1.0 / self.alarm
+        """Whether the e-value has reached 1/``alarm``."""
+        return self.e_value >= 1.0 / self.alarm
 
     def step(self, tangential_velocity: float, normal_force: float, friction_coefficient: float) -> "ChangeDetector":
         """The detector after one more sample; once it has seen a change it stays so until ``restart``."""

@@ -1,7 +1,6 @@
 """Which material is this: by the exact predictive likelihood of a grasp's samples under each model."""
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,13 +8,9 @@ from scipy import special
 
 from estimators.defaults import RECOGNITION, REFERENCE
 from estimators.errors import InvalidSamples
-from estimators.evidence import Evidence, gather
 from estimators.friction_model import FrictionModel
-from estimators.least_squares import upper_triangle, whole_triangle
-
-if TYPE_CHECKING:
-    from estimators.moments import Moments
-    from slipcore.samples import FrictionSamples
+from estimators.linear.fit_data import FitData, GraspData, gather
+from estimators.linear.least_squares import upper_triangle, whole_triangle
 
 FloatArray = NDArray[np.float64]
 
@@ -23,7 +18,7 @@ UNKNOWN = "unknown"
 
 
 def recognise(
-    samples: "FrictionSamples | Moments | Sequence[FrictionSamples] | Sequence[Moments]",
+    samples: GraspData,
     materials: Mapping[str, FrictionModel],
     prior: Mapping[str, float] | None = None,
     unknown: float = RECOGNITION.unknown,
@@ -41,9 +36,9 @@ def recognise(
         raise InvalidSamples("materials", sorted(materials), f'at least one, none of them called "{UNKNOWN}"')
     if not 0.0 <= unknown < 1.0:
         raise InvalidSamples("unknown", unknown, "at least 0 and below 1")
-    evidence, belief = gather(samples), _belief(materials, prior)
-    log = {name: belief[name] + np.log1p(-unknown) + _of_material(evidence, materials[name]) for name in materials}
-    log[UNKNOWN] = (np.log(unknown) if unknown > 0.0 else -np.inf) + _of_unknown(evidence)
+    data, belief = gather(samples), _belief(materials, prior)
+    log = {name: belief[name] + np.log1p(-unknown) + _of_material(data, materials[name]) for name in materials}
+    log[UNKNOWN] = (np.log(unknown) if unknown > 0.0 else -np.inf) + _of_unknown(data)
     probability = special.softmax(np.array(list(log.values())))
     return dict(zip(log, map(float, probability), strict=True))
 
@@ -79,23 +74,23 @@ def _belief(materials: Mapping[str, FrictionModel], prior: Mapping[str, float] |
     return {name: float(np.log(value / total)) for name, value in weight.items()}
 
 
-def _of_material(evidence: Evidence, model: FrictionModel) -> float:
-    triangle = whole_triangle(evidence.factor).astype(float)
-    triangle[:, 2] *= model.element_area / evidence.element_area  # the same pressure on an element of the model's area
+def _of_material(data: FitData, model: FrictionModel) -> float:
+    triangle = whole_triangle(data.factor).astype(float)
+    triangle[:, 2] *= model.element_area / data.element_area  # the same pressure on an element of the model's area
     covariance, scale = model.covariance.copy(), model.scale
     if model.draws is not None and model.diagnostics.get("likelihood") == "grasp_effects":
         scale = float(np.sqrt(np.mean(model.draws[:, 3] ** 2)))
         covariance[0, 0] += float(np.mean(model.draws[:, 4] ** 2))
     freedom = model.n - 3.0 if model.scatter_degrees_of_freedom is None else model.scatter_degrees_of_freedom
-    floor = 1e-6 * max(abs(float(evidence.mean_friction)), 1e-6)  # a model without scatter still meets rounded data
-    return log_predictive(triangle, evidence.effective_n, model.coefficients, covariance, max(scale, floor), freedom)
+    floor = 1e-6 * max(abs(float(data.mean_friction)), 1e-6)  # a model without scatter still meets rounded data
+    return log_predictive(triangle, data.effective_n, model.coefficients, covariance, max(scale, floor), freedom)
 
 
-def _of_unknown(evidence: Evidence) -> float:
-    spans = np.concatenate([[1.0], REFERENCE.spans(evidence.element_area)])
+def _of_unknown(data: FitData) -> float:
+    spans = np.concatenate([[1.0], REFERENCE.spans(data.element_area)])
     return log_predictive(
-        whole_triangle(evidence.factor).astype(float),
-        evidence.effective_n,
+        whole_triangle(data.factor).astype(float),
+        data.effective_n,
         np.array([REFERENCE.friction, 0.0, 0.0]),
         np.diag((np.array([RECOGNITION.level, RECOGNITION.slope, RECOGNITION.slope]) / spans) ** 2),
         REFERENCE.scatter,

@@ -13,7 +13,7 @@ def warm_up() -> float:
     began = time.perf_counter()
     import statsmodels.regression.linear_model  # noqa: F401
 
-    import estimators.ensemble  # noqa: F401
+    import estimators.sampling.ensemble  # noqa: F401
     from estimators.likelihoods import kernels
 
     beta, one, column = np.zeros((1, 3)), np.ones(1), np.ones(3)

@@ -54,6 +54,20 @@ def test_estimators_know_only_the_samples_of_slipcore() -> None:
         assert all(name.startswith("slipcore.samples") for name in modules), path
 
 
+ESTIMATOR_ROOMS = ("linear", "sampling", "likelihoods", "methods")
+"""From the ground up: each may import those before it."""
+
+
+def test_the_rooms_of_estimators_import_one_way() -> None:
+    for position, room in enumerate(ESTIMATOR_ROOMS):
+        above = tuple(f"estimators.{other}" for other in (*ESTIMATOR_ROOMS[position + 1 :], "fitting", "moments"))
+        files = sorted((ROOT / "estimators" / room).glob("*.py"))
+        assert files
+        for path in files:
+            upward = {name for name in imported_modules(path) if name.startswith(above)}
+            assert not upward, f"{path.relative_to(ROOT)} imports {sorted(upward)}"
+
+
 def test_nothing_but_the_service_knows_a_web_framework() -> None:
     for package in ("slipcore", "estimators", "db", "migrations"):
         for path in (ROOT / package).rglob("*.py"):

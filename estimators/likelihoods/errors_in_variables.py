@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.errors import InvalidSamples
-from estimators.evidence import Evidence
 from estimators.likelihoods.kernels import sum_log_normal
 from estimators.likelihoods.per_sample import PerSample, Rows, per_sample
 from estimators.likelihoods.posterior import bounded_exp
-from estimators.priors import log_half_student
+from estimators.linear.fit_data import FitData
+from estimators.linear.priors import log_half_student
 
 FloatArray = NDArray[np.float64]
 
@@ -70,9 +70,9 @@ class ErrorsInVariables:
         return otherwise if natural.size else 1.0
 
 
-def errors_in_variables(evidence: Evidence) -> PerSample:
+def errors_in_variables(data: FitData) -> PerSample:
     """Posterior of (β, σ, force noise)."""
-    observations = evidence.raw("bayes, errors_in_variables")
+    observations = data.raw("bayes, errors_in_variables")
     f_n, weight = observations.normal_force, observations.weight
     mean = float(np.average(f_n, weights=weight))
     variance = float(np.average((f_n - mean) ** 2, weights=weight))
@@ -88,4 +88,4 @@ def errors_in_variables(evidence: Evidence) -> PerSample:
         noise_scale=scale,
         prior=f"noise of a force component ~ half-Student-t with scale {scale:.3g} N",
     )
-    return per_sample(evidence, terms, "errors_in_variables")
+    return per_sample(data, terms, "errors_in_variables")

@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.conjugate import NormalInverseGamma, exact_posterior
 from estimators.defaults import PRIOR, REFERENCE, SAMPLING
-from estimators.evidence import Evidence
-from estimators.least_squares import whole_triangle
 from estimators.likelihoods.posterior import Summary, Whitening, bounded_exp, corners, supported
-from estimators.priors import positive_friction, prior_rows
-from estimators.proposal import Proposal, standard
+from estimators.linear.fit_data import FitData
+from estimators.linear.least_squares import whole_triangle
+from estimators.linear.normal_inverse_gamma import NormalInverseGamma, exact_posterior
+from estimators.linear.priors import positive_friction, prior_rows
+from estimators.sampling.proposal import StudentMixture, standard
 
 FloatArray = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ class Gaussian:
     sampled: tuple[str, ...] = NAMES
     names: tuple[str, ...] = NAMES
     prior: str = positive_friction()
-    proposal: Proposal = field(default_factory=lambda: standard(4))
+    proposal: StudentMixture = field(default_factory=lambda: standard(4))
     local: float = 0.0
 
     def log_probability(self, whitened: FloatArray) -> FloatArray:
@@ -67,15 +67,15 @@ class Gaussian:
         return self.exact.mean + sigma[:, None] * (whitened[:, :3] @ self.exact.root.T), sigma
 
 
-def gaussian(evidence: Evidence) -> Gaussian:
+def gaussian(data: FitData) -> Gaussian:
     """Posterior from the factor alone."""
-    triangle, prior = whole_triangle(evidence.factor), prior_rows(evidence.element_area)
-    exact = exact_posterior(evidence)
+    triangle, prior = whole_triangle(data.factor), prior_rows(data.element_area)
+    exact = exact_posterior(data)
     centre, spread = exact.log_scale()
     return Gaussian(
         exact=exact,
         log_sigma=Whitening(np.array([centre]), np.array([[spread]])),
         rows=np.concatenate([prior, triangle.astype(float)]),
-        effective_n=evidence.effective_n,
-        corners=corners(evidence.domain),
+        effective_n=data.effective_n,
+        corners=corners(data.domain),
     )

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from estimators.conjugate import NormalInverseGamma, exact_posterior
 from estimators.defaults import PRIOR, REFERENCE, SAMPLING
-from estimators.evidence import Evidence
 from estimators.likelihoods.posterior import Summary, bounded_exp, scatter
-from estimators.normal_score import NormalScore, normal_score
-from estimators.priors import grasp_effect, log_half_student, prior_rows
-from estimators.proposal import Proposal, standard
+from estimators.linear.fit_data import FitData
+from estimators.linear.normal_inverse_gamma import NormalInverseGamma, exact_posterior
+from estimators.linear.priors import grasp_effect, log_half_student, prior_rows
+from estimators.sampling.normal_score import NormalScore, normal_score
+from estimators.sampling.proposal import StudentMixture, standard
 
 FloatArray = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class GraspEffects:
     sampled: tuple[str, ...] = ("log_sigma", "log_tau")
     names: tuple[str, ...] = ("beta0", "beta1", "beta2", "sigma", "tau")
     prior: str = grasp_effect()
-    proposal: Proposal = field(default_factory=lambda: standard(2))
+    proposal: StudentMixture = field(default_factory=lambda: standard(2))
     local: float = 0.0
 
     def log_probability(self, whitened: FloatArray) -> FloatArray:
@@ -117,16 +117,16 @@ class GraspEffects:
         return np.asarray(log + log_half_student(bounded_exp(log_tau), REFERENCE.scatter) + log_tau)
 
 
-def grasp_effects(evidence: Evidence) -> GraspEffects:
+def grasp_effects(data: FitData) -> GraspEffects:
     """Posterior from each cluster's weight and mean, and the spread within clusters."""
-    prior, pooled, means = prior_rows(evidence.element_area), exact_posterior(evidence), evidence.cluster_means()
+    prior, pooled, means = prior_rows(data.element_area), exact_posterior(data), data.cluster_means()
     fixed = _rows(np.concatenate([prior, means.within]), pooled)
     between = _rows(np.column_stack([np.ones(len(means.weight)), means.mean]), pooled)
     effects = GraspEffects(
         weight=means.weight,
         between=means.weight[:, None, None] * between[:, :, None] * between[:, None, :],
         fixed=fixed.T @ fixed,
-        effective_n=evidence.effective_n,
+        effective_n=data.effective_n,
         pooled=pooled,
         score=NormalScore(np.array([-1.0, 1.0]), np.array([-1.0, 1.0])),
     )

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.evidence import Evidence
 from estimators.likelihoods.kernels import sum_log_mixture
 from estimators.likelihoods.per_sample import PerSample, Rows, per_sample
 from estimators.likelihoods.posterior import bounded_exp
+from estimators.linear.fit_data import FitData
 
 FloatArray = NDArray[np.float64]
 
@@ -67,6 +67,6 @@ class Outlier:
         return otherwise if natural.size else 1.0
 
 
-def outlier(evidence: Evidence) -> PerSample:
+def outlier(data: FitData) -> PerSample:
     """Posterior of (β, σ, π, scatter and offset of outliers)."""
-    return per_sample(evidence, Outlier(), "outlier")
+    return per_sample(data, Outlier(), "outlier")

@@ -6,15 +6,16 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators import robust
-from estimators.conjugate import exact_posterior
 from estimators.defaults import PRIOR, REFERENCE, SAMPLING
 from estimators.errors import InvalidSamples
-from estimators.evidence import Evidence
-from estimators.laplace import laplace, refine
 from estimators.likelihoods.posterior import Summary, Whitening, corners, scatter, supported
-from estimators.priors import positive_friction, prior_rows
-from estimators.proposal import Fit, Proposal, adapted, standard
+from estimators.linear.fit_data import FitData
+from estimators.linear.m_estimate import LOSSES, m_estimate
+from estimators.linear.normal_inverse_gamma import exact_posterior
+from estimators.linear.priors import positive_friction, prior_rows
+from estimators.sampling.adaptation import Fit, adapted
+from estimators.sampling.laplace import laplace, refine
+from estimators.sampling.proposal import StudentMixture, standard
 
 FloatArray = NDArray[np.float64]
 
@@ -81,7 +82,7 @@ class PerSample:
     centre: FloatArray
     root: FloatArray
     whitening: Whitening
-    proposal: Proposal
+    proposal: StudentMixture
     local: float
 
     @property
@@ -140,22 +141,22 @@ class PerSample:
         return np.asarray(-(3.0 + PRIOR.degrees_of_freedom) * np.log(sigma) - 0.5 * square / sigma**2)
 
 
-def per_sample(evidence: Evidence, terms: Terms, name: str) -> PerSample:
+def per_sample(data: FitData, terms: Terms, name: str) -> PerSample:
     """Posterior around the robust fit, whose plane and scale no outlier moves far."""
-    observations = evidence.raw(f"bayes, {name}")
-    start = robust.fit(evidence, loss="tukey")
+    observations = data.raw(f"bayes, {name}")
+    start = m_estimate(data, observations, LOSSES["tukey"])
     forces = observations.normal_force, observations.friction, observations.tangential_force
     columns = (observations.tangential_velocity, *forces, observations.weight)
-    scale = float(np.hypot(start.scale, REFERENCE.scatter * np.sqrt(PRIOR.degrees_of_freedom / evidence.effective_n)))
+    scale = float(np.hypot(start.scale, REFERENCE.scatter * np.sqrt(PRIOR.degrees_of_freedom / data.effective_n)))
     initial, spread = terms.start(scale)
     posterior = PerSample(
         terms=terms,
         rows=Rows(*(np.require(column, requirements=["C", "W"]) for column in columns)),  # else kernels compile anew
-        prior_rows=prior_rows(evidence.element_area),
-        corners=corners(evidence.domain),
-        effective_n=evidence.effective_n,
-        centre=_possible(start.coefficients, evidence),
-        root=scale * exact_posterior(evidence).root,
+        prior_rows=prior_rows(data.element_area),
+        corners=corners(data.domain),
+        effective_n=data.effective_n,
+        centre=_possible(start.linear.coefficients.astype(float), data),
+        root=scale * exact_posterior(data).root,
         whitening=Whitening(np.concatenate([np.zeros(3), initial]), np.diag(np.concatenate([np.ones(3), spread]))),
         proposal=standard(3 + len(initial)),
         local=SAMPLING.local,
@@ -165,9 +166,9 @@ def per_sample(evidence: Evidence, terms: Terms, name: str) -> PerSample:
     return _proposing(_rewhitened(posterior, 1))
 
 
-def _possible(plane: FloatArray, evidence: Evidence) -> FloatArray:
+def _possible(plane: FloatArray, data: FitData) -> FloatArray:
     """The plane, or a level one where it is not above 0 over the data's domain; raises ``InvalidSamples`` for none."""
-    at = corners(evidence.domain)
+    at = corners(data.domain)
     if (at @ plane > 0.0).all():
         return plane
     middle = float(at.mean(axis=0) @ plane)

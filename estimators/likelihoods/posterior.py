@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.friction_model import Domain
-from estimators.proposal import Proposal
+from estimators.sampling.proposal import StudentMixture
 
 FloatArray = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ class Posterior(Protocol):
         ...
 
     @property
-    def proposal(self) -> Proposal:
+    def proposal(self) -> StudentMixture:
         """What its independence sampling proposes."""
         ...
 

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from estimators.evidence import Evidence
 from estimators.likelihoods.kernels import sum_log1p_square
 from estimators.likelihoods.per_sample import PerSample, Rows, per_sample
 from estimators.likelihoods.posterior import bounded_exp
+from estimators.linear.fit_data import FitData
 
 FloatArray = NDArray[np.float64]
 
@@ -48,6 +48,6 @@ class StudentT:
         return min(float(1.0 / np.mean(1.0 / natural[:, 1])), otherwise)
 
 
-def student_t(evidence: Evidence) -> PerSample:
+def student_t(data: FitData) -> PerSample:
     """Posterior of (β, σ, ν)."""
-    return per_sample(evidence, StudentT(), "student_t")
+    return per_sample(data, StudentT(), "student_t")

@@ -9,7 +9,7 @@ import pytest
 import estimators
 from estimators import Domain, Moments
 from estimators.defaults import REFERENCE
-from estimators.least_squares import factorise, solve
+from estimators.linear.least_squares import factorise, solve
 from slipcore.samples import FrictionSamples
 
 Make = Callable[..., FrictionSamples]

@@ -49,11 +49,11 @@ def test_a_late_change_is_not_buried_under_a_quiet_past(samples: Make) -> None:
     assert watch(fresh, late) < (watch(buried, late) or len(late) + 1)
 
 
-def test_evidence_is_the_mixture_of_likelihood_ratios(samples: Make) -> None:
+def test_the_e_value_is_the_mixture_of_likelihood_ratios(samples: Make) -> None:
     detector = ChangeDetector(estimators.fit(samples(100)), spread=0.7, total=3.0, count=8)
     shifts = np.linspace(-8.0, 8.0, 200_001)
     ratio = np.exp(shifts * 3.0 - 4.0 * shifts**2) * stats.norm(0.0, 0.7).pdf(shifts)
-    np.testing.assert_allclose(detector.evidence, np.trapezoid(ratio, shifts), rtol=1e-6)
+    np.testing.assert_allclose(detector.e_value, np.trapezoid(ratio, shifts), rtol=1e-6)
 
 
 def test_once_seen_a_change_stays_until_restarted(samples: Make) -> None:
@@ -73,3 +73,9 @@ def test_settings_out_of_range_are_refused(samples: Make, options: dict[str, flo
 def test_a_sample_that_is_no_number_is_refused(samples: Make) -> None:
     with pytest.raises(estimators.InvalidSamples, match="sample"):
         ChangeDetector(estimators.fit(samples(50))).step(1e-3, 0.05, float("nan"))
+
+
+def test_the_former_name_of_the_e_value_still_works(samples: Make) -> None:
+    detector = ChangeDetector(estimators.fit(samples())).step(2e-3, 0.1, 0.5)
+    with pytest.warns(DeprecationWarning, match="e_value"):
+        assert detector.evidence == detector.e_value

@@ -1,0 +1,158 @@
+"""What the data say, in the form that every method reads: a factor, its clusters and, where kept, the samples."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.defaults import MIN_SAMPLES
+from estimators.errors import InvalidSamples, TooFewSamples
+from estimators.friction_model import Domain
+from estimators.linear.least_squares import Factor, factorise, upper_triangle
+from estimators.linear.observations import Observations, observe
+from estimators.linear.statistics import SufficientStatistics
+
+if TYPE_CHECKING:
+    from slipcore.samples import FrictionSamples
+
+FloatArray = NDArray[np.float64]
+GraspData: TypeAlias = (
+    "FrictionSamples | SufficientStatistics | Sequence[FrictionSamples] | Sequence[SufficientStatistics]"
+)
+"""Samples or moments of one grasp, or of several."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FitData:
+    """Data behind a fit: ``factor`` of (v, f_n, μ) whose weight is the effective number of samples.
+
+    ``clusters``: how many groups of samples share errors, of ``cluster_kind``; ``observations``: the samples, or None
+    where only moments are known; ``blocks``: the moments, one a grasp, where they came so.
+    """
+
+    factor: Factor
+    n: int
+    domain: Domain
+    element_area: float
+    clusters: int
+    cluster_kind: str
+    observations: Observations | None
+    blocks: tuple[SufficientStatistics, ...]
+
+    @property
+    def effective_n(self) -> float:
+        """Effective number of samples (Kish)."""
+        return self.factor.weight
+
+    @property
+    def mean_friction(self) -> float:
+        """Weighted mean of μ."""
+        return float(self.factor.mean[-1])
+
+    def centred_rows(self) -> FloatArray:
+        """Four rows a grasp, [g, 4, 4], in (1, v, f_n, μ) about the common mean, with all its sums of squares."""
+        whole = self.blocks[0].merge(*self.blocks[1:])
+        rows = np.zeros((len(self.blocks), 4, 4))
+        for row, block in zip(rows, self.blocks, strict=True):
+            part = relative(block.factor, whole)
+            row[0] = np.sqrt(part.weight) * np.array([1.0, *(part.mean - self.factor.mean)], dtype=float)
+            row[1:, 1:] = part.triangle
+        return rows
+
+    def cluster_means(self) -> "ClusterMeans":
+        """Weight and mean of each cluster, and the spread within clusters."""
+        if self.observations is None:
+            return _means_of_blocks(self)
+        return _means_of_samples(self.observations)
+
+    def raw(self, method: str) -> Observations:
+        """The samples; raises ``InvalidSamples`` where there are moments only."""
+        if self.observations is None:
+            raise InvalidSamples("samples", "moments only", f'the samples themselves, which "{method}" needs')
+        return self.observations
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ClusterMeans:
+    """``weight`` [g] and ``mean`` [g, 3] of (v, f_n, μ) in each cluster, and the spread about those means.
+
+    ``within`` [3, 4]: rows in (1, v, f_n | μ) with all the sums of squares and products about the clusters' means.
+    """
+
+    weight: FloatArray
+    mean: FloatArray
+    within: FloatArray
+
+
+def gather(
+    samples: GraspData,
+) -> FitData:
+    """What a fit reads, from samples or moments of one grasp or of several; raises what ``observe`` raises."""
+    parts = list(samples) if isinstance(samples, Sequence) else [samples]
+    moments = [part for part in parts if isinstance(part, SufficientStatistics)]
+    if not moments:
+        return _from_samples(observe(cast("list[FrictionSamples]", parts)))
+    if len(moments) < len(parts):
+        raise InvalidSamples("samples", "a mixture of samples and moments", "one kind")
+    return _from_moments(moments)
+
+
+def _from_samples(observations: Observations) -> FitData:
+    v, f_n = observations.tangential_velocity, observations.normal_force
+    return FitData(
+        factor=factorise(observations.columns(), observations.weight),
+        n=len(observations),
+        domain=Domain((float(v.min()), float(v.max())), (float(f_n.min()), float(f_n.max()))),
+        element_area=observations.element_area,
+        clusters=observations.clusters,
+        cluster_kind=observations.cluster_kind,
+        observations=observations,
+        blocks=(),
+    )
+
+
+def _from_moments(moments: list[SufficientStatistics]) -> FitData:
+    whole = moments[0].merge(*moments[1:])
+    if whole.n < MIN_SAMPLES or whole.effective_n <= MIN_SAMPLES - 1:
+        value = f"{whole.n}, worth {whole.effective_n:.3g} by their weights"
+        raise TooFewSamples("samples", value, f"at least {MIN_SAMPLES}")
+    blocks = tuple(part for part in moments if part.n)
+    return FitData(
+        factor=relative(whole.factor, whole),
+        n=whole.n,
+        domain=whole.domain,
+        element_area=whole.element_area,
+        clusters=len(blocks),
+        cluster_kind="grasp" if len(blocks) > 1 else "none",
+        observations=None,
+        blocks=blocks,
+    )
+
+
+def relative(factor: Factor, whole: SufficientStatistics) -> Factor:
+    """A factor with its weights in units that make those of ``whole`` sum to their effective number."""
+    unit = whole.factor.weight / whole.weight_square
+    return Factor(factor.weight * unit, factor.mean, factor.triangle * np.sqrt(unit))
+
+
+def _means_of_samples(observations: Observations) -> ClusterMeans:
+    columns, cluster = observations.columns(), observations.cluster
+    weight = np.bincount(cluster, observations.weight).astype(float)
+    sums = [np.bincount(cluster, observations.weight * column) for column in columns.T]
+    mean = np.stack(sums, axis=1) / weight[:, None]
+    inside = factorise(columns - mean[cluster], observations.weight, intercept=False)
+    return ClusterMeans(weight, mean, _without_constant(inside.triangle))
+
+
+def _means_of_blocks(data: FitData) -> ClusterMeans:
+    whole = data.blocks[0].merge(*data.blocks[1:])
+    parts = [relative(block.factor, whole) for block in data.blocks]
+    inside = upper_triangle(np.concatenate([part.triangle for part in parts]))
+    weight, mean = np.array([part.weight for part in parts]), np.array([part.mean for part in parts], dtype=float)
+    return ClusterMeans(weight, mean, _without_constant(inside))
+
+
+def _without_constant(triangle: NDArray[np.floating]) -> FloatArray:
+    return np.column_stack([np.zeros(len(triangle)), triangle.astype(float)])

@@ -1,0 +1,139 @@
+"""Mergeable sufficient statistics of the linear Gaussian model: all of a grasp's samples that its fit needs."""
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from estimators.errors import InvalidSamples
+from estimators.friction_model import Domain
+from estimators.linear.least_squares import Factor, factorise, merge
+from estimators.linear.observations import check_columns, common_element_area, positive
+
+if TYPE_CHECKING:
+    from slipcore.samples import FrictionSamples
+
+MAGIC = b"SMo1"
+UPPER = np.triu_indices(3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SufficientStatistics:
+    """Weighted mean and triangular factor (QR) of (v, f_n, μ) about it; XᵀX is never formed.
+
+    ``factor`` carries Σw; ``weight_square`` is Σw², so that the effective number of samples survives a merge; ``n``
+    counts samples of positive weight; ``domain`` is the range of v and f_n; ``element_area`` in m².
+    """
+
+    factor: Factor
+    weight_square: float
+    n: int
+    domain: Domain
+    element_area: float
+
+    @classmethod
+    def from_samples(cls, samples: "FrictionSamples") -> Self:
+        """Moments of one grasp's samples, none of them allowed; raises ``InvalidSamples`` as ``fit`` does."""
+        area = common_element_area([samples.element_area])
+        columns = check_columns([samples])
+        used = positive(columns["weight"])
+        v, f_n, mu, weight = (
+            columns[name][used] for name in ("tangential_velocity", "normal_force", "friction_coefficient", "weight")
+        )
+        if len(weight) == 0:
+            return cls.empty(area)
+        domain = Domain((float(v.min()), float(v.max())), (float(f_n.min()), float(f_n.max())))
+        factor = factorise(np.stack([v, f_n, mu]).T, weight)
+        return cls(factor, float(weight @ weight), len(weight), domain, area)
+
+    @classmethod
+    def empty(cls, element_area: float) -> Self:
+        """Moments of no samples: merging them changes nothing."""
+        nothing = (np.inf, -np.inf)
+        return cls(Factor(0.0, np.zeros(3), np.zeros((3, 3))), 0.0, 0, Domain(nothing, nothing), element_area)
+
+    @property
+    def effective_n(self) -> float:
+        """Effective number of samples (Σw)²/Σw² (Kish); 0 where there are none."""
+        return self.factor.weight**2 / self.weight_square if self.weight_square > 0.0 else 0.0
+
+    def at_element_area(self, element_area: float) -> Self:
+        """The same pressures on elements of another area, m²: the column of f_n scales, exactly but for rounding."""
+        if element_area == self.element_area:
+            return self
+        scale = np.array([1.0, element_area / self.element_area, 1.0])
+        factor = Factor(self.factor.weight, self.factor.mean * scale, self.factor.triangle * scale)
+        low, high = self.domain.normal_force
+        domain = Domain(self.domain.tangential_velocity, (low * scale[1], high * scale[1]))
+        return replace(self, factor=factor, domain=domain, element_area=element_area)
+
+    def merge(self, *others: Self) -> Self:
+        """Moments of all samples behind these; any order and any grouping agree to rounding."""
+        area = common_element_area([part.element_area for part in (self, *others)])
+        parts = [part.at_element_area(area) for part in (self, *others)]
+        return type(self)(
+            merge(part.factor for part in parts),
+            sum(part.weight_square for part in parts),
+            sum(part.n for part in parts),
+            union([part.domain for part in parts]),
+            area,
+        )
+
+    def add(
+        self, tangential_velocity: float, normal_force: float, friction_coefficient: float, weight: float = 1.0
+    ) -> Self:
+        """Moments with one more sample, at a cost that does not depend on those before."""
+        row = np.array([tangential_velocity, normal_force, friction_coefficient])
+        _check_sample(row, weight)
+        v, f_n = float(tangential_velocity), float(normal_force)
+        factor = Factor(float(weight), row, np.zeros((3, 3)))
+        return self.merge(type(self)(factor, weight**2, 1, Domain((v, v), (f_n, f_n)), self.element_area))
+
+    def forget(self, factor: float) -> Self:
+        """Moments with every weight multiplied by ``factor`` in (0, 1]: exponential, if done at each sample."""
+        if not 0.0 < factor <= 1.0:
+            raise InvalidSamples("factor", factor, "above 0 and at most 1")
+        kept = self.factor
+        faded = Factor(kept.weight * factor, kept.mean, kept.triangle * np.sqrt(factor))
+        return replace(self, factor=faded, weight_square=self.weight_square * factor**2)
+
+    def to_bytes(self) -> bytes:
+        """These moments in 140 bytes, little-endian doubles."""
+        numbers = [self.n, self.factor.weight, self.weight_square, self.element_area, *self.factor.mean]
+        numbers += [*self.domain.tangential_velocity, *self.domain.normal_force, *self.factor.triangle[UPPER]]
+        return MAGIC + struct.pack("<17d", *(float(number) for number in numbers))
+
+    @classmethod
+    def from_bytes(cls, content: bytes) -> Self:
+        """Moments from ``to_bytes``; raises ``InvalidSamples`` for anything else."""
+        if content[:4] != MAGIC or len(content) != 4 + 17 * 8:
+            raise InvalidSamples("moments", f"{len(content)} bytes from {content[:4]!r}", "140 bytes made by to_bytes")
+        n, weight, square, area, *rest = struct.unpack("<17d", content[4:])
+        triangle = np.zeros((3, 3))
+        triangle[UPPER] = rest[7:]
+        if not (np.isfinite([n, weight, square, area, *rest[:3], *rest[7:]]).all() and weight >= 0.0 and n >= 0.0):
+            raise InvalidSamples(
+                "moments", "not finite or negative", "finite numbers, counts and weights of at least 0"
+            )
+        factor = Factor(weight, np.array(rest[:3]), triangle)
+        return cls(factor, square, int(n), Domain((rest[3], rest[4]), (rest[5], rest[6])), area)
+
+
+def union(domains: Sequence[Domain]) -> Domain:
+    """The smallest domain that holds all of them."""
+    v = np.array([domain.tangential_velocity for domain in domains])
+    f_n = np.array([domain.normal_force for domain in domains])
+    return Domain(
+        (float(v[:, 0].min()), float(v[:, 1].max())),
+        (float(f_n[:, 0].min()), float(f_n[:, 1].max())),
+    )
+
+
+def _check_sample(row: np.ndarray, weight: float) -> None:
+    for name, value in zip(("tangential_velocity", "normal_force", "friction_coefficient"), row, strict=True):
+        if not np.isfinite(value) or (value < 0.0 and name != "friction_coefficient"):
+            raise InvalidSamples(name, value, "finite" if name == "friction_coefficient" else "finite and at least 0")
+    if not (np.isfinite(weight) and weight > 0.0):
+        raise InvalidSamples("weight", weight, "finite and above 0")

@@ -1,0 +1,1 @@
+"""The methods of ``fit``, one a file, and what each of them reports."""

@@ -1,0 +1,107 @@
+"""Bayesian fit by emcee: the posterior of a likelihood, sampled until its Monte-Carlo error is small enough."""
+
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from estimators.defaults import SAMPLING
+from estimators.errors import InvalidSamples
+from estimators.friction_model import FrictionModel
+from estimators.likelihoods.errors_in_variables import errors_in_variables
+from estimators.likelihoods.gaussian import gaussian
+from estimators.likelihoods.grasp_effects import grasp_effects
+from estimators.likelihoods.outlier import outlier
+from estimators.likelihoods.posterior import Posterior
+from estimators.likelihoods.student_t import student_t
+from estimators.linear.fit_data import FitData
+from estimators.linear.normal_inverse_gamma import exact_posterior
+from estimators.linear.shared_errors import shared_by_elements
+from estimators.methods.conjugate import sensitivity
+from estimators.methods.reporting import Diagnostics, report
+from estimators.not_converged import NotConverged
+from estimators.sampling.chain import Chain, sample
+
+
+class Likelihood(NamedTuple):
+    """How a posterior is made from data, and the accuracy that it is sampled to by default."""
+
+    posterior: Callable[[FitData], Posterior]
+    accuracy: float
+
+
+LIKELIHOODS = {
+    "gaussian": Likelihood(gaussian, SAMPLING.accuracy),
+    "grasp_effects": Likelihood(grasp_effects, SAMPLING.accuracy),
+    "student_t": Likelihood(student_t, SAMPLING.accuracy_per_sample),
+    "outlier": Likelihood(outlier, SAMPLING.accuracy_per_sample),
+    "errors_in_variables": Likelihood(errors_in_variables, SAMPLING.accuracy_per_sample),
+}
+
+
+def default_likelihood(data: FitData) -> str:
+    """A random intercept per cluster wherever there are clusters, else independent errors."""
+    return "grasp_effects" if 1 < data.clusters < data.n else "gaussian"
+
+
+def fit(
+    data: FitData,
+    likelihood: str | None = None,
+    accuracy: float | None = None,
+    seconds: float | None = None,
+    seed: int = 0,
+) -> FrictionModel:
+    """Posterior of (β, σ, …) by emcee, whitened by its exact or Laplace approximation and started from it.
+
+    Raises ``NotConverged``, which carries the model, where the chain is shorter than 50 autocorrelation times or its
+    walkers disagree. A chain that is sound but was stopped by ``seconds`` before ``accuracy`` says so in
+    ``diagnostics["stopped"]`` and in ``cost.monte_carlo_error``. ``diagnostics["shared_by_elements"]`` is the part of
+    the errors' variance that samples of an element share; where it is not 0 these intervals are too narrow. Moments
+    know of no elements, and nothing is said of it then.
+    """
+    begin = time.perf_counter()
+    name = default_likelihood(data) if likelihood is None else likelihood
+    if name not in LIKELIHOODS:
+        raise InvalidSamples("likelihood", name, ", ".join(LIKELIHOODS))
+    goal = LIKELIHOODS[name].accuracy if accuracy is None else accuracy
+    posterior = LIKELIHOODS[name].posterior(data)
+    left = None if seconds is None else max(seconds - (time.perf_counter() - begin), 0.0)
+    chain = sample(posterior.log_probability, posterior.proposal, goal, left, seed, posterior.local)
+    summary = posterior.summarise(chain.flat(), np.random.default_rng([seed, 1]))
+    diagnostics: Diagnostics = {"likelihood": name, "prior": posterior.prior, "draws": ", ".join(posterior.names)}
+    diagnostics |= _convergence(chain, posterior) | sensitivity(data, exact_posterior(data))
+    if data.observations is not None and data.cluster_kind != "element":  # moments cannot tell
+        diagnostics["shared_by_elements"] = shared_by_elements(data)
+    model = report(
+        data,
+        "bayes",
+        summary.coefficients,
+        summary.covariance,
+        summary.scale,
+        summary.degrees_of_freedom,
+        begin,
+        diagnostics,
+        monte_carlo_error=chain.monte_carlo_error,
+        draws=summary.draws,
+        scatter_degrees_of_freedom=summary.scatter_degrees_of_freedom,
+    )
+    if chain.trouble:
+        raise NotConverged(chain.trouble, model)
+    return model
+
+
+def _convergence(chain: Chain, posterior: Posterior) -> Diagnostics:
+    diagnostics: Diagnostics = {
+        "move": chain.move,
+        "stopped": chain.stopped,
+        "acceptance": chain.acceptance,
+        "steps": float(chain.draws.shape[0]),
+        "walkers": float(chain.draws.shape[1]),
+    }
+    if np.isfinite(chain.split_rhat):
+        diagnostics["split_rhat"] = chain.split_rhat
+    for name, tau, size in zip(posterior.sampled, chain.autocorrelation_time, chain.effective_sample_size, strict=True):
+        diagnostics[f"autocorrelation_time_{name}"] = float(tau)
+        diagnostics[f"effective_sample_size_{name}"] = float(size)
+    return diagnostics

@@ -1,0 +1,28 @@
+"""Which coefficients the data do determine: judged by what their uncertainty does to friction."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from estimators.defaults import IDENTIFIABILITY, REFERENCE
+from estimators.linear.fit_data import FitData
+
+FloatArray = NDArray[np.float64]
+
+
+def effects(covariance: FloatArray, degrees_of_freedom: float, data: FitData) -> FloatArray:
+    """Half-width of each coefficient's 95 % interval as a change of μ over its span, in parts of the mean |μ|, [3].
+
+    The span is the larger of the reference span and the largest v (f_n) seen, from zero: a slope that is known only
+    over a sliver of v is not known for a planner.
+    """
+    largest = np.array([data.domain.tangential_velocity[1], data.domain.normal_force[1]])
+    span = np.concatenate([[1.0], np.maximum(REFERENCE.spans(data.element_area), largest)])
+    half = special.stdtrit(degrees_of_freedom, 0.975) * np.sqrt(np.diag(covariance)) * span
+    mean = abs(data.mean_friction)
+    return np.asarray(half / max(mean, np.finfo(float).tiny))
+
+
+def identifiable(effect: FloatArray, prior_shift: FloatArray) -> NDArray[np.bool_]:
+    """Whether each coefficient counts as known: its effect is small, and it is the data's rather than the prior's."""
+    return np.asarray((effect <= IDENTIFIABILITY.effect) & (prior_shift <= IDENTIFIABILITY.prior_shift))

@@ -1,0 +1,102 @@
+"""Ordinary (weighted) least squares with errors that hold when samples of one grasp or element move together."""
+
+import time
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.defaults import REFERENCE
+from estimators.friction_model import FrictionModel
+from estimators.linear.cluster_errors import cluster_sums, jackknife
+from estimators.linear.fit_data import FitData
+from estimators.linear.least_squares import LinearFit, solve
+from estimators.linear.observations import IntArray
+from estimators.linear.orthonormal import in_coefficients, orthonormal, orthonormal_blocks
+from estimators.methods.reporting import Diagnostics, by_coefficient, report
+
+FloatArray = NDArray[np.float64]
+Rows = tuple[FloatArray, FloatArray, IntArray]
+
+STATSMODELS_LIMIT = 20_000
+"""Samples up to which statsmodels adds its classical, HC3 and CR1 errors for comparison; it takes seconds beyond."""
+
+
+def fit(data: FitData) -> FrictionModel:
+    """Least squares of μ on (1, v, f_n), weighted; the covariance is the cluster jackknife with t on G − 1 degrees.
+
+    Clusters are grasps where there are two or more, else elements, else stretches of time; the moments of a single
+    grasp know of none, and errors are then taken to be independent. The noise of μ = f_t/f_n grows as 1/f_n: the
+    jackknife is valid under it, the classical errors in the diagnostics are not.
+    """
+    begin = time.perf_counter()
+    linear = solve(data.factor, REFERENCE.spans(data.element_area))
+    residual_degrees = data.effective_n - 1.0 - linear.rank
+    scale = float(linear.residual_norm / np.sqrt(residual_degrees))
+    covariance, errors = _cluster_robust(data, linear, scale)
+    degrees = residual_degrees if data.clusters < 2 else min(residual_degrees, float(data.clusters - 1))
+    diagnostics = errors | {
+        "r_squared": r_squared(data.factor.triangle, linear.residual_norm),
+        **by_coefficient("standard_error_classical", np.sqrt(np.diag(classical(linear, scale)))),
+    }
+    return report(
+        data,
+        "ols",
+        linear.coefficients,
+        covariance,
+        scale,
+        degrees,
+        begin,
+        diagnostics,
+        linear,
+        scatter_degrees_of_freedom=residual_degrees,
+    )
+
+
+def classical(linear: LinearFit, scale: float) -> FloatArray:
+    """Covariance [3, 3] if all errors were independent and alike."""
+    return in_coefficients(linear, scale**2 * np.eye(linear.rank + 1))
+
+
+def r_squared(triangle: NDArray[np.floating], residual_norm: float) -> float:
+    """Part of the weighted variance of μ that the plane explains; 0 where μ does not vary."""
+    total = float(np.sqrt(np.sum(np.square(triangle[:, -1]))))
+    return 1.0 - (residual_norm / total) ** 2 if total > 0.0 else 0.0
+
+
+def _cluster_robust(data: FitData, linear: LinearFit, scale: float) -> tuple[FloatArray, Diagnostics]:
+    """Covariance [3, 3] by the cluster jackknife where there are clusters, and what statsmodels says beside it."""
+    observations = data.observations
+    if data.clusters < 2:
+        return classical(linear, scale), {}
+    if observations is None:
+        blocks: Iterable[Rows] = [_of_blocks(data, linear)]
+    else:
+        blocks = orthonormal_blocks(observations, linear)
+    covariance = in_coefficients(linear, jackknife(*cluster_sums(blocks, data.clusters), scale))
+    errors = by_coefficient("standard_error_cluster", np.sqrt(np.diag(covariance)))
+    if observations is not None and len(observations) <= STATSMODELS_LIMIT:
+        errors |= _statsmodels_errors(*orthonormal(observations, linear), observations.cluster, linear)
+    return covariance, errors
+
+
+def _of_blocks(data: FitData, linear: LinearFit) -> Rows:
+    """The same from moments: four rows a grasp that have the sums of squares and products of all its samples."""
+    rows = data.centred_rows()
+    basis = linear.basis.astype(float)
+    design = np.concatenate([rows[..., :1] / np.sqrt(data.effective_n), rows[..., 1:3] @ basis], axis=-1)
+    residual = rows[..., 3] - rows[..., 1:3] @ linear.coefficients[1:].astype(float)
+    cluster = np.repeat(np.arange(len(rows)), rows.shape[1])
+    return design.reshape(len(cluster), -1), residual.reshape(-1), cluster
+
+
+def _statsmodels_errors(design: FloatArray, residual: FloatArray, cluster: IntArray, linear: LinearFit) -> Diagnostics:
+    """HC3 and CR1 errors by statsmodels, on the orthonormal design, where nothing can fail silently."""
+    from statsmodels.regression.linear_model import OLS  # takes more than a second to load
+
+    results = OLS(residual, design).fit()
+    clustered = results.get_robustcov_results("cluster", groups=cluster)
+    return {
+        **by_coefficient("standard_error_hc3", np.sqrt(np.diag(in_coefficients(linear, results.cov_HC3)))),
+        **by_coefficient("standard_error_cr1", np.sqrt(np.diag(in_coefficients(linear, clustered.cov_params())))),
+    }

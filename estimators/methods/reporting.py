@@ -1,0 +1,69 @@
+"""What every method says of its data and its answer, in one form."""
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.defaults import REFERENCE
+from estimators.friction_model import Cost, FrictionModel
+from estimators.linear.fit_data import FitData
+from estimators.linear.least_squares import LinearFit, solve
+from estimators.methods.identifiability import effects, identifiable
+
+FloatArray = NDArray[np.float64]
+Diagnostics = dict[str, float | str]
+
+
+def by_coefficient(name: str, values: FloatArray) -> Diagnostics:
+    """One diagnostic a coefficient, under names that JSON can carry."""
+    return {f"{name}_beta{k}": float(value) for k, value in enumerate(values)}
+
+
+def describe(data: FitData, linear: LinearFit | None = None) -> Diagnostics:
+    """The data: how many, in how many clusters, and how well they spread over v and f_n."""
+    linear = solve(data.factor, REFERENCE.spans(data.element_area)) if linear is None else linear
+    return {
+        "effective_n": data.effective_n,
+        "clusters": float(data.clusters),
+        "cluster_kind": data.cluster_kind,
+        "condition_number": linear.condition,
+        "rank": float(linear.rank + 1),
+        "variance_inflation_tangential_velocity": float(linear.inflation[0]),
+        "variance_inflation_normal_force": float(linear.inflation[1]),
+    }
+
+
+def report(
+    data: FitData,
+    method: str,
+    coefficients: NDArray[np.floating],
+    covariance: FloatArray,
+    scale: float,
+    degrees_of_freedom: float,
+    begin: float,
+    diagnostics: Diagnostics,
+    linear: LinearFit | None = None,
+    monte_carlo_error: float = 0.0,
+    draws: FloatArray | None = None,
+    *,
+    scatter_degrees_of_freedom: float,
+) -> FrictionModel:
+    """The friction model, with what its uncertainty does to friction; ``begin``: when the fit began."""
+    effect = effects(covariance, degrees_of_freedom, data)
+    prior_shift = np.array([float(diagnostics.get(f"prior_sensitivity_beta{k}", 0.0)) for k in range(3)])
+    return FrictionModel(
+        method=method,
+        coefficients=np.asarray(coefficients, dtype=float),
+        covariance=covariance,
+        scale=scale,
+        n=data.n,
+        degrees_of_freedom=degrees_of_freedom,
+        domain=data.domain,
+        identifiable=identifiable(effect, prior_shift),
+        element_area=data.element_area,
+        diagnostics=describe(data, linear) | by_coefficient("effect", effect) | diagnostics,
+        cost=Cost(time.perf_counter() - begin, monte_carlo_error),
+        draws=draws,
+        scatter_degrees_of_freedom=scatter_degrees_of_freedom,
+    )

@@ -1,0 +1,1 @@
+"""Markov chain Monte Carlo by emcee near a known approximation: proposals, ensembles, convergence."""

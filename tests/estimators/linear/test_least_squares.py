@@ -1,0 +1,135 @@
+"""The least-squares core on hard problems, against 120-digit solutions and closed forms."""
+
+import csv
+from pathlib import Path
+
+import mpmath
+import numpy as np
+import pytest
+
+from estimators.linear.least_squares import Factor, condition_number, factorise, merge, solve
+
+STRD = Path(__file__).parents[4] / "shared" / "data" / "strd"
+DEGREE = {"filip": 10, "norris": 1, "pontius": 2} | {f"wampler{k}": 5 for k in range(1, 6)}
+
+# Fewest right digits (coefficients, standard errors): with the powers as doubles, and in extended precision.
+DIGITS = {
+    "longley": ((12.0, 12.0), (14.0, 14.0)),
+    "filip": ((7.0, 7.0), (10.0, 10.0)),
+    "norris": ((12.0, 13.0), (14.0, 14.0)),
+    "pontius": ((12.0, 12.0), (14.0, 14.0)),
+    "noint1": ((14.0, 14.0), (14.0, 14.0)),
+    "noint2": ((14.0, 14.0), (14.0, 14.0)),
+    "wampler1": ((12.0, 12.0), (12.0, 12.0)),
+    "wampler2": ((12.0, 12.0), (12.0, 12.0)),
+    "wampler3": ((12.0, 14.0), (12.0, 14.0)),
+    "wampler4": ((11.0, 14.0), (11.0, 14.0)),
+    "wampler5": ((9.0, 14.0), (9.0, 14.0)),
+}
+EXTENDED = np.finfo(np.longdouble).nmant >= 63
+
+Matrix = list[list[mpmath.mpf]]
+
+
+def read(name: str) -> tuple[Matrix, list[mpmath.mpf]]:
+    """Regressors without the constant, and response, to 120 digits."""
+    if not STRD.is_dir():
+        pytest.skip("the NIST StRD sets are not beside the project (../shared/data/strd)")
+    with (STRD / f"{name}.csv").open() as file:
+        rows = [[mpmath.mpf(cell) for cell in row] for row in list(csv.reader(file))[1:]]
+    if name in DEGREE:
+        return [[row[1] ** k for k in range(1, DEGREE[name] + 1)] for row in rows], [row[0] for row in rows]
+    return [row[1:] for row in rows], [row[0] for row in rows]
+
+
+def certificate(x: Matrix, y: list[mpmath.mpf], intercept: bool) -> tuple[list[mpmath.mpf], list[mpmath.mpf]]:
+    """Coefficients and standard errors by the normal equations, which 120 digits can afford."""
+    design, response = mpmath.matrix([[1] * intercept + row for row in x]), mpmath.matrix(y)
+    inverse = (design.T * design) ** -1
+    beta = inverse * (design.T * response)
+    residual = response - design * beta
+    variance = (residual.T * residual)[0] / (design.rows - design.cols)
+    return list(beta), [mpmath.sqrt(variance * inverse[k, k]) for k in range(design.cols)]
+
+
+def as_doubles(name: str, x: Matrix, y: list[mpmath.mpf]) -> np.ndarray:
+    if name not in DEGREE:
+        return np.array([[float(cell) for cell in [*row, t]] for row, t in zip(x, y, strict=True)])
+    first = np.array([float(row[0]) for row in x])
+    powers = [first**k for k in range(1, DEGREE[name] + 1)]
+    return np.column_stack([*powers, [float(t) for t in y]])
+
+
+def as_long_doubles(x: Matrix, y: list[mpmath.mpf]) -> np.ndarray:
+    rows = [[*row, t] for row, t in zip(x, y, strict=True)]
+    high = np.array([[float(cell) for cell in row] for row in rows])
+    low = np.array([[float(cell - mpmath.mpf(float(cell))) for cell in row] for row in rows])
+    return high.astype(np.longdouble) + low
+
+
+def digits(found: np.ndarray, certified: list[mpmath.mpf]) -> float:
+    """Fewest right digits; a certified zero counts absolutely."""
+    fewest = 15.0
+    for value, truth in zip(found, certified, strict=True):
+        exact = mpmath.mpf(float(value)) + mpmath.mpf(float(value - np.longdouble(float(value))))
+        error = abs(exact - truth) / (abs(truth) if abs(truth) > mpmath.mpf(10) ** -60 else 1)
+        fewest = min(fewest, float(-mpmath.log10(error)) if error > 0 else 15.0)
+    return fewest
+
+
+@pytest.mark.parametrize("extended", [False, True], ids=["double", "extended"])
+@pytest.mark.parametrize("name", DIGITS)
+def test_nist_sets_are_solved_to_the_digits_asked_for(name: str, extended: bool) -> None:
+    if extended and not EXTENDED:
+        pytest.skip("this platform's long double has no more digits than a double")
+    intercept = not name.startswith("noint")
+    with mpmath.workdps(120):
+        x, y = read(name)
+        beta, errors = certificate(x, y, intercept)
+        columns = as_long_doubles(x, y) if extended else as_doubles(name, x, y)
+        fit = solve(factorise(columns, intercept=intercept))
+        scale = fit.residual_norm / np.sqrt(len(y) - len(beta))
+        found = digits(fit.coefficients, beta), digits(scale * np.sqrt(np.sum(fit.root**2, axis=1)), errors)
+    wanted = DIGITS[name][extended]
+    assert found[0] >= wanted[0], found
+    assert found[1] >= wanted[1], found
+
+
+def test_weights_act_as_repeated_rows() -> None:
+    rng = np.random.default_rng(0)
+    columns, times = rng.standard_normal((30, 3)), rng.integers(1, 5, 30)
+    weighted, repeated = factorise(columns, times.astype(float)), factorise(np.repeat(columns, times, axis=0))
+    np.testing.assert_allclose(weighted.triangle, repeated.triangle, rtol=1e-12, atol=1e-13)
+    assert weighted.weight == repeated.weight == times.sum()
+
+
+def test_chunks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
+    columns = np.random.default_rng(0).standard_normal((1000, 3)) + 5.0
+    whole = factorise(columns)
+    monkeypatch.setattr("estimators.linear.least_squares.CHUNK", 7)
+    np.testing.assert_allclose(factorise(columns).triangle, whole.triangle, rtol=1e-12, atol=1e-13)
+
+
+def test_merged_factors_keep_the_sum_of_squares() -> None:
+    rng = np.random.default_rng(0)
+    parts = [rng.standard_normal((k + 1, 3)) + k for k in range(6)]
+    merged = merge(factorise(part) for part in parts)
+    rows = np.concatenate(parts)
+    centred = rows - rows.mean(axis=0)
+    np.testing.assert_allclose(merged.triangle.T @ merged.triangle, centred.T @ centred, rtol=1e-12)
+    np.testing.assert_allclose(merged.mean, rows.mean(axis=0), rtol=1e-14)
+
+
+def test_condition_number_is_that_of_scaled_columns() -> None:
+    triangle = np.array([[1e9, 0.6e-5], [0.0, 0.8e-5]])
+    np.testing.assert_allclose(condition_number(triangle), np.sqrt(1.6 / 0.4), rtol=1e-12)
+
+
+def test_input_is_left_as_it_was() -> None:
+    columns = np.asfortranarray(np.random.default_rng(0).standard_normal((50, 3)))
+    before = columns.copy()
+    factor = factorise(columns, intercept=False)
+    np.testing.assert_array_equal(columns, before)
+    kept = Factor(factor.weight, factor.mean.copy(), factor.triangle.copy())
+    solve(factor)
+    np.testing.assert_array_equal(factor.triangle, kept.triangle)
