@@ -84,7 +84,8 @@ class Material:
 class Job:
     """A durable job: an ``ingest`` of a grasp log or a ``fit`` of a material.
 
-    ``deaths`` counts the worker processes that died under it; ``seconds`` is the time of each stage that is done.
+    ``deaths`` counts the worker processes that died under it; ``seconds`` is the time of each stage that is done;
+    ``requested_by`` is the id of the access key with which it was asked for, None without one.
     """
 
     id: str
@@ -100,6 +101,7 @@ class Job:
     deaths: int
     model_version: int | None
     trace: str | None
+    requested_by: str | None
     created_at: datetime
     finished_at: datetime | None
 
@@ -171,7 +173,10 @@ class SamplesOfLog:
 
 @dataclass(frozen=True, slots=True)
 class NewGraspLog:
-    """A grasp log about to be stored: its content's ``sha256`` and size, and what the reader found in it."""
+    """A grasp log about to be stored: its content's ``sha256`` and size, and what the reader found in it.
+
+    ``uploaded_by`` is the id of the access key with which it was sent, None without one.
+    """
 
     sha256: str
     bytes: int
@@ -182,6 +187,7 @@ class NewGraspLog:
     frames: int
     duration: float
     grid: tuple[int, int]
+    uploaded_by: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,7 +212,7 @@ class Withdrawal:
 class StoredGraspLog:
     """A grasp log with its ingest job and, once there, what detection and sampling found.
 
-    ``has_file``: whether its bytes are still there.
+    ``has_file``: whether its bytes are still there; ``uploaded_by``: the access key with which it was first sent.
     """
 
     id: str
@@ -221,6 +227,7 @@ class StoredGraspLog:
     grid: tuple[int, int]
     created_at: datetime
     has_file: bool
+    uploaded_by: str | None
     withdrawal: Withdrawal | None
     job: Job
     detection: Detection | None

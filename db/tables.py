@@ -109,7 +109,7 @@ class SensorRow(Base):
 class GraspLogRow(Base):
     """A grasp log; its bytes are the blob of hash ``sha256``. The same content, material and detector is one log.
 
-    ``file_state`` is NULL while the blob is there, since ``file_since``.
+    ``file_state`` is NULL while the blob is there, since ``file_since``; ``uploaded_by`` is NULL where no key was sent.
     """
 
     __tablename__ = "grasp_logs"
@@ -130,6 +130,7 @@ class GraspLogRow(Base):
         CheckConstraint("(withdrawn_at IS NULL) = (withdrawn_because IS NULL)", name="withdrawn"),
         Index(None, "created_at", "id"),
         Index(None, "material_id", "created_at", "id"),
+        Index(None, "uploaded_by", "created_at"),  # how much a key has sent lately
         _one_of("file_state", ("leaving", "gone")),
         Index(None, "file_state", "file_since"),  # what has been there for longest, and what is to be deleted
     )
@@ -150,6 +151,7 @@ class GraspLogRow(Base):
     withdrawn_because: Mapped[str | None]
     file_state: Mapped[str | None] = mapped_column(String(10))
     file_since: Mapped[datetime] = mapped_column(default=now)
+    uploaded_by: Mapped[str | None] = mapped_column(ForeignKey("access_keys.id"))
 
 
 class RunnerRow(Base):
@@ -164,7 +166,10 @@ class RunnerRow(Base):
 
 
 class JobRow(Base):
-    """A durable job. A grasp log has exactly one, its ingest. A running one is claimed by its runner."""
+    """A durable job. A grasp log has exactly one, its ingest. A running one is claimed by its runner.
+
+    ``requested_by`` is the access key with which it was asked for, NULL without one.
+    """
 
     __tablename__ = "jobs"
     __table_args__ = (
@@ -194,6 +199,7 @@ class JobRow(Base):
     deaths: Mapped[int] = mapped_column(default=0)
     model_version: Mapped[int | None]
     trace: Mapped[str | None] = mapped_column(String(55))
+    requested_by: Mapped[str | None] = mapped_column(ForeignKey("access_keys.id"))
     created_at: Mapped[datetime] = mapped_column(default=now)
     finished_at: Mapped[datetime | None]
 

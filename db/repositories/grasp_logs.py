@@ -37,6 +37,7 @@ def add(session: Session, log: NewGraspLog) -> str:
         duration=log.duration,
         grid_rows=log.grid[0],
         grid_columns=log.grid[1],
+        uploaded_by=log.uploaded_by,
     )
     try:
         with session.begin_nested():
@@ -136,6 +137,7 @@ def _record(
         grid=(row.grid_rows, row.grid_columns),
         created_at=row.created_at,
         has_file=row.file_state is None,
+        uploaded_by=row.uploaded_by,
         withdrawal=_withdrawal(row),
         job=jobs.record(job, material),
         detection=detections.detection_record(detection),

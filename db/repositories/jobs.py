@@ -22,8 +22,12 @@ def add(
     grasp_log_id: str | None = None,
     seed: int = 0,
     trace: str | None = None,
+    requested_by: str | None = None,
 ) -> str:
-    """Store a queued job and return its id; ``trace`` tells where in a trace it was asked for (W3C traceparent)."""
+    """Store a queued job and return its id; ``trace`` tells where in a trace it was asked for (W3C traceparent).
+
+    ``requested_by`` is the id of the access key with which it was asked for.
+    """
     row = JobRow(
         id=uuid.uuid4().hex,
         kind=kind,
@@ -34,6 +38,7 @@ def add(
         seed=seed,
         seconds={},
         trace=trace,
+        requested_by=requested_by,
     )
     session.add(row)
     session.flush()
@@ -114,9 +119,10 @@ def start_stage(session: Session, claim: Claim, stage: str, seconds: Mapping[str
     _change_claimed(session, claim, stage=stage, seconds=dict(seconds))
 
 
-def requeue(session: Session, job_id: str) -> None:
+def requeue(session: Session, job_id: str, requested_by: str | None = None) -> None:
     """Put a job that has ended back into the queue, as if it had just been added; nothing happens to another."""
     changes = {"status": "queued", "stage": None, "reason": None, "deaths": 0, "finished_at": None}
+    changes |= {"requested_by": requested_by}
     session.execute(update(JobRow).where(JobRow.id == job_id, JobRow.finished_at.is_not(None)).values(**changes))
 
 
@@ -181,6 +187,7 @@ def record(row: JobRow, material: str | None) -> Job:
         deaths=row.deaths,
         model_version=row.model_version,
         trace=row.trace,
+        requested_by=row.requested_by,
         created_at=row.created_at,
         finished_at=row.finished_at,
     )

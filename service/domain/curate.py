@@ -44,7 +44,7 @@ def remove_alias(context: Context, material: str, alias: str) -> None:
     context.models.seen()
 
 
-def merge(context: Context, material: str, source: str) -> tuple[Material, list[Job]]:
+def merge(context: Context, material: str, source: str, key_id: str | None = None) -> tuple[Material, list[Job]]:
     """Put what is known of ``source`` to ``material`` and refit it; raises ``NotFound``."""
     with context.database.write() as session:
         target_id, source_id = (materials.find_id(session, name) for name in (material, source))
@@ -52,33 +52,37 @@ def merge(context: Context, material: str, source: str) -> tuple[Material, list[
             raise Problem.wrong_value(INVALID_REQUEST, "source", source, "another material than the one in the path")
         methods = friction_models.current_methods(session, [target_id, source_id])
         materials.merge(session, target_id, source_id)
-        queued = _queue_refits(session, target_id, methods)
+        queued = _queue_refits(session, target_id, methods, key_id)
         merged = materials.get(session, material)
     return merged, _follow_up(context, queued)
 
 
-def withdraw(context: Context, log_id: str, because: str) -> tuple[StoredGraspLog, list[Job]]:
+def withdraw(
+    context: Context, log_id: str, because: str, key_id: str | None = None
+) -> tuple[StoredGraspLog, list[Job]]:
     """Take a log out of its material's fits, and fit again without it; raises ``NotFound``."""
     with context.database.write() as session:
         is_new = grasp_logs.withdraw(session, log_id, because)
-        queued = _refit_without(session, grasp_logs.material_id(session, log_id)) if is_new else []
+        material_id = grasp_logs.material_id(session, log_id)
+        queued = _refit_without(session, material_id, key_id) if is_new else []
         log = grasp_logs.get(session, log_id)
     return log, _follow_up(context, queued)
 
 
-def restore(context: Context, log_id: str) -> tuple[StoredGraspLog, list[Job]]:
+def restore(context: Context, log_id: str, key_id: str | None = None) -> tuple[StoredGraspLog, list[Job]]:
     """Put a withdrawn log back into its material's fits, and fit again with it; raises ``NotFound``."""
     with context.database.write() as session:
         was_withdrawn = grasp_logs.restore(session, log_id)
         material_id = grasp_logs.material_id(session, log_id)
         queued: list[Job] = []
         if was_withdrawn and material_id is not None:
-            queued = _queue_refits(session, material_id, friction_models.current_methods(session, [material_id]))
+            methods = friction_models.current_methods(session, [material_id])
+            queued = _queue_refits(session, material_id, methods, key_id)
         log = grasp_logs.get(session, log_id)
     return log, _follow_up(context, queued)
 
 
-def _refit_without(session: Session, material_id: int | None) -> list[Job]:
+def _refit_without(session: Session, material_id: int | None, key_id: str | None) -> list[Job]:
     """Until the refits are there the models say that they are outdated; without any samples left there is none."""
     if material_id is None:
         return []
@@ -87,13 +91,16 @@ def _refit_without(session: Session, material_id: int | None) -> list[Job]:
     if not detections.any_samples(session, material_id):
         friction_models.retire(session, material_id)
         return []
-    return _queue_refits(session, material_id, methods)
+    return _queue_refits(session, material_id, methods, key_id)
 
 
-def _queue_refits(session: Session, material_id: int, methods: Iterable[str]) -> list[Job]:
+def _queue_refits(session: Session, material_id: int, methods: Iterable[str], key_id: str | None) -> list[Job]:
     if not detections.any_samples(session, material_id):
         return []
-    ids = [queue(session, "fit", method, material_id=material_id) for method in sorted({REFITTED, *methods})]
+    ids = [
+        queue(session, "fit", method, material_id=material_id, requested_by=key_id)
+        for method in sorted({REFITTED, *methods})
+    ]
     return [jobs.get(session, job_id) for job_id in ids]
 
 

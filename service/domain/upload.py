@@ -33,7 +33,7 @@ LONGEST_SENSOR_NAME = 200
 @dataclass(frozen=True, slots=True)
 class Wish:
     """What the uploader says of a log: its material, sensor and detector, type and encoding of its bytes, and the
-    settings that its format needs (``formats.read``).
+    settings that its format needs (``formats.read``); ``key_id`` is the access key that was sent with it.
     """
 
     material: str | None
@@ -44,6 +44,7 @@ class Wish:
     content_encoding: str = ""
     settings: Settings = field(default_factory=dict)
     once: Once | None = None
+    key_id: str | None = None
 
 
 async def upload(context: Context, chunks: AsyncIterator[bytes], wish: Wish) -> Answer:
@@ -73,9 +74,8 @@ async def check_target(context: Context, material: str | None, detector: str) ->
     await asyncio.to_thread(_check, context, Wish(material, None, detector, None, None))
 
 
-async def store_made(context: Context, spool: Spool, found: Description, material: str | None, detector: str) -> Answer:
+async def store_made(context: Context, spool: Spool, found: Description, wish: Wish) -> Answer:
     """Store a log that the service itself has written to ``spool.path``, and queue its ingest; raises as ``upload``."""
-    wish = Wish(material, None, detector, None, None)
     material_id = await asyncio.to_thread(_check, context, wish)
     await asyncio.to_thread(spool.adopt)
     return await asyncio.to_thread(_store, context, spool, _new_log(spool, found, wish, material_id), None)
@@ -140,6 +140,7 @@ def _new_log(spool: Spool, found: Description, wish: Wish, material_id: int | No
         frames=found.frames,
         duration=found.duration,
         grid=found.grid,
+        uploaded_by=wish.key_id,
     )
 
 
@@ -168,11 +169,12 @@ def _accept(session: Session, log: NewGraspLog) -> Answer:
         log = replace(log, material_id=materials.still(session, log.material_id))
     try:
         log_id, status = grasp_logs.add(session, log), 202
-        queue(session, "ingest", "ols", material_id=log.material_id, grasp_log_id=log_id)
+        asker = log.uploaded_by
+        queue(session, "ingest", "ols", material_id=log.material_id, grasp_log_id=log_id, requested_by=asker)
     except AlreadyExists:
         log_id, status = grasp_logs.find_id(session, log.sha256, log.material_id, log.detector), 200
         job = grasp_logs.get(session, log_id).job
         if job.status in {"failed", "cancelled"}:
-            jobs.requeue(session, job.id)
+            jobs.requeue(session, job.id, requested_by=log.uploaded_by)
     body = GraspLogOut.of(grasp_logs.get(session, log_id)).model_dump(mode="json")
     return Answer(status, f"/v1/grasp-logs/{log_id}", body)

@@ -8,9 +8,9 @@ import secrets
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import get_args
+from typing import Annotated, get_args
 
-from fastapi import FastAPI, Security
+from fastapi import Depends, FastAPI, Security
 from fastapi.dependencies.models import Dependant
 from fastapi.openapi.models import HTTPBearer
 from fastapi.routing import iter_route_contexts
@@ -100,6 +100,15 @@ class Needs(SecurityBase):
 _needs = Needs()
 READ, UPLOAD, ADMIN = (Security(_needs, scopes=[scope]) for scope in SCOPES)
 """What a route puts into its ``dependencies``."""
+
+
+async def _key_id(connection: HTTPConnection) -> str | None:
+    access: Access = connection.state.access
+    return access.key_id
+
+
+KeyId = Annotated[str | None, Depends(_key_id)]
+"""The id of the access key that was sent with a request, None without one."""
 
 
 def scopes_of_routes(app: FastAPI) -> dict[str, set[str]]:

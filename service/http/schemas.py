@@ -52,6 +52,7 @@ _JOB: JsonDict = {
     "material": "paper",
     "deaths": 0,
     "model_version": 3,
+    "requested_by": "3f9c2a7b51de",
     "created_at": _MOMENT,
     "finished_at": _MOMENT,
 }
@@ -87,6 +88,7 @@ _GRASP_LOG: JsonDict = {
     "grid": [20, 20],
     "created_at": _MOMENT,
     "has_file": True,
+    "uploaded_by": "3f9c2a7b51de",
     "withdrawal": None,
     "job": _JOB,
     "detection": _DETECTION,
@@ -330,6 +332,7 @@ class JobOut(BaseModel):
     material: str | None
     deaths: Annotated[int, Field(description="Worker processes that died under it")]
     model_version: Annotated[int | None, Field(description="The version of the model that it stored")]
+    requested_by: Annotated[str | None, Field(description="Id of the access key with which it was asked for")]
     created_at: datetime
     finished_at: datetime | None
 
@@ -347,6 +350,7 @@ class JobOut(BaseModel):
             material=job.material,
             deaths=job.deaths,
             model_version=job.model_version,
+            requested_by=job.requested_by,
             created_at=job.created_at,
             finished_at=job.finished_at,
         )
@@ -387,6 +391,7 @@ class GraspLogOut(BaseModel):
     grid: Annotated[tuple[int, int], Field(description="Markers along the two axes")]
     created_at: datetime
     has_file: Annotated[bool, Field(description="Whether the upload can still be downloaded")]
+    uploaded_by: Annotated[str | None, Field(description="Id of the access key with which it was first sent")]
     withdrawal: WithdrawalOut | None
     job: JobOut
     detection: DetectionOut | None
@@ -406,6 +411,7 @@ class GraspLogOut(BaseModel):
             grid=log.grid,
             created_at=log.created_at,
             has_file=log.has_file,
+            uploaded_by=log.uploaded_by,
             withdrawal=WithdrawalOut.of(log.withdrawal) if log.withdrawal else None,
             job=JobOut.of(log.job),
             detection=_detection_out(log),

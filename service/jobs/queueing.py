@@ -19,8 +19,12 @@ def queue(
     material_id: int | None,
     grasp_log_id: str | None = None,
     seed: int = 0,
+    requested_by: str | None,
 ) -> str:
-    """Store a job and return its id; the log then has it beside the id of the request that asks for it."""
+    """Store a job and return its id; the log then has it beside the id of the request that asks for it.
+
+    ``requested_by`` is the id of the access key with which it is asked for, None without one.
+    """
     job_id = jobs.add(
         session,
         kind,
@@ -29,6 +33,7 @@ def queue(
         grasp_log_id=grasp_log_id,
         seed=seed,
         trace=traces.place(),
+        requested_by=requested_by,
     )
     logger.info("job queued", extra=logs.of(job=job_id, kind=kind))
     return job_id

@@ -11,7 +11,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from db.errors import NotFound, StorageUnavailable
 from service.context import Context
-from service.domain.upload import check_target, store_made
+from service.domain.upload import Wish, check_target, store_made
 from service.http.problems import Problem
 from service.stream import live
 from service.stream.sessions import (
@@ -167,7 +167,8 @@ class _Connection:
             raise End(REFUSED, "store needs keep, said when the session was opened")
         with self._context.blobs.spool() as spool:
             found = await self._streams.call(live.write, session.id, spool.path, opening.sensor)
-            answer = await store_made(self._context, spool, found, opening.material, opening.detector)
+            wish = Wish(opening.material, None, opening.detector, None, None, key_id=self._key_id)
+            answer = await store_made(self._context, spool, found, wish)
         return {"type": "finished", "grasp_log": answer.body}
 
     async def _receive(self) -> Incoming:

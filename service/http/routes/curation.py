@@ -6,7 +6,7 @@ from fastapi import APIRouter, Path, Response
 
 from service.context import Given
 from service.domain import curate
-from service.http.access import ADMIN
+from service.http.access import ADMIN, KeyId
 from service.http.problems import (
     INVALID_REQUEST,
     MATERIAL_EXISTS,
@@ -81,12 +81,12 @@ def remove_alias(context: Given, name: str, alias: Alias) -> Response:
     summary="Merge another material into this one",
     responses=problems(UNKNOWN_MATERIAL, *_BODY),
 )
-def merge_materials(context: Given, name: str, wish: NewMerge) -> MergedOut:
+def merge_materials(context: Given, name: str, wish: NewMerge, key_id: KeyId) -> MergedOut:
     """Its logs and names move here, for good, and the fits are made again over all logs.
 
     A log that both have, by content and detector, counts once.
     """
-    material, jobs = curate.merge(context, name, wish.source)
+    material, jobs = curate.merge(context, name, wish.source, key_id)
     return MergedOut(material=MaterialOut.of(material), jobs=[JobOut.of(job) for job in jobs])
 
 
@@ -97,12 +97,17 @@ def merge_materials(context: Given, name: str, wish: NewMerge) -> MergedOut:
     summary="Withdraw a grasp log",
     responses=problems(UNKNOWN_GRASP_LOG, *_BODY),
 )
-def withdraw_grasp_log(context: Given, id: str, wish: NewWithdrawal) -> WithdrawnOut:  # noqa: A002  (the path's own name)
+def withdraw_grasp_log(
+    context: Given,
+    id: str,  # noqa: A002  (the path's own name)
+    wish: NewWithdrawal,
+    key_id: KeyId,
+) -> WithdrawnOut:
     """It is kept, but counts in no fit from then on; its material's models are fitted again without it.
 
     Until then those models are marked as outdated; where no samples are left, the material has none.
     """
-    log, jobs = curate.withdraw(context, id, wish.reason)
+    log, jobs = curate.withdraw(context, id, wish.reason, key_id)
     return WithdrawnOut(grasp_log=GraspLogOut.of(log), jobs=[JobOut.of(job) for job in jobs])
 
 
@@ -113,7 +118,7 @@ def withdraw_grasp_log(context: Given, id: str, wish: NewWithdrawal) -> Withdraw
     summary="Take a withdrawal back",
     responses=problems(UNKNOWN_GRASP_LOG, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
-def restore_grasp_log(context: Given, id: str) -> WithdrawnOut:  # noqa: A002
+def restore_grasp_log(context: Given, id: str, key_id: KeyId) -> WithdrawnOut:  # noqa: A002
     """The log counts again, and its material's models are fitted again with it."""
-    log, jobs = curate.restore(context, id)
+    log, jobs = curate.restore(context, id, key_id)
     return WithdrawnOut(grasp_log=GraspLogOut.of(log), jobs=[JobOut.of(job) for job in jobs])

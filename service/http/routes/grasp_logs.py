@@ -16,7 +16,7 @@ from service.domain.stored_results import EVENT_KINDS, SAMPLE_ARRAYS, decode_his
 from service.domain.upload import Wish, upload
 from service.formats import writing
 from service.formats.tracked_markers import FRAME_RATE, SCALE
-from service.http.access import READ, UPLOAD
+from service.http.access import READ, UPLOAD, KeyId
 from service.http.idempotency import OnceWithoutBody
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import (
@@ -86,6 +86,7 @@ async def create_grasp_log(
     context: Given,
     request: Request,
     once: OnceWithoutBody,
+    key_id: KeyId,
     material: Annotated[
         str | None, Query(description="What was held; without it slip is only detected", examples=["paper"])
     ] = None,
@@ -122,6 +123,7 @@ async def create_grasp_log(
         ",".join(request.headers.getlist("content-encoding")),
         {"scale": scale, "frame_rate": frame_rate, "mapping": mapping},
         once,
+        key_id,
     )
     return (await upload(context, request.stream(), wish)).response()
 

@@ -9,7 +9,7 @@ from db.repositories import friction_models, materials
 from service.context import Given
 from service.domain.fit import request_fit
 from service.domain.look_up import Question, look_up
-from service.http.access import READ, UPLOAD
+from service.http.access import READ, UPLOAD, KeyId
 from service.http.conditional import NOT_MODIFIED, conditional, tagged
 from service.http.idempotency import Answer, OnceGiven, answer_once
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
@@ -147,9 +147,9 @@ async def read_friction(
     response_model=JobOut,
     responses=problems(UNKNOWN_MATERIAL, *_BODY),
 )
-def create_fit(context: Given, name: str, wish: NewFit, once: OnceGiven) -> Response:
+def create_fit(context: Given, name: str, wish: NewFit, once: OnceGiven, key_id: KeyId) -> Response:
     """Over the samples of all its logs. Answers at once; the job at `Location` tells how it went."""
-    return request_fit(context, name, wish.method, wish.seed, once).response()
+    return request_fit(context, name, wish.method, wish.seed, once, key_id).response()
 
 
 @router.get(

@@ -228,5 +228,11 @@ def test_a_stream_needs_a_key_that_may_upload(ramp: GraspLog, tmp_path: Path) ->
             socket.send('{"type": "finish"}')
             with pytest.raises(ConnectionClosed, match="must be of type open or resume"):  # it was let in
                 socket.recv(30.0)
+        with SlipStream(served.url, log.position, log.element_area, keep=True, key=keys["upload"]) as live:
+            for k in range(2):
+                live.send(log.time[k], *parts(log, k))
+            stored = live.finish(store=True)
+        assert stored is not None
+        assert (stored["uploaded_by"], stored["job"]["requested_by"]) == (key_id, key_id)
     finally:
         served.stop()
