@@ -21,6 +21,7 @@ from service.http.gate import Gate
 from service.http.head_requests import HeadRequests
 from service.http.lookups import Lookups
 from service.http.routes import curation, grasp_logs, health, jobs, materials, metrics, planning, stream
+from service.http.start_refusal import StartRefusal
 from service.jobs.lanes import lanes
 from service.jobs.retention import Retention
 from service.jobs.runner import JobRunner
@@ -48,9 +49,13 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        async with running(chosen, check=gate.check_start) as context:
-            app.state.context = context
-            yield
+        try:
+            async with running(chosen, check=gate.check_start) as context:
+                app.state.context = context
+                yield
+        except Exception as error:
+            app.state.start_error = error
+            raise
 
     app = openapi.DescribedApp(
         title="Stiction",
@@ -78,6 +83,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(Envelope)
     app.state.metrics = Metrics()
     app.add_middleware(Metering, metrics=app.state.metrics)
+    app.add_middleware(StartRefusal)
     problems.install(app)
     return app
 

@@ -1,5 +1,6 @@
 """Settings of the service, each from an environment variable of the same name with the prefix ``STICTION_``."""
 
+import ipaddress
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -53,6 +54,10 @@ class Settings(BaseSettings):
         default="auto",
         description="Who must send a key: all but users of this machine (auto), everybody (keys), or nobody (open).",
     )
+    trusted_proxies: str = Field(
+        default="",
+        description="Addresses or networks of proxies whose X-Forwarded-For and -Proto are believed; empty: none.",
+    )
     rate_limit: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
         default=1000.0, description="Requests a second of one key, or of one address without a key; 0: any number."
     )
@@ -97,6 +102,16 @@ class Settings(BaseSettings):
         description="How long a stopping server waits for requests and then for running jobs, in s; the next start "
         "takes up the rest.",
     )
+
+    @field_validator("trusted_proxies")
+    @classmethod
+    def _addresses(cls, text: str) -> str:
+        for part in filter(None, map(str.strip, text.split(","))):
+            try:
+                ipaddress.ip_network(part)
+            except ValueError as error:
+                raise ValueError(f"{part} is no address; allowed: such as 10.0.0.7,10.1.0.0/16") from error
+        return text
 
     @field_validator("database_url")
     @classmethod

@@ -12,6 +12,7 @@ def exit_code(error: Exception) -> int | None:
 
     from db.errors import DatabaseError
     from estimators.errors import EstimatorError
+    from service.http.gate import NoKeys
     from slipcore.errors import SlipcoreError
     from stiction_client.errors import InvalidArgument, NoFeasibleForce, StictionError
 
@@ -21,6 +22,7 @@ def exit_code(error: Exception) -> int | None:
         (StictionError, SERVICE_REFUSED),
         (ValidationError, INPUT_REFUSED),  # a setting outside its range
         (DatabaseError, INPUT_REFUSED),
+        (NoKeys, INPUT_REFUSED),
         (EstimatorError, INPUT_REFUSED),
         (SlipcoreError, INPUT_REFUSED),
         (OSError, INPUT_REFUSED),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.exit_codes import FAILURE
+from service.cli.exit_codes import FAILURE, exit_code
 
 if TYPE_CHECKING:
     from service.settings import Settings
@@ -29,10 +29,12 @@ def serve(
 
     settings = _settings(host=host, port=port, data_folder=data_folder, database_url=database_url)
     _prepare(settings)
-    server = uvicorn.Server(configuration(settings))
+    chosen = configuration(settings)
+    server = uvicorn.Server(chosen)
     server.run()
     if not server.started:  # its log says why
-        raise typer.Exit(FAILURE)
+        error = getattr(getattr(chosen.app, "state", None), "start_error", None)
+        raise typer.Exit((error and exit_code(error)) or FAILURE)
 
 
 def worker(

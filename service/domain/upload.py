@@ -55,6 +55,7 @@ async def upload(context: Context, chunks: AsyncIterator[bytes], wish: Wish) -> 
     """
     limit, expansion = context.settings.max_upload_bytes, context.settings.max_expansion
     check_size(wish.content_length or 0, limit)
+    _check_type(wish.content_type)
     encoding = check_encoding(wish.content_encoding)
     material_id = await asyncio.to_thread(_check, context, wish)
     with ExitStack() as spools:
@@ -93,6 +94,13 @@ def _check(context: Context, wish: Wish) -> int | None:
         return None
     with context.database.read() as session:
         return materials.find_id(session, wish.material)
+
+
+def _check_type(content_type: str | None) -> None:
+    """A body without a type may be one that a page of another site had a browser send."""
+    if not content_type:
+        allowed = ", ".join((*formats.CONTENT_TYPES, *formats.UNSPECIFIC_TYPES))
+        raise Problem.wrong_value(UNSUPPORTED_FORMAT, "content type", "missing", allowed)
 
 
 def _identify(spool: Spool, wish: Wish) -> str:

@@ -14,7 +14,7 @@ from db.errors import NotFound, StorageUnavailable
 from db.records import AccessKey
 from db.repositories import access_keys
 from service.context import Context
-from service.http import access, problems
+from service.http import access, origin, problems
 from service.http.access import CHALLENGE, EVERYTHING, PUBLIC_PATHS, Access, is_loopback
 from service.http.problems import INVALID_KEY, KEY_REQUIRED, MISDIRECTED_REQUEST, TOO_MANY_REQUESTS, Problem
 from service.http.rate_limit import RateLimit
@@ -111,9 +111,9 @@ class Gate:
         kind, _, text = connection.headers.get("authorization", "").partition(" ")
         if kind.lower() != "bearer":
             if self._needs_key(connection.scope):
-                detail = f"send an access key: Authorization: Bearer KEY; got {kind or 'no such header'}"
-                raise Problem(KEY_REQUIRED, detail, headers={"WWW-Authenticate": CHALLENGE})
+                raise Problem(KEY_REQUIRED, _key_needed(connection), headers={"WWW-Authenticate": CHALLENGE})
             _check_host(connection)
+            origin.check_site(connection)
             return EVERYTHING
         context: Context = connection.app.state.context
         try:
@@ -128,8 +128,15 @@ class Gate:
     def _needs_key(self, scope: Scope) -> bool:
         """Without a setting, all but those who are on this machine themselves, behind no proxy."""
         if self._settings.access == "auto":
-            return not _is_local(scope)
+            return not _is_local(scope) or origin.is_forwarded(scope)
         return self._settings.access == "keys"
+
+
+def _key_needed(connection: HTTPConnection) -> str:
+    """What to do, without a word of what the header says: it may be a key in the wrong form."""
+    sent = "another scheme was sent" if "authorization" in connection.headers else "no such header was sent"
+    passed = "; the request passed a proxy" if origin.is_forwarded(connection.scope) else ""
+    return f"send an access key: Authorization: Bearer KEY; {sent}{passed}"
 
 
 def _check_host(connection: HTTPConnection) -> None:
@@ -140,7 +147,7 @@ def _check_host(connection: HTTPConnection) -> None:
     host = connection.headers.get("host", "localhost")
     name = host.rpartition(":")[0] if re.search(r":\d*$", host) else host
     if _is_local(connection.scope) and not is_loopback(name.strip("[]").lower()):
-        allowed = "localhost or a loopback address; a proxy sends X-Forwarded-For or a key"
+        allowed = "localhost or a loopback address, or a request with a key"
         raise Problem.wrong_value(MISDIRECTED_REQUEST, "Host", host, allowed)
 
 

@@ -40,6 +40,7 @@ UPLOAD_INTERRUPTED = ProblemType("upload-interrupted", "The upload broke off", 4
 KEY_REQUIRED = ProblemType("key-required", "An access key is needed", 401)
 INVALID_KEY = ProblemType("invalid-key", "The access key is not valid", 401)
 INSUFFICIENT_SCOPE = ProblemType("insufficient-scope", "The access key does not allow this", 403)
+CROSS_SITE_REQUEST = ProblemType("cross-site-request", "The request is of another site's page", 403)
 UNKNOWN_ROUTE = ProblemType("unknown-route", "No such route", 404)
 UNKNOWN_MATERIAL = ProblemType("unknown-material", "No such material", 404)
 UNKNOWN_ALIAS = ProblemType("unknown-alias", "No such alias", 404)

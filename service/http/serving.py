@@ -24,6 +24,8 @@ def configuration(settings: Settings, **options: Any) -> uvicorn.Config:
         h11_max_incomplete_event_size=MOST_HEADER_BYTES,
         limit_concurrency=settings.max_connections,
         server_header=False,
+        proxy_headers=bool(settings.trusted_proxies),  # by default the server would believe any proxy on this machine,
+        forwarded_allow_ips=settings.trusted_proxies,  # or those of a variable that is not ours
         timeout_graceful_shutdown=max(1, math.ceil(settings.shutdown_seconds)),  # without it, clients hold the end up
         log_config=None,  # ours, service.observability: its logs, and in its metrics the record of each request
         access_log=False,

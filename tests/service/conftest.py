@@ -19,10 +19,11 @@ from fastapi import FastAPI
 from db.blobs import BlobStore
 from db.database import Database
 from db.records import NewModel
-from db.repositories import friction_models, jobs, materials
+from db.repositories import access_keys, friction_models, jobs, materials
 from service.app import create_app
 from service.context import Context
 from service.domain.model_cache import ModelCache
+from service.http import access
 from service.http.serving import configuration
 from service.observability import logs
 from service.settings import Settings
@@ -82,9 +83,10 @@ class Caller:
         ends = {"server": (self.server, 80), "client": (self.address, 50000)}
         scope = {"type": "websocket", "path": path, "raw_path": path.encode(), "query_string": b"", "headers": headers}
         sent: list[Any] = []
+        said = iter(["websocket.connect"])
 
         async def receive() -> dict[str, str]:
-            return {"type": "websocket.connect"}
+            return {"type": next(said, "websocket.disconnect")}
 
         async def send(message: Any) -> None:
             sent.append(message)
@@ -117,6 +119,19 @@ def reach(database: Database, blobs: BlobStore) -> Callable[..., Caller]:
         return Caller(app, server, address, {"Authorization": f"Bearer {key}"} if key else {})
 
     return client
+
+
+@pytest.fixture
+def make(database: Database) -> Callable[..., str]:
+    """Store an access key and return its text."""
+
+    def make_key(scope: str = "read") -> str:
+        key_id, text = access.new_key()
+        with database.write() as session:
+            access_keys.add(session, key_id, "robot", scope, access.digest(text))
+        return text
+
+    return make_key
 
 
 @pytest.fixture(scope="session")

@@ -25,17 +25,6 @@ Make = Callable[..., str]
 Reach = Callable[..., Any]
 
 
-@pytest.fixture
-def make(database: Database) -> Make:
-    def make_key(scope: str = "read") -> str:
-        key_id, text = access.new_key()
-        with database.write() as session:
-            access_keys.add(session, key_id, "robot", scope, access.digest(text))
-        return text
-
-    return make_key
-
-
 def knock(client: Any, route: str) -> httpx.Response:
     """The answer of a route to a request that is well-formed as far as anybody without the route's secrets knows."""
     method, _, path = route.partition(" ")
