@@ -2,13 +2,17 @@
 PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
+UV := $(BIN)/uv pip
 CACHE := .cache
 RECORDINGS := $(CACHE)/tac3d/PyTac3D/example_data
-TAC3D := pytac3d==3.3.0.9
+TAC3D := pytac3d==3.3.0.9 --hash=sha256:403db42faa530bf716d4acbb22ab3b51382750ed95dbbeaeb6e0c43024348865
+SHIPPED := $(CACHE)/shipped
 OUTPUT ?= demo-output
+RESOLUTION := --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
+    --no-emit-package stiction --no-emit-package stiction-client
 export UV_PYTHON_DOWNLOADS := never
 
-.PHONY: demo test test-long coverage lint types unit setup recordings constraints clean
+.PHONY: demo test test-long coverage lint types unit setup recordings constraints upgrade sbom notices clean
 
 demo: setup recordings  ## run the whole path on real input and write pictures and a report to $(OUTPUT)
 	$(BIN)/stiction demo --output $(OUTPUT) --recordings $(RECORDINGS)
@@ -40,8 +44,10 @@ $(VENV)/.installed: pyproject.toml clients/pyproject.toml constraints.txt
 	@echo "== setting up $(VENV) (about a minute the first time)"
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed: make PYTHON=..."; exit 1; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check --constraint constraints.txt uv
-	$(BIN)/uv pip install --quiet --compile-bytecode --python $(BIN)/python --constraint constraints.txt --editable ./clients --editable '.[test]'
+	@awk '/^[^ ]/ {wanted = /^uv==/} wanted' constraints.txt \
+	    | $(BIN)/pip install --quiet --disable-pip-version-check --require-hashes --requirement /dev/stdin
+	$(UV) install --quiet --python $(BIN)/python --compile-bytecode --require-hashes --requirement constraints.txt
+	$(UV) install --quiet --python $(BIN)/python --no-deps --no-build-isolation --editable ./clients --editable .
 	@echo "   compiling the kernels"
 	@$(BIN)/python -c 'import slipcore; slipcore.warm_up()' & compiling=$$!; \
 	    $(BIN)/python -c 'import estimators; estimators.warm_up()'; status=$$?; wait $$compiling && exit $$status
@@ -53,16 +59,31 @@ recordings: $(CACHE)/tac3d.tried
 $(CACHE)/tac3d.tried: | setup
 	@mkdir -p $(CACHE)/tac3d
 	@echo "== fetching the Tac3D example recordings"
-	@$(BIN)/pip download --quiet --disable-pip-version-check --no-deps --only-binary=:all: --python-version 3.11 \
-	    --dest $(CACHE)/tac3d $(TAC3D) \
+	@echo "$(TAC3D)" | $(BIN)/pip download --quiet --disable-pip-version-check --no-deps --only-binary=:all: \
+	    --python-version 3.11 --dest $(CACHE)/tac3d --require-hashes --requirement /dev/stdin \
 	    && $(BIN)/python -m zipfile -e $(CACHE)/tac3d/pytac3d-*.whl $(CACHE)/tac3d && touch $@ \
 	    || echo "   not to be had: real recordings are left out, and what needs them says so"
 
-constraints:  ## resolve the pins afresh
-	printf -- '-e ./clients\n-e .[test]\nuv\n' > $(CACHE)/requirements.in && cp $(CACHE)/requirements.in requirements.in
-	$(BIN)/uv pip compile --quiet --upgrade --no-header --no-annotate --no-emit-index-url \
-	    --no-emit-package stiction --no-emit-package stiction-client --python-version 3.11 requirements.in -o constraints.txt; \
-	    rm -f requirements.in
+constraints:  ## pin with hashes what pyproject.toml names and constraints.txt lacks; other pins stay
+	printf -- '-e ./clients\n-e .[test]\nsetuptools\nuv\n' | $(UV) compile --quiet $(RESOLUTION) - --output-file constraints.txt
+
+upgrade: RESOLUTION += --upgrade
+upgrade: constraints  ## resolve all pins afresh
+
+# What a service installs, without what only tests need: these are the packages that are passed on with it.
+$(SHIPPED)/.installed: $(VENV)/.installed
+	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(SHIPPED)
+	$(UV) install --quiet --python $(SHIPPED)/bin/python --constraint constraints.txt --build-constraint constraints.txt \
+	    --editable ./clients --editable '.[dask,formats,otel,postgresql,s3]'
+	rm -f $(SHIPPED)/lib/*/site-packages/*.dist-info/direct_url.json  # they tell where this was built
+	@touch $@
+
+sbom: $(SHIPPED)/.installed  ## write sbom.cdx.json, the software bill of materials (CycloneDX)
+	$(BIN)/cyclonedx-py environment $(SHIPPED)/bin/python --pyproject pyproject.toml --output-reproducible --output-file sbom.cdx.json
+
+notices: $(SHIPPED)/.installed  ## write THIRD-PARTY-NOTICES.txt, the licences of all that is installed with a service
+	$(BIN)/pip-licenses --python $(SHIPPED)/bin/python --from=mixed --format=plain-vertical --with-urls --with-license-file \
+	    --with-notice-file --no-license-path --ignore-packages stiction stiction-client --output-file THIRD-PARTY-NOTICES.txt
 
 clean:
-	rm -rf $(VENV) $(CACHE) demo-output .mypy_cache .ruff_cache .pytest_cache .coverage
+	rm -rf $(VENV) $(CACHE) demo-output sbom.cdx.json THIRD-PARTY-NOTICES.txt .mypy_cache .ruff_cache .pytest_cache .coverage
