@@ -1,13 +1,31 @@
 """Friction samples to friction models (samples → friction_model → material)."""
 
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 from estimators.errors import EstimatorError, InvalidSamples, TooFewSamples
-from estimators.fitting import fit, needs_samples
-from estimators.friction_model import Cost, Domain, FrictionModel
-from estimators.moments import Moments
-from estimators.not_converged import NotConverged
-from estimators.online import ChangeDetector
-from estimators.recognition import recognise
 from estimators.warm_up import warm_up
+
+if TYPE_CHECKING:
+    from estimators.fitting import fit, needs_samples
+    from estimators.friction_model import Cost, Domain, FrictionModel
+    from estimators.moments import Moments
+    from estimators.not_converged import NotConverged
+    from estimators.online import ChangeDetector
+    from estimators.recognition import recognise
+
+_LAZY = {
+    "fit": "estimators.fitting",
+    "needs_samples": "estimators.fitting",
+    "Cost": "estimators.friction_model",
+    "Domain": "estimators.friction_model",
+    "FrictionModel": "estimators.friction_model",
+    "Moments": "estimators.moments",
+    "NotConverged": "estimators.not_converged",
+    "ChangeDetector": "estimators.online",
+    "recognise": "estimators.recognition",
+}
+"""Names whose modules load scipy: who only handles errors, or passes models on, goes without."""
 
 __all__ = [
     "ChangeDetector",
@@ -24,3 +42,15 @@ __all__ = [
     "recognise",
     "warm_up",
 ]
+
+
+def __getattr__(name: str) -> object:
+    """A public name's module is loaded when the name is first asked for (PEP 562)."""
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_LAZY[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

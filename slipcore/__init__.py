@@ -1,6 +1,8 @@
 """Tactile frames to friction samples: numerics only (frames → strain → events → slip_state → samples)."""
 
-from slipcore.batch import Hindsight, collect_history, detect_slip
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 from slipcore.defaults import (
     LOOKAHEAD,
     FilterOptions,
@@ -10,14 +12,27 @@ from slipcore.defaults import (
     StrainRateOptions,
     describe_options,
 )
-from slipcore.detector import DetectorState, SlipDetector
 from slipcore.element_forces import ElementForces, contact_factor, element_forces, stick_ratio
 from slipcore.errors import InvalidInput, NoForces, SlipcoreError, UnknownScale
 from slipcore.frames import Frame, FrictionLaw, GraspLog, GroundTruth
-from slipcore.methods import METHODS
 from slipcore.samples import FrictionSamples, collect_samples
 from slipcore.slip_state import EventList, SlipEvents, SlipHistory, SlipState
 from slipcore.warm_up import warm_up
+
+if TYPE_CHECKING:
+    from slipcore.batch import Hindsight, collect_history, detect_slip
+    from slipcore.detector import DetectorState, SlipDetector
+    from slipcore.methods import METHODS
+
+_LAZY = {
+    "Hindsight": "slipcore.batch",
+    "collect_history": "slipcore.batch",
+    "detect_slip": "slipcore.batch",
+    "DetectorState": "slipcore.detector",
+    "SlipDetector": "slipcore.detector",
+    "METHODS": "slipcore.methods",
+}
+"""Names whose modules load compiled kernels, a second of work: who only holds logs and results goes without."""
 
 __all__ = [
     "LOOKAHEAD",
@@ -53,3 +68,15 @@ __all__ = [
     "stick_ratio",
     "warm_up",
 ]
+
+
+def __getattr__(name: str) -> object:
+    """A public name's module is loaded when the name is first asked for (PEP 562)."""
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(_LAZY[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

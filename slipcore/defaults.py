@@ -270,6 +270,17 @@ class SampleOptions(Options):
     """Least probability of slip."""
 
 
+METHOD_NAMES = (
+    "filter",
+    "strain_rate",
+    "strain_rate_literal",
+    "rigid_fit",
+    "local_deformation",
+    "deformation_gradient",
+    "force_ratio",
+    "strain_threshold",
+)
+"""The methods of detection, for who offers them without loading their kernels (``slipcore.METHODS`` does)."""
 DEFAULT_METHOD = "filter"
 LOOKAHEAD = 2
 """Frames after it that a frame of a stored log is decided by; more than two gains little (tuning scenes)."""

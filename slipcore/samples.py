@@ -11,8 +11,6 @@ from slipcore.defaults import SampleOptions, choose_options
 from slipcore.element_forces import ElementForces, element_forces
 from slipcore.errors import InvalidInput, NoForces, UnknownScale
 from slipcore.frames import BoolArray, FloatArray, GraspLog
-from slipcore.kernels.surface import surface_normals
-from slipcore.noise import estimate_noise
 from slipcore.slip_state import SlipHistory
 from slipcore.strain import Lattice
 
@@ -140,6 +138,8 @@ def normals_of(log: GraspLog) -> FloatArray:
     """Outward normals [t, n, m, 3] of a log, from the deformed shape where it has none."""
     if log.normal is not None:
         return log.normal
+    from slipcore.kernels.surface import surface_normals  # compiled: who only holds samples goes without
+
     lattice = Lattice.at_rest(log.position)
     normals = np.empty_like(log.displacement)
     for displacement, normal in zip(log.displacement, normals, strict=True):
@@ -189,6 +189,8 @@ class _ForceNoise(NamedTuple):
 def _force_noise(log: GraspLog, forces: ElementForces, options: SampleOptions) -> _ForceNoise:
     if not np.isnan(options.force_noise):
         return _ForceNoise(options.force_noise, options.force_noise)
+    from slipcore.noise import estimate_noise  # compiled, as above
+
     assert log.force is not None
     plane = log.force[..., :2].reshape(len(log), -1, 2).swapaxes(1, 2)
     normal = estimate_noise(log.time, forces.pressing.reshape(len(log), 1, -1))

@@ -4,14 +4,15 @@ import time
 
 import numpy as np
 
-from slipcore.batch import detect_slip
 from slipcore.frames import GraspLog
-from slipcore.methods import METHODS
 
 
 def warm_up() -> float:
     """Compile the kernels, or load them from the cache beside the package; seconds that it took."""
     began = time.perf_counter()
+    from slipcore.batch import detect_slip
+    from slipcore.methods import METHODS
+
     axis = 1e-3 * np.arange(3.0)
     position = np.stack([*np.meshgrid(axis, axis, indexing="ij"), np.zeros((3, 3))], axis=-1)
     force = np.broadcast_to([0.0, 0.0, -0.1], (2, *position.shape))

@@ -1,7 +1,9 @@
 """The shape of the house: which package may import which, and who owns each."""
 
 import ast
+import importlib
 import importlib.metadata
+import subprocess
 import sys
 from pathlib import Path
 
@@ -20,6 +22,10 @@ ALLOWED = {
 
 OPTIONAL = {f"{CLIENT}/stream.py": {"websockets", "msgspec"}}
 """What a module needs that nothing else imports: an extra brings it."""
+
+
+NUMERICS = {"numba", "scipy", "statsmodels", "emcee", "pandas"}
+"""What the server process does without until a request needs it: half of its memory, and half of its start."""
 
 
 def imported_modules(path: Path) -> set[str]:
@@ -85,6 +91,25 @@ def test_each_import_package_has_one_owner(package: str) -> None:
     owners = importlib.metadata.packages_distributions().get(package, [])
     expected = "stiction-client" if package == "stiction_client" else "stiction"
     assert set(owners) == {expected}
+
+
+def test_the_server_starts_without_the_numerics() -> None:
+    script = (
+        "import sys; from service.app import create_app; create_app();"
+        f"print({NUMERICS} & {{name.split('.')[0] for name in sys.modules}},"
+        "[name for name in sys.modules if name.startswith(('slipcore.kernels', 'slipcore.contact'))])"
+    )
+    answer = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert answer.stdout == "set() []\n"
+
+
+@pytest.mark.parametrize("package", ["slipcore", "estimators", "stiction_client"])
+def test_every_public_name_is_there(package: str) -> None:
+    module = importlib.import_module(package)
+    assert all(getattr(module, name) is not None for name in module.__all__)
+    assert set(module.__all__) <= set(dir(module))
+    with pytest.raises(AttributeError, match="'unheard_of'"):
+        module.unheard_of  # noqa: B018
 
 
 def test_no_file_names_a_package_registry_or_this_machine() -> None:

@@ -7,14 +7,16 @@ import time
 from collections import OrderedDict
 from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from db.database import Database
 from db.records import StoredModel
 from db.repositories import friction_models, materials
-from estimators.friction_model import FrictionModel
 from service.domain.stored_results import to_friction_model
 from service.http.problems import NO_MODEL, Problem
+
+if TYPE_CHECKING:
+    from estimators import FrictionModel
 
 MOST = 10_000
 """Models kept, each about 2 kB; when there are more, all are read anew."""
@@ -33,7 +35,7 @@ class KnownModel:
     """
 
     stored: StoredModel
-    model: FrictionModel
+    model: "FrictionModel"
     tag: str
     read_at: float
     until: float

@@ -3,13 +3,15 @@
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 import estimators
+import stiction_client
 from db.records import StoredModel
 from db.repositories import friction_models, grasp_logs, materials
-from estimators import EstimatorError, Moments
+from estimators.errors import EstimatorError
 from service.context import Context
 from service.domain.look_up import OUTDATED
 from service.domain.stored_results import decode_samples, to_friction_model
@@ -24,7 +26,10 @@ from service.http.schemas import (
     SamplesIn,
 )
 from slipcore import FrictionSamples
-from stiction_client import FrictionModel, InvalidArgument, NoFeasibleForce, required_normal_force
+from stiction_client.errors import InvalidArgument, NoFeasibleForce
+
+if TYPE_CHECKING:
+    from estimators import Moments
 
 MOST_CANDIDATES = 100
 """Materials compared in one answer, which keeps one thread of the server busy for 0.15 ms each."""
@@ -34,9 +39,9 @@ def grasp_force(context: Context, wish: NewGraspForce) -> GraspForceOut:
     """The smallest normal force that holds; raises ``Problem`` where none does, and ``NotFound``."""
     known = context.models.fresh(wish.material, wish.method)
     known = known or context.models.read(context.database, wish.material, wish.method)
-    model = FrictionModel.from_json(FrictionModelOut.of(known.stored).model_dump(mode="json"))
+    model = stiction_client.FrictionModel.from_json(FrictionModelOut.of(known.stored).model_dump(mode="json"))
     try:
-        answer = required_normal_force(
+        answer = stiction_client.required_normal_force(
             model,
             wish.tangential_load,
             wish.slip_probability,
@@ -93,7 +98,7 @@ def _candidates(context: Context, names: Sequence[str] | None, method: str) -> l
     return found
 
 
-def _samples(context: Context, wish: NewRecognition) -> FrictionSamples | Moments:
+def _samples(context: Context, wish: NewRecognition) -> "FrictionSamples | Moments":
     """What is known of the grasp; the moments of a stored one say all that is asked, whatever its length."""
     if wish.samples is not None:
         return _given(wish.samples)
@@ -104,7 +109,7 @@ def _samples(context: Context, wish: NewRecognition) -> FrictionSamples | Moment
     if log.samples.none_because is not None:
         raise Problem(INVALID_SAMPLES, log.samples.none_because)
     if log.samples.moments is not None:
-        return Moments.from_bytes(log.samples.moments)
+        return estimators.Moments.from_bytes(log.samples.moments)
     return decode_samples(context.blobs.path(log.samples.samples_blob))
 
 

@@ -5,18 +5,20 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+import estimators
 from db.records import Detection, NewModel, SampleSummary
-from estimators import Moments
-from estimators.friction_model import Cost, Domain, FrictionModel
 from service.formats.npy import HEADER_LOCK
 from slipcore.frames import FloatArray
 from slipcore.samples import FrictionSamples
 from slipcore.slip_state import EventList, SlipEvents, SlipHistory
+
+if TYPE_CHECKING:
+    from estimators import FrictionModel
 
 EVENT_KINDS = ("onset", "end", "touch", "release")
 SAMPLE_ARRAYS = tuple(entry.name for entry in fields(FrictionSamples) if entry.name != "element_area")
@@ -84,11 +86,11 @@ def summarise_samples(samples: FrictionSamples, none_because: str | None, blob: 
         tangential_velocity=_range(samples.tangential_velocity),
         normal_force=_range(samples.normal_force),
         samples_blob=blob,
-        moments=Moments.from_samples(samples).to_bytes() if len(samples) else None,
+        moments=estimators.Moments.from_samples(samples).to_bytes() if len(samples) else None,
     )
 
 
-def to_new_model(model: FrictionModel) -> NewModel:
+def to_new_model(model: "FrictionModel") -> NewModel:
     """A fitted model as it is stored."""
     return NewModel(
         method=model.method,
@@ -108,9 +110,9 @@ def to_new_model(model: FrictionModel) -> NewModel:
     )
 
 
-def to_friction_model(stored: NewModel) -> FrictionModel:
+def to_friction_model(stored: NewModel) -> "FrictionModel":
     """A stored model as one that predicts; its draws are not kept."""
-    return FrictionModel(
+    return estimators.FrictionModel(
         method=stored.method,
         coefficients=np.array(stored.coefficients),
         covariance=np.array(stored.covariance),
@@ -118,10 +120,10 @@ def to_friction_model(stored: NewModel) -> FrictionModel:
         n=stored.n,
         degrees_of_freedom=_or_infinite(stored.degrees_of_freedom),
         scatter_degrees_of_freedom=_or_infinite(stored.scatter_degrees_of_freedom),
-        domain=Domain(stored.tangential_velocity, stored.normal_force),
+        domain=estimators.Domain(stored.tangential_velocity, stored.normal_force),
         identifiable=np.array(stored.identifiable),
         element_area=stored.element_area,
-        cost=Cost(stored.cost_seconds, stored.monte_carlo_error),
+        cost=estimators.Cost(stored.cost_seconds, stored.monte_carlo_error),
     )
 
 

@@ -24,8 +24,8 @@ from service.http.problems import (
 )
 from service.http.schemas import GraspLogOut
 from service.jobs.queueing import queue
+from slipcore.defaults import METHOD_NAMES
 from slipcore.errors import InvalidInput
-from slipcore.methods import METHODS
 
 LONGEST_SENSOR_NAME = 200
 
@@ -84,8 +84,8 @@ async def store_made(context: Context, spool: Spool, found: Description, wish: W
 
 def _check(context: Context, wish: Wish) -> int | None:
     """What can be told before the bytes are there; returns the material's key."""
-    if wish.detector not in METHODS:
-        raise Problem.wrong_value(INVALID_REQUEST, "detector", wish.detector, ", ".join(METHODS))
+    if wish.detector not in METHOD_NAMES:
+        raise Problem.wrong_value(INVALID_REQUEST, "detector", wish.detector, ", ".join(METHOD_NAMES))
     try:
         formats.parse_mapping(wish.settings)
     except InvalidInput as error:

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from service.formats.npy import MAX_ARRAY_BYTES
 from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray, GraspLog
-from slipcore.markers import on_lattice
 
 ALIASES = {
     "time": "time", "frame": "frame", "marker": "marker", "particle": "marker", "id": "marker", "track_id": "marker",
@@ -245,6 +244,8 @@ def _grasp_log(tracks: Tracks, settings: Mapping[str, str], ignored: tuple[str, 
     else:
         scale = ASSUMED_WIDTH / max(float(np.ptp(place[0, :, :2], axis=0).max()), 1e-300)
         metadata |= {"scale": "unknown", "assumed_scale": f"{scale:.6g} m per pixel"}
+    from slipcore.markers import on_lattice  # loads scipy.spatial, which whoever only looks what a file is does without
+
     contact = tracks.contact
     if contact is None and not tracks.has_height:
         contact, metadata["contact"] = np.ones(tracks.place.shape[:2], bool), "assumed: every marker"

@@ -6,27 +6,22 @@ from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+import estimators
+import slipcore
 from db.blobs import disk_errors_named
 from estimators.errors import EstimatorError
-from estimators.moments import Moments
 from service.formats.reading import Description, describe
-from slipcore import (
-    DetectorState,
-    Frame,
-    FrictionSamples,
-    GraspLog,
-    InvalidInput,
-    SlipDetector,
-    SlipState,
-    collect_history,
-    collect_samples,
-)
+from slipcore import Frame, FrictionSamples, GraspLog, InvalidInput, SlipState, collect_samples
 from stiction_client import container
+
+if TYPE_CHECKING:
+    from estimators import Moments
+    from slipcore import DetectorState, SlipDetector
 
 logger = logging.getLogger(__name__)
 
@@ -46,10 +41,10 @@ Numbers = bytes | Sequence[Any]
 class Session:
     """A running detector with what it saw: the last frames and answers, all frames if they are ``kept``."""
 
-    detector: SlipDetector
+    detector: "SlipDetector"
     position: NDArray[np.float64]
     element_area: float
-    moments: Moments
+    moments: "Moments"
     kept: list[Frame] | None
     frames: list[Frame] = field(default_factory=list)
     answers: list[SlipState] = field(default_factory=list)
@@ -72,8 +67,8 @@ def open_session(name: str, position: Numbers, grid: tuple[int, int], area: floa
     if not 0 < rows * columns <= MAX_MARKERS or rows < 1:
         raise InvalidInput("grid", list(grid), f"1 to {MAX_MARKERS} markers")
     at_rest = _array("position", position, (rows, columns, 3))
-    detector = SlipDetector(at_rest, area, method)
-    _SESSIONS[name] = Session(detector, at_rest, area, Moments.empty(area), [] if keep else None)
+    detector = slipcore.SlipDetector(at_rest, area, method)
+    _SESSIONS[name] = Session(detector, at_rest, area, estimators.Moments.empty(area), [] if keep else None)
 
 
 def step(
@@ -152,26 +147,26 @@ def _plan_look(session: Session, frame: Frame, state: SlipState) -> None:
         session.look = _LOOKS.submit(_look, session, *given)
 
 
-def _look(session: Session, frames: list[Frame], answers: list[SlipState], state: DetectorState) -> None:
+def _look(session: Session, frames: list[Frame], answers: list[SlipState], state: "DetectorState") -> None:
     try:
         _find_friction(session, frames, answers, state)
     except Exception:  # costs the stream this second's friction, and nothing else
         logger.exception("a look for friction failed")
 
 
-def _find_friction(session: Session, frames: list[Frame], answers: list[SlipState], state: DetectorState) -> None:
+def _find_friction(session: Session, frames: list[Frame], answers: list[SlipState], state: "DetectorState") -> None:
     """The samples since the last look, merged with those before."""
-    samples = collect_samples(_log(session, frames, "", {}), collect_history(answers, state))
+    samples = collect_samples(_log(session, frames, "", {}), slipcore.collect_history(answers, state))
     end = frames[-1].time  # which has no next frame yet, so it is the next look's
     new = (samples.time >= session.looked_until) & (samples.time < end)
     session.looked_until = end
     part = {entry.name: getattr(samples, entry.name)[new] for entry in fields(samples) if entry.name != "element_area"}
     found = FrictionSamples(**part, element_area=samples.element_area)
-    session.moments = session.moments.merge(Moments.from_samples(found))
+    session.moments = session.moments.merge(estimators.Moments.from_samples(found))
     session.friction = _fitted(session.moments)
 
 
-def _fitted(moments: Moments) -> dict[str, Any] | None:
+def _fitted(moments: "Moments") -> dict[str, Any] | None:
     try:
         model = moments.fit()
     except EstimatorError:  # too few samples yet

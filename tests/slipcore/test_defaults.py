@@ -3,7 +3,7 @@ from dataclasses import fields
 import pytest
 
 from slipcore import METHODS, InvalidInput, SampleOptions, describe_options
-from slipcore.defaults import Options, choose_options
+from slipcore.defaults import METHOD_NAMES, Options, choose_options
 
 KINDS = [SampleOptions, *(method.options for method in METHODS.values())]
 
@@ -28,3 +28,7 @@ def test_ends_of_the_range_are_allowed_and_what_lies_beyond_is_refused(kind: typ
             assert getattr(choose_options(kind, {name: int(value) if whole else value}), name) == value
         with pytest.raises(InvalidInput, match=name):
             choose_options(kind, {name: int(option.high) + 1 if whole else option.high * 1.001})
+
+
+def test_the_names_of_the_methods_are_those_of_the_table() -> None:
+    assert tuple(METHODS) == METHOD_NAMES

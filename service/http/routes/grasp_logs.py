@@ -35,8 +35,7 @@ from service.http.problems import (
 )
 from service.http.routes.common import problems
 from service.http.schemas import EventsOfOneKind, EventsOut, GraspLogOut, GraspLogsOut, SamplesOut, StickRatioOut
-from slipcore.defaults import DEFAULT_METHOD
-from slipcore.methods import METHODS
+from slipcore.defaults import DEFAULT_METHOD, METHOD_NAMES
 
 router = APIRouter(prefix="/v1/grasp-logs", tags=["grasp logs"])
 
@@ -92,7 +91,7 @@ async def create_grasp_log(
     ] = None,
     sensor: Annotated[str | None, Query(description="In place of the sensor that the log names")] = None,
     detector: Annotated[
-        str, Query(description="Method of detection", json_schema_extra={"enum": list(METHODS)})
+        str, Query(description="Method of detection", json_schema_extra={"enum": list(METHOD_NAMES)})
     ] = DEFAULT_METHOD,
     scale: Annotated[
         float | None, Query(description="Of tracked markers: m per pixel", ge=SCALE[0], le=SCALE[1])
