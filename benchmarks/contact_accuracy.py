@@ -18,17 +18,17 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from slipcore.contact import reference
-from slipcore.contact.accuracy import difference, simulate_to
-from slipcore.contact.boundary_elements import Fidelity, run
-from slipcore.contact.grid import Grid
-from slipcore.contact.kernels import HalfSpace
-from slipcore.contact.normal import solve_normal
-from slipcore.contact.operator import Operators
-from slipcore.contact.problem import Problem, StepLoad
-from slipcore.contact.quasi_static import QuasiStatic, StepResult
+from slipcore.contact.elasticity.grid import Grid
+from slipcore.contact.elasticity.influence import HalfSpace
+from slipcore.contact.elasticity.operator import Operators
 from slipcore.contact.reference.mindlin_deresiewicz import MindlinDeresiewicz
 from slipcore.contact.reference.torsion import TorsionPartialSlip, sliding_moment
 from slipcore.contact.scene import Scene
+from slipcore.contact.solver.normal import solve_normal
+from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
+from slipcore.contact.tiers.accuracy import difference, simulate_to
+from slipcore.contact.tiers.boundary_elements import Fidelity, run
 from slipcore.frames import FloatArray
 
 FRICTION, RADIUS, FORCE, YOUNG = 0.4, 15e-3, 10.0, 1e6

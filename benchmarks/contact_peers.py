@@ -24,14 +24,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
-from slipcore.contact.grid import Grid, bounding_box
-from slipcore.contact.kernels import HalfSpace
-from slipcore.contact.normal import solve_normal
-from slipcore.contact.operator import Operators
+from slipcore.contact.elasticity.grid import Grid, bounding_box
+from slipcore.contact.elasticity.influence import HalfSpace
+from slipcore.contact.elasticity.operator import Operators
 from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
 from slipcore.contact.reference.elastic_pair import half_space
 from slipcore.contact.reference.hertz import HertzContact
-from slipcore.contact.tangential import Control, solve_tangential
+from slipcore.contact.solver.normal import solve_normal
+from slipcore.contact.solver.tangential import Control, solve_tangential
 from slipcore.frames import FloatArray
 
 OURS = "Stiction"

@@ -16,14 +16,13 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from slipcore.contact import boundary_elements
-from slipcore.contact.accuracy import difference, simulate_to
-from slipcore.contact.boundary_elements import Fidelity
 from slipcore.contact.effects import LoadPath, SensorSampling, SphereSurface
-from slipcore.contact.plan import Plan
-from slipcore.contact.sampling import frame_times
+from slipcore.contact.plan.plan import Plan
 from slipcore.contact.scene import Finger, Press, Scene, library
-from slipcore.contact.tiers import closed_form
+from slipcore.contact.tiers import boundary_elements, closed_form
+from slipcore.contact.tiers.accuracy import difference, simulate_to
+from slipcore.contact.tiers.boundary_elements import Fidelity
+from slipcore.contact.tiers.sampling import frame_times
 from slipcore.frames import GraspLog
 
 ASKED = (0.1, 0.05, 0.02, 0.01)

@@ -19,14 +19,14 @@ from pathlib import Path
 import numpy as np
 
 from slipcore.contact import simulate
-from slipcore.contact.boundary_elements import Fidelity
-from slipcore.contact.grid import Grid
-from slipcore.contact.kernels import HalfSpace
-from slipcore.contact.normal import solve_normal
-from slipcore.contact.operator import Count, ElasticOperator, Operators
-from slipcore.contact.problem import Problem, StepLoad
-from slipcore.contact.quasi_static import QuasiStatic, StepResult
+from slipcore.contact.elasticity.grid import Grid
+from slipcore.contact.elasticity.influence import HalfSpace
+from slipcore.contact.elasticity.operator import Count, ElasticOperator, Operators
 from slipcore.contact.scene import Scene
+from slipcore.contact.solver.normal import solve_normal
+from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
+from slipcore.contact.tiers.boundary_elements import Fidelity
 
 YOUNG, RADIUS, FORCE, FRICTION = 1e6, 15e-3, 10.0, 0.4
 STEPS, LARGEST = 50, 3.96

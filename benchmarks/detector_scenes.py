@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 
 from slipcore import FrictionLaw, GraspLog, GroundTruth
-from slipcore.contact.boundary_elements import Fidelity
 from slipcore.contact.effects import (
     CylinderSurface,
     ElasticObject,
@@ -35,8 +34,8 @@ from slipcore.contact.effects import (
     Viscoelasticity,
     WavySurface,
 )
-from slipcore.contact.scene import Finger, Press, Scene
-from slipcore.contact.simulate import simulate
+from slipcore.contact.scene import Finger, Press, Scene, simulate
+from slipcore.contact.tiers.boundary_elements import Fidelity
 
 CACHE = Path(".cache/detector_scenes")
 REFERENCES = Path("../shared/data/contact")

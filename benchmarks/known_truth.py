@@ -19,9 +19,9 @@ from benchmarks.detector_scenes import PITCH, simulated
 from estimators import EstimatorError, fit
 from slipcore import LOOKAHEAD, FrictionSamples, GraspLog, collect_samples, detect_slip
 from slipcore.contact import tangential_ramp
-from slipcore.contact.boundary_elements import Fidelity
 from slipcore.contact.effects import ObjectMotion, PressureFriction, SensorSampling, VelocityFriction
 from slipcore.contact.scene import Finger, Press, Scene
+from slipcore.contact.tiers.boundary_elements import Fidelity
 
 FRICTION = (0.25, 0.45, 0.8)
 NORMAL_FORCES = (4.0, 6.0, 9.0, 13.0)

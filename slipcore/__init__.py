@@ -20,17 +20,17 @@ from slipcore.slip_state import EventList, SlipEvents, SlipHistory, SlipState
 from slipcore.warm_up import warm_up
 
 if TYPE_CHECKING:
-    from slipcore.batch import Hindsight, collect_history, detect_slip
-    from slipcore.detector import DetectorState, SlipDetector
-    from slipcore.methods import METHODS
+    from slipcore.detection.batch import Hindsight, collect_history, detect_slip
+    from slipcore.detection.detector import DetectorState, SlipDetector
+    from slipcore.detection.methods import METHODS
 
 _LAZY = {
-    "Hindsight": "slipcore.batch",
-    "collect_history": "slipcore.batch",
-    "detect_slip": "slipcore.batch",
-    "DetectorState": "slipcore.detector",
-    "SlipDetector": "slipcore.detector",
-    "METHODS": "slipcore.methods",
+    "Hindsight": "slipcore.detection.batch",
+    "collect_history": "slipcore.detection.batch",
+    "detect_slip": "slipcore.detection.batch",
+    "DetectorState": "slipcore.detection.detector",
+    "SlipDetector": "slipcore.detection.detector",
+    "METHODS": "slipcore.detection.methods",
 }
 """Names whose modules load compiled kernels, a second of work: who only holds logs and results goes without."""
 

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import binary_dilation, generate_binary_structure
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
+from slipcore.detection.shared.strain import lattice_steps
 from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray, GraspLog
-from slipcore.strain import lattice_steps
 
 REACH = 2.0
 """A lost marker moves on as those do that lie within so many mean distances: about twelve."""

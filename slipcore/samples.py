@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipcore.defaults import SampleOptions, choose_options
+from slipcore.detection.shared.strain import Lattice
 from slipcore.element_forces import ElementForces, element_forces
 from slipcore.errors import InvalidInput, NoForces, UnknownScale
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.slip_state import SlipHistory
-from slipcore.strain import Lattice
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -138,7 +138,6 @@ def normals_of(log: GraspLog) -> FloatArray:
     """Outward normals [t, n, m, 3] of a log, from the deformed shape where it has none."""
     if log.normal is not None:
         return log.normal
-    from slipcore.kernels.surface import surface_normals  # compiled: who only holds samples goes without
 
     lattice = Lattice.at_rest(log.position)
     normals = np.empty_like(log.displacement)
@@ -189,7 +188,6 @@ class _ForceNoise(NamedTuple):
 def _force_noise(log: GraspLog, forces: ElementForces, options: SampleOptions) -> _ForceNoise:
     if not np.isnan(options.force_noise):
         return _ForceNoise(options.force_noise, options.force_noise)
-    from slipcore.noise import estimate_noise  # compiled, as above
 
     assert log.force is not None
     plane = log.force[..., :2].reshape(len(log), -1, 2).swapaxes(1, 2)

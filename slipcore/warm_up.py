@@ -10,8 +10,8 @@ from slipcore.frames import GraspLog
 def warm_up() -> float:
     """Compile the kernels, or load them from the cache beside the package; seconds that it took."""
     began = time.perf_counter()
-    from slipcore.batch import detect_slip
-    from slipcore.methods import METHODS
+    from slipcore.detection.batch import detect_slip
+    from slipcore.detection.methods import METHODS
 
     axis = 1e-3 * np.arange(3.0)
     position = np.stack([*np.meshgrid(axis, axis, indexing="ij"), np.zeros((3, 3))], axis=-1)

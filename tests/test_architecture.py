@@ -97,7 +97,7 @@ def test_the_server_starts_without_the_numerics() -> None:
     script = (
         "import sys; from service.app import create_app; create_app();"
         f"print({NUMERICS} & {{name.split('.')[0] for name in sys.modules}},"
-        "[name for name in sys.modules if name.startswith(('slipcore.kernels', 'slipcore.contact'))])"
+        "[name for name in sys.modules if name.startswith(('slipcore.detection.shared.comp', 'slipcore.contact'))])"
     )
     answer = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT)
     assert answer.stdout == "set() []\n"

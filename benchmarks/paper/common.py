@@ -11,10 +11,17 @@ from matplotlib.figure import Figure
 from benchmarks.detector_scenes import simulated
 from slipcore import GraspLog, GroundTruth, SlipHistory, detect_slip
 from slipcore.contact.effects import ForceNoise, MarkerNoise, SensorSampling
-from slipcore.contact.plan import Effect
+from slipcore.contact.plan.plan import Effect
 from slipcore.contact.scene import Scene
+from slipcore.detection.shared.strain import (
+    Lattice,
+    displacement_gradient,
+    frobenius,
+    green_lagrange,
+    lattice_steps,
+    signed_rate,
+)
 from slipcore.frames import BoolArray, FloatArray
-from slipcore.strain import Lattice, displacement_gradient, frobenius, green_lagrange, lattice_steps, signed_rate
 
 METHODS = ("filter", "strain_rate", "strain_rate_literal")
 COLOURS = {"filter": "#2b6cb0", "strain_rate": "#dd6b20", "strain_rate_literal": "#805ad5", "truth": "#1a202c"}

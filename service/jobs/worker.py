@@ -31,10 +31,10 @@ def warm_up() -> None:
     import estimators
     import slipcore
     from service.jobs import pipeline
-    from slipcore.contact import ramp
+    from slipcore.contact import tangential_ramp
 
     try:
-        log = ramp.tangential_ramp(points=8, pitch=1.5e-3)
+        log = tangential_ramp(points=8, pitch=1.5e-3)
         estimators.fit(slipcore.collect_samples(log, slipcore.detect_slip(log)), method="ols")
         estimators.warm_up()
     except Exception:

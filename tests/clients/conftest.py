@@ -16,7 +16,7 @@ import stiction_client.flows
 from service.app import create_app
 from service.settings import Settings
 from slipcore import GraspLog
-from slipcore.contact.ramp import RampSchedule, tangential_ramp
+from slipcore.contact.tiers.ramp import RampSchedule, tangential_ramp
 from stiction_client import AsyncFrictionClient, Cost, Domain, FrictionClient, FrictionModel
 
 MODEL = {

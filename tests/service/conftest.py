@@ -28,7 +28,7 @@ from service.http.serving import configuration
 from service.observability import logs
 from service.settings import Settings
 from slipcore import GraspLog
-from slipcore.contact.ramp import RampSchedule, tangential_ramp
+from slipcore.contact.tiers.ramp import RampSchedule, tangential_ramp
 from stiction_client.container import encode
 
 NPZ = "application/vnd.stiction.grasp-log+npz"

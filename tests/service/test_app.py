@@ -25,7 +25,7 @@ from db.tables import FrictionModelRow, JobRow
 from service.app import create_app, running
 from service.jobs.lanes import ProcessLane
 from service.settings import Settings
-from slipcore.contact.ramp import tangential_ramp
+from slipcore.contact.tiers.ramp import tangential_ramp
 from stiction_client.container import encode
 
 Serving = Callable[[Settings], AbstractContextManager[httpx.Client]]

@@ -20,7 +20,7 @@ from service.cli.output import plain
 from service.demo.server import running_server
 from service.settings import Settings
 from slipcore.contact import tangential_ramp
-from slipcore.contact.ramp import RampSchedule
+from slipcore.contact.tiers.ramp import RampSchedule
 from stiction_client import container
 
 WRONG_USAGE = 2

@@ -26,7 +26,7 @@ from slipcore.contact.effects.tangential_load import TangentialLoad
 from slipcore.contact.effects.torsion import Torsion
 from slipcore.contact.effects.velocity_friction import VelocityFriction
 from slipcore.contact.effects.viscoelasticity import Viscoelasticity
-from slipcore.contact.plan import Effect
+from slipcore.contact.plan.plan import Effect
 
 EFFECTS: dict[str, type[Effect]] = {
     kind.__name__: kind

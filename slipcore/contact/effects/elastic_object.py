@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from slipcore.contact.kernels import HalfSpace, Opposite
-from slipcore.contact.plan import Plan
+from slipcore.contact.elasticity.influence import HalfSpace, Opposite
+from slipcore.contact.plan.plan import Plan
 from slipcore.errors import InvalidInput
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from slipcore.contact.effects.load_path import repeated
-from slipcore.contact.plan import Channel, History, Plan
+from slipcore.contact.plan.plan import Channel, History, Plan
 
 
 @dataclass(frozen=True, slots=True)

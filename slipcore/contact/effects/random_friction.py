@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from slipcore.contact.plan import Plan
+from slipcore.contact.plan.plan import Plan
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray
 

@@ -6,8 +6,8 @@ from typing import ClassVar
 import numpy as np
 from scipy import interpolate
 
-from slipcore.contact.plan import Plan
-from slipcore.contact.problem import HeightField
+from slipcore.contact.plan.plan import Plan
+from slipcore.contact.solver.problem import HeightField
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from slipcore.contact.plan import Plan
+from slipcore.contact.plan.plan import Plan
 from slipcore.frames import FloatArray
 
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from slipcore.contact.plan import Plan
-from slipcore.contact.problem import MaxwellBranch
+from slipcore.contact.plan.plan import Plan
+from slipcore.contact.solver.problem import MaxwellBranch
 from slipcore.errors import InvalidInput
 
 

@@ -10,15 +10,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from slipcore.contact import boundary_elements
-from slipcore.contact.boundary_elements import ROOM, Fidelity, contact_reach
-from slipcore.contact.grid import Grid
-from slipcore.contact.kernels import Component, ElasticBody
-from slipcore.contact.normal import solve_normal
-from slipcore.contact.operator import Operators
-from slipcore.contact.plan import Plan
-from slipcore.contact.sampling import lattice
-from slipcore.contact.scene import Scene
+from slipcore.contact.elasticity.grid import Grid
+from slipcore.contact.elasticity.influence import Component, ElasticBody
+from slipcore.contact.elasticity.operator import Operators
+from slipcore.contact.plan.description import SceneDescription
+from slipcore.contact.plan.plan import Plan
+from slipcore.contact.solver.normal import solve_normal
+from slipcore.contact.tiers import boundary_elements
+from slipcore.contact.tiers.boundary_elements import ROOM, Fidelity, contact_reach
+from slipcore.contact.tiers.sampling import lattice
 from slipcore.frames import FloatArray, GraspLog
 
 NAME = "beams"
@@ -54,14 +54,14 @@ class Beams:
         return np.ascontiguousarray(np.fft.ifft2(1.0 / stiffness).real[:ny, :nx])
 
 
-def accuracy(scene: Scene, plan: Plan) -> float | None:  # noqa: ARG001 - as every tier is called
+def accuracy(scene: SceneDescription, plan: Plan) -> float | None:  # noqa: ARG001 - as every tier is called
     """Largest error to expect; None for a scene with something that beams do not have."""
     problem = plan.problem
     lacking = (problem.obstacle, problem.creep, problem.coupled, problem.spread)
     return None if any(lacking) or plan.sampling is None else ACCURACY
 
 
-def run(scene: Scene, plan: Plan) -> GraspLog:  # noqa: ARG001 - as every tier is called
+def run(scene: SceneDescription, plan: Plan) -> GraspLog:  # noqa: ARG001 - as every tier is called
     """Simulate a scene with beams in place of the bodies' tangential compliance."""
     beams = fitted(plan)
     problem = replace(plan.problem, finger=(beams,))

@@ -12,13 +12,13 @@ import numpy as np
 
 from slipcore.contact.effects.elastic_object import ElasticObject
 from slipcore.contact.effects.surface_shape import SphereSurface
-from slipcore.contact.grid import Grid
-from slipcore.contact.plan import Plan
+from slipcore.contact.elasticity.grid import Grid
+from slipcore.contact.plan.description import SceneDescription
+from slipcore.contact.plan.plan import Plan
 from slipcore.contact.reference.elastic_pair import Compliance, elastic_pair, half_space
 from slipcore.contact.reference.hertz import HertzContact
 from slipcore.contact.reference.mindlin_deresiewicz import MindlinDeresiewicz
-from slipcore.contact.sampling import FrameRecord, Lattice, frame_times, grasp_log, untouched
-from slipcore.contact.scene import Scene
+from slipcore.contact.tiers.sampling import FrameRecord, Lattice, frame_times, grasp_log, untouched
 from slipcore.frames import FloatArray, GraspLog
 
 NAME = "closed form"
@@ -44,7 +44,7 @@ class SphereOnPlane:
     along: tuple[float, float]
 
 
-def sphere_on_plane(scene: Scene, plan: Plan) -> SphereOnPlane | None:
+def sphere_on_plane(scene: SceneDescription, plan: Plan) -> SphereOnPlane | None:
     """The scene as a closed form sees it; None where something in it has none."""
     problem, finger = plan.problem, scene.finger
     spheres = [effect.curvature for effect in scene.present() if isinstance(effect, SphereSurface)]
@@ -89,7 +89,7 @@ def _line_of_force(plan: Plan) -> tuple[float, float] | None:
     return (float(x), float(y)) if across <= 1e-12 * size[longest] else None
 
 
-def accuracy(scene: Scene, plan: Plan) -> float | None:
+def accuracy(scene: SceneDescription, plan: Plan) -> float | None:
     """Largest error against the full problem, as ``simulate`` counts it; None where the closed form does not hold."""
     case = sphere_on_plane(scene, plan)
     if case is None:
@@ -97,7 +97,7 @@ def accuracy(scene: Scene, plan: Plan) -> float | None:
     return SAMPLING_ERROR + POISSON_ERROR * case.both.poisson / case.both.shear
 
 
-def run(scene: Scene, plan: Plan) -> GraspLog:
+def run(scene: SceneDescription, plan: Plan) -> GraspLog:
     """Simulate a scene of which ``sphere_on_plane`` knows the closed form."""
     began, case, sampling = time.perf_counter(), sphere_on_plane(scene, plan), plan.sampling
     assert case is not None  # the caller has asked for the accuracy

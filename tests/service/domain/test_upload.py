@@ -16,7 +16,7 @@ from backports import zstd
 
 from service.formats import parquet
 from slipcore import GraspLog
-from slipcore.contact.ramp import tangential_ramp
+from slipcore.contact.tiers.ramp import tangential_ramp
 from stiction_client.container import encode
 
 Upload = Callable[..., httpx.Response]

@@ -28,7 +28,7 @@ from sqlalchemy.orm import Session
 from db.blobs import BlobStore
 from db.database import Database
 from db.tables import DetectionRow, FrictionModelRow, GraspLogRow, JobRow, RunnerRow, SampleSummaryRow
-from slipcore.contact.ramp import RampSchedule, tangential_ramp
+from slipcore.contact.tiers.ramp import RampSchedule, tangential_ramp
 from stiction_client.container import encode
 
 NPZ = "application/vnd.stiction.grasp-log+npz"

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from slipcore.contact.grid import Grid, bounding_box
-from slipcore.contact.kernels import HalfSpace
-from slipcore.contact.normal import solve_normal
-from slipcore.contact.operator import Operators
+from slipcore.contact.elasticity.grid import Grid, bounding_box
+from slipcore.contact.elasticity.influence import HalfSpace
+from slipcore.contact.elasticity.operator import Operators
 from slipcore.contact.reference.elastic_pair import half_space
 from slipcore.contact.reference.hertz import HertzContact
+from slipcore.contact.solver.normal import solve_normal
 from slipcore.frames import FloatArray
 
 YOUNG, RADIUS, FORCE, FRICTION = 1e6, 15e-3, 10.0, 0.4

@@ -5,18 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slipcore.contact import boundary_elements, simulate
-from slipcore.contact.accuracy import difference
-from slipcore.contact.boundary_elements import Fidelity
+from slipcore.contact import simulate
 from slipcore.contact.effects import ElasticObject, FiniteLayer, NormalTangentialCoupling, Viscoelasticity
-from slipcore.contact.grid import Grid
-from slipcore.contact.kernels import HalfSpace
-from slipcore.contact.operator import ElasticOperator
-from slipcore.contact.plan import Effect
+from slipcore.contact.elasticity.grid import Grid
+from slipcore.contact.elasticity.influence import HalfSpace
+from slipcore.contact.elasticity.operator import ElasticOperator
+from slipcore.contact.plan.plan import Effect
 from slipcore.contact.reference.beam_chain import BeamLattice
 from slipcore.contact.scene import Scene
-from slipcore.contact.tiers import beam_lattice, cheapest, named
+from slipcore.contact.tiers import beam_lattice, boundary_elements
+from slipcore.contact.tiers.accuracy import difference
 from slipcore.contact.tiers.beam_lattice import Beams
+from slipcore.contact.tiers.boundary_elements import Fidelity
+from slipcore.contact.tiers.choice import cheapest, named
 from slipcore.errors import InvalidInput
 
 

@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slipcore.contact import boundary_elements, simulate
-from slipcore.contact.accuracy import difference
-from slipcore.contact.boundary_elements import Fidelity
+from slipcore.contact import simulate
 from slipcore.contact.effects import (
     CylinderSurface,
     ElasticObject,
@@ -26,9 +24,12 @@ from slipcore.contact.effects import (
     Viscoelasticity,
 )
 from slipcore.contact.errors import InfeasibleLoad
-from slipcore.contact.plan import Effect
+from slipcore.contact.plan.plan import Effect
 from slipcore.contact.scene import Finger, Scene
-from slipcore.contact.tiers import cheapest, closed_form
+from slipcore.contact.tiers import boundary_elements, closed_form
+from slipcore.contact.tiers.accuracy import difference
+from slipcore.contact.tiers.boundary_elements import Fidelity
+from slipcore.contact.tiers.choice import cheapest
 
 SENSOR = SensorSampling(frame_rate=6.0)
 LOAD = TangentialLoad((1.2, -1.6))

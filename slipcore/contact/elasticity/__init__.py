@@ -1,0 +1,1 @@
+"""How elastic bodies answer tractions: grid, influence functions, convolutions."""

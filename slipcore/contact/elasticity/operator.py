@@ -1,0 +1,184 @@
+"""Displacement by pressure and traction: zero-padded FFT convolution on a box of cells."""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from slipcore.contact.elasticity.grid import Grid
+from slipcore.contact.elasticity.influence import Component, ElasticBody
+from slipcore.contact.elasticity.preconditioner import NormalInverse, TangentialInverse
+from slipcore.contact.elasticity.transform import Transform, fast_lengths, multiply_pair, padded_lengths
+from slipcore.frames import FloatArray
+
+
+@dataclass(slots=True)
+class Count:
+    """How often the operators of one problem were applied."""
+
+    normal: int = 0
+    tangential: int = 0
+    coupling: int = 0
+
+    def since(self, earlier: "Count") -> "Count":
+        """What was added to an earlier count."""
+        return Count(*(getattr(self, f.name) - getattr(earlier, f.name) for f in fields(self)))
+
+
+class ElasticOperator:
+    """Compliance of the bodies in contact on one box: pressure and traction [..., ny, nx] Pa to displacement m.
+
+    Symbols are made when first used, so what is never asked for costs nothing. ``count`` may be shared by many boxes;
+    ``source``: an operator on a larger grid of the same pitch, whose kernels hold this one's.
+    """
+
+    __slots__ = (
+        "_coarse",
+        "_kernels",
+        "_normal_inverse",
+        "_symbols",
+        "_tangential_inverse",
+        "bodies",
+        "count",
+        "grid",
+        "source",
+        "transform",
+    )
+
+    def __init__(
+        self,
+        bodies: tuple[ElasticBody, ...],
+        grid: Grid,
+        count: Count | None = None,
+        source: "ElasticOperator | None" = None,
+    ) -> None:
+        self.bodies, self.grid, self.source = bodies, replace(grid, centre=(0.0, 0.0)), source
+        self.count = Count() if count is None else count
+        self.transform = Transform(grid.shape, padded_lengths(grid.shape))
+        self._kernels: dict[Component, FloatArray | None] = {}
+        self._symbols: dict[Component, FloatArray | None] = {}
+        self._coarse: ElasticOperator | None = None
+        self._normal_inverse: NormalInverse | None = None
+        self._tangential_inverse: TangentialInverse | None = None
+
+    def normal(self, pressure: FloatArray) -> FloatArray:
+        """Normal displacement by pressure."""
+        self.count.normal += 1
+        spectrum = self.transform.forward(pressure[None])
+        spectrum *= self._known("nn")
+        displacement: FloatArray = self.transform.backward(spectrum)[0]
+        return displacement
+
+    def tangential(self, traction: FloatArray) -> FloatArray:
+        """Tangential displacement [2, ny, nx] by traction [2, ny, nx]."""
+        self.count.tangential += 1
+        spectrum = self.transform.forward(traction)
+        multiply_pair(spectrum, self._known("xx"), self._known("yy"), self._symbol("xy"))
+        return self.transform.backward(spectrum)
+
+    def normal_by_traction(self, traction: FloatArray) -> FloatArray:
+        """Normal displacement [ny, nx] by traction [2, ny, nx]."""
+        along_x, along_y = self._symbol("zx"), self._symbol("zy")
+        if along_x is None or along_y is None:
+            return np.zeros(self.grid.shape)
+        self.count.coupling += 1
+        force = self.transform.forward(traction)
+        lift: FloatArray = self.transform.backward((1j * (along_x * force[0] + along_y * force[1]))[None])[0]
+        return lift
+
+    def tangential_by_pressure(self, pressure: FloatArray) -> FloatArray:
+        """Tangential displacement [2, ny, nx] by pressure [ny, nx]: the negative of the above's transpose."""
+        along_x, along_y = self._symbol("zx"), self._symbol("zy")
+        if along_x is None or along_y is None:
+            return np.zeros((2, *self.grid.shape))
+        self.count.coupling += 1
+        force = -1j * self.transform.forward(pressure[None])[0]
+        return self.transform.backward(np.stack((along_x * force, along_y * force)))
+
+    @property
+    def normal_inverse(self) -> NormalInverse:
+        """Approximate inverse of ``normal``."""
+        if self._normal_inverse is None:
+            self._normal_inverse = NormalInverse(self.grid.shape, self._nonzero("nn", self._fast_grid))
+        return self._normal_inverse
+
+    @property
+    def tangential_inverse(self) -> TangentialInverse:
+        """Approximate inverse of ``tangential``."""
+        if self._tangential_inverse is None:
+            xx, yy = (self._nonzero(component, self._fast_grid) for component in ("xx", "yy"))
+            xy = self._influence("xy", self._fast_grid)
+            self._tangential_inverse = TangentialInverse(self.grid.shape, xx, yy, xy)
+        return self._tangential_inverse
+
+    @property
+    def coarse(self) -> "ElasticOperator":
+        """The same bodies on half as many cells a side, rounded up."""
+        if self._coarse is None:
+            (ny, nx), (hx, hy) = self.grid.shape, self.grid.pitch
+            grid = Grid((-(-ny // 2), -(-nx // 2)), (2.0 * hx, 2.0 * hy))
+            self._coarse = ElasticOperator(self.bodies, grid, self.count)
+        return self._coarse
+
+    def kernel(self, component: Component) -> FloatArray | None:
+        """Influence of one cell, summed over the bodies; first quadrant [ny, nx], None where it is zero."""
+        if component not in self._kernels:
+            self._kernels[component] = self._influence(component, self.grid)
+        return self._kernels[component]
+
+    @property
+    def _fast_grid(self) -> Grid:
+        return replace(self.grid, shape=fast_lengths(self.grid.shape))
+
+    def _influence(self, component: Component, grid: Grid) -> FloatArray | None:
+        if self.source is not None:
+            whole = self.source.kernel(component)
+            return None if whole is None else whole[: grid.shape[0], : grid.shape[1]]
+        parts = [body.influence(component, grid) for body in self.bodies]
+        present = [part for part in parts if part is not None]
+        return sum(present[1:], start=present[0]) if present else None
+
+    def _symbol(self, component: Component) -> FloatArray | None:
+        if component not in self._symbols:
+            quadrant = self.kernel(component)
+            odd_y, odd_x = component in {"xy", "zy"}, component in {"xy", "zx"}
+            self._symbols[component] = None if quadrant is None else self.transform.symbol(quadrant, odd_y, odd_x)
+        return self._symbols[component]
+
+    def _known(self, component: Component) -> FloatArray:
+        symbol = self._symbol(component)
+        assert symbol is not None  # no body is rigid in nn, xx and yy
+        return symbol
+
+    def _nonzero(self, component: Component, grid: Grid) -> FloatArray:
+        kernel = self._influence(component, grid)
+        assert kernel is not None  # as above
+        return kernel
+
+
+class Operators:
+    """The compliance of the same bodies on boxes of any size; kept, because setting one up costs several
+    applications. Boxes within ``whole`` take their kernels from it.
+    """
+
+    __slots__ = ("_known", "_source", "bodies", "count")
+
+    def __init__(self, bodies: tuple[ElasticBody, ...], count: Count | None = None, whole: Grid | None = None) -> None:
+        self.bodies, self.count = bodies, Count() if count is None else count
+        self._known: dict[tuple[object, ...], ElasticOperator] = {}
+        self._source: ElasticOperator | None = None
+        if whole is not None:
+            self._source = ElasticOperator(bodies, replace(whole, shape=fast_lengths(whole.shape)))
+
+    def on(self, grid: Grid) -> ElasticOperator:
+        """The operator on a grid; where the grid lies does not matter."""
+        key = (grid.shape, grid.pitch)
+        if key not in self._known:
+            self._known[key] = ElasticOperator(self.bodies, grid, self.count, self._holding(grid))
+        return self._known[key]
+
+    def _holding(self, grid: Grid) -> ElasticOperator | None:
+        """The source of kernels, if the grid is a part of its."""
+        if self._source is None or self._source.grid.pitch != grid.pitch:
+            return None
+        fits = all(n <= most for n, most in zip(fast_lengths(grid.shape), self._source.grid.shape, strict=True))
+        return self._source if fits else None

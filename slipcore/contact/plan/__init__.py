@@ -1,0 +1,1 @@
+"""What a scene comes to for a simulation: mechanics, loads over time, sampling."""

@@ -1,0 +1,94 @@
+"""What a scene is made of: a finger, a press, friction and the effects that it calls for; and its plan."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from slipcore.contact.elasticity.influence import HalfSpace
+from slipcore.contact.plan.plan import Effect, Plan, ramp
+from slipcore.contact.solver.problem import HeightField, Problem
+from slipcore.errors import InvalidInput
+from slipcore.frames import FloatArray, FrictionLaw
+
+
+@dataclass(frozen=True, slots=True)
+class Finger:
+    """A gel fingertip: ``radius`` m (inf for a flat one), ``young_modulus`` Pa, ``poisson_ratio``, ``thickness`` m of
+    the gel.
+
+    The gel is a half-space to the solver unless the scene has a bonded layer; its thickness tells whether it should.
+    """
+
+    radius: float = 15e-3
+    young_modulus: float = 1e6
+    poisson_ratio: float = 0.49
+    thickness: float = float("inf")
+
+    def __post_init__(self) -> None:
+        for name in ("radius", "thickness"):
+            if not getattr(self, name) > 0.0:
+                raise InvalidInput(f"{name} of the finger", getattr(self, name), "above 0 m, inf for none")
+
+    def height(self) -> HeightField:
+        """Gap to a flat object."""
+        half = 0.5 / self.radius
+
+        def paraboloid(x: FloatArray, y: FloatArray) -> FloatArray:
+            return half * (x**2 + y**2)
+
+        return paraboloid
+
+
+@dataclass(frozen=True, slots=True)
+class Press:
+    """Normal ``force`` N, reached within ``duration`` s from the begin, then held."""
+
+    force: float = 10.0
+    duration: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.force < np.inf:
+            raise InvalidInput("press.force", self.force, "finite and at least 0 N")
+
+
+@dataclass(frozen=True, slots=True)
+class SceneDescription:
+    """A grasp to simulate: ``friction`` is the Coulomb coefficient, ``duration`` s covers press and all that follows.
+
+    What is not among the ``effects`` does not happen: no tangential load, a rigid flat object, a half-space, friction
+    that is the same everywhere, a log of every cell and step. Raises ``InvalidInput``.
+    """
+
+    name: str
+    effects: tuple[Effect, ...] = ()
+    finger: Finger = field(default_factory=Finger)
+    friction: float = 0.4
+    press: Press = field(default_factory=Press)
+    duration: float = 2.0
+    description: str = ""
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.duration < np.inf:
+            raise InvalidInput("duration", self.duration, "finite and above 0 s")
+        self.plan()
+
+    def plan(self, seed: int = 0) -> Plan:
+        """The scene with all its effects added, in an order that does not depend on how they are listed."""
+        finger = self.finger
+        body = HalfSpace.from_young(finger.young_modulus, finger.poisson_ratio)
+        plan = Plan(
+            problem=Problem((body,), self.friction, heights=(finger.height(),)),
+            duration=self.duration,
+            histories=(ramp("normal_force", self.press.force, 0.0, self.press.duration),),
+            law=FrictionLaw((self.friction, 0.0, 0.0)),
+            young_modulus=finger.young_modulus,
+            poisson_ratio=finger.poisson_ratio,
+            seed=seed,
+        )
+        for effect in sorted(self.present(), key=lambda effect: (type(effect).__name__, repr(effect))):
+            plan = effect.extend(plan)
+        return plan.check()
+
+    def present(self) -> tuple[Effect, ...]:
+        """The effects that have any strength."""
+        return tuple(effect for effect in self.effects if not effect.absent)

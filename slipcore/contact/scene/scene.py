@@ -1,0 +1,78 @@
+"""Scenes as users have them: described in code or in a file, simulated and explained."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Self, TypeVar
+
+from slipcore.contact.effects import EFFECTS
+from slipcore.contact.plan.description import Finger, Press, SceneDescription
+from slipcore.contact.plan.plan import Effect
+from slipcore.contact.scene.explain import Explanation, explain
+from slipcore.errors import InvalidInput
+
+LIBRARY = Path(__file__).parents[1] / "scenes"
+
+
+@dataclass(frozen=True, slots=True)
+class Scene(SceneDescription):
+    """A scene that can be read from a file and can explain its effects; its entries are ``SceneDescription``'s."""
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Self:
+        """Read a scene file; a bare name is one of the library's."""
+        path = Path(path)
+        if not path.suffix and not path.exists():
+            path = LIBRARY / f"{path}.toml"
+        if not path.exists():
+            raise InvalidInput("scene", path, "a TOML file, or one of " + ", ".join(library()))
+        try:
+            entries = tomllib.loads(path.read_text(encoding="utf-8"))
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise InvalidInput("scene file", path, f"TOML ({error})") from error
+        return cls.from_mapping(entries)
+
+    @classmethod
+    def from_mapping(cls, entries: Mapping[str, Any]) -> Self:
+        """A scene from the entries of a scene file; effects are tables with a ``kind``."""
+        entries = dict(entries)
+        effects = tuple(_effect(dict(table)) for table in entries.pop("effect", ()))
+        parts = {name: _record(kind, entries.pop(name)) for name, kind in _PARTS.items() if name in entries}
+        return _record(cls, entries | parts | {"effects": effects})
+
+    def explain(self, seed: int = 0) -> Explanation:
+        """What each effect is there for, what it costs and what leaving it out would change, by coarse runs."""
+        return explain(self, seed)
+
+
+Record = TypeVar("Record")
+_PARTS: dict[str, type[Any]] = {"finger": Finger, "press": Press}
+
+
+def library() -> list[str]:
+    """Names of the scenes that come with the package."""
+    return sorted(path.stem for path in LIBRARY.glob("*.toml"))
+
+
+def _effect(table: dict[str, Any]) -> Effect:
+    kind = table.pop("kind", None)
+    if kind not in EFFECTS:
+        raise InvalidInput("kind of effect", kind, ", ".join(sorted(EFFECTS)))
+    return _record(EFFECTS[kind], table)
+
+
+def _record(kind: type[Record], entries: Mapping[str, Any]) -> Record:
+    """A record from a table, refused where the table has a key that the record has not."""
+    known = [entry.name for entry in fields(kind)]  # type: ignore[arg-type]
+    for name in entries:
+        if name not in known:
+            raise InvalidInput(f"entry of {kind.__name__}", name, ", ".join(known))
+    try:
+        return kind(**{name: _frozen(value) for name, value in entries.items()})
+    except TypeError as error:
+        raise InvalidInput(kind.__name__, entries, f"all of its entries, of their types ({error})") from error
+
+
+def _frozen(value: Any) -> Any:
+    return tuple(_frozen(part) for part in value) if isinstance(value, list) else value

@@ -1,0 +1,60 @@
+"""A scene in, a log with truth out."""
+
+import zlib
+from dataclasses import replace
+
+import numpy as np
+
+from slipcore.contact.plan.description import SceneDescription
+from slipcore.contact.plan.plan import Plan
+from slipcore.contact.tiers import boundary_elements
+from slipcore.contact.tiers.accuracy import simulate_to
+from slipcore.contact.tiers.boundary_elements import Fidelity
+from slipcore.contact.tiers.choice import cheapest, named
+from slipcore.errors import InvalidInput
+from slipcore.frames import GraspLog
+
+
+def simulate(
+    scene: SceneDescription,
+    accuracy: float | None = None,
+    seconds: float | None = None,
+    seed: int = 0,
+    fidelity: Fidelity | None = None,
+    tier: str | None = None,
+) -> GraspLog:
+    """Simulate a scene to an ``accuracy``, within ``seconds``, or at a ``fidelity``; with none of them, at the default
+    one. For an accuracy the cheapest tier is taken that has it, unless ``tier`` names one: "closed form", "beams" (the
+    paper's, at its own accuracy) or "boundary elements".
+
+    ``accuracy`` is the largest of: absolute error of the stick ratio, relative L2 error over time of displacement and
+    of force at the sensor's points, all before observation effects. ``seed`` draws random fields and noise. The
+    metadata tell tier, grid, steps, tolerance, estimated accuracy and seconds.
+
+    Raises ``InfeasibleLoad`` where friction cannot carry a load, ``NotConverged`` and ``InvalidInput``.
+    """
+    plan = scene.plan(seed)
+    if fidelity is not None and (accuracy is not None or seconds is not None):
+        raise InvalidInput("fidelity", fidelity, "no fidelity beside an accuracy or seconds")
+    cheap = None
+    if tier is not None:
+        cheap = named(tier, scene, plan, accuracy)
+    elif accuracy is not None:
+        cheap = cheapest(scene, plan, accuracy)
+    if cheap is not None:
+        log, estimated = cheap.run(scene, plan), f"{cheap.accuracy(scene, plan):.2g}"
+    elif accuracy is None and seconds is None:
+        log, estimated = boundary_elements.run(plan, fidelity), "not asked for"
+    else:
+        found = simulate_to(plan, accuracy, seconds)
+        log, estimated = found.log, f"{found.error.largest:.2g}"
+        log = replace(log, metadata={**log.metadata, "seconds": f"{found.seconds:.3f}"})
+    return observe(plan, replace(log, metadata={"scene": scene.name, **log.metadata, "estimated accuracy": estimated}))
+
+
+def observe(plan: Plan, log: GraspLog) -> GraspLog:
+    """The log as the plan's observation effects let it be seen; each has a random generator of its own."""
+    for effect in sorted(plan.observations, key=lambda effect: (effect.stage, type(effect).__name__, repr(effect))):
+        own = zlib.crc32(type(effect).__name__.encode())
+        log = effect.observe(log, np.random.default_rng([plan.seed, own]))
+    return log

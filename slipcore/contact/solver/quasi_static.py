@@ -1,0 +1,272 @@
+"""Contact through a sequence of load steps: press, shear, twist, reverse, release.
+
+``start`` gives the state of bodies apart, ``step`` the next state and what happened on the way.
+"""
+
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from slipcore.contact.elasticity.fields import rigid_displacement
+from slipcore.contact.elasticity.grid import Grid
+from slipcore.contact.elasticity.influence import Scaled
+from slipcore.contact.elasticity.operator import Count, Operators
+from slipcore.contact.solver.creep import creep_compliance, creep_recalled, creep_step
+from slipcore.contact.solver.extrapolation import Stress, continuation, foreseen
+from slipcore.contact.solver.normal import NormalContact
+from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.resolution import unresolved
+from slipcore.contact.solver.step_equations import StepEquations, StepSolution
+from slipcore.frames import BoolArray, FloatArray
+
+AT_LIMIT = 1e-3
+"""A cell whose traction is within this share of its limit is at it (contact factor, paper eq. 36)."""
+MOVED = 1e-3
+"""A cell that slips more than this share of the object's motion in the step moves against it."""
+LEAST_SHARE = 1e-3
+"""Tolerances follow a step's increment down to this share of the contact's capacity, where rounding comes near."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class State:
+    """What the next step depends on; fields on the whole grid.
+
+    ``normal`` contact, ``stress`` and that of the step ``before``; ``displacement`` [2, ny, nx] m of the finger against
+    the object's own surface; ``elastic`` [3, ny, nx] m, the finger's displacement without creep; ``creep`` m, one
+    [3, ny, nx] a branch; ``pose`` [3] of the object (m, m, rad); ``speed`` [ny, nx] m/s of slip, where friction depends
+    on it; ``load``: the last; ``drive`` [3]: how it differed from the one before.
+    """
+
+    normal: NormalContact | None
+    stress: Stress
+    before: Stress
+    displacement: FloatArray
+    elastic: FloatArray
+    creep: tuple[FloatArray, ...]
+    pose: FloatArray
+    speed: FloatArray
+    load: StepLoad
+    drive: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StepResult:
+    """What happened in one step; fields on the whole grid [ny, nx], z into the finger.
+
+    ``displacement`` [3, ny, nx] m of the finger's surface; ``force`` [3, ny, nx] N on each cell by the object;
+    ``slip`` [2, ny, nx] m of the finger against the object within this step, zero outside contact; ``contact``,
+    ``at_limit`` (contact factor) and ``moved`` (kinematic slip); ``pose`` [3] and ``approach`` of the object;
+    ``sliding``: nothing sticks; ``residual`` of the natural map (share of the largest limit), ``normal_residual``
+    (share of the indentation), ``imbalance`` (share of μF_N); ``iterations`` (Newton steps), ``applications`` of
+    operators and ``seconds`` it took.
+    """
+
+    displacement: FloatArray
+    force: FloatArray
+    slip: FloatArray
+    contact: BoolArray
+    at_limit: BoolArray
+    moved: BoolArray
+    pose: FloatArray
+    approach: float
+    sliding: bool
+    residual: float
+    normal_residual: float
+    imbalance: float
+    iterations: int
+    applications: Count
+    seconds: float
+
+    @property
+    def stick_ratio(self) -> float:
+        """Stick area over contact area by contact factor (paper, eq. 37 corrected); NaN without contact."""
+        touching = int(self.contact.sum())
+        return float((self.contact & ~self.at_limit).sum()) / touching if touching else float("nan")
+
+    def warnings(self) -> tuple[str, ...]:
+        """What the grid is too coarse or too small for, in this step."""
+        return unresolved(self.contact, self.at_limit, sheared=bool(self.force[:2].any()))
+
+
+class QuasiStatic:
+    """A contact problem on a grid. Steps change nothing but the kept operators.
+
+    ``tolerance`` on tractions is relative to what the step can change, so that slip rates hold too;
+    ``normal_tolerance`` on the gap is relative to the indentation.
+    """
+
+    def __init__(self, problem: Problem, grid: Grid, tolerance: float = 1e-5, normal_tolerance: float = 1e-7) -> None:
+        self.problem, self.grid = problem, grid
+        self.tolerance, self.normal_tolerance = tolerance, normal_tolerance
+        self.height, self.friction = problem.height(grid), problem.static_friction(grid)
+        self.count = Count()
+        self.finger = Operators(problem.finger, self.count, grid)
+        self._relaxed: dict[float, Operators] = {}
+
+    def start(self) -> State:
+        """Bodies apart."""
+        zero = np.zeros((3, *self.grid.shape))
+        creep = tuple(zero for _ in self.problem.creep)
+        apart, still = Stress(zero[0], zero[:2], zero[0]), np.zeros(3)
+        return State(None, apart, apart, zero[:2], zero, creep, still, zero[0], StepLoad(0.0), still)
+
+    def run(self, loads: Iterable[StepLoad]) -> Iterator[StepResult]:
+        """Results of loads one after the other, from bodies apart."""
+        state = self.start()
+        for load in loads:
+            state, result = self.step(state, load)
+            yield result
+
+    def step(self, state: State, load: StepLoad) -> tuple[State, StepResult]:
+        """The next state and what happened; raises ``InfeasibleLoad``, ``NotConverged`` and ``InvalidInput``."""
+        began, counted = time.perf_counter(), replace(self.count)
+        recalled = creep_recalled(self.problem.creep, state.creep, state.elastic, load.duration)
+        drive = _drive(state.load, load)
+        equations = StepEquations(
+            self.problem,
+            self.grid,
+            self._operators(load.duration),
+            self.height if recalled is None else self.height + recalled[2],
+            self.friction,
+            -state.displacement if recalled is None else recalled[:2] - state.displacement,
+            state.speed,
+            load,
+            self.tolerance * self._share(state, load, drive),
+            self.normal_tolerance,
+            state.normal if self._pressed_alike(state, load) else None,
+        )
+        solution = equations.solve(foreseen(state.stress, state.before, continuation(state.drive, drive)))
+        after = self._advance(equations, state, load, drive, solution, recalled)
+        result = self._result(equations, state, after, solution)
+        seconds = time.perf_counter() - began
+        return after, replace(result, applications=self.count.since(counted), seconds=seconds)
+
+    def _pressed_alike(self, state: State, load: StepLoad) -> bool:
+        """Whether nothing that pressure depends on has changed since the last step."""
+        pressed = (load.normal_force, load.approach) == (state.load.normal_force, state.load.approach)
+        return pressed and not self.problem.coupled and not self.problem.creep
+
+    def _operators(self, duration: float) -> Operators:
+        """Compliance of both bodies together within a step of this duration."""
+        softening = creep_compliance(self.problem.creep, duration)
+        if softening not in self._relaxed:
+            finger = self.problem.finger
+            if softening != 1.0:
+                finger = tuple(Scaled(body, softening) for body in finger)
+            self._relaxed[softening] = Operators((*finger, *self.problem.obstacle), self.count, self.grid)
+        return self._relaxed[softening]
+
+    def _share(self, state: State, load: StepLoad, drive: FloatArray) -> float:
+        """How much of the contact's capacity the step can change: what its tolerance is measured by."""
+        before, now = state.load.normal_force, load.normal_force
+        if before is None or now is None or now == 0.0 or not all(load.given):
+            return max(LEAST_SHARE, 0.01)
+        capacity = float(self.friction.max()) * now
+        shear = float(np.hypot(drive[0], drive[1])) + abs(drive[2]) / _lever(state.stress.pressure, self.grid)
+        return float(np.clip(max(abs(now - before) / now, shear / max(capacity, 1e-300)), LEAST_SHARE, 1.0))
+
+    def _advance(
+        self,
+        equations: StepEquations,
+        state: State,
+        load: StepLoad,
+        drive: FloatArray,
+        solution: StepSolution,
+        recalled: FloatArray | None,
+    ) -> State:
+        """The state at the end of the step."""
+        pressure, traction, limit = solution.normal.pressure, np.zeros((2, *self.grid.shape)), np.zeros(self.grid.shape)
+        traction[:, *solution.box], limit[solution.box] = solution.tangential.traction, solution.limit
+        both = self._displacement(equations.operators, pressure, traction, solution)
+        alone = equations.operators.bodies == self.finger.bodies
+        elastic = both if alone else self._displacement(self.finger, pressure, traction)
+        displacement = both[:2]
+        creep = creep_step(self.problem.creep, state.creep, state.elastic, elastic, load.duration)
+        if recalled is not None:
+            displacement = displacement + recalled[:2]
+        speed = state.speed
+        if self.problem.velocity_laws:
+            speed = np.zeros_like(pressure)
+            speed[solution.box] = np.hypot(*solution.tangential.slip) / load.duration
+        return State(
+            normal=solution.normal,
+            stress=Stress(pressure, traction, limit),
+            before=state.stress,
+            displacement=displacement,
+            elastic=elastic,
+            creep=creep,
+            pose=state.pose + solution.tangential.motion,
+            speed=speed,
+            load=load,
+            drive=drive,
+        )
+
+    def _displacement(
+        self, operators: Operators, pressure: FloatArray, traction: FloatArray, known: StepSolution | None = None
+    ) -> FloatArray:
+        """Displacement [3, ny, nx] m on the whole grid by pressure and traction, as far as not ``known`` already."""
+        operator = operators.on(self.grid)
+        whole = np.zeros((3, *self.grid.shape))
+        if pressure.any():
+            whole[2] = operator.normal(pressure) if known is None else known.normal.displacement
+            if traction.any():
+                everywhere = known is not None and known.limit.shape == self.grid.shape
+                whole[:2] = known.tangential.displacement if known and everywhere else operator.tangential(traction)
+            if self.problem.coupled:
+                whole[2] += operator.normal_by_traction(traction)
+            if self.problem.coupled or self.problem.spread:
+                whole[:2] += operator.tangential_by_pressure(pressure)
+        return whole
+
+    def _result(self, equations: StepEquations, state: State, after: State, solution: StepSolution) -> StepResult:
+        normal, tangential, box = solution.normal, solution.tangential, solution.box
+        contact = normal.pressure > 0.0
+        slip, at_limit, moved = np.zeros_like(after.stress.traction), np.zeros_like(contact), np.zeros_like(contact)
+        touching = contact[box]
+        slip[:, *box] = np.where(touching, tangential.slip, 0.0)
+        at_limit[box] = touching & (np.hypot(*tangential.traction) >= (1.0 - AT_LIMIT) * solution.limit)
+        moved[box] = np.hypot(*slip[:, *box]) > self._noticeable(equations, solution, after.pose - state.pose)
+        creep = sum(after.creep, start=np.zeros_like(after.elastic))
+        return StepResult(
+            displacement=after.elastic + creep,
+            force=np.stack((*after.stress.traction, after.stress.pressure)) * self.grid.cell_area,
+            slip=slip,
+            contact=contact,
+            at_limit=at_limit,
+            moved=moved,
+            pose=after.pose,
+            approach=normal.approach,
+            sliding=tangential.sliding and bool(contact.any()),
+            residual=tangential.residual,
+            normal_residual=normal.residual,
+            imbalance=tangential.imbalance,
+            iterations=solution.iterations,
+            applications=Count(),
+            seconds=0.0,
+        )
+
+    def _noticeable(self, equations: StepEquations, solution: StepSolution, motion: FloatArray) -> float:
+        """Slip m above which a cell moves against the object: a share of the object's motion, and more than solver
+        noise.
+        """
+        part = self.grid.part(solution.box)
+        carried = float(np.hypot(*rigid_displacement(np.stack(part.points()), motion)).max())
+        kernel = equations.operators.on(part).kernel("xx")
+        compliance = 0.0 if kernel is None else float(kernel[0, 0])
+        return max(MOVED * carried, 10.0 * equations.tolerance * float(solution.limit.max()) * compliance)
+
+
+def _drive(before: StepLoad, load: StepLoad) -> FloatArray:
+    """By how much the step changes what drives the object: load where that is given, otherwise motion [3]."""
+    return np.where(load.given, load.tangential - before.tangential, load.motion)
+
+
+def _lever(pressure: FloatArray, grid: Grid) -> float:
+    """Half the extent of the contact, m; the grid's where there is none yet."""
+    x, y = grid.points()
+    touching = pressure > 0.0
+    if not touching.any():
+        touching = np.ones_like(touching)
+    return 0.5 * max(float(np.ptp(x[touching])), float(np.ptp(y[touching])), min(grid.pitch))

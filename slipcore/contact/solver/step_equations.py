@@ -1,0 +1,172 @@
+"""The equations of one load step: normal contact, tangential contact, and what ties them together."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from slipcore.contact.elasticity.fields import inner
+from slipcore.contact.elasticity.grid import Box, Grid, bounding_box
+from slipcore.contact.elasticity.operator import Operators
+from slipcore.contact.errors import NotConverged
+from slipcore.contact.solver.extrapolation import Stress
+from slipcore.contact.solver.normal import NormalContact, solve_normal
+from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.tangential import TangentialContact, solve_tangential
+from slipcore.errors import InvalidInput
+from slipcore.frames import FloatArray
+
+BOX_MULTIPLE = 4
+"""Boxes grow by so many cells, so that a growing contact meets few new operators."""
+OUTER_ITERATIONS = 60
+"""Of coupling and of velocity-dependent friction."""
+PRESSURE_BY_LIFT = 5.0
+"""Change of a sphere's pressure, as a share of its largest, by a lift as a share of the indentation: π²/2."""
+COUPLING_START = 1e-2
+"""What the first guess of the lift is taken to be off by, in the same measure."""
+INEXACT = 0.3
+"""Of the last change of the lift: how far contact is solved under one that will change again."""
+
+
+class Mixing:
+    """Anderson's acceleration of a fixed point, of depth one (J. ACM 12 (1965) 547)."""
+
+    def __init__(self) -> None:
+        self._last: tuple[FloatArray, FloatArray] | None = None
+
+    def next(self, point: FloatArray, answer: FloatArray) -> FloatArray:
+        """The next point, given the last and what the map made of it."""
+        change, share = answer - point, 0.0
+        if self._last is not None:
+            bend = change - self._last[0]
+            size = inner(bend, bend)
+            share = float(np.clip(inner(change, bend) / size, -1.0, 1.0)) if size > 0.0 else 0.0
+            following = answer - share * (answer - self._last[1])
+        else:
+            following = answer
+        self._last = (change, answer)
+        return following
+
+
+class StepSolution(NamedTuple):
+    """``normal`` contact on the whole grid; ``tangential`` contact and ``limit`` μp Pa on its ``box`` (without contact
+    the whole grid); ``iterations``: Newton steps in all.
+    """
+
+    normal: NormalContact
+    tangential: TangentialContact
+    limit: FloatArray
+    box: Box
+    iterations: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StepEquations:
+    """What is given in one step; fields on the whole grid.
+
+    ``height`` [ny, nx] m, with what creep recalls; ``friction`` [ny, nx]; ``offset`` [2, ny, nx] m: what the surface
+    has moved since the last step apart from traction and pressure; ``speed`` [ny, nx] m/s: a guess of how fast it
+    slips; ``tolerance`` of tractions, as a share of the
+    largest limit; ``known``: normal contact where it is that of the last step.
+    """
+
+    problem: Problem
+    grid: Grid
+    operators: Operators
+    height: FloatArray
+    friction: FloatArray
+    offset: FloatArray
+    speed: FloatArray
+    load: StepLoad
+    tolerance: float
+    normal_tolerance: float
+    known: NormalContact | None = None
+
+    def solve(self, guess: Stress) -> StepSolution:
+        """Pressure and traction that agree with each other, from a guess of both on the whole grid."""
+        pressure, traction, _ = guess
+        if not self.problem.coupled:
+            return self._once(pressure, traction, self.height, self.tolerance)
+        lift, change, iterations, mixing = self._lift(traction), COUPLING_START, 0, Mixing()
+        for _ in range(OUTER_ITERATIONS):
+            goal = max(self.tolerance, INEXACT * change)
+            solution = self._once(pressure, traction, self.height + lift, goal)
+            pressure, traction = solution.normal.pressure, self._whole(solution)
+            iterations += solution.iterations
+            if not pressure.any():
+                return solution
+            answer = self._lift(traction)
+            change = PRESSURE_BY_LIFT * float(np.abs(answer - lift).max() / solution.normal.displacement.max())
+            if max(10.0 * change, goal) <= self.tolerance:
+                return solution._replace(iterations=iterations)
+            lift = mixing.next(lift, answer)
+        raise NotConverged("normal-tangential coupling", change, self.tolerance, OUTER_ITERATIONS)
+
+    def _lift(self, traction: FloatArray) -> FloatArray:
+        return self.operators.on(self.grid).normal_by_traction(traction)
+
+    def _whole(self, solution: StepSolution) -> FloatArray:
+        whole = np.zeros((2, *self.grid.shape))
+        whole[:, *solution.box] = solution.tangential.traction
+        return whole
+
+    def _once(self, pressure: FloatArray, traction: FloatArray, height: FloatArray, tolerance: float) -> StepSolution:
+        """Normal contact, then tangential contact under its pressure."""
+        normal = self.known or solve_normal(
+            self.operators,
+            self.grid,
+            height,
+            self.load.normal_force,
+            self.load.approach,
+            self.normal_tolerance * tolerance / self.tolerance,
+            pressure,
+        )
+        touching = normal.pressure > 0.0
+        box = bounding_box(touching if touching.any() else ~touching, BOX_MULTIPLE)
+        offset = self.offset
+        if self.problem.coupled or self.problem.spread:
+            offset = offset + self.operators.on(self.grid).tangential_by_pressure(normal.pressure)
+        return self._slide(normal, box, offset[:, *box], traction[:, *box], tolerance)
+
+    def _slide(
+        self, normal: NormalContact, box: Box, offset: FloatArray, start: FloatArray, tolerance: float
+    ) -> StepSolution:
+        """Tangential contact; again with new limits as long as friction depends on the velocity that comes out."""
+        pressure, coefficient = normal.pressure[box], self.friction[box]
+        for law in self.problem.pressure_laws:
+            coefficient = coefficient + law(pressure)
+        if not self.problem.velocity_laws:
+            limit = _coulomb_limit(coefficient, pressure)
+            tangential = self._tangential(box, limit, offset, start, tolerance)
+            return StepSolution(normal, tangential, limit, box, tangential.iterations)
+        iterations, speed, mixing = 0, self.speed[box], Mixing()
+        for _ in range(OUTER_ITERATIONS):
+            limit = self._limit(coefficient, speed, pressure)
+            tangential = self._tangential(box, limit, offset, start, tolerance)
+            iterations += tangential.iterations
+            answer = np.hypot(*tangential.slip) / self.load.duration
+            off = np.abs(self._limit(coefficient, answer, pressure) - limit)
+            change = float(off.max()) / max(float(limit.max()), 1e-300)
+            if change <= tolerance:
+                return StepSolution(normal, tangential, limit, box, iterations)
+            start, speed = tangential.traction, np.maximum(mixing.next(speed, answer), 0.0)
+        raise NotConverged("velocity-dependent friction", change, tolerance, OUTER_ITERATIONS)
+
+    def _limit(self, coefficient: FloatArray, speed: FloatArray, pressure: FloatArray) -> FloatArray:
+        """μp at a slip speed."""
+        added = [law(speed) for law in self.problem.velocity_laws]
+        return _coulomb_limit(sum(added, start=coefficient), pressure)
+
+    def _tangential(
+        self, box: Box, limit: FloatArray, offset: FloatArray, start: FloatArray, tolerance: float
+    ) -> TangentialContact:
+        part = self.grid.part(box)
+        operator = self.operators.on(part)
+        return solve_tangential(operator, part.points(), limit, offset, self.load.control(), start, tolerance)
+
+
+def _coulomb_limit(coefficient: FloatArray, pressure: FloatArray) -> FloatArray:
+    """μp where the coefficient is positive."""
+    if not np.isfinite(coefficient).all():
+        raise InvalidInput("friction coefficient", "not finite at some pressure or velocity", "finite in all contacts")
+    return np.maximum(coefficient, 0.0) * pressure

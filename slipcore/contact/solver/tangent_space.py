@@ -1,0 +1,253 @@
+"""Newton's system of tangential contact, in the space tangent to Coulomb's limits and to the given load.
+
+Loops over cells are compiled, without branches so that they run in vectors, and fused: at 64² cells a call of numpy
+costs as much as its arithmetic.
+"""
+
+import numpy as np
+from numba import njit
+
+from slipcore.contact.elasticity.fields import VECTOR
+from slipcore.contact.elasticity.operator import ElasticOperator
+from slipcore.frames import BoolArray, FloatArray
+
+OUTSIDE, STICK, SLIP = 0, 1, 2
+
+
+class TangentSpace:
+    """Directions in which tractions may move to first order, and the curvature of the limits along them.
+
+    A cell slides if a gradient step from it, of length ``stiffness``, leaves its disk. ``onto_circle`` [2, ny, nx]
+    first moves sliding cells to their limit. ``state`` [ny, nx] is OUTSIDE, STICK or SLIP; ``projector`` [3, ny, nx]
+    holds xx, xy and yy of each cell's projection on the space; ``curvature`` [ny, nx] a sliding cell's slip over its
+    limit.
+    """
+
+    def __init__(
+        self,
+        traction: FloatArray,
+        slip: FloatArray,
+        limit: FloatArray,
+        stiffness: float,
+        arm: FloatArray,
+        given: BoolArray,
+    ) -> None:
+        self.arm = arm
+        self.state = np.empty(limit.shape, dtype=np.int8)
+        self.projector, self.onto_circle = np.empty((3, *limit.shape)), np.zeros_like(traction)
+        self.curvature, self.scale = np.zeros(limit.shape), np.empty(limit.shape)
+        _classify(
+            _flat(traction),
+            _flat(slip),
+            limit.ravel(),
+            stiffness,
+            self.state.ravel(),
+            _flat(self.projector),
+            _flat(self.onto_circle),
+            self.curvature.ravel(),
+        )
+        # Where the curvature outweighs a cell's own compliance it is what the preconditioner must invert.
+        np.divide(1.0, np.sqrt(1.0 + self.curvature * stiffness), out=self.scale)
+        self.inverse_gram = _inverse(_gram(_flat(self.projector), _flat(arm)) * np.outer(given, given))
+
+    def balancing(self, lacking: FloatArray) -> FloatArray:
+        """The smallest move within the space that adds the resultants ``lacking`` [3]."""
+        move = np.zeros_like(self.onto_circle)
+        _subtract_rigid(_flat(self.projector), _flat(self.arm), -self.inverse_gram @ lacking, _flat(move))
+        return move
+
+    def balanced(self, move: FloatArray) -> FloatArray:
+        """The part of a move [2, ny, nx] that lies in the space and has no given resultant; in place."""
+        _balance(_flat(self.projector), _flat(self.arm), self.inverse_gram, _flat(move))
+        return move
+
+    def conjugate_gradients(
+        self, operator: ElasticOperator, slip: FloatArray, made: FloatArray, reduction: float, max_iterations: int
+    ) -> FloatArray:
+        """The move that brings the tangential part of ``slip`` to zero; ``made`` is the move made so far.
+
+        Solves P(C + curvature)P move = −P(slip + curvature·made), preconditioned, to a share ``reduction`` of the
+        first preconditioned residual.
+        """
+        inverse, move, direction = operator.tangential_inverse, np.zeros_like(slip), np.zeros_like(slip)
+        residual = self.balanced(slip + self.curvature * made)
+        improved = inverse(self.scale * residual)
+        size = first = self._improve(residual, improved)
+        direction -= improved
+        for _ in range(max_iterations):
+            if size <= 0.0:
+                break
+            answer = operator.tangential(direction)
+            self._advance(move, residual, direction, answer, size)
+            improved = inverse(answer)
+            before, size = size, self._improve(residual, improved)
+            if size <= reduction**2 * first:
+                break
+            _turn(_flat(direction), _flat(improved), size / before)
+        return move
+
+    def _advance(
+        self, move: FloatArray, residual: FloatArray, direction: FloatArray, answer: FloatArray, size: float
+    ) -> None:
+        """One step along ``direction``; the new residual, scaled for the preconditioner, in place of ``answer``."""
+        _advance(
+            _flat(self.projector),
+            _flat(self.arm),
+            self.inverse_gram,
+            self.curvature.ravel(),
+            self.scale.ravel(),
+            _flat(move),
+            _flat(residual),
+            _flat(direction),
+            _flat(answer),
+            size,
+        )
+
+    def _improve(self, residual: FloatArray, improved: FloatArray) -> float:
+        """Scale and balance a preconditioned residual in place; its product with the residual."""
+        return float(
+            _improve(
+                _flat(self.projector),
+                _flat(self.arm),
+                self.inverse_gram,
+                self.scale.ravel(),
+                _flat(residual),
+                _flat(improved),
+            )
+        )
+
+
+def _flat(field: FloatArray) -> FloatArray:
+    return field.reshape(len(field), -1)
+
+
+@njit(cache=True)
+def _classify(traction, slip, limit, stiffness, state, projector, onto_circle, curvature):  # type: ignore[no-untyped-def]
+    for i in range(limit.size):
+        radius = limit[i]
+        if radius <= 0.0:
+            state[i] = OUTSIDE
+            projector[:, i] = 0.0
+            continue
+        qx, qy = traction[0, i], traction[1, i]
+        wx, wy = qx - stiffness * slip[0, i], qy - stiffness * slip[1, i]
+        if wx * wx + wy * wy <= radius * radius:
+            state[i] = STICK
+            projector[0, i], projector[1, i], projector[2, i] = 1.0, 0.0, 1.0
+            continue
+        size = np.sqrt(qx * qx + qy * qy)
+        on_circle = size > radius * (1.0 - 1e-12)
+        nx, ny = (qx / size, qy / size) if on_circle else (wx, wy)
+        if not on_circle:
+            size = np.sqrt(wx * wx + wy * wy)
+            nx, ny = wx / size, wy / size
+            onto_circle[0, i], onto_circle[1, i] = radius * nx - qx, radius * ny - qy
+        state[i] = SLIP
+        projector[0, i], projector[1, i], projector[2, i] = ny * ny, -nx * ny, nx * nx
+        curvature[i] = max(-(slip[0, i] * nx + slip[1, i] * ny), 0.0) / radius
+
+
+@njit(cache=True, fastmath=VECTOR)
+def _gram(projector, arm):  # type: ignore[no-untyped-def]
+    """Products of the three rigid motions, restricted to the space."""
+    xx = xy = yy = xm = ym = mm = 0.0
+    for i in range(arm.shape[1]):
+        x, y = arm[0, i], arm[1, i]
+        pxx, pxy, pyy = projector[0, i], projector[1, i], projector[2, i]
+        pxm, pym = x * pxy - y * pxx, x * pyy - y * pxy
+        xx += pxx
+        xy += pxy
+        yy += pyy
+        xm += pxm
+        ym += pym
+        mm += x * pym - y * pxm
+    return np.array(((xx, xy, xm), (xy, yy, ym), (xm, ym, mm)))
+
+
+@njit(cache=True)
+def _inverse(gram):  # type: ignore[no-untyped-def]
+    """Pseudo-inverse: where all cells slide along one line some rigid motion is not in the space."""
+    values, vectors = np.linalg.eigh(gram)
+    inverse = np.zeros((3, 3))
+    for k in range(3):
+        if values[k] > 1e-12 * values[2]:
+            inverse += np.outer(vectors[:, k], vectors[:, k]) / values[k]
+    return inverse
+
+
+@njit(cache=True, fastmath=VECTOR)
+def _restrict(projector, arm, move):  # type: ignore[no-untyped-def]
+    """Restrict a move to the space in place and return its resultants."""
+    sx = sy = sm = 0.0
+    for i in range(move.shape[1]):
+        mx, my = move[0, i], move[1, i]
+        px = projector[0, i] * mx + projector[1, i] * my
+        py = projector[1, i] * mx + projector[2, i] * my
+        move[0, i], move[1, i] = px, py
+        sx += px
+        sy += py
+        sm += arm[0, i] * py - arm[1, i] * px
+    return sx, sy, sm
+
+
+@njit(cache=True, fastmath=VECTOR)
+def _subtract_rigid(projector, arm, motion, move):  # type: ignore[no-untyped-def]
+    """Subtract from a move, in place, the part of a rigid motion [3] that lies in the space."""
+    mx, my, yaw = motion[0], motion[1], motion[2]
+    for i in range(move.shape[1]):
+        dx, dy = mx - arm[1, i] * yaw, my + arm[0, i] * yaw
+        move[0, i] -= projector[0, i] * dx + projector[1, i] * dy
+        move[1, i] -= projector[1, i] * dx + projector[2, i] * dy
+
+
+@njit(cache=True)
+def _balance(projector, arm, inverse_gram, move):  # type: ignore[no-untyped-def]
+    sx, sy, sm = _restrict(projector, arm, move)
+    motion = inverse_gram[:, 0] * sx + inverse_gram[:, 1] * sy + inverse_gram[:, 2] * sm
+    _subtract_rigid(projector, arm, motion, move)
+
+
+@njit(cache=True)
+def _advance(projector, arm, inverse_gram, curvature, scale, move, residual, direction, answer, size):  # type: ignore[no-untyped-def]
+    step = size / _stiffen(projector, curvature, direction, answer)
+    for k in range(2):
+        for i in range(move.shape[1]):
+            move[k, i] += step * direction[k, i]
+            residual[k, i] += step * answer[k, i]
+    _balance(projector, arm, inverse_gram, residual)
+    for k in range(2):
+        for i in range(move.shape[1]):
+            answer[k, i] = scale[i] * residual[k, i]
+
+
+@njit(cache=True, fastmath=VECTOR)
+def _stiffen(projector, curvature, direction, answer):  # type: ignore[no-untyped-def]
+    """Restrict C·direction to the space and add the curvature, in place; return direction·answer."""
+    product = 0.0
+    for i in range(direction.shape[1]):
+        ax, ay, dx, dy = answer[0, i], answer[1, i], direction[0, i], direction[1, i]
+        px = projector[0, i] * ax + projector[1, i] * ay + curvature[i] * dx
+        py = projector[1, i] * ax + projector[2, i] * ay + curvature[i] * dy
+        answer[0, i], answer[1, i] = px, py
+        product += dx * px + dy * py
+    return product
+
+
+@njit(cache=True, fastmath=VECTOR)
+def _improve(projector, arm, inverse_gram, scale, residual, improved):  # type: ignore[no-untyped-def]
+    for k in range(2):
+        for i in range(improved.shape[1]):
+            improved[k, i] *= scale[i]
+    _balance(projector, arm, inverse_gram, improved)
+    product = 0.0
+    for k in range(2):
+        for i in range(improved.shape[1]):
+            product += residual[k, i] * improved[k, i]
+    return product
+
+
+@njit(cache=True)
+def _turn(direction, improved, share):  # type: ignore[no-untyped-def]
+    for k in range(2):
+        for i in range(direction.shape[1]):
+            direction[k, i] = share * direction[k, i] - improved[k, i]

@@ -1,0 +1,250 @@
+"""One incremental step of tangential contact with Coulomb friction.
+
+    minimise ½ qᵀCq + qᵀc   over |q_i| ≤ R_i, Σq A = F, Σ(x × q) A = M
+
+with C the tangential compliance, c what the surface has moved apart from it since the last step, and R = μp. The rigid
+motion of the object is the multiplier of the load: slip = Cq + c − B·motion is zero where a cell sticks and opposite
+to its traction where it slides.
+
+Newton's method in the space tangent to the constraints (both directions where a cell sticks, along the circle where it
+slides), each system solved by preconditioned conjugate gradients; then the exact projection back, and an exact line
+search, which is free because the objective is quadratic and the feasible set convex. Every iterate balances the load.
+"""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from slipcore.contact.elasticity.fields import doubled, halved, inner, resultants, rigid_displacement
+from slipcore.contact.elasticity.operator import ElasticOperator
+from slipcore.contact.errors import InfeasibleLoad, NotConverged
+from slipcore.contact.solver.limit_surface import limit_load, sliding_traction
+from slipcore.contact.solver.projection import project
+from slipcore.contact.solver.tangent_space import TangentSpace
+from slipcore.errors import InvalidInput
+from slipcore.frames import BoolArray, FloatArray
+
+CG_REDUCTION = 0.05
+"""How far each Newton system is solved, in the preconditioned residual; measured best between 0.03 and 0.1."""
+CG_ITERATIONS = 25
+ROUNDING = 1e-13
+"""Of the work of slip at the limits, below which a slope is noise."""
+FAR = 0.2
+"""Residual of a start from which a coarser grid is asked first: Newton's steps move fronts by a few cells only."""
+COARSEST = 24
+COARSE_TOLERANCE = 1e-3
+LIMIT_MARGIN = 1e-12
+"""Loads this close to the limit surface (relative) are on it: all slides."""
+BALANCE = 1e-10
+"""Of the summed limits: a load that tractions miss by more is not carried, however small the residual."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Control:
+    """What drives the object along x, along y and in rotation: its load where ``given``, otherwise its motion.
+
+    ``load``: F_x N, F_y N, M N·m on the finger, total; ``motion``: dx m, dy m, dφ rad in this step.
+    """
+
+    load: FloatArray = field(default_factory=lambda: np.zeros(3))
+    motion: FloatArray = field(default_factory=lambda: np.zeros(3))
+    given: BoolArray = field(default_factory=lambda: np.ones(3, dtype=bool))
+
+    def __post_init__(self) -> None:
+        for name in ("load", "motion", "given"):
+            value = getattr(self, name)
+            if value.shape != (3,) or not np.isfinite(value).all():
+                raise InvalidInput(f"tangential {name}", value, "three finite numbers")
+
+
+class TangentialContact(NamedTuple):
+    """``traction`` on the finger and its ``displacement`` Cq [2, ny, nx]; ``slip`` of the finger against the object in
+    this step; ``motion`` [3] of the object in this step (m, m, rad); ``residual`` of the natural map as a share of the
+    largest limit; ``imbalance`` as a share of the summed limits; ``iterations``: Newton steps; ``sliding``: all cells
+    slide. On the limit surface no motion is too large; the one given is the least with which all slide.
+    """
+
+    traction: FloatArray
+    displacement: FloatArray
+    slip: FloatArray
+    motion: FloatArray
+    residual: float
+    imbalance: float
+    iterations: int
+    sliding: bool
+
+
+def solve_tangential(
+    operator: ElasticOperator,
+    points: tuple[FloatArray, FloatArray],
+    limit: FloatArray,
+    offset: FloatArray,
+    control: Control,
+    start: FloatArray,
+    tolerance: float = 1e-8,
+    max_iterations: int = 60,
+) -> TangentialContact:
+    """Tractions and motion of one step.
+
+    ``points``: x and y of the cells [ny, nx] m; ``limit``: μp [ny, nx] Pa, zero outside contact; ``offset``: c above,
+    [2, ny, nx] m; ``start``: a guess of the tractions; ``tolerance`` on the residual, relative to the largest limit.
+
+    Raises ``InfeasibleLoad`` outside the limit surface and ``NotConverged`` at ``max_iterations`` or where the
+    tractions miss the load.
+    """
+    if not limit.any():
+        return _frictionless(offset, control)
+    return _Problem(operator, points, limit, offset, control).solve(start, tolerance, max_iterations)
+
+
+class _Problem:
+    """The step with lengths and sums scaled, so that neither units nor the size of the contact matter."""
+
+    def __init__(
+        self,
+        operator: ElasticOperator,
+        points: tuple[FloatArray, FloatArray],
+        limit: FloatArray,
+        offset: FloatArray,
+        control: Control,
+    ) -> None:
+        self.operator, self.limit, self.control = operator, limit, control
+        self.given = control.given
+        x, y = points
+        touching = limit > 0.0
+        self.length = float(np.hypot(np.ptp(x[touching]), np.ptp(y[touching]))) / 2 or max(operator.grid.pitch)
+        self.units = np.array([1.0, 1.0, self.length])
+        self.arm = np.stack((x, y)) / self.length
+        self.target = control.load / self.units / operator.grid.cell_area
+        self.original = offset
+        self.offset = offset - rigid_displacement(self.arm, np.where(self.given, 0.0, control.motion * self.units))
+        kernel = operator.kernel("xx")
+        assert kernel is not None  # no body is rigid
+        self.stiffness = 1.0 / float(kernel[0, 0])
+        self.largest, self.capacity = float(limit.max()), float(limit.sum())
+        self.dual = np.zeros(3)
+
+    def solve(self, start: FloatArray, tolerance: float, max_iterations: int) -> TangentialContact:
+        traction, feasible = self.project(start)
+        if not feasible:
+            return self._at_the_limit()
+        displacement = self.operator.tangential(traction)
+        residual = np.inf
+        for iteration in range(max_iterations):
+            gradient = displacement + self.offset
+            nearest, _ = self.project(traction - self.stiffness * gradient, keep=True)
+            before, residual = residual, float(np.abs(traction - nearest).max()) / self.largest
+            if iteration == 0 and residual > FAR and min(self.limit.shape) >= 2 * COARSEST:
+                traction, _ = self.project(self._from_coarse(traction))
+                displacement = self.operator.tangential(traction)
+                continue
+            if residual <= tolerance:
+                result = self._result(traction, displacement, residual, iteration)
+                return self._at_the_limit(result) if result.sliding and self.given.all() else result
+            slip = gradient - rigid_displacement(self.arm, self.dual / self.stiffness)
+            trial = nearest if residual > 0.9 * before and iteration % 2 else self._newton(traction, slip)
+            traction, displacement = self._search(traction, displacement, slip, trial)
+        raise NotConverged("tangential contact", residual, tolerance, max_iterations)
+
+    def _from_coarse(self, traction: FloatArray) -> FloatArray:
+        """The tractions of a grid of half as many cells a side, interpolated."""
+        operator = self.operator.coarse
+        x, y = halved(self.arm * self.length)
+        limit, start = halved(self.limit, "constant"), halved(traction, "constant")
+        try:
+            coarse = solve_tangential(
+                operator, (x, y), limit, halved(self.original), self.control, start, COARSE_TOLERANCE
+            )
+        except (InfeasibleLoad, NotConverged):  # the coarse contact is another one; this is only a guess
+            return traction
+        return doubled(coarse.traction, self.limit.shape)
+
+    def project(self, wish: FloatArray, keep: bool = False) -> tuple[FloatArray, bool]:
+        """Nearest feasible traction; ``keep`` its dual, which is the rigid motion when the wish is a gradient step."""
+        flat = project(
+            wish.reshape(2, -1),
+            self.limit.ravel(),
+            self.arm.reshape(2, -1),
+            self.target,
+            self.given,
+            self.dual if keep else None,
+        )
+        if keep:
+            self.dual = flat.motion
+        return flat.traction.reshape(wish.shape), flat.feasible
+
+    def _newton(self, traction: FloatArray, slip: FloatArray) -> FloatArray:
+        space = TangentSpace(traction, slip, self.limit, self.stiffness, self.arm, self.given)
+        lacking = self.target - resultants(traction + space.onto_circle, self.arm)
+        move = space.onto_circle + space.balancing(lacking)
+        answer = slip.copy()
+        if np.abs(move).max() > 1e-14 * self.largest:
+            answer += self.operator.tangential(move)
+        move += space.conjugate_gradients(self.operator, answer, move, CG_REDUCTION, CG_ITERATIONS)
+        return self.project(traction + move)[0]
+
+    def _search(
+        self, traction: FloatArray, displacement: FloatArray, slip: FloatArray, trial: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """The best point on the way to a feasible trial; the whole way where that at least does not climb.
+
+        The slope is taken with the slip, not with the gradient: the rigid motion in the latter does no work on a
+        balanced way, but its rounding would drown the slope near the solution.
+        """
+        way = trial - traction
+        response = self.operator.tangential(way)
+        slope, curvature = inner(slip, way), inner(way, response)
+        rounding = ROUNDING * inner(np.hypot(slip[0], slip[1]), self.limit)
+        best = -slope / curvature if curvature > 0.0 and abs(slope) > rounding else 1.0
+        share = 1.0 if best >= 0.5 else max(best, 0.0)
+        if share == 1.0:
+            return trial, displacement + response
+        return traction + share * way, displacement + share * response
+
+    def _result(
+        self, traction: FloatArray, displacement: FloatArray, residual: float, iterations: int
+    ) -> TangentialContact:
+        scaled = np.where(self.given, self.dual / self.stiffness, self.control.motion * self.units)
+        slip = displacement + self.offset - rigid_displacement(self.arm, np.where(self.given, scaled, 0.0))
+        lacking = (self.target - resultants(traction, self.arm)) * self.given
+        imbalance = float(np.abs(lacking).max()) / self.capacity
+        if imbalance > BALANCE:
+            raise NotConverged("balance of the tangential load", imbalance, BALANCE, iterations)
+        wish = np.hypot(*(traction - self.stiffness * slip))
+        return TangentialContact(
+            traction,
+            displacement,
+            slip,
+            scaled / self.units,
+            residual,
+            imbalance,
+            iterations,
+            bool((wish > self.limit)[self.limit > 0.0].all()),
+        )
+
+    def _at_the_limit(self, balanced: TangentialContact | None = None) -> TangentialContact:
+        """All slides: the load is on the limit surface, or it is refused; ``balanced`` holds where it is inside.
+
+        Cells that slide apart, as lateral slip makes them, add up to less than the limit.
+        """
+        radius, arm = self.limit.ravel(), self.arm.reshape(2, -1)
+        factor, direction = limit_load(radius, arm, self.target, self.given)
+        if factor < 1.0 - LIMIT_MARGIN:
+            raise InfeasibleLoad(self.control.load, factor)
+        if balanced is not None and factor > 1.0 + LIMIT_MARGIN:
+            return balanced
+        traction = sliding_traction(radius, arm, direction).reshape(self.offset.shape)
+        displacement = self.operator.tangential(traction)
+        along = rigid_displacement(self.arm, direction)
+        lag = ((displacement + self.offset) * along).sum(axis=0) / (along**2).sum(axis=0).clip(min=1e-300)
+        self.dual = direction * float(lag[self.limit > 0.0].max()) * self.stiffness
+        return self._result(traction, displacement, 0.0, 0)._replace(sliding=True)
+
+
+def _frictionless(offset: FloatArray, control: Control) -> TangentialContact:
+    """Nothing holds and nothing is held."""
+    if (np.abs(control.load) * control.given).any():
+        raise InfeasibleLoad(control.load, 0.0)
+    nothing, motion = np.zeros_like(offset), np.where(control.given, 0.0, control.motion)
+    return TangentialContact(nothing, nothing.copy(), offset.copy(), motion, 0.0, 0.0, 0, True)

@@ -1,0 +1,117 @@
+"""The boundary-element tier: a plan, a fidelity, a log."""
+
+import time
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from slipcore.contact.elasticity.grid import Grid
+from slipcore.contact.elasticity.influence import Scaled
+from slipcore.contact.elasticity.operator import Operators
+from slipcore.contact.plan.plan import Plan
+from slipcore.contact.solver.normal import solve_normal
+from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
+from slipcore.contact.solver.resolution import summary
+from slipcore.contact.tiers.sampling import (
+    FrameRecord,
+    Lattice,
+    frame_record,
+    frame_times,
+    grasp_log,
+    lattice,
+    untouched,
+)
+from slipcore.errors import InvalidInput
+from slipcore.frames import FloatArray, GraspLog
+
+PROBE_CELLS = 48
+PROBE_TOLERANCE = 1e-3
+ROOM = 1.06
+"""Of the contact's reach, for what the coarse probe misses at its edge."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fidelity:
+    """``cells`` across the largest contact, load steps a frame (``substeps``), ``tolerance`` of the solver."""
+
+    cells: int = 32
+    substeps: int = 1
+    tolerance: float = 1e-4
+
+    def __post_init__(self) -> None:
+        if self.cells < 4 or self.substeps < 1 or not 0.0 < self.tolerance < 1.0:
+            raise InvalidInput("fidelity", self, "4 cells or more, 1 substep or more, a tolerance between 0 and 1")
+
+
+def run(plan: Plan, fidelity: Fidelity | None = None) -> GraspLog:
+    """Simulate a plan; the log has no observation effects yet.
+
+    Raises ``InfeasibleLoad``, ``NotConverged`` and ``InvalidInput``.
+    """
+    fidelity = Fidelity() if fidelity is None else fidelity
+    began = time.perf_counter()
+    where = lattice(plan.sampling, ROOM * contact_reach(plan), fidelity.cells)
+    solver = QuasiStatic(plan.problem, where.grid, fidelity.tolerance, 1e-2 * fidelity.tolerance)
+    times = frame_times(plan)
+    frames, warnings = _frames(plan, solver, where, times, fidelity.substeps)
+    metadata = {
+        "tier": "boundary elements",
+        "grid": f"{where.grid.shape[1]} x {where.grid.shape[0]} cells of {where.grid.pitch[0]:.6g} m",
+        "steps": str(len(warnings)),
+        "tolerance": f"{fidelity.tolerance:g}",
+        "unresolved": summary(warnings),
+        "applications": str(solver.count.normal + solver.count.tangential + solver.count.coupling),
+        "seconds": f"{time.perf_counter() - began:.3f}",
+    }
+    return grasp_log(plan, where, times, frames, metadata)
+
+
+def _frames(
+    plan: Plan, solver: QuasiStatic, where: Lattice, times: FloatArray, substeps: int
+) -> tuple[list[FrameRecord], list[tuple[str, ...]]]:
+    """Records of all frames, and of each load step what the grid does not resolve."""
+    corners, state = plan.corners(), solver.start()
+    frames, warnings = [untouched(where)], list[tuple[str, ...]]()
+    for begin, end in pairwise(times):
+        bends = corners[(corners > begin) & (corners < end)]
+        instants = np.union1d(np.linspace(begin, end, substeps + 1), bends)
+        results: list[StepResult] = []
+        for before, now in pairwise(instants):
+            state, result = solver.step(state, plan.load(float(before), float(now)))
+            results.append(result)
+        warnings += [result.warnings() for result in results]
+        frames.append(frame_record(where, results))
+    return frames, warnings
+
+
+def contact_reach(plan: Plan) -> float:
+    """How far from the centre the contact reaches along x or y under the largest normal force, m; found on a coarse
+    grid.
+    """
+    problem = plan.problem
+    knots = np.append(plan.corners(), plan.duration)
+    force = max(plan.value("normal_force", float(t)) for t in knots)
+    softening = 1.0 + sum(branch.strength for branch in problem.creep)
+    operators = Operators((*(Scaled(body, softening) for body in problem.finger), *problem.obstacle))
+    reach = 4e-3
+    if force <= 0.0:
+        return reach
+    for _ in range(20):
+        grid = Grid.square(PROBE_CELLS, 2.0 * reach)
+        try:
+            height = problem.height(grid)
+            pressure = solve_normal(operators, grid, height, force=force, tolerance=PROBE_TOLERANCE).pressure
+        except InvalidInput:  # no surface within reach yet
+            reach *= 2.0
+            continue
+        x, y = grid.points()
+        touching = pressure > 0.0
+        extent = float(np.maximum(np.abs(x), np.abs(y))[touching].max()) + 0.5 * grid.pitch[0]
+        if extent > 0.95 * reach:
+            reach *= 2.0
+        elif extent < 0.3 * reach:
+            reach = 1.5 * extent
+        else:
+            return extent
+    raise InvalidInput("contact", f"reaches beyond {reach:.3g} m", "surfaces that part within some metres")

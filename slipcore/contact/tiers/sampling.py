@@ -1,0 +1,139 @@
+"""From fields on the solver's grid to a sensor's points, elements and frames, in the contract's frame (z outward)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from slipcore.contact.elasticity.grid import Grid
+from slipcore.contact.plan.plan import Plan, Sampling
+from slipcore.contact.solver.quasi_static import StepResult
+from slipcore.frames import BoolArray, FloatArray, GraspLog, GroundTruth
+
+UNSAMPLED_FRAMES = 60
+"""Frames of a scene without a sensor."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """Sensor points on a grid: ``points`` along x and y, each the centre of ``cells`` × ``cells`` cells (an odd
+    number).
+    """
+
+    grid: Grid
+    points: tuple[int, int]
+    cells: int
+
+    @property
+    def pitch(self) -> float:
+        """Distance of points, m."""
+        return self.cells * self.grid.pitch[0]
+
+    def at_points(self, field: FloatArray | BoolArray) -> FloatArray | BoolArray:
+        """Values [..., n, m] of a field [..., ny, nx] at the points, x along the first axis."""
+        inside = field[..., *self._inside()]
+        middle = self.cells // 2
+        return np.swapaxes(inside[..., middle :: self.cells, middle :: self.cells], -1, -2)
+
+    def over_elements(self, field: FloatArray) -> FloatArray:
+        """Sums [..., n, m] of a field [..., ny, nx] over the elements around the points."""
+        inside = field[..., *self._inside()]
+        n, m = self.points
+        blocks = inside.reshape(*field.shape[:-2], m, self.cells, n, self.cells)
+        return np.swapaxes(blocks.sum(axis=(-3, -1)), -1, -2)
+
+    def position(self) -> FloatArray:
+        """Rest positions [n, m, 3] m."""
+        x, y = self.grid.points()
+        places = np.stack((x, y, np.zeros_like(x)))
+        return np.moveaxis(self.at_points(places), 0, -1).astype(np.float64)
+
+    def _inside(self) -> tuple[slice, slice]:
+        (ny, nx), (n, m) = self.grid.shape, self.points
+        first_y, first_x = (ny - m * self.cells) // 2, (nx - n * self.cells) // 2
+        return slice(first_y, first_y + m * self.cells), slice(first_x, first_x + n * self.cells)
+
+
+def lattice(sampling: Sampling | None, reach: float, cells_across: int) -> Lattice:
+    """Points and grid for a contact that reaches ``reach`` m from the centre, with that many cells across it at least.
+
+    Points are cell centres, so that the truth at a point is exact. Without a sensor every cell is a point.
+    """
+    width = 2.0 * reach
+    if sampling is None:
+        return Lattice(Grid.square(cells_across, width), (cells_across, cells_across), 1)
+    cells = max(int(np.ceil(cells_across * sampling.pitch / width)), 1)
+    cells += 1 - cells % 2
+    pitch = sampling.pitch / cells
+    needed = int(np.ceil(width / pitch))
+    sides = [max(count * cells, needed) for count in sampling.points]
+    nx, ny = (side + (side - count * cells) % 2 for side, count in zip(sides, sampling.points, strict=True))
+    return Lattice(Grid((ny, nx), (pitch, pitch)), sampling.points, cells)
+
+
+def frame_times(plan: Plan) -> FloatArray:
+    """Times of the frames, from zero to the end of the scene."""
+    rate = UNSAMPLED_FRAMES / plan.duration if plan.sampling is None else plan.sampling.frame_rate
+    last = np.floor(plan.duration * rate * (1.0 + 1e-12))  # a whole number of frames stays one in spite of rounding
+    return np.asarray(np.arange(last + 1.0) / rate)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameRecord:
+    """One frame at the points: [n, m, 3] and [n, m], z outward."""
+
+    displacement: FloatArray
+    force: FloatArray
+    pose: FloatArray
+    contact: BoolArray
+    moved: BoolArray
+    at_limit: BoolArray
+    stick_ratio: float
+
+
+def frame_record(lattice: Lattice, steps: Sequence[StepResult]) -> FrameRecord:
+    """What the sensor sees at the end of the steps since the last frame; a point moved if it did in any of them."""
+    last = steps[-1]
+    outward = np.array([1.0, 1.0, -1.0])
+    moved = np.logical_or.reduce([step.moved for step in steps])
+    return FrameRecord(
+        displacement=np.moveaxis(lattice.at_points(last.displacement), 0, -1) * outward,
+        force=np.moveaxis(lattice.over_elements(last.force), 0, -1) * outward,
+        pose=last.pose,
+        contact=np.asarray(lattice.at_points(last.contact), dtype=bool),
+        moved=np.asarray(lattice.at_points(moved), dtype=bool),
+        at_limit=np.asarray(lattice.at_points(last.at_limit), dtype=bool),
+        stick_ratio=last.stick_ratio,
+    )
+
+
+def untouched(lattice: Lattice) -> FrameRecord:
+    """A frame before anything touches."""
+    nothing, none = np.zeros((*lattice.points, 3)), np.zeros(lattice.points, dtype=bool)
+    return FrameRecord(nothing, nothing, np.zeros(3), none, none, none, float("nan"))
+
+
+def grasp_log(
+    plan: Plan, lattice: Lattice, time: FloatArray, frames: Sequence[FrameRecord], metadata: dict[str, str]
+) -> GraspLog:
+    """The log of all frames, with truth and before any observation effect."""
+    force = np.stack([frame.force for frame in frames])
+    truth = GroundTruth(
+        contact=np.stack([frame.contact for frame in frames]),
+        slip_kinematic=np.stack([frame.moved for frame in frames]),
+        slip_contact_factor=np.stack([frame.at_limit for frame in frames]),
+        stick_ratio=np.array([frame.stick_ratio for frame in frames]),
+        friction=plan.law,
+    )
+    return GraspLog(
+        time=time,
+        position=lattice.position(),
+        displacement=np.stack([frame.displacement for frame in frames]),
+        element_area=lattice.pitch**2,
+        force=force,
+        normal=np.broadcast_to([0.0, 0.0, 1.0], force.shape),  # linear theory: loads act on the undeformed plane
+        object_pose=np.stack([frame.pose for frame in frames]),
+        sensor="simulated",
+        metadata=metadata,
+        truth=truth,
+    )

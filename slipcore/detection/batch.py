@@ -1,0 +1,104 @@
+"""Whole logs: the fold of the detector's steps, and what later frames say of earlier ones."""
+
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+
+from slipcore.defaults import DEFAULT_METHOD, MOST_LOOKAHEAD
+from slipcore.detection.detector import DetectorState, init, masked, said, step
+from slipcore.detection.methods import find_method
+from slipcore.detection.shared.answer import answer
+from slipcore.detection.shared.interface import CompiledMethod
+from slipcore.errors import InvalidInput
+from slipcore.frames import GraspLog
+from slipcore.slip_state import SlipHistory, SlipState, observed_over_time, slip_events
+
+
+def detect_slip(log: GraspLog, method: str = DEFAULT_METHOD, *, lookahead: int = 0, **options: float) -> SlipHistory:
+    """Detect local slip in a whole log: the fold of ``step`` over its frames.
+
+    With a ``lookahead`` each frame is decided in the light of that many frames after it (see ``Hindsight``). Raises
+    ``InvalidInput`` as ``init`` does.
+    """
+    state = init(log.position, log.element_area, method, **options)
+    hindsight, answers = Hindsight(state, lookahead), []
+    for frame in log.frames():
+        state, now = step(state, frame)
+        if (settled := hindsight.take(state, now)) is not None:
+            answers.append(settled)
+    return collect_history([*answers, *hindsight.rest()], state)
+
+
+class Hindsight:
+    """A running detector's answers, each ``lookahead`` frames late and revised by what came meanwhile.
+
+    A fixed-lag smoother (Kim, 1994) of the two states of method "filter"; the answers of other methods, which keep no
+    posterior, are late but the same. ``start`` is the detector's state before the first frame that is taken.
+    """
+
+    def __init__(self, start: DetectorState, lookahead: int) -> None:
+        whole = isinstance(lookahead, int | np.integer) and not isinstance(lookahead, bool)
+        if not whole or not 0 <= lookahead <= MOST_LOOKAHEAD:
+            raise InvalidInput("lookahead", lookahead, f"a whole number of frames, 0 to {MOST_LOOKAHEAD}")
+        method = find_method(start.setup.method)
+        self._revise = method.revise if lookahead and isinstance(method, CompiledMethod) else None
+        self._lookahead = lookahead
+        self._states, self._answers = deque([start]), deque[SlipState]()
+        self._slipped, self._likely = start.memory.masks[1], start.memory.probability
+
+    def take(self, state: DetectorState, now: SlipState) -> SlipState | None:
+        """The detector's state after a frame, and its answer: what is settled by it, if anything."""
+        self._states.append(state)
+        self._answers.append(now)
+        return self._settle() if len(self._answers) > self._lookahead else None
+
+    def rest(self) -> list[SlipState]:
+        """The last frames, with what lookahead there is."""
+        return [self._settle() for _ in range(len(self._answers))]
+
+    def _settle(self) -> SlipState:
+        now, (setup, before, _) = self._answers.popleft(), self._states.popleft()
+        if self._revise is None:
+            return now
+        memory = self._states[0].memory
+        contact = memory.masks[0]
+        decision = self._revise([state.memory.own for state in self._states], setup.settings)
+        slip, likely = np.empty_like(contact), np.empty_like(memory.probability)
+        velocity = np.empty((*contact.shape, 2))
+        touching, slipping = answer(
+            setup.lattice.position,
+            memory.time - before.time,
+            before.displacement,
+            memory.displacement,
+            before.object_pose,
+            memory.object_pose,
+            contact,
+            contact & before.masks[0],
+            *decision,
+            self._slipped,
+            self._likely,
+            slip,
+            likely,
+            velocity,
+        )
+        self._slipped, self._likely = slip, likely
+        settled = said(memory.time, contact, slip, likely, velocity, touching, slipping)
+        return masked(settled, memory.observed, before.observed)
+
+
+def collect_history(answers: Sequence[SlipState], state: DetectorState) -> SlipHistory:
+    """The history that a detector's answers add up to, with the ``state`` that it ended in.
+
+    Raises ``InvalidInput`` when there are none.
+    """
+    if not answers:
+        raise InvalidInput("answers", "empty", "at least one frame's slip state")
+    time, contact, slip, probability, ratio, velocity, macro_slip = (
+        np.array([getattr(answer, name) for answer in answers])
+        for name in ("time", "contact", "slip", "probability", "stick_ratio", "velocity", "macro_slip")
+    )
+    observed = observed_over_time(answers)
+    events = slip_events(time, contact, slip, observed)
+    noise, method = state.noise, state.setup.method
+    return SlipHistory(time, contact, slip, probability, ratio, velocity, macro_slip, events, noise, method, observed)

@@ -1,0 +1,154 @@
+"""Where the object is: a robust fit of its pose to the elements that most likely stick, and how it moved."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from slipcore.detection.shared.compilation import compiled
+from slipcore.frames import FloatArray
+
+
+class Pose(NamedTuple):
+    """Where the object is: x, y m, yaw rad, and a stretch that stands in for linear rotation (1 for a rigid body); with
+    the cosine and sine of the yaw, see ``pose_at``.
+    """
+
+    x: float
+    y: float
+    yaw: float
+    stretch: float
+    cosine: float
+    sine: float
+
+
+class Uncertainty(NamedTuple):
+    """Variance of a fitted pose: of the place of (x, y) m², and of the yaw about it rad²."""
+
+    place: float
+    yaw: float
+    x: float
+    y: float
+
+
+class Anchors(NamedTuple):
+    """Elements that stay in contact, [k]: place on the object if they stuck, x, y m and its variance m²; where their
+    markers are, m; and how likely they stuck.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    variance: FloatArray
+    marker_x: FloatArray
+    marker_y: FloatArray
+    stick: FloatArray
+
+
+@compiled
+def pose_at(x: float, y: float, yaw: float, stretch: float) -> Pose:
+    """The pose with its cosine and sine, which a loop over elements would otherwise work out for each."""
+    return Pose(x, y, yaw, stretch, math.cos(yaw), math.sin(yaw))
+
+
+@compiled
+def place_on_object(pose: Pose, x: float, y: float) -> tuple[float, float]:
+    """A point in the object's frame."""
+    cosine, sine = pose.cosine / pose.stretch, pose.sine / pose.stretch
+    dx, dy = x - pose.x, y - pose.y
+    return cosine * dx + sine * dy, cosine * dy - sine * dx
+
+
+@compiled
+def place_of_object(pose: Pose, x: float, y: float) -> tuple[float, float]:
+    """Where a point of the object's frame is."""
+    cosine, sine = pose.cosine * pose.stretch, pose.sine * pose.stretch
+    return cosine * x - sine * y + pose.x, sine * x + cosine * y + pose.y
+
+
+@compiled
+def fit_pose(anchors: Anchors, weight: FloatArray, given: FloatArray) -> tuple[Pose, Uncertainty]:
+    """Weighted Procrustes fit of the pose that carries each anchor to its marker, and its variance.
+
+    A stretch is allowed as far as linear theory of so large a rotation would make one; of a ``given`` pose (empty if
+    there is none) only the stretch and, within that of linear theory, the yaw.
+    """
+    total = mx = my = ax = ay = 0.0
+    for e in range(len(weight)):
+        w = weight[e]
+        total += w
+        mx += w * anchors.marker_x[e]
+        my += w * anchors.marker_y[e]
+        ax += w * anchors.x[e]
+        ay += w * anchors.y[e]
+    mx, my, ax, ay = mx / total, my / total, ax / total, ay / total
+    sine = cosine = spread = 0.0
+    for e in range(len(weight)):
+        w = weight[e]
+        px, py = anchors.x[e] - ax, anchors.y[e] - ay
+        qx, qy = anchors.marker_x[e] - mx, anchors.marker_y[e] - my
+        sine += w * (px * qy - py * qx)
+        cosine += w * (px * qx + py * qy)
+        spread += w * (px * px + py * py)
+    spread = max(spread, 1e-30)
+    yaw = math.atan2(sine, cosine)
+    variance = 1.0 / spread
+    turned = given[2] if given.size else yaw
+    room = 0.25 * turned**4 + 1e-14
+    stretch = 1.0 + (math.hypot(sine, cosine) / spread - 1.0) * room / (room + variance)
+    if given.size:
+        room = turned**6 / 9.0 + 1e-16
+        difference = math.atan2(math.sin(yaw - turned), math.cos(yaw - turned))
+        pose = pose_at(given[0], given[1], turned + difference * room / (room + variance), stretch)
+        return pose, Uncertainty(0.0, 0.0, mx, my)
+    c, s = stretch * math.cos(yaw), stretch * math.sin(yaw)
+    return pose_at(mx - c * ax + s * ay, my - s * ax - c * ay, yaw, stretch), Uncertainty(1.0 / total, variance, mx, my)
+
+
+@compiled
+def find_pose(
+    anchors: Anchors,
+    before: Pose,
+    given: FloatArray,
+    variance: float,
+    least_weight: float,
+    rigidity: float,
+    outlier: float,
+) -> tuple[Pose, Uncertainty]:
+    """Pose of the object by iteratively reweighted fits to what most likely sticks; ``variance`` of a marker, m²."""
+    if len(anchors.x) < 2:
+        known = pose_at(given[0], given[1], given[2], 1.0) if given.size else before
+        return known, Uncertainty(0.0, 1e-30, 0.0, 0.0)
+    base = np.maximum(anchors.stick * anchors.stick, least_weight) / (variance + anchors.variance)
+    pose, doubt = fit_pose(anchors, base, given)
+    weight = np.empty(len(base))
+    for _ in range(2):
+        for e in range(len(base)):
+            px, py = place_of_object(pose, anchors.x[e], anchors.y[e])
+            bx, by = place_of_object(before, anchors.x[e], anchors.y[e])
+            scale = 2.0 * (variance + anchors.variance[e]) + rigidity**2 * ((px - bx) ** 2 + (py - by) ** 2)
+            misfit = ((px - anchors.marker_x[e]) ** 2 + (py - anchors.marker_y[e]) ** 2) / (outlier * scale)
+            weight[e] = base[e] / (1.0 + misfit) ** 2
+        pose, doubt = fit_pose(anchors, weight, given)
+    return pose, doubt
+
+
+@compiled
+def object_motion(
+    anchors: Anchors, before: Pose, pose: Pose, doubt: Uncertainty, margin: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """How far the object carried each anchor, x and y in its own frame, m, and the variance of that, m²: [k] each.
+
+    Taken from each squared motion is what noise alone makes of it, ``margin`` times over.
+    """
+    count = len(anchors.x)
+    motion_x, motion_y, noise = np.zeros(count), np.zeros(count), np.empty(count)
+    cosine, sine = pose.cosine, pose.sine
+    for e in range(count):
+        px, py = place_of_object(pose, anchors.x[e], anchors.y[e])
+        bx, by = place_of_object(before, anchors.x[e], anchors.y[e])
+        noise[e] = doubt.place + doubt.yaw * ((px - doubt.x) ** 2 + (py - doubt.y) ** 2)
+        dx, dy = px - bx, py - by
+        size = dx * dx + dy * dy
+        share = max(0.0, 1.0 - margin * noise[e] / size) if size > 0.0 else 0.0
+        motion_x[e], motion_y[e] = share * (cosine * dx + sine * dy), share * (cosine * dy - sine * dx)
+    return motion_x, motion_y, noise

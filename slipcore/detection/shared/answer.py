@@ -1,0 +1,64 @@
+"""What a decision means: slip of what may slip, stick ratio, and velocity relative to the object."""
+
+import math
+
+import numpy as np
+
+from slipcore.detection.shared.compilation import compiled
+from slipcore.detection.shared.rigid_motion import Motion, fit_motion
+from slipcore.frames import BoolArray, FloatArray
+
+
+@compiled
+def answer(
+    position: FloatArray,
+    interval: float,
+    start: FloatArray,
+    end: FloatArray,
+    pose_before: FloatArray,
+    pose: FloatArray,
+    contact: BoolArray,
+    stays: BoolArray,
+    decided: BoolArray,
+    likely: FloatArray,
+    slipped: BoolArray,
+    was_likely: FloatArray,
+    slip: BoolArray,
+    probability: FloatArray,
+    velocity: FloatArray,
+) -> tuple[int, int]:
+    """Fill the last three and return how many elements touch and how many of them slip.
+
+    What was not in contact before has not slipped. The velocity is that over the last ``interval``, from displacement
+    ``start`` to ``end`` [n, m, 3], of what was in contact all through it, relative to the object: this moves as its
+    poses say, or if one is empty as the elements do that stick before and after, the more surely the more. NaN where it
+    is unobservable.
+    """
+    n, m = contact.shape
+    touching = slipping = 0
+    known = pose_before.size > 0 and pose.size > 0
+    weight = np.zeros((n, m))
+    for i in range(n):
+        for j in range(m):
+            s = decided[i, j] and stays[i, j]
+            p = likely[i, j] if stays[i, j] else 0.0
+            slip[i, j], probability[i, j] = s, p
+            touching += contact[i, j]
+            slipping += s
+            if stays[i, j] and not s and not slipped[i, j]:
+                weight[i, j] = (1.0 - p) * (1.0 - was_likely[i, j])
+    if known:
+        dx, dy, turn = pose[0] - pose_before[0], pose[1] - pose_before[1], pose[2] - pose_before[2]
+        motion = Motion(pose_before[0], pose_before[1], dx, dy, turn)
+    else:
+        motion = fit_motion(position, start, end, weight)
+    sine, versine = math.sin(motion.rotation), 2.0 * math.sin(0.5 * motion.rotation) ** 2
+    for i in range(n):
+        for j in range(m):
+            u = v = math.nan
+            if stays[i, j]:
+                rx, ry = position[i, j, 0] + start[i, j, 0] - motion.x, position[i, j, 1] + start[i, j, 1] - motion.y
+                u = (end[i, j, 0] - start[i, j, 0] - (motion.dx - versine * rx - sine * ry)) / interval
+                v = (end[i, j, 1] - start[i, j, 1] - (motion.dy + sine * rx - versine * ry)) / interval
+            velocity[i, j, 0], velocity[i, j, 1] = u, v
+    return touching, slipping

@@ -1,0 +1,70 @@
+"""What a detection method is given, and what it answers."""
+
+from collections.abc import Callable, Sequence
+from typing import Generic, NamedTuple, TypeVar
+
+from slipcore.defaults import ContactOptions
+from slipcore.detection.shared.strain import Lattice
+from slipcore.frames import BoolArray, FloatArray
+
+State = TypeVar("State")
+Options = TypeVar("Options", bound=ContactOptions)
+
+
+class Observation(NamedTuple):
+    """One frame as a method in numpy sees it, with what is common to all of them already worked out.
+
+    ``interval`` s since the frame before (infinite for the first); ``displacement`` [n, m, 3] m and outward ``normal``;
+    ``force`` [n, m, 3] N as measured, empty where missing; ``pressing``: the force inwards, N, or without forces the
+    indentation, m, and ``tangential`` force, N, [n, m]; ``contact`` and ``stays`` (in contact now and before) [n, m];
+    ``noise`` of a marker coordinate, m, NaN while unknown.
+    """
+
+    interval: float
+    displacement: FloatArray
+    normal: FloatArray
+    force: FloatArray
+    pressing: FloatArray
+    tangential: FloatArray
+    contact: BoolArray
+    stays: BoolArray
+    noise: float
+
+
+class Decision(NamedTuple):
+    """Slip of each element [n, m] and its probability [n, m]; only looked at where an element stays in contact."""
+
+    slip: BoolArray
+    probability: FloatArray
+
+
+class Method(NamedTuple, Generic[State, Options]):
+    """A detection method: its options, and pure functions on an immutable state of its own choosing.
+
+    ``init`` makes the state of a method that has seen nothing; ``step`` takes each frame.
+    """
+
+    options: type[Options]
+    init: Callable[[Lattice, Options], State]
+    step: Callable[[State, Lattice, Observation, Options], tuple[State, Decision]]
+
+
+class Start(NamedTuple):
+    """What a compiled method begins with: its options as an array, and its memory (see its ``run`` module)."""
+
+    settings: FloatArray
+    own: FloatArray
+    numbers: FloatArray
+
+
+class CompiledMethod(NamedTuple, Generic[Options]):
+    """A detection method whose whole step is one compiled call, ``run_filter`` or ``run_strain_rate``.
+
+    ``revise``: the decision on a frame from its ``own`` memory and those of the frames after it, and the settings;
+    None for a method that later frames tell nothing.
+    """
+
+    options: type[Options]
+    start: Callable[[Lattice, Options], Start]
+    run: Callable[..., tuple[float, int, int]]
+    revise: Callable[[Sequence[FloatArray], FloatArray], Decision] | None = None

@@ -1,0 +1,130 @@
+"""Scene files, sampling and the log that comes out."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from slipcore.contact.effects import FlatSurface, SensorSampling, TangentialLoad
+from slipcore.contact.elasticity.grid import Grid
+from slipcore.contact.scene import Finger, Press, Scene, simulate
+from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach
+from slipcore.contact.tiers.sampling import Lattice, lattice
+from slipcore.errors import InvalidInput
+
+TEXT = """
+name = "sheared sphere"
+friction = 0.5
+duration = 1.5
+
+[finger]
+radius = 0.012
+
+[press]
+force = 5.0
+duration = 0.5
+
+[[effect]]
+kind = "TangentialLoad"
+force = [1.0, 0.0]
+start = 0.5
+
+[[effect]]
+kind = "SensorSampling"
+points = [10, 8]
+"""
+
+
+def test_a_scene_file_is_the_scene_written_in_python(tmp_path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(TEXT, encoding="utf-8")
+    expected = Scene(
+        "sheared sphere",
+        (TangentialLoad((1.0, 0.0), start=0.5), SensorSampling((10, 8))),
+        finger=Finger(radius=0.012),
+        friction=0.5,
+        press=Press(5.0, 0.5),
+        duration=1.5,
+    )
+    assert Scene.from_toml(path) == expected
+
+
+@pytest.mark.parametrize(
+    ("entries", "named"),
+    [
+        ({"name": "a", "colour": 1}, "colour"),
+        ({"name": "a", "finger": {"raduis": 1.0}}, "raduis"),
+        ({"name": "a", "effect": [{"kind": "Magic"}]}, "Magic"),
+        ({"name": "a", "effect": [{"kind": "Torsion", "twist": 1.0}]}, "twist"),
+        ({"name": "a", "effect": [{"kind": "Torsion"}]}, "Torsion"),
+        ({"name": "a", "friction": -0.1}, "friction"),
+    ],
+)
+def test_what_a_scene_file_cannot_mean_is_refused_by_name(entries: dict, named: str) -> None:
+    with pytest.raises(InvalidInput, match=named):
+        Scene.from_mapping(entries)
+
+
+def test_a_missing_scene_names_the_library() -> None:
+    with pytest.raises(InvalidInput, match="TOML"):
+        Scene.from_toml("no_such_scene")
+
+
+def test_points_are_cell_centres_and_elements_sums_of_cells() -> None:
+    where = lattice(SensorSampling((4, 3), pitch=1e-3).extend(Scene("s").plan()).sampling, 3e-3, 16)
+    assert where.cells % 2 == 1
+    assert where.pitch == pytest.approx(1e-3)
+    position = where.position()
+    np.testing.assert_allclose(position[:, 0, 0], [-1.5e-3, -0.5e-3, 0.5e-3, 1.5e-3], atol=1e-15)
+    np.testing.assert_allclose(position[0, :, 1], [-1e-3, 0.0, 1e-3], atol=1e-15)
+    x, y = where.grid.points()
+    inside = (abs(x - 0.5e-3) < 0.5e-3) & (abs(y - 1e-3) < 0.5e-3)
+    field = np.random.default_rng(0).normal(size=where.grid.shape)
+    assert where.over_elements(field)[2, 2] == pytest.approx(field[inside].sum(), rel=1e-12)
+
+
+def test_a_lattice_of_cells_is_the_grid() -> None:
+    where = Lattice(Grid.square(6, 1.0), (6, 6), 1)
+    field = np.arange(36.0).reshape(6, 6)
+    np.testing.assert_array_equal(where.at_points(field), field.T)
+    np.testing.assert_array_equal(where.over_elements(field), field.T)
+
+
+def test_the_contact_is_found_wherever_it_ends() -> None:
+    hertz = (0.75 * 10.0 * 15e-3 * (1 - 0.49**2) / 1e6) ** (1 / 3)
+    assert contact_reach(Scene("hertz").plan()) == pytest.approx(hertz, rel=0.05)
+    wide = Scene("punch", (FlatSurface((60e-3, 10e-3)),), finger=Finger(radius=np.inf))
+    assert contact_reach(wide.plan()) == pytest.approx(30e-3, rel=0.05)
+    with pytest.raises(InvalidInput, match="contact"):
+        contact_reach(Scene("flat on flat", finger=Finger(radius=np.inf)).plan())
+
+
+def test_the_log_is_in_the_frame_of_the_contract() -> None:
+    log = simulate(
+        Scene("s", (TangentialLoad((1.5, 0.0)), SensorSampling((8, 6), 1.5e-3, 10.0))), fidelity=Fidelity(cells=16)
+    )
+    assert log.grid == (8, 6)
+    assert log.element_area == pytest.approx(2.25e-6)
+    np.testing.assert_allclose(log.time, np.arange(21) / 10.0, rtol=1e-12)
+    assert log.position[1, 0, 0] > log.position[0, 0, 0]
+    assert log.force[-1, ..., 2].sum() == pytest.approx(-10.0, rel=1e-9)
+    assert log.displacement[-1, ..., 2].min() < -1e-4
+    assert log.object_pose[-1, 0] > 0.0
+    assert not log.truth.contact[0].any()
+    assert np.isnan(log.truth.stick_ratio[0])
+    assert 0.0 < log.truth.stick_ratio[-1] < 1.0
+    assert log.metadata["tier"] == "boundary elements"
+
+
+def test_without_a_sensor_every_cell_and_step_is_in_the_log() -> None:
+    log = simulate(Scene("bare"), fidelity=Fidelity(cells=10))
+    assert log.grid == (10, 10)
+    assert len(log) == 61
+
+
+@pytest.mark.parametrize("content", [b"garbage = [", b"\xff\xfe"])
+def test_a_file_that_is_not_toml_is_refused_by_name(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "broken.toml"
+    path.write_bytes(content)
+    with pytest.raises(InvalidInput, match=r"broken\.toml"):
+        Scene.from_toml(path)

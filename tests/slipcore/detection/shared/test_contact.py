@@ -1,0 +1,114 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from slipcore import detect_slip
+from slipcore.contact import tangential_ramp
+from slipcore.defaults import ContactOptions, FilterOptions
+from slipcore.detection.detector import touch_thresholds
+from slipcore.detection.shared.contact import CURVATURE_NOISE, Touch, curvature, find_contact, reach_rim, spatial_noise
+
+OPTIONS = ContactOptions()
+AREA = 1e-6
+
+
+def contact_from_force(
+    pressing: np.ndarray, area: float, noise: float, before: np.ndarray | None, options: ContactOptions
+) -> np.ndarray:
+    return found_contact(pressing, noise, before, touch_thresholds(options, area)[0])
+
+
+def contact_from_shape(
+    pressing: np.ndarray, noise: float, before: np.ndarray | None, options: ContactOptions
+) -> np.ndarray:
+    return found_contact(pressing, noise, before, touch_thresholds(options, AREA)[1])
+
+
+def found_contact(pressing: np.ndarray, noise: float, before: np.ndarray | None, touch: np.ndarray) -> np.ndarray:
+    contact = np.zeros(pressing.shape, bool)
+    find_contact(pressing, noise, contact.copy() if before is None else before, Touch(*touch), contact)
+    return contact
+
+
+def test_the_threshold_is_the_largest_of_pressure_share_and_noise() -> None:
+    pressing = np.array([[1e-1, 9e-3, 7e-3, -1e-1]])
+    np.testing.assert_array_equal(contact_from_force(pressing, AREA, np.nan, None, OPTIONS), [[1, 1, 0, 0]])
+    np.testing.assert_array_equal(contact_from_force(pressing, AREA, 2e-3, None, OPTIONS), [[1, 0, 0, 0]])
+    weak = np.array([[6e-4, 4e-4]])  # 500 Pa on 1 mm² is 0.5 mN
+    np.testing.assert_array_equal(contact_from_force(weak, AREA, 0.0, None, OPTIONS), [[1, 0]])
+
+
+def test_an_element_is_released_later_than_it_would_touch() -> None:
+    pressing, before = np.array([[4.5e-4, 4.5e-4, 3e-4]]), np.array([[True, False, True]])
+    np.testing.assert_array_equal(contact_from_force(pressing, AREA, np.nan, before, OPTIONS), [[1, 0, 0]])
+
+
+@pytest.mark.parametrize("depth", [2e-4, 1e-3])
+def test_the_shape_tells_contact_by_a_share_of_its_depth(depth: float) -> None:
+    indentation = depth * np.array([[1.0, 0.4, 0.2, -0.5]])
+    np.testing.assert_array_equal(contact_from_shape(indentation, np.nan, None, OPTIONS), [[1, 1, 0, 0]])
+
+
+def test_a_sensor_at_rest_touches_nothing() -> None:
+    assert not contact_from_shape(np.array([[2e-5, 0.0]]), 1e-6, None, OPTIONS).any()
+
+
+def test_the_noise_of_one_frame_is_told_by_what_seems_to_pull() -> None:
+    pressing = 2e-3 * np.random.default_rng(1).standard_normal((40, 40))
+    pressing[10:30, 10:30] += 0.1  # the contact itself pushes
+    assert spatial_noise(pressing) == pytest.approx(2e-3, rel=0.15)  # 3 standard errors of 600 values
+    assert np.isnan(spatial_noise(np.full((5, 5), 0.1)))
+
+
+def test_a_noisy_first_frame_touches_nothing() -> None:
+    log = tangential_ramp(marker_noise=1e-6, force_noise=2e-3)
+    history = detect_slip(log)
+    assert not history.contact[log.time < 0.4].any()  # the object comes at 0.5 s
+    assert len(history.events.release) < 0.2 * len(history.events.touch)
+
+
+def test_beyond_the_rim_the_shape_is_hollow() -> None:
+    x, y = np.meshgrid(np.arange(-9.0, 10.0), np.arange(-9.0, 10.0))
+    r = np.hypot(x, y) / 5.0
+    outside = np.maximum(r, 1.0)
+    sunk = np.where(
+        r <= 1.0, 1.0 - r**2 / 2.0, ((2.0 - outside**2) * np.arcsin(1.0 / outside) + np.sqrt(outside**2 - 1.0)) / np.pi
+    )  # Hertz: the surface beyond the contact follows it down
+    found = contact_from_shape(
+        1e-3 * sunk, np.nan, None, replace(OPTIONS, contact_depth_share=0.3, rim_curvature=0.008)
+    )
+    assert np.count_nonzero(found ^ (r <= 1.0)) <= 0.15 * np.count_nonzero(r <= 1.0)
+    deeper = contact_from_shape(1e-3 * sunk, np.nan, None, replace(OPTIONS, contact_depth_share=0.3))
+    assert np.count_nonzero(deeper) > 1.5 * np.count_nonzero(r <= 1.0)
+
+
+@pytest.mark.parametrize(("noise", "part"), [(0.0, 0.75), (1e-6, 0.75), (2e-5, 0.45)])
+def test_on_a_bonded_gel_the_contact_is_followed_to_its_rim_while_noise_allows(noise: float, part: float) -> None:
+    x, y = np.meshgrid(np.arange(-9.0, 10.0), np.arange(-9.0, 10.0))
+    r = np.hypot(x, y) / 6.0
+    sunk = 4e-4 * np.maximum(1.0 - r**2, 0.0)  # a thin layer sinks in under the object and nowhere else
+    seen = sunk + noise * np.random.default_rng(0).standard_normal(sunk.shape)
+    found = contact_from_shape(seen, noise, None, FilterOptions())
+    assert np.count_nonzero(found & (r < 1.0)) > part * np.count_nonzero(r < 1.0)
+    assert np.count_nonzero(found & (r < 1.0)) < (part + 0.15) * np.count_nonzero(r < 1.0)
+    assert not found[r >= 1.1].any()
+
+
+def test_a_contact_does_not_leak_through_a_single_gap_of_its_rim() -> None:
+    pressing, bend = np.ones((9, 9)), np.zeros((9, 9))
+    bend[5] = 1.0  # the rim, hollow
+    bend[5, 4] = 0.0
+    contact = np.zeros((9, 9), bool)
+    contact[:3] = True
+    reach_rim(pressing, bend, 0.5, 0.5, contact)
+    wanted = np.zeros((9, 9), bool)
+    wanted[:5] = True
+    wanted[5, 4] = True
+    np.testing.assert_array_equal(contact, wanted)
+
+
+def test_the_noise_of_the_curvature_is_that_of_its_stencil() -> None:
+    impulse = np.zeros((9, 9))
+    impulse[4, 4] = 1.0
+    assert np.sqrt((curvature(impulse) ** 2).sum()) == pytest.approx(CURVATURE_NOISE, rel=2e-3)
