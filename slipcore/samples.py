@@ -138,6 +138,7 @@ def normals_of(log: GraspLog) -> FloatArray:
     """Outward normals [t, n, m, 3] of a log, from the deformed shape where it has none."""
     if log.normal is not None:
         return log.normal
+    from slipcore.detection.shared.surface import surface_normals  # compiled: who only holds samples goes without
 
     lattice = Lattice.at_rest(log.position)
     normals = np.empty_like(log.displacement)
@@ -188,6 +189,7 @@ class _ForceNoise(NamedTuple):
 def _force_noise(log: GraspLog, forces: ElementForces, options: SampleOptions) -> _ForceNoise:
     if not np.isnan(options.force_noise):
         return _ForceNoise(options.force_noise, options.force_noise)
+    from slipcore.detection.shared.noise import estimate_noise  # compiled, as above
 
     assert log.force is not None
     plane = log.force[..., :2].reshape(len(log), -1, 2).swapaxes(1, 2)
