@@ -64,6 +64,9 @@ class Settings(BaseSettings):
     max_connections: Annotated[int, Field(ge=1, le=100_000)] = Field(
         default=1000, description="Connections at once; further requests are answered 503."
     )
+    max_connections_per_address: Annotated[int, Field(ge=1, le=100_000)] = Field(
+        default=200, description="Connections of one address; beyond that its idle ones are closed."
+    )
     max_upload_bytes: Annotated[int, Field(ge=1, le=2**40)] = Field(
         default=256 * MIB, description="Largest grasp log that is accepted, in bytes."
     )

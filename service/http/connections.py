@@ -1,14 +1,15 @@
-"""HTTP connections that cannot be kept waiting: who is slow with a request's headers is let go.
+"""HTTP connections that cannot be kept waiting, whichever parser reads them.
 
-So is who goes on with a body after its answer.
+Who is slow with a request's headers is let go, and so is who goes on with a body after its answer. No address may
+hold all connections, and a request that two parsers could read differently is refused.
 """
 
 import asyncio
 import json
 from typing import Any
 
-import h11
-from starlette.types import Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
+from uvicorn.config import Config
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from service.http.problems import BAD_REQUEST, MEDIA_TYPE, TOO_MANY_CONNECTIONS, ProblemType
@@ -22,39 +23,68 @@ As long may a body go on that was answered before it was whole: nobody reads it.
 RECEIVED_BYTES = 512 * 1024
 """Taken from a socket at once at most. With asyncio's own 256 KiB a body of 4 MB takes 11 ms to receive, not 7."""
 
+VERSIONS = frozenset({"1.0", "1.1"})
 
-class BoundedConnection(H11Protocol):
-    """The server's own protocol with a clock for headers, which it lacks, and its own refusals as problem details."""
 
-    def __init__(self, *given: Any, **options: Any) -> None:
+class BoundedConnection(asyncio.Protocol):
+    """What is added to either of the server's own protocols: its bounds, and its refusals as problem details.
+
+    An address may have ``per_address`` connections; beyond that the one that was idle for longest makes room.
+    """
+
+    transport: asyncio.Transport
+    loop: asyncio.AbstractEventLoop
+    config: Config
+    client: tuple[str, int] | None
+    connections: set[Any]
+    tasks: set[Any]
+    cycle: Any
+    app: Any
+    limit_concurrency: int | None
+
+    def __init__(self, *given: Any, per_address: int | None = None, **options: Any) -> None:
         super().__init__(*given, **options)
         self._header_timer: asyncio.TimerHandle | None = None
-        self._served = self.app
+        self._served: ASGIApp = self.app
+        self.app = self._serve
         self._most, self.limit_concurrency = self.limit_concurrency, None  # its own refusal is plain text
+        self._per_address = per_address
+        self._is_beyond = False
+        self.idle_since = self.loop.time()
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether no request is being answered."""
+        return self.cycle is None or bool(self.cycle.response_complete)
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Begin to wait for a request."""
         super().connection_made(transport)
         if hasattr(transport, "max_size"):  # asyncio's own; other event loops choose by themselves
             transport.max_size = RECEIVED_BYTES
+        self._make_room()
         self._wait_for_headers()
 
     def data_received(self, data: bytes) -> None:
         """Go on waiting unless the headers are there, and the body while it is read."""
-        is_full = self._most is not None and max(len(self.connections) - 1, len(self.tasks)) >= self._most
-        self.app = _refuse if is_full else self._served
         super().data_received(data)
-        is_answered = self.conn.our_state is h11.DONE and self.conn.their_state is h11.SEND_BODY
-        if (self.conn.their_state is h11.IDLE or is_answered) and not self.transport.is_closing():
+        if self.transport.get_protocol() is not self:  # it became a WebSocket
+            return
+        if self.is_idle and not self.transport.is_closing():
             if self._header_timer is None:
                 self._wait_for_headers()
         else:
             self._stop_waiting()
 
-    def handle_websocket_upgrade(self, event: h11.Request) -> None:
+    def handle_websocket_upgrade(self, *event: Any) -> None:
         """Hand the connection on."""
         self._stop_waiting()
-        super().handle_websocket_upgrade(event)
+        super().handle_websocket_upgrade(*event)  # type: ignore[misc]  # of the server's protocol
+
+    def on_response_complete(self) -> None:
+        """Begin to be idle."""
+        self.idle_since = self.loop.time()
+        super().on_response_complete()  # type: ignore[misc]  # of the server's protocol
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the connection."""
@@ -63,7 +93,7 @@ class BoundedConnection(H11Protocol):
 
     def shutdown(self) -> None:
         """End after the answer under way; one that nobody reads is given up before the server's own patience ends."""
-        super().shutdown()
+        super().shutdown()  # type: ignore[misc]  # of the server's protocol
         if self.config.timeout_graceful_shutdown is not None:
             self.loop.call_later(0.9 * self.config.timeout_graceful_shutdown, self._give_up)
 
@@ -72,12 +102,28 @@ class BoundedConnection(H11Protocol):
             self.transport.abort()
 
     def send_400_response(self, msg: str) -> None:
-        """Refuse what is not HTTP, and close."""
-        content = _problem(BAD_REQUEST, msg)
-        response = h11.Response(status_code=BAD_REQUEST.status, headers=_headers(content))
-        for event in (response, h11.Data(data=content), h11.EndOfMessage()):
-            self.transport.write(self.conn.send(event) or b"")
+        """Refuse what is not HTTP, and close; say so where that cannot be taken for the answer to another request."""
+        if self.is_idle or self._is_receiving():
+            content = _problem(BAD_REQUEST, msg)
+            lines = [b"HTTP/1.1 400 Bad Request", *(name + b": " + value for name, value in _headers(content))]
+            self.transport.write(b"\r\n".join([*lines, b"", content]))
         self.transport.close()
+
+    def _is_receiving(self) -> bool:
+        return self.cycle.more_body and not self.cycle.response_started
+
+    def _make_room(self) -> None:
+        """Close another connection of an address that has too many, or else refuse what comes on this one."""
+        if self._per_address is None or self.client is None:
+            return
+        same = [each for each in self.connections if each.client and each.client[0] == self.client[0]]
+        open_ones = [each for each in same if not each.transport.is_closing()]
+        if len(open_ones) <= self._per_address:
+            return
+        idle = [each for each in open_ones if isinstance(each, BoundedConnection) and each.is_idle and each is not self]
+        self._is_beyond = not idle
+        if idle:
+            min(idle, key=lambda each: each.idle_since).transport.close()
 
     def _wait_for_headers(self) -> None:
         self._header_timer = self.loop.call_later(HEADER_SECONDS, self.transport.close)
@@ -87,12 +133,45 @@ class BoundedConnection(H11Protocol):
             self._header_timer.cancel()
             self._header_timer = None
 
+    async def _serve(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if self._is_beyond:
+            await _refuse(TOO_MANY_CONNECTIONS, "this address has as many as it may; try again later", scope, send)
+        elif self._most is not None and max(len(self.connections) - 1, len(self.tasks) - 1) >= self._most:
+            await _refuse(TOO_MANY_CONNECTIONS, "as many connections are open as may be; try again later", scope, send)
+        elif (fault := ambiguity(scope)) is not None:
+            await _refuse(BAD_REQUEST, fault, scope, send)
+        else:
+            await self._served(scope, receive, send)
 
-async def _refuse(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001
-    """Answer a request for which there is no room, before anything else of the service sees it."""
-    content = _problem(TOO_MANY_CONNECTIONS, "as many connections are open as may be; try again later", scope["path"])
-    headers = [*_headers(content), (b"retry-after", b"1")]
-    await send({"type": "http.response.start", "status": TOO_MANY_CONNECTIONS.status, "headers": headers})
+
+class H11Connection(BoundedConnection, H11Protocol):
+    """Read by h11, in Python: where the compiled parser is not installed."""
+
+
+def ambiguity(scope: Scope) -> str | None:
+    """Why a request could be read differently by another parser on its way (RFC 9112: 2.3, 3.2, 6.1), None if not."""
+    if scope["http_version"] not in VERSIONS:
+        return f"HTTP version {scope['http_version']}; allowed: 1.0, 1.1"
+    hosts, lengths, codings = 0, 0, []
+    for name, value in scope["headers"]:
+        if name == b"host":
+            hosts += 1
+        elif name == b"content-length":
+            lengths += 1
+        elif name == b"transfer-encoding":
+            codings.append(value.lower())
+    if hosts > 1 or (hosts == 0 and scope["http_version"] == "1.1"):
+        return f"{hosts} headers Host; allowed: 1"
+    if codings and lengths:
+        return "both Transfer-Encoding and Content-Length; allowed: one of them"
+    return None if codings in ([], [b"chunked"]) else "a Transfer-Encoding other than chunked; allowed: chunked"
+
+
+async def _refuse(kind: ProblemType, detail: str, scope: Scope, send: Send) -> None:
+    """Answer before anything else of the service sees the request, and close."""
+    content = _problem(kind, detail, scope["path"])
+    retry = [(b"retry-after", b"1")] if kind is TOO_MANY_CONNECTIONS else []
+    await send({"type": "http.response.start", "status": kind.status, "headers": [*_headers(content), *retry]})
     await send({"type": "http.response.body", "body": content})
 
 

@@ -7,17 +7,19 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import partial
 
 import pytest
 import uvicorn
 from starlette.types import Receive, Scope, Send
 
 from service.http import connections
-from service.http.connections import BoundedConnection
+from service.http.connections import BoundedConnection, H11Connection
 from service.http.envelope import MOST_HEADER_BYTES
+from service.http.httptools_connections import HttpToolsConnection
 
 PATIENCE = 0.2
-MOST = 60
+MOST, MOST_OF_ONE = 60, 100
 Connect = Callable[[], socket.socket]
 
 
@@ -30,8 +32,15 @@ async def hello(scope: Scope, receive: Receive, send: Send) -> None:
     await send({"type": "http.response.body", "body": b"hello"})
 
 
+@pytest.fixture(params=[H11Connection, HttpToolsConnection])
+def protocol(request: pytest.FixtureRequest) -> type[BoundedConnection]:
+    """Either parser."""
+    chosen: type[BoundedConnection] = request.param
+    return chosen
+
+
 @pytest.fixture
-def connect(monkeypatch: pytest.MonkeyPatch) -> Iterator[Connect]:
+def connect(monkeypatch: pytest.MonkeyPatch, protocol: type[BoundedConnection]) -> Iterator[Connect]:
     monkeypatch.setattr(connections, "HEADER_SECONDS", PATIENCE)
     server = uvicorn.Server(
         uvicorn.Config(
@@ -39,7 +48,8 @@ def connect(monkeypatch: pytest.MonkeyPatch) -> Iterator[Connect]:
             port=0,
             lifespan="off",
             log_level="critical",
-            http=BoundedConnection,
+            http=partial(protocol, per_address=MOST_OF_ONE),  # type: ignore[arg-type]
+            loop="asyncio" if protocol is H11Connection else "uvloop",
             h11_max_incomplete_event_size=MOST_HEADER_BYTES,
             limit_concurrency=MOST,
             ws="none",
@@ -159,6 +169,7 @@ def test_what_is_not_http_is_a_problem_and_ends_the_connection(connect: Connect,
     assert b'"type": "/problems/bad-request"' in body
 
 
+@pytest.mark.parametrize("protocol", [H11Connection], indirect=True)
 def test_a_socket_is_read_in_large_pieces(connect: Connect, monkeypatch: pytest.MonkeyPatch) -> None:
     sizes: list[int] = []
     begin = BoundedConnection.connection_made

@@ -1,0 +1,133 @@
+"""Connections of somebody who means harm, to a whole server."""
+
+import json
+import socket
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, closing, suppress
+
+import httpx
+import pytest
+
+from service.http import serving as http_serving
+from service.http.connections import BoundedConnection, H11Connection
+from service.http.envelope import MOST_HEADER_BYTES
+from service.http.httptools_connections import HttpToolsConnection
+from service.settings import Settings
+
+MOST_OF_ONE = 20
+Address = tuple[str, int]
+Serving = Callable[[Settings], AbstractContextManager[httpx.Client]]
+
+
+@pytest.fixture(scope="module", params=[HttpToolsConnection, H11Connection])
+def address(
+    request: pytest.FixtureRequest, serving: Serving, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Address]:
+    """Of a server with either parser."""
+    protocol: type[BoundedConnection] = request.param
+    folder = tmp_path_factory.mktemp("served")
+    settings = Settings(data_folder=folder, workers=0, max_connections_per_address=MOST_OF_ONE, max_connections=100)
+    with pytest.MonkeyPatch.context() as patch, ExitStack() as stack:
+        patch.setattr(http_serving, "parsed_connection", lambda: protocol)
+        client = stack.enter_context(serving(settings))
+        yield client.base_url.host, int(client.base_url.port or 0)
+
+
+def everything(connection: socket.socket) -> bytes:
+    """What the server sends until it closes."""
+    received = b""
+    with suppress(ConnectionResetError):
+        while part := connection.recv(65536):
+            received += part
+    return received
+
+
+def told(address: Address, *pieces: bytes) -> bytes:
+    """The answer to some bytes, until the server closes."""
+    with closing(socket.create_connection(address, timeout=10.0)) as connection:
+        with suppress(BrokenPipeError, ConnectionResetError):
+            for piece in pieces:
+                connection.sendall(piece)
+        return everything(connection)
+
+
+CHUNKED = b"POST /v1/materials HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n"
+HIDDEN = b"GET /v1/hidden HTTP/1.1\r\nHost: localhost\r\n\r\n"
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        CHUNKED + b"Content-Length: 5\r\n\r\n0\r\n\r\n" + HIDDEN,
+        CHUNKED.replace(b"chunked", b"gzip, chunked") + b"\r\n0\r\n\r\n" + HIDDEN,
+        CHUNKED + b"Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n" + HIDDEN,
+        b"GET /healthz HTTP/1.1\r\n\r\n" + HIDDEN,
+        b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nHost: localhost\r\n\r\n" + HIDDEN,
+        b"GET /healthz HTTP/2.0\r\nHost: localhost\r\n\r\n" + HIDDEN,
+        b"GET /healthz HTTP/0.9\r\nHost: localhost\r\n\r\n" + HIDDEN,
+        b"GET /healthz HTTP/9.9\r\nHost: localhost\r\n\r\n" + HIDDEN,
+    ],
+    ids=lambda sent: sent[:80].decode(),
+)
+def test_what_two_parsers_read_differently_is_refused_and_ends_the_connection(address: Address, sent: bytes) -> None:
+    head, _, body = told(address, sent).partition(b"\r\n\r\n")
+    assert head.split()[1] in {b"400", b"501"}
+    assert b"connection: close" in head.lower()
+    assert json.loads(body)["type"] == "/problems/bad-request"  # and nothing after it: the hidden request has no answer
+
+
+@pytest.mark.parametrize(
+    "endless",
+    [
+        (b"\r\n" * MOST_HEADER_BYTES,),
+        (b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nX: ", b"x" * 2**20),
+        (b"GET /" + b"x" * 2**20,),
+        (CHUNKED + b"\r\n1;", b"x" * 2**20),
+        (CHUNKED + b"\r\n0\r\n", b"X: y\r\n" * 2**17),
+    ],
+    ids=["empty lines", "header", "address", "extension of a chunk", "trailers"],
+)
+def test_what_does_not_end_is_not_kept(address: Address, endless: tuple[bytes, ...]) -> None:
+    began = time.monotonic()
+    assert not told(address, *endless).startswith(b"HTTP/1.1 2")
+    assert time.monotonic() - began < 5.0
+
+
+def test_trailers_do_not_become_headers(address: Address) -> None:
+    sent = CHUNKED + b"Content-Type: application/json\r\n\r\n0\r\nX-Request-ID: from-a-trailer\r\n\r\n"
+    answer = told(address, sent, HIDDEN.replace(b"\r\n\r\n", b"\r\nConnection: close\r\n\r\n"))
+    assert answer.count(b"HTTP/1.1 4") == 2
+    assert b"from-a-trailer" not in answer
+
+
+def test_garbage_behind_a_request_is_not_taken_for_its_answer(address: Address) -> None:
+    answer = told(address, b"GET /v1/jobs HTTP/1.1\r\nHost: localhost\r\n\r\nnonsense\r\n\r\n")
+    assert not answer or answer.startswith(b"HTTP/1.1 200")
+
+
+def test_idle_connections_of_an_address_make_room_for_its_next(address: Address) -> None:
+    with ExitStack() as opened:
+        idle = []
+        for _ in range(MOST_OF_ONE):
+            idle.append(opened.enter_context(socket.create_connection(address, timeout=5.0)))
+            time.sleep(0.01)
+        answer = told(address, b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+        assert answer.startswith(b"HTTP/1.1 200")
+        assert idle[0].recv(1) == b""  # it had been idle for longest
+        idle[-1].sendall(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+        assert everything(idle[-1]).startswith(b"HTTP/1.1 200")
+
+
+def test_an_address_whose_connections_are_all_busy_is_told_so(address: Address) -> None:
+    head = b"POST /v1/materials HTTP/1.1\r\nHost: localhost\r\n"
+    slow = head + b"Content-Type: application/json\r\nContent-Length: 9\r\n\r\n{"
+    with ExitStack() as opened:
+        for _ in range(MOST_OF_ONE):
+            opened.enter_context(socket.create_connection(address, timeout=5.0)).sendall(slow)
+        time.sleep(0.3)
+        head, _, body = told(address, b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n").partition(b"\r\n\r\n")
+        assert head.startswith(b"HTTP/1.1 503")
+        assert json.loads(body)["type"] == "/problems/too-many-connections"
+    time.sleep(0.3)
+    assert told(address, b"GET /healthz HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n").startswith(b"HTTP/1.1 200")
