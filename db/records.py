@@ -236,7 +236,10 @@ class StoredGraspLog:
 
 @dataclass(frozen=True, slots=True)
 class AccessKey:
-    """An access key as it is known: its public ``id``, what it may do, and the SHA-256 of its secret."""
+    """An access key as it is known: its public ``id``, what it may do, and the SHA-256 of its secret.
+
+    ``expires_at`` is None for one that does not expire; ``group`` is shared with other keys, or None.
+    """
 
     id: str
     name: str
@@ -244,6 +247,8 @@ class AccessKey:
     sha256: str = field(repr=False)
     created_at: datetime
     revoked_at: datetime | None
+    expires_at: datetime | None = None
+    group: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -96,6 +96,15 @@ class MaterialNameRow(Base):
     material_id: Mapped[int] = mapped_column(ForeignKey("materials.id"), index=True)
 
 
+class MaterialOwnerRow(Base):
+    """A key (``key:ID``) or a group of keys (``group:NAME``) that a material belongs to; without any, anybody's."""
+
+    __tablename__ = "material_owners"
+
+    material_id: Mapped[int] = mapped_column(ForeignKey("materials.id"), primary_key=True)
+    owner: Mapped[str] = mapped_column(String(110), primary_key=True)
+
+
 class SensorRow(Base):
     """A tactile sensor that logs come from."""
 
@@ -152,6 +161,7 @@ class GraspLogRow(Base):
     file_state: Mapped[str | None] = mapped_column(String(10))
     file_since: Mapped[datetime] = mapped_column(default=now)
     uploaded_by: Mapped[str | None] = mapped_column(ForeignKey("access_keys.id"))
+    withdrawn_by: Mapped[str | None] = mapped_column(ForeignKey("access_keys.id"))
 
 
 class RunnerRow(Base):
@@ -293,7 +303,7 @@ class FrictionModelRow(Base):
 
 
 class AccessKeyRow(Base):
-    """An access key; of its secret only the digest is kept."""
+    """An access key; of its secret only the digest is kept. Keys of one ``group`` may own materials together."""
 
     __tablename__ = "access_keys"
     __table_args__ = (_one_of("scope", get_args(Scope)),)
@@ -304,6 +314,8 @@ class AccessKeyRow(Base):
     sha256: Mapped[str] = mapped_column(String(64))
     created_at: Mapped[datetime] = mapped_column(default=now)
     revoked_at: Mapped[datetime | None]
+    expires_at: Mapped[datetime | None]
+    group: Mapped[str | None] = mapped_column(String(100))
 
 
 class IdempotencyKeyRow(Base):

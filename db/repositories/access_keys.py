@@ -1,23 +1,34 @@
 """Queries on access keys: only digests of them are stored."""
 
-from sqlalchemy import exists, func, select, update
+from datetime import datetime
+
+from sqlalchemy import exists, func, or_, select, update
 from sqlalchemy.orm import Session
 
 from db.errors import NotFound
-from db.records import AccessKey
+from db.records import AccessKey, Scope
 from db.tables import AccessKeyRow, now
 
 
-def add(session: Session, key_id: str, name: str, scope: str, sha256: str) -> AccessKey:
+def add(
+    session: Session,
+    key_id: str,
+    name: str,
+    scope: str,
+    sha256: str,
+    *,
+    expires_at: datetime | None = None,
+    group: str | None = None,
+) -> AccessKey:
     """Store a new key's digest."""
-    row = AccessKeyRow(id=key_id, name=name, scope=scope, sha256=sha256)
+    row = AccessKeyRow(id=key_id, name=name, scope=scope, sha256=sha256, expires_at=expires_at, group=group)
     session.add(row)
     session.flush()
     return _record(row)
 
 
 def get(session: Session, key_id: str) -> AccessKey:
-    """One key, revoked or not; raises ``NotFound``."""
+    """One key, valid or not; raises ``NotFound``."""
     row = session.get(AccessKeyRow, key_id)
     if row is None:
         raise NotFound("access key", key_id)
@@ -25,7 +36,7 @@ def get(session: Session, key_id: str) -> AccessKey:
 
 
 def list_all(session: Session) -> list[AccessKey]:
-    """Every key, oldest first, the revoked ones too."""
+    """Every key, oldest first, the revoked and expired ones too."""
     return [_record(row) for row in session.scalars(select(AccessKeyRow).order_by(AccessKeyRow.created_at))]
 
 
@@ -37,9 +48,12 @@ def revoke(session: Session, key_id: str) -> AccessKey:
 
 
 def any_valid(session: Session) -> bool:
-    """Whether some key is not revoked."""
-    return bool(session.scalar(select(exists().where(AccessKeyRow.revoked_at.is_(None)))))
+    """Whether some key is neither revoked nor expired."""
+    is_live = or_(AccessKeyRow.expires_at.is_(None), AccessKeyRow.expires_at > now())
+    return bool(session.scalar(select(exists().where(AccessKeyRow.revoked_at.is_(None), is_live))))
 
 
 def _record(row: AccessKeyRow) -> AccessKey:
-    return AccessKey(row.id, row.name, row.scope, row.sha256, row.created_at, row.revoked_at)  # type: ignore[arg-type]
+    scope: Scope = row.scope  # type: ignore[assignment]  # the database checks it
+    times = row.created_at, row.revoked_at, row.expires_at
+    return AccessKey(row.id, row.name, scope, row.sha256, *times, row.group)

@@ -1,16 +1,14 @@
 """Commands on the files that are stored: prune."""
 
-import re
 from datetime import timedelta
 from typing import Annotated
 
 import typer
 
 from service.cli.database import Url, opened, opened_blobs
+from service.cli.durations import duration
 
 app = typer.Typer(help="Look after the files that are stored.", no_args_is_help=True)
-
-_UNITS = {"h": timedelta(hours=1), "d": timedelta(days=1)}
 
 
 @app.command()
@@ -47,7 +45,4 @@ def _age(text: str | None) -> timedelta:
         if days is None:
             raise typer.BadParameter("older-than is missing, and STICTION_KEEP_UPLOADS_DAYS is not set; allowed: 90d")
         return timedelta(days=days)
-    found = re.fullmatch(r"(\d{1,6})([hd])", text)
-    if found is None:
-        raise typer.BadParameter(f"older-than is {text}; allowed: hours or days such as 12h or 90d")
-    return int(found[1]) * _UNITS[found[2]]
+    return duration("older-than", text)

@@ -1,5 +1,6 @@
 """Commands on the database: its schema (upgrade, downgrade, current, check), and copies of all that is stored."""
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +13,7 @@ from service.cli.exit_codes import INPUT_REFUSED
 if TYPE_CHECKING:
     from db.blobs import BlobStore
     from db.database import Database
+    from db.records import Actor
 
 app = typer.Typer(help="Create, upgrade, check, back up and restore what is stored.", no_args_is_help=True)
 Url = Annotated[
@@ -107,6 +109,19 @@ def opened_blobs() -> "BlobStore":
 
     settings = Settings()
     return open_blobs(settings.data_folder, settings.blob_url, settings.blob_cache_bytes)
+
+
+def command_actor() -> "Actor":
+    """Whoever runs this command, as the audit trail tells it."""
+    import getpass
+
+    from db.records import Actor
+
+    try:
+        user = getpass.getuser()
+    except (KeyError, OSError):  # a container's user without a name
+        user = str(os.getuid())
+    return Actor(f"command:{user[:100]}")
 
 
 def _tell(what: str, count: int) -> None:

@@ -1,10 +1,13 @@
 """Commands on access keys: create, list, revoke. They work on the database, with or without a running service."""
 
+import re
+from datetime import datetime
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from service.cli.database import Url, opened
+from service.cli.database import Url, command_actor, opened
+from service.cli.durations import moment_to_come
 from service.cli.output import print_json, print_table
 
 if TYPE_CHECKING:
@@ -12,6 +15,7 @@ if TYPE_CHECKING:
     from db.records import AccessKey
 
 app = typer.Typer(help="Make, list and revoke access keys.", no_args_is_help=True)
+GROUP = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}")
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
 
 
@@ -22,20 +26,31 @@ def create(
         Literal["read", "upload", "admin"],
         typer.Option(help="What it may do; each implies those before."),
     ] = "read",
+    expires: Annotated[
+        str | None, typer.Option(help="When it ends: in 90d or 12h, or on 2027-01-31. Without: never.")
+    ] = None,
+    group: Annotated[
+        str | None, typer.Option(help="Group of keys that it belongs to: they may own materials together.")
+    ] = None,
     database_url: Url = None,
     json: Json = False,
 ) -> None:
     """Make a key and print it: this once, for only its digest is stored."""
-    from db.repositories import access_keys
+    from db.repositories import access_keys, audit
+    from db.tables import now
     from service.http.access import digest, new_key
 
     if not 0 < len(name) <= 100 or not name.isprintable():
         raise typer.BadParameter(f"name is {name!r}; allowed: 1 to 100 printable characters")
+    if group is not None and not GROUP.fullmatch(group):
+        raise typer.BadParameter(f"group is {group!r}; allowed: 1 to 100 letters, digits, spaces and `._-`")
+    ends = None if expires is None else moment_to_come("expires", expires, now())
     key_id, text = new_key()
     with opened(database_url, may_be_new=True) as database:
         _prepare(database)
         with database.write() as session:
-            stored = access_keys.add(session, key_id, name, scope, digest(text))
+            stored = access_keys.add(session, key_id, name, scope, digest(text), expires_at=ends, group=group)
+            audit.add(session, command_actor(), "key.created", key_id, _told(stored))
     if json:
         print_json(_shown(stored) | {"key": text})
     else:
@@ -44,7 +59,7 @@ def create(
 
 @app.command("list")
 def list_keys(database_url: Url = None, json: Json = False) -> None:
-    """List all keys, the revoked ones too; the keys themselves are not to be had again."""
+    """List all keys, the revoked and expired ones too; the keys themselves are not to be had again."""
     from db.repositories import access_keys
 
     with opened(database_url) as database:
@@ -54,7 +69,7 @@ def list_keys(database_url: Url = None, json: Json = False) -> None:
     if json:
         print_json({"keys": shown})
     else:
-        columns = ("id", "name", "scope", "created_at", "revoked_at")
+        columns = ("id", "name", "scope", "group", "created_at", "expires_at", "revoked_at")
         print_table("Access keys", columns, [[key[column] or "" for column in columns] for key in shown])
 
 
@@ -64,12 +79,13 @@ def revoke(
     database_url: Url = None,
 ) -> None:
     """Make a key invalid; a running service notices within two seconds."""
-    from db.repositories import access_keys
+    from db.repositories import access_keys, audit
 
     with opened(database_url) as database:
         _prepare(database)
         with database.write() as session:
             stored = access_keys.revoke(session, key_id)
+            audit.add(session, command_actor(), "key.revoked", key_id, _told(stored))
     typer.echo(f"key {stored.id} ({stored.name}) is revoked")
 
 
@@ -83,11 +99,22 @@ def _prepare(database: "Database") -> None:
         migrate.check(database)
 
 
+def _told(key: "AccessKey") -> dict[str, str | None]:
+    """What the audit trail says of a key."""
+    return {"name": key.name, "scope": key.scope, "group": key.group, "expires_at": _iso(key.expires_at)}
+
+
 def _shown(key: "AccessKey") -> dict[str, str | None]:
     return {
         "id": key.id,
         "name": key.name,
         "scope": key.scope,
-        "created_at": key.created_at.isoformat(timespec="seconds"),
-        "revoked_at": key.revoked_at.isoformat(timespec="seconds") if key.revoked_at else None,
+        "group": key.group,
+        "created_at": _iso(key.created_at),
+        "expires_at": _iso(key.expires_at),
+        "revoked_at": _iso(key.revoked_at),
     }
+
+
+def _iso(moment: datetime | None) -> str | None:
+    return None if moment is None else moment.isoformat(timespec="seconds")

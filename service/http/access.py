@@ -7,6 +7,7 @@ import re
 import secrets
 from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from functools import lru_cache
 from typing import Annotated, get_args
 
@@ -33,10 +34,11 @@ _KEY = re.compile(r"stiction_([0-9a-f]{12})_[0-9a-f]{64}")
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """What a request may do; ``key_id`` is None where no key is asked for."""
+    """What a request may do; ``key_id`` is None where no key is asked for, ``group`` where the key is of none."""
 
     key_id: str | None
     scope: Scope
+    group: str | None = None
 
     def allows(self, scope: str) -> bool:
         """Whether this scope is the needed one, or implies it."""
@@ -44,6 +46,9 @@ class Access:
 
 
 EVERYTHING = Access(None, "admin")
+
+NO_KEY = AccessKey("", "", "read", "0" * 64, datetime.min.replace(tzinfo=UTC), None)
+"""Stands for a key that is not stored: no text is it, and to find that out takes as long as with one that is."""
 
 
 def new_key() -> tuple[str, str]:
@@ -67,8 +72,11 @@ def digest(text: str) -> str:
 
 
 def is_key(text: str, stored: AccessKey) -> bool:
-    """Whether ``text`` is this key and it is not revoked; takes as long wherever they differ."""
-    return hmac.compare_digest(digest(text), stored.sha256) and stored.revoked_at is None
+    """Whether ``text`` is this key, neither revoked nor expired; takes as long wherever they differ."""
+    is_same = hmac.compare_digest(digest(text), stored.sha256)
+    return (
+        is_same and stored.revoked_at is None and (stored.expires_at is None or datetime.now(UTC) < stored.expires_at)
+    )
 
 
 @lru_cache(maxsize=1024)

@@ -15,7 +15,7 @@ from db.records import AccessKey
 from db.repositories import access_keys
 from service.context import Context
 from service.http import access, origin, problems
-from service.http.access import CHALLENGE, EVERYTHING, PUBLIC_PATHS, Access, is_loopback
+from service.http.access import CHALLENGE, EVERYTHING, NO_KEY, PUBLIC_PATHS, Access, is_loopback
 from service.http.problems import INVALID_KEY, KEY_REQUIRED, MISDIRECTED_REQUEST, TOO_MANY_REQUESTS, Problem
 from service.http.rate_limit import RateLimit
 from service.settings import Settings
@@ -42,7 +42,11 @@ def check_start(settings: Settings, database: Database) -> None:
 
 
 class KeyRing:
-    """Keys of the database, each read once every few seconds at most."""
+    """Keys of the database, each read once every few seconds at most.
+
+    Whatever is wrong with a key, an unknown id or another secret, costs one question to the database and two
+    comparisons: the time that a refusal takes does not tell which ids there are.
+    """
 
     def __init__(self) -> None:
         self._kept: dict[str, tuple[AccessKey, float]] = {}
@@ -52,15 +56,16 @@ class KeyRing:
         key_id = access.key_id(text)
         if key_id is None:
             return None
-        known, until = self._kept.get(key_id, (None, 0.0))
-        if known is None or time.monotonic() > until:
-            known = await run_in_threadpool(_read, database, key_id)
-            if known is None:
-                return None
-            if len(self._kept) >= MOST_KEPT:
-                self._kept.clear()
-            self._kept[key_id] = (known, time.monotonic() + KEPT_SECONDS)
-        return known if access.is_key(text, known) else None
+        known, until = self._kept.get(key_id, (NO_KEY, 0.0))
+        if access.is_key(text, known) and time.monotonic() <= until:
+            return known
+        known = await run_in_threadpool(_read, database, key_id)
+        if not access.is_key(text, known):
+            return None
+        if len(self._kept) >= MOST_KEPT:
+            self._kept.clear()
+        self._kept[key_id] = (known, time.monotonic() + KEPT_SECONDS)
+        return known
 
 
 class Gate:
@@ -122,8 +127,8 @@ class Gate:
             raise problems.storage_unavailable(error) from error
         if found is None:
             headers = {"WWW-Authenticate": f'{CHALLENGE}, error="invalid_token"'}
-            raise Problem(INVALID_KEY, "the access key is unknown, revoked or garbled", headers=headers)
-        return Access(found.id, found.scope)
+            raise Problem(INVALID_KEY, "the access key is unknown, revoked, expired or garbled", headers=headers)
+        return Access(found.id, found.scope, found.group)
 
     def _needs_key(self, scope: Scope) -> bool:
         """Without a setting, all but those who are on this machine themselves, behind no proxy."""
@@ -156,9 +161,9 @@ def _is_local(scope: Scope) -> bool:
     return all(is_loopback((scope.get(end) or ("",))[0]) for end in ("server", "client"))
 
 
-def _read(database: Database, key_id: str) -> AccessKey | None:
+def _read(database: Database, key_id: str) -> AccessKey:
     with database.read() as session:
         try:
             return access_keys.get(session, key_id)
         except NotFound:
-            return None
+            return NO_KEY

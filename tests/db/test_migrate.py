@@ -25,7 +25,7 @@ from db.repositories import (
     materials,
     runners,
 )
-from db.tables import Base
+from db.tables import Base, MaterialOwnerRow, now
 
 ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
 REVISIONS = [entry.revision for entry in ScriptDirectory.from_config(migrate._config()).walk_revisions()][::-1]
@@ -35,6 +35,7 @@ def fill(database: Database, log: NewGraspLog, detection: Detection, samples: Sa
     """A row in every table."""
     with database.write() as session:
         material = materials.create(session, "paper", "")
+        session.add(MaterialOwnerRow(material_id=material.id, owner="group:lab"))
         log_id = grasp_logs.add(session, log)
         job = jobs.add(session, "ingest", "ols", material_id=material.id, grasp_log_id=log_id)
         detections.add(session, log_id, detection, samples)
@@ -224,3 +225,13 @@ def test_a_database_that_cannot_be_opened_is_named(tmp_path: Path, step: Callabl
         with closing(Database(f"sqlite:///{path}")) as database, pytest.raises(StorageUnavailable, match=cause) as seen:
             step(database)
         assert path.name in str(seen.value)
+
+
+def test_a_key_that_expires_stops_the_way_back(database: Database) -> None:
+    with database.write() as session:
+        access_keys.add(session, "0" * 12, "guest", "read", "0" * 64, expires_at=now() + timedelta(days=1))
+    with pytest.raises(RuntimeError, match="1 access keys expire"):
+        migrate.downgrade(database, "0009")
+    with database.write() as session:
+        access_keys.revoke(session, "0" * 12)
+    migrate.downgrade(database, "0009")

@@ -125,10 +125,10 @@ def reach(database: Database, blobs: BlobStore) -> Callable[..., Caller]:
 def make(database: Database) -> Callable[..., str]:
     """Store an access key and return its text."""
 
-    def make_key(scope: str = "read") -> str:
+    def make_key(scope: str = "read", **more: Any) -> str:
         key_id, text = access.new_key()
         with database.write() as session:
-            access_keys.add(session, key_id, "robot", scope, access.digest(text))
+            access_keys.add(session, key_id, "robot", scope, access.digest(text), **more)
         return text
 
     return make_key

@@ -1,0 +1,28 @@
+"""Ages and moments as a command line tells them."""
+
+import re
+from datetime import UTC, datetime, timedelta
+
+import typer
+
+_UNITS = {"h": timedelta(hours=1), "d": timedelta(days=1)}
+
+
+def duration(name: str, text: str) -> timedelta:
+    """Hours or days, such as 12h or 90d; raises ``typer.BadParameter`` with the option's name."""
+    found = re.fullmatch(r"(\d{1,6})([hd])", text)
+    if found is None:
+        raise typer.BadParameter(f"{name} is {text}; allowed: hours or days such as 12h or 90d")
+    return int(found[1]) * _UNITS[found[2]]
+
+
+def moment_to_come(name: str, text: str, now: datetime) -> datetime:
+    """A duration from ``now``, or a date (its beginning in UTC) or moment of ISO 8601 after it."""
+    try:
+        moment = now + duration(name, text) if text[-1:] in _UNITS else datetime.fromisoformat(text)
+    except (ValueError, OverflowError) as error:
+        raise typer.BadParameter(f"{name} is {text}; allowed: such as 90d, 12h or 2027-01-31") from error
+    moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+    if moment <= now:
+        raise typer.BadParameter(f"{name} is {text}, which is past; allowed: a moment to come")
+    return moment

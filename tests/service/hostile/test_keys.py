@@ -1,0 +1,123 @@
+"""What somebody with a wrong key, or one that has ended, learns and gets."""
+
+import hmac
+import json
+import time
+from collections.abc import Callable
+from datetime import timedelta
+from typing import Any
+
+import httpx
+import pytest
+from sqlalchemy import event
+
+from db.database import Database
+from db.paging import Window
+from db.records import AuditFilter
+from db.repositories import access_keys, audit
+from db.tables import now
+from service import cli
+from service.cli.durations import moment_to_come
+from service.http import access, gate
+from service.http.gate import NoKeys, check_start
+from service.settings import Settings
+
+Reach = Callable[..., Any]
+Make = Callable[..., str]
+NEWEST = Window("id", descending=True)
+ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+
+
+def test_a_key_ends_to_the_moment(reach: Reach, make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gate, "KEPT_SECONDS", 60.0)
+    client = reach(key=make(expires_at=now() + timedelta(seconds=1.5)))
+    assert client.get("/v1/materials").status_code == httpx.codes.OK
+    time.sleep(1.6)
+    answer = client.get("/v1/materials")
+    assert (answer.status_code, answer.json()["type"]) == (401, "/problems/invalid-key")
+
+
+def test_a_key_that_has_expired_does_not_start_a_service(database: Database, make: Make) -> None:
+    settings = Settings(host="0.0.0.0")
+    make(expires_at=now() - timedelta(seconds=1))
+    with pytest.raises(NoKeys):
+        check_start(settings, database)
+    make(expires_at=now() + timedelta(hours=1))
+    check_start(settings, database)
+
+
+@ONLY_SQLITE
+def test_a_refusal_takes_the_same_steps_whether_the_id_is_stored_or_not(
+    reach: Reach, make: Make, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text, client, steps = make(), reach(), list[str]()
+    compare = hmac.compare_digest
+
+    def note_comparison(one: str, other: str) -> bool:
+        steps.append("compared")
+        return compare(one, other)
+
+    def note_query(_connection: object, _cursor: object, statement: str, *_rest: object) -> None:
+        steps.extend(["asked"] if "access_keys" in statement else [])
+
+    monkeypatch.setattr(hmac, "compare_digest", note_comparison)
+    event.listen(database.engine, "before_cursor_execute", note_query)
+
+    def taken(key: str) -> list[str]:
+        steps.clear()
+        client.headers = {"Authorization": f"Bearer {key}"}
+        client.get("/v1/materials")
+        return list(steps)
+
+    assert taken(text) == ["compared", "asked", "compared"]
+    assert taken(text) == ["compared"]
+    wrong = text[:-1] + ("0" if text[-1] != "0" else "1")
+    assert taken(wrong) == taken(access.new_key()[1]) == taken(wrong) == ["compared", "asked", "compared"]
+    event.remove(database.engine, "before_cursor_execute", note_query)
+
+
+@ONLY_SQLITE
+def test_no_answer_repeats_what_was_sent_as_a_key(reach: Reach, make: Make, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level("DEBUG")
+    text = make()
+    for sent in (text, f"Basic {text}", f"Bearer {text}0", f"Bearer{text}", f"Token {text}"):
+        client = reach()
+        client.headers = {"Authorization": sent}
+        answer = client.get("/v1/materials")
+        assert answer.status_code == httpx.codes.UNAUTHORIZED
+        assert text not in answer.text + str(answer.headers) + caplog.text
+
+
+def test_the_command_makes_keys_that_expire_and_records_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], database: Database
+) -> None:
+    monkeypatch.setenv("STICTION_DATABASE_URL", database.url)
+
+    def run(*arguments: str) -> str:
+        with pytest.raises(SystemExit) as ended:
+            cli.main(["keys", *arguments])
+        assert not ended.value.code
+        return capsys.readouterr().out
+
+    made = json.loads(run("create", "guest", "--expires", "30d", "--group", "lab 1", "--json"))
+    shown = json.loads(run("list", "--json"))["keys"][0]
+    assert (shown["group"], shown["expires_at"]) == ("lab 1", made["expires_at"])
+    run("revoke", made["id"])
+    with database.read() as session:
+        revoked, created = audit.list_all(session, NEWEST, AuditFilter(subject=made["id"]))
+        stored = access_keys.get(session, made["id"])
+    assert stored.expires_at is not None
+    assert abs(stored.expires_at - stored.created_at - timedelta(days=30)) < timedelta(minutes=1)
+    assert (created.action, revoked.action) == ("key.created", "key.revoked")
+    assert created.actor.name.startswith("command:")
+    assert made["key"].rpartition("_")[2] not in str(created)
+
+
+@pytest.mark.parametrize("text", ["", "d", "0d", "-1d", "soon", "2020-01-31", "9999999d", "1w", "2027-13-01"])
+def test_a_moment_that_is_none_or_past_is_refused(text: str) -> None:
+    with pytest.raises(Exception, match=r"expires is .*; allowed: "):
+        moment_to_come("expires", text, now())
+
+
+def test_a_date_is_its_beginning_in_utc() -> None:
+    assert moment_to_come("expires", "2999-01-31", now()).isoformat() == "2999-01-31T00:00:00+00:00"
