@@ -20,6 +20,7 @@ from stiction_client.errors import (
 
 if TYPE_CHECKING:
     from stiction_client.client import AsyncFrictionClient, FrictionClient
+    from stiction_client.contacts import Contact, Contacts, antipodal, n_fingers
     from stiction_client.exports import (
         CoulombFriction,
         conservative_friction,
@@ -29,12 +30,16 @@ if TYPE_CHECKING:
         mujoco_geom,
     )
     from stiction_client.model import Cost, Domain, FrictionModel
-    from stiction_client.planner import RequiredForce, required_normal_force
+    from stiction_client.planner import RequiredForce, RequiredForces, required_normal_force
     from stiction_client.records import Detection, FrictionAnswer, GraspLogReceipt, Job, Material, Recognition
 
 _LAZY = {
     "AsyncFrictionClient": "stiction_client.client",
     "FrictionClient": "stiction_client.client",
+    "Contact": "stiction_client.contacts",
+    "Contacts": "stiction_client.contacts",
+    "antipodal": "stiction_client.contacts",
+    "n_fingers": "stiction_client.contacts",
     "CoulombFriction": "stiction_client.exports",
     "conservative_friction": "stiction_client.exports",
     "drake_friction": "stiction_client.exports",
@@ -45,6 +50,7 @@ _LAZY = {
     "Domain": "stiction_client.model",
     "FrictionModel": "stiction_client.model",
     "RequiredForce": "stiction_client.planner",
+    "RequiredForces": "stiction_client.planner",
     "required_normal_force": "stiction_client.planner",
     "Detection": "stiction_client.records",
     "FrictionAnswer": "stiction_client.records",
@@ -53,11 +59,13 @@ _LAZY = {
     "Material": "stiction_client.records",
     "Recognition": "stiction_client.records",
 }
-"""Names whose modules load httpx or scipy: a program pays for what it uses."""
+"""Names whose modules load httpx or numpy: a program pays for what it uses."""
 
 __all__ = [
     "AsyncFrictionClient",
     "ConnectionFailed",
+    "Contact",
+    "Contacts",
     "Cost",
     "CoulombFriction",
     "Detection",
@@ -79,13 +87,16 @@ __all__ = [
     "ProblemError",
     "Recognition",
     "RequiredForce",
+    "RequiredForces",
     "StictionError",
     "UnexpectedAnswer",
+    "antipodal",
     "conservative_friction",
     "drake_friction",
     "friction_cone",
     "mujoco_friction",
     "mujoco_geom",
+    "n_fingers",
     "required_normal_force",
 ]
 

@@ -1,5 +1,7 @@
 """The exceptions of the client: one small tree."""
 
+from typing import Literal
+
 
 class StictionError(Exception):
     """Whatever this package refuses to do, or could not."""
@@ -79,16 +81,32 @@ class JobTimedOut(JobError):
     """The job had not ended when waiting did; it goes on in the service."""
 
 
+Cause = Literal["physics", "limit", "range", "ignorance"]
+"""Why no normal force holds a load: even the expected friction would not; only forces above the limit would; only
+forces beyond those observed would; or the expected friction would, but too little is known of it."""
+
+_CAUSES: dict[str, str] = {
+    "physics": "even the friction that is expected holds less",
+    "limit": "a normal force above the limit would hold it",
+    "range": "only normal forces beyond those observed would hold it: record grasps that press harder",
+    "ignorance": "the friction that is expected would hold it, but is too uncertain: record more grasps",
+    "": "",
+}
+
+
 class NoFeasibleForce(StictionError):
     """No normal force holds the load with the slip probability asked for.
 
-    ``largest_load``: N, the most that can be held so (0 where nothing can), at ``normal_force`` N.
+    ``largest_load``: N, the most that can be held so (0 where nothing can), at ``normal_force`` N; ``cause``: whether
+    physics, the limit, the range of the data or ignorance is why.
     """
 
-    def __init__(self, tangential_load: float, largest_load: float, normal_force: float, reason: str) -> None:
+    def __init__(
+        self, tangential_load: float, largest_load: float, normal_force: float, reason: str, cause: Cause | str = ""
+    ) -> None:
         self.tangential_load, self.largest_load = tangential_load, largest_load
-        self.normal_force, self.reason = normal_force, reason
-        super().__init__(tangential_load, largest_load, normal_force, reason)
+        self.normal_force, self.reason, self.cause = normal_force, reason, cause
+        super().__init__(tangential_load, largest_load, normal_force, reason, cause)
 
     def __str__(self) -> str:
         most = (
@@ -96,4 +114,5 @@ class NoFeasibleForce(StictionError):
             if self.largest_load > 0.0
             else "no load is held so at any force"
         )
-        return f"no normal force holds {self.tangential_load:.6g} N ({self.reason}); {most}"
+        because = f"; {_CAUSES[self.cause]}" if self.cause else ""
+        return f"no normal force holds {self.tangential_load:.6g} N ({self.reason}); {most}{because}"

@@ -5,14 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stiction_client.contacts import HERTZ_TORSION
 from stiction_client.errors import InvalidArgument
 from stiction_client.model import FloatArray, FrictionModel
 
 QUANTILE = 0.05
 """Default: nineteen observations of twenty have more friction."""
-
-HERTZ_TORSION = 3.0 * math.pi / 16.0
-"""Friction moment of a Hertzian contact over μ F_N a (a: contact radius); a uniform pressure would give 2/3."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import special
 
 from stiction_client.errors import InvalidArgument
 
@@ -86,6 +85,8 @@ class FrictionModel:
 
     def interval(self, level: float = 0.95) -> FloatArray:
         """Central interval of each coefficient at ``level``: [3, 2]."""
+        from scipy import special  # takes longer to import than all else of this package
+
         check_probability("level", level)
         half = special.stdtrit(self.degrees_of_freedom, 0.5 * (1.0 + level)) * self.standard_errors
         return np.stack([self.coefficients - half, self.coefficients + half], axis=1)
@@ -99,6 +100,8 @@ class FrictionModel:
         as root of squares (Graybill & Wang 1980), as in the service. Shapes broadcast. Raises ``InvalidArgument`` for
         a quantile outside (0, 1).
         """
+        from scipy import special
+
         v, f_n = np.broadcast_arrays(np.asarray(tangential_velocity, float), np.asarray(normal_force, float))
         x = np.stack([np.ones_like(v), v, f_n], axis=-1)
         mean = x @ self.coefficients

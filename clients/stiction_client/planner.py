@@ -1,15 +1,18 @@
 """How hard to grip: the smallest normal force that keeps the probability of slip under a bound."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, Literal, overload
 
 import numpy as np
-from scipy import special
-from scipy.optimize import brentq
+from numpy.typing import NDArray
 
-from stiction_client.errors import InvalidArgument, NoFeasibleForce
+from stiction_client.arguments import within
+from stiction_client.contacts import AREAS, Contact, Contacts
+from stiction_client.errors import Cause, InvalidArgument, NoFeasibleForce
+from stiction_client.holding import LoadedContact
 from stiction_client.model import FloatArray, FrictionModel
+from stiction_client.quantile import FrictionQuantile, Number
 
 SLIP_PROBABILITY = 1e-3
 """Default bound: one slip in a thousand grasps that bear the full load."""
@@ -18,22 +21,25 @@ SLIP_PROBABILITIES = (1e-12, 0.5)
 """What may be asked for. Below, no data tell, and the quantile of Student's t is no longer computed reliably; above,
 the quantile would be more optimistic than the mean, and the capacity no longer have a single peak."""
 
-LARGEST_FORCE = 1e12
-"""N an element; a capacity that still grows there has no maximum."""
+LARGEST = 1e9
+"""N and N·m of a load, N of a limit."""
 
-_SMALLEST_BRACKET, _SMALLEST_FORCE = 1e-12, 1e-30
-"""N an element; where the search for a bracket starts, and below what a force counts as 0."""
+SAFETY_FACTORS = (1.0, 100.0)
+
+Outcome = Literal["held", "held within bounds", Cause]
+"""One root, so that any greater force holds as well; two roots, between which all forces hold; or why there is none."""
 
 
 @dataclass(frozen=True, slots=True)
 class RequiredForce:
-    """The planner's answer, forces in N.
+    """The planner's answer, forces in N, of each contact.
 
     ``normal_force``: the smallest that holds; ``feasible_interval``: smallest and largest that hold (infinite where
     there is no upper bound); ``margin``: the largest less the smallest, by how much a gripper may press too hard;
-    ``largest_load``: the most that any force holds so (infinite where unbounded); ``element_force``: normal force of
-    one element at the answer; ``friction_coefficient``: the conservative quantile there; ``within_domain``: whether
-    velocity and element force lie where the model was observed; ``warning``: which of them does not, or None.
+    ``largest_load``: the most tangential load on one contact, in the ratio to the torque that was asked for, that any
+    force holds so (infinite where unbounded); ``element_force``: mean normal force of one element at the answer;
+    ``friction_coefficient``: the conservative quantile there; ``within_domain``: whether velocity and element force lie
+    where the model was observed; ``warning``: which of them does not, or None.
     """
 
     normal_force: float
@@ -47,154 +53,208 @@ class RequiredForce:
     warning: str | None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class RequiredForces:
+    """The planner's answers to many grasps, each array of their common shape; NaN where no force holds.
+
+    ``outcome`` names each case; the other fields are those of ``RequiredForce``.
+    """
+
+    normal_force: FloatArray
+    feasible_interval: tuple[FloatArray, FloatArray]
+    element_force: FloatArray
+    friction_coefficient: FloatArray
+    within_domain: NDArray[np.bool_]
+    outcome: NDArray[np.str_]
+
+
+@overload
 def required_normal_force(
     model: FrictionModel,
     tangential_load: float,
-    slip_probability: float = SLIP_PROBABILITY,
+    slip_probability: float = ...,
     *,
-    contact_area: float,
-    tangential_velocity: float = 0.0,
-    normal_force_limit: float | None = None,
-) -> RequiredForce:
-    """Smallest total normal force F_N (N) at which a contact slips with at most ``slip_probability``.
+    contact_area: float | None = ...,
+    contacts: Contact | Contacts | None = ...,
+    torque: float = ...,
+    tangential_velocity: float = ...,
+    safety_factor: float = ...,
+    normal_force_limit: float | None = ...,
+) -> RequiredForce: ...
 
-    ``tangential_load`` N on this contact (in a grasp by two fingers each bears its share); ``contact_area`` m², held
-    fixed; ``tangential_velocity`` m/s; ``normal_force_limit`` N, the most that object or gripper bear. The load is
-    spread evenly over N = contact_area / element_area elements, and F_N is the smallest with
-    q(v, F_N/N)·F_N ≥ tangential_load, where q is the ``slip_probability``-quantile of the predictive distribution of
-    μ: the scatter ε and the uncertainty of all coefficients are in it. ε is taken as common to all elements, which
-    is conservative: were it independent, it would average out.
 
-    Raises ``NoFeasibleForce`` where no force holds the load, ``InvalidArgument`` for an argument that cannot be.
+@overload
+def required_normal_force(
+    model: FrictionModel,
+    tangential_load: FloatArray,
+    slip_probability: Number = ...,
+    *,
+    contact_area: Number | None = ...,
+    contacts: Contact | Contacts | None = ...,
+    torque: Number = ...,
+    tangential_velocity: Number = ...,
+    safety_factor: Number = ...,
+    normal_force_limit: Number | None = ...,
+) -> RequiredForces: ...
+
+
+def required_normal_force(
+    model: FrictionModel,
+    tangential_load: Number,
+    slip_probability: Number = SLIP_PROBABILITY,
+    *,
+    contact_area: Number | None = None,
+    contacts: Contact | Contacts | None = None,
+    torque: Number = 0.0,
+    tangential_velocity: Number = 0.0,
+    safety_factor: Number = 1.0,
+    normal_force_limit: Number | None = None,
+) -> RequiredForce | RequiredForces:
+    """Smallest normal force F (N) of each contact at which a grasp slips with at most ``slip_probability``.
+
+    ``tangential_load`` N and ``torque`` N·m are borne by all ``contacts`` together; ``contact_area`` m² stands for
+    one flat contact of it. ``tangential_velocity`` m/s; ``safety_factor`` multiplies the loads; ``normal_force_limit``
+    N of each contact, the most that object or gripper bear. F is the smallest that meets the elliptic limit surface
+    (Goyal, Ruina & Papadopoulos 1991; Howe & Cutkosky 1996) of each contact:
+
+        q(v, f)·F ≥ √(T² + (M/b)²)
+
+    with its share T of the load and M of the torque, its torque arm b, and q the ``slip_probability``-quantile of the
+    predictive distribution of μ at its elements' normal force f, each weighted with itself: what a contact holds is
+    Σ μ(fᵢ)·fᵢ. The scatter ε and the uncertainty of all coefficients are in q; ε is taken as common to all elements,
+    which is conservative: were it independent, it would average out.
+
+    Any argument but the model may be an array; all broadcast, and the answer is then ``RequiredForces``. For one
+    grasp, raises ``NoFeasibleForce`` where no force holds. Raises ``InvalidArgument`` for an argument that cannot be.
     """
-    _check_arguments(tangential_load, slip_probability, contact_area, tangential_velocity, normal_force_limit)
-    elements = contact_area / model.element_area
-    limit = math.inf if normal_force_limit is None else normal_force_limit / elements
-    load = tangential_load / elements
-    capacity = _Capacity.of(model, tangential_velocity, slip_probability)
-    best = capacity.best_force(limit)
-    if not capacity(best) >= load:
-        limited = "" if normal_force_limit is None else f", normal force up to {normal_force_limit:g} N"
-        reason = f"slip probability {slip_probability:g}{limited}"
-        raise NoFeasibleForce(tangential_load, capacity(best) * elements, best * elements, reason)
-    low, high = capacity.interval(load, best, limit)
-    warning = model.extrapolation(tangential_velocity, low)
+    together = _contacts(contact_area, contacts)
+    velocity = within("tangential_velocity", tangential_velocity, 0.0, 1e3, "m/s, as a magnitude")
+    probability = within("slip_probability", slip_probability, *SLIP_PROBABILITIES)
+    load, moment = _shares(together, tangential_load, torque, within("safety_factor", safety_factor, *SAFETY_FACTORS))
+    limit: Number = math.inf
+    if normal_force_limit is not None:
+        limit = within("normal_force_limit", normal_force_limit, 1e-9, LARGEST, "N")
+    growing = together.contact.reference_force
+    per_newton = model.element_area / together.contact.area * together.contact.pressure_square
+    loaded = LoadedContact(
+        FrictionQuantile.of(model, velocity, probability),
+        load,
+        moment,
+        per_newton if growing is None else per_newton * growing ** (2.0 / 3.0),
+        1 if growing is None else 3,
+    )
+    question = _Question(model, together, velocity, probability, limit, loaded)
+    given = (load, moment, loaded.unit, velocity, probability, limit)
+    if any(isinstance(each, np.ndarray) for each in given):
+        return _many(question, given)
+    return _one(question, tangential_load)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Question:
+    """What was asked, with the contact's share of the load."""
+
+    model: FrictionModel
+    contacts: Contacts
+    velocity: Number
+    probability: Number
+    limit: Number
+    loaded: LoadedContact
+
+    def element_force(self, x: Number) -> Number:
+        """Mean normal force of the contact's elements, N."""
+        return self.loaded.unit * x / self.contacts.contact.pressure_square
+
+
+def _contacts(contact_area: Number | None, contacts: Contact | Contacts | None) -> Contacts:
+    if (contact_area is None) == (contacts is None):
+        raise InvalidArgument("contact_area and contacts", "both or neither given", "one of them")
+    if isinstance(contacts, Contacts):
+        return contacts
+    return Contacts(contacts or Contact.flat(within("contact_area", contact_area, *AREAS, "m²")))
+
+
+def _shares(
+    contacts: Contacts, tangential_load: Number, torque: Number, safety_factor: Number
+) -> tuple[Number, Number]:
+    """Each contact's share of the load, N, and of the torque as force at the torque arm of x = 1, N."""
+    load = within("tangential_load", tangential_load, 0.0, LARGEST, "N, as a magnitude") * (
+        safety_factor / contacts.count
+    )
+    turns = within("torque", torque, 0.0, LARGEST, "N·m, as a magnitude") * (safety_factor / contacts.count)
+    if contacts.lever_arm is not None:
+        return (load * load + (turns / contacts.lever_arm) ** 2) ** 0.5, 0.0
+    contact = contacts.contact
+    if np.any(turns) and not np.all(contact.torque_arm):
+        raise InvalidArgument("torque", float(np.max(torque)), "0 where the contact has no torque_arm")
+    grown = 1.0 if contact.reference_force is None else contact.reference_force ** (1.0 / 3.0)
+    arm = contact.torque_arm / grown
+    return load, turns / (arm + (arm == 0.0))
+
+
+def _one(question: _Question, tangential_load: Number) -> RequiredForce:
+    loaded, most = question.loaded, float(question.loaded.root(question.limit))
+    low, high, holds = loaded.interval(most)
+    best = loaded.best(most)
+    per_load = float(tangential_load) if loaded.load or loaded.moment else float(question.contacts.count)
+    largest = math.inf if math.isinf(best) else per_load * loaded.multiple(best) if best > 0.0 else 0.0
+    if not holds:
+        raise NoFeasibleForce(
+            float(tangential_load),
+            largest,
+            float(loaded.force(best)),
+            _asked(question),
+            str(_causes(question)),
+        )
+    element = float(question.element_force(low))
+    warning = question.model.extrapolation(float(question.velocity), element)
+    bounds = float(loaded.force(low)), float(loaded.force(high))
     return RequiredForce(
-        normal_force=low * elements,
-        feasible_interval=(low * elements, high * elements),
-        margin=(high - low) * elements,
-        largest_load=math.inf if best >= LARGEST_FORCE else capacity(best) * elements,
-        element_force=low,
-        friction_coefficient=capacity.friction(low),
-        slip_probability=slip_probability,
+        normal_force=bounds[0],
+        feasible_interval=bounds,
+        margin=bounds[1] - bounds[0],
+        largest_load=largest,
+        element_force=element,
+        friction_coefficient=float(loaded.quantile(loaded.unit * low)[0]),
+        slip_probability=float(question.probability),
         within_domain=warning is None,
         warning=warning,
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Capacity:
-    """Tangential force f·q(f) that one element holds under the normal force f, N.
-
-    q(f) = a + c·f − √(s² + |p + f·r|²) is the conservative quantile of μ (``FrictionModel.predict``). It is concave, so
-    that f·q(f) is log-concave where it is positive: it has one peak, and the forces that hold a load are one interval.
-    With Σ = L·Lᵀ and Student's quantiles t: s = t·σ, p = t·Lᵀ(1, v, 0) and r = t·Lᵀ(0, 0, 1). A sum of squares can't
-    turn negative by rounding, as xᵀΣx can.
-    """
-
-    a: float
-    c: float
-    s: float
-    p: FloatArray
-    r: FloatArray
-
-    @classmethod
-    def of(cls, model: FrictionModel, tangential_velocity: float, slip_probability: float) -> "_Capacity":
-        scatter, error = special.stdtrit([model.scatter_degrees_of_freedom, model.degrees_of_freedom], slip_probability)
-        if not np.isfinite([*model.coefficients, *model.covariance.flat, model.scale, scatter, error]).all():
-            raise InvalidArgument("model", "not finite at this slip probability", "finite coefficients and quantile")
-        variance, axes = np.linalg.eigh(model.covariance)
-        factor = axes * np.sqrt(np.maximum(variance, 0.0))
-        constant, slope = np.array([1.0, tangential_velocity, 0.0]), np.array([0.0, 0.0, 1.0])
-        return cls(
-            a=float(constant @ model.coefficients),
-            c=float(slope @ model.coefficients),
-            s=scatter * model.scale,
-            p=error * constant @ factor,
-            r=error * slope @ factor,
+def _many(question: _Question, given: tuple[Number, ...]) -> RequiredForces:
+    loaded = question.loaded
+    with np.errstate(all="ignore"):  # entries that are settled take part in the steps of the others
+        low, high, holds = np.broadcast_arrays(*loaded.interval(loaded.root(question.limit)), *given)[:3]
+        outcome = np.where(np.isinf(high), "held", "held within bounds").astype("<U18")
+        if not holds.all():
+            outcome = np.where(holds, outcome, _causes(question))
+        low, high = np.where(holds, low, np.nan), np.where(holds, high, np.nan)
+        element = question.element_force(low)
+        domain = question.model.domain
+        inside = (domain.normal_force[0] <= element) & (element <= domain.normal_force[1])
+        return RequiredForces(
+            normal_force=np.asarray(loaded.force(low)),
+            feasible_interval=(np.asarray(loaded.force(low)), np.asarray(loaded.force(high))),
+            element_force=np.asarray(element),
+            friction_coefficient=np.asarray(loaded.quantile(loaded.unit * low)[0]),
+            within_domain=np.asarray(inside & (question.velocity <= domain.tangential_velocity[1])),
+            outcome=outcome,
         )
 
-    def __call__(self, force: float) -> float:
-        return force * self.friction(force)
 
-    def friction(self, force: float) -> float:
-        """Conservative quantile of μ."""
-        return self.a + self.c * force - self._spread(force)
-
-    def best_force(self, limit: float) -> float:
-        """Normal force that holds most, at most ``limit``; 0 where none holds anything."""
-        most_friction = _last_positive(self._friction_slope, 0.0, limit)
-        if self.friction(most_friction) <= 0.0:
-            return 0.0
-        return _last_positive(lambda f: self.friction(f) + f * self._friction_slope(f), most_friction, limit)
-
-    def interval(self, load: float, best: float, limit: float) -> tuple[float, float]:
-        """Smallest and largest normal force that hold ``load``, which ``best`` does."""
-        if load == 0.0 and self.friction(0.0) <= 0.0:
-            return 0.0, 0.0  # pressing helps nothing until it presses harder
-        low = _last_positive(lambda f: load - self(f), 0.0, best) if load > 0.0 else 0.0
-        high = _last_positive(lambda f: self(f) - load, best, limit)
-        low, high = self._inside(low, load, best), self._inside(high, load, best)
-        return low, math.inf if high >= LARGEST_FORCE else high
-
-    def _inside(self, force: float, load: float, best: float) -> float:
-        """Move a root by its rounding towards ``best``, so that the answer does hold the load."""
-        step = math.copysign(np.finfo(float).eps * force, best - force)
-        while self(force) < load and force != best:
-            moved = force + step
-            force, step = (moved if (best - moved) * step > 0.0 else best), 2.0 * step
-        return force
-
-    def _spread(self, force: float) -> float:
-        return math.hypot(self.s, *(self.p + force * self.r))
-
-    def _friction_slope(self, force: float) -> float:
-        spread = self._spread(force)
-        inclination = float((self.p + force * self.r) @ self.r) / spread if spread > 0.0 else 0.0
-        return self.c - inclination
+def _causes(question: _Question) -> Any:
+    """Why no force holds, in the order in which one would mend it (``Cause``); of no meaning where one does."""
+    loaded = question.loaded
+    beyond, _, could = loaded.interval(math.inf)
+    expected, _, possible = loaded.expected().interval(math.inf)
+    most = loaded.root(question.limit)
+    observed = question.model.domain.normal_force[1]
+    unobserved = question.element_force(expected) > observed
+    limited = (could & (beyond > most)) | (possible & (expected > most))
+    return np.select([~np.asarray(possible), limited, unobserved], ["physics", "limit", "range"], "ignorance")
 
 
-def _last_positive(function: Callable[[float], float], start: float, limit: float) -> float:
-    """Where a function that is first positive, then negative, changes its sign in [start, limit].
-
-    ``start`` where it isn't positive there, ``limit`` (or ``LARGEST_FORCE``) where it is positive all the way.
-    """
-    end = min(limit, LARGEST_FORCE)
-    below, above = start, min(max(2.0 * start, _SMALLEST_BRACKET), end)
-    if not function(below) > 0.0:
-        return start
-    while function(above) > 0.0:
-        if above >= end:
-            return end
-        below, above = above, min(4.0 * above, end)
-    return float(brentq(function, below, above, xtol=_SMALLEST_FORCE, rtol=4.0 * np.finfo(float).eps, maxiter=1000))
-
-
-def _check_arguments(
-    tangential_load: float,
-    slip_probability: float,
-    contact_area: float,
-    tangential_velocity: float,
-    normal_force_limit: float | None,
-) -> None:
-    if not 0.0 <= tangential_load < math.inf:
-        raise InvalidArgument("tangential_load", tangential_load, "a magnitude in N, at least 0 and finite")
-    rarest, most_frequent = SLIP_PROBABILITIES
-    if not rarest <= slip_probability <= most_frequent:
-        raise InvalidArgument("slip_probability", slip_probability, f"{rarest:g} to {most_frequent:g}")
-    if not 0.0 < contact_area < math.inf:
-        raise InvalidArgument("contact_area", contact_area, "m², above 0 and finite")
-    if not 0.0 <= tangential_velocity < math.inf:
-        raise InvalidArgument("tangential_velocity", tangential_velocity, "a magnitude in m/s, at least 0 and finite")
-    if normal_force_limit is not None and not 0.0 < normal_force_limit < math.inf:
-        raise InvalidArgument("normal_force_limit", normal_force_limit, "N, above 0 and finite, or None")
+def _asked(question: _Question) -> str:
+    limited = "" if math.isinf(question.limit) else f", normal force up to {question.limit:g} N"
+    return f"slip probability {question.probability:g}{limited}"

@@ -50,7 +50,7 @@ def grasp_force(context: Context, wish: NewGraspForce) -> GraspForceOut:
             normal_force_limit=wish.normal_force_limit,
         )
     except NoFeasibleForce as refusal:
-        more = {"largest_load": refusal.largest_load, "normal_force": refusal.normal_force}
+        more = {"largest_load": refusal.largest_load, "normal_force": refusal.normal_force, "cause": refusal.cause}
         raise Problem(NO_FEASIBLE_FORCE, str(refusal), more=more) from refusal
     except InvalidArgument as error:
         raise Problem.wrong_value(INVALID_REQUEST, error.name, error.value, error.allowed) from error

@@ -1,0 +1,31 @@
+"""What callers may pass: numbers, and arrays of them, within their range."""
+
+import numpy as np
+
+from stiction_client.errors import InvalidArgument
+from stiction_client.quantile import Number
+
+
+def within(name: str, value: object, low: float, high: float, unit: str = "") -> Number:
+    """``value`` as a float, or an array of them, all in [low, high]; raises ``InvalidArgument`` for anything else."""
+    if type(value) is float or (type(value) is int and abs(value) < 2**53):
+        number = float(value)
+        if low <= number <= high:
+            return number
+        raise InvalidArgument(name, value, _range(low, high, unit))
+    array = np.asarray(value)
+    if array.dtype.kind not in "iuf":
+        raise InvalidArgument(name, _shown(value), f"numbers: {_range(low, high, unit)}")
+    numbers = array.astype(np.float64)
+    wrong = ~((low <= numbers) & (numbers <= high))
+    if wrong.any():
+        raise InvalidArgument(name, float(numbers[wrong][0]), _range(low, high, unit))
+    return numbers if numbers.ndim else float(numbers)
+
+
+def _range(low: float, high: float, unit: str) -> str:
+    return f"{low:g} to {high:g} {unit}".strip()
+
+
+def _shown(value: object) -> str:
+    return repr(value)[:60]

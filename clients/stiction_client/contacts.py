@@ -1,0 +1,85 @@
+"""Contacts that bear a load together: how large each is, how its pressure is spread, and what torque it bears."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from stiction_client.arguments import within
+from stiction_client.quantile import Number
+
+AREAS = (1e-12, 1.0)
+"""m² that a contact of a gripper may have."""
+
+UNIFORM_TORSION, HERTZ_TORSION = 2.0 / 3.0, 3.0 * math.pi / 16.0
+"""Friction moment of a contact over μ F_N a (a: contact radius), under uniform pressure and under Hertz's
+(Johnson, Contact Mechanics, 1985, section 3.9)."""
+
+HERTZ_SQUARE = 9.0 / 8.0
+"""Mean of the squared pressure of Hertz over the square of its mean: by how much its elements' forces, each weighted
+with itself, exceed their mean."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """One contact: area A = ``area``·(F/``reference_force``)^⅔ m² under the normal force F, or ``area`` at any force.
+
+    ``pressure_square``: mean of p² over the square of the mean of p, 1 for uniform pressure. ``torque_arm`` m: the
+    friction moment over μF, at ``reference_force`` where the area grows (its radius with F^⅓).
+    """
+
+    area: Number
+    reference_force: float | None = None
+    pressure_square: Number = 1.0
+    torque_arm: Number = 0.0
+
+    @classmethod
+    def flat(cls, area: Number) -> "Contact":
+        """A disk of ``area`` m² under uniform pressure, at any force."""
+        area = within("area", area, *AREAS, "m²")
+        return cls(area, None, 1.0, UNIFORM_TORSION * (area / math.pi) ** 0.5)
+
+    @classmethod
+    def round(cls, area: Number, at_force: float) -> "Contact":
+        """A round fingertip: its contact has ``area`` m² under ``at_force`` N, and grows with force as Hertz's does."""
+        area, force = within("area", area, *AREAS, "m²"), float(within("at_force", at_force, 1e-9, 1e9, "N"))
+        return cls(area, force, HERTZ_SQUARE, HERTZ_TORSION * (area / math.pi) ** 0.5)
+
+    @classmethod
+    def measured(cls, pressure: Number, x: Number, y: Number, element_area: float) -> "Contact":
+        """A contact as a sensor sees it: ``pressure`` [k] Pa of elements of ``element_area`` m² at ``x``, ``y`` [k] m.
+
+        Its area is that of the elements under pressure and stays so at any force.
+        """
+        p = np.asarray(within("pressure", pressure, 0.0, 1e12, "Pa"), dtype=np.float64)
+        element = within("element_area", element_area, *AREAS, "m²")
+        force = within("total pressure", float(p.sum()), 1e-300, 1e300, "Pa, above 0")
+        centre = [float(p @ np.asarray(place)) / force for place in (x, y)]
+        radius = np.hypot(np.asarray(x) - centre[0], np.asarray(y) - centre[1])
+        pressed = int((p > 0.0).sum())
+        return cls(pressed * element, None, float(p @ p) * pressed / force**2, float(p @ radius) / force)
+
+
+@dataclass(frozen=True, slots=True)
+class Contacts:
+    """``count`` equal contacts, pressed with the same normal force; the load is shared evenly.
+
+    Of equal contacts none needs less in total: what a contact holds under a force is concave in it. A torque about the
+    axis of the load is borne as moments of the contacts about their common normal (``lever_arm`` None), or as
+    tangential forces at ``lever_arm`` m from the axis.
+    """
+
+    contact: Contact
+    count: int = 1
+    lever_arm: Number | None = None
+
+
+def antipodal(contact: Contact) -> Contacts:
+    """Two fingers that press against each other; a torque is one about the line between them."""
+    return Contacts(contact, 2)
+
+
+def n_fingers(count: int, contact: Contact, object_radius: Number) -> Contacts:
+    """Fingers evenly around an object of ``object_radius`` m, such as a lid; a torque is about the object's axis."""
+    fingers = int(within("count", count, 2, 100, "fingers"))
+    return Contacts(contact, fingers, within("object_radius", object_radius, 1e-6, 1e3, "m"))

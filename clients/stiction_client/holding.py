@@ -1,0 +1,158 @@
+"""Which normal forces hold a loaded contact: the roots of a concave function, for one grasp or for arrays of them."""
+
+import math
+import sys
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from stiction_client.quantile import FrictionQuantile, Number, Truth
+
+MOST_STEPS = 200
+"""Steps of a search; a root that only touches takes 50, any other fewer than 20."""
+
+ROUNDING = 8.0 * sys.float_info.epsilon
+"""Relative, to which a load counts as held and a force as found."""
+
+ENDLESS = 1e30
+"""Cube root of N, or N: a force that has grown so far has no root before it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LoadedContact:
+    """A contact's share T (N) and M (as force M/b at x = 1, N) of the load, in x = F^(1/n) of its normal force F.
+
+    n is 1 where the area is fixed, and 3 where it grows with F^⅔: the normal force of its elements, each weighted with
+    itself, then is ``unit``·x, the torque arm b grows as x^j with j = (n − 1)/2, and the contact holds where
+
+        q(unit·x) ≥ L(x)/xⁿ,   L(x) = √(T² + (M·x^-j)²)
+
+    q is concave and the right side convex: their difference has no root, one, or two. Newton's steps on a concave
+    function never pass the root next to them, so that none is missed and a bracket isn't needed. Numbers are floats,
+    or arrays that broadcast.
+    """
+
+    quantile: FrictionQuantile
+    load: Number
+    moment: Number
+    unit: Number
+    power: int
+
+    def root(self, force: Number) -> Number:
+        """x of a normal force, N."""
+        return force if self.power == 1 else force ** (1.0 / 3.0)
+
+    def force(self, x: Number) -> Number:
+        """Normal force of the contact, N."""
+        return x if self.power == 1 else x * x * x
+
+    def expected(self) -> "LoadedContact":
+        """The same contact, were friction its mean and nothing about it uncertain."""
+        return replace(self, quantile=self.quantile.expected())
+
+    def interval(self, most: Number) -> tuple[Number, Number, Truth]:
+        """The least x that holds, the greatest up to ``most``, and whether there are such."""
+        loaded = (self.load > 0.0) | (self.moment > 0.0)
+        low, found = self._search(select(loaded, self._start(), 1.0), 1)
+        end = self.end(most)
+        bounded = (end > 0.0) & (end < math.inf)
+        high = select(bounded, self._search(select(bounded, end, 1.0), -1)[0], end)
+        rests = (self.load + self.moment == 0.0) & (self.quantile(0.0)[0] <= 0.0)  # and no force but 0 is sure to hold
+        low, high = select(loaded, low, 0.0), select(rests, 0.0, high)
+        return low, select(high > low, high, low), (found | (low == 0.0)) & (low <= most * (1.0 + ROUNDING))
+
+    def best(self, most: float) -> float:
+        """The x up to ``most`` at which most of the load is held: 0 where none ever is, infinite if it has no end."""
+        end = float(self.end(most))
+        if not end < math.inf:
+            return end
+        least = min(self.quantile.peak() / float(self.unit), end)
+        if not self.quantile(self.unit * least)[0] > 0.0:
+            return 0.0
+        return end if self._growth(end)[0] > 0.0 else self._turning_point(max(least, 1e-9 * end), end)
+
+    def multiple(self, x: float) -> float:
+        """How many times its load the contact holds at x; without a load, how many newtons."""
+        return float(self.force(x) * self.quantile(self.unit * x)[0] / (self._load(x) or 1.0))
+
+    def end(self, most: Number) -> Number:
+        """An x up to ``most`` beyond which nothing holds: where the line that bounds friction from above meets zero."""
+        height, slope = self.quantile.asymptote
+        falls = slope < 0.0
+        zero = -height / select(falls, slope, -1.0) / self.unit
+        end = select(falls, zero, select((slope > 0.0) | (height > 0.0), math.inf, 0.0))
+        return select(end < most, select(end > 0.0, end, 0.0), most)
+
+    def _load(self, x: Number) -> Number:
+        """L(x), N."""
+        twist = self.moment if self.power == 1 else self.moment / x
+        return (self.load * self.load + twist * twist) ** 0.5
+
+    def _relief(self, x: Number) -> Number:
+        """−d log L / d log x: what part of the load is torque that a larger contact bears more easily."""
+        if self.power == 1:
+            return 0.0
+        load = self._load(x)
+        return (self.moment / x / (load + (load == 0.0))) ** 2
+
+    def surplus(self, x: Number) -> tuple[Number, Number]:
+        """q(unit·x) − L(x)/xⁿ, and its slope."""
+        friction, slope = self.quantile(self.unit * x)
+        asked = self._load(x) / x if self.power == 1 else self._load(x) / x / x / x  # no power of x may underflow
+        return friction - asked, self.unit * slope + (self.power + self._relief(x)) * asked / x
+
+    def _search(self, x: Number, direction: int) -> tuple[Number, Truth]:
+        """Newton's method from ``x``: the next root in ``direction``, 1 or -1, and whether there is one."""
+        q = self.quantile
+        rounding = ROUNDING * ((q.a * q.a + q.k * q.k) ** 0.5 + q.s)
+        value, slope = self.surplus(x)
+        for _ in range(MOST_STEPS):
+            onwards = direction * slope > 0.0
+            step = -value / (slope + (slope == 0.0))
+            moving = (value < -0.25 * rounding) & onwards & (direction * step > 0.25 * ROUNDING * x) & (x < ENDLESS)
+            if not (moving.any() if isinstance(moving, np.ndarray) else moving):
+                break
+            x = x + select(moving, step, 0.0)
+            value, slope = self.surplus(x)
+        return x, (value >= -rounding) | (onwards & (x < ENDLESS))
+
+    def _start(self) -> Number:
+        """An x that is no greater than the least that holds: where friction, if it were on that line, would."""
+        height, slope = (0.5 / (select(part > 0.0, part, 0.0) + 1e-300) for part in self.quantile.asymptote)
+        starts = [
+            least((load * height) ** (1.0 / power), (load * slope / self.unit) ** (1.0 / (power + 1)))
+            for load, power in ((self.load, self.power), (self.moment, 1 if self.power == 1 else 4))
+        ]
+        return -least(-starts[0], -starts[1])
+
+    def _growth(self, x: float) -> tuple[float, float]:
+        """Sign of the growth with x of the load that is held, φ = q·(n + relief) + unit·x·q', and its slope."""
+        f = self.unit * x
+        (friction, slope), bend, relief = self.quantile(f), self.quantile.bend(f), self._relief(x)
+        growth = friction * (self.power + relief) + f * slope
+        relieving = -2.0 * relief * (1.0 - relief) / x
+        bent = self.unit * (slope * (self.power + relief + 1.0) + f * bend) + friction * relieving
+        return float(growth), float(bent)
+
+    def _turning_point(self, below: float, above: float) -> float:
+        """Where φ, positive at ``below`` and negative at ``above``, changes its sign: Newton's method in a bracket."""
+        x = 0.5 * (below + above)
+        for _ in range(MOST_STEPS):
+            growth, slope = self._growth(x)
+            below, above = (x, above) if growth > 0.0 else (below, x)
+            guess = x - growth / slope if slope < 0.0 else below
+            guess = guess if below < guess < above else 0.5 * (below + above)
+            if abs(guess - x) <= ROUNDING * x:
+                break
+            x = guess
+        return x
+
+
+def select(condition: Truth, yes: Number, no: Number) -> Number:
+    """``yes`` where the condition holds: NumPy's ``where``, which takes too long for floats."""
+    return np.where(condition, yes, no) if isinstance(condition, np.ndarray) else (yes if condition else no)
+
+
+def least(one: Number, other: Number) -> Number:
+    """The smaller one."""
+    return select(one < other, one, other)
