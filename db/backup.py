@@ -6,24 +6,23 @@ The same from either database and into either, so that a backup is the way from 
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import closing
-from itertools import islice
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from sqlalchemy import URL, Table, func, insert, select, text, update
 from sqlalchemy.orm import Session
 
-from db import migrate
+from db import identity, migrate
 from db.blobs import BlobStore
 from db.database import Database
-from db.defaults import HASHES_PER_QUERY
-from db.errors import NotEmpty
-from db.repositories import blobs as references
-from db.tables import Base, IdempotencyKeyRow, RunnerRow
+from db.errors import BlobDamaged, NotEmpty, NotFound
+from db.quarantine import sync_folder
+from db.tables import Base, IdempotencyKeyRow, RunnerRow, StoreRow
 
 FILE = "stiction.sqlite3"
-LEFT_OUT = {RunnerRow.__tablename__, IdempotencyKeyRow.__tablename__}
-"""Tables of what lives for a moment only: a copy has no running processes, and answers no repeated requests."""
+LEFT_OUT = {RunnerRow.__tablename__, IdempotencyKeyRow.__tablename__, StoreRow.__tablename__}
+"""Tables of what is not copied: running processes, answers to repeated requests, and the store id: what is restored is
+a store of its own, so that two that grow apart are never taken for one."""
 
 ROWS_AT_ONCE = 500
 
@@ -49,19 +48,25 @@ def backup(database: Database, blobs: BlobStore, folder: Path, report: Report) -
         _copy_rows(database, copy, report)
         _copy_blobs(copy, blobs, BlobStore(folder), report)
     unfinished.replace(file)  # closing took what was ahead of it in the log into the file
+    sync_folder(folder)
 
 
-def restore(folder: Path, database: Database, blobs: BlobStore, report: Report) -> None:
-    """Fill an empty database and blob store from a backup.
+def restore(folder: Path, database: Database, blobs: BlobStore, report: Report, *, take_over: bool = False) -> None:
+    """Fill an empty database and blob store from a backup; they become a store of their own, with an id of its own.
 
-    Every blob must have the bytes that it is named for. Raises ``NotEmpty`` for a database that has any rows,
-    ``NotFound`` for a blob that is missing, ``StorageUnavailable`` for one whose bytes have changed.
+    Every blob must have the bytes that it is named for. A blob store of another database is only filled to
+    ``take_over`` from that one, which is refused there from then on. Raises ``NotEmpty`` for a database that has any
+    rows, ``StoreMismatch``, ``NotFound`` for a blob that is missing, ``BlobDamaged`` for one whose bytes have changed.
     """
     file = folder / FILE
     if not file.is_file():
         raise FileNotFoundError(f"backup {file} is not there")
     migrate.upgrade(database)
     _refuse_rows(database)
+    if take_over:
+        identity.adopt(database, blobs)
+    else:
+        identity.join(database, blobs, alone=True, to_fill=True)
     with TemporaryDirectory() as own, closing(_opened(_copied(file, Path(own)))) as copy:
         migrate.check(copy)
         _copy_blobs(copy, BlobStore(folder), blobs, report)
@@ -72,11 +77,16 @@ def damaged(database: Database, blobs: BlobStore, *, deep: bool) -> Iterator[str
     """What is wrong with the blobs that rows refer to, a line each: missing, or (``deep``) not the bytes of before."""
     present = set(blobs.hashes())
     with database.read() as session:
-        for sha256 in _wanted(session):
-            if sha256 not in present:
+        for sha256 in identity.wanted(session):
+            try:
+                if deep:
+                    blobs.path(sha256)
+                elif sha256 not in present:
+                    blobs.locate(sha256)  # it may be in quarantine
+            except NotFound:
                 yield f"blob {sha256} is missing"
-            elif deep and not blobs.is_intact(sha256):
-                yield f"blob {sha256} has other bytes than it had"
+            except BlobDamaged as error:
+                yield str(error)
 
 
 def _copied(file: Path, folder: Path) -> Path:
@@ -137,15 +147,9 @@ def _copy_blobs(rows: Database, source: BlobStore, target: BlobStore, report: Re
     """Those that the rows refer to and the target has not; rows never refer to a blob that is not stored."""
     present, count = set(target.hashes()), 0
     with rows.read() as session:
-        for sha256 in _wanted(session):
+        for sha256 in identity.wanted(session):
             if sha256 not in present:
-                target.take(source.path(sha256), sha256)
+                target.take(source.locate(sha256), sha256)
                 count += 1
                 report("blobs", count)
     report("blobs", count)
-
-
-def _wanted(session: Session) -> Iterator[str]:
-    everything = references.all_referenced(session)
-    while some := list(islice(everything, HASHES_PER_QUERY)):
-        yield from some

@@ -7,16 +7,19 @@ import time
 import uuid
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from itertools import islice
+from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from db.defaults import CACHE_GRACE, COPY_BYTES, HASHES_PER_QUERY, ORPHAN_AGE
-from db.errors import NotFound, StorageUnavailable
-from db.object_store import ObjectStore
+from db.defaults import CACHE_GRACE, COPY_BYTES
+from db.errors import BlobDamaged, NotFound, StorageUnavailable
+from db.object_store import ObjectQuarantine, ObjectStore
+from db.quarantine import FolderQuarantine, Quarantine, move, sync_folder
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
+STORE_ID = "store-id"
+"""File beside the blobs that tells which store they belong to (``db.identity``)."""
 
 
 @contextmanager
@@ -91,18 +94,31 @@ class BlobStore:
     """A folder of blobs, ``blobs/ab/ab12…``, with the spool files under way beside them in ``spool``.
 
     With a ``remote`` the blobs are there, and the folder holds those that were used last, ``cache_bytes`` of them.
+    Blobs to which nothing refers are set aside in ``quarantine``, from where a reader still gets them.
     """
 
     def __init__(self, folder: Path, remote: ObjectStore | None = None, cache_bytes: int = 0) -> None:
         self._blobs, self._spool = folder / "blobs", folder / "spool"
         self._remote, self._cache_bytes, self._fetched = remote, cache_bytes, cache_bytes
+        self.quarantine: Quarantine = (
+            FolderQuarantine(folder / "quarantine", self._place) if remote is None else ObjectQuarantine(remote)
+        )
+        self.store_id: str | None = None  # that of the database that works with it, once somebody has compared them
         for part in (self._blobs, self._spool):
             part.mkdir(parents=True, exist_ok=True)
+
+    def __str__(self) -> str:
+        return f"blob folder {self._blobs}" if self._remote is None else f"blob store {self._remote}"
 
     def spool(self) -> Spool:
         """A new file to write to; use it in a ``with`` statement."""
         with disk_errors_named():
             return Spool(self._spool / uuid.uuid4().hex, self._take_in)
+
+    def clear_spool(self) -> None:
+        """Remove what was under way when its process ended; only for one who works in the folder alone."""
+        for path in self._spool.iterdir():
+            path.unlink(missing_ok=True)
 
     def put(self, content: bytes) -> str:
         """Store bytes and return their hash."""
@@ -111,85 +127,133 @@ class BlobStore:
             return spool.keep()
 
     def take(self, file: Path, sha256: str) -> None:
-        """Store a copy of a file that must have this hash; raises ``StorageUnavailable`` if it has another."""
+        """Store a copy of a file that must have this hash; raises ``BlobDamaged`` if it has another."""
         with self.spool() as spool:
-            with file.open("rb") as stream:
+            with disk_errors_named(), file.open("rb") as stream:
                 while chunk := stream.read(COPY_BYTES):
                     spool.write(chunk)
             if spool.sha256 != sha256:
-                raise StorageUnavailable(f"{file} has other bytes than it had: its hash is {spool.sha256}")
+                raise BlobDamaged(sha256, spool.sha256)
             spool.keep()
 
     def path(self, sha256: str) -> Path:
-        """The file that holds a blob, fetched where it has to be; raises ``NotFound``."""
+        """The file that holds a blob, with the bytes that it is named for: they are read and compared each time.
+
+        Raises ``NotFound``, and ``BlobDamaged``.
+        """
+        path = self.locate(sha256)
+        found = _hash(path)
+        if found != sha256 and self._remote is not None:  # the cache's copy
+            path.unlink(missing_ok=True)
+            path = self.locate(sha256)
+            found = _hash(path)
+        if found != sha256:
+            raise BlobDamaged(sha256, found)
+        return path
+
+    def locate(self, sha256: str) -> Path:
+        """The file that holds a blob, for one who compares its bytes with the hash; raises ``NotFound``."""
         path = self._place(sha256)
         if path.is_file():
             if self._remote is not None:
                 path.touch()  # the cache drops those that were not used for longest
             return path
         if self._remote is None:
-            raise NotFound("blob", sha256)
-        with self.spool() as spool:
-            self._remote.get(sha256, spool.path)
-            spool.adopt()
-            if spool.sha256 != sha256:
-                raise StorageUnavailable(f"blob store: {sha256} has other bytes than it had")
-            _move(spool.path, path)
-        self._make_room(path.stat().st_size)
-        return path
+            if not self.quarantine.recall(sha256):
+                self._require_own()
+                raise NotFound("blob", sha256)
+            return path
+        return self._fetch(self._remote, sha256, path)
 
     def has(self, sha256: str) -> bool:
         """Whether a blob is stored."""
         return self._place(sha256).is_file() if self._remote is None else self._remote.has(sha256)
 
-    def is_intact(self, sha256: str) -> bool:
-        """Whether a blob, read as a whole, has the bytes that it is named for."""
-        with self.path(sha256).open("rb") as stream:
-            return hashlib.file_digest(stream, hashlib.sha256).hexdigest() == sha256
-
     def remove(self, hashes: Iterable[str]) -> None:
         """Delete blobs to which nothing refers; those that aren't there are no error."""
         gone = list(hashes)
+        self._require_own()
         if self._remote is not None:
             self._remote.delete(gone)
         for sha256 in gone:
             self._place(sha256).unlink(missing_ok=True)
 
     def ping(self) -> None:
-        """Make sure that the folder takes files, and the remote answers; raises ``StorageUnavailable``."""
+        """Make sure that the folder takes files and is still that of the store; raises ``StorageUnavailable``."""
         with self.spool() as spool:
             spool.write(b"ready")
             spool.flush()
+        self._require_own()
         if self._remote is not None:
             self._remote.ping()
 
-    def hashes(self) -> Iterator[str]:
-        """Hashes of all blobs, in no order. Files that are not blobs are left out."""
-        return self._local() if self._remote is None else self._remote.hashes()
+    def hashes(self, before: datetime | None = None) -> Iterator[str]:
+        """Hashes of all blobs, or of those stored before a moment, in no order. What is no blob is left out."""
+        return self._local(before) if self._remote is None else self._remote.hashes(before)
 
-    def sweep(self, referenced: Callable[[list[str]], set[str]]) -> list[str]:
-        """Remove spool files and the blobs that nothing refers to; returns the hashes removed.
+    def now(self) -> datetime:
+        """The present moment by the clock that blobs get their times from."""
+        return datetime.now(UTC) if self._remote is None else self._remote.now()
 
-        ``referenced`` tells which of some hashes are referred to. Only for when nobody writes to the folder: at
-        start-up. Of a remote, to which others may write, only objects of some age are removed.
-        """
-        for path in self._spool.iterdir():
-            path.unlink(missing_ok=True)
-        removed: list[str] = []
-        remaining = self._local() if self._remote is None else self._remote.hashes(self._remote.now() - ORPHAN_AGE)
-        while some := list(islice(remaining, HASHES_PER_QUERY)):
-            removed += sorted(set(some) - referenced(some))
-        self.remove(removed)
-        return removed
+    def read_store_id(self) -> str | None:
+        """The store that the blobs say they belong to; None where they don't say."""
+        return self._local_store_id() if self._remote is None else self._remote.read(STORE_ID)
+
+    def cached_store_id(self) -> str | None:
+        """The store of which the folder is no cache of an object store, but the only place; None elsewhere."""
+        return None if self._remote is None else self._local_store_id()
+
+    def write_store_id(self, store_id: str) -> None:
+        """Let the blobs say, durably, which store they belong to."""
+        if self._remote is not None:
+            self._remote.write(STORE_ID, store_id)
+            return
+        with disk_errors_named(), Spool(self._spool / uuid.uuid4().hex, self._name_store) as spool:
+            spool.write(f"{store_id}\n".encode())
+            spool.keep()
+
+    def _name_store(self, spooled: Path, _sha256: str) -> None:
+        spooled.replace(self._blobs / STORE_ID)
+        sync_folder(self._blobs)
+
+    def _local_store_id(self) -> str | None:
+        with disk_errors_named():
+            try:
+                return (self._blobs / STORE_ID).read_text().strip()
+            except FileNotFoundError:
+                return None
+
+    def _require_own(self) -> None:
+        """That what is mounted here is still the folder that was opened: a missing disk leaves an empty one."""
+        if self.store_id is not None and (found := self.read_store_id()) != self.store_id:
+            raise StorageUnavailable(f"{self}: its store id was {self.store_id} and is {found}; is its disk there?")
 
     def _take_in(self, spooled: Path, sha256: str) -> None:
         """Make a spooled file, which is on the disk already, a blob."""
         if self._remote is not None:
             self._remote.put(sha256, spooled)
         size = spooled.stat().st_size
-        _move(spooled, self._place(sha256))
-        if self._remote is not None:
+        move(spooled, self._place(sha256))
+        if self._remote is None:
+            self._require_own()
+        else:
             self._make_room(size)
+
+    def _fetch(self, remote: ObjectStore, sha256: str, path: Path) -> Path:
+        with self.spool() as spool:
+            try:
+                remote.get(sha256, spool.path)
+            except NotFound:
+                if not self.quarantine.recall(sha256):
+                    raise
+                remote.get(sha256, spool.path)
+            spool.adopt()
+            if spool.sha256 != sha256:
+                raise BlobDamaged(sha256, spool.sha256)
+            with disk_errors_named():
+                move(spool.path, path)
+        self._make_room(path.stat().st_size)
+        return path
 
     def _make_room(self, size: int) -> None:
         """Drop what was not used for longest once the cache may be over its size: looking takes a walk over it."""
@@ -211,10 +275,12 @@ class BlobStore:
             with suppress(FileNotFoundError):
                 yield path, path.stat()
 
-    def _local(self) -> Iterator[str]:
+    def _local(self, before: datetime | None) -> Iterator[str]:
+        latest = None if before is None else before.timestamp()
         for path in self._blobs.glob("??/*"):
-            if _SHA256.fullmatch(path.name):
-                yield path.name
+            with suppress(FileNotFoundError):
+                if _SHA256.fullmatch(path.name) and (latest is None or path.stat().st_mtime < latest):
+                    yield path.name
 
     def _place(self, sha256: str) -> Path:
         if not _SHA256.fullmatch(sha256):
@@ -227,22 +293,6 @@ def open_blobs(folder: Path, url: str | None = None, cache_bytes: int = 0) -> Bl
     return BlobStore(folder, None if url is None else ObjectStore(url), cache_bytes)
 
 
-def _move(spooled: Path, target: Path) -> None:
-    """Atomic and durable: file, then name, then folder reach the disk; a blob of that name has the same bytes."""
-    _make_folder(target.parent)
-    spooled.replace(target)
-    _sync_folder(target.parent)
-
-
-def _make_folder(folder: Path) -> None:
-    if not folder.is_dir():
-        folder.mkdir(exist_ok=True)
-        _sync_folder(folder.parent)
-
-
-def _sync_folder(folder: Path) -> None:
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+def _hash(path: Path) -> str:
+    with disk_errors_named(), path.open("rb") as stream:
+        return hashlib.file_digest(stream, hashlib.sha256).hexdigest()

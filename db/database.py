@@ -46,12 +46,16 @@ class Database:
         self._writing = self.engine.execution_options(**{_BEGIN: "BEGIN IMMEDIATE"})
         self._noting = self._writing.execution_options(**{_DURABLE: False})
         self._reading = self.engine
+        self.store_id: str | None = None  # that of the blob store that it works with, once somebody has compared them
         if self.is_sqlite:
             _prepare_sqlite(self.engine, lock_timeout)
         if self.engine.dialect.name == "postgresql":
             _prepare_postgresql(self.engine, lock_timeout)
             # by default each statement would see what was committed meanwhile
             self._reading = self.engine.execution_options(isolation_level="REPEATABLE READ")
+
+    def __str__(self) -> str:
+        return f"database {self.engine.url.render_as_string(hide_password=True)}"
 
     @property
     def is_sqlite(self) -> bool:
@@ -61,8 +65,7 @@ class Database:
     @contextmanager
     def connect(self) -> Iterator[Connection]:
         """A connection below the transactions of the stores: for migrations, whose errors tell the URL too."""
-        shown = self.engine.url.render_as_string(hide_password=True)
-        with _unavailable_named(f"database {shown}"), self.engine.connect() as connection:
+        with _unavailable_named(str(self)), self.engine.connect() as connection:
             yield connection
 
     @contextmanager

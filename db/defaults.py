@@ -33,7 +33,10 @@ OBJECT_STORE_TIMEOUT = 20.0
 """s, above 0; how long an object store may take to answer, retries and all, before it counts as away."""
 
 ORPHAN_AGE = timedelta(hours=24)
-"""How long an object to which nothing refers stays: another server may be about to write its row."""
+"""How long a blob to which nothing refers stays in its place: somebody may be about to write its row."""
+
+QUARANTINE_AGE = timedelta(days=7)
+"""How long such a blob stays in quarantine where no age is named: time to see that something is missing."""
 
 CACHE_GRACE = 600.0
 """s, above 0; how long a blob that was just used stays in the local cache, however full: somebody may be reading it."""

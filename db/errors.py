@@ -58,6 +58,21 @@ class StorageUnavailable(DatabaseError):
     """The database or the blob folder cannot be used now: locked, full, gone. Worth another try later."""
 
 
+class BlobDamaged(DatabaseError):
+    """A stored file has other bytes than those that it is named for."""
+
+    def __init__(self, sha256: str, found: str) -> None:
+        self.sha256, self.found = sha256, found
+        super().__init__(sha256, found)
+
+    def __str__(self) -> str:
+        return f"blob {self.sha256} has other bytes than it had: their hash is {self.found}"
+
+
+class StoreMismatch(DatabaseError):
+    """The database and the blob store are not those of one service: to work on them would lose files."""
+
+
 class ClaimLost(DatabaseError):
     """The job is no longer this runner's to do: it was cancelled, ended, or given to another."""
 

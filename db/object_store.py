@@ -13,6 +13,7 @@ from db.errors import DriverMissing, NotFound, StorageUnavailable
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _CLOCK = "clock"
+_QUARANTINE = "quarantine"
 
 
 class ObjectStore:
@@ -27,7 +28,7 @@ class ObjectStore:
             from obstore.store import from_url
         except ModuleNotFoundError as error:
             raise DriverMissing(url.partition("?")[0], "obstore", what="blob store", extra="s3") from error
-        self._obstore = obstore
+        self._obstore, self._name = obstore, url.partition("?")[0]
         seconds = timedelta(seconds=OBJECT_STORE_TIMEOUT)
         with _answered("blob store"):
             self._store: Any = from_url(
@@ -35,6 +36,9 @@ class ObjectStore:
                 client_options={"timeout": seconds, "connect_timeout": seconds, "allow_http": _is_plain_http()},
                 retry_config={"max_retries": 2, "retry_timeout": seconds},
             )
+
+    def __str__(self) -> str:
+        return self._name
 
     def put(self, sha256: str, path: Path) -> None:
         """Store a file as the blob of this hash; when it returns, the store has it."""
@@ -59,21 +63,48 @@ class ObjectStore:
             self._obstore.delete(self._store, _CLOCK)
         return written
 
-    def hashes(self, before: datetime | None = None) -> Iterator[str]:
-        """Hashes of all blobs, or of those that were stored before a moment of the store's clock."""
+    def hashes(self, before: datetime | None = None, *, set_aside: bool = False) -> Iterator[str]:
+        """Hashes of all blobs, or of those that were stored before a moment of the store's clock.
+
+        Either of the blobs in their places, or of those ``set_aside``.
+        """
         with _answered("blob store"):
             for page in self._obstore.list(self._store):
                 for entry in page:
-                    name = entry["path"].rpartition("/")[2]
-                    if _SHA256.fullmatch(name) and (before is None or entry["last_modified"] < before):
+                    folder, _, name = entry["path"].rpartition("/")
+                    is_aside = folder.rpartition("/")[2] == _QUARANTINE
+                    is_old = before is None or entry["last_modified"] < before
+                    if _SHA256.fullmatch(name) and is_old and is_aside == set_aside:
                         yield name
 
-    def delete(self, hashes: Iterable[str]) -> None:
+    def delete(self, hashes: Iterable[str], *, set_aside: bool = False) -> None:
         """Remove blobs; those that aren't there are no error."""
-        keys = [_key(sha256) for sha256 in hashes]
+        keys = [_aside(sha256) if set_aside else _key(sha256) for sha256 in hashes]
         if keys:
             with _answered("blob store"):
                 self._obstore.delete(self._store, keys)
+
+    def set_aside(self, sha256: str, *, back: bool = False) -> bool:
+        """Move a blob into the quarantine, or ``back`` to its place; False where it isn't."""
+        source, target = (_aside(sha256), _key(sha256)) if back else (_key(sha256), _aside(sha256))
+        if not self._is_there(source):
+            return False
+        with _answered("blob store", sha256):
+            self._obstore.rename(self._store, source, target)
+        return True
+
+    def read(self, key: str) -> str | None:
+        """The text of an object that is no blob; None where there is none."""
+        with _answered("blob store"):
+            try:
+                return bytes(self._obstore.get(self._store, key).bytes()).decode()
+            except FileNotFoundError:
+                return None
+
+    def write(self, key: str, text: str) -> None:
+        """Store a text that is no blob."""
+        with _answered("blob store"):
+            self._obstore.put(self._store, key, text.encode())
 
     def ping(self) -> None:
         """Make sure that the store answers; raises ``StorageUnavailable``."""
@@ -88,6 +119,29 @@ class ObjectStore:
         return True
 
 
+class ObjectQuarantine:
+    """Objects beside the blobs (``db.quarantine.Quarantine``)."""
+
+    def __init__(self, store: ObjectStore) -> None:
+        self._store = store
+
+    def put(self, sha256: str) -> None:
+        """Set a blob aside, as of now; one that isn't there is no error."""
+        self._store.set_aside(sha256)
+
+    def recall(self, sha256: str) -> bool:
+        """Make it a blob again; False if it was not set aside."""
+        return self._store.set_aside(sha256, back=True)
+
+    def hashes(self, before: datetime | None = None) -> Iterator[str]:
+        """Hashes of all that were set aside, or of those before a moment of the store's clock."""
+        return self._store.hashes(before, set_aside=True)
+
+    def delete(self, hashes: Iterable[str]) -> None:
+        """Delete for good."""
+        self._store.delete(hashes, set_aside=True)
+
+
 def _is_plain_http() -> bool:
     """Whether an endpoint without TLS was chosen by name."""
     return os.environ.get("AWS_ENDPOINT_URL", "").startswith("http://")
@@ -95,6 +149,10 @@ def _is_plain_http() -> bool:
 
 def _key(sha256: str) -> str:
     return f"{sha256[:2]}/{sha256}"
+
+
+def _aside(sha256: str) -> str:
+    return f"{_QUARANTINE}/{sha256}"
 
 
 @contextmanager

@@ -1,16 +1,14 @@
 """The application: stores opened, jobs taken up, routes and problems put together."""
 
-import logging
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, closing
 from functools import partial
 
 from fastapi import FastAPI
 
-from db import migrate
+from db import identity, migrate
 from db.blobs import BlobStore, open_blobs
 from db.database import Database
-from db.repositories import blobs as blob_references
 from db.repositories import runners
 from service.context import Context
 from service.domain.model_cache import ModelCache
@@ -31,8 +29,6 @@ from service.observability.metrics import Metering, Metrics
 from service.processes.folder_lock import shared
 from service.settings import Settings
 from service.stream.sessions import Streams
-
-logger = logging.getLogger(__name__)
 
 UNTRACED = access.PUBLIC_PATHS | {"/metrics"}
 """Paths of which a monitor asks all the time."""
@@ -92,7 +88,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 async def running(
     settings: Settings, check: Callable[[Settings, Database], None] | None = None
 ) -> AsyncIterator[Context]:
-    """Open the stores, leave no orphan in them, take up unfinished jobs; at the end, stop in the opposite order.
+    """Open the stores, which must belong together, and take up unfinished jobs; at the end, stop in opposite order.
 
     ``check`` may raise what stops the start.
     """
@@ -110,7 +106,13 @@ async def running(
             )
             readers, streams = Readers(settings.read_seconds), Streams()
             await runner.start()
-            retention = Retention(database, blobs, settings.keep_uploads_days, lambda: runner.leads)
+            retention = Retention(
+                database,
+                blobs,
+                settings.keep_uploads_days,
+                lambda: runner.leads,
+                unreferenced_days=settings.keep_unreferenced_days,
+            )
             retention.start()
             try:
                 models = ModelCache(settings.lookup_seconds)
@@ -133,24 +135,16 @@ def _enter(
         migrate.upgrade(database)
     else:
         migrate.check(database)
+    identity.join(database, blobs, alone=alone)
     if check is not None:
         check(settings, database)
     if alone:
         if database.is_sqlite:  # whoever else worked on it worked in this folder
             _release_jobs_of_the_dead(database)
-        _sweep(database, blobs)
+        blobs.clear_spool()
 
 
 def _release_jobs_of_the_dead(database: Database) -> None:
     with database.write() as session:
         for dead in runners.list_all(session):
             runners.remove(session, dead.id)
-
-
-def _sweep(database: Database, blobs: BlobStore) -> None:
-    def referenced(hashes: list[str]) -> set[str]:
-        with database.read() as session:
-            return blob_references.referenced(session, hashes)
-
-    for sha256 in blobs.sweep(referenced):
-        logger.info("removed blob %s, to which nothing refers", sha256)

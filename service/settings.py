@@ -38,6 +38,10 @@ class Settings(BaseSettings):
         default=None,
         description="Days after which uploads are deleted; what was found in them stays. Default: never.",
     )
+    keep_unreferenced_days: Annotated[float, Field(gt=0.0, le=36500.0)] | None = Field(
+        default=None,
+        description="Days after which files to which nothing refers, set aside by then, are deleted. Default: never.",
+    )
     migrate_at_start: bool = Field(
         default=True,
         description="Bring the database to this version's schema at start; otherwise an old one stops the start.",

@@ -99,6 +99,9 @@ class S3:
             return Response(status_code=503)
         key = request.path_params.get("key", "")
         body = await request.body()
+        if source := request.headers.get("x-amz-copy-source"):
+            self.objects[key] = self.objects[source.partition("/grasps/")[2] or source.removeprefix("grasps/")]
+            return Response("<CopyObjectResult><ETag>1</ETag></CopyObjectResult>", media_type="application/xml")
         answers = {"PUT": self._put, "GET": self._get, "HEAD": self._get, "DELETE": self._delete, "POST": self._post}
         return answers[request.method](key, body, request.query_params)
 

@@ -18,6 +18,11 @@ def all_referenced(session: Session) -> Iterator[str]:
     return iter(session.scalars(union(*_queries()).execution_options(yield_per=1000)))
 
 
+def any_referenced(session: Session) -> bool:
+    """Whether any row refers to any."""
+    return any(session.scalar(query.limit(1)) is not None for query in _queries())
+
+
 def _queries() -> tuple[Select[str], ...]:
     """Uploads, but for those that go or are gone, and what was found in them."""
     files = select(GraspLogRow.sha256).where(GraspLogRow.file_state.is_(None))

@@ -1,12 +1,17 @@
 """Commands on the files that are stored: prune."""
 
 from datetime import timedelta
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from db.defaults import QUARANTINE_AGE
 from service.cli.database import Url, opened, opened_blobs
 from service.cli.durations import duration
+
+if TYPE_CHECKING:
+    from db.blobs import BlobStore
+    from db.database import Database
 
 app = typer.Typer(help="Look after the files that are stored.", no_args_is_help=True)
 
@@ -15,34 +20,69 @@ app = typer.Typer(help="Look after the files that are stored.", no_args_is_help=
 def prune(
     older_than: Annotated[
         str | None,
-        typer.Option(help="Age such as 90d or 12h; by default that of STICTION_KEEP_UPLOADS_DAYS."),
+        typer.Option(help="Age of uploads such as 90d or 12h; by default that of STICTION_KEEP_UPLOADS_DAYS, if set."),
     ] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say how many uploads would go.")] = False,
+    grace: Annotated[
+        str | None,
+        typer.Option(help="How long unreferenced files are in quarantine; by default 7d, or the setting's days."),
+    ] = None,
+    delete: Annotated[bool, typer.Option("--delete", help="Do what is else only told.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would go, also with an age.")] = False,
     database_url: Url = None,
 ) -> None:
-    """Delete old uploads whose jobs have ended; what was found in them stays. The service may run meanwhile."""
-    from db import migrate
+    """Say what may be deleted, and with --delete do so: old uploads, and files to which nothing refers.
+
+    Uploads go once they are older than an age, if their jobs have ended; what was found in them stays. Unreferenced
+    files are set aside first. The service may run meanwhile. --older-than without --delete is about old uploads only,
+    and without --dry-run deletes them, as it always did.
+    """
+    from db import identity, migrate
+    from service.settings import Settings
+
+    if delete and dry_run:
+        raise typer.BadParameter("delete and dry-run are both set; allowed: one of them")
+    age = _age("older-than", older_than, Settings().keep_uploads_days)
+    chosen = _age("grace", grace, Settings().keep_unreferenced_days)
+    waiting = QUARANTINE_AGE if chosen is None else chosen
+    uploads_only = older_than is not None and not delete
+    with opened(database_url) as database:
+        migrate.check(database)
+        blobs = opened_blobs()
+        identity.verify(database, blobs)
+        if age is not None:
+            _prune_uploads(database, blobs, age, delete=delete or (uploads_only and not dry_run))
+        if not uploads_only:
+            _prune_unreferenced(database, blobs, waiting, delete=delete)
+
+
+def _prune_uploads(database: "Database", blobs: "BlobStore", age: timedelta, *, delete: bool) -> None:
     from db.repositories import uploads
     from db.tables import now
     from service.jobs.retention import prune as delete_old
 
-    before = now() - _age(older_than)
-    with opened(database_url) as database:
-        migrate.check(database)
-        with database.read() as session:
-            count, size = uploads.count_old(session, before)
-        if dry_run:
-            typer.echo(f"{count} uploads ({size} bytes) would be deleted")
-        else:
-            typer.echo(f"deleted {delete_old(database, opened_blobs(), before)} uploads ({size} bytes)")
+    before = now() - age
+    with database.read() as session:
+        count, size = uploads.count_old(session, before)
+    if delete:
+        typer.echo(f"deleted {delete_old(database, blobs, before)} uploads ({size} bytes)")
+    else:
+        typer.echo(f"{count} uploads ({size} bytes) would be deleted")
 
 
-def _age(text: str | None) -> timedelta:
-    from service.settings import Settings
+def _prune_unreferenced(database: "Database", blobs: "BlobStore", grace: timedelta, *, delete: bool) -> None:
+    from service.jobs import garbage
 
+    if delete:
+        typer.echo(f"deleted {garbage.delete_set_aside(database, blobs, grace)} unreferenced files")
+        typer.echo(f"set {garbage.set_aside(database, blobs)} unreferenced files aside")
+        return
+    old, new = garbage.find_deletable(database, blobs, grace), garbage.find_unreferenced(database, blobs)
+    typer.echo(f"{sum(1 for _ in old)} unreferenced files would be deleted, which are in quarantine for {grace}")
+    typer.echo(f"{sum(1 for _ in new)} unreferenced files would be set aside")
+
+
+def _age(name: str, text: str | None, days: float | None) -> timedelta | None:
+    """What an option says, or else a setting."""
     if text is None:
-        days = Settings().keep_uploads_days
-        if days is None:
-            raise typer.BadParameter("older-than is missing, and STICTION_KEEP_UPLOADS_DAYS is not set; allowed: 90d")
-        return timedelta(days=days)
-    return duration("older-than", text)
+        return None if days is None else timedelta(days=days)
+    return duration(name, text)

@@ -61,14 +61,16 @@ def check(
     ] = False,
 ) -> None:
     """Make sure that the schema is this version's and every file that rows refer to is there; exit code 3 if not."""
-    from db import migrate
+    from db import identity, migrate
     from db.backup import damaged
 
     with opened(database_url) as database:
         migrate.check(database)
         typer.echo("the schema is this version's")
+        blobs = opened_blobs()
+        identity.verify(database, blobs)
         is_whole = True
-        for line in damaged(database, opened_blobs(), deep=deep):
+        for line in damaged(database, blobs, deep=deep):
             typer.echo(line, err=True)
             is_whole = False
     if not is_whole:
@@ -82,10 +84,14 @@ def backup(
     database_url: Url = None,
 ) -> None:
     """Copy everything, rows and blobs, into a folder, as of one moment; the service may run meanwhile."""
+    from db import identity, migrate
     from db.backup import backup as copy_out
 
     with opened(database_url) as database:
-        copy_out(database, opened_blobs(), folder, _tell)
+        migrate.check(database)
+        blobs = opened_blobs()
+        identity.verify(database, blobs)
+        copy_out(database, blobs, folder, _tell)
     typer.echo(f"backed up to {folder}")
 
 
@@ -93,13 +99,28 @@ def backup(
 def restore(
     folder: Annotated[Path, typer.Argument(help="A folder that `stiction db backup` made.")],
     database_url: Url = None,
+    take_over: Annotated[
+        bool, typer.Option("--take-over", help="Into files of another database, which is refused there from then on.")
+    ] = False,
 ) -> None:
     """Fill an empty database, SQLite or PostgreSQL, and its blob store from a backup."""
     from db.backup import restore as copy_in
 
     with opened(database_url, may_be_new=True) as database:
-        copy_in(folder, database, opened_blobs(), _tell)
+        copy_in(folder, database, opened_blobs(), _tell, take_over=take_over)
     typer.echo(f"restored from {folder}")
+
+
+@app.command()
+def adopt(database_url: Url = None) -> None:
+    """Join the database and its files by hand where a start refuses them; nothing else works with either after that."""
+    from db import identity, migrate
+
+    with opened(database_url) as database:
+        migrate.check(database)
+        adopted = identity.adopt(database, opened_blobs())
+    found = f"{adopted.referenced - adopted.missing} of {adopted.referenced} files that rows refer to are there"
+    typer.echo(f"joined as store {adopted.store_id}: {found}")
 
 
 def opened_blobs() -> "BlobStore":

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 from db.blobs import Spool
 from db.errors import AlreadyExists, StorageUnavailable
 from db.records import NewGraspLog
-from db.repositories import grasp_logs, jobs, materials, uploads
+from db.repositories import grasp_logs, jobs, materials, stores, uploads
 from service import formats
 from service.context import Context
 from service.domain.receive import check_encoding, check_size, receive, unpack
@@ -163,6 +163,7 @@ def _store(context: Context, spool: Spool, log: NewGraspLog, once: Once | None) 
     """First the blob, durably, then the rows that refer to it."""
     spool.keep()
     with context.database.write() as session:
+        stores.require(session, context.database.store_id)
         uploads.lock(session, [log.sha256])
         if uploads.bring_back(session, log.sha256) and not context.blobs.has(log.sha256):
             raise StorageUnavailable("the file was old and about to be deleted when it came in again")

@@ -1,21 +1,29 @@
-"""Delete uploads once they are old: what was found in them stays, and fits need no more than that."""
+"""Delete uploads once they are old: what was found in them stays, and fits need no more than that.
+
+Also, where that is wanted, files to which nothing refers (``service.jobs.garbage``).
+"""
 
 import asyncio
 import logging
 import threading
+import time
 from collections.abc import Callable
 from datetime import datetime, timedelta
 
 from db.blobs import BlobStore
 from db.database import Database
-from db.errors import StorageUnavailable
+from db.errors import DatabaseError
 from db.repositories import uploads
 from db.tables import now
+from service.jobs import garbage
 
 logger = logging.getLogger(__name__)
 
 LOOK_SECONDS = 60.0
 """s between two looks for uploads that have grown old."""
+
+GARBAGE_SECONDS = 3600.0
+"""s between two looks for files to which nothing refers: each is a walk over all of them."""
 
 FILES_AT_ONCE = 100
 """Files deleted in one transaction: others who write to SQLite wait for it."""
@@ -52,17 +60,29 @@ def _delete_marked(database: Database, blobs: BlobStore) -> int:
 
 
 class Retention:
-    """Prunes now and then, in whichever process ``leads`` the others."""
+    """Prunes now and then, in whichever process ``leads`` the others.
 
-    def __init__(self, database: Database, blobs: BlobStore, days: float | None, leads: Callable[[], bool]) -> None:
+    ``days``: after which uploads go; ``unreferenced_days``: after which files to which nothing refers do.
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        blobs: BlobStore,
+        days: float | None,
+        leads: Callable[[], bool],
+        unreferenced_days: float | None = None,
+    ) -> None:
         self._database, self._blobs, self._leads = database, blobs, leads
         self._age = None if days is None else timedelta(days=days)
+        self._grace = None if unreferenced_days is None else timedelta(days=unreferenced_days)
+        self._next_garbage = 0.0
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._go_on, name="retention", daemon=True)
 
     def start(self) -> None:
-        """Begin, where uploads are to be kept for some days only."""
-        if self._age is not None:
+        """Begin, where uploads or files to which nothing refers are to be kept for some days only."""
+        if self._age is not None or self._grace is not None:
             self._thread.start()
 
     async def stop(self) -> None:
@@ -73,16 +93,27 @@ class Retention:
 
     def _go_on(self) -> None:
         while not self._stopping.wait(LOOK_SECONDS):
-            if self._age is not None and self._leads():
+            if self._leads():
+                self._look()
+
+    def _look(self) -> None:
+        try:
+            if self._age is not None:
                 self._prune(self._age)
+            if self._grace is not None and time.monotonic() >= self._next_garbage:
+                self._collect_garbage(self._grace)
+        except DatabaseError as error:
+            logger.warning("no old files are deleted: %s", error)
+        except Exception:
+            logger.exception("no old files are deleted")
 
     def _prune(self, age: timedelta) -> None:
-        try:
-            deleted = prune(self._database, self._blobs, now() - age, self._stopping.is_set)
-        except StorageUnavailable as error:
-            logger.warning("uploads are not looked through: %s", error)
-        except Exception:
-            logger.exception("uploads are not looked through")
-        else:
-            if deleted:
-                logger.info("deleted %d uploads older than %s", deleted, age)
+        if deleted := prune(self._database, self._blobs, now() - age, self._stopping.is_set):
+            logger.info("deleted %d uploads older than %s", deleted, age)
+
+    def _collect_garbage(self, grace: timedelta) -> None:
+        self._next_garbage = time.monotonic() + GARBAGE_SECONDS
+        if deleted := garbage.delete_set_aside(self._database, self._blobs, grace):
+            logger.info("deleted %d files that nothing referred to for %s", deleted, grace)
+        if count := garbage.set_aside(self._database, self._blobs, stop=self._stopping.is_set):
+            logger.info("set %d files aside, to which nothing refers", count)

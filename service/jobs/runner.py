@@ -20,7 +20,7 @@ from db import migrate
 from db.database import Database
 from db.errors import ClaimLost, SchemaMismatch, StorageUnavailable
 from db.records import Claim
-from db.repositories import jobs, runners
+from db.repositories import jobs, runners, stores
 from service.jobs.lanes import Lane, WorkerDied
 from service.observability import logs
 
@@ -185,6 +185,7 @@ class JobRunner:
                 return None
         with self._database.write(durable=False) as session:
             migrate.require_head(session)
+            stores.require(session, self._database.store_id)
             claim = jobs.claim(session, self._id, besides=self._at)
         if claim is not None:
             self._at.add(claim.job_id)

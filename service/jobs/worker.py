@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from db import identity
 from db.blobs import BlobStore, open_blobs
 from db.database import Database
 from db.errors import ClaimLost, StorageUnavailable
@@ -65,4 +66,7 @@ def _run(place: Place, claim: Claim) -> None:
 
 @cache
 def _stores(place: Place) -> tuple[Database, BlobStore]:
-    return Database(place.database_url), open_blobs(place.data_folder, place.blob_url, place.blob_cache_bytes)
+    database = Database(place.database_url)
+    blobs = open_blobs(place.data_folder, place.blob_url, place.blob_cache_bytes)
+    identity.verify(database, blobs)
+    return database, blobs

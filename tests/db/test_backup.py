@@ -10,7 +10,7 @@ from db import migrate
 from db.backup import FILE, LEFT_OUT, backup, restore
 from db.blobs import BlobStore
 from db.database import Database
-from db.errors import NotEmpty, NotFound, SchemaMismatch, StorageUnavailable
+from db.errors import BlobDamaged, NotEmpty, NotFound, SchemaMismatch
 from db.records import Claim, Detection, NewGraspLog, NewModel, SampleSummary
 from db.repositories import access_keys, detections, friction_models, grasp_logs, jobs, materials, runners
 from db.tables import Base, MaterialRow
@@ -119,7 +119,7 @@ def test_a_blob_that_changed_or_went_stops_a_restore_before_any_row(
     path = BlobStore(tmp_path / "copy").path(sha256)
     content = path.read_bytes()
     path.write_bytes(content + b"!")
-    with pytest.raises(StorageUnavailable, match=sha256):
+    with pytest.raises(BlobDamaged, match=sha256):
         restore(tmp_path / "copy", other, BlobStore(tmp_path / "again"), nothing)
     path.unlink()
     with pytest.raises(NotFound, match=sha256):

@@ -1,24 +1,22 @@
 import hashlib
 import os
-from datetime import timedelta
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from db.blobs import BlobStore, open_blobs
-from db.errors import NotFound, StorageUnavailable
+from db.errors import BlobDamaged, NotFound, StorageUnavailable
 
 CONTENT = b"tactile"
 SHA256 = hashlib.sha256(CONTENT).hexdigest()
 
 
 @pytest.fixture(params=["folder", "s3"])
-def blobs(tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> BlobStore:
+def blobs(tmp_path: Path, request: pytest.FixtureRequest) -> BlobStore:
     if request.param == "folder":
         return BlobStore(tmp_path)
     request.getfixturevalue("s3")
-    monkeypatch.setattr("db.blobs.ORPHAN_AGE", timedelta(0))
     return open_blobs(tmp_path, "s3://grasps/lab", 2**30)
 
 
@@ -86,29 +84,59 @@ def test_an_unknown_blob_is_named(blobs: BlobStore, name: str) -> None:
         blobs.path(name)
 
 
-def test_a_sweep_removes_what_nothing_refers_to(blobs: BlobStore, tmp_path: Path) -> None:
-    kept, orphan = blobs.put(b"kept"), blobs.put(b"orphan")
+def test_only_blobs_count_and_what_was_under_way_can_be_cleared(blobs: BlobStore, tmp_path: Path) -> None:
+    kept = blobs.put(b"kept")
     (tmp_path / "spool" / "left").write_bytes(b"half an upload")
     foreign = tmp_path / "blobs" / kept[:2] / "README"
     foreign.write_text("not ours")
-    assert blobs.sweep(lambda hashes: set(hashes) & {kept}) == [orphan]
+    blobs.write_store_id("0" * 32)
+    blobs.clear_spool()
     assert list(blobs.hashes()) == [kept]
+    assert blobs.read_store_id() == "0" * 32
     assert foreign.exists()
     assert not list((tmp_path / "spool").iterdir())
 
 
-def test_a_sweep_asks_for_all_hashes_in_portions(blobs: BlobStore, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("db.blobs.HASHES_PER_QUERY", 3)
-    stored = {blobs.put(bytes([number])) for number in range(8)}
-    asked: list[list[str]] = []
+def test_a_blob_set_aside_is_no_blob_until_somebody_reads_it(blobs: BlobStore) -> None:
+    sha256 = blobs.put(CONTENT)
+    blobs.quarantine.put(sha256)
+    assert (list(blobs.hashes()), list(blobs.quarantine.hashes())) == ([], [sha256])
+    assert not blobs.has(sha256)
+    blobs.remove([sha256])  # from the cache of an object store
+    assert blobs.path(sha256).read_bytes() == CONTENT
+    assert (list(blobs.hashes()), list(blobs.quarantine.hashes())) == ([sha256], [])
+    blobs.quarantine.put(sha256)
+    blobs.quarantine.delete([sha256])
+    blobs.remove([sha256])
+    with pytest.raises(NotFound):
+        blobs.path(sha256)
+    assert not blobs.quarantine.recall(sha256)
 
-    def referenced(hashes: list[str]) -> set[str]:
-        asked.append(hashes)
-        return set(hashes)
 
-    assert blobs.sweep(referenced) == []
-    assert [len(some) for some in asked] == [3, 3, 2]
-    assert {sha256 for some in asked for sha256 in some} == stored
+def test_a_flipped_bit_is_named_at_the_next_reading(tmp_path: Path) -> None:
+    blobs = BlobStore(tmp_path)
+    sha256 = blobs.put(CONTENT)
+    path = blobs.path(sha256)
+    path.write_bytes(bytes([CONTENT[0] ^ 1]) + CONTENT[1:])
+    with pytest.raises(BlobDamaged, match=f"{sha256} has other bytes than it had: their hash is "):
+        blobs.path(sha256)
+    assert blobs.put(CONTENT) == sha256  # sent again, it is mended
+    assert blobs.path(sha256).read_bytes() == CONTENT
+
+
+def test_a_folder_that_is_not_there_any_more_is_no_missing_blob(tmp_path: Path) -> None:
+    """Its disk is not mounted: whoever reads or writes is to come again."""
+    blobs = BlobStore(tmp_path)
+    sha256 = blobs.put(CONTENT)
+    blobs.write_store_id("0" * 32)
+    blobs.store_id = "0" * 32
+    (tmp_path / "blobs").rename(tmp_path / "away")
+    for left in ("nothing", "an empty folder"):
+        if left != "nothing":
+            (tmp_path / "blobs").mkdir()
+        for use in (lambda: blobs.path(sha256), lambda: blobs.put(CONTENT), lambda: blobs.remove([]), blobs.ping):
+            with pytest.raises(StorageUnavailable, match="blob folder"):
+                use()
 
 
 @pytest.mark.parametrize("moment", ["write", "keep"])

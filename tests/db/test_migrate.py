@@ -24,6 +24,7 @@ from db.repositories import (
     jobs,
     materials,
     runners,
+    stores,
 )
 from db.tables import Base, MaterialOwnerRow, now
 
@@ -40,6 +41,7 @@ def fill(database: Database, log: NewGraspLog, detection: Detection, samples: Sa
         job = jobs.add(session, "ingest", "ols", material_id=material.id, grasp_log_id=log_id)
         detections.add(session, log_id, detection, samples)
         friction_models.add(session, material.id, job, model)
+        stores.set_id(session, "0" * 32)
         idempotency_keys.claim(session, "", "once", log.sha256, timedelta(hours=1))
         access_keys.add(session, "0" * 12, "robot", "read", log.sha256)
         audit.add(session, audit.SERVICE, "material.created", "paper")

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from db.blobs import open_blobs
-from db.errors import DriverMissing, NotFound, StorageUnavailable
+from db.errors import BlobDamaged, DriverMissing, StorageUnavailable
 
 URL = "s3://grasps/lab"
 MIB = 2**20
@@ -46,7 +46,7 @@ def test_what_comes_back_changed_is_not_taken(s3: Any, tmp_path: Path) -> None:
     sha256 = open_blobs(tmp_path / "one", URL, MIB).put(b"tactile")
     s3.objects[f"lab/{sha256[:2]}/{sha256}"] = b"tactilE"
     other = open_blobs(tmp_path / "other", URL, MIB)
-    with pytest.raises(StorageUnavailable, match="other bytes than it had"):
+    with pytest.raises(BlobDamaged, match="other bytes than it had"):
         other.path(sha256)
     assert not [path for path in (tmp_path / "other").rglob("*") if path.is_file()]
 
@@ -78,17 +78,24 @@ def test_what_was_just_used_stays_in_the_cache_where_the_clock_was_set_ahead(
     assert sorted(path.name for path in (tmp_path / "blobs").glob("??/*")) == sorted(stored)
 
 
-def test_a_young_object_to_which_nothing_refers_stays(s3: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another server may have stored it and not yet written its row. Two days are two days of the store's clock."""
+def test_ages_are_those_of_the_stores_clock(s3: Any, tmp_path: Path) -> None:
+    """Two days passed there since anything was stored."""
     blobs = open_blobs(tmp_path, URL, MIB)
     sha256 = blobs.put(b"tactile")
-    monkeypatch.setattr("db.blobs.ORPHAN_AGE", timedelta(days=3))
-    assert blobs.sweep(lambda _: set()) == []
-    monkeypatch.setattr("db.blobs.ORPHAN_AGE", timedelta(hours=24))
-    assert blobs.sweep(lambda _: set()) == [sha256]
+    assert list(blobs.hashes(blobs.now() - timedelta(days=3))) == []
+    assert list(blobs.hashes(blobs.now() - timedelta(hours=24))) == [sha256]
+    blobs.quarantine.put(sha256)
+    assert list(s3.objects) == [f"lab/quarantine/{sha256}"]
+    assert list(blobs.quarantine.hashes(blobs.now() - timedelta(days=3))) == []
+    assert list(blobs.quarantine.hashes(blobs.now() - timedelta(hours=24))) == [sha256]
+
+
+def test_a_damaged_copy_in_the_cache_is_fetched_again(s3: Any, tmp_path: Path) -> None:
     assert s3.objects == {}
-    with pytest.raises(NotFound):
-        blobs.path(sha256)
+    blobs = open_blobs(tmp_path, URL, MIB)
+    sha256 = blobs.put(b"tactile")
+    blobs.path(sha256).write_bytes(b"tactilE")
+    assert blobs.path(sha256).read_bytes() == b"tactile"
 
 
 def test_a_missing_library_is_named_with_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

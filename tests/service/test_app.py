@@ -38,7 +38,7 @@ async def start_and_stop(settings: Settings) -> None:
         pass
 
 
-def test_two_servers_share_a_folder_and_only_one_that_is_alone_sweeps(
+def test_two_servers_share_a_folder_and_only_one_that_is_alone_clears_what_was_under_way(
     serving: Serving, tmp_path: Path, upload: Upload, content: bytes
 ) -> None:
     settings = Settings(data_folder=tmp_path, workers=0)
@@ -77,18 +77,17 @@ def test_an_old_schema_stops_the_start_where_it_must_not_be_changed(tmp_path: Pa
         asyncio.run(start_and_stop(Settings(data_folder=tmp_path, migrate_at_start=False)))
 
 
-def test_a_start_brings_the_schema_up_and_sweeps_what_nothing_refers_to(serving: Serving, tmp_path: Path) -> None:
-    blobs = BlobStore(tmp_path)
-    blobs.put(b"stored, but the server died before its row was")
-    (tmp_path / "spool" / "left").write_bytes(b"half an upload")
+def test_a_start_brings_the_schema_up_and_leaves_every_file(tmp_path: Path) -> None:
     settings = Settings(data_folder=tmp_path, workers=0)
-    with serving(settings) as client:
-        assert client.get("/readyz").status_code == httpx.codes.OK
-        assert list(blobs.hashes()) == []
-        assert not list((tmp_path / "spool").iterdir())
-    database = Database(settings.resolved_database_url)
-    assert migrate.current(database) == migrate.head()
-    database.close()
+    asyncio.run(start_and_stop(settings))
+    blobs = BlobStore(tmp_path)
+    orphan = blobs.put(b"stored, but the server died before its row was")
+    (tmp_path / "spool" / "left").write_bytes(b"half an upload")
+    asyncio.run(start_and_stop(settings))
+    assert list(blobs.hashes()) == [orphan]
+    assert not list((tmp_path / "spool").iterdir())
+    with closing(Database(settings.resolved_database_url)) as database:
+        assert migrate.current(database) == migrate.head()
 
 
 def test_a_job_whose_worker_is_killed_is_done_by_the_next_one(
@@ -151,7 +150,7 @@ def test_uploads_and_results_are_kept_in_an_object_store(
         accepted = upload(client, content, material="paper").json()
         assert accepted["sha256"] in {key.rpartition("/")[2] for key in s3.objects}
         assert wait(client, accepted["job"]["id"])["status"] == "done"
-        assert len(s3.objects) == 3  # the log, its history, its samples
+        assert len(s3.objects) == 4  # the log, its history, its samples, and the store's id
         shutil.rmtree(tmp_path / "blobs")  # but a cache
         (tmp_path / "blobs").mkdir()
         log = f"/v1/grasp-logs/{accepted['id']}"

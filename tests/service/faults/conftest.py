@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
+from datetime import timedelta
 from multiprocessing import resource_tracker
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
@@ -28,6 +29,7 @@ from sqlalchemy.orm import Session
 from db.blobs import BlobStore
 from db.database import Database
 from db.tables import DetectionRow, FrictionModelRow, GraspLogRow, JobRow, RunnerRow, SampleSummaryRow
+from service.jobs import garbage
 from slipcore.contact.tiers.ramp import RampSchedule, tangential_ramp
 from stiction_client.container import encode
 
@@ -235,12 +237,13 @@ class Fleet:
         assert referenced <= set(BlobStore(self.folder).hashes())
 
     def check_complete(self, accepted: Iterable[str]) -> None:
-        """What must hold once all jobs have ended and a server that started alone has swept: all of it, and no more."""
+        """What must hold once all jobs have ended and what nothing refers to was set aside: all of it, and no more."""
         wait_until(self.all_ended, "all jobs to end")
         self.stop()
         self.serve()
         self.check_consistent()
         blobs = BlobStore(self.folder)
+        garbage.set_aside(self.database, blobs, age=timedelta(0))
         stored = set(blobs.hashes())
         for sha256 in stored:
             assert hashlib.sha256(blobs.path(sha256).read_bytes()).hexdigest() == sha256

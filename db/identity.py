@@ -1,0 +1,117 @@
+"""The id that a database and the blob store of its files share: neither works with another.
+
+A server with the wrong database, or in the wrong folder, would take every file for one that nobody needs, or accept
+uploads that no worker finds. The database has the id in a row, the folder in the file ``blobs/store-id``, an object
+store in an object of that name. An id is made once, for two that belong together by what they hold; no other database
+ever has it, also not one that is restored from a backup.
+"""
+
+import uuid
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+
+from sqlalchemy.orm import Session
+
+from db.blobs import BlobStore
+from db.database import Database
+from db.defaults import HASHES_PER_QUERY
+from db.errors import StoreMismatch
+from db.repositories import blobs as references
+from db.repositories import stores
+
+REMEDY = "name the database and the data folder (or object store) of one service, or join these by `stiction db adopt`"
+
+
+@dataclass(frozen=True, slots=True)
+class Adopted:
+    """What was joined by hand: how many files the database refers to, and how many of them are missing."""
+
+    store_id: str
+    referenced: int
+    missing: int
+
+
+def join(database: Database, blobs: BlobStore, *, alone: bool, to_fill: bool = False) -> None:
+    """Make sure that the two belong together, and from now on say so; ``alone``: nobody else works in the folder.
+
+    Two without an id get one if all that the database refers to is there, and if nothing is there that it cannot
+    know, but for a database ``to_fill`` from a backup. Raises ``StoreMismatch``.
+    """
+    with database.write() as session:
+        stores.lock(session)
+        known, found = stores.find_id(session), blobs.read_store_id()
+        if known is None:
+            _require_same(database, blobs, known, None if alone and _is_new(session, blobs) else found)
+            if not to_fill:
+                _require_consistent(session, database, blobs)
+            known = uuid.uuid4().hex
+            blobs.write_store_id(known)  # before the row: what dies in between leaves two without content
+            stores.set_id(session, known)
+        else:
+            _require_same(database, blobs, known, found)
+    database.store_id = blobs.store_id = known
+
+
+def verify(database: Database, blobs: BlobStore) -> None:
+    """Make sure that the two belong together, or have not been joined yet; raises ``StoreMismatch``."""
+    with database.read() as session:
+        known = stores.find_id(session)
+    _require_same(database, blobs, known, blobs.read_store_id())
+    database.store_id = blobs.store_id = known
+
+
+def adopt(database: Database, blobs: BlobStore) -> Adopted:
+    """Join two because somebody says so, under a new id: whatever else worked with either is refused from then on."""
+    store_id = uuid.uuid4().hex
+    with database.write() as session:
+        stores.lock(session)
+        referenced, missing = count_missing(session, blobs)
+        blobs.write_store_id(store_id)
+        stores.set_id(session, store_id)
+    database.store_id = blobs.store_id = store_id
+    return Adopted(store_id, referenced, missing)
+
+
+def count_missing(session: Session, blobs: BlobStore) -> tuple[int, int]:
+    """How many blobs the database refers to, and how many of them are not there."""
+    present, count, missing = set(blobs.hashes()), 0, 0
+    for sha256 in wanted(session):
+        count += 1
+        missing += sha256 not in present
+    return count, missing
+
+
+def wanted(session: Session) -> Iterator[str]:
+    """Hashes of all that rows refer to, some at a time."""
+    everything = references.all_referenced(session)
+    while some := list(islice(everything, HASHES_PER_QUERY)):
+        yield from some
+
+
+def _is_new(session: Session, blobs: BlobStore) -> bool:
+    """Whether neither has anything: one died between the two halves of its first start."""
+    return not references.any_referenced(session) and next(blobs.hashes(), None) is None
+
+
+def _require_consistent(session: Session, database: Database, blobs: BlobStore) -> None:
+    """That two of before there were ids are of one service."""
+    referenced, missing = count_missing(session, blobs)
+    if missing:
+        what = f"{missing} of the {referenced} files that {database} refers to are not in {blobs}"
+        raise StoreMismatch(f"{what}; allowed: {REMEDY}")
+    if not referenced and next(blobs.hashes(), None) is not None:
+        raise StoreMismatch(f"{blobs} has files, and {database} refers to none; allowed: {REMEDY}")
+
+
+def _require_same(database: Database, blobs: BlobStore, known: str | None, found: str | None) -> None:
+    if found != known:
+        what = f"{database} is of {_named(known)}, and {blobs} of {_named(found)}"
+        raise StoreMismatch(f"{what}; allowed: {REMEDY}")
+    if (cached := blobs.cached_store_id()) not in (None, known):
+        what = f"the data folder, to be the cache of {blobs}, holds the files of {_named(cached)}"
+        raise StoreMismatch(f"{what}; allowed: a folder of its own")
+
+
+def _named(store_id: str | None) -> str:
+    return "no store yet" if store_id is None else f"store {store_id}"

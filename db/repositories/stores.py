@@ -1,0 +1,36 @@
+"""The id of the store that the database belongs to."""
+
+from sqlalchemy import select, text
+from sqlalchemy.orm import Session
+
+from db.errors import StorageUnavailable
+from db.tables import StoreRow
+
+
+def lock(session: Session) -> None:
+    """Let others who would give the database an id wait until the end of the transaction (SQLite has one writer)."""
+    if session.connection().dialect.name == "postgresql":
+        session.execute(text("SELECT pg_advisory_xact_lock(hashtext('stiction store'))"))
+
+
+def find_id(session: Session) -> str | None:
+    """The database's store id; None where it has none yet."""
+    return session.scalar(select(StoreRow.id))
+
+
+def set_id(session: Session, store_id: str) -> None:
+    """Give the database this store id."""
+    session.merge(StoreRow(number=1, id=store_id))
+
+
+def require(session: Session, store_id: str | None) -> None:
+    """Make sure, inside a transaction, that the database is still the one that was opened; None: it had no id.
+
+    Raises ``StorageUnavailable``.
+    """
+    found = find_id(session)
+    if store_id is not None and found != store_id:
+        raise StorageUnavailable(
+            f"database: its store id was {store_id} and is {found}: another database is in its place; allowed: the "
+            "first one, or a restart"
+        )

@@ -1,0 +1,194 @@
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from db import identity, migrate
+from db.backup import backup, restore
+from db.blobs import BlobStore, open_blobs
+from db.database import Database
+from db.errors import StorageUnavailable, StoreMismatch
+from db.records import NewGraspLog
+from db.repositories import grasp_logs, stores
+
+NewLog = Callable[..., NewGraspLog]
+
+
+@pytest.fixture(params=["folder", "s3"])
+def blobs(tmp_path: Path, request: pytest.FixtureRequest) -> BlobStore:
+    if request.param == "folder":
+        return BlobStore(tmp_path / "data")
+    request.getfixturevalue("s3")
+    return open_blobs(tmp_path / "data", "s3://grasps/lab", 2**30)
+
+
+@pytest.fixture
+def other(new_url: Callable[..., str], tmp_path: Path) -> Iterator[Database]:
+    (tmp_path / "other").mkdir()
+    with closing(Database(new_url(tmp_path / "other"))) as database:
+        yield database
+
+
+@pytest.fixture
+def refer(new_log: NewLog) -> Callable[[Database, BlobStore, bytes], str]:
+    """Store a blob, and a row that refers to it."""
+
+    def store(database: Database, blobs: BlobStore, content: bytes) -> str:
+        sha256 = blobs.put(content)
+        with database.write() as session:
+            grasp_logs.add(session, new_log(sha256=sha256))
+        return sha256
+
+    return store
+
+
+def nothing(what: str, count: int) -> None:
+    pass
+
+
+def store_id(database: Database) -> str | None:
+    with database.read() as session:
+        return stores.find_id(session)
+
+
+def join(database: Database, blobs: BlobStore) -> None:
+    identity.join(database, blobs, alone=True)
+
+
+def test_two_new_ones_get_a_common_id_and_keep_it(database: Database, blobs: BlobStore) -> None:
+    join(database, blobs)
+    first = store_id(database)
+    assert first is not None
+    assert (database.store_id, blobs.store_id, blobs.read_store_id()) == (first, first, first)
+    join(database, blobs)
+    assert store_id(database) == first
+
+
+def test_two_of_before_are_joined_where_all_is_there(
+    database: Database, blobs: BlobStore, refer: Callable[..., str]
+) -> None:
+    refer(database, blobs, b"tactile")
+    blobs.put(b"to which nothing refers")
+    join(database, blobs)
+    assert store_id(database) == blobs.read_store_id() is not None
+
+
+def test_a_database_that_knows_no_file_is_refused_where_there_are_some(database: Database, blobs: BlobStore) -> None:
+    sha256 = blobs.put(b"tactile")
+    with pytest.raises(StoreMismatch, match=r"has files, and database .* refers to none; allowed: .*stiction db adopt"):
+        join(database, blobs)
+    assert (store_id(database), blobs.read_store_id(), list(blobs.hashes())) == (None, None, [sha256])
+
+
+def test_a_database_whose_files_are_elsewhere_is_refused(
+    database: Database, blobs: BlobStore, refer: Callable[..., str]
+) -> None:
+    refer(database, blobs, b"one")
+    blobs.remove([refer(database, blobs, b"two")])
+    with pytest.raises(StoreMismatch, match=r"1 of the 2 files that database .* refers to are not in blob"):
+        join(database, blobs)
+
+
+@pytest.mark.parametrize("is_used", [False, True])
+def test_another_database_or_another_folder_is_refused_by_name(
+    database: Database, blobs: BlobStore, other: Database, tmp_path: Path, refer: Callable[..., str], *, is_used: bool
+) -> None:
+    join(database, blobs)
+    if is_used:
+        refer(database, blobs, b"tactile")
+    elsewhere = BlobStore(tmp_path / "elsewhere")
+    with pytest.raises(StoreMismatch, match=rf"is of store {store_id(database)}, and blob folder .* of no store yet"):
+        join(database, elsewhere)
+    join(other, elsewhere)
+    for wrong in ((database, elsewhere), (other, blobs)):
+        for use in (join, identity.verify):
+            with pytest.raises(StoreMismatch, match=store_id(wrong[0])):
+                use(*wrong)
+    join(database, blobs)
+
+
+def test_a_new_database_is_refused_while_others_work_in_the_folder(
+    database: Database, blobs: BlobStore, other: Database
+) -> None:
+    """Alone, it may be what is left of a first start that died half-way, for there is nothing to lose."""
+    join(database, blobs)
+    with pytest.raises(StoreMismatch, match=r"of no store yet, and .* of store"):
+        identity.join(other, blobs, alone=False)
+    identity.join(other, blobs, alone=True)
+    with pytest.raises(StoreMismatch):
+        join(database, blobs)
+
+
+def test_a_folder_of_files_becomes_no_cache_of_another_store(
+    database: Database, other: Database, s3: object, tmp_path: Path
+) -> None:
+    assert s3 is not None
+    join(database, BlobStore(tmp_path / "one"))
+    join(other, open_blobs(tmp_path / "two", "s3://grasps/lab"))
+    with pytest.raises(StoreMismatch, match="to be the cache of"):
+        join(other, open_blobs(tmp_path / "one", "s3://grasps/lab"))
+
+
+def test_a_person_can_join_two_and_what_worked_with_them_is_refused(
+    database: Database, blobs: BlobStore, other: Database, refer: Callable[..., str]
+) -> None:
+    join(database, blobs)
+    refer(database, blobs, b"tactile")
+    adopted = identity.adopt(other, blobs)
+    assert (adopted.referenced, adopted.missing) == (0, 0)
+    join(other, blobs)
+    with pytest.raises(StoreMismatch):
+        join(database, blobs)
+    adopted = identity.adopt(database, blobs)
+    assert (adopted.referenced, adopted.missing) == (1, 0)
+    join(database, blobs)
+
+
+def test_a_database_that_was_replaced_is_noticed_inside_a_transaction(database: Database, blobs: BlobStore) -> None:
+    join(database, blobs)
+    with database.write() as session:
+        stores.require(session, database.store_id)
+        stores.set_id(session, "0" * 32)
+        with pytest.raises(StorageUnavailable, match="another database is in its place"):
+            stores.require(session, database.store_id)
+
+
+def test_a_restored_store_is_one_of_its_own(
+    database: Database, other: Database, tmp_path: Path, refer: Callable[..., str]
+) -> None:
+    blobs, again = BlobStore(tmp_path / "data"), BlobStore(tmp_path / "again")
+    join(database, blobs)
+    refer(database, blobs, b"tactile")
+    backup(database, blobs, tmp_path / "copy", nothing)
+    with pytest.raises(StoreMismatch, match="of no store yet"):
+        restore(tmp_path / "copy", other, blobs, nothing)
+    restore(tmp_path / "copy", other, again, nothing)
+    join(other, again)
+    join(database, blobs)
+    assert store_id(other) != store_id(database)
+
+
+def test_a_restore_can_take_the_files_over(
+    database: Database, other: Database, tmp_path: Path, refer: Callable[..., str]
+) -> None:
+    """The database is lost, its files are not."""
+    blobs = BlobStore(tmp_path / "data")
+    join(database, blobs)
+    sha256 = refer(database, blobs, b"tactile")
+    backup(database, blobs, tmp_path / "copy", nothing)
+    restore(tmp_path / "copy", other, blobs, nothing, take_over=True)
+    join(other, blobs)
+    assert blobs.path(sha256).read_bytes() == b"tactile"
+    with pytest.raises(StoreMismatch):
+        join(database, blobs)
+
+
+def test_the_way_back_and_forth_wants_a_hand(database: Database, blobs: BlobStore, refer: Callable[..., str]) -> None:
+    """Who worked with the files meanwhile is not known."""
+    join(database, blobs)
+    refer(database, blobs, b"tactile")
+    migrate.downgrade(database, "0010")
+    migrate.upgrade(database)
+    with pytest.raises(StoreMismatch, match="stiction db adopt"):
+        join(database, blobs)
