@@ -15,7 +15,7 @@ from service.domain.model_cache import ModelCache
 from service.formats.reading import Readers
 from service.http import access, gate, openapi, problems
 from service.http.envelope import Envelope
-from service.http.gate import Gate
+from service.http.gate import Admission, Gate
 from service.http.head_requests import HeadRequests
 from service.http.lookups import Lookups
 from service.http.routes import curation, grasp_logs, health, jobs, materials, metrics, planning, stream
@@ -25,6 +25,7 @@ from service.jobs.retention import Retention
 from service.jobs.runner import JobRunner
 from service.jobs.worker import Place
 from service.observability import traces
+from service.observability.answered import Answered
 from service.observability.metrics import Metering, Metrics
 from service.processes.folder_lock import shared
 from service.settings import Settings
@@ -52,6 +53,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         except Exception as error:
             app.state.start_error = error
             raise
+        finally:
+            answered.tell_others()
 
     app = openapi.DescribedApp(
         title="Stiction",
@@ -73,12 +76,13 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     for module in (health, metrics, materials, grasp_logs, curation, planning, jobs, stream):
         app.include_router(module.router)
     access.check_routes(app)
-    app.add_middleware(Lookups)
-    app.add_middleware(Gate, settings=chosen)
+    app.state.metrics = Metrics()
+    answered, admission = Answered(app.state.metrics.requests), Admission(chosen)
+    app.add_middleware(Gate, admission=admission)
     app.add_middleware(HeadRequests)
     app.add_middleware(Envelope)
-    app.state.metrics = Metrics()
-    app.add_middleware(Metering, metrics=app.state.metrics)
+    app.add_middleware(Metering, answered=answered)
+    app.add_middleware(Lookups, admission=admission, answered=answered)
     app.add_middleware(StartRefusal)
     problems.install(app)
     return app

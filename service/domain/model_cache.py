@@ -7,7 +7,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from db.database import Database
 from db.records import StoredModel
@@ -30,8 +30,7 @@ which costs a look at the database."""
 class KnownModel:
     """A material's current model as it was at a moment, with the tag that stands for what it answers.
 
-    ``read_at`` and ``until`` are s of the clock that nobody sets; ``answers`` are those that were given, as JSON, by
-    question.
+    ``read_at`` and ``until`` are s of the clock that nobody sets; ``answers`` are those that were given, by question.
     """
 
     stored: StoredModel
@@ -39,7 +38,7 @@ class KnownModel:
     tag: str
     read_at: float
     until: float
-    answers: dict[Hashable, str] = field(default_factory=dict)
+    answers: dict[Hashable, Any] = field(default_factory=dict)
 
 
 class _Reading(NamedTuple):

@@ -17,10 +17,19 @@ KEEP_AND_ASK = "private, no-cache"
 
 def conditional(request: Request, tag: str, body: Callable[[], str]) -> Response:
     """The JSON ``body`` with its tag, or only that it has not changed; then it is not even made."""
-    headers = {"ETag": tag, "Cache-Control": KEEP_AND_ASK}
-    if _is_one_of(tag, request.headers.get("if-none-match", "")):
-        return Response(None, 304, headers)
-    return Response(body(), 200, headers, "application/json")
+    if is_one_of(tag, request.headers.get("if-none-match", "")):
+        return unchanged(tag)
+    return whole(tag, body())
+
+
+def whole(tag: str, body: str) -> Response:
+    """The JSON ``body`` with its tag."""
+    return Response(body, 200, {"ETag": tag, "Cache-Control": KEEP_AND_ASK}, "application/json")
+
+
+def unchanged(tag: str) -> Response:
+    """That the client has it already."""
+    return Response(None, 304, {"ETag": tag, "Cache-Control": KEEP_AND_ASK})
 
 
 def tagged(request: Request, body: str) -> Response:
@@ -28,5 +37,6 @@ def tagged(request: Request, body: str) -> Response:
     return conditional(request, f'"{hashlib.blake2b(body.encode(), digest_size=12).hexdigest()}"', lambda: body)
 
 
-def _is_one_of(tag: str, listed: str) -> bool:
+def is_one_of(tag: str, listed: str) -> bool:
+    """Whether ``If-None-Match`` names the tag."""
     return any(each.strip().removeprefix("W/") in {tag, "*"} for each in listed.split(","))

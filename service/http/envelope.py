@@ -4,7 +4,7 @@ import asyncio
 import re
 import time
 import uuid
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 from fastapi import Request
 from starlette.exceptions import HTTPException
@@ -33,6 +33,8 @@ PAGE_POLICIES = dict.fromkeys(("/docs", "/docs/oauth2-redirect", "/redoc"), _SWA
 OF_ALL = ((b"x-content-type-options", b"nosniff"), (b"cache-control", b"no-store"))
 OF_TLS = (b"strict-transport-security", b"max-age=31536000")
 
+Headers = list[tuple[bytes, bytes]]
+
 _ID = re.compile(rb"[A-Za-z0-9._-]{1,128}")
 
 
@@ -50,7 +52,7 @@ class Envelope:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        request_id = _request_id(scope)
+        request_id = request_id_of(scope)
         scope.setdefault("state", {})["request_id"] = request_id
         token = ABOUT.set({"request_id": request_id})
         try:
@@ -85,19 +87,8 @@ class _Sender:
     async def __call__(self, message: Message) -> None:
         if message["type"] == "http.response.start":
             self.has_begun = True
-            said = dict(message["headers"])
-            more = [(name, value) for name, value in self._headers(said) if name not in said]
-            message = {**message, "headers": [*message["headers"], *more]}
+            message = {**message, "headers": completed(message["headers"], self._scope, self._request_id)}
         await self._send(message)
-
-    def _headers(self, said: Mapping[bytes, bytes]) -> Iterator[tuple[bytes, bytes]]:
-        yield b"x-request-id", self._request_id.encode()
-        yield from OF_ALL
-        if self._scope["scheme"] == "https":
-            yield OF_TLS
-        if said.get(b"content-type", b"").startswith(b"text/html"):
-            yield b"referrer-policy", b"no-referrer"
-            yield b"content-security-policy", PAGE_POLICIES.get(self._scope["path"], NOTHING).encode()
 
 
 class _Receiver:
@@ -123,14 +114,35 @@ class _Receiver:
         return message
 
 
-def _request_id(scope: Scope) -> str:
+def completed(headers: Headers, scope: Scope, request_id: str) -> Headers:
+    """The headers of an answer, and those that every one has, unless it says something else itself."""
+    said = dict(headers)
+    return [*headers, *(header for header in _usual(scope, said, request_id) if header[0] not in said)]
+
+
+def _usual(scope: Scope, said: Mapping[bytes, bytes], request_id: str) -> Headers:
+    usual = [(b"x-request-id", request_id.encode()), *OF_ALL]
+    if scope["scheme"] == "https":
+        usual.append(OF_TLS)
+    if said.get(b"content-type", b"").startswith(b"text/html"):
+        policy = PAGE_POLICIES.get(scope["path"], NOTHING).encode()
+        usual += (b"referrer-policy", b"no-referrer"), (b"content-security-policy", policy)
+    return usual
+
+
+def size_of_headers(scope: Scope) -> int:
+    """Bytes of their names and values."""
+    return sum(len(name) + len(value) for name, value in scope["headers"])
+
+
+def request_id_of(scope: Scope) -> str:
     """The id that the client gave, if it is one that may stand in a log and a header."""
     given = next((value for name, value in scope["headers"] if name == b"x-request-id"), b"")
     return given.decode() if _ID.fullmatch(given) else uuid.uuid4().hex
 
 
 def _check(scope: Scope) -> None:
-    size = sum(len(name) + len(value) for name, value in scope["headers"])
+    size = size_of_headers(scope)
     if size > MOST_HEADER_BYTES:
         raise Problem.wrong_value(HEADERS_TOO_LARGE, "headers", f"{size} bytes", f"at most {MOST_HEADER_BYTES} bytes")
     if "\0" in scope["path"] or b"%00" in scope["query_string"]:

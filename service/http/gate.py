@@ -56,8 +56,8 @@ class KeyRing:
         key_id = access.key_id(text)
         if key_id is None:
             return None
-        known, until = self._kept.get(key_id, (NO_KEY, 0.0))
-        if access.is_key(text, known) and time.monotonic() <= until:
+        known = self.find_kept(text)
+        if known is not None:
             return known
         known = await run_in_threadpool(_read, database, key_id)
         if not access.is_key(text, known):
@@ -67,15 +67,18 @@ class KeyRing:
         self._kept[key_id] = (known, time.monotonic() + KEPT_SECONDS)
         return known
 
+    def find_kept(self, text: str) -> AccessKey | None:
+        """The same without a question to the database: None, too, where one would be needed."""
+        known, until = self._kept.get(access.key_id(text) or "", (NO_KEY, 0.0))
+        return known if access.is_key(text, known) and time.monotonic() <= until else None
+
 
 class Gate:
     """Tells the routes who asks (``request.state.access``); answers by itself who has no key where one is needed."""
 
-    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+    def __init__(self, app: ASGIApp, admission: "Admission") -> None:
         self.app = app
-        self._settings = settings
-        self._ring = KeyRing()
-        self._rate = RateLimit(settings.rate_limit)
+        self._admission = admission
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
@@ -84,45 +87,57 @@ class Gate:
             return
         connection = HTTPConnection(scope)
         try:
-            connection.state.access = await self._admit(connection)
+            connection.state.access = await self._admission.admit(connection)
         except Problem as problem:
             await problems.answer(Request({**scope, "type": "http"}), problem)(scope, receive, send)
             return
         await self.app(scope, receive, send)
 
-    async def _admit(self, connection: HTTPConnection) -> Access:
-        """Who asks, and not too often; those on this machine of whom no key is asked may ask at any rate."""
-        address = f"address {connection.client.host if connection.client else ''}"
+
+class Admission:
+    """Finds out who asks, and counts how often."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._ring = KeyRing()
+        self._rate = RateLimit(settings.rate_limit)
+
+    async def admit(self, connection: HTTPConnection) -> Access:
+        """Who asks, and not too often; raises ``Problem`` for who may not."""
         try:
             admitted = await self._identify(connection)
         except Problem:
-            self._count(address)  # before it is said what is wrong with the key: nobody tries many
+            self._count(_address(connection))  # before it is said what is wrong with the key: nobody tries many
             raise
-        if admitted.key_id is not None:
-            self._count(admitted.key_id)
-        elif not _is_local(connection.scope):
-            self._count(address)
+        self._count(_counted_as(admitted, connection))
         return admitted
 
-    def _count(self, who: str) -> None:
-        seconds = self._rate.wait(who)
+    def admits_at_once(self, connection: HTTPConnection) -> bool:
+        """Whether somebody may ask who is known without waiting; for all others ``admit`` has to say."""
+        try:
+            text = self._sent_key(connection)
+        except Problem:
+            return False
+        found = None if text is None else self._ring.find_kept(text)
+        if text is not None and found is None:
+            return False
+        who = _counted_as(EVERYTHING if found is None else Access(found.id, found.scope), connection)
+        return who is None or self._rate.wait(who) == 0.0
+
+    def _count(self, who: str | None) -> None:
+        seconds = 0.0 if who is None else self._rate.wait(who)
         if seconds > 0.0:
             headers = {"Retry-After": str(math.ceil(seconds))}
             detail = f"more than {self._settings.rate_limit:g} requests a second; try again in {seconds:.3f} s"
             raise Problem(TOO_MANY_REQUESTS, detail, headers=headers)
 
     async def _identify(self, connection: HTTPConnection) -> Access:
-        """Who asks; a key that is sent counts even where none is needed."""
-        kind, _, text = connection.headers.get("authorization", "").partition(" ")
-        if kind.lower() != "bearer":
-            if self._needs_key(connection.scope):
-                raise Problem(KEY_REQUIRED, _key_needed(connection), headers={"WWW-Authenticate": CHALLENGE})
-            _check_host(connection)
-            origin.check_site(connection)
+        text = self._sent_key(connection)
+        if text is None:
             return EVERYTHING
         context: Context = connection.app.state.context
         try:
-            found = await self._ring.find(context.database, text.strip())
+            found = await self._ring.find(context.database, text)
         except StorageUnavailable as error:
             raise problems.storage_unavailable(error) from error
         if found is None:
@@ -130,11 +145,33 @@ class Gate:
             raise Problem(INVALID_KEY, "the access key is unknown, revoked, expired or garbled", headers=headers)
         return Access(found.id, found.scope, found.group)
 
+    def _sent_key(self, connection: HTTPConnection) -> str | None:
+        """The key that was sent, which counts even where none is needed; None where none was and that is well."""
+        kind, _, text = connection.headers.get("authorization", "").partition(" ")
+        if kind.lower() != "bearer":
+            if self._needs_key(connection.scope):
+                raise Problem(KEY_REQUIRED, _key_needed(connection), headers={"WWW-Authenticate": CHALLENGE})
+            _check_host(connection)
+            origin.check_site(connection)
+            return None
+        return text.strip()
+
     def _needs_key(self, scope: Scope) -> bool:
         """Without a setting, all but those who are on this machine themselves, behind no proxy."""
         if self._settings.access == "auto":
             return not _is_local(scope) or origin.is_forwarded(scope)
         return self._settings.access == "keys"
+
+
+def _counted_as(admitted: Access, connection: HTTPConnection) -> str | None:
+    """Whose requests this one counts among; those on this machine of whom no key is asked may ask at any rate."""
+    if admitted.key_id is not None:
+        return admitted.key_id
+    return None if _is_local(connection.scope) else _address(connection)
+
+
+def _address(connection: HTTPConnection) -> str:
+    return f"address {connection.client.host if connection.client else ''}"
 
 
 def _key_needed(connection: HTTPConnection) -> str:
@@ -158,7 +195,8 @@ def _check_host(connection: HTTPConnection) -> None:
 
 def _is_local(scope: Scope) -> bool:
     """Whether both ends of the connection are on this machine, as far as is known."""
-    return all(is_loopback((scope.get(end) or ("",))[0]) for end in ("server", "client"))
+    server, client = scope.get("server") or ("",), scope.get("client") or ("",)
+    return is_loopback(server[0]) and is_loopback(client[0])
 
 
 def _read(database: Database, key_id: str) -> AccessKey:

@@ -1,82 +1,102 @@
-"""The shortest way to a look-up: what planners ask most often, answered from memory without the framework."""
+"""The shortest way to a look-up: what planners ask most often, answered from memory before all other layers."""
 
 import re
+import time
+from dataclasses import dataclass
 from functools import lru_cache
 from types import SimpleNamespace
+from urllib.parse import parse_qsl
 
-from fastapi import Request, Response
+from fastapi import Response
+from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.context import Context
 from service.domain.look_up import Question, look_up
-from service.http.conditional import conditional
-from service.http.schemas import LARGEST_FORCE, LARGEST_VELOCITY, SMALLEST_TAIL
+from service.domain.model_cache import KnownModel
+from service.http import envelope
+from service.http.conditional import is_one_of, unchanged, whole
+from service.http.envelope import MOST_HEADER_BYTES
+from service.http.gate import Admission
+from service.http.schemas import LookUpQuery
 from service.observability import traces
+from service.observability.answered import Answered
 
 MOST_ANSWERS = 1000
-"""Answers kept with a model, half a kB each: planners ask the same again and again."""
+"""Answers kept with a model, 3 kB each: planners ask the same again and again."""
+
+LONGEST_QUERY = 200
+"""Bytes; what is longer is no question that many ask, and is not remembered."""
 
 ROUTE = SimpleNamespace(path="/v1/materials/{name}/friction")
 """Under which the look-ups are counted, as those that the route itself answers."""
 
 _PATH = re.compile(r"/v1/materials/([A-Za-z0-9][A-Za-z0-9 ._-]{0,99})/friction")
-_METHODS = frozenset({"ols", "robust", "conjugate", "bayes"})
-_NUMBER = re.compile(r"[0-9]{1,20}(\.[0-9]{1,20})?(e-?[0-9]{1,2})?")
-_LIMITS = {"v": (0.0, LARGEST_VELOCITY), "fn": (0.0, LARGEST_FORCE), "quantile": (SMALLEST_TAIL, 1.0 - SMALLEST_TAIL)}
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What is sent to who has an older answer or none, and to who has this one."""
+
+    whole: Response
+    unchanged: Response
 
 
 class Lookups:
     """Answers a well-formed look-up of a model in memory; hands anything else on to the route, which says the same.
 
-    To be put behind the gate: whoever has come so far may read.
+    Who asks is admitted, counted and logged as by the layers that are passed over.
     """
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: ASGIApp, admission: Admission, answered: Answered) -> None:
         self.app = app
+        self._admission, self._answered = admission, answered
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
-        answer = _answer(scope) if scope["type"] == "http" and scope["method"] == "GET" else None
-        await (self.app if answer is None else answer)(scope, receive, send)
+        begin = time.perf_counter()
+        answer = self._answer(scope) if scope["type"] == "http" and scope["method"] == "GET" else None
+        if answer is None:
+            await self.app(scope, receive, send)
+            return
+        request_id = envelope.request_id_of(scope)
+        headers = envelope.completed(answer.raw_headers, scope, request_id)
+        await send({"type": "http.response.start", "status": answer.status_code, "headers": headers})
+        await send({"type": "http.response.body", "body": answer.body})
+        self._answered.note("GET", ROUTE.path, answer.status_code, time.perf_counter() - begin, request_id)
+
+    def _answer(self, scope: Scope) -> Response | None:
+        found = _PATH.fullmatch(scope["path"])
+        asked = _read(scope["query_string"]) if found and len(scope["query_string"]) <= LONGEST_QUERY else None
+        if found is None or asked is None or envelope.size_of_headers(scope) > MOST_HEADER_BYTES:
+            return None
+        connection = HTTPConnection(scope)
+        context: Context = scope["app"].state.context
+        known = context.models.fresh(found[1], asked.method)
+        if known is None or not self._admission.admits_at_once(connection):
+            return None
+        context.models.renew(context.database, known, found[1], asked.method)
+        answer = _answered_before(known, Question(asked.v, asked.fn, asked.quantile))
+        traces.name_request("GET", ROUTE.path)
+        listed = connection.headers.get("if-none-match")
+        return answer.whole if listed is None or not is_one_of(known.tag, listed) else answer.unchanged
 
 
-def _answer(scope: Scope) -> Response | None:
-    found = _PATH.fullmatch(scope["path"])
-    asked = scope["query_string"] if found else b""
-    read = _read(asked.decode("latin-1")) if asked else None
-    if found is None or read is None:
-        return None
-    method, question = read
-    context: Context = scope["app"].state.context
-    known = context.models.fresh(found[1], method)
-    if known is None:
-        return None
-    context.models.renew(context.database, known, found[1], method)
-    body = known.answers.get(question)
-    if body is None:
+def _answered_before(known: KnownModel, question: Question) -> Answer:
+    """The answer to a question, made where nobody asked it yet."""
+    answer = known.answers.get(question)
+    if answer is None:
         body = look_up(known, question).model_dump_json()
+        answer = Answer(whole(known.tag, body), unchanged(known.tag))
         if len(known.answers) < MOST_ANSWERS:
-            known.answers[question] = body
-    scope["route"] = ROUTE
-    traces.name_request("GET", ROUTE.path)
-    return conditional(Request(scope), known.tag, lambda: body)
+            known.answers[question] = answer
+    return answer
 
 
 @lru_cache(maxsize=4096)
-def _read(query: str) -> tuple[str, Question] | None:
-    """Method and question of a query in its simplest form, None for any other."""
-    method, numbers = "ols", dict[str, float]()
-    for part in query.split("&"):
-        name, _, value = part.partition("=")
-        if name == "method" and value in _METHODS and query.count("method=") == 1:
-            method = value
-        elif name in _LIMITS and name not in numbers and _NUMBER.fullmatch(value):
-            low, high = _LIMITS[name]
-            numbers[name] = float(value)
-            if not low <= numbers[name] <= high:
-                return None
-        else:
-            return None
-    if "fn" not in numbers:
+def _read(query: bytes) -> LookUpQuery | None:
+    """What a query asks, None for one that the route has to refuse."""
+    try:
+        return LookUpQuery.model_validate(dict(parse_qsl(query.decode("latin-1"), keep_blank_values=True)))
+    except ValueError:  # pydantic's, or of the address
         return None
-    return method, Question(numbers.get("v", 0.0), numbers["fn"], numbers.get("quantile"))

@@ -520,9 +520,27 @@ LARGEST_FORCE, LARGEST_VELOCITY = 1e4, 1e3
 SMALLEST_TAIL = 1e-12
 """As the planner's smallest slip probability; a Student-t quantile further out says nothing of friction."""
 
+
 _Velocity = Annotated[float, Field(ge=0.0, le=LARGEST_VELOCITY, allow_inf_nan=False)]
 _Force = Annotated[float, Field(ge=0.0, le=LARGEST_FORCE, allow_inf_nan=False)]
 _Area = Annotated[float, Field(gt=1e-12, le=1.0, allow_inf_nan=False, description="m²")]
+
+
+class LookUpQuery(BaseModel):
+    """What a look-up asks: the parameters of its address."""
+
+    fn: Annotated[_Force, Field(description="Normal force on an element, N", examples=[0.05])]
+    v: Annotated[_Velocity, Field(description="Tangential velocity, m/s", examples=[0.0])] = 0.0
+    quantile: Annotated[
+        float | None,
+        Field(
+            ge=SMALLEST_TAIL,
+            le=1.0 - SMALLEST_TAIL,
+            description="Of a new observation of μ; the mean without",
+            examples=[0.05],
+        ),
+    ] = None
+    method: Annotated[ModelMethod, Field(description="Whose current model answers")] = "ols"
 
 
 class NewGraspForce(BaseModel):

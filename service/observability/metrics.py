@@ -1,6 +1,5 @@
 """What a running service tells of itself at ``/metrics``, in the text format of Prometheus."""
 
-import logging
 import threading
 import time
 from datetime import datetime, timedelta
@@ -13,19 +12,13 @@ from db.database import Database
 from db.records import Job
 from db.repositories import grasp_logs, jobs
 from db.tables import now
-from service.observability import logs
-
-logger = logging.getLogger(__name__)
+from service.observability.answered import Answered
 
 REQUEST_BUCKETS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0)
 STAGE_BUCKETS = (0.001, 0.005, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 60.0)
 
 OVERLAP = timedelta(seconds=60)
 """How long before another one a job may have ended and be seen after it: transactions end in their own order."""
-
-
-METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
-"""Any other word may be a method of HTTP, too; each would be a label."""
 
 
 class Metrics:
@@ -95,14 +88,10 @@ class Metrics:
 
 
 class Metering:
-    """Times every request for the figures and for the log.
+    """Times every request for the figures and for the log."""
 
-    Both know it by its route's path and not by its own: names of materials are not to be labels, and what somebody
-    wrote into an address is not to be logged.
-    """
-
-    def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
-        self.app, self._metrics = app, metrics
+    def __init__(self, app: ASGIApp, answered: Answered) -> None:
+        self.app, self._answered = app, answered
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
@@ -121,12 +110,5 @@ class Metering:
             await self.app(scope, receive, noting)
         finally:
             route = getattr(scope.get("route"), "path", "none")
-            method = scope["method"] if scope["method"] in METHODS else "other"
-            seconds = time.perf_counter() - begin
-            self._metrics.requests.labels(method, route, str(status or "none")).observe(seconds)
-            if logger.isEnabledFor(logging.INFO):
-                request_id = scope.get("state", {}).get("request_id")
-                told = logs.of(
-                    request_id=request_id, method=method, route=route, status=status, seconds=round(seconds, 6)
-                )
-                logger.info("answered", extra=told)
+            request_id = scope.get("state", {}).get("request_id")
+            self._answered.note(scope["method"], route, status, time.perf_counter() - begin, request_id)

@@ -25,13 +25,11 @@ from service.http.problems import (
 )
 from service.http.routes.common import JsonRoute, problems
 from service.http.schemas import (
-    LARGEST_FORCE,
-    LARGEST_VELOCITY,
-    SMALLEST_TAIL,
     FrictionModelOut,
     FrictionModelsOut,
     FrictionOut,
     JobOut,
+    LookUpQuery,
     MaterialOut,
     MaterialsOut,
     ModelMethod,
@@ -42,8 +40,6 @@ from service.http.schemas import (
 router = APIRouter(prefix="/v1/materials", tags=["materials"], route_class=JsonRoute)
 
 _BODY = (UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, IDEMPOTENCY_KEY_REUSED, STORAGE_UNAVAILABLE)
-
-Finite = Query(allow_inf_nan=False, ge=0.0)
 
 
 @router.post(
@@ -115,28 +111,16 @@ async def read_friction(
     context: Given,
     request: Request,
     name: str,
-    fn: Annotated[float, Finite, Query(le=LARGEST_FORCE, description="Normal force on an element, N", examples=[0.05])],
-    v: Annotated[
-        float, Finite, Query(le=LARGEST_VELOCITY, description="Tangential velocity, m/s", examples=[0.0])
-    ] = 0.0,
-    quantile: Annotated[
-        float | None,
-        Query(
-            ge=SMALLEST_TAIL,
-            le=1.0 - SMALLEST_TAIL,
-            description="Of a new observation of μ; the mean without",
-            examples=[0.05],
-        ),
-    ] = None,
-    method: Annotated[ModelMethod, Query(description="Whose current model answers")] = "ols",
+    asked: Annotated[LookUpQuery, Query()],
 ) -> Response:
     """At a tangential velocity and a normal force: the mean, or a quantile that a cautious planner asks for.
 
     A quantile includes the scatter of μ and the uncertainty of the model. `ETag` and `If-None-Match` save the answer to
     who has it.
     """
-    known = await context.models.get(context.database, name, method)
-    return conditional(request, known.tag, lambda: look_up(known, Question(v, fn, quantile)).model_dump_json())
+    known = await context.models.get(context.database, name, asked.method)
+    question = Question(asked.v, asked.fn, asked.quantile)
+    return conditional(request, known.tag, lambda: look_up(known, question).model_dump_json())
 
 
 @router.post(

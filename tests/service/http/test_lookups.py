@@ -6,8 +6,9 @@ import pytest
 
 from db.database import Database
 from db.records import NewModel
-from db.repositories import friction_models, jobs, materials
-from service.http import lookups
+from db.repositories import access_keys, friction_models, jobs, materials
+from service.http import access, lookups
+from service.http.lookups import Lookups
 from service.http.routes import materials as route
 
 pytestmark = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -50,7 +51,7 @@ def both_ways(client: Any, queries: str, monkeypatch: pytest.MonkeyPatch) -> lis
     client.get(f"{PATH}fn=0.05")
     client.get(f"{PATH}fn=0.05&method=bayes")
     short = [told(client.get(PATH + query)) for query in asked]
-    monkeypatch.setattr(lookups, "_answer", lambda _: None)
+    monkeypatch.setattr(Lookups, "_answer", lambda *_: None)
     return list(zip(asked, short, [told(client.get(PATH + query)) for query in asked], strict=True))
 
 
@@ -119,16 +120,10 @@ def test_a_simple_question_does_not_reach_the_route(client: Any, monkeypatch: py
 
 
 def test_the_shortest_way_is_counted_as_the_route(client: Any) -> None:
-    seen = []
-
-    async def note(scope: Any, receive: Any, send: Any) -> None:
-        await client_app(scope, receive, send)
-        seen.append(scope["route"].path)
-
-    client_app, client.app = client.app, note
-    for _ in range(2):
+    for _ in range(3):
         client.get(f"{PATH}fn=0.05")
-    assert seen == [lookups.ROUTE.path] * 2
+    counted = client.app.state.metrics.requests.labels("GET", "/v1/materials/{name}/friction", "200")
+    assert sum(bucket.get() for bucket in counted._buckets) == 3
 
 
 def test_the_answers_kept_are_bounded(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -143,3 +138,36 @@ def test_the_shortest_way_leads_through_the_gate(reach: Callable[..., Any], clie
     stranger.app.state.context = client.app.state.context
     client.get(f"{PATH}fn=0.05")
     assert stranger.get(f"{PATH}fn=0.05").status_code == 401
+
+
+def test_the_shortest_way_is_as_narrow_as_the_gate(reach: Callable[..., Any], client: Any) -> None:
+    def shared(**given: Any) -> Any:
+        caller = reach(lookup_seconds=60.0, **given)
+        caller.app.state.context = client.app.state.context
+        return caller
+
+    client.get(f"{PATH}fn=0.05")
+    misled = shared(server="127.0.0.1", address="127.0.0.1")
+    assert misled.get(f"{PATH}fn=0.05", headers={"Host": "evil.example"}).status_code == 421
+    assert misled.get(f"{PATH}fn=0.05", headers={"X-Forwarded-For": "10.0.0.1"}).status_code == 401
+    assert misled.get(f"{PATH}fn=0.05", headers={"X": "x" * 20_000}).status_code == 431
+    hasty = shared(access="open", rate_limit=2.0)
+    assert [hasty.get(f"{PATH}fn=0.05").status_code for _ in range(3)] == [200, 200, 429]
+
+
+def test_the_shortest_way_knows_a_key_that_was_used_a_moment_ago(
+    reach: Callable[..., Any], client: Any, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    key_id, key = access.new_key()
+    with database.write() as session:
+        access_keys.add(session, key_id, "planner", "read", access.digest(key))
+    planner = reach("keys", key=key, lookup_seconds=60.0, rate_limit=3.0)
+    planner.app.state.context = client.app.state.context
+    client.get(f"{PATH}fn=0.05")
+    assert planner.get(f"{PATH}fn=0.05").status_code == 200
+    asked: list[object] = []
+    monkeypatch.setattr(route, "look_up", lambda *given: asked.append(given))
+    assert planner.get(f"{PATH}fn=0.05").status_code == 200
+    assert asked == []
+    assert planner.get(f"{PATH}fn=0.05", headers={"Authorization": f"Bearer {key[:-1]}x"}).status_code == 401
+    assert [planner.get(f"{PATH}fn=0.05").status_code for _ in range(2)] == [200, 429]
