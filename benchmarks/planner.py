@@ -113,7 +113,6 @@ def draw(rows: list[dict[str, float]], alone: float) -> Figure:
     }
     for (name, label), style in zip(labels.items(), ("o-", "s-", "--"), strict=True):
         axes.plot(grasps, [row[name] for row in rows], style, label=label, markersize=4)
-    axes.axhspan(1e-3, 10.0, color="0.93", zorder=0)
     axes.set(xscale="log", yscale="log", xlabel="grasps", ylabel="time, ms", ylim=(1e-3, 1e4))
     axes.legend(frameon=False, fontsize=8)
     return figure
