@@ -59,6 +59,22 @@ class Contact:
         pressed = int((p > 0.0).sum())
         return cls(pressed * element, None, float(p @ p) * pressed / force**2, float(p @ radius) / force)
 
+    def element_force(self, force: Number, element_area: Number) -> Number:
+        """Normal force of an element of ``element_area`` m², each weighted with itself, under ``force`` N; N."""
+        grown = 1.0 if self.reference_force is None else (force / self.reference_force) ** (2.0 / 3.0)
+        return self.pressure_square * force * element_area / (self.area * grown)
+
+    def arm(self, force: Number) -> Number:
+        """Friction moment over μF under ``force`` N, m."""
+        return self.torque_arm * (
+            1.0 if self.reference_force is None else (force / self.reference_force) ** (1.0 / 3.0)
+        )
+
+    @property
+    def power(self) -> int:
+        """n, where F^(1/n) is what the elements' normal force grows with."""
+        return 1 if self.reference_force is None else 3
+
 
 @dataclass(frozen=True, slots=True)
 class Contacts:

@@ -14,8 +14,8 @@ MOST_STEPS = 200
 ROUNDING = 8.0 * sys.float_info.epsilon
 """Relative, to which a load counts as held and a force as found."""
 
-ENDLESS = 1e30
-"""Cube root of N, or N: a force that has grown so far has no root before it."""
+ENDLESS = 1e12
+"""N an element: what holds up to there has no upper bound, and what doesn't hold has no root."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,6 +81,7 @@ class LoadedContact:
         falls = slope < 0.0
         zero = -height / select(falls, slope, -1.0) / self.unit
         end = select(falls, zero, select((slope > 0.0) | (height > 0.0), math.inf, 0.0))
+        end = select(self.unit * end < ENDLESS, end, math.inf)
         return select(end < most, select(end > 0.0, end, 0.0), most)
 
     def _load(self, x: Number) -> Number:
@@ -109,12 +110,17 @@ class LoadedContact:
         for _ in range(MOST_STEPS):
             onwards = direction * slope > 0.0
             step = -value / (slope + (slope == 0.0))
-            moving = (value < -0.25 * rounding) & onwards & (direction * step > 0.25 * ROUNDING * x) & (x < ENDLESS)
+            moving = (
+                (value < -0.25 * rounding)
+                & onwards
+                & (direction * step > 0.25 * ROUNDING * x)
+                & (self.unit * x < ENDLESS)
+            )
             if not (moving.any() if isinstance(moving, np.ndarray) else moving):
                 break
             x = x + select(moving, step, 0.0)
             value, slope = self.surplus(x)
-        return x, (value >= -rounding) | (onwards & (x < ENDLESS))
+        return x, (value >= -rounding) | (onwards & (self.unit * x < ENDLESS))
 
     def _start(self) -> Number:
         """An x that is no greater than the least that holds: where friction, if it were on that line, would."""

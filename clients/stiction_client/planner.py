@@ -134,14 +134,13 @@ def required_normal_force(
     limit: Number = math.inf
     if normal_force_limit is not None:
         limit = within("normal_force_limit", normal_force_limit, 1e-9, LARGEST, "N")
-    growing = together.contact.reference_force
-    per_newton = model.element_area / together.contact.area * together.contact.pressure_square
+    unit = together.contact.element_force(1.0, model.element_area)
     loaded = LoadedContact(
         FrictionQuantile.of(model, velocity, probability),
         load,
         moment,
-        per_newton if growing is None else per_newton * growing ** (2.0 / 3.0),
-        1 if growing is None else 3,
+        unit,
+        together.contact.power,
     )
     question = _Question(model, together, velocity, probability, limit, loaded)
     given = (load, moment, loaded.unit, velocity, probability, limit)
@@ -187,8 +186,7 @@ def _shares(
     contact = contacts.contact
     if np.any(turns) and not np.all(contact.torque_arm):
         raise InvalidArgument("torque", float(np.max(torque)), "0 where the contact has no torque_arm")
-    grown = 1.0 if contact.reference_force is None else contact.reference_force ** (1.0 / 3.0)
-    arm = contact.torque_arm / grown
+    arm = contact.arm(1.0)
     return load, turns / (arm + (arm == 0.0))
 
 

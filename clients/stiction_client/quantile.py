@@ -80,7 +80,7 @@ class FrictionQuantile:
         c, s, k, g = (float(part) for part in (self.c, self.s, self.k, self.g))
         if c >= g:
             return math.inf if c > 0.0 else 0.0
-        return max((s * c / math.sqrt((g - c) * (g + c)) - k) / g, 0.0) if c > -g else 0.0
+        return max((s * c / (math.sqrt(g - c) * math.sqrt(g + c)) - k) / g, 0.0) if c > -g else 0.0
 
     def expected(self) -> "FrictionQuantile":
         """The mean instead: what is known were there no uncertainty and no scatter."""

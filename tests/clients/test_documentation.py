@@ -36,7 +36,7 @@ def test_the_code_of_the_client_page_runs(
     assert names["job"].status == "done"
     assert 1.5 / 0.5 < names["grip"].normal_force < 1.5 / 0.3  # the grasp was simulated with μ = 0.4
     printed = capsys.readouterr().out
-    for expected in ("press with ", "<geom name='fingertip' friction=", "<drake:mu_static>", "[["):
+    for expected in ("press with ", '<pair geom1="fingertip"', "physics:staticFriction", "<drake:mu_static>", "[["):
         assert expected in printed
 
 

@@ -9,11 +9,19 @@ import pytest
 from stiction_client import (
     FrictionModel,
     InvalidArgument,
+    cone_half_angle,
     conservative_friction,
+    contactile_answer,
+    dexnet_friction,
     drake_friction,
     friction_cone,
+    moveit_max_contact_force,
     mujoco_friction,
     mujoco_geom,
+    physx_material,
+    required_normal_force,
+    sdf_surface,
+    urdf_gazebo,
 )
 
 Make = Callable[..., FrictionModel]
@@ -111,3 +119,47 @@ def test_the_linearised_cone_lies_inside_the_true_one_and_fills_it(make_model: M
 def test_a_cone_needs_three_edges(make_model: Make) -> None:
     with pytest.raises(InvalidArgument, match="edges is 2; allowed: at least 3"):
         friction_cone(make_model(), 0.1, edges=2)
+
+
+def test_physx_gets_friction_that_never_grows_with_sliding(make_model: Make) -> None:
+    material = physx_material(make_model((0.4, 5.0, 0.0)), 0.1)
+    assert material.dynamic_friction == material.static_friction
+    falling = physx_material(make_model((0.4, -20.0, 0.0)), 0.1)
+    assert (
+        falling.dynamic_friction < falling.static_friction == conservative_friction(make_model((0.4, -20.0, 0.0)), 0.1)
+    )
+    lines = falling.to_usd().splitlines()
+    assert lines[0] == f"float physics:staticFriction = {falling.static_friction:.9g}"
+    assert lines[2] == 'uniform token physxMaterial:frictionCombineMode = "min"'
+
+
+def test_descriptions_of_robots_are_xml_with_the_conservative_value(make_model: Make) -> None:
+    expected = conservative_friction(make_model(), 0.1)
+    for text in (sdf_surface(make_model(), 0.1), urdf_gazebo(make_model(), "finger", 0.1)):
+        numbers = [float(entry.text or "") for entry in ElementTree.fromstring(text).iter() if entry.text]
+        assert numbers == pytest.approx([expected, expected], rel=1e-8)  # nine digits are written
+
+
+def test_dexnet_s_sigma_is_the_variance_of_an_observation(make_model: Make) -> None:
+    model = make_model(covariance=np.zeros((3, 3)), scatter_degrees_of_freedom=np.inf)
+    told = dexnet_friction(model, 0.1)
+    assert told["friction_coef"] == float(model.predict(0.0, 0.1))
+    assert told["sigma_friction_coef"] == pytest.approx(model.scale**2, rel=1e-9)
+
+
+def test_a_cone_s_half_angle_is_the_arc_tangent(make_model: Make) -> None:
+    assert np.tan(cone_half_angle(make_model(), 0.1)) == pytest.approx(
+        conservative_friction(make_model(), 0.1), rel=1e-15
+    )
+
+
+def test_moveit_and_contactile_are_told_what_the_planner_found(make_model: Make) -> None:
+    bounded = required_normal_force(make_model((0.5, 0.0, -1.0), np.zeros((3, 3)), scale=0.0), 3.0, contact_area=6e-5)
+    unbounded = required_normal_force(make_model((0.4, 0.0, 0.0), np.zeros((3, 3))), 3.0, contact_area=6e-5)
+    assert moveit_max_contact_force(bounded) == bounded.feasible_interval[1]
+    assert moveit_max_contact_force(unbounded) == 0.0
+    assert contactile_answer(bounded) == {
+        "friction_est": bounded.friction_coefficient,
+        "target_grip_force": bounded.normal_force,
+    }
+    assert contactile_answer(None) == {"friction_est": -1.0, "target_grip_force": -1.0}
