@@ -8,7 +8,7 @@ from estimators.warm_up import warm_up
 
 if TYPE_CHECKING:
     from estimators.fitting import fit, needs_samples
-    from estimators.friction_model import Cost, Domain, FrictionModel
+    from estimators.friction_model import Cost, Domain, FrictionModel, Scale, Scales
     from estimators.moments import Moments
     from estimators.not_converged import NotConverged
     from estimators.online import ChangeDetector
@@ -20,6 +20,8 @@ _LAZY = {
     "Cost": "estimators.friction_model",
     "Domain": "estimators.friction_model",
     "FrictionModel": "estimators.friction_model",
+    "Scale": "estimators.friction_model",
+    "Scales": "estimators.friction_model",
     "Moments": "estimators.moments",
     "NotConverged": "estimators.not_converged",
     "ChangeDetector": "estimators.online",
@@ -36,6 +38,8 @@ __all__ = [
     "InvalidSamples",
     "Moments",
     "NotConverged",
+    "Scale",
+    "Scales",
     "TooFewSamples",
     "fit",
     "needs_samples",

@@ -5,18 +5,18 @@ from dataclasses import replace
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.linear.fit_data import FitData, GraspData, gather
-from estimators.methods import conjugate, ols, robust
+from estimators.methods import conjugate, hierarchical, ols, robust
 
-METHODS = ("ols", "robust", "conjugate", "bayes", "auto")
+METHODS = ("ols", "robust", "conjugate", "hierarchical", "bayes", "auto")
 
 
 def needs_samples(method: str, grasps: int) -> bool:
     """Whether a ``method``, by default options, fits so many grasps from less than their samples worse than from them.
 
-    Least squares and the Bayesian default take errors to be shared within a grasp, which its moments tell exactly; of
-    a single grasp they look at its elements, which moments do not know.
+    Moments tell exactly what a grasp and its places share. Least squares and the Bayesian default look at the elements
+    of a single grasp, which they take from its samples.
     """
-    return method != "conjugate" and (grasps < 2 or method not in {"ols", "bayes"})
+    return method not in {"conjugate", "hierarchical"} and (grasps < 2 or method not in {"ols", "bayes"})
 
 
 def fit(
@@ -33,8 +33,9 @@ def fit(
     Moments may stand for the samples where the method needs no more.
 
     ``method``: "ols" (weighted least squares, cluster-robust), "robust" (M-estimate with the ``loss`` "tukey" or
-    "huber", cluster-robust), "conjugate" (exact posterior for independent Gaussian errors) or "bayes" (emcee), whose
-    ``likelihood`` is "grasp_effects" (the default wherever samples come in clusters), "gaussian", "student_t",
+    "huber", cluster-robust), "conjugate" (exact posterior for independent Gaussian errors), "hierarchical" (exact
+    posterior with scatter between grasps, between places and within, told apart in ``scales``) or "bayes" (emcee),
+    whose ``likelihood`` is "grasp_effects" (the default wherever samples come in clusters), "gaussian", "student_t",
     "outlier" (a part of false slip) or "errors_in_variables" (noise in the forces). "auto" takes the one that the data
     call for; ``diagnostics["chosen_because"]`` says why. A sampled method stops once the Monte-Carlo error of its means
     and 5/95 % quantiles is under ``accuracy`` posterior standard deviations, or after ``seconds``; ``seed`` makes it
@@ -75,6 +76,8 @@ def _fit(
         return robust.fit(data, loss, seed)
     if method == "conjugate":
         return conjugate.fit(data)
+    if method == "hierarchical":
+        return hierarchical.fit(data)
     from estimators.methods import bayes  # emcee takes a second to load
 
     return bayes.fit(data, likelihood, accuracy, seconds, seed)

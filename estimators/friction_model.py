@@ -21,6 +21,29 @@ class Domain:
 
 
 @dataclass(frozen=True, slots=True)
+class Scale:
+    """A standard deviation as data tell it: ``value`` times a Student-t on ``degrees_of_freedom`` is what it draws."""
+
+    value: float
+    degrees_of_freedom: float
+
+    def quantile(self, level: float) -> float:
+        """Quantile of one draw."""
+        return float(self.value * special.stdtrit(self.degrees_of_freedom, level))
+
+
+@dataclass(frozen=True, slots=True)
+class Scales:
+    """How friction scatters: ``between_grasps`` τ, as a part of friction itself; ``between_places`` ω of a grasp and
+    ``within`` a place σ, as friction [-].
+    """
+
+    between_grasps: Scale
+    between_places: Scale
+    within: Scale
+
+
+@dataclass(frozen=True, slots=True)
 class Cost:
     """What a fit cost: ``seconds``, and the Monte-Carlo error it left, in posterior standard deviations (0: exact)."""
 
@@ -35,7 +58,8 @@ class FrictionModel:
     ``coefficients`` [3]: β₀ [-], β₁ [s/m], β₂ [1/N]; ``covariance`` [3, 3] of them; ``scale``: standard deviation σ
     of ε [-]; ``n`` samples of elements of ``element_area`` m²; ``degrees_of_freedom`` of the Student-t distribution
     that the coefficients follow and ``scatter_degrees_of_freedom`` of that which ε/σ follows; ``identifiable`` [3]
-    bool; ``draws`` [k, ≥ 4] of (β, σ, …) or None.
+    bool; ``draws`` [k, ≥ 4] of (β, σ, …) or None; ``scales`` of the scatter where the method tells them apart, when
+    σ is all of it, as one element in a new grasp shows it.
     """
 
     method: str
@@ -51,6 +75,7 @@ class FrictionModel:
     cost: Cost
     diagnostics: Mapping[str, float | str] = field(default_factory=dict)
     draws: FloatArray | None = None
+    scales: Scales | None = None
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -66,15 +91,25 @@ class FrictionModel:
         return np.stack([self.coefficients - half, self.coefficients + half], axis=1)
 
     def predict(
-        self, tangential_velocity: ArrayLike, normal_force: ArrayLike, quantile: float | None = None
+        self,
+        tangential_velocity: ArrayLike,
+        normal_force: ArrayLike,
+        quantile: float | None = None,
+        of: str = "element",
+        elements: int | None = None,
     ) -> FloatArray:
-        """Friction coefficient expected at v (m/s) and f_n (N an element), or a quantile of a new observation of it.
+        """Friction coefficient expected at v (m/s) and f_n (N an element), or a quantile of what a new grasp shows.
 
-        The quantile includes the scatter ε and the uncertainty of the coefficients, whose distances from the mean add
-        as root of squares (Graybill & Wang 1980): exact where both have the same degrees of freedom, and not too narrow
-        in the tails where the coefficients, shared by few grasps, have less. Shapes broadcast. Raises
-        ``InvalidSamples`` for a quantile outside (0, 1).
+        ``of``: one "element", or a "contact", whose friction is the mean over its ``elements``: scatter between grasps
+        stays, that between places and within them averages out. A model that cannot tell its ``scales`` apart takes
+        all of its scatter as shared.
+
+        The quantile includes the scatter and the uncertainty of the coefficients, whose distances from the mean add
+        as root of squares (Graybill & Wang 1980): exact where all have the same degrees of freedom, and not too narrow
+        in the tails where some have less. Shapes broadcast. Raises ``InvalidSamples`` for a quantile outside (0, 1) and
+        for a contact of no elements.
         """
+        count = _averaged(of, elements)
         v, f_n = np.broadcast_arrays(np.asarray(tangential_velocity, float), np.asarray(normal_force, float))
         x = np.stack([np.ones_like(v), v, f_n], axis=-1)
         mean = x @ self.coefficients
@@ -82,9 +117,19 @@ class FrictionModel:
             return mean
         _check_probability("quantile", quantile)
         error = np.sqrt(np.maximum(np.einsum("...i,ij,...j->...", x, self.covariance, x), 0.0))
-        scatter = special.stdtrit(self.scatter_degrees_of_freedom, quantile) * self.scale
-        distance = np.hypot(scatter, special.stdtrit(self.degrees_of_freedom, quantile) * error)
+        uncertain = special.stdtrit(self.degrees_of_freedom, quantile) * error
+        distance = np.hypot(self._scattered(quantile, mean, count), uncertain)
         return np.asarray(mean + np.sign(quantile - 0.5) * distance)
+
+    def _scattered(self, quantile: float, mean: FloatArray, count: int) -> FloatArray | float:
+        """How far scatter alone takes the mean over so many elements of a new grasp from the ``mean`` [...]."""
+        if self.scales is None:
+            return float(special.stdtrit(self.scatter_degrees_of_freedom, quantile) * self.scale)
+        grasp, place, within = (
+            scale.quantile(quantile)
+            for scale in (self.scales.between_grasps, self.scales.between_places, self.scales.within)
+        )
+        return np.asarray(np.sqrt((grasp * mean) ** 2 + (place**2 + within**2) / count))
 
     def extrapolation(self, tangential_velocity: float, normal_force: float) -> str | None:
         """Which of v (m/s) and f_n (N an element) lies outside the data behind the model; None where neither does.
@@ -106,3 +151,14 @@ class FrictionModel:
 def _check_probability(name: str, value: float) -> None:
     if not 0.0 < value < 1.0:
         raise InvalidSamples(name, value, "above 0 and below 1")
+
+
+def _averaged(of: str, elements: int | None) -> int:
+    """Over how many elements the scatter of places averages out."""
+    if of not in ("element", "contact"):
+        raise InvalidSamples("of", of, '"element" or "contact"')
+    if of == "element":
+        return 1
+    if elements is None or elements < 1:
+        raise InvalidSamples("elements", elements, "the number of elements of the contact, at least 1")
+    return elements

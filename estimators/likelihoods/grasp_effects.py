@@ -11,7 +11,7 @@ from estimators.defaults import PRIOR, REFERENCE, SAMPLING
 from estimators.likelihoods.posterior import Summary, bounded_exp, scatter
 from estimators.linear.fit_data import FitData
 from estimators.linear.normal_inverse_gamma import NormalInverseGamma, exact_posterior
-from estimators.linear.priors import grasp_effect, log_half_student, prior_rows
+from estimators.linear.priors import log_half_student, prior_rows, structured
 from estimators.sampling.normal_score import NormalScore, normal_score
 from estimators.sampling.proposal import StudentMixture, standard
 
@@ -48,7 +48,7 @@ class GraspEffects:
     score: NormalScore
     sampled: tuple[str, ...] = ("log_sigma", "log_tau")
     names: tuple[str, ...] = ("beta0", "beta1", "beta2", "sigma", "tau")
-    prior: str = grasp_effect()
+    prior: str = structured()
     proposal: StudentMixture = field(default_factory=lambda: standard(2))
     local: float = 0.0
 

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from estimators.defaults import MIN_SAMPLES
 from estimators.errors import InvalidSamples, TooFewSamples
 from estimators.friction_model import Domain
+from estimators.linear.grasp_statistics import Columns, GraspStatistics
 from estimators.linear.least_squares import Factor, factorise, upper_triangle
-from estimators.linear.observations import Observations, observe
+from estimators.linear.observations import Observations, codes_of, observe
 from estimators.linear.statistics import SufficientStatistics
 
 if TYPE_CHECKING:
@@ -60,6 +61,16 @@ class FitData:
             row[0] = np.sqrt(part.weight) * np.array([1.0, *(part.mean - self.factor.mean)], dtype=float)
             row[1:, 1:] = part.triangle
         return rows
+
+    def mean_row(self) -> FloatArray:
+        """(1, v, f_n) at the weighted mean of the data, [3]."""
+        return np.array([1.0, *self.factor.mean[:2]], dtype=float)
+
+    def grasp_statistics(self) -> tuple[GraspStatistics, ...]:
+        """Each grasp place by place; moments that know of no places count as those of one."""
+        if self.observations is not None:
+            return _statistics_of_samples(self.observations)
+        return tuple(grasp for block in self.blocks for grasp in block.grasps or (_of_one_place(block),))
 
     def cluster_means(self) -> "ClusterMeans":
         """Weight and mean of each cluster, and the spread within clusters."""
@@ -118,7 +129,7 @@ def _from_moments(moments: list[SufficientStatistics]) -> FitData:
     if whole.n < MIN_SAMPLES or whole.effective_n <= MIN_SAMPLES - 1:
         value = f"{whole.n}, worth {whole.effective_n:.3g} by their weights"
         raise TooFewSamples("samples", value, f"at least {MIN_SAMPLES}")
-    blocks = tuple(part for part in moments if part.n)
+    blocks = tuple(part.at_element_area(whole.element_area) for part in moments if part.n)
     return FitData(
         factor=relative(whole.factor, whole),
         n=whole.n,
@@ -152,6 +163,30 @@ def _means_of_blocks(data: FitData) -> ClusterMeans:
     inside = upper_triangle(np.concatenate([part.triangle for part in parts]))
     weight, mean = np.array([part.weight for part in parts]), np.array([part.mean for part in parts], dtype=float)
     return ClusterMeans(weight, mean, _without_constant(inside))
+
+
+def _statistics_of_samples(observations: Observations) -> tuple[GraspStatistics, ...]:
+    values, order = observations.columns(), np.argsort(observations.grasp, kind="stable")
+    ends = np.flatnonzero(np.diff(observations.grasp[order])) + 1
+    return tuple(
+        GraspStatistics.from_columns(
+            Columns(values[rows], observations.weight[rows], codes_of(observations.element[rows]))
+        )
+        for rows in np.split(order, ends)
+    )
+
+
+def _of_one_place(block: SufficientStatistics) -> GraspStatistics:
+    factor = block.factor
+    return GraspStatistics(
+        count=np.ones(1),
+        weight=np.array([factor.weight]),
+        mean=np.asarray(factor.mean, dtype=float)[None],
+        spread=np.zeros((1, 3, 3)),
+        within=factor.triangle.astype(float),
+        total_weight=factor.weight,
+        weight_square=block.weight_square,
+    )
 
 
 def _without_constant(triangle: NDArray[np.floating]) -> FloatArray:

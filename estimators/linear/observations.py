@@ -70,8 +70,8 @@ class Observations:
 
     def place(self) -> IntArray:
         """Codes [k] from 0 of the elements of all grasps: the same element of another grasp is another place."""
-        element = _codes(self.element)
-        return _codes(self.grasp * (int(element.max()) + 1) + element)
+        element = codes_of(self.element)
+        return codes_of(self.grasp * (int(element.max()) + 1) + element)
 
     def columns(self) -> FloatArray:
         """Regressors and response (v, f_n, μ), [k, 3]."""
@@ -183,8 +183,8 @@ def _clusters(
 ) -> tuple[IntArray, str]:
     """Codes [k] from 0 of what shares an error: the grasp, else the element, else a stretch of time."""
     if grasp[-1] > grasp[0]:
-        return _codes(grasp), "grasp"
-    codes = _codes(element)
+        return codes_of(grasp), "grasp"
+    codes = codes_of(element)
     if codes.max() > 0:
         return codes, "element"
     order = np.argsort(joined([part.time for part in parts])[used], kind="stable")
@@ -193,7 +193,7 @@ def _clusters(
     return block, "time block"
 
 
-def _codes(labels: IntArray) -> IntArray:
+def codes_of(labels: IntArray) -> IntArray:
     """Labels [k] numbered from 0 in their order; by a table where their range allows: a sort takes ten times longer."""
     lowest = int(labels.min())
     span = int(labels.max()) - lowest + 1

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.defaults import PRIOR, REFERENCE, Prior
+from estimators.friction_model import Domain
 
 FloatArray = NDArray[np.float64]
 
@@ -17,9 +18,18 @@ def prior_rows(element_area: float, prior: Prior = PRIOR) -> FloatArray:
     return rows
 
 
-def log_half_student(value: FloatArray, scale: float) -> FloatArray:
-    """Log density, up to a constant, of a half-Student-t on ``EFFECT_DEGREES`` degrees of freedom with ``scale``."""
-    degrees = PRIOR.effect_degrees_of_freedom
+def weak_spans(domain: Domain, element_area: float) -> FloatArray:
+    """Spans [2] of v and f_n over which a slope has the prior's width: the reference's, or less where less was seen.
+
+    Over a sliver of v a prior made for millimetres a second would be strong.
+    """
+    largest = np.array([domain.tangential_velocity[1], domain.normal_force[1]])
+    spans = REFERENCE.spans(element_area)
+    return np.where(largest > 0.0, np.minimum(spans, largest), spans)
+
+
+def log_half_student(value: FloatArray, scale: float, degrees: float = PRIOR.effect_degrees_of_freedom) -> FloatArray:
+    """Log density, up to a constant, of a half-Student-t on so many degrees of freedom with ``scale``."""
     return np.asarray(-0.5 * (degrees + 1.0) * np.log1p((value / scale) ** 2 / degrees))
 
 
@@ -38,9 +48,13 @@ def positive_friction() -> str:
     return conjugate_prior() + "; mean friction above 0 over the data's domain"
 
 
-def grasp_effect() -> str:
-    """The prior of a random intercept per cluster, beside the conjugate one."""
+def structured() -> str:
+    """The prior of the hierarchical model in words and numbers."""
     return (
-        conjugate_prior() + f"; intercepts of clusters ~ N(0, tau^2), tau ~ half-Student-t on "
-        f"{PRIOR.effect_degrees_of_freedom:g} degrees of freedom with scale {REFERENCE.scatter:g}"
+        f"beta0 ~ N({REFERENCE.friction:g}, {PRIOR.width:g}^2), each slope times its span ~ N(0, {PRIOR.width:g}^2), "
+        f"the spans {REFERENCE.tangential_velocity:g} m/s and {REFERENCE.pressure:g} Pa times the element area, or the "
+        f"largest seen if less; between grasps tau ~ half-Student-t on {PRIOR.grasp_degrees_of_freedom:g} degrees of "
+        f"freedom with scale {PRIOR.grasp_scatter:g}; between places omega ~ half-Student-t on "
+        f"{PRIOR.effect_degrees_of_freedom:g} with scale {REFERENCE.scatter:g}; sigma^2 ~ "
+        f"IG({PRIOR.degrees_of_freedom / 2:g}, {PRIOR.degrees_of_freedom / 2 * REFERENCE.scatter**2:g})"
     )

@@ -9,13 +9,16 @@ import numpy as np
 
 from estimators.errors import InvalidSamples
 from estimators.friction_model import Domain
+from estimators.linear.grasp_statistics import Columns, GraspStatistics
 from estimators.linear.least_squares import Factor, factorise, merge
-from estimators.linear.observations import check_columns, common_element_area, positive
+from estimators.linear.observations import check_columns, codes_of, common_element_area, positive
 
 if TYPE_CHECKING:
     from slipcore.samples import FrictionSamples
 
-MAGIC = b"SMo1"
+MAGIC, WITH_GRASPS = b"SMo1", b"SMo2"
+NUMBERS = struct.Struct("<17d")
+GRASPS = struct.Struct("<I")
 UPPER = np.triu_indices(3)
 
 
@@ -24,7 +27,8 @@ class SufficientStatistics:
     """Weighted mean and triangular factor (QR) of (v, f_n, μ) about it; XᵀX is never formed.
 
     ``factor`` carries Σw; ``weight_square`` is Σw², so that the effective number of samples survives a merge; ``n``
-    counts samples of positive weight; ``domain`` is the range of v and f_n; ``element_area`` in m².
+    counts samples of positive weight; ``domain`` is the range of v and f_n; ``element_area`` in m². ``grasps``: what
+    each grasp says place by place, or none where some sample was added without its place.
     """
 
     factor: Factor
@@ -32,10 +36,14 @@ class SufficientStatistics:
     n: int
     domain: Domain
     element_area: float
+    grasps: tuple[GraspStatistics, ...] = ()
 
     @classmethod
-    def from_samples(cls, samples: "FrictionSamples") -> Self:
-        """Moments of one grasp's samples, none of them allowed; raises ``InvalidSamples`` as ``fit`` does."""
+    def from_samples(cls, samples: "FrictionSamples", places: bool = True) -> Self:
+        """Moments of one grasp's samples, none of them allowed; raises ``InvalidSamples`` as ``fit`` does.
+
+        Without ``places`` they may be of a part of a grasp, whose parts are then merged.
+        """
         area = common_element_area([samples.element_area])
         columns = check_columns([samples])
         used = positive(columns["weight"])
@@ -45,8 +53,10 @@ class SufficientStatistics:
         if len(weight) == 0:
             return cls.empty(area)
         domain = Domain((float(v.min()), float(v.max())), (float(f_n.min()), float(f_n.max())))
-        factor = factorise(np.stack([v, f_n, mu]).T, weight)
-        return cls(factor, float(weight @ weight), len(weight), domain, area)
+        values = np.stack([v, f_n, mu]).T
+        grasp = (GraspStatistics.from_columns(Columns(values, weight, codes_of(samples.element[used]))),)
+        factor = factorise(values, weight)
+        return cls(factor, float(weight @ weight), len(weight), domain, area, grasp if places else ())
 
     @classmethod
     def empty(cls, element_area: float) -> Self:
@@ -67,7 +77,8 @@ class SufficientStatistics:
         factor = Factor(self.factor.weight, self.factor.mean * scale, self.factor.triangle * scale)
         low, high = self.domain.normal_force
         domain = Domain(self.domain.tangential_velocity, (low * scale[1], high * scale[1]))
-        return replace(self, factor=factor, domain=domain, element_area=element_area)
+        grasps = tuple(grasp.scaled(scale[1]) for grasp in self.grasps)
+        return replace(self, factor=factor, domain=domain, element_area=element_area, grasps=grasps)
 
     def merge(self, *others: Self) -> Self:
         """Moments of all samples behind these; any order and any grouping agree to rounding."""
@@ -79,6 +90,7 @@ class SufficientStatistics:
             sum(part.n for part in parts),
             union([part.domain for part in parts]),
             area,
+            _joined([part for part in parts if part.n]),
         )
 
     def add(
@@ -97,28 +109,54 @@ class SufficientStatistics:
             raise InvalidSamples("factor", factor, "above 0 and at most 1")
         kept = self.factor
         faded = Factor(kept.weight * factor, kept.mean, kept.triangle * np.sqrt(factor))
-        return replace(self, factor=faded, weight_square=self.weight_square * factor**2)
+        return replace(self, factor=faded, weight_square=self.weight_square * factor**2, grasps=())
 
     def to_bytes(self) -> bytes:
-        """These moments in 140 bytes, little-endian doubles."""
+        """These moments in little-endian doubles: 140 bytes, and less than 16 kB for each grasp."""
         numbers = [self.n, self.factor.weight, self.weight_square, self.element_area, *self.factor.mean]
         numbers += [*self.domain.tangential_velocity, *self.domain.normal_force, *self.factor.triangle[UPPER]]
-        return MAGIC + struct.pack("<17d", *(float(number) for number in numbers))
+        content = NUMBERS.pack(*(float(number) for number in numbers))
+        if not self.grasps:
+            return MAGIC + content
+        grasps = b"".join(grasp.to_bytes() for grasp in self.grasps)
+        return WITH_GRASPS + content + GRASPS.pack(len(self.grasps)) + grasps
 
     @classmethod
     def from_bytes(cls, content: bytes) -> Self:
-        """Moments from ``to_bytes``; raises ``InvalidSamples`` for anything else."""
-        if content[:4] != MAGIC or len(content) != 4 + 17 * 8:
-            raise InvalidSamples("moments", f"{len(content)} bytes from {content[:4]!r}", "140 bytes made by to_bytes")
-        n, weight, square, area, *rest = struct.unpack("<17d", content[4:])
+        """Moments from ``to_bytes``, of this version or the one before; raises ``InvalidSamples`` for anything else."""
+        magic, numbers, rest = content[:4], content[4 : 4 + NUMBERS.size], content[4 + NUMBERS.size :]
+        if magic not in (MAGIC, WITH_GRASPS) or len(numbers) < NUMBERS.size or (magic == MAGIC and rest):
+            raise InvalidSamples("moments", f"{len(content)} bytes from {magic!r}", "bytes made by to_bytes")
+        n, weight, square, area, *values = NUMBERS.unpack(numbers)
         triangle = np.zeros((3, 3))
-        triangle[UPPER] = rest[7:]
-        if not (np.isfinite([n, weight, square, area, *rest[:3], *rest[7:]]).all() and weight >= 0.0 and n >= 0.0):
+        triangle[UPPER] = values[7:]
+        if not (np.isfinite([n, weight, square, area, *values[:3], *values[7:]]).all() and weight >= 0.0 and n >= 0.0):
             raise InvalidSamples(
                 "moments", "not finite or negative", "finite numbers, counts and weights of at least 0"
             )
-        factor = Factor(weight, np.array(rest[:3]), triangle)
-        return cls(factor, square, int(n), Domain((rest[3], rest[4]), (rest[5], rest[6])), area)
+        factor = Factor(weight, np.array(values[:3]), triangle)
+        domain = Domain((values[3], values[4]), (values[5], values[6]))
+        return cls(factor, square, int(n), domain, area, _read_grasps(rest) if magic == WITH_GRASPS else ())
+
+
+def _joined(parts: "list[SufficientStatistics]") -> tuple[GraspStatistics, ...]:
+    """The grasps of all parts; none where one of the parts does not know of its places."""
+    if all(part.grasps for part in parts):
+        return tuple(grasp for part in parts for grasp in part.grasps)
+    return ()
+
+
+def _read_grasps(content: bytes) -> tuple[GraspStatistics, ...]:
+    if len(content) < GRASPS.size:
+        raise InvalidSamples("moments", "cut short", "bytes made by to_bytes")
+    (count,), rest = GRASPS.unpack_from(content), content[GRASPS.size :]
+    grasps = []
+    for _ in range(count):
+        grasp, rest = GraspStatistics.from_bytes(rest)
+        grasps.append(grasp)
+    if rest:
+        raise InvalidSamples("moments", f"followed by {len(rest)} more bytes", "bytes made by to_bytes")
+    return tuple(grasps)
 
 
 def union(domains: Sequence[Domain]) -> Domain:

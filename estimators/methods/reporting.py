@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.defaults import REFERENCE
-from estimators.friction_model import Cost, FrictionModel
+from estimators.friction_model import Cost, FrictionModel, Scales
 from estimators.linear.fit_data import FitData
 from estimators.linear.least_squares import LinearFit, solve
 from estimators.methods.identifiability import effects, identifiable
@@ -48,8 +48,11 @@ def report(
     draws: FloatArray | None = None,
     *,
     scatter_degrees_of_freedom: float,
+    scales: Scales | None = None,
 ) -> FrictionModel:
     """The friction model, with what its uncertainty does to friction; ``begin``: when the fit began."""
+    if scales is not None:
+        diagnostics = diagnostics | _told(scales)
     effect = effects(covariance, degrees_of_freedom, data)
     prior_shift = np.array([float(diagnostics.get(f"prior_sensitivity_beta{k}", 0.0)) for k in range(3)])
     return FrictionModel(
@@ -65,5 +68,15 @@ def report(
         diagnostics=describe(data, linear) | by_coefficient("effect", effect) | diagnostics,
         cost=Cost(time.perf_counter() - begin, monte_carlo_error),
         draws=draws,
+        scales=scales,
         scatter_degrees_of_freedom=scatter_degrees_of_freedom,
     )
+
+
+def _told(scales: Scales) -> Diagnostics:
+    """Scales as diagnostics, under names that JSON can carry."""
+    told: Diagnostics = {}
+    for name in ("between_grasps", "between_places", "within"):
+        scale = getattr(scales, name)
+        told |= {f"scale_{name}": scale.value, f"scale_{name}_degrees_of_freedom": scale.degrees_of_freedom}
+    return told

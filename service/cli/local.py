@@ -17,6 +17,7 @@ Log = Annotated[
     typer.Argument(help="A grasp log in any format of docs/formats.md: NPZ, Tac3D, tracked markers, MCAP, ROS bag, …"),
 ]
 DETECTOR_HELP = "Slip detector (docs/detector.md); the best one where none is named."
+METHOD_HELP = "Estimator: ols, robust, conjugate, hierarchical, bayes or auto."
 Logs = Annotated[list[Path], typer.Argument(help="Grasp logs of one material, each one grasp.")]
 
 
@@ -71,7 +72,7 @@ def detect(
 
 def fit(
     logs: Logs,
-    method: Annotated[str, typer.Option("--method", help="Estimator: ols, robust, conjugate, bayes or auto.")] = "ols",
+    method: Annotated[str, typer.Option("--method", help=METHOD_HELP)] = "ols",
     detector: Annotated[str | None, typer.Option(help=DETECTOR_HELP)] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the sampler.")] = 0,
     mapping: Mapping = None,

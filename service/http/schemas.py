@@ -9,8 +9,8 @@ from pydantic.config import JsonDict
 from db.records import Job, JobKind, JobStatus, Material, StoredGraspLog, StoredModel, Withdrawal
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}$"
-ModelMethod = Literal["ols", "robust", "conjugate", "bayes"]
-FitMethod = Literal["ols", "robust", "conjugate", "bayes", "auto"]
+ModelMethod = Literal["ols", "robust", "conjugate", "hierarchical", "bayes"]
+FitMethod = Literal["ols", "robust", "conjugate", "hierarchical", "bayes", "auto"]
 
 _MOMENT = "2026-11-21T08:41:00.123456Z"
 _MODEL: JsonDict = {

@@ -162,7 +162,7 @@ def _find_friction(session: Session, frames: list[Frame], answers: list[SlipStat
     session.looked_until = end
     part = {entry.name: getattr(samples, entry.name)[new] for entry in fields(samples) if entry.name != "element_area"}
     found = FrictionSamples(**part, element_area=samples.element_area)
-    session.moments = session.moments.merge(estimators.Moments.from_samples(found))
+    session.moments = session.moments.merge(estimators.Moments.from_samples(found, places=False))
     session.friction = _fitted(session.moments)
 
 

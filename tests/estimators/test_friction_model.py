@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import integrate, special, stats
 
-from estimators import Cost, Domain, FrictionModel, InvalidSamples
+from estimators import Cost, Domain, FrictionModel, InvalidSamples, Scale, Scales
 
 
 def model(scale: float = 1.0, error: float = 0.3, freedom: float = 3.0, n: int = 5003) -> FrictionModel:
@@ -76,3 +76,30 @@ def test_without_scatter_and_error_every_quantile_is_the_mean() -> None:
 def test_a_quantile_that_is_no_probability_is_refused(quantile: float) -> None:
     with pytest.raises(InvalidSamples, match="quantile"):
         model().predict(0.0, 0.0, quantile)
+
+
+def scattering(**changes: object) -> FrictionModel:
+    scales = Scales(Scale(0.05, np.inf), Scale(0.02, np.inf), Scale(0.03, np.inf))
+    return replace(model(), degrees_of_freedom=np.inf, scales=scales, **changes)
+
+
+def test_a_contact_averages_what_differs_between_its_elements() -> None:
+    asked, score = scattering(covariance=np.zeros((3, 3))), special.ndtri(0.01)
+    mean = float(asked.predict(2e-3, 0.05))
+    for of, elements, count in (("element", None, 1), ("contact", 1, 1), ("contact", 50, 50)):
+        expected = mean + score * np.sqrt((0.05 * mean) ** 2 + (0.02**2 + 0.03**2) / count)
+        np.testing.assert_allclose(asked.predict(2e-3, 0.05, 0.01, of=of, elements=elements), expected, rtol=1e-12)
+
+
+def test_without_scales_a_contact_scatters_as_an_element_does() -> None:
+    asked = replace(scattering(), scales=None)
+    assert asked.predict(2e-3, 0.05, 0.01, of="contact", elements=50) == asked.predict(2e-3, 0.05, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("of", "elements", "name"),
+    [("grasp", 5, "of"), ("contact", None, "elements"), ("contact", 0, "elements")],
+)
+def test_what_is_predicted_must_be_known(of: str, elements: int | None, name: str) -> None:
+    with pytest.raises(InvalidSamples, match=f"^{name} is"):
+        scattering().predict(2e-3, 0.05, 0.01, of=of, elements=elements)

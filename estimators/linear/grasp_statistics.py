@@ -1,0 +1,155 @@
+"""Mergeable statistics of a grasp by place: what the model of scatter between grasps, places and samples needs."""
+
+import struct
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.errors import InvalidSamples
+from estimators.linear.least_squares import factorise, upper_triangle
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+MAX_PLACES = 480
+"""Places that are kept one by one: 32 bytes each, so that a grasp takes less than 16 kB."""
+MAX_GROUPS = 170
+"""Groups of places of about the same weight that more places are pooled into: 88 bytes each."""
+
+HEADER = struct.Struct("<2I8d")
+UPPER = np.triu_indices(3)
+
+
+class Columns(NamedTuple):
+    """Samples of one grasp: ``values`` [k, 3] of (v, f_n, μ), ``weight`` [k] > 0 and ``place`` [k], codes from 0."""
+
+    values: FloatArray
+    weight: FloatArray
+    place: IntArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GraspStatistics:
+    """Weights and means of the places (elements) of one grasp, and the spread of its samples about them.
+
+    Groups [g] of places: ``count`` places of about the same ``weight`` Σw each, the weighted ``mean`` [g, 3] of
+    (v, f_n, μ), and the triangular factor ``spread`` [g, 3, 3] of the places' means about it, which is zero where a
+    group is one place. ``within`` [3, 3]: triangular factor of all samples about the means of their places.
+    ``total_weight`` Σw and ``weight_square`` Σw² give the effective number of samples.
+
+    Exact up to ``MAX_PLACES`` places; beyond, places whose weights differ by a few per cent count as alike.
+    """
+
+    count: FloatArray
+    weight: FloatArray
+    mean: FloatArray
+    spread: FloatArray
+    within: FloatArray
+    total_weight: float
+    weight_square: float
+
+    @classmethod
+    def from_columns(cls, columns: Columns, normal_force_noise: float = 0.0) -> "GraspStatistics":
+        """Statistics of samples whose f_n carries noise of the standard deviation given, N.
+
+        The places' means average that noise away; the deviations from them are regressed towards what v says of f_n
+        (regression calibration; Carroll et al., 2006, §4), or noise would pass for a slope within places.
+        """
+        values, weight, place = columns
+        centre = weight @ values / weight.sum()
+        offset = values - centre
+        sums = np.bincount(place, weight).astype(float)
+        mean = np.stack([np.bincount(place, weight * column) for column in offset.T], axis=1) / sums[:, None]
+        within = factorise(offset - mean[place], weight, intercept=False).triangle.astype(float)
+        freedom = max(1.0 - len(sums) / len(weight), 0.0)
+        count, sums, mean, spread = _pooled(sums, mean)
+        return cls(
+            count=count,
+            weight=sums,
+            mean=mean + centre,
+            spread=spread,
+            within=calibrated(within, float(weight.sum()) * freedom, normal_force_noise),
+            total_weight=float(weight.sum()),
+            weight_square=float(weight @ weight),
+        )
+
+    def scaled(self, normal_force: float) -> "GraspStatistics":
+        """The same with all f_n times a factor, as on elements of another area."""
+        factor = np.array([1.0, normal_force, 1.0])
+        return replace(self, mean=self.mean * factor, spread=self.spread * factor, within=self.within * factor)
+
+    def to_bytes(self) -> bytes:
+        """These statistics in little-endian doubles, less than 16 kB."""
+        pooled = bool((self.count > 1.0).any())
+        header = HEADER.pack(
+            len(self.count), pooled, self.total_weight, self.weight_square, *(float(x) for x in self.within[UPPER])
+        )
+        columns = [self.weight[:, None], self.mean]
+        if pooled:
+            columns += [self.count[:, None], self.spread[:, UPPER[0], UPPER[1]]]
+        return header + np.concatenate(columns, axis=1).astype("<f8").tobytes()
+
+    @classmethod
+    def from_bytes(cls, content: bytes) -> tuple["GraspStatistics", bytes]:
+        """Statistics from the start of ``content``, and the rest; raises ``InvalidSamples`` for anything else."""
+        if len(content) < HEADER.size:
+            raise InvalidSamples("moments of a grasp", f"{len(content)} bytes", f"at least {HEADER.size} bytes")
+        groups, pooled, total, square, *within = HEADER.unpack_from(content)
+        width = 11 if pooled else 4
+        end = HEADER.size + 8 * width * groups
+        if pooled > 1 or len(content) < end:
+            raise InvalidSamples("moments of a grasp", f"{len(content)} bytes", f"{end} bytes for {groups} groups")
+        table = np.frombuffer(content[HEADER.size : end], "<f8").reshape(groups, width).astype(float)
+        _check(table, total, square, within)
+        triangle, spread = np.zeros((3, 3)), np.zeros((groups, 3, 3))
+        triangle[UPPER] = within
+        count = table[:, 4] if pooled else np.ones(groups)
+        if pooled:
+            spread[:, UPPER[0], UPPER[1]] = table[:, 5:]
+        return cls(count, table[:, 0], table[:, 1:4], spread, triangle, total, square), content[end:]
+
+
+def calibrated(within: FloatArray, weight: float, noise: float) -> FloatArray:
+    """Triangle [3, 3] of (v, f_n, μ) about places with f_n replaced by what is expected of it without its noise.
+
+    Of the part of f_n that v does not tell, whose variance is the square of the diagonal entry over the ``weight`` that
+    is left after the means, the part ``noise``² is noise. Its regression on the measured values shrinks that entry and
+    nothing else.
+    """
+    square = float(within[1, 1]) ** 2
+    if not (noise > 0.0 and square > 0.0):
+        return within
+    shrunk = within.copy()
+    shrunk[1, 1] *= 1.0 - min(noise**2 * weight / square, 1.0)
+    return shrunk
+
+
+def _pooled(weight: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Count, weight, mean and spread of groups: one a place, or places of about the same weight where there are many.
+
+    Σ W mean meanᵀ over the places stays exact; that all places of a group have its mean weight is approximate.
+    """
+    if len(weight) <= MAX_PLACES:
+        return np.ones(len(weight)), weight, mean, np.zeros((len(weight), 3, 3))
+    height = np.log(weight / weight.min())
+    bins = np.floor(height / (height.max() or 1.0) * (1.0 - 1e-12) * MAX_GROUPS).astype(np.int64)
+    groups = [np.flatnonzero(bins == code) for code in np.unique(bins)]
+    count = np.array([float(len(group)) for group in groups])
+    typical = np.array([weight[group].mean() for group in groups])
+    centre = np.stack([weight[group] @ mean[group] / weight[group].sum() for group in groups])
+    spread: FloatArray = np.stack(
+        [
+            upper_triangle(np.sqrt(weight[group] / typical[k])[:, None] * (mean[group] - centre[k])).astype(float)
+            for k, group in enumerate(groups)
+        ]
+    )
+    return count, typical, centre, spread
+
+
+def _check(table: FloatArray, total: float, square: float, within: list[float]) -> None:
+    if not (np.isfinite(table).all() and np.isfinite([total, square, *within]).all()):
+        raise InvalidSamples("moments of a grasp", "not finite", "finite numbers")
+    if not (total > 0.0 and square > 0.0 and (table[:, 0] > 0.0).all()):
+        raise InvalidSamples("moments of a grasp", "a weight of 0 or less", "weights above 0")

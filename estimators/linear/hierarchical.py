@@ -1,0 +1,174 @@
+"""The Gaussian model with the structure that grasps have; friction's coefficients integrated out in closed form.
+
+A sample k of place e in grasp g observes ``μ = (1 + u_g) x·β + p_ge + ε_k`` with x = (1, v, f_n), u ~ N(0, τ²),
+p ~ N(0, ω²), ε ~ N(0, σ²/w_k): a grasp scales the whole law, a place shifts it (Searle et al., 1992, ch. 6).
+
+Given λ = τ²/σ² and ρ = ω²/σ², the places are integrated out by giving the mean of a place of weight W the weight
+W/(1 + ρW) (Lindley & Smith, 1972), the grasp by the rank-one update of Sherman and Morrison along h = x·b̂, with b̂ near
+the coefficients' mean; determinants follow from the same two. What is left is a normal density of β.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from estimators.defaults import PRIOR, REFERENCE
+from estimators.linear.grasp_statistics import GraspStatistics
+from estimators.linear.normal_inverse_gamma import NormalInverseGamma
+from estimators.linear.priors import log_half_student
+
+FloatArray = NDArray[np.float64]
+
+FIRST, SECOND = np.triu_indices(4)
+WHOLE = np.zeros((4, 4), dtype=int)
+WHOLE[FIRST, SECOND] = WHOLE[SECOND, FIRST] = np.arange(10)
+"""Where each entry of a symmetric matrix [4, 4] stands among the ten that are kept."""
+
+
+class Conditional(NamedTuple):
+    """What follows at points [k]: the log density of (log σ, log λ, log ρ), mean [k, 3] and covariance of β."""
+
+    log_density: FloatArray
+    mean: FloatArray
+    covariance: FloatArray
+
+
+class Products(NamedTuple):
+    """Sums over all grasps at points [k]: the ``square`` [k, 10] of the rows (γ | residual), and a log determinant."""
+
+    square: FloatArray
+    log_determinant: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hierarchical:
+    """Rows of all grasps in coordinates γ in which the pooled fit is (0, I), so that squares may be formed.
+
+    β = ``pooled.mean`` + ``pooled.root`` γ. Groups of places [m] in the order of their grasps: ``group`` [10, m] sums
+    of squares of (γ | residual), ``count`` and ``weight`` [m] as in ``GraspStatistics``; ``start`` [g]: where those of
+    each grasp begin; ``within`` [g, 10]; ``prior`` [10] the same of the prior; ``direction`` [3]: the γ of b̂.
+    """
+
+    group: FloatArray
+    count: FloatArray
+    weight: FloatArray
+    start: NDArray[np.int64]
+    within: FloatArray
+    prior: FloatArray
+    direction: FloatArray
+    effective_n: float
+    pooled: NormalInverseGamma
+
+    def products(self, log_lambda: FloatArray, log_rho: FloatArray) -> Products:
+        """Sums at all pairs of λ [l] and ρ [r], as [l · r] points of which ρ varies fastest."""
+        cells = [self._given_rho(np.exp(log_lambda), rho) for rho in np.exp(log_rho)]
+        square = np.stack([cell.square for cell in cells], axis=1)
+        log_determinant = np.stack([cell.log_determinant for cell in cells], axis=1)
+        return Products(square.reshape(-1, 10), log_determinant.reshape(-1))
+
+    def _given_rho(self, ratio: FloatArray, rho: float) -> Products:
+        """Sums for all λ [l]: what a grasp says across h stays, what it says along h shrinks by 1/(1 + λ h'h)."""
+        shrunk = self.weight / (1.0 + rho * self.weight)
+        grasp = self.within + np.add.reduceat(shrunk * self.group, self.start, axis=1).T
+        along = grasp[:, WHOLE[:, :3]] @ self.direction  # [g, 4]
+        size = np.maximum(along[:, :3] @ self.direction, np.finfo(float).tiny)
+        outer = along[:, FIRST] * along[:, SECOND] / size[:, None]
+        growth = 1.0 + ratio[:, None] * size
+        square = (grasp - outer).sum(axis=0) + (1.0 / growth) @ outer
+        places = float(self.count @ np.log1p(rho * self.weight))
+        return Products(square, places + np.log(growth).sum(axis=1))
+
+    def conditional(
+        self, products: Products, log_lambda: FloatArray, log_rho: FloatArray, log_sigma: FloatArray
+    ) -> Conditional:
+        """Density of (log σ, log λ, log ρ) at points [k] with all else integrated out, and β given them."""
+        square = products.square * np.exp(-2.0 * log_sigma)[:, None] + self.prior
+        precision = square[:, WHOLE[:3, :3]]
+        covariance = np.linalg.inv(precision)
+        gamma = np.einsum("kij,kj->ki", covariance, square[:, WHOLE[:3, 3]])
+        misfit = square[:, WHOLE[3, 3]] - np.einsum("ki,ki->k", gamma, square[:, WHOLE[:3, 3]])
+        log_tau, log_omega = log_sigma + 0.5 * log_lambda, log_sigma + 0.5 * log_rho
+        log = -0.5 * (misfit + products.log_determinant + np.linalg.slogdet(precision)[1])
+        log += -self.effective_n * log_sigma + log_prior(log_sigma, log_tau, log_omega)
+        root = self.pooled.root
+        return Conditional(log, self.pooled.mean + gamma @ root.T, root @ covariance @ root.T)
+
+    def log_sigma(self, products: Products) -> tuple[FloatArray, float]:
+        """Mean [k] and spread of log σ at points [k], the priors of β, τ and ω left aside: σ² is inverse-gamma then."""
+        square = products.square
+        precision = square[:, WHOLE[:3, :3]] + 1e-12 * np.eye(3)
+        solved = np.linalg.solve(precision, square[:, WHOLE[:3, 3], None])[..., 0]
+        misfit = square[:, WHOLE[3, 3]] - np.einsum("ki,ki->k", solved, square[:, WHOLE[:3, 3]])
+        total = np.maximum(misfit, 0.0) + PRIOR.degrees_of_freedom * REFERENCE.scatter**2
+        shape = 0.5 * max(self.effective_n + PRIOR.degrees_of_freedom - 3.0, 1.0)
+        mean = 0.5 * (np.log(0.5 * total) - special.digamma(shape))
+        return np.asarray(mean), float(0.5 * np.sqrt(special.polygamma(1, shape)))
+
+    def about(self, coefficients: FloatArray) -> "Hierarchical":
+        """The same with another b̂ [3]."""
+        return replace(self, direction=_direction(self.pooled, coefficients))
+
+
+def log_prior(log_sigma: FloatArray, log_tau: FloatArray, log_omega: FloatArray) -> FloatArray:
+    """Log density [k] of (log σ, log τ, log ω): σ² inverse-gamma, τ and ω half-Student-t; see ``defaults.PRIOR``."""
+    scatter = -PRIOR.degrees_of_freedom * (log_sigma + 0.5 * REFERENCE.scatter**2 * np.exp(-2.0 * log_sigma))
+    grasp = log_half_student(np.exp(log_tau), PRIOR.grasp_scatter, PRIOR.grasp_degrees_of_freedom) + log_tau
+    place = log_half_student(np.exp(log_omega), REFERENCE.scatter, PRIOR.effect_degrees_of_freedom) + log_omega
+    return np.asarray(scatter + grasp + place)
+
+
+def hierarchical(
+    grasps: Sequence[GraspStatistics], pooled: NormalInverseGamma, spans: FloatArray, about: FloatArray
+) -> Hierarchical:
+    """The model of these grasps; ``about`` [3]: b̂; the prior's slopes are weak over ``spans`` [2]."""
+    total = sum(grasp.total_weight for grasp in grasps)
+    unit = total / sum(grasp.weight_square for grasp in grasps)
+    group = np.concatenate([_group_squares(grasp, pooled) for grasp in grasps])
+    sizes = [len(grasp.count) for grasp in grasps]
+    return Hierarchical(
+        group=np.ascontiguousarray(group.T),
+        count=np.concatenate([grasp.count for grasp in grasps]),
+        weight=unit * np.concatenate([grasp.weight for grasp in grasps]),
+        start=np.concatenate([[0], np.cumsum(sizes)[:-1]]),
+        within=unit * np.stack([_squares(_rows(grasp.within, pooled)).sum(axis=0) for grasp in grasps]),
+        prior=_prior_square(pooled, spans),
+        direction=_direction(pooled, about),
+        effective_n=unit * total,
+        pooled=pooled,
+    )
+
+
+def _direction(pooled: NormalInverseGamma, about: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.solve(pooled.root, about))
+
+
+def _group_squares(grasp: GraspStatistics, pooled: NormalInverseGamma) -> FloatArray:
+    """Sums of squares [g, 10] over the places of each group, a weight of 1 each."""
+    means = np.column_stack([np.ones(len(grasp.mean)), grasp.mean])
+    centre = np.column_stack([means[:, :3] @ pooled.root, means[:, 3] - means[:, :3] @ pooled.mean])
+    square = grasp.count[:, None] * _squares(centre)
+    if (grasp.count > 1.0).any():
+        square += np.stack([_squares(_rows(spread, pooled)).sum(axis=0) for spread in grasp.spread])
+    return square
+
+
+def _rows(triangle: FloatArray, pooled: NormalInverseGamma) -> FloatArray:
+    """Rows in (v, f_n | μ) about their mean as rows [3, 4] in (γ | residual)."""
+    regressors = triangle[:, :2]
+    return np.column_stack([regressors @ pooled.root[1:], triangle[:, 2] - regressors @ pooled.mean[1:]])
+
+
+def _squares(rows: FloatArray) -> FloatArray:
+    """The ten products [k, 10] of each row [k, 4]."""
+    return np.asarray(rows[:, FIRST] * rows[:, SECOND])
+
+
+def _prior_square(pooled: NormalInverseGamma, spans: FloatArray) -> FloatArray:
+    """The prior β ~ N((μ₀, 0, 0), width² diag(1, 1/span²)) as sums of squares [10] in (γ | residual)."""
+    scale = np.concatenate([[1.0], spans]) / PRIOR.width
+    away = np.array([REFERENCE.friction, 0.0, 0.0]) - pooled.mean
+    return np.asarray(_squares(scale[:, None] * np.column_stack([pooled.root, away])).sum(axis=0))

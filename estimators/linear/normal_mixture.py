@@ -1,0 +1,53 @@
+"""Mixtures of normal distributions: their quantiles, and the Student-t that stands for one."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+FloatArray = NDArray[np.float64]
+
+MATCHED = (0.975, 0.999)
+"""Quantiles at which a Student-t is matched: that of a 95 % interval, and one that a planner asks for."""
+MOST_FREEDOM = 1e4
+"""Degrees of freedom from which a Student-t is taken as normal."""
+BISECTIONS = 40
+
+
+class Student(NamedTuple):
+    """A Student-t distribution about 0: ``scale`` and ``degrees_of_freedom``."""
+
+    scale: float
+    degrees_of_freedom: float
+
+
+def mixture_quantile(weight: FloatArray, mean: FloatArray, deviation: FloatArray, level: ArrayLike) -> FloatArray:
+    """Quantiles at ``level`` [q] of a mixture of m normals, by bisection; ``weight`` [m] sums to 1."""
+    wanted = np.atleast_1d(np.asarray(level, dtype=float))
+    score = special.ndtri(wanted)[:, None]
+    at = mean + score * deviation  # the mixture's quantile lies between the least and the largest of its parts'
+    low, high = at.min(axis=1), at.max(axis=1)
+    safe = np.maximum(deviation, np.finfo(float).tiny)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        below = special.ndtr((middle[:, None] - mean) / safe) @ weight < wanted
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return np.asarray(0.5 * (low + high))
+
+
+def matched_student(weight: FloatArray, mean: FloatArray, deviation: FloatArray) -> Student:
+    """The Student-t whose quantiles ``MATCHED`` are half the distances between those of a mixture and their mirrors."""
+    levels = np.array(MATCHED)
+    inner, outer = 0.5 * (
+        mixture_quantile(weight, mean, deviation, levels) - mixture_quantile(weight, mean, deviation, 1.0 - levels)
+    )
+    if not inner > 0.0:
+        return Student(0.0, MOST_FREEDOM)
+    low, high = 0.0, float(np.log(MOST_FREEDOM))
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        near, far = special.stdtrit(np.exp(middle), levels)
+        low, high = (middle, high) if far / near > outer / inner else (low, middle)
+    freedom = float(np.exp(0.5 * (low + high)))
+    return Student(float(inner / special.stdtrit(freedom, MATCHED[0])), freedom)

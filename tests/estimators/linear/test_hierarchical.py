@@ -1,0 +1,160 @@
+"""The hierarchical model against the dense normal density that it stands for."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import estimators
+from estimators.defaults import PRIOR, REFERENCE
+from estimators.linear import posterior_grid as grids
+from estimators.linear.fit_data import FitData, gather
+from estimators.linear.hierarchical import hierarchical, log_prior
+from estimators.linear.normal_inverse_gamma import exact_posterior
+from estimators.linear.normal_mixture import matched_student, mixture_quantile
+from estimators.linear.posterior_grid import posterior_grid
+from estimators.linear.priors import weak_spans
+from slipcore.samples import FrictionSamples
+
+TRUTH = np.array([0.45, 8.0, -0.8])
+
+
+def grasp(seed: int, tau: float = 0.06, omega: float = 0.02, sigma: float = 0.03, n: int = 60) -> FrictionSamples:
+    """A grasp whose law is scaled as a whole, and whose places differ."""
+    rng = np.random.default_rng([seed, 17])
+    place = rng.integers(0, 8, n)
+    v, f_n = rng.uniform(1e-4, 5e-3, n), rng.uniform(0.05, 0.2, 8)[place] * rng.uniform(0.8, 1.2, n)
+    law = (TRUTH @ [np.ones(n), v, f_n]) * (1.0 + tau * rng.standard_normal())
+    mu = law + omega * rng.standard_normal(8)[place] + sigma * rng.standard_normal(n)
+    return FrictionSamples(mu, v, f_n, mu * f_n, np.arange(n) * 0.01, place, np.ones(n), 1e-6)
+
+
+def dense(
+    data: FitData, about: np.ndarray, sigma: float, tau: float, omega: float
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Log density of μ, and mean and covariance of β, from covariance matrices of all samples."""
+    seen = data.observations
+    assert seen is not None
+    x = np.column_stack([np.ones(len(seen)), seen.tangential_velocity, seen.normal_force])
+    place, expected = seen.place(), x @ about
+    noise = np.diag(sigma**2 / seen.weight)
+    noise += omega**2 * (place[:, None] == place)
+    noise += tau**2 * (seen.grasp[:, None] == seen.grasp) * np.outer(expected, expected)
+    width = PRIOR.width / np.concatenate([[1.0], weak_spans(data.domain, data.element_area)])
+    centre = np.array([REFERENCE.friction, 0.0, 0.0])
+    marginal = stats.multivariate_normal(x @ centre, noise + (x * width**2) @ x.T)
+    covariance = np.linalg.inv(np.diag(width**-2.0) + x.T @ np.linalg.solve(noise, x))
+    mean = covariance @ (centre / width**2 + x.T @ np.linalg.solve(noise, seen.friction))
+    return float(marginal.logpdf(seen.friction)), mean, covariance
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_density_and_coefficients_are_those_of_the_dense_model(count: int) -> None:
+    data = gather([grasp(k) for k in range(count)])
+    pooled = exact_posterior(data)
+    about = np.array([0.42, 6.0, -0.5])
+    model = hierarchical(data.grasp_statistics(), pooled, weak_spans(data.domain, data.element_area), about)
+    points = [(0.03, 0.05, 0.02), (0.02, 0.2, 0.001), (0.05, 0.001, 0.05), (0.03, 0.5, 0.3)]
+    ours, theirs = [], []
+    for sigma, tau, omega in points:
+        ratios = np.log([tau**2 / sigma**2]), np.log([omega**2 / sigma**2])
+        given = model.conditional(model.products(*ratios), *ratios, np.log([sigma]))
+        log, mean, covariance = dense(data, about, sigma, tau, omega)
+        np.testing.assert_allclose(given.mean[0], mean, rtol=1e-8)
+        np.testing.assert_allclose(given.covariance[0], covariance, rtol=1e-7, atol=1e-12)
+        ours.append(given.log_density[0] - log_prior(*np.log([[sigma], [tau], [omega]]))[0])
+        theirs.append(log)
+    for (a, b), (c, d) in zip(pairwise(ours), pairwise(theirs), strict=True):
+        np.testing.assert_allclose(a - b, c - d, rtol=1e-8, atol=1e-7)
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_a_finer_grid_changes_nothing(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    data = gather([grasp(k) for k in range(count)])
+    coarse = posterior_grid(data).nodes
+    nodes, weights = np.polynomial.hermite_e.hermegauss(15)
+    for name, value in (("FINE", 60), ("DEPTH", 14.0), ("SIGMA_NODES", nodes), ("SIGMA_WEIGHTS", weights)):
+        monkeypatch.setattr(grids, name, value)
+    fine = posterior_grid(data).nodes
+    for k in range(3):
+        low, high = (
+            mixture_quantile(part.weight, part.mean[:, k], np.sqrt(part.covariance[:, k, k]), [0.025, 0.5, 0.975])
+            for part in (coarse, fine)
+        )
+        np.testing.assert_allclose(low, high, atol=0.02 * np.ptp(high))
+    np.testing.assert_allclose(coarse.weight @ coarse.scatter, fine.weight @ fine.scatter, rtol=0.03)
+
+
+def test_the_scales_are_found() -> None:
+    scales = estimators.fit([grasp(k, n=300) for k in range(60)], method="hierarchical").scales
+    assert scales is not None
+    assert abs(scales.between_grasps.value - 0.06) < 3 * 0.06 / np.sqrt(2 * 60)
+    assert abs(scales.between_places.value - 0.02) < 3 * 0.02 / np.sqrt(2 * 60 * 7)
+    assert abs(scales.within.value - 0.03) < 3 * 0.03 / np.sqrt(2 * 60 * 290)
+    assert 20.0 < scales.between_grasps.degrees_of_freedom < 120.0
+
+
+def test_intervals_shrink_as_grasps_come_and_one_grasp_answers() -> None:
+    widths = [
+        np.ptp(estimators.fit([grasp(k) for k in range(count)], method="hierarchical").interval()[0])
+        for count in (1, 3, 10, 40)
+    ]
+    assert np.isfinite(widths).all()
+    assert (np.diff(widths) < 0.0).all()
+
+
+@pytest.mark.parametrize("scatter", [(0.06, 0.0, 0.03), (0.0, 0.03, 0.005), (0.0, 0.0, 0.03), (0.06, 0.03, 0.03)])
+def test_intervals_cover_whatever_scatters(scatter: tuple[float, float, float]) -> None:
+    fits, inside = 60, np.zeros(3)
+    for seed in range(fits):
+        low, high = (
+            estimators.fit([grasp(1000 * seed + k, *scatter) for k in range(4)], method="hierarchical").interval().T
+        )
+        inside += (low <= TRUTH) & (high >= TRUTH)
+    assert (inside >= stats.binom(fits, 0.95).ppf(1e-3)).all(), inside
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_units_of_force_do_not_matter(unit: float) -> None:
+    grasps = [grasp(k) for k in range(3)]
+    model = estimators.fit(grasps, method="hierarchical")
+    other = estimators.fit([part.at_element_area(unit * 1e-6) for part in grasps], method="hierarchical")
+    factor = np.array([1.0, 1.0, 1.0 / unit])
+    np.testing.assert_allclose(other.coefficients, model.coefficients * factor, rtol=1e-6)
+    np.testing.assert_allclose(other.covariance, model.covariance * np.outer(factor, factor), rtol=1e-4)
+
+
+def flat(part: FrictionSamples, name: str) -> FrictionSamples:
+    from dataclasses import replace
+
+    return replace(part, **{name: np.full(len(part), float(getattr(part, name).mean()))})
+
+
+@pytest.mark.parametrize("name", ["tangential_velocity", "normal_force"])
+def test_a_regressor_that_never_varies_is_not_identified(name: str) -> None:
+    model = estimators.fit([flat(grasp(k), name) for k in range(4)], method="hierarchical")
+    which = 1 if name == "tangential_velocity" else 2
+    assert not model.identifiable[which]
+    low, high = model.predict(2.5e-3, 0.125, 0.005), model.predict(2.5e-3, 0.125, 0.995)
+    assert 0.1 < low < model.predict(2.5e-3, 0.125) < high < 0.7
+
+
+def test_friction_without_any_scatter_is_found_all_the_same() -> None:
+    model = estimators.fit([grasp(k, 0.0, 0.0, 0.0) for k in range(3)], method="hierarchical")
+    np.testing.assert_allclose(model.coefficients, TRUTH, rtol=5e-3)
+    assert model.scales is not None
+    assert model.scales.within.value < 3e-3
+
+
+def test_a_student_is_matched_to_its_own_mixture() -> None:
+    rank = (np.arange(4000) + 0.5) / 4000
+    deviation = 0.3 * np.sqrt(9.0 / stats.chi2(9).ppf(rank))
+    found = matched_student(np.full(4000, 1 / 4000), np.zeros(4000), deviation)
+    np.testing.assert_allclose(found, (0.3, 9.0), rtol=0.03)
+
+
+def test_the_quantile_of_a_mixture_is_where_its_distribution_says() -> None:
+    weight, mean, deviation = np.array([0.2, 0.5, 0.3]), np.array([-1.0, 0.0, 2.0]), np.array([0.5, 0.1, 1.0])
+    at = mixture_quantile(weight, mean, deviation, [1e-3, 0.3, 0.9])
+    np.testing.assert_allclose(stats.norm(mean, deviation).cdf(at[:, None]) @ weight, [1e-3, 0.3, 0.9], atol=1e-9)
