@@ -202,10 +202,11 @@ class LogFilter:
 
 @dataclass(frozen=True, slots=True)
 class Withdrawal:
-    """That a log was taken out of the fits, when and why."""
+    """That a log was taken out of the fits, when, why, and with which access key, None without one."""
 
     at: datetime
     because: str
+    by: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from service.http.envelope import Envelope
 from service.http.gate import Admission, Gate
 from service.http.head_requests import HeadRequests
 from service.http.lookups import Lookups
-from service.http.routes import curation, grasp_logs, health, jobs, materials, metrics, planning, stream
+from service.http.routes import audit, curation, grasp_logs, health, jobs, materials, metrics, owners, planning, stream
 from service.http.start_refusal import StartRefusal
 from service.jobs.lanes import lanes
 from service.jobs.retention import Retention
@@ -73,7 +73,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         },
         generate_unique_id_function=openapi.operation_id,
     )
-    for module in (health, metrics, materials, grasp_logs, curation, planning, jobs, stream):
+    for module in (health, metrics, materials, owners, grasp_logs, curation, planning, jobs, stream, audit):
         app.include_router(module.router)
     access.check_routes(app)
     app.state.metrics = Metrics()
@@ -116,6 +116,7 @@ async def running(
                 settings.keep_uploads_days,
                 lambda: runner.leads,
                 unreferenced_days=settings.keep_unreferenced_days,
+                audit_days=settings.keep_audit_days,
             )
             retention.start()
             try:

@@ -42,6 +42,9 @@ class Settings(BaseSettings):
         default=None,
         description="Days after which files to which nothing refers, set aside by then, are deleted. Default: never.",
     )
+    keep_audit_days: Annotated[float, Field(ge=30.0, le=36500.0)] | None = Field(
+        default=None, description="Days after which entries of the audit trail are deleted. Default: never."
+    )
     migrate_at_start: bool = Field(
         default=True,
         description="Bring the database to this version's schema at start; otherwise an old one stops the start.",

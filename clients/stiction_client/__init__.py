@@ -41,7 +41,15 @@ if TYPE_CHECKING:
     )
     from stiction_client.model import Cost, Domain, FrictionModel
     from stiction_client.planner import RequiredForce, RequiredForces, required_normal_force
-    from stiction_client.records import Detection, FrictionAnswer, GraspLogReceipt, Job, Material, Recognition
+    from stiction_client.records import (
+        AuditEntry,
+        Detection,
+        FrictionAnswer,
+        GraspLogReceipt,
+        Job,
+        Material,
+        Recognition,
+    )
 
 _LAZY = {
     "AsyncFrictionClient": "stiction_client.client",
@@ -72,6 +80,7 @@ _LAZY = {
     "RequiredForce": "stiction_client.planner",
     "RequiredForces": "stiction_client.planner",
     "required_normal_force": "stiction_client.planner",
+    "AuditEntry": "stiction_client.records",
     "Detection": "stiction_client.records",
     "FrictionAnswer": "stiction_client.records",
     "GraspLogReceipt": "stiction_client.records",
@@ -83,6 +92,7 @@ _LAZY = {
 
 __all__ = [
     "AsyncFrictionClient",
+    "AuditEntry",
     "ConnectionFailed",
     "Contact",
     "Contacts",

@@ -14,7 +14,7 @@ from stiction_client.container import GraspLogLike
 from stiction_client.errors import ConnectionFailed
 from stiction_client.flows import Answer, Ended, Flow, Pause, Request, T
 from stiction_client.model import FrictionModel
-from stiction_client.records import FrictionAnswer, GraspLogReceipt, Job, Material, Recognition
+from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt, Job, Material, Recognition
 
 TIMEOUT = 30.0
 """s for one request; an upload at the service's size limit takes a second on a local network."""
@@ -129,6 +129,24 @@ class FrictionClient:
         """End a job that nobody wants any more; ``ProblemError`` where it has ended otherwise."""
         return self._run(flows.cancel(_job_id(job)))
 
+    def owners(self, name: str) -> list[str]:
+        """Whose a material is: ``key:ID`` and ``group:NAME``; without any, the keys' scopes alone decide."""
+        return self._run(flows.owners(name))
+
+    def add_owner(self, name: str, owner: str) -> list[str]:
+        """Let ``key:ID`` or ``group:NAME`` own a material, too, and get all its owners."""
+        return self._run(flows.add_owner(name, owner))
+
+    def remove_owner(self, name: str, owner: str) -> None:
+        """Take a material from an owner."""
+        self._run(flows.remove_owner(name, owner))
+
+    def audit(
+        self, actor: str | None = None, action: str | None = None, subject: str | None = None, limit: int = 100
+    ) -> list[AuditEntry]:
+        """The newest entries of the audit trail: who changed what, when, and from where. Needs a key of scope admin."""
+        return self._run(flows.audit(actor, action, subject, limit))
+
     def wait(self, job: Job | GraspLogReceipt | str, timeout: float = JOB_TIMEOUT) -> Job:
         """Wait until a job has ended and return it, whatever its end; ``JobTimedOut`` after ``timeout`` s.
 
@@ -240,6 +258,24 @@ class AsyncFrictionClient:
     async def cancel(self, job: Job | GraspLogReceipt | str) -> Job:
         """As ``FrictionClient.cancel``."""
         return await self._run(flows.cancel(_job_id(job)))
+
+    async def owners(self, name: str) -> list[str]:
+        """As ``FrictionClient.owners``."""
+        return await self._run(flows.owners(name))
+
+    async def add_owner(self, name: str, owner: str) -> list[str]:
+        """As ``FrictionClient.add_owner``."""
+        return await self._run(flows.add_owner(name, owner))
+
+    async def remove_owner(self, name: str, owner: str) -> None:
+        """As ``FrictionClient.remove_owner``."""
+        await self._run(flows.remove_owner(name, owner))
+
+    async def audit(
+        self, actor: str | None = None, action: str | None = None, subject: str | None = None, limit: int = 100
+    ) -> list[AuditEntry]:
+        """As ``FrictionClient.audit``."""
+        return await self._run(flows.audit(actor, action, subject, limit))
 
     async def wait(self, job: Job | GraspLogReceipt | str, timeout: float = JOB_TIMEOUT) -> Job:
         """As ``FrictionClient.wait``."""

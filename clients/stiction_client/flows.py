@@ -28,7 +28,7 @@ from stiction_client.errors import (
     UnexpectedAnswer,
 )
 from stiction_client.model import FrictionModel
-from stiction_client.records import FrictionAnswer, GraspLogReceipt, Job, Material, Recognition
+from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt, Job, Material, Recognition
 
 ATTEMPTS = 3
 """Times that a request is tried before a broken connection is an error."""
@@ -212,6 +212,45 @@ def cancel(job_id: str) -> Flow[Job]:
     return _record(Job.from_json, (yield from _ask(request)))
 
 
+def owners(name: str) -> Flow[list[str]]:
+    """Ask whose a material is."""
+    return _record(_owners, (yield from _get(f"/v1/materials/{_part(name)}/owners")))
+
+
+def add_owner(name: str, owner: str) -> Flow[list[str]]:
+    """Let a key or a group own a material, too, which is harmless twice."""
+    path = f"/v1/materials/{_part(name)}/owners/{_part(owner)}"
+    return _record(_owners, (yield from _ask(Request("PUT", path))))
+
+
+def remove_owner(name: str, owner: str) -> Flow[None]:
+    """Take a material from an owner."""
+    yield from _ask(Request("DELETE", f"/v1/materials/{_part(name)}/owners/{_part(owner)}"))
+
+
+def _owners(record: Mapping[str, Any]) -> list[str]:
+    return [str(owner) for owner in record["owners"]]
+
+
+def audit(actor: str | None, action: str | None, subject: str | None, limit: int) -> Flow[list[AuditEntry]]:
+    """Ask for the newest entries of the audit trail, page after page up to ``limit``."""
+    found: list[AuditEntry] = []
+    cursor: str | None = None
+    while True:
+        page = min(PAGE, limit - len(found))
+        answer = yield from _get(
+            "/v1/audit", _given(actor=actor, action=action, subject=subject, limit=page, cursor=cursor)
+        )
+        entries, cursor = _record(_page_of_entries, answer)
+        found += entries
+        if cursor is None or len(found) >= limit:
+            return found
+
+
+def _page_of_entries(record: Mapping[str, Any]) -> tuple[list[AuditEntry], str | None]:
+    return [AuditEntry.from_json(item) for item in record["items"]], record.get("next")
+
+
 def wait(job_id: str, timeout: float) -> Flow[Job]:
     """Ask for a job until it has ended; the service keeps its answer back that long, unless it is an older one."""
     deadline = time.monotonic() + timeout
@@ -255,6 +294,8 @@ def _ask(request: Request) -> Flow[Any]:
 def _content(response: httpx.Response) -> Any:
     if not response.is_success:
         _refuse(response)
+    if response.status_code == httpx.codes.NO_CONTENT:
+        return None
     try:
         return response.json()
     except (JSONDecodeError, UnicodeDecodeError) as error:

@@ -160,5 +160,27 @@ class Recognition:
         return cls(record["method"], probability, float(record["unknown"]))
 
 
+@dataclass(frozen=True, slots=True)
+class AuditEntry:
+    """That ``actor`` (``key:ID``, ``anybody``, ``command:USER`` or ``service``) did ``action`` to ``subject``.
+
+    ``address`` and ``request_id`` tell from where, ``details`` what else there is to say.
+    """
+
+    id: int
+    at: str
+    actor: str
+    address: str | None
+    request_id: str | None
+    action: str
+    subject: str
+    details: dict[str, Any]
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "AuditEntry":
+        """The entry in the service's answer."""
+        return cls(**_values(cls, record))
+
+
 def _values(kind: type[Any], record: Mapping[str, Any]) -> dict[str, Any]:
     return {entry.name: record[entry.name] for entry in fields(kind)}  # what a newer service adds is passed over

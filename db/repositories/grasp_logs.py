@@ -89,11 +89,14 @@ def material_id(session: Session, log_id: str) -> int | None:
     return found[0]
 
 
-def withdraw(session: Session, log_id: str, because: str) -> bool:
-    """Take a log out of the fits, or only renew the reason; True if that was the first time. Raises ``NotFound``."""
+def withdraw(session: Session, log_id: str, because: str, by: str | None = None) -> bool:
+    """Take a log out of the fits, or only renew the reason; True if that was the first time. Raises ``NotFound``.
+
+    ``by`` is the id of the access key with which that is asked for.
+    """
     row = _locked(session, log_id)
     is_new = row.withdrawn_at is None
-    row.withdrawn_at, row.withdrawn_because = row.withdrawn_at or now(), because
+    row.withdrawn_at, row.withdrawn_because, row.withdrawn_by = row.withdrawn_at or now(), because, by
     session.flush()
     return is_new
 
@@ -102,7 +105,7 @@ def restore(session: Session, log_id: str) -> bool:
     """Put a log back into the fits; False if it was in them. Raises ``NotFound``."""
     row = _locked(session, log_id)
     was_withdrawn = row.withdrawn_at is not None
-    row.withdrawn_at = row.withdrawn_because = None
+    row.withdrawn_at = row.withdrawn_because = row.withdrawn_by = None
     session.flush()
     return was_withdrawn
 
@@ -155,7 +158,7 @@ def _locked(session: Session, log_id: str) -> GraspLogRow:
 def _withdrawal(row: GraspLogRow) -> Withdrawal | None:
     if row.withdrawn_at is None or row.withdrawn_because is None:
         return None
-    return Withdrawal(row.withdrawn_at, row.withdrawn_because)
+    return Withdrawal(row.withdrawn_at, row.withdrawn_because, row.withdrawn_by)
 
 
 def _sensor_id(session: Session, name: str) -> int:

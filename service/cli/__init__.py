@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import typer
 
-from service.cli import blobs, database, jobs, keys, local, remote, running, simulation
+from service.cli import audit, blobs, database, jobs, keys, local, owners, remote, running, simulation
 from service.cli.exit_codes import exit_code
 
 app = typer.Typer(
@@ -29,9 +29,11 @@ for command in (
     remote.upload,
     remote.lookup,
     remote.plan,
+    audit.audit,
 ):
     app.command()(command)
 app.add_typer(jobs.app, name="jobs")
+app.add_typer(owners.app, name="owners")
 app.add_typer(database.app, name="db")
 app.add_typer(blobs.app, name="blobs")
 app.add_typer(keys.app, name="keys")

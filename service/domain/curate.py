@@ -5,8 +5,11 @@ from collections.abc import Iterable
 from sqlalchemy.orm import Session
 
 from db.records import Job, Material, StoredGraspLog
-from db.repositories import detections, friction_models, grasp_logs, jobs, materials
+from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, owners
 from service.context import Context
+from service.domain.asker import ANYBODY, Asker
+from service.domain.ownership import check_may_change
+from service.http.access import insufficient_scope
 from service.http.problems import INVALID_REQUEST, Problem
 from service.jobs.queueing import queue
 
@@ -14,13 +17,26 @@ REFITTED = "ols"
 """The method by which a material is fitted even if it has no model yet, as after an upload."""
 
 
-def change(context: Context, material: str, name: str | None, description: str | None) -> Material:
+def create(session: Session, name: str, description: str, asker: Asker) -> Material:
+    """Make a material known, which belongs to the asker's key and its group; raises ``AlreadyExists``."""
+    made = materials.create(session, name, description)
+    for owner in asker.owners:
+        owners.add(session, made.id, owner)
+    told = {"description": description, "owners": list(asker.owners)}
+    audit.add(session, asker.actor, "material.created", name, told)
+    return made
+
+
+def change(
+    context: Context, material: str, name: str | None, description: str | None, asker: Asker = ANYBODY
+) -> Material:
     """Rename a material, its old name becoming an alias, or change its description.
 
-    Raises ``NotFound``, and ``AlreadyExists`` for a name that another material has.
+    Raises ``NotFound``, ``AlreadyExists`` for a name that another material has, ``Problem`` for who may not.
     """
     with context.database.write() as session:
-        material_id = materials.find_id(session, material)
+        material_id = _changeable(session, material, asker)
+        audit.add(session, asker.actor, "material.changed", material, {"name": name, "description": description})
         if description is not None:
             materials.describe(session, material_id, description)
         if name is not None:
@@ -30,56 +46,77 @@ def change(context: Context, material: str, name: str | None, description: str |
     return changed
 
 
-def add_alias(context: Context, material: str, alias: str) -> Material:
-    """Let a material be found by one more name; raises ``NotFound`` and ``AlreadyExists``."""
+def add_alias(context: Context, material: str, alias: str, asker: Asker = ANYBODY) -> Material:
+    """Let a material be found by one more name; raises as ``change``."""
     with context.database.write() as session:
-        materials.add_alias(session, materials.find_id(session, material), alias)
+        materials.add_alias(session, _changeable(session, material, asker), alias)
+        audit.add(session, asker.actor, "alias.added", material, {"alias": alias})
         return materials.get(session, material)
 
 
-def remove_alias(context: Context, material: str, alias: str) -> None:
-    """Free an alias; raises ``NotFound``."""
+def remove_alias(context: Context, material: str, alias: str, asker: Asker = ANYBODY) -> None:
+    """Free an alias; raises as ``change``."""
     with context.database.write() as session:
-        materials.remove_alias(session, materials.find_id(session, material), alias)
+        materials.remove_alias(session, _changeable(session, material, asker), alias)
+        audit.add(session, asker.actor, "alias.removed", material, {"alias": alias})
     context.models.seen()
 
 
-def merge(context: Context, material: str, source: str, key_id: str | None = None) -> tuple[Material, list[Job]]:
-    """Put what is known of ``source`` to ``material`` and refit it; raises ``NotFound``."""
+def merge(context: Context, material: str, source: str, asker: Asker = ANYBODY) -> tuple[Material, list[Job]]:
+    """Put what is known of ``source`` to ``material`` and refit it; both must be the asker's. Raises as ``change``."""
     with context.database.write() as session:
-        target_id, source_id = (materials.find_id(session, name) for name in (material, source))
+        target_id, source_id = (_changeable(session, name, asker) for name in (material, source))
         if target_id == source_id:
             raise Problem.wrong_value(INVALID_REQUEST, "source", source, "another material than the one in the path")
         methods = friction_models.current_methods(session, [target_id, source_id])
         materials.merge(session, target_id, source_id)
-        queued = _queue_refits(session, target_id, methods, key_id)
+        audit.add(session, asker.actor, "material.merged", material, {"source": source})
+        queued = _queue_refits(session, target_id, methods, asker.key_id)
         merged = materials.get(session, material)
     return merged, _follow_up(context, queued)
 
 
-def withdraw(
-    context: Context, log_id: str, because: str, key_id: str | None = None
-) -> tuple[StoredGraspLog, list[Job]]:
-    """Take a log out of its material's fits, and fit again without it; raises ``NotFound``."""
+def withdraw(context: Context, log_id: str, because: str, asker: Asker = ANYBODY) -> tuple[StoredGraspLog, list[Job]]:
+    """Take a log out of its material's fits, and fit again without it; raises as ``change``."""
     with context.database.write() as session:
-        is_new = grasp_logs.withdraw(session, log_id, because)
-        material_id = grasp_logs.material_id(session, log_id)
-        queued = _refit_without(session, material_id, key_id) if is_new else []
+        material_id = _material_to_change(session, log_id, asker)
+        is_new = grasp_logs.withdraw(session, log_id, because, asker.key_id)
+        audit.add(session, asker.actor, "grasp_log.withdrawn", log_id, {"reason": because})
+        queued = _refit_without(session, material_id, asker.key_id) if is_new else []
         log = grasp_logs.get(session, log_id)
     return log, _follow_up(context, queued)
 
 
-def restore(context: Context, log_id: str, key_id: str | None = None) -> tuple[StoredGraspLog, list[Job]]:
-    """Put a withdrawn log back into its material's fits, and fit again with it; raises ``NotFound``."""
+def restore(context: Context, log_id: str, asker: Asker = ANYBODY) -> tuple[StoredGraspLog, list[Job]]:
+    """Put a withdrawn log back into its material's fits, and fit again with it; raises as ``change``."""
     with context.database.write() as session:
+        material_id = _material_to_change(session, log_id, asker)
         was_withdrawn = grasp_logs.restore(session, log_id)
-        material_id = grasp_logs.material_id(session, log_id)
+        if was_withdrawn:
+            audit.add(session, asker.actor, "grasp_log.restored", log_id)
         queued: list[Job] = []
         if was_withdrawn and material_id is not None:
             methods = friction_models.current_methods(session, [material_id])
-            queued = _queue_refits(session, material_id, methods, key_id)
+            queued = _queue_refits(session, material_id, methods, asker.key_id)
         log = grasp_logs.get(session, log_id)
     return log, _follow_up(context, queued)
+
+
+def _changeable(session: Session, material: str, asker: Asker) -> int:
+    """The key of a material that the asker may change."""
+    material_id = materials.find_id(session, material)
+    check_may_change(session, material_id, asker)
+    return material_id
+
+
+def _material_to_change(session: Session, log_id: str, asker: Asker) -> int | None:
+    """The key of a log's material, if it has one; a log without material is for admins to change."""
+    material_id = grasp_logs.material_id(session, log_id)
+    if material_id is not None:
+        check_may_change(session, material_id, asker)
+    elif not asker.is_admin:
+        raise insufficient_scope("upload", "admin")
+    return material_id
 
 
 def _refit_without(session: Session, material_id: int | None, key_id: str | None) -> list[Job]:

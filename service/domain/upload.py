@@ -9,10 +9,12 @@ from sqlalchemy.orm import Session
 
 from db.blobs import Spool
 from db.errors import AlreadyExists, StorageUnavailable
-from db.records import NewGraspLog
-from db.repositories import grasp_logs, jobs, materials, stores, uploads
+from db.records import NewGraspLog, StoredGraspLog
+from db.repositories import audit, grasp_logs, jobs, materials, stores, uploads
 from service import formats
 from service.context import Context
+from service.domain.asker import ANYBODY, Asker
+from service.domain.ownership import check_may_add
 from service.domain.receive import check_encoding, check_size, receive, unpack
 from service.formats.reading import Description, Settings, read_plain
 from service.http.idempotency import Answer, Once, answer_once
@@ -33,7 +35,7 @@ LONGEST_SENSOR_NAME = 200
 @dataclass(frozen=True, slots=True)
 class Wish:
     """What the uploader says of a log: its material, sensor and detector, type and encoding of its bytes, and the
-    settings that its format needs (``formats.read``); ``key_id`` is the access key that was sent with it.
+    settings that its format needs (``formats.read``); ``asker`` is who sends it.
     """
 
     material: str | None
@@ -44,7 +46,7 @@ class Wish:
     content_encoding: str = ""
     settings: Settings = field(default_factory=dict)
     once: Once | None = None
-    key_id: str | None = None
+    asker: Asker = ANYBODY
 
 
 async def upload(context: Context, chunks: AsyncIterator[bytes], wish: Wish) -> Answer:
@@ -67,19 +69,20 @@ async def upload(context: Context, chunks: AsyncIterator[bytes], wish: Wish) -> 
         kept, description = await _read(context, spools, spool, wish)
         log = _new_log(kept, description, wish, material_id)
         once = wish.once and wish.once.about(body.sha256)
-        return await asyncio.to_thread(_store, context, kept, log, once)
+        return await asyncio.to_thread(_store, context, kept, log, once, wish.asker)
 
 
-async def check_target(context: Context, material: str | None, detector: str) -> None:
+async def check_target(context: Context, wish: Wish) -> None:
     """Raises ``Problem`` or ``NotFound`` for what a log could not be stored for."""
-    await asyncio.to_thread(_check, context, Wish(material, None, detector, None, None))
+    await asyncio.to_thread(_check, context, wish)
 
 
 async def store_made(context: Context, spool: Spool, found: Description, wish: Wish) -> Answer:
     """Store a log that the service itself has written to ``spool.path``, and queue its ingest; raises as ``upload``."""
     material_id = await asyncio.to_thread(_check, context, wish)
     await asyncio.to_thread(spool.adopt)
-    return await asyncio.to_thread(_store, context, spool, _new_log(spool, found, wish, material_id), None)
+    log = _new_log(spool, found, wish, material_id)
+    return await asyncio.to_thread(_store, context, spool, log, None, wish.asker)
 
 
 def _check(context: Context, wish: Wish) -> int | None:
@@ -93,7 +96,9 @@ def _check(context: Context, wish: Wish) -> int | None:
     if wish.material is None:
         return None
     with context.database.read() as session:
-        return materials.find_id(session, wish.material)
+        material_id = materials.find_id(session, wish.material)
+        check_may_add(session, material_id, wish.asker)
+    return material_id
 
 
 def _check_type(content_type: str | None) -> None:
@@ -148,7 +153,7 @@ def _new_log(spool: Spool, found: Description, wish: Wish, material_id: int | No
         frames=found.frames,
         duration=found.duration,
         grid=found.grid,
-        uploaded_by=wish.key_id,
+        uploaded_by=wish.asker.key_id,
     )
 
 
@@ -159,7 +164,7 @@ def _sensor_name(name: str) -> str:
     return name
 
 
-def _store(context: Context, spool: Spool, log: NewGraspLog, once: Once | None) -> Answer:
+def _store(context: Context, spool: Spool, log: NewGraspLog, once: Once | None, asker: Asker) -> Answer:
     """First the blob, durably, then the rows that refer to it."""
     spool.keep()
     with context.database.write() as session:
@@ -167,23 +172,32 @@ def _store(context: Context, spool: Spool, log: NewGraspLog, once: Once | None) 
         uploads.lock(session, [log.sha256])
         if uploads.bring_back(session, log.sha256) and not context.blobs.has(log.sha256):
             raise StorageUnavailable("the file was old and about to be deleted when it came in again")
-        answer = answer_once(session, once, lambda: _accept(session, log))
+        answer = answer_once(session, once, lambda: _accept(session, log, asker))
     context.jobs.wake()
     return answer
 
 
-def _accept(session: Session, log: NewGraspLog) -> Answer:
+def _accept(session: Session, log: NewGraspLog, asker: Asker) -> Answer:
     """Store a new log with its job; a known one whose job failed, which is our fault, or was cancelled gets another."""
     if log.material_id is not None:  # it may have been merged into another while the log came in
-        log = replace(log, material_id=materials.still(session, log.material_id))
+        material_id = materials.still(session, log.material_id)
+        check_may_add(session, material_id, asker)
+        log = replace(log, material_id=material_id)
     try:
         log_id, status = grasp_logs.add(session, log), 202
-        asker = log.uploaded_by
-        queue(session, "ingest", "ols", material_id=log.material_id, grasp_log_id=log_id, requested_by=asker)
+        key_id = asker.key_id
+        queue(session, "ingest", "ols", material_id=log.material_id, grasp_log_id=log_id, requested_by=key_id)
     except AlreadyExists:
         log_id, status = grasp_logs.find_id(session, log.sha256, log.material_id, log.detector), 200
         job = grasp_logs.get(session, log_id).job
-        if job.status in {"failed", "cancelled"}:
-            jobs.requeue(session, job.id, requested_by=log.uploaded_by)
-    body = GraspLogOut.of(grasp_logs.get(session, log_id)).model_dump(mode="json")
-    return Answer(status, f"/v1/grasp-logs/{log_id}", body)
+        if job.status not in {"failed", "cancelled"}:
+            return _stored(status, grasp_logs.get(session, log_id))
+        jobs.requeue(session, job.id, requested_by=asker.key_id)
+    stored = grasp_logs.get(session, log_id)
+    told = {"material": stored.material, "sha256": stored.sha256, "bytes": stored.bytes, "new": status == 202}
+    audit.add(session, asker.actor, "grasp_log.uploaded", log_id, told)
+    return _stored(status, stored)
+
+
+def _stored(status: int, log: StoredGraspLog) -> Answer:
+    return Answer(status, f"/v1/grasp-logs/{log.id}", GraspLogOut.of(log).model_dump(mode="json"))

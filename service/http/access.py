@@ -20,6 +20,7 @@ from fastapi.security.base import SecurityBase
 from starlette.requests import HTTPConnection
 
 from db.records import AccessKey, Scope
+from service.domain.asker import Asker
 from service.http.problems import INSUFFICIENT_SCOPE, Problem
 
 SCOPES: tuple[Scope, ...] = get_args(Scope)
@@ -28,6 +29,9 @@ SCOPES: tuple[Scope, ...] = get_args(Scope)
 CHALLENGE = 'Bearer realm="stiction"'
 PUBLIC_PATHS = frozenset({"/healthz", "/readyz", "/openapi.json", "/docs", "/docs/oauth2-redirect", "/redoc"})
 """What anybody may see: whether the service lives, and its description, which is the same everywhere."""
+
+LONGEST_ADDRESS = 100
+"""Characters of a network address that the audit trail keeps: one of IPv6 with its zone has some 60."""
 
 _KEY = re.compile(r"stiction_([0-9a-f]{12})_[0-9a-f]{64}")
 
@@ -89,6 +93,12 @@ def is_loopback(host: str) -> bool:
     return (getattr(address, "ipv4_mapped", None) or address).is_loopback
 
 
+def insufficient_scope(scope: str, needed: str) -> Problem:
+    """That a key may do less than what is asked for."""
+    headers = {"WWW-Authenticate": f'{CHALLENGE}, error="insufficient_scope", scope="{needed}"'}
+    return Problem(INSUFFICIENT_SCOPE, f"the key has scope {scope}; this needs {needed}", headers=headers)
+
+
 class Needs(SecurityBase):
     """The dependency of a route on a scope; the gate before it has found out who asks."""
 
@@ -100,9 +110,7 @@ class Needs(SecurityBase):
         access: Access = connection.state.access
         for scope in needed.scopes:
             if not access.allows(scope):
-                headers = {"WWW-Authenticate": f'{CHALLENGE}, error="insufficient_scope", scope="{scope}"'}
-                detail = f"the key has scope {access.scope}; this needs {scope}"
-                raise Problem(INSUFFICIENT_SCOPE, detail, headers=headers)
+                raise insufficient_scope(access.scope, scope)
 
 
 _needs = Needs()
@@ -110,13 +118,16 @@ READ, UPLOAD, ADMIN = (Security(_needs, scopes=[scope]) for scope in SCOPES)
 """What a route puts into its ``dependencies``."""
 
 
-async def _key_id(connection: HTTPConnection) -> str | None:
+async def asker(connection: HTTPConnection) -> Asker:
+    """Who asks, as the use cases take it."""
     access: Access = connection.state.access
-    return access.key_id
+    address = connection.client.host[:LONGEST_ADDRESS] if connection.client else None
+    request_id = getattr(connection.state, "request_id", None)
+    return Asker(access.key_id, access.group, access.scope == "admin", address, request_id)
 
 
-KeyId = Annotated[str | None, Depends(_key_id)]
-"""The id of the access key that was sent with a request, None without one."""
+Asking = Annotated[Asker, Depends(asker)]
+"""Who asks for a change, for the routes that make some."""
 
 
 def scopes_of_routes(app: FastAPI) -> dict[str, set[str]]:

@@ -1,12 +1,12 @@
 """What goes over the wire: the shapes of requests and answers, with examples."""
 
 from datetime import datetime
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic.config import JsonDict
 
-from db.records import Job, JobKind, JobStatus, Material, StoredGraspLog, StoredModel, Withdrawal
+from db.records import AuditEntry, Job, JobKind, JobStatus, Material, StoredGraspLog, StoredModel, Withdrawal
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}$"
 ModelMethod = Literal["ols", "robust", "conjugate", "hierarchical", "bayes"]
@@ -361,11 +361,12 @@ class WithdrawalOut(BaseModel):
 
     at: datetime
     reason: str
+    by: Annotated[str | None, Field(description="Id of the access key with which it was withdrawn")]
 
     @classmethod
     def of(cls, withdrawal: Withdrawal) -> "WithdrawalOut":
         """The stored withdrawal as an answer."""
-        return cls(at=withdrawal.at, reason=withdrawal.because)
+        return cls(at=withdrawal.at, reason=withdrawal.because, by=withdrawal.by)
 
 
 class JobsOut(BaseModel):
@@ -676,6 +677,65 @@ class RecognitionOut(BaseModel):
     method: str
     candidates: list[CandidateOut]
     unknown: Annotated[float, Field(description="Probability that it is none of them")]
+
+
+class OwnersOut(BaseModel):
+    """Whose a material is."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"owners": ["key:3f9c2a7b51de", "group:lab 1"]}]})
+
+    owners: Annotated[list[str], Field(description="`key:ID` or `group:NAME`; none: the scope alone decides")]
+
+
+class AuditEntryOut(BaseModel):
+    """Who changed what, when, and from where."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "id": 812,
+                    "at": _MOMENT,
+                    "actor": "key:3f9c2a7b51de",
+                    "address": "10.0.0.9",
+                    "request_id": "3f1c9a0e6d2b4a5c8e7f0a1b2c3d4e5f",
+                    "action": "grasp_log.withdrawn",
+                    "subject": "7c9e6679742540de944be07fc1f90ae7",
+                    "details": {"reason": "the sensor was wet"},
+                }
+            ]
+        }
+    )
+
+    id: int
+    at: datetime
+    actor: Annotated[str, Field(description="`key:ID`, `anybody` without a key, `command:USER` or `service`")]
+    address: Annotated[str | None, Field(description="Network address of the caller")]
+    request_id: str | None
+    action: Annotated[str, Field(description="docs/api.md has them all; more may be added")]
+    subject: Annotated[str, Field(description="Name of a material, or id of a log, a job or a key")]
+    details: dict[str, Any]
+
+    @classmethod
+    def of(cls, entry: AuditEntry) -> "AuditEntryOut":
+        """The stored entry as an answer."""
+        return cls(
+            id=entry.id,
+            at=entry.at,
+            actor=entry.actor.name,
+            address=entry.actor.address,
+            request_id=entry.actor.request_id,
+            action=entry.action,
+            subject=entry.subject,
+            details=dict(entry.details),
+        )
+
+
+class AuditOut(BaseModel):
+    """Entries of the audit trail, newest first."""
+
+    items: list[AuditEntryOut]
+    next: Next
 
 
 class HealthOut(BaseModel):

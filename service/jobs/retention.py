@@ -1,6 +1,6 @@
 """Delete uploads once they are old: what was found in them stays, and fits need no more than that.
 
-Also, where that is wanted, files to which nothing refers (``service.jobs.garbage``).
+Also, where that is wanted, files to which nothing refers (``service.jobs.garbage``), and the audit trail's old entries.
 """
 
 import asyncio
@@ -13,7 +13,7 @@ from datetime import datetime, timedelta
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import DatabaseError
-from db.repositories import uploads
+from db.repositories import audit, uploads
 from db.tables import now
 from service.jobs import garbage
 
@@ -62,7 +62,8 @@ def _delete_marked(database: Database, blobs: BlobStore) -> int:
 class Retention:
     """Prunes now and then, in whichever process ``leads`` the others.
 
-    ``days``: after which uploads go; ``unreferenced_days``: after which files to which nothing refers do.
+    ``days``: after which uploads go; ``unreferenced_days``: after which files to which nothing refers do;
+    ``audit_days``: after which entries of the audit trail do.
     """
 
     def __init__(
@@ -72,17 +73,19 @@ class Retention:
         days: float | None,
         leads: Callable[[], bool],
         unreferenced_days: float | None = None,
+        audit_days: float | None = None,
     ) -> None:
         self._database, self._blobs, self._leads = database, blobs, leads
         self._age = None if days is None else timedelta(days=days)
         self._grace = None if unreferenced_days is None else timedelta(days=unreferenced_days)
+        self._audit_age = None if audit_days is None else timedelta(days=audit_days)
         self._next_garbage = 0.0
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._go_on, name="retention", daemon=True)
 
     def start(self) -> None:
-        """Begin, where uploads or files to which nothing refers are to be kept for some days only."""
-        if self._age is not None or self._grace is not None:
+        """Begin, where something is to be kept for some days only."""
+        if any(age is not None for age in (self._age, self._grace, self._audit_age)):
             self._thread.start()
 
     async def stop(self) -> None:
@@ -100,16 +103,24 @@ class Retention:
         try:
             if self._age is not None:
                 self._prune(self._age)
+            if self._audit_age is not None:
+                self._forget_changes(self._audit_age)
             if self._grace is not None and time.monotonic() >= self._next_garbage:
                 self._collect_garbage(self._grace)
         except DatabaseError as error:
-            logger.warning("no old files are deleted: %s", error)
+            logger.warning("nothing old is deleted: %s", error)
         except Exception:
-            logger.exception("no old files are deleted")
+            logger.exception("nothing old is deleted")
 
     def _prune(self, age: timedelta) -> None:
         if deleted := prune(self._database, self._blobs, now() - age, self._stopping.is_set):
             logger.info("deleted %d uploads older than %s", deleted, age)
+
+    def _forget_changes(self, age: timedelta) -> None:
+        with self._database.write(durable=False) as session:
+            deleted = audit.delete_before(session, now() - age)
+        if deleted:
+            logger.info("deleted %d entries of the audit trail older than %s", deleted, age)
 
     def _collect_garbage(self, grace: timedelta) -> None:
         self._next_garbage = time.monotonic() + GARBAGE_SECONDS

@@ -11,6 +11,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from db.errors import NotFound, StorageUnavailable
 from service.context import Context
+from service.domain.asker import Asker
 from service.domain.upload import Wish, check_target, store_made
 from service.http.problems import Problem
 from service.stream import live
@@ -40,9 +41,9 @@ MOST_WAITING_IN, MOST_WAITING_OUT = 8, 64
 dropped, for it does not read."""
 
 
-async def serve(socket: WebSocket, context: Context, key_id: str | None) -> None:
+async def serve(socket: WebSocket, context: Context, asker: Asker) -> None:
     """One connection from its first message to its end."""
-    connection = _Connection(socket, context, key_id)
+    connection = _Connection(socket, context, asker)
     try:
         await connection.run()
     except End as end:
@@ -66,8 +67,8 @@ async def _close(socket: WebSocket, code: int, reason: str) -> None:
 
 
 class _Connection:
-    def __init__(self, socket: WebSocket, context: Context, key_id: str | None) -> None:
-        self._socket, self._context, self._key_id = socket, context, key_id
+    def __init__(self, socket: WebSocket, context: Context, asker: Asker) -> None:
+        self._socket, self._context, self._asker = socket, context, asker
         self._streams = context.streams
         self._incoming: asyncio.Queue[Incoming] = asyncio.Queue(MOST_WAITING_IN)
         self._outgoing: asyncio.Queue[dict[str, Any]] = asyncio.Queue(MOST_WAITING_OUT)
@@ -88,10 +89,10 @@ class _Connection:
 
     async def _begin(self, first: Incoming) -> Session:
         if isinstance(first, Open):
-            await check_target(self._context, first.material, first.detector)
-            session, missed = await self._streams.open(first, self._key_id), []
+            await check_target(self._context, self._wish(first))
+            session, missed = await self._streams.open(first, self._asker.key_id), []
         elif isinstance(first, Resume):
-            session = self._streams.find(first.session, self._key_id)
+            session = self._streams.find(first.session, self._asker.key_id)
             missed = [answer for answer in session.recent if answer["number"] > first.last]
         else:
             raise End(NOT_UNDERSTOOD, "the first message must be of type open or resume")
@@ -167,9 +168,11 @@ class _Connection:
             raise End(REFUSED, "store needs keep, said when the session was opened")
         with self._context.blobs.spool() as spool:
             found = await self._streams.call(live.write, session.id, spool.path, opening.sensor)
-            wish = Wish(opening.material, None, opening.detector, None, None, key_id=self._key_id)
-            answer = await store_made(self._context, spool, found, wish)
+            answer = await store_made(self._context, spool, found, self._wish(opening))
         return {"type": "finished", "grasp_log": answer.body}
+
+    def _wish(self, opening: Open) -> Wish:
+        return Wish(opening.material, None, opening.detector, None, None, asker=self._asker)
 
     async def _receive(self) -> Incoming:
         event = await self._socket.receive()

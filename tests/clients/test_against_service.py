@@ -131,3 +131,17 @@ def test_a_real_recording_goes_in_as_a_folder(call: Call) -> None:
 def test_nobody_listening_is_a_failed_connection() -> None:
     with FrictionClient("http://127.0.0.1:9") as client, pytest.raises(ConnectionFailed, match="ConnectError"):
         client.materials()
+
+
+def test_owners_are_shown_added_and_removed_and_the_trail_tells_so(call: Call, name: str) -> None:
+    assert call("owners", name) == []
+    assert call("add_owner", name, "group:lab 1") == ["group:lab 1"]
+    assert call("remove_owner", name, "group:lab 1") is None
+    removed, added, created = call("audit", subject=name)
+    assert [entry.action for entry in (created, added, removed)] == [
+        "material.created",
+        "owner.added",
+        "owner.removed",
+    ]
+    assert (removed.actor, removed.address, removed.details) == ("anybody", "127.0.0.1", {"owner": "group:lab 1"})
+    assert call("audit", subject=name, action="owner.added", limit=1) == [added]

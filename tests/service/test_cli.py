@@ -21,7 +21,7 @@ from service.demo.server import running_server
 from service.settings import Settings
 from slipcore.contact import tangential_ramp
 from slipcore.contact.tiers.ramp import RampSchedule
-from stiction_client import container
+from stiction_client import FrictionClient, container
 
 WRONG_USAGE = 2
 Run = Callable[..., tuple[int, str, str]]
@@ -347,3 +347,15 @@ def test_a_recording_is_uploaded_with_its_mapping(run: Run, url: str, ramps: lis
     code, _, err = run("upload", path, "--mapping", mapping, "--url", url)
     assert code == INPUT_REFUSED
     assert "mapping is of the unknown 'tim'" in err
+
+
+def test_owners_and_the_audit_trail_from_the_command_line(run: Run, url: str) -> None:
+    with FrictionClient(url) as client:
+        client.create_material("owned")
+    assert run("owners", "add", "owned", "group:lab 1", "--url", url)[:2] == (0, "owned belongs to group:lab 1\n")
+    assert run("owners", "list", "owned", "--url", url)[:2] == (0, "group:lab 1\n")
+    assert run("owners", "remove", "owned", "group:lab 1", "--url", url)[0] == 0
+    assert run("owners", "add", "owned", "robot", "--url", url)[0] == SERVICE_REFUSED
+    entries = json.loads(run("audit", "--subject", "owned", "--json", "--url", url)[1])["entries"]
+    assert [entry["action"] for entry in entries] == ["owner.removed", "owner.added", "material.created"]
+    assert "owner.added" in run("audit", "--action", "owner.added", "--url", url)[1]

@@ -15,6 +15,7 @@ DOCUMENTED = dict(
 UNSET = {
     "keep_uploads_days": "for ever",
     "keep_unreferenced_days": "for ever",
+    "keep_audit_days": "for ever",
     "database_url": "SQLite file",
     "blob_url": "the data folder",
     "dask_address": "none",
@@ -67,6 +68,8 @@ def test_the_databases_password_is_not_shown() -> None:
         ("keep_uploads_days", 0.0),
         ("keep_uploads_days", 36501.0),
         ("keep_unreferenced_days", 0.0),
+        ("keep_audit_days", 29.0),
+        ("trusted_proxies", "localhost"),
         ("log_format", "xml"),
         ("log_level", "trace"),
         ("shutdown_seconds", -1.0),

@@ -6,10 +6,11 @@ from fastapi import APIRouter, Path, Response
 
 from service.context import Given
 from service.domain import curate
-from service.http.access import ADMIN, KeyId
+from service.http.access import UPLOAD, Asking
 from service.http.problems import (
     INVALID_REQUEST,
     MATERIAL_EXISTS,
+    NOT_OWNER,
     STORAGE_UNAVAILABLE,
     UNKNOWN_ALIAS,
     UNKNOWN_GRASP_LOG,
@@ -39,86 +40,86 @@ _BODY = (UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILA
 @router.patch(
     "/materials/{name}",
     tags=["materials"],
-    dependencies=[ADMIN],
+    dependencies=[UPLOAD],
     summary="Rename or describe a material",
-    responses=problems(UNKNOWN_MATERIAL, MATERIAL_EXISTS, *_BODY),
+    responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, MATERIAL_EXISTS, *_BODY),
 )
-def change_material(context: Given, name: str, wish: MaterialChange) -> MaterialOut:
+def change_material(context: Given, name: str, wish: MaterialChange, asker: Asking) -> MaterialOut:
     """The old name becomes an alias, so that whoever knows it still finds the material."""
-    return MaterialOut.of(curate.change(context, name, wish.name, wish.description))
+    return MaterialOut.of(curate.change(context, name, wish.name, wish.description, asker))
 
 
 @router.put(
     "/materials/{name}/aliases/{alias}",
     tags=["materials"],
-    dependencies=[ADMIN],
+    dependencies=[UPLOAD],
     summary="Give a material one more name",
-    responses=problems(UNKNOWN_MATERIAL, MATERIAL_EXISTS, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+    responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, MATERIAL_EXISTS, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
-def add_alias(context: Given, name: str, alias: Alias) -> MaterialOut:
+def add_alias(context: Given, name: str, alias: Alias, asker: Asking) -> MaterialOut:
     """Every route finds the material by any of its names."""
-    return MaterialOut.of(curate.add_alias(context, name, alias))
+    return MaterialOut.of(curate.add_alias(context, name, alias, asker))
 
 
 @router.delete(
     "/materials/{name}/aliases/{alias}",
     tags=["materials"],
-    dependencies=[ADMIN],
+    dependencies=[UPLOAD],
     summary="Take an alias away",
     status_code=204,
-    responses=problems(UNKNOWN_MATERIAL, UNKNOWN_ALIAS, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+    responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, UNKNOWN_ALIAS, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
-def remove_alias(context: Given, name: str, alias: Alias) -> Response:
+def remove_alias(context: Given, name: str, alias: Alias, asker: Asking) -> Response:
     """The name is free then; a material's own name is no alias."""
-    curate.remove_alias(context, name, alias)
+    curate.remove_alias(context, name, alias, asker)
     return Response(status_code=204)
 
 
 @router.post(
     "/materials/{name}/merges",
     tags=["materials"],
-    dependencies=[ADMIN],
+    dependencies=[UPLOAD],
     summary="Merge another material into this one",
-    responses=problems(UNKNOWN_MATERIAL, *_BODY),
+    responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, *_BODY),
 )
-def merge_materials(context: Given, name: str, wish: NewMerge, key_id: KeyId) -> MergedOut:
+def merge_materials(context: Given, name: str, wish: NewMerge, asker: Asking) -> MergedOut:
     """Its logs and names move here, for good, and the fits are made again over all logs.
 
     A log that both have, by content and detector, counts once.
     """
-    material, jobs = curate.merge(context, name, wish.source, key_id)
+    material, jobs = curate.merge(context, name, wish.source, asker)
     return MergedOut(material=MaterialOut.of(material), jobs=[JobOut.of(job) for job in jobs])
 
 
 @router.put(
     "/grasp-logs/{id}/withdrawal",
     tags=["grasp logs"],
-    dependencies=[ADMIN],
+    dependencies=[UPLOAD],
     summary="Withdraw a grasp log",
-    responses=problems(UNKNOWN_GRASP_LOG, *_BODY),
+    responses=problems(NOT_OWNER, UNKNOWN_GRASP_LOG, *_BODY),
 )
 def withdraw_grasp_log(
     context: Given,
     id: str,  # noqa: A002  (the path's own name)
     wish: NewWithdrawal,
-    key_id: KeyId,
+    asker: Asking,
 ) -> WithdrawnOut:
     """It is kept, but counts in no fit from then on; its material's models are fitted again without it.
 
     Until then those models are marked as outdated; where no samples are left, the material has none.
     """
-    log, jobs = curate.withdraw(context, id, wish.reason, key_id)
+    log, jobs = curate.withdraw(context, id, wish.reason, asker)
     return WithdrawnOut(grasp_log=GraspLogOut.of(log), jobs=[JobOut.of(job) for job in jobs])
 
 
 @router.delete(
     "/grasp-logs/{id}/withdrawal",
     tags=["grasp logs"],
-    dependencies=[ADMIN],
+    dependencies=[UPLOAD],
     summary="Take a withdrawal back",
-    responses=problems(UNKNOWN_GRASP_LOG, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+    responses=problems(NOT_OWNER, UNKNOWN_GRASP_LOG, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
-def restore_grasp_log(context: Given, id: str, key_id: KeyId) -> WithdrawnOut:  # noqa: A002
+def restore_grasp_log(context: Given, id: str, asker: Asking) -> WithdrawnOut:  # noqa: A002
     """The log counts again, and its material's models are fitted again with it."""
-    log, jobs = curate.restore(context, id, key_id)
+    log, jobs = curate.restore(context, id, asker)
     return WithdrawnOut(grasp_log=GraspLogOut.of(log), jobs=[JobOut.of(job) for job in jobs])

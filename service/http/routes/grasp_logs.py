@@ -16,7 +16,7 @@ from service.domain.stored_results import EVENT_KINDS, SAMPLE_ARRAYS, decode_his
 from service.domain.upload import Wish, upload
 from service.formats import writing
 from service.formats.tracked_markers import FRAME_RATE, SCALE
-from service.http.access import READ, UPLOAD, KeyId
+from service.http.access import READ, UPLOAD, Asking
 from service.http.idempotency import OnceWithoutBody
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import (
@@ -24,6 +24,7 @@ from service.http.problems import (
     IDEMPOTENCY_KEY_REUSED,
     INVALID_GRASP_LOG,
     INVALID_REQUEST,
+    NOT_OWNER,
     NOT_READY,
     STORAGE_UNAVAILABLE,
     UNKNOWN_GRASP_LOG,
@@ -72,6 +73,7 @@ _RESULTS = problems(UNKNOWN_GRASP_LOG, NOT_READY, INVALID_REQUEST, STORAGE_UNAVA
     responses=_ALREADY_THERE
     | problems(
         UPLOAD_INTERRUPTED,
+        NOT_OWNER,
         UNKNOWN_MATERIAL,
         UPLOAD_TOO_LARGE,
         UNSUPPORTED_FORMAT,
@@ -85,7 +87,7 @@ async def create_grasp_log(
     context: Given,
     request: Request,
     once: OnceWithoutBody,
-    key_id: KeyId,
+    asker: Asking,
     material: Annotated[
         str | None, Query(description="What was held; without it slip is only detected", examples=["paper"])
     ] = None,
@@ -122,7 +124,7 @@ async def create_grasp_log(
         ",".join(request.headers.getlist("content-encoding")),
         {"scale": scale, "frame_rate": frame_rate, "mapping": mapping},
         once,
-        key_id,
+        asker,
     )
     return (await upload(context, request.stream(), wish)).response()
 

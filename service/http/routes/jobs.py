@@ -9,7 +9,7 @@ from db.repositories import jobs
 from service.context import Given
 from service.domain.await_job import MOST_SECONDS, await_job
 from service.domain.cancel import cancel
-from service.http.access import ADMIN, READ
+from service.http.access import ADMIN, READ, Asking
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import INVALID_REQUEST, JOB_ENDED, STORAGE_UNAVAILABLE, UNKNOWN_JOB
 from service.http.routes.common import problems
@@ -64,6 +64,6 @@ async def read_job(
     summary="Cancel a job",
     responses=problems(UNKNOWN_JOB, JOB_ENDED, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
-def cancel_job(context: Given, id: str) -> JobOut:  # noqa: A002
+def cancel_job(context: Given, id: str, asker: Asking) -> JobOut:  # noqa: A002
     """It stores nothing more; a worker that is at it turns to the next one after the stage that it is in."""
-    return JobOut.of(cancel(context, id))
+    return JobOut.of(cancel(context, id, asker))

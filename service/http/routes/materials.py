@@ -7,9 +7,10 @@ from fastapi import APIRouter, Query, Request, Response
 
 from db.repositories import friction_models, materials
 from service.context import Given
+from service.domain import curate
 from service.domain.fit import request_fit
 from service.domain.look_up import Question, look_up
-from service.http.access import READ, UPLOAD, KeyId
+from service.http.access import READ, UPLOAD, Asking
 from service.http.conditional import NOT_MODIFIED, conditional, tagged
 from service.http.idempotency import Answer, OnceGiven, answer_once
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
@@ -18,6 +19,7 @@ from service.http.problems import (
     INVALID_REQUEST,
     MATERIAL_EXISTS,
     NO_MODEL,
+    NOT_OWNER,
     STORAGE_UNAVAILABLE,
     UNKNOWN_MATERIAL,
     UNSUPPORTED_FORMAT,
@@ -50,12 +52,12 @@ _BODY = (UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, IDEMPOTENCY_KEY_
     response_model=MaterialOut,
     responses=problems(MATERIAL_EXISTS, *_BODY),
 )
-def create_material(context: Given, new: NewMaterial, once: OnceGiven) -> Response:
-    """Logs can be uploaded for it from then on."""
+def create_material(context: Given, new: NewMaterial, once: OnceGiven, asker: Asking) -> Response:
+    """Logs can be uploaded for it from then on. It belongs to the key that is sent, and to its group."""
     with context.database.write() as session:
 
         def create() -> Answer:
-            made = MaterialOut.of(materials.create(session, new.name, new.description))
+            made = MaterialOut.of(curate.create(session, new.name, new.description, asker))
             return Answer(201, f"/v1/materials/{quote(new.name)}", made.model_dump(mode="json"))
 
         return answer_once(session, once, create).response()
@@ -129,11 +131,11 @@ async def read_friction(
     summary="Fit a material's model",
     status_code=202,
     response_model=JobOut,
-    responses=problems(UNKNOWN_MATERIAL, *_BODY),
+    responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, *_BODY),
 )
-def create_fit(context: Given, name: str, wish: NewFit, once: OnceGiven, key_id: KeyId) -> Response:
+def create_fit(context: Given, name: str, wish: NewFit, once: OnceGiven, asker: Asking) -> Response:
     """Over the samples of all its logs. Answers at once; the job at `Location` tells how it went."""
-    return request_fit(context, name, wish.method, wish.seed, once, key_id).response()
+    return request_fit(context, name, wish.method, wish.seed, once, asker).response()
 
 
 @router.get(

@@ -3,7 +3,7 @@
 from fastapi import APIRouter, WebSocket
 
 from service.context import Context
-from service.http.access import UPLOAD, Access
+from service.http.access import UPLOAD, asker
 from service.stream import connection
 
 router = APIRouter()
@@ -13,6 +13,5 @@ router = APIRouter()
 async def live_stream(socket: WebSocket) -> None:
     """Frames in, slip states out (docs/stream.md)."""
     context: Context = socket.app.state.context
-    access: Access = socket.state.access
     await socket.accept()
-    await connection.serve(socket, context, access.key_id)
+    await connection.serve(socket, context, await asker(socket))

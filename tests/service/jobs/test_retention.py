@@ -13,13 +13,14 @@ from sqlalchemy import select, update
 from db import migrate
 from db.blobs import BlobStore, Spool, open_blobs
 from db.database import Database
-from db.records import Claim
+from db.paging import Window
+from db.records import AuditFilter, Claim
+from db.repositories import audit, jobs, uploads
 from db.repositories import blobs as references
-from db.repositories import jobs, uploads
-from db.tables import GraspLogRow, JobRow, now
+from db.tables import AuditEntryRow, GraspLogRow, JobRow, now
 from service.cli import main
 from service.jobs import pipeline, retention
-from service.jobs.retention import prune
+from service.jobs.retention import Retention, prune
 from service.settings import Settings
 from slipcore import GraspLog
 from stiction_client.container import encode
@@ -273,3 +274,16 @@ def test_logs_of_before_have_their_files_and_those_without_stop_the_way_back(she
     assert shelf.prune() == 1
     with closing(Database(shelf.database.url)) as database, pytest.raises(RuntimeError, match="1 grasp logs have no"):
         migrate.downgrade(database, "0006")
+
+
+def test_old_entries_of_the_audit_trail_are_deleted_where_that_is_set(database: Database, blobs: BlobStore) -> None:
+    with database.write() as session:
+        for days in (29, 31):
+            entry = AuditEntryRow(at=now() - timedelta(days=days), actor="service", action="x", subject="y", details={})
+            session.add(entry)
+    for policy, left in ((None, 2), (30.0, 2)):  # one goes, and one that tells so comes
+        Retention(database, blobs, None, lambda: True, audit_days=policy)._look()
+        with database.read() as session:
+            found = audit.list_all(session, Window("id"), AuditFilter())
+        assert len(found) == left
+    assert found[-1].action == "audit.deleted"

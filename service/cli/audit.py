@@ -1,0 +1,33 @@
+"""The command on the audit trail of a running service."""
+
+from dataclasses import asdict
+from json import dumps
+from typing import Annotated
+
+import typer
+
+from service.cli.output import print_json, print_table
+from service.cli.remote import DEFAULT_URL, Json, Key, Url
+
+COLUMNS = ("at", "actor", "address", "action", "subject", "details")
+
+
+def audit(
+    actor: Annotated[str | None, typer.Option(help="Only what it did, such as key:3f9c2a7b51de.")] = None,
+    action: Annotated[str | None, typer.Option(help="Only this, such as grasp_log.withdrawn.")] = None,
+    subject: Annotated[str | None, typer.Option(help="Only what was done to this material, log, job or key.")] = None,
+    limit: Annotated[int, typer.Option(min=1, help="So many at most.")] = 20,
+    url: Url = DEFAULT_URL,
+    key: Key = None,
+    json: Json = False,
+) -> None:
+    """Show who changed what in a service, when, and from where: the newest first."""
+    from stiction_client import FrictionClient
+
+    with FrictionClient(url, key=key) as client:
+        found = [asdict(entry) for entry in client.audit(actor, action, subject, limit)]
+    if json:
+        print_json({"entries": found})
+    else:
+        shown = [entry | {"details": dumps(entry["details"], ensure_ascii=False)} for entry in found]
+        print_table("Audit trail", COLUMNS, [[entry[name] or "" for name in COLUMNS] for entry in shown])

@@ -1,0 +1,35 @@
+"""Who asks for a change, with what right, and from where."""
+
+from dataclasses import dataclass
+
+from db.records import Actor
+
+
+@dataclass(frozen=True, slots=True)
+class Asker:
+    """An access key and its group, None where no key is asked for; ``is_admin``: what is another's may be changed, too.
+
+    ``address`` is the network address, ``request_id`` the request's.
+    """
+
+    key_id: str | None = None
+    group: str | None = None
+    is_admin: bool = True
+    address: str | None = None
+    request_id: str | None = None
+
+    @property
+    def actor(self) -> Actor:
+        """As the audit trail tells it."""
+        name = "anybody" if self.key_id is None else f"key:{self.key_id}"
+        return Actor(name, self.address, self.request_id)
+
+    @property
+    def owners(self) -> tuple[str, ...]:
+        """As whom it may own materials."""
+        own = {"key": self.key_id, "group": self.group}
+        return tuple(f"{kind}:{name}" for kind, name in own.items() if name is not None)
+
+
+ANYBODY = Asker()
+"""Where no key is asked for, everything is allowed."""

@@ -1,0 +1,57 @@
+"""Whose a material is."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path, Response
+
+from service.context import Given
+from service.domain import ownership
+from service.http.access import READ, UPLOAD, Asking
+from service.http.problems import (
+    INVALID_REQUEST,
+    NOT_OWNER,
+    STORAGE_UNAVAILABLE,
+    UNKNOWN_MATERIAL,
+    UNKNOWN_OWNER,
+)
+from service.http.routes.common import problems
+from service.http.schemas import OwnersOut
+
+router = APIRouter(prefix="/v1/materials/{name}/owners", tags=["materials"])
+
+Owner = Annotated[
+    str,
+    Path(
+        pattern=r"^(key:[0-9a-f]{12}|group:[A-Za-z0-9][A-Za-z0-9 ._-]{0,99})$",
+        description="`key:` and the id of an access key, or `group:` and a group's name.",
+        examples=["key:3f9c2a7b51de"],
+    ),
+]
+_ALWAYS = (UNKNOWN_MATERIAL, INVALID_REQUEST, STORAGE_UNAVAILABLE)
+
+
+@router.get("", dependencies=[READ], summary="Look at a material's owners", responses=problems(*_ALWAYS))
+def list_owners(context: Given, name: str) -> OwnersOut:
+    """Without any, whoever has the scope may add to it, and admins change it."""
+    return OwnersOut(owners=ownership.list_owners(context, name))
+
+
+@router.put(
+    "/{owner}", dependencies=[UPLOAD], summary="Let another own a material", responses=problems(NOT_OWNER, *_ALWAYS)
+)
+def add_owner(context: Given, name: str, owner: Owner, asker: Asking) -> OwnersOut:
+    """For its owners, and admins."""
+    return OwnersOut(owners=ownership.add_owner(context, name, owner, asker))
+
+
+@router.delete(
+    "/{owner}",
+    dependencies=[UPLOAD],
+    summary="Take a material from an owner",
+    status_code=204,
+    responses=problems(NOT_OWNER, UNKNOWN_OWNER, *_ALWAYS),
+)
+def remove_owner(context: Given, name: str, owner: Owner, asker: Asking) -> Response:
+    """For its owners, and admins. Without any owner the scope alone decides again."""
+    ownership.remove_owner(context, name, owner, asker)
+    return Response(status_code=204)
