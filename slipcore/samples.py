@@ -138,12 +138,11 @@ def normals_of(log: GraspLog) -> FloatArray:
     """Outward normals [t, n, m, 3] of a log, from the deformed shape where it has none."""
     if log.normal is not None:
         return log.normal
-    from slipcore.detection.shared.surface import surface_normals  # compiled: who only holds samples goes without
+    from slipcore.detection.shared.surface import normals_over_time  # compiled: who only holds samples goes without
 
     lattice = Lattice.at_rest(log.position)
     normals = np.empty_like(log.displacement)
-    for displacement, normal in zip(log.displacement, normals, strict=True):
-        surface_normals(lattice.steps, lattice.orientation, displacement, normal)
+    normals_over_time(lattice.steps, lattice.orientation, log.displacement, normals)
     return normals
 
 

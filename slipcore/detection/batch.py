@@ -10,6 +10,7 @@ from slipcore.detection.detector import DetectorState, init, masked, said, step
 from slipcore.detection.methods import find_method
 from slipcore.detection.shared.answer import answer
 from slipcore.detection.shared.interface import CompiledMethod
+from slipcore.detection.whole_log import history_of
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 from slipcore.slip_state import SlipHistory, SlipState, observed_over_time, slip_events
@@ -22,12 +23,22 @@ def detect_slip(log: GraspLog, method: str = DEFAULT_METHOD, *, lookahead: int =
     ``InvalidInput`` as ``init`` does.
     """
     state = init(log.position, log.element_area, method, **options)
+    if isinstance(find_method(method), CompiledMethod):
+        return history_of(log, state, checked_lookahead(lookahead))
     hindsight, answers = Hindsight(state, lookahead), []
     for frame in log.frames():
         state, now = step(state, frame)
         if (settled := hindsight.take(state, now)) is not None:
             answers.append(settled)
     return collect_history([*answers, *hindsight.rest()], state)
+
+
+def checked_lookahead(lookahead: int) -> int:
+    """The number of frames, refused where it is none."""
+    whole = isinstance(lookahead, int | np.integer) and not isinstance(lookahead, bool)
+    if not whole or not 0 <= lookahead <= MOST_LOOKAHEAD:
+        raise InvalidInput("lookahead", lookahead, f"a whole number of frames, 0 to {MOST_LOOKAHEAD}")
+    return int(lookahead)
 
 
 class Hindsight:
@@ -38,12 +49,9 @@ class Hindsight:
     """
 
     def __init__(self, start: DetectorState, lookahead: int) -> None:
-        whole = isinstance(lookahead, int | np.integer) and not isinstance(lookahead, bool)
-        if not whole or not 0 <= lookahead <= MOST_LOOKAHEAD:
-            raise InvalidInput("lookahead", lookahead, f"a whole number of frames, 0 to {MOST_LOOKAHEAD}")
         method = find_method(start.setup.method)
         self._revise = method.revise if lookahead and isinstance(method, CompiledMethod) else None
-        self._lookahead = lookahead
+        self._lookahead = checked_lookahead(lookahead)
         self._states, self._answers = deque([start]), deque[SlipState]()
         self._slipped, self._likely = start.memory.masks[1], start.memory.probability
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from slipcore.defaults import FilterOptions
 from slipcore.detection.filter.run import run_filter
-from slipcore.detection.filter.step import BODY, PROBABILITY, ROWS, STICK_VARIANCE, Tuning, decide, look_back
+from slipcore.detection.filter.step import BODY, PROBABILITY, ROWS, STICK_VARIANCE, THRESHOLD, Tuning, decide, look_back
 from slipcore.detection.shared.interface import CompiledMethod, Decision, Start
 from slipcore.detection.shared.strain import Lattice
 from slipcore.frames import FloatArray
@@ -29,7 +29,7 @@ def revise(own: Sequence[FloatArray], settings: FloatArray) -> Decision:
         known, posterior = posterior, np.empty(posterior.shape)
         look_back(before, after, known, posterior)
     slip, probability = np.empty(posterior.shape, bool), np.empty(posterior.shape)
-    decide(posterior, settings[Tuning._fields.index("threshold")], slip, probability)
+    decide(posterior, settings[THRESHOLD], slip, probability)
     return Decision(slip, probability)
 
 

@@ -78,7 +78,7 @@ class Tuning(NamedTuple):
     threshold: float
 
 
-TUNING = len(Tuning._fields)
+TUNING, THRESHOLD = len(Tuning._fields), Tuning._fields.index("threshold")
 
 
 @compiled

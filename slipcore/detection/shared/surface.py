@@ -45,6 +45,13 @@ def surface_normals(rest_steps: FloatArray, orientation: float, displacement: Fl
 
 
 @compiled
+def normals_over_time(rest_steps: FloatArray, orientation: float, displacement: FloatArray, normal: FloatArray) -> None:
+    """Normals [t, n, m, 3] of each frame (see ``surface_normals``)."""
+    for k in range(len(displacement)):
+        surface_normals(rest_steps, orientation, displacement[k], normal[k])
+
+
+@compiled
 def split_forces(force: FloatArray, normal: FloatArray, pressing: FloatArray, tangential: FloatArray) -> None:
     """Force on each element, split at the surface: inwards positive, N, and the magnitude along it, N.
 

@@ -1,0 +1,79 @@
+"""Whole logs by a compiled method: the first frame by ``step``, all others in one call."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipcore.detection.detector import NO_FIELD, NO_MASK, NO_POSE, DetectorState, Setup, step
+from slipcore.detection.fold import Answers, Recording, Remembered, Sensor, fold
+from slipcore.frames import BoolArray, FloatArray, GraspLog
+from slipcore.slip_state import SlipHistory, slip_events
+
+
+def history_of(log: GraspLog, state: DetectorState, lookahead: int) -> SlipHistory:
+    """What a compiled method's detector in its ``state`` before a log says of it, as frame by frame to the last bit."""
+    setup, answers = state.setup, _room(log)
+    state, first = step(state, next(log.frames()))
+    memory = state.memory
+    answers.contact[0], answers.slip[0], answers.velocity[0] = memory.masks[0], memory.masks[1], first.velocity
+    answers.probability[0] = memory.probability
+    answers.touching[0], answers.slipping[0] = memory.masks[0].sum(), memory.masks[1].sum()
+    start = Remembered(memory.masks, memory.probability, memory.noise, memory.own, memory.numbers)
+    is_filter = setup.method == "filter"
+    noise = fold(is_filter, _sensor(setup, log), _recording(log), start, lookahead if is_filter else 0, answers)
+    return _history(log, setup.method, noise, answers)
+
+
+def _room(log: GraspLog) -> Answers:
+    shape = log.displacement.shape[:3]
+    counts = np.empty(len(log), np.int64), np.empty(len(log), np.int64)
+    return Answers(np.empty(shape, bool), np.empty(shape, bool), np.empty(shape), np.empty((*shape, 2)), *counts)
+
+
+def _sensor(setup: Setup, log: GraspLog) -> Sensor:
+    touch = setup.touch_by_shape if log.force is None else setup.touch_by_force
+    lattice = setup.lattice
+    steps, inverse = lattice.steps, lattice.inverse_jacobian
+    return Sensor(lattice.position, steps, inverse, lattice.orientation, touch, setup.settings)
+
+
+def _recording(log: GraspLog) -> Recording:
+    return Recording(
+        log.time,
+        _frames(log.displacement, NO_FIELD, log),
+        _frames(log.force, NO_FIELD, log),
+        _frames(log.object_pose, NO_POSE, log),
+        _frames(log.normal, NO_FIELD, log),
+        _frames(log.contact, NO_MASK, log),
+    )
+
+
+def _frames(field: NDArray[Any] | None, none: NDArray[Any], log: GraspLog) -> NDArray[Any]:
+    """The field, or ``none`` of it in each frame; not to be written to, so that the kernels see one type."""
+    given = np.empty((len(log), *none.shape), none.dtype) if field is None else field
+    frames = np.ascontiguousarray(given).view()
+    frames.flags.writeable = False
+    return frames
+
+
+def _history(log: GraspLog, method: str, noise: float, answers: Answers) -> SlipHistory:
+    contact, slip, probability, velocity, touching, slipping = answers
+    if log.observed is not None:
+        contact, slip, probability, velocity = _masked(log.observed, answers)
+        touching, slipping = (np.count_nonzero(field, axis=(1, 2)) for field in (contact, slip))
+    ratio = np.full(len(log), np.nan)
+    np.divide(slipping, touching, out=ratio, where=touching > 0)
+    events = slip_events(log.time, contact, slip, log.observed)
+    macro_slip = (touching > 0) & (touching == slipping)
+    said = contact, slip, probability, 1.0 - ratio, velocity, macro_slip
+    return SlipHistory(log.time, *said, events, noise, method, log.observed)
+
+
+def _masked(observed: BoolArray, answers: Answers) -> tuple[BoolArray, BoolArray, FloatArray, FloatArray]:
+    """As ``SlipState.masked`` of each frame: what was not observed, and no velocity unless it was so before."""
+    throughout = observed.copy()
+    throughout[1:] &= observed[:-1]
+    velocity = np.where(throughout[..., None], answers.velocity, np.nan)
+    contact, slip = answers.contact & observed, answers.slip & observed
+    return contact, slip, np.where(observed, answers.probability, 0.0), velocity
