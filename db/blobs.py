@@ -110,6 +110,11 @@ class BlobStore:
     def __str__(self) -> str:
         return f"blob folder {self._blobs}" if self._remote is None else f"blob store {self._remote}"
 
+    @property
+    def is_remote(self) -> bool:
+        """Whether the blobs are in an object store."""
+        return self._remote is not None
+
     def spool(self) -> Spool:
         """A new file to write to; use it in a ``with`` statement."""
         with disk_errors_named():
@@ -190,6 +195,10 @@ class BlobStore:
     def hashes(self, before: datetime | None = None) -> Iterator[str]:
         """Hashes of all blobs, or of those stored before a moment, in no order. What is no blob is left out."""
         return self._local(before) if self._remote is None else self._remote.hashes(before)
+
+    def hashes_under(self, prefix: str) -> Iterator[str]:
+        """Hashes of the blobs in the folder that begin with these two characters."""
+        yield from (path.name for path in self._blobs.glob(f"{prefix}/*") if _SHA256.fullmatch(path.name))
 
     def now(self) -> datetime:
         """The present moment by the clock that blobs get their times from."""

@@ -23,6 +23,7 @@ from db.defaults import (
     SQLITE_SYNCHRONOUS,
 )
 from db.errors import DriverMissing, InvalidUrl, StorageUnavailable
+from db.sqlite_file import SqliteFile
 
 _BEGIN = "sqlite_begin"
 _DURABLE = "durable"
@@ -46,9 +47,10 @@ class Database:
         self._writing = self.engine.execution_options(**{_BEGIN: "BEGIN IMMEDIATE"})
         self._noting = self._writing.execution_options(**{_DURABLE: False})
         self._reading = self.engine
+        self._file = SqliteFile(self.engine.url.database if self.is_sqlite else None)
         self.store_id: str | None = None  # that of the blob store that it works with, once somebody has compared them
         if self.is_sqlite:
-            _prepare_sqlite(self.engine, lock_timeout)
+            _prepare_sqlite(self.engine, lock_timeout, self._file)
         if self.engine.dialect.name == "postgresql":
             _prepare_postgresql(self.engine, lock_timeout)
             # by default each statement would see what was committed meanwhile
@@ -87,15 +89,31 @@ class Database:
             if not durable and connection.dialect.name == "postgresql":
                 connection.exec_driver_sql("SET LOCAL synchronous_commit = off")
             yield session
+        self._file.require()  # a commit into a file that was deleted meanwhile is none
 
     def ping(self) -> None:
-        """Make sure that the database answers; raises ``StorageUnavailable``."""
+        """Make sure that the database answers and has its tables; raises ``StorageUnavailable``."""
         with self.read() as session:
-            session.connection().exec_driver_sql("SELECT 1")
+            session.connection().exec_driver_sql("SELECT version_num FROM alembic_version")
+        with _sqlite_errors_named():
+            self._file.check_head()
+
+    def check_pages(self) -> None:
+        """Read the whole of an SQLite file; raises ``StorageUnavailable`` where it is damaged."""
+        with _sqlite_errors_named():
+            self._file.check_pages()
 
     def close(self) -> None:
         """Close every connection."""
         self.engine.dispose()
+
+
+@contextmanager
+def _sqlite_errors_named() -> Iterator[None]:
+    try:
+        yield
+    except sqlite3.Error as error:
+        raise StorageUnavailable(f"database: {error}") from error
 
 
 @contextmanager
@@ -141,7 +159,11 @@ def _prepare_postgresql(engine: Engine, lock_timeout: float) -> None:
         connection.commit()
 
 
-def _prepare_sqlite(engine: Engine, busy_timeout: float) -> None:
+def _prepare_sqlite(engine: Engine, busy_timeout: float, file: SqliteFile) -> None:
+    @event.listens_for(engine, "do_connect")
+    def refuse_another(*_: object) -> None:
+        file.require()  # where it is gone, SQLite would make an empty one
+
     @event.listens_for(engine, "connect")
     def set_pragmas(connection: sqlite3.Connection, _record: object) -> None:
         connection.isolation_level = None  # Python's own BEGIN comes late and skips SELECT and DDL; ours does not
@@ -151,9 +173,11 @@ def _prepare_sqlite(engine: Engine, busy_timeout: float) -> None:
             "foreign_keys = ON",
         ):
             connection.execute(f"PRAGMA {pragma}")
+        file.note_opened()
 
     @event.listens_for(engine, "begin")
     def begin(connection: Connection) -> None:
+        file.require()
         options = connection.get_execution_options()
         synchronous = SQLITE_SYNCHRONOUS if options.get(_DURABLE, True) else "NORMAL"
         connection.exec_driver_sql(f"PRAGMA synchronous = {synchronous}")  # inside a transaction it would do nothing

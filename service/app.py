@@ -23,10 +23,12 @@ from service.http.start_refusal import StartRefusal
 from service.jobs.lanes import lanes
 from service.jobs.retention import Retention
 from service.jobs.runner import JobRunner
+from service.jobs.scrub import Scrub
 from service.jobs.worker import Place
 from service.observability import traces
 from service.observability.answered import Answered
 from service.observability.metrics import Metering, Metrics
+from service.observability.store_watch import StoreWatch
 from service.processes.folder_lock import shared
 from service.settings import Settings
 from service.stream.sessions import Streams
@@ -118,12 +120,16 @@ async def running(
                 unreferenced_days=settings.keep_unreferenced_days,
                 audit_days=settings.keep_audit_days,
             )
-            retention.start()
+            scrub = Scrub(database, blobs, settings.scrub_bytes_per_second, lambda: runner.leads)
+            watch = StoreWatch(database, blobs)
+            for thread in (retention, scrub, watch):
+                thread.start()
             try:
                 models = ModelCache(settings.lookup_seconds)
-                yield Context(settings, database, blobs, runner, readers, streams, models)
+                yield Context(settings, database, blobs, runner, readers, streams, models, scrub, watch)
             finally:
-                await retention.stop()
+                for thread in (retention, scrub, watch):
+                    await thread.stop()
                 await streams.stop()
                 await runner.stop()
                 await readers.stop()

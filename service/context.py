@@ -10,6 +10,8 @@ from db.database import Database
 from service.domain.model_cache import ModelCache
 from service.formats.reading import Readers
 from service.jobs.runner import JobRunner
+from service.jobs.scrub import Scrub
+from service.observability.store_watch import StoreWatch
 from service.settings import Settings
 from service.stream.sessions import Streams
 
@@ -25,6 +27,8 @@ class Context:
     readers: Readers = field(default_factory=Readers)
     streams: Streams = field(default_factory=Streams)
     models: ModelCache = field(default_factory=ModelCache)
+    scrub: Scrub | None = None
+    watch: StoreWatch | None = None
 
 
 async def _context(request: Request) -> Context:

@@ -45,6 +45,9 @@ class Settings(BaseSettings):
     keep_audit_days: Annotated[float, Field(ge=30.0, le=36500.0)] | None = Field(
         default=None, description="Days after which entries of the audit trail are deleted. Default: never."
     )
+    scrub_bytes_per_second: Annotated[float, Field(ge=0.0, le=1e12)] = Field(
+        default=float(MIB), description="Pace at which stored files are read and compared with their hashes; 0: not."
+    )
     migrate_at_start: bool = Field(
         default=True,
         description="Bring the database to this version's schema at start; otherwise an old one stops the start.",

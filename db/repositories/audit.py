@@ -34,6 +34,18 @@ def list_all(session: Session, window: Window, wanted: AuditFilter) -> list[Audi
     ]
 
 
+def is_recorded(session: Session, action: AuditAction, subject: str, since: datetime) -> bool:
+    """Whether there is an entry of this action and subject since a moment."""
+    entry = (AuditEntryRow.subject == subject, AuditEntryRow.action == action, AuditEntryRow.at >= since)
+    return session.scalar(select(AuditEntryRow.id).where(*entry).limit(1)) is not None
+
+
+def count_of_service(session: Session, action: AuditAction) -> int:
+    """How many different subjects the service itself has recorded this of."""
+    entry = (AuditEntryRow.actor == SERVICE.name, AuditEntryRow.action == action)
+    return int(session.scalar(select(func.count(AuditEntryRow.subject.distinct())).where(*entry)) or 0)
+
+
 def delete_before(session: Session, moment: datetime) -> int:
     """Delete the entries from before a moment, at least 30 days ago, and record that; returns how many."""
     old = AuditEntryRow.at < moment

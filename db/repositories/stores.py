@@ -1,6 +1,6 @@
 """The id of the store that the database belongs to."""
 
-from sqlalchemy import select, text
+from sqlalchemy import select, text, update
 from sqlalchemy.orm import Session
 
 from db.errors import StorageUnavailable
@@ -21,6 +21,11 @@ def find_id(session: Session) -> str | None:
 def set_id(session: Session, store_id: str) -> None:
     """Give the database this store id."""
     session.merge(StoreRow(number=1, id=store_id))
+
+
+def touch(session: Session) -> None:
+    """Write the row anew: it shows whether the database takes anything."""
+    session.execute(update(StoreRow).values(number=1))
 
 
 def require(session: Session, store_id: str | None) -> None:

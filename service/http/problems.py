@@ -1,5 +1,6 @@
 """Errors as RFC 9457 problem details: one stable type a kind of problem (docs/problems.md)."""
 
+import asyncio
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +13,8 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 from starlette.routing import Match, Router
 
-from db.errors import AlreadyExists, NotFound, StorageUnavailable
+from db.errors import AlreadyExists, BlobDamaged, NotFound, StorageUnavailable
+from service.domain.damage import record_damage
 
 logger = logging.getLogger(__name__)
 
@@ -65,6 +67,7 @@ INVALID_REQUEST = ProblemType("invalid-request", "A value in the request is not 
 IDEMPOTENCY_KEY_REUSED = ProblemType("idempotency-key-reused", "The key stands for another request", 422)
 TOO_MANY_REQUESTS = ProblemType("too-many-requests", "Requests come too often", 429)
 HEADERS_TOO_LARGE = ProblemType("headers-too-large", "The headers are too large", 431)
+FILE_DAMAGED = ProblemType("file-damaged", "A stored file is damaged", 500)
 INTERNAL_ERROR = ProblemType("internal-error", "The service failed", 500)
 TOO_MANY_CONNECTIONS = ProblemType("too-many-connections", "Too many connections", 503)
 STOPPING = ProblemType("stopping", "The server stops", 503)
@@ -116,6 +119,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(Problem, _on_problem)
     app.add_exception_handler(NotFound, _on_not_found)
     app.add_exception_handler(AlreadyExists, _on_already_exists)
+    app.add_exception_handler(BlobDamaged, _on_blob_damaged)
     app.add_exception_handler(StorageUnavailable, _on_storage_unavailable)
     app.add_exception_handler(RequestValidationError, _on_invalid_request)
     app.add_exception_handler(HTTPException, _on_http_exception)
@@ -169,6 +173,13 @@ async def _on_already_exists(request: Request, error: Exception) -> JSONResponse
     assert isinstance(error, AlreadyExists)
     allowed = f"a name that no {error.kind} has yet"
     return answer(request, Problem.wrong_value(MATERIAL_EXISTS, "name", error.name, allowed))
+
+
+async def _on_blob_damaged(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, BlobDamaged)
+    found_by = f"{request.method} {request.url.path}"
+    await asyncio.to_thread(record_damage, request.app.state.context.database, error, found_by)
+    return answer(request, Problem(FILE_DAMAGED, f"{error}; allowed: a copy from a backup, or the same upload again"))
 
 
 async def _on_storage_unavailable(request: Request, error: Exception) -> JSONResponse:

@@ -739,9 +739,10 @@ class AuditOut(BaseModel):
 
 
 class HealthOut(BaseModel):
-    """The process lives."""
+    """The process lives; its stores may be in trouble, which a restart does not always mend."""
 
-    status: Literal["ok"] = "ok"
+    status: Literal["ok", "degraded"] = "ok"
+    trouble: str | None = Field(default=None, description="What is wrong with database or files, since seconds ago")
 
 
 class ReadyOut(BaseModel):

@@ -18,7 +18,7 @@ from sqlalchemy.orm import Session
 
 from db import migrate
 from db.database import Database
-from db.errors import ClaimLost, SchemaMismatch, StorageUnavailable
+from db.errors import ClaimLost, SchemaMismatch, StorageUnavailable, StoreMismatch
 from db.records import Claim
 from db.repositories import jobs, runners, stores
 from service.jobs.lanes import Lane, WorkerDied
@@ -199,7 +199,7 @@ class JobRunner:
             is_lost = not self._stopping
             if is_lost:
                 await self._try(lambda: self._count_death(claim))
-        except StorageUnavailable as error:
+        except (StorageUnavailable, StoreMismatch) as error:
             logger.warning("job %s waits: %s", claim.job_id, error)
             await asyncio.sleep(RETRY_SECONDS)
         except Exception as error:  # a lane outlives whatever one job throws at it

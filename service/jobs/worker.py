@@ -9,9 +9,10 @@ from pathlib import Path
 from db import identity
 from db.blobs import BlobStore, open_blobs
 from db.database import Database
-from db.errors import ClaimLost, StorageUnavailable
+from db.errors import BlobDamaged, ClaimLost, StorageUnavailable
 from db.records import Claim
 from db.repositories import jobs
+from service.domain.damage import record_damage
 from service.observability import logs
 
 logger = logging.getLogger(__name__)
@@ -58,6 +59,10 @@ def _run(place: Place, claim: Claim) -> None:
         raise
     except ClaimLost as lost:
         logger.warning("%s; what was done of it stays", lost)
+    except BlobDamaged as damage:
+        record_damage(database, damage, f"job {claim.job_id}")
+        with database.write() as session, suppress(ClaimLost):
+            jobs.finish(session, claim, "failed", reason=str(damage))
     except Exception as error:
         logger.exception("job failed")
         with database.write() as session, suppress(ClaimLost):

@@ -10,8 +10,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from db.database import Database
 from db.records import Job
-from db.repositories import grasp_logs, jobs
+from db.repositories import audit, grasp_logs, jobs
 from db.tables import now
+from service.jobs.scrub import Scrub
 from service.observability.answered import Answered
 
 REQUEST_BUCKETS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0)
@@ -53,19 +54,32 @@ class Metrics:
             "stiction_deleted_uploads", "Grasp logs whose uploads were old and are deleted.", registry=self.registry
         )
         self._bytes = Gauge("stiction_upload_bytes", "Bytes of the uploads of the others.", registry=self.registry)
+        self._damaged = Gauge(
+            "stiction_damaged_files", "Stored files that were found damaged, ever.", registry=self.registry
+        )
+        self._scrubbed = Gauge(
+            "stiction_scrubbed_bytes", "Bytes of stored files that this process has compared.", registry=self.registry
+        )
+        self._scrub_passes = Gauge(
+            "stiction_scrub_passes", "Times that this process has compared all of them.", registry=self.registry
+        )
         self._lock = threading.Lock()
         self._horizon = now()
         self._counted: dict[str, datetime] = {}
 
-    def expose(self, database: Database) -> bytes:
+    def expose(self, database: Database, scrub: Scrub | None = None) -> bytes:
         """Everything, as of now."""
         with self._lock:
             with database.read() as session:
                 self._follow_jobs(session)
                 count, deleted, size = grasp_logs.count_and_bytes(session)
+                self._damaged.set(audit.count_of_service(session, "blob.damaged"))
             self._logs.set(count)
             self._deleted.set(deleted)
             self._bytes.set(size)
+            if scrub is not None:
+                self._scrubbed.set(scrub.bytes)
+                self._scrub_passes.set(scrub.passes)
             return generate_latest(self.registry)
 
     def _follow_jobs(self, session: Session) -> None:

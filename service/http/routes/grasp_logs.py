@@ -20,6 +20,7 @@ from service.http.access import READ, UPLOAD, Asking
 from service.http.idempotency import OnceWithoutBody
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import (
+    FILE_DAMAGED,
     FILE_DELETED,
     IDEMPOTENCY_KEY_REUSED,
     INVALID_GRASP_LOG,
@@ -60,7 +61,7 @@ _FILE: dict[int | str, dict[str, Any]] = {
     }
 }
 _FOUND = problems(UNKNOWN_GRASP_LOG, INVALID_REQUEST, STORAGE_UNAVAILABLE)
-_RESULTS = problems(UNKNOWN_GRASP_LOG, NOT_READY, INVALID_REQUEST, STORAGE_UNAVAILABLE)
+_RESULTS = problems(UNKNOWN_GRASP_LOG, NOT_READY, INVALID_REQUEST, FILE_DAMAGED, STORAGE_UNAVAILABLE)
 
 
 @router.post(
@@ -206,7 +207,7 @@ def read_samples(context: Given, id: str) -> SamplesOut:  # noqa: A002
     summary="Download a grasp log",
     response_class=FileResponse,
     responses=_FILE
-    | problems(UNKNOWN_GRASP_LOG, FILE_DELETED, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+    | problems(UNKNOWN_GRASP_LOG, FILE_DELETED, UNSUPPORTED_FORMAT, INVALID_REQUEST, FILE_DAMAGED, STORAGE_UNAVAILABLE),
 )
 async def read_file(
     context: Given,

@@ -2,18 +2,20 @@
 
 from fastapi import APIRouter
 
+from db.errors import StorageUnavailable
 from service.context import Given
-from service.http.problems import STORAGE_UNAVAILABLE, WORKERS_NOT_READY, Problem
+from service.http.problems import STORAGE_UNAVAILABLE, WORKERS_NOT_READY, Problem, storage_unavailable
 from service.http.routes.common import problems
 from service.http.schemas import HealthOut, ReadyOut
 
 router = APIRouter(tags=["health"])
 
 
-@router.get("/healthz", summary="Does the process live?")
-async def read_health() -> HealthOut:
-    """Touches neither database nor disk."""
-    return HealthOut()
+@router.get("/healthz", summary="Does the process live?", response_model_exclude_none=True)
+async def read_health(context: Given) -> HealthOut:
+    """Touches neither database nor disk: it tells what was last seen of them, some seconds ago."""
+    trouble = context.watch.trouble if context.watch is not None else None
+    return HealthOut() if trouble is None else HealthOut(status="degraded", trouble=trouble)
 
 
 @router.get("/readyz", summary="Can it take work?", responses=problems(STORAGE_UNAVAILABLE, WORKERS_NOT_READY))
@@ -21,6 +23,8 @@ def read_readiness(context: Given) -> ReadyOut:
     """Tries the database and the blob folder, and waits for the workers' warm-up; the problem names what is missing."""
     context.database.ping()
     context.blobs.ping()
+    if context.watch is not None and context.watch.trouble is not None:
+        raise storage_unavailable(StorageUnavailable(context.watch.trouble))
     if context.jobs.missing is not None:
         raise Problem(WORKERS_NOT_READY, context.jobs.missing)
     return ReadyOut()

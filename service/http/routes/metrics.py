@@ -32,4 +32,4 @@ async def _metrics(request: Request) -> Metrics:
 )
 def read_metrics(context: Given, metrics: Annotated[Metrics, Depends(_metrics)]) -> Response:
     """Requests, jobs and their stages, and what is stored (docs/operations.md)."""
-    return Response(metrics.expose(context.database), media_type=CONTENT_TYPE_LATEST)
+    return Response(metrics.expose(context.database, context.scrub), media_type=CONTENT_TYPE_LATEST)

@@ -153,8 +153,9 @@ class Fleet:
         self.wait_for(server)
         return server
 
-    def begin_serving(self, server: Server, *, workers: int = 0) -> None:
-        self.servers[server] = self._start("service.cli", "serve", f"--port={server.port}", workers=workers)
+    def begin_serving(self, server: Server, *, workers: int = 0, **environment: str) -> None:
+        command = ("service.cli", "serve", f"--port={server.port}")
+        self.servers[server] = self._start(*command, workers=workers, **environment)
 
     def wait_for(self, server: Server) -> None:
         def is_ready() -> bool:
@@ -163,8 +164,8 @@ class Fleet:
 
         wait_until(is_ready, "the server to be ready")
 
-    def _start(self, *command: str, workers: int) -> BaseProcess:
-        environment = self.environment | {"STICTION_WORKERS": str(workers)}
+    def _start(self, *command: str, workers: int, **environment: str) -> BaseProcess:
+        environment = self.environment | {"STICTION_WORKERS": str(workers)} | environment
         process = self._context.Process(target=run_module, args=(command, environment, self.log))
         process.start()
         return process

@@ -15,12 +15,20 @@ import numpy as np
 import pytest
 from sqlalchemy import select, update
 
+from db.blobs import BlobStore
 from db.tables import DetectionRow, JobRow, RunnerRow
+from service.cli.exit_codes import INPUT_REFUSED
 
-KILLS = 200
+KILLS = 300
+WRONG_STARTS = 30
+"""Of the servers that are killed, how many are first started again with a wrong database."""
+
 KINDS = ("server", "runner", "worker process")
 EARLIEST, LATEST = 1e-3, 0.5
 """s from the beginning of an upload to the kill, of which each power of ten is as likely."""
+
+PATIENCE = 600.0
+"""s; only against waiting for ever."""
 
 MOST_UNFINISHED = 3
 """Jobs left when the next upload comes: workers get on, in spite of all the kills."""
@@ -88,7 +96,8 @@ def test_the_job_of_a_killed_worker_is_ended_by_another_without_doing_finished_s
 class Campaign:
     """Two servers and two workers, of which one process after the other is killed while logs come in.
 
-    ``killed`` counts the kills of each kind, ``struck`` those of a server in an upload and of a worker in a job.
+    ``killed`` counts the kills of each kind, ``struck`` those of a server in an upload and of a worker in a job,
+    ``refused`` the starts with a wrong database.
     """
 
     def __init__(self, fleet: Any) -> None:
@@ -97,6 +106,7 @@ class Campaign:
         self.accepted: list[str] = []
         self.killed: Counter[str] = Counter()
         self.struck: Counter[str] = Counter()
+        self.refused = 0
         for _ in range(2):
             fleet.serve()
             fleet.work()
@@ -118,11 +128,24 @@ class Campaign:
         if kind == "server":
             self.struck[kind] += sender.is_alive()
             self.fleet.kill(self.fleet.servers[server])
+            if self.killed["server"] * WRONG_STARTS % (KILLS // len(KINDS)) < WRONG_STARTS:
+                self.start_with_a_wrong_database(server)
             self.fleet.begin_serving(server)
         else:
             self.kill_worker(kind)
         self.killed[kind] += 1
         sender.join()
+
+    def start_with_a_wrong_database(self, server: Any) -> None:
+        """It is refused, while the others work on, and every file stays."""
+        before = set(BlobStore(self.fleet.folder).hashes())
+        wrong = self.fleet.folder.parent / "wrong.sqlite3"
+        self.fleet.begin_serving(server, STICTION_DATABASE_URL=f"sqlite:///{wrong}")
+        process = self.fleet.servers.pop(server)
+        process.join(PATIENCE)
+        assert process.exitcode == INPUT_REFUSED
+        assert set(BlobStore(self.fleet.folder).hashes()) >= before
+        self.refused += 1
 
     def upload(self, server: Any, content: bytes) -> None:
         with suppress(httpx.TransportError):  # killed before its answer
@@ -160,6 +183,7 @@ def test_processes_killed_at_random_moments_leave_all_or_nothing(fleet: Any, con
     assert set(everything) > stored >= set(campaign.accepted)
     fleet.check_complete(everything)
     result = {"killed": campaign.killed, "struck": campaign.struck, "accepted": len(campaign.accepted)}
-    print(json.dumps(result | {"stored": len(stored)}))  # noqa: T201  (for docs/long-tests.md)
+    print(json.dumps(result | {"stored": len(stored), "refused": campaign.refused}))  # noqa: T201  (for docs/long-tests.md)
     assert min(campaign.killed.values()) >= KILLS // len(KINDS)
     assert min(campaign.struck.values()) > KILLS // 20
+    assert campaign.refused >= WRONG_STARTS

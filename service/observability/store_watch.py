@@ -1,0 +1,69 @@
+"""Looks now and then whether database and files are well, so that a monitor that asks often costs nothing."""
+
+import asyncio
+import threading
+import time
+
+from db.blobs import BlobStore
+from db.database import Database
+from db.errors import DatabaseError
+from db.repositories import stores
+
+LOOK_SECONDS = 10.0
+"""s between two looks."""
+
+SHARE_OF_TIME = 0.01
+"""Of its time that the process may spend on reading the pages of an SQLite file."""
+
+
+class StoreWatch:
+    """``trouble`` says what was wrong with the stores when they were last looked at; None: nothing."""
+
+    def __init__(self, database: Database, blobs: BlobStore) -> None:
+        self._database, self._blobs = database, blobs
+        self.trouble: str | None = None
+        self._damage: str | None = None  # of the pages, which are read more seldom
+        self._next_pages = 0.0
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._go_on, name="store watch", daemon=True)
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    async def stop(self) -> None:
+        """End after the present look."""
+        self._stopping.set()
+        if self._thread.ident is not None:
+            await asyncio.to_thread(self._thread.join)
+
+    def look(self) -> None:
+        """Ask, write and read."""
+        try:
+            self._database.ping()
+            self._blobs.ping()
+            with self._database.write(durable=False) as session:
+                stores.require(session, self._database.store_id)
+                stores.touch(session)
+            self._look_at_pages()
+        except (DatabaseError, OSError) as error:
+            self.trouble = str(error)
+        else:
+            self.trouble = self._damage
+
+    def _look_at_pages(self) -> None:
+        begin = time.monotonic()
+        if begin < self._next_pages:
+            return
+        try:
+            self._database.check_pages()
+        except DatabaseError as error:
+            self._damage = str(error)
+        else:
+            self._damage = None
+        end = time.monotonic()
+        self._next_pages = end + (end - begin) / SHARE_OF_TIME
+
+    def _go_on(self) -> None:
+        while not self._stopping.wait(LOOK_SECONDS):
+            self.look()

@@ -1,0 +1,153 @@
+"""An unlucky operator: the database's file, the folder or the disk goes while the service runs."""
+
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from sqlalchemy.orm import Session
+
+from db.blobs import BlobStore
+from db.database import Database
+from db.errors import StorageUnavailable
+from db.repositories import stores
+from service.observability.store_watch import StoreWatch
+from service.settings import Settings
+
+NPZ = {"content-type": "application/vnd.stiction.grasp-log+npz"}
+UNAVAILABLE = (503, "/problems/storage-unavailable")
+
+
+@pytest.fixture
+def running(tmp_path: Path, serving: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[httpx.Client]:
+    monkeypatch.setattr("service.observability.store_watch.LOOK_SECONDS", 0.05)
+    with serving(Settings(data_folder=tmp_path / "data", workers=0)) as client:
+        yield client
+
+
+def send(client: httpx.Client, content: bytes) -> httpx.Response:
+    return client.post("/v1/grasp-logs", content=content, headers=NPZ)
+
+
+def told(response: httpx.Response) -> tuple[int, str]:
+    return response.status_code, response.json().get("type", "")
+
+
+def wait_for_health(client: httpx.Client, status: str) -> dict[str, Any]:
+    for _ in range(400):
+        health: dict[str, Any] = client.get("/healthz").raise_for_status().json()
+        if health["status"] == status:
+            return health
+    raise AssertionError(health)
+
+
+def database_files(folder: Path) -> list[Path]:
+    return list(folder.glob("stiction.sqlite3*"))
+
+
+@pytest.mark.parametrize("is_replaced", [False, True])
+def test_no_upload_is_accepted_into_a_deleted_or_replaced_database(
+    running: httpx.Client, tmp_path: Path, content: bytes, sqlite_template: Path, *, is_replaced: bool
+) -> None:
+    send(running, content).raise_for_status()
+    (tmp_path / "away").mkdir()
+    for file in database_files(tmp_path / "data"):
+        file.rename(tmp_path / "away" / file.name)
+    if is_replaced:
+        shutil.copyfile(sqlite_template, tmp_path / "data" / "stiction.sqlite3")
+    for _ in range(2):
+        refused = send(running, content)
+        assert told(refused) == UNAVAILABLE
+        assert "was deleted or replaced while it was in use" in refused.json()["detail"]
+    assert told(running.get("/readyz")) == UNAVAILABLE
+    assert "deleted or replaced" in wait_for_health(running, "degraded")["trouble"]
+    assert len(database_files(tmp_path / "data")) == is_replaced  # no empty one was made in its place
+    for file in database_files(tmp_path / "away"):
+        file.rename(tmp_path / "data" / file.name)
+    wait_for_health(running, "ok")
+    assert send(running, content).status_code == httpx.codes.OK
+
+
+def test_a_database_deleted_in_the_middle_of_a_write_is_noticed_before_the_answer(tmp_path: Path) -> None:
+    with closing(Database(f"sqlite:///{tmp_path / 'stiction.sqlite3'}")) as database:
+
+        def write() -> None:
+            with database.write() as session:
+                session.connection().exec_driver_sql("CREATE TABLE kept (number INTEGER)")
+                (tmp_path / "stiction.sqlite3").unlink()
+
+        with pytest.raises(StorageUnavailable, match="deleted or replaced"):
+            write()
+
+
+def test_another_database_under_the_same_name_takes_no_upload(
+    reach: Callable[..., Any], database: Database, content: bytes
+) -> None:
+    """As PostgreSQL allows: dropped, made anew and restored."""
+    database.store_id = "0" * 32
+    with database.write() as session:
+        stores.set_id(session, "1" * 32)
+    refused = reach("open").request("POST", "/v1/grasp-logs", content=content, headers=NPZ)
+    assert told(refused) == UNAVAILABLE
+    assert "another database is in its place" in refused.json()["detail"]
+
+
+def test_a_damaged_database_is_told(running: httpx.Client, tmp_path: Path, content: bytes) -> None:
+    send(running, content).raise_for_status()
+    file = tmp_path / "data" / "stiction.sqlite3"
+    with closing(Database(f"sqlite:///{file}")) as database, database.connect() as connection:
+        connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
+    with file.open("r+b") as stream:
+        stream.seek(4096)
+        stream.write(b"\xff" * (file.stat().st_size - 4096))
+    health = wait_for_health(running, "degraded")
+    assert "damaged" in health["trouble"] or "malformed" in health["trouble"]
+    assert told(running.get("/readyz")) == UNAVAILABLE
+
+
+def test_a_header_that_is_none_is_told_at_once(database: Database, tmp_path: Path) -> None:
+    if not database.is_sqlite:
+        pytest.skip("PostgreSQL keeps its own files")
+    database.ping()
+    with (tmp_path / "stiction.sqlite3").open("r+b") as stream:
+        stream.write(b"no database" * 20)
+    with pytest.raises(StorageUnavailable, match="not a database"):
+        database.ping()
+
+
+def test_a_missing_blob_folder_is_told_and_takes_no_upload(
+    running: httpx.Client, tmp_path: Path, content: bytes
+) -> None:
+    folder = tmp_path / "data" / "blobs"
+    folder.rename(tmp_path / "unmounted")
+    folder.mkdir()  # the mount point is there, its disk is not
+    assert told(running.get("/readyz")) == UNAVAILABLE
+    assert "blob folder" in wait_for_health(running, "degraded")["trouble"]
+    assert told(send(running, content)) == UNAVAILABLE
+    assert running.get("/v1/grasp-logs").json()["items"] == []
+
+
+@pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+def test_a_full_disk_of_the_database_is_told(
+    database: Database, blobs: BlobStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    watch = StoreWatch(database, blobs)
+    watch.look()
+    assert watch.trouble is None
+    with database.read() as session:
+        pages = session.connection().exec_driver_sql("PRAGMA page_count").scalar()
+    begin = stores.touch
+
+    def on_a_full_disk(session: Session) -> None:
+        connection = session.connection()
+        connection.exec_driver_sql(f"PRAGMA max_page_count = {pages}")
+        connection.exec_driver_sql("CREATE TABLE needs_a_page (number INTEGER)")
+        begin(session)
+
+    monkeypatch.setattr(stores, "touch", on_a_full_disk)
+    watch.look()
+    assert watch.trouble is not None
+    assert "database or disk is full" in watch.trouble
