@@ -6,7 +6,7 @@ import numpy as np
 
 
 def warm_up() -> float:
-    """Compile the likelihoods' sums, or load them from the cache beside the package; seconds that it took.
+    """Compile the likelihoods' sums, or load them from where they are kept; seconds that it took.
 
     The libraries that only some methods need are loaded on the way.
     """

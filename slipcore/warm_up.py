@@ -8,7 +8,7 @@ from slipcore.frames import GraspLog
 
 
 def warm_up() -> float:
-    """Compile the kernels, or load them from the cache beside the package; seconds that it took."""
+    """Compile the kernels, or load them from where they are kept; seconds that it took."""
     began = time.perf_counter()
     from slipcore.detection.batch import detect_slip
     from slipcore.detection.methods import METHODS

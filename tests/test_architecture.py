@@ -54,10 +54,15 @@ def test_imports_run_one_way(package: str) -> None:
         assert not extra, f"{path.relative_to(ROOT)} imports {sorted(extra)}"
 
 
-def test_estimators_know_only_the_samples_of_slipcore() -> None:
+def test_estimators_know_of_slipcore_only_its_samples_and_its_compiler() -> None:
     for path in sorted((ROOT / "estimators").rglob("*.py")):
         modules = {name for name in imported_modules(path) if name.split(".")[0] == "slipcore"}
-        assert all(name.startswith("slipcore.samples") for name in modules), path
+        assert all(name.startswith(("slipcore.samples", "slipcore.compilation")) for name in modules), path
+
+
+def test_one_module_decides_how_kernels_are_compiled_and_kept() -> None:
+    paths = (path for package in ALLOWED for path in (ROOT / package).rglob("*.py"))
+    assert [path for path in paths if "numba" in third_party(path)] == [ROOT / "slipcore/compilation.py"]
 
 
 ESTIMATOR_ROOMS = ("linear", "sampling", "likelihoods", "methods")
@@ -97,7 +102,7 @@ def test_the_server_starts_without_the_numerics() -> None:
     script = (
         "import sys; from service.app import create_app; create_app();"
         f"print({NUMERICS} & {{name.split('.')[0] for name in sys.modules}},"
-        "[name for name in sys.modules if name.startswith(('slipcore.detection.shared.comp', 'slipcore.contact'))])"
+        "[name for name in sys.modules if name.startswith(('slipcore.compilation', 'slipcore.contact'))])"
     )
     answer = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT)
     assert answer.stdout == "set() []\n"

@@ -80,6 +80,19 @@ def test_each_distribution_brings_its_licence(folder: Path) -> None:
         assert (folder / file).read_text(encoding="utf-8").startswith("MIT License")
 
 
+def test_an_image_is_built_on_a_base_of_known_content() -> None:
+    text = (ROOT / "docs/deploy/Containerfile").read_text(encoding="utf-8")
+    assert re.search(r"^ARG BASE=\S+@sha256:[0-9a-f]{64}$", text, re.M)
+    assert re.findall(r"^FROM (\S+)", text, re.M) == ["${BASE}"]
+
+
+def test_an_image_gets_all_packages_and_nothing_else() -> None:
+    let_in = {line[1:] for line in (ROOT / ".containerignore").read_text().splitlines() if line.startswith("!")}
+    found = project(ROOT)["tool"]["setuptools"]["packages"]["find"]["include"]
+    packages = {pattern.rstrip("*") for pattern in found}
+    assert let_in == packages | {"LICENSE", "README.md", "clients", "constraints.txt", "pyproject.toml"}
+
+
 @pytest.mark.long
 def test_a_fresh_clone_sets_itself_up_and_lists_what_it_ships(tmp_path: Path) -> None:
     clone = tmp_path / "clone"

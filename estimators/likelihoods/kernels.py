@@ -7,16 +7,17 @@ C library, which takes one number at a time, would cost five times as much.
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from slipcore.compilation import compiled
 
 FloatArray = NDArray[np.float64]
 
 BLOCK = 1024
 """Samples in a block: five columns of them are 40 kilobytes."""
-elementary = njit(cache=True, error_model="numpy", fastmath={"contract"})
+elementary = compiled(fastmath={"contract"})
 """Rounding tricks forbid the compiler to reorder, and a division that could raise would cost it the parallel lanes."""
-parallel_sum = njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+parallel_sum = compiled(fastmath={"contract", "reassoc", "nsz"})
 """A sum in any order runs in parallel lanes; infinities keep their meaning."""
 EXPONENT_BITS, MANTISSA, ONE = 52, 0x000FFFFFFFFFFFFF, 0x3FF0000000000000
 TWO_52, TWO_52_BITS = 2.0**52, 0x4330000000000000

@@ -5,10 +5,10 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from slipcore.compilation import compiled
 from slipcore.detection.filter.run import run_filter
 from slipcore.detection.filter.step import PROBABILITY, THRESHOLD, decide, look_back
 from slipcore.detection.shared.answer import answer
-from slipcore.detection.shared.compilation import compiled
 from slipcore.detection.strain_rate.run import run_strain_rate
 from slipcore.frames import BoolArray, FloatArray
 

@@ -3,8 +3,8 @@
 from typing import Literal
 
 import numpy as np
-from numba import njit
 
+from slipcore.compilation import compiled
 from slipcore.frames import FloatArray
 
 VECTOR = {"reassoc", "nsz", "contract"}
@@ -52,7 +52,7 @@ def _doubled_last(field: FloatArray) -> FloatArray:
     return halves.reshape(*field.shape[:-1], -1)
 
 
-@njit(cache=True, fastmath=VECTOR)
+@compiled(fastmath=VECTOR)
 def _inner(a, b):  # type: ignore[no-untyped-def]
     total = 0.0
     for i in range(a.size):

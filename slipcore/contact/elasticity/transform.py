@@ -2,9 +2,9 @@
 
 import numpy as np
 import scipy.fft
-from numba import njit
 from numpy.typing import NDArray
 
+from slipcore.compilation import compiled
 from slipcore.frames import FloatArray
 
 ComplexArray = NDArray[np.complex128]
@@ -78,7 +78,7 @@ def multiply_pair(spectrum: ComplexArray, xx: FloatArray, yy: FloatArray, xy: Fl
         _multiply(spectrum[0].ravel(), spectrum[1].ravel(), xx.ravel(), yy.ravel(), xy.ravel())
 
 
-@njit(cache=True)
+@compiled
 def _multiply(along_x, along_y, xx, yy, xy):  # type: ignore[no-untyped-def]
     for i in range(xx.size):
         first, second = along_x[i], along_y[i]

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.fft
-from numba import njit
 from scipy import optimize
 
+from slipcore.compilation import compiled
 from slipcore.contact.errors import InfeasibleLoad, NotConverged
 from slipcore.contact.reference.checks import check_range
 from slipcore.contact.reference.elastic_pair import half_space
@@ -210,7 +210,7 @@ def _checked_limit(lattice: BeamLattice, limit: FloatArray) -> FloatArray:
     return checked
 
 
-@njit(cache=True)
+@compiled
 def _relax(u, goal, limit, bending, coupling, relaxation, tolerance, max_sweeps):  # type: ignore[no-untyped-def]
     """Sweep over the beams until no force is off by more than ``tolerance``; ``u`` is overwritten."""
     n, m = limit.shape

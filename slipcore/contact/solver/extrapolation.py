@@ -8,8 +8,8 @@ in c², and zero at the front. So this is extrapolated, along the traction; acro
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from slipcore.compilation import compiled
 from slipcore.frames import FloatArray
 
 
@@ -44,7 +44,7 @@ def foreseen(now: Stress, before: Stress, share: float) -> Stress:
     return Stress(pressure, traction, limit)
 
 
-@njit(cache=True)
+@compiled
 def _go_on(traction, earlier, limit, earlier_limit, coming_limit, share, coming):  # type: ignore[no-untyped-def]
     for i in range(limit.size):
         qx, qy, ex, ey = traction[0, i], traction[1, i], earlier[0, i], earlier[1, i]

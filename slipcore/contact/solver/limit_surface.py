@@ -7,8 +7,8 @@ everywhere takes up: load·d ≤ σ(d) = Σ R_i |B_i d| for every d.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from slipcore.compilation import compiled
 from slipcore.contact.elasticity.fields import rigid_displacement
 from slipcore.frames import BoolArray, FloatArray
 
@@ -55,7 +55,7 @@ def sliding_traction(radius: FloatArray, arm: FloatArray, motion: FloatArray) ->
     return along * (radius / np.where(speed > 0.0, speed, 1.0))
 
 
-@njit(cache=True)
+@compiled
 def _friction(radius, arm, motion):  # type: ignore[no-untyped-def]
     """What friction takes up in a sliding motion, σ, and the matrix A for which motion·A·motion = σ."""
     taken, matrix = 0.0, np.zeros((3, 3))

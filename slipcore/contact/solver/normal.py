@@ -10,8 +10,8 @@ from collections import deque
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from slipcore.compilation import compiled
 from slipcore.contact.elasticity.fields import doubled, inner
 from slipcore.contact.elasticity.grid import Box, Grid, bounding_box
 from slipcore.contact.elasticity.operator import ElasticOperator, Operators
@@ -259,7 +259,7 @@ class _Relaxation:
         return pressure + share * way, displacement + share * response
 
 
-@njit(cache=True)
+@compiled
 def _restrict(field, active, balanced):  # type: ignore[no-untyped-def]
     total, count = 0.0, 0
     for i in range(field.shape[0]):
@@ -277,7 +277,7 @@ def _restrict(field, active, balanced):  # type: ignore[no-untyped-def]
                     field[i, j] -= mean
 
 
-@njit(cache=True)
+@compiled
 def _advance(change, response, residual, direction, answer, step):  # type: ignore[no-untyped-def]
     for i in range(change.shape[0]):
         for j in range(change.shape[1]):

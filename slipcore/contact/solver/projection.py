@@ -9,8 +9,8 @@ of the imbalance, which near full sliding hardly falls until the very end.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from slipcore.compilation import compiled
 from slipcore.contact.elasticity.fields import VECTOR
 from slipcore.frames import BoolArray, FloatArray
 
@@ -63,7 +63,7 @@ def project(
     return Projection(traction, motion, imbalance, iterations, feasible)
 
 
-@njit(cache=True)
+@compiled
 def _dual_newton(wish, radius, arm, target, given, motion, traction, tight, max_iterations):  # type: ignore[no-untyped-def]
     gradient, hessian = np.empty(3), np.empty((3, 3))
     trial_gradient, trial_hessian = np.empty(3), np.empty((3, 3))
@@ -86,7 +86,7 @@ def _dual_newton(wish, radius, arm, target, given, motion, traction, tight, max_
     return motion, gradient, iteration, feasible
 
 
-@njit(cache=True)
+@compiled
 def _search(wish, radius, arm, target, given, motion, step, gradient, tight, traction, trial_gradient, trial_hessian):  # type: ignore[no-untyped-def]
     """Move along ``step`` to where the slope of φ has at most half its first size, by bracketing and false position."""
     first = gradient @ step
@@ -112,7 +112,7 @@ def _search(wish, radius, arm, target, given, motion, step, gradient, tight, tra
     return trial
 
 
-@njit(cache=True)
+@compiled
 def _evaluate(wish, radius, arm, target, given, motion, traction, gradient, hessian):  # type: ignore[no-untyped-def]
     """Tractions for a dual ``motion``, the gradient of φ (the imbalance) and its Hessian."""
     gx, gy, gm = -target[0], -target[1], -target[2]
@@ -137,7 +137,7 @@ def _evaluate(wish, radius, arm, target, given, motion, traction, gradient, hess
     hessian[2, 0], hessian[2, 1], hessian[2, 2] = hxm, hym, hmm
 
 
-@njit(cache=True, fastmath=VECTOR, error_model="numpy")
+@compiled(fastmath=VECTOR)
 def _evaluate_block(wish_x, wish_y, radius, arm_x, arm_y, motion, traction_x, traction_y):  # type: ignore[no-untyped-def]
     """Tractions of a few cells, their resultants and derivatives; without branches, so that it runs in vectors."""
     mx, my, yaw = motion[0], motion[1], motion[2]
@@ -165,7 +165,7 @@ def _evaluate_block(wish_x, wish_y, radius, arm_x, arm_y, motion, traction_x, tr
     return (bx, by, bm), (hxx, hxy, hyy, hxm, hym, hmm)
 
 
-@njit(cache=True)
+@compiled
 def _solve(hessian, gradient, given):  # type: ignore[no-untyped-def]
     """Newton's step in the directions whose load is given (Cholesky), with a ridge where φ is flat."""
     lower, step = np.zeros((3, 3)), np.zeros(3)
@@ -182,7 +182,7 @@ def _solve(hessian, gradient, given):  # type: ignore[no-untyped-def]
     return step
 
 
-@njit(cache=True)
+@compiled
 def _is_certificate(radius, arm, target, motion):  # type: ignore[no-untyped-def]
     """Whether the load does more work on this motion than friction everywhere could take up."""
     work, taken = target @ motion, 0.0

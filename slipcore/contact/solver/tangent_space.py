@@ -5,8 +5,8 @@ costs as much as its arithmetic.
 """
 
 import numpy as np
-from numba import njit
 
+from slipcore.compilation import compiled
 from slipcore.contact.elasticity.fields import VECTOR
 from slipcore.contact.elasticity.operator import ElasticOperator
 from slipcore.frames import BoolArray, FloatArray
@@ -121,7 +121,7 @@ def _flat(field: FloatArray) -> FloatArray:
     return field.reshape(len(field), -1)
 
 
-@njit(cache=True)
+@compiled
 def _classify(traction, slip, limit, stiffness, state, projector, onto_circle, curvature):  # type: ignore[no-untyped-def]
     for i in range(limit.size):
         radius = limit[i]
@@ -147,7 +147,7 @@ def _classify(traction, slip, limit, stiffness, state, projector, onto_circle, c
         curvature[i] = max(-(slip[0, i] * nx + slip[1, i] * ny), 0.0) / radius
 
 
-@njit(cache=True, fastmath=VECTOR)
+@compiled(fastmath=VECTOR)
 def _gram(projector, arm):  # type: ignore[no-untyped-def]
     """Products of the three rigid motions, restricted to the space."""
     xx = xy = yy = xm = ym = mm = 0.0
@@ -164,7 +164,7 @@ def _gram(projector, arm):  # type: ignore[no-untyped-def]
     return np.array(((xx, xy, xm), (xy, yy, ym), (xm, ym, mm)))
 
 
-@njit(cache=True)
+@compiled
 def _inverse(gram):  # type: ignore[no-untyped-def]
     """Pseudo-inverse: where all cells slide along one line some rigid motion is not in the space."""
     values, vectors = np.linalg.eigh(gram)
@@ -175,7 +175,7 @@ def _inverse(gram):  # type: ignore[no-untyped-def]
     return inverse
 
 
-@njit(cache=True, fastmath=VECTOR)
+@compiled(fastmath=VECTOR)
 def _restrict(projector, arm, move):  # type: ignore[no-untyped-def]
     """Restrict a move to the space in place and return its resultants."""
     sx = sy = sm = 0.0
@@ -190,7 +190,7 @@ def _restrict(projector, arm, move):  # type: ignore[no-untyped-def]
     return sx, sy, sm
 
 
-@njit(cache=True, fastmath=VECTOR)
+@compiled(fastmath=VECTOR)
 def _subtract_rigid(projector, arm, motion, move):  # type: ignore[no-untyped-def]
     """Subtract from a move, in place, the part of a rigid motion [3] that lies in the space."""
     mx, my, yaw = motion[0], motion[1], motion[2]
@@ -200,14 +200,14 @@ def _subtract_rigid(projector, arm, motion, move):  # type: ignore[no-untyped-de
         move[1, i] -= projector[1, i] * dx + projector[2, i] * dy
 
 
-@njit(cache=True)
+@compiled
 def _balance(projector, arm, inverse_gram, move):  # type: ignore[no-untyped-def]
     sx, sy, sm = _restrict(projector, arm, move)
     motion = inverse_gram[:, 0] * sx + inverse_gram[:, 1] * sy + inverse_gram[:, 2] * sm
     _subtract_rigid(projector, arm, motion, move)
 
 
-@njit(cache=True)
+@compiled
 def _advance(projector, arm, inverse_gram, curvature, scale, move, residual, direction, answer, size):  # type: ignore[no-untyped-def]
     step = size / _stiffen(projector, curvature, direction, answer)
     for k in range(2):
@@ -220,7 +220,7 @@ def _advance(projector, arm, inverse_gram, curvature, scale, move, residual, dir
             answer[k, i] = scale[i] * residual[k, i]
 
 
-@njit(cache=True, fastmath=VECTOR)
+@compiled(fastmath=VECTOR)
 def _stiffen(projector, curvature, direction, answer):  # type: ignore[no-untyped-def]
     """Restrict C·direction to the space and add the curvature, in place; return direction·answer."""
     product = 0.0
@@ -233,7 +233,7 @@ def _stiffen(projector, curvature, direction, answer):  # type: ignore[no-untype
     return product
 
 
-@njit(cache=True, fastmath=VECTOR)
+@compiled(fastmath=VECTOR)
 def _improve(projector, arm, inverse_gram, scale, residual, improved):  # type: ignore[no-untyped-def]
     for k in range(2):
         for i in range(improved.shape[1]):
@@ -246,7 +246,7 @@ def _improve(projector, arm, inverse_gram, scale, residual, improved):  # type: 
     return product
 
 
-@njit(cache=True)
+@compiled
 def _turn(direction, improved, share):  # type: ignore[no-untyped-def]
     for k in range(2):
         for i in range(direction.shape[1]):

@@ -2,7 +2,7 @@
 
 import math
 
-from slipcore.detection.shared.compilation import compiled
+from slipcore.compilation import compiled
 
 HALF_LOG_TWO_PI = 0.5 * math.log(2.0 * math.pi)
 

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from slipcore.detection.shared.compilation import compiled
+from slipcore.compilation import compiled
 from slipcore.frames import FloatArray
 
 STIFFNESS = 0.67

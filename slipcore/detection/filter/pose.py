@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipcore.detection.shared.compilation import compiled
+from slipcore.compilation import compiled
 from slipcore.frames import FloatArray
 
 

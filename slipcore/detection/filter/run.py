@@ -8,9 +8,9 @@ answered.
 
 import numpy as np
 
+from slipcore.compilation import compiled
 from slipcore.detection.filter.step import step_filter
 from slipcore.detection.shared.answer import answer
-from slipcore.detection.shared.compilation import compiled
 from slipcore.detection.shared.observe import observe
 from slipcore.frames import BoolArray, FloatArray
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from slipcore.compilation import compiled, unpack
 from slipcore.detection.filter.force_ratio import ratio_evidence
 from slipcore.detection.filter.loading import Loading, depth_presses_home, forces_press_home, low_pass, step_loading
 from slipcore.detection.filter.pose import (
@@ -23,7 +24,6 @@ from slipcore.detection.filter.pose import (
     place_on_object,
     pose_at,
 )
-from slipcore.detection.shared.compilation import compiled, unpack
 from slipcore.detection.shared.observe import same
 from slipcore.frames import BoolArray, FloatArray
 

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from slipcore.detection.shared.compilation import compiled
+from slipcore.compilation import compiled
 from slipcore.detection.shared.rigid_motion import Motion, fit_motion
 from slipcore.frames import BoolArray, FloatArray
 

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from slipcore.compilation import compiled
 from slipcore.defaults import NOISE
-from slipcore.detection.shared.compilation import compiled
 from slipcore.detection.shared.noise import median
 from slipcore.frames import BoolArray, FloatArray
 

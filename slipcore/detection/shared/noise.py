@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
+from slipcore.compilation import compiled
 from slipcore.defaults import NOISE
-from slipcore.detection.shared.compilation import compiled
 from slipcore.frames import FloatArray
 
 _LEAST, _MEMORY, _TO_SIGMA = NOISE.least_series, NOISE.memory, NOISE.deviation_to_sigma

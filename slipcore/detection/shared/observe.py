@@ -1,7 +1,7 @@
 """What all methods share of a frame: noise, normals, split forces, contact."""
 
+from slipcore.compilation import compiled, unpack
 from slipcore.defaults import NOISE
-from slipcore.detection.shared.compilation import compiled, unpack
 from slipcore.detection.shared.contact import Touch, find_contact
 from slipcore.detection.shared.noise import noise_of_three, recent_median, remember
 from slipcore.detection.shared.surface import split_forces, surface_normals

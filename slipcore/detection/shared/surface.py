@@ -2,7 +2,7 @@
 
 import math
 
-from slipcore.detection.shared.compilation import compiled
+from slipcore.compilation import compiled
 from slipcore.frames import FloatArray
 
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from slipcore.compilation import compiled
 from slipcore.detection.shared.answer import answer
-from slipcore.detection.shared.compilation import compiled
 from slipcore.detection.shared.observe import observe
 from slipcore.detection.strain_rate.step import step_strain_rate
 from slipcore.frames import BoolArray, FloatArray

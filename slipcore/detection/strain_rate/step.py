@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from slipcore.compilation import compiled, unpack
 from slipcore.defaults import LIMITS
-from slipcore.detection.shared.compilation import compiled, unpack
 from slipcore.detection.shared.surface import steps_at
 from slipcore.frames import BoolArray, FloatArray
 

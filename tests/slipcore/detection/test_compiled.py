@@ -1,9 +1,7 @@
 """Compiled kernels against the same loops interpreted, and against numpy."""
 
 import importlib
-import os
 import pkgutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +9,6 @@ import pytest
 from slipcore import GraspLog, detect_slip, detection
 from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.detection.methods import METHODS
-from slipcore.detection.shared.compilation import forget_stale_kernels
 from slipcore.detection.shared.contact import curvature
 from slipcore.detection.shared.strain import Lattice, lattice_steps, surface_normal, surface_strain
 from slipcore.detection.shared.surface import split_forces, surface_normals
@@ -66,17 +63,3 @@ def test_surface_and_forces_are_those_of_numpy() -> None:
 def test_the_curvature_of_a_paraboloid_is_constant_inside() -> None:
     x, y = np.meshgrid(np.arange(7.0), np.arange(9.0), indexing="ij")
     np.testing.assert_allclose(curvature(x**2 + 0.5 * y**2)[2:-2, 2:-2], 3.0, rtol=1e-12)
-
-
-def test_a_cached_kernel_older_than_any_source_is_forgotten(tmp_path: Path) -> None:
-    package = tmp_path / "detection"
-    cache = package / "filter" / "__pycache__"
-    cache.mkdir(parents=True)
-    for source in (tmp_path / "defaults.py", package / "one.py", package / "two.py"):
-        source.touch()
-        os.utime(source, (100.0, 100.0))
-    for name, age in (("one.nbi", 50.0), ("two.1.nbc", 150.0)):
-        (cache / name).touch()
-        os.utime(cache / name, (age, age))
-    forget_stale_kernels(package)
-    assert [path.name for path in cache.iterdir()] == ["two.1.nbc"]

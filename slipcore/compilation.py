@@ -1,0 +1,165 @@
+"""Compile loops over plain arrays to machine code, and keep what was compiled for the next process.
+
+A kernel is kept in one place: under the folder of numba's own variable ``NUMBA_CACHE_DIR`` if it is set, else in the
+``__pycache__`` beside its module. It counts as long as its source file and all files of ours that this one imports,
+directly or not, have the same content: numba itself looks only at the file that a kernel is in, and would run on with
+an old value of a constant from another. A folder that may only be read, or a damaged file, costs time and no more.
+
+Whoever may write in that folder decides what runs here: only the service's own user should.
+"""
+
+import hashlib
+import re
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar, cast, overload
+
+from numba import njit
+from numba.core import config
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.np.unsafe.ndarray import to_fixed_tuple
+
+_IMPORT = re.compile(r"^\s*(?:from\s+(\S+)\s+import\s+(\([^)]*\)|[^\n#]*)|import\s+([^\n#]*))", re.MULTILINE)
+
+Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+
+unpack: Any = to_fixed_tuple
+"""``unpack(array, size)``: its values as arguments, in compiled code; ``size`` is a constant there."""
+
+
+@overload
+def compiled(function: Kernel, /) -> Kernel: ...
+@overload
+def compiled(*, fastmath: set[str] | bool) -> Callable[[Kernel], Kernel]: ...
+def compiled(function: Kernel | None = None, /, *, fastmath: set[str] | bool = False) -> Any:
+    """Compile a function at its first call for given types; a division by zero is as IEEE 754 has it.
+
+    ``fastmath`` names the liberties that LLVM may take with sums and products.
+    """
+    return _compile(fastmath)(function) if function else _compile(fastmath)
+
+
+def _compile(fastmath: set[str] | bool) -> Callable[[Kernel], Kernel]:
+    def decorate(function: Kernel) -> Kernel:
+        kernel: Any = njit(error_model="numpy", fastmath=fastmath)(function)
+        if not config.DISABLE_JIT:
+            kernel._cache = _KernelCache(function)
+        return cast("Kernel", kernel)
+
+    return decorate
+
+
+class _Locator:
+    """Where numba keeps a kernel, and what its file is named; see ``numba.core.caching._CacheLocator``."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+
+    @classmethod
+    def from_function(cls, _function: Callable[..., Any], file: str) -> "_Locator":
+        return cls(Path(file).resolve())
+
+    def get_cache_path(self) -> str:
+        if config.CACHE_DIR:
+            return str(Path(config.CACHE_DIR, self._file.parent.relative_to(_root(self._file))))
+        return str(self._file.parent / "__pycache__")
+
+    def ensure_cache_path(self) -> None:
+        Path(self.get_cache_path()).mkdir(parents=True, exist_ok=True)
+
+    def get_disambiguator(self) -> str:
+        return fingerprint(self._file)
+
+    def get_source_stamp(self) -> str:
+        return fingerprint(self._file)
+
+
+class _Implementation(CompileResultCacheImpl):  # type: ignore[misc]
+    _locator_classes = [_Locator]  # noqa: RUF012 - as the base class has it
+
+
+class _KernelCache(FunctionCache):  # type: ignore[misc]
+    """Keeps one kernel. No fault of the folder stops it: what cannot be loaded is compiled."""
+
+    _impl_class = _Implementation
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # a damaged file can raise anything while it is unpickled
+            with suppress(OSError):
+                self.flush()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)
+            self._forget_stale()
+        except OSError as error:
+            warnings.warn(
+                f"compiled kernels cannot be kept, so that each process compiles them anew: {error}; "
+                "allowed: NUMBA_CACHE_DIR names a folder that this user may write",
+                RuntimeWarning,
+                stacklevel=2,
+            )
+
+    def _forget_stale(self) -> None:
+        """Delete what was compiled of this kernel from other sources."""
+        base = self._impl.filename_base
+        name, current = base.split("-")[0], f"{base}."
+        for file in Path(self.cache_path).glob(f"{name}-*.nb[ic]"):
+            if not file.name.startswith(current):
+                file.unlink(missing_ok=True)
+
+
+@cache
+def fingerprint(file: Path) -> str:
+    """What the content of a source file, and of ours that it imports directly or not, is known by."""
+    root, digest = _root(file), hashlib.sha256()
+    for source in sorted(_with_imports(file)):
+        digest.update(source.relative_to(root).as_posix().encode() + b"\0" + source.read_bytes() + b"\0")
+    return digest.hexdigest()[:16]
+
+
+def _root(file: Path) -> Path:
+    """The folder that the top package of a source file stands in."""
+    folder = file.parent
+    while (folder / "__init__.py").is_file():
+        folder = folder.parent
+    return folder
+
+
+def _with_imports(file: Path) -> set[Path]:
+    found, waiting = set[Path](), [file]
+    while waiting:
+        source = waiting.pop()
+        if source not in found:
+            found.add(source)
+            waiting += _imports(source)
+    return found
+
+
+@cache
+def _imports(file: Path) -> list[Path]:
+    """The files of the same package, or of this one, that a file imports, at its top or anywhere in it."""
+    root = _root(file)
+    own = {file.relative_to(root).parts[0], __name__.split(".")[0]}
+    modules = [
+        f"{module}.{name.split()[0]}" if module else name.split()[0]
+        for module, names, plain in _IMPORT.findall(file.read_text(encoding="utf-8"))
+        for name in re.split(r"[(),]", names or plain)
+        if name.strip()
+    ]
+    return [source for module in modules if module.split(".")[0] in own and (source := _source(root, module))]
+
+
+def _source(root: Path, module: str) -> Path | None:
+    """The source file of a module, or of the one that ``module`` is a name in."""
+    for path in (root.joinpath(*module.split(".")), root.joinpath(*module.split(".")[:-1])):
+        for source in (path.with_suffix(".py"), path / "__init__.py"):
+            if source.is_file():
+                return source
+    return None
