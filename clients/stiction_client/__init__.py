@@ -14,6 +14,7 @@ from stiction_client.errors import (
     NoFeasibleForce,
     NoModel,
     ProblemError,
+    StaleModel,
     StictionError,
     UnexpectedAnswer,
 )
@@ -120,6 +121,7 @@ __all__ = [
     "Recognition",
     "RequiredForce",
     "RequiredForces",
+    "StaleModel",
     "StictionError",
     "UnexpectedAnswer",
     "antipodal",

@@ -1,6 +1,7 @@
 """The two clients, one waiting and one awaiting: they carry out what ``flows`` describes."""
 
 import asyncio
+import os
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,6 +17,8 @@ from stiction_client.flows import Answer, Ended, Flow, Pause, Request, T
 from stiction_client.model import FrictionModel
 from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt, Job, Material, Recognition
 
+DEFAULT_URL = "http://127.0.0.1:8000"
+
 TIMEOUT = 30.0
 """s for one request; an upload at the service's size limit takes a second on a local network."""
 
@@ -29,20 +32,27 @@ JOB_TIMEOUT = 300.0
 class FrictionClient:
     """A Stiction service over one kept-open connection; use it as a context manager, or ``close`` it.
 
-    ``key`` is sent as ``Authorization: Bearer``; ``timeout`` s holds for one request; ``transport`` replaces the
-    network, as in tests. Where the connection breaks, a request is tried three times; the service does it once.
+    ``url`` and ``key``, sent as ``Authorization: Bearer``, are by default those of the environment, ``STICTION_URL``
+    and ``STICTION_KEY``, or this machine's service without a key; ``timeout`` s holds for one request; ``transport``
+    replaces the network, as in tests. Where the connection breaks or the service is busy (429, 503), a request is tried
+    three times, not before the service asks for it; the service does it once. Models are kept: one younger than
+    ``stale_after`` s isn't asked for again, an older one isn't sent again unless it changed, and where the service
+    can't be reached the last one is used with a ``StaleModel`` warning.
 
     Every call raises ``ConnectionFailed``, ``ProblemError`` (the service refused) or ``UnexpectedAnswer``.
     """
 
     def __init__(
         self,
-        url: str,
+        url: str | None = None,
         key: str | None = None,
         transport: httpx.BaseTransport | None = None,
         *,
         timeout: float = TIMEOUT,
+        stale_after: float = 0.0,
     ) -> None:
+        self._kept: dict[str, flows.Kept] = {}
+        self._stale_after = stale_after
         self._http = httpx.Client(**_options(url, key, timeout), transport=transport)
 
     def __enter__(self) -> Self:
@@ -96,9 +106,21 @@ class FrictionClient:
         """All materials."""
         return self._run(flows.materials())
 
+    def rename_material(self, name: str, new_name: str) -> Material:
+        """Rename a material; the old name stays an alias of it."""
+        return self._run(flows.rename_material(name, new_name))
+
+    def merge_materials(self, name: str, source: str) -> Material:
+        """Move the logs and names of ``source`` to the material ``name``, for good; its models are fitted again."""
+        return self._run(flows.merge_materials(name, source))
+
+    def withdraw(self, log: GraspLogReceipt | str, reason: str) -> GraspLogReceipt:
+        """Let a log count in no fit any more; it is kept, with the reason."""
+        return self._run(flows.withdraw(log if isinstance(log, str) else log.id, reason))
+
     def model(self, name: str, method: str = "ols") -> FrictionModel:
         """The current model of a material, to be kept and evaluated here; raises ``NoModel`` where there is none."""
-        return self._run(flows.model(name, method))
+        return self._run(flows.model(name, method, self._kept, self._stale_after))
 
     def friction(
         self, name: str, v: float, fn: float, quantile: float | None = None, method: str | None = None
@@ -176,12 +198,15 @@ class AsyncFrictionClient:
 
     def __init__(
         self,
-        url: str,
+        url: str | None = None,
         key: str | None = None,
         transport: httpx.AsyncBaseTransport | None = None,
         *,
         timeout: float = TIMEOUT,
+        stale_after: float = 0.0,
     ) -> None:
+        self._kept: dict[str, flows.Kept] = {}
+        self._stale_after = stale_after
         self._http = httpx.AsyncClient(**_options(url, key, timeout), transport=transport)
 
     async def __aenter__(self) -> Self:
@@ -229,9 +254,21 @@ class AsyncFrictionClient:
         """As ``FrictionClient.materials``."""
         return await self._run(flows.materials())
 
+    async def rename_material(self, name: str, new_name: str) -> Material:
+        """As ``FrictionClient.rename_material``."""
+        return await self._run(flows.rename_material(name, new_name))
+
+    async def merge_materials(self, name: str, source: str) -> Material:
+        """As ``FrictionClient.merge_materials``."""
+        return await self._run(flows.merge_materials(name, source))
+
+    async def withdraw(self, log: GraspLogReceipt | str, reason: str) -> GraspLogReceipt:
+        """As ``FrictionClient.withdraw``."""
+        return await self._run(flows.withdraw(log if isinstance(log, str) else log.id, reason))
+
     async def model(self, name: str, method: str = "ols") -> FrictionModel:
         """As ``FrictionClient.model``."""
-        return await self._run(flows.model(name, method))
+        return await self._run(flows.model(name, method, self._kept, self._stale_after))
 
     async def friction(
         self, name: str, v: float, fn: float, quantile: float | None = None, method: str | None = None
@@ -297,16 +334,21 @@ class AsyncFrictionClient:
             return _broken(step, error)
 
 
-def _options(url: str, key: str | None, timeout: float) -> dict[str, Any]:
+def _options(url: str | None, key: str | None, timeout: float) -> dict[str, Any]:
+    key = os.environ.get("STICTION_KEY") if key is None else key
     return {
-        "base_url": url,
+        "base_url": os.environ.get("STICTION_URL", DEFAULT_URL) if url is None else url,
         "headers": {"Authorization": f"Bearer {key}"} if key else {},
         "timeout": httpx.Timeout(timeout, connect=min(timeout, CONNECT_TIMEOUT)),
     }
 
 
 def _http_request(http: httpx.Client | httpx.AsyncClient, request: Request) -> httpx.Request:
-    given = {"Content-Type": request.content_type, "Idempotency-Key": request.idempotency_key}
+    given = {
+        "Content-Type": request.content_type,
+        "Idempotency-Key": request.idempotency_key,
+        "If-None-Match": request.tag,
+    }
     headers = {name: value for name, value in given.items() if value is not None}
     limits = http.timeout.as_dict()
     if limits["read"] is not None:

@@ -50,6 +50,10 @@ class UnexpectedAnswer(StictionError):
     """The answer is not one that a Stiction service gives: a wrong address, a proxy, or another version."""
 
 
+class StaleModel(UserWarning):
+    """The service can't be reached, so that a model is used as it was when it was last asked for."""
+
+
 class NoModel(StictionError):
     """The material has no fitted model of this method yet."""
 

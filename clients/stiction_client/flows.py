@@ -6,8 +6,9 @@ clients only carry requests out, one waiting, the other awaiting, so nothing is 
 
 import json
 import time
+import warnings
 from collections.abc import Callable, Generator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from json import JSONDecodeError
 from pathlib import Path
 from typing import Any, Generic, NoReturn, TypeVar
@@ -25,13 +26,20 @@ from stiction_client.errors import (
     JobTimedOut,
     NoModel,
     ProblemError,
+    StaleModel,
     UnexpectedAnswer,
 )
 from stiction_client.model import FrictionModel
 from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt, Job, Material, Recognition
 
 ATTEMPTS = 3
-"""Times that a request is tried before a broken connection is an error."""
+"""Times that a request is tried before a broken connection, or a service that is busy, is an error."""
+
+BUSY = frozenset({429, 503})
+"""Statuses with which the service asks for patience."""
+
+LONGEST_RETRY = 30.0
+"""s; a service that asks to be left alone for longer is not waited for."""
 
 RETRY_PAUSE = 0.2
 """s before the second attempt; doubled for each one after."""
@@ -54,12 +62,14 @@ PAGE = 1000
 
 MATERIAL_EXISTS = "/problems/material-exists"
 
+NOT_MODIFIED = 304
+
 
 @dataclass(frozen=True, slots=True)
 class Request:
     """One HTTP request, which may be sent again: it is harmless twice, or done once under its ``idempotency_key``.
 
-    ``patience``: s for which the service is asked to keep its answer back.
+    ``patience``: s for which the service is asked to keep its answer back; ``tag``: that of the answer it gave before.
     """
 
     method: str
@@ -70,6 +80,7 @@ class Request:
     content_type: str | None = None
     idempotency_key: str | None = None
     patience: float = 0.0
+    tag: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,13 +176,67 @@ def _page_of_materials(record: Mapping[str, Any]) -> tuple[list[Material], str |
     return [Material.from_json(item) for item in record["items"]], record.get("next")
 
 
-def model(name: str, method: str) -> Flow[FrictionModel]:
-    """Ask for a material's current model of one method."""
-    models = (yield from material(name)).models
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """A material as the service last told it, with the tag of that answer and when it was asked (monotonic, s)."""
+
+    material: Material
+    tag: str
+    asked: float
+
+    @property
+    def age(self) -> float:
+        """s since the service said so."""
+        return time.monotonic() - self.asked
+
+
+def model(name: str, method: str, kept: dict[str, Kept], stale_after: float) -> Flow[FrictionModel]:
+    """A material's current model of one method, as ``kept`` where it is younger than ``stale_after`` s.
+
+    An older one is asked for again; where nobody answers, the last is good enough, with a warning of its age.
+    """
+    known = kept.get(name)
+    if known is None or known.age >= stale_after:
+        try:
+            known = yield from _ask_again(name, known)
+            kept[name] = known
+        except ConnectionFailed as error:
+            if known is None:
+                raise
+            warnings.warn(f"{error}; going on with the model of {name!r} from {known.age:.0f} s ago", StaleModel, 5)
+    models = known.material.models
     if method not in models:
-        known = ", ".join(sorted(models)) or "none"
-        raise NoModel(f"material {name!r} has no fitted model of method {method!r}; fitted: {known}")
+        fitted = ", ".join(sorted(models)) or "none"
+        raise NoModel(f"material {name!r} has no fitted model of method {method!r}; fitted: {fitted}")
     return models[method]
+
+
+def _ask_again(name: str, known: Kept | None) -> Flow[Kept]:
+    """Ask for a material; it isn't sent once more if it is as ``known``."""
+    request = Request("GET", f"/v1/materials/{_part(name)}", tag=None if known is None else known.tag)
+    asked = time.monotonic()
+    response = yield from _send(request)
+    if known is not None and response.status_code == NOT_MODIFIED:
+        return replace(known, asked=asked)
+    return Kept(_record(Material.from_json, _content(response)), response.headers.get("etag", ""), asked)
+
+
+def rename_material(name: str, new_name: str) -> Flow[Material]:
+    """Rename a material."""
+    request = Request("PATCH", f"/v1/materials/{_part(name)}", json={"name": new_name})
+    return _record(Material.from_json, (yield from _ask(request)))
+
+
+def merge_materials(name: str, source: str) -> Flow[Material]:
+    """Merge another material into one."""
+    answer = yield from _ask(Request("POST", f"/v1/materials/{_part(name)}/merges", json={"source": source}))
+    return _record(lambda record: Material.from_json(record["material"]), answer)
+
+
+def withdraw(log_id: str, reason: str) -> Flow[GraspLogReceipt]:
+    """Withdraw a log."""
+    request = Request("PUT", f"/v1/grasp-logs/{_part(log_id)}/withdrawal", json={"reason": reason})
+    return _record(lambda record: GraspLogReceipt.from_json(record["grasp_log"]), (yield from _ask(request)))
 
 
 def friction(
@@ -279,16 +344,33 @@ def _post_once(path: str, body: Mapping[str, Any]) -> Request:
 
 def _ask(request: Request) -> Flow[Any]:
     """Send a request, again where the connection breaks, and return the JSON of a good answer."""
+    return _content((yield from _send(request)))
+
+
+def _send(request: Request) -> Flow[httpx.Response]:
+    """Send a request, again where the connection breaks or the service is busy, and return what is answered."""
     for attempt in range(ATTEMPTS):
+        pause = RETRY_PAUSE * 2**attempt
         try:
             response = yield request
-            break
         except ConnectionFailed:
             if attempt == ATTEMPTS - 1:
                 raise
-        yield Pause(RETRY_PAUSE * 2**attempt)
-    assert response is not None  # what a driver sends for a request
-    return _content(response)
+        else:
+            assert response is not None  # what a driver sends for a request
+            pause = max(_retry_after(response, pause), 0.0)
+            if response.status_code not in BUSY or attempt == ATTEMPTS - 1 or pause > LONGEST_RETRY:
+                return response
+        yield Pause(pause)
+    raise AssertionError("the last attempt returns or raises")
+
+
+def _retry_after(response: httpx.Response, default: float) -> float:
+    """s that the service asks to wait; ``default`` where it doesn't say."""
+    try:
+        return float(response.headers.get("retry-after", default))
+    except ValueError:  # a date, of which it is not known by which clock
+        return default
 
 
 def _content(response: httpx.Response) -> Any:

@@ -1,8 +1,11 @@
 """The fitted friction model as the planner's side sees it; evaluated here, without the network."""
 
+import json
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from stiction_client.errors import InvalidArgument
 
 FloatArray = NDArray[np.float64]
+
+FILE_FORMAT, FILE_VERSION = "stiction-friction-model", 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +83,54 @@ class FrictionModel:
             created_at=record["created_at"],
         )
 
+    def to_json(self) -> dict[str, Any]:
+        """The model as the service tells it: what ``from_json`` reads."""
+        return {
+            "material": self.material,
+            "method": self.method,
+            "version": self.version,
+            "coefficients": self.coefficients.tolist(),
+            "covariance": self.covariance.tolist(),
+            "scale": self.scale,
+            "n": self.n,
+            "degrees_of_freedom": _finite(self.degrees_of_freedom),
+            "scatter_degrees_of_freedom": _finite(self.scatter_degrees_of_freedom),
+            "domain": {
+                "tangential_velocity": list(self.domain.tangential_velocity),
+                "normal_force": list(self.domain.normal_force),
+            },
+            "identifiable": self.identifiable.tolist(),
+            "element_area": self.element_area,
+            "cost": {"seconds": self.cost.seconds, "monte_carlo_error": self.cost.monte_carlo_error},
+            "current": self.current,
+            "diagnostics": dict(self.diagnostics),
+            "created_at": self.created_at,
+        }
+
+    def save(self, path: Path | str) -> None:
+        """Write the model to a file, as a whole or not at all (docs/client.md has the schema)."""
+        content = json.dumps({"format": FILE_FORMAT, "version": FILE_VERSION, "model": self.to_json()}, indent=1)
+        target = Path(path)
+        beside = target.with_name(f"{target.name}.{os.getpid()}.part")
+        beside.write_text(content, encoding="utf-8")
+        beside.replace(target)
+
+    @classmethod
+    def load(cls, path: Path | str) -> "FrictionModel":
+        """The model in a file that ``save`` wrote; raises ``InvalidArgument`` for any other."""
+        try:
+            record = json.loads(Path(path).read_text(encoding="utf-8"))
+            kind, version = record["format"], record["version"]
+        except (ValueError, KeyError, TypeError) as error:
+            raise InvalidArgument("file", path, f"one that FrictionModel.save wrote ({error})") from error
+        if kind != FILE_FORMAT or version != FILE_VERSION:
+            allowed = f"{FILE_FORMAT} of version {FILE_VERSION}; save it anew, or upgrade stiction-client"
+            raise InvalidArgument("file", f"{path}, of {kind} version {version}", allowed)
+        try:
+            return cls.from_json(record["model"])
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise InvalidArgument("file", path, f"a whole model (it lacks or garbles {error})") from error
+
     @property
     def standard_errors(self) -> FloatArray:
         """Standard errors of the coefficients, [3]."""
@@ -138,6 +191,10 @@ def check_probability(name: str, value: float) -> None:
 
 def _freedom(value: float | None) -> float:
     return math.inf if value is None else float(value)
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _pair(values: Any) -> tuple[float, float]:

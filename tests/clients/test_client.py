@@ -22,8 +22,10 @@ from stiction_client import (
     JobTimedOut,
     NoModel,
     ProblemError,
+    StaleModel,
     UnexpectedAnswer,
     container,
+    flows,
 )
 
 Ask = Callable[..., Any]
@@ -296,12 +298,125 @@ def test_what_would_happen_twice_is_sent_under_one_key(ask: Ask, service: Servic
     assert keys[0] != keys[3]
 
 
-@pytest.mark.usefixtures("quick")
 def test_refusals_are_not_tried_again(ask: Ask, service: Service) -> None:
-    server = service(problem(503, type="/problems/storage-unavailable"))
+    server = service(problem(409, type="/problems/no-model"))
     with pytest.raises(ProblemError):
         ask(server, "materials")
     assert len(server.requests) == 1
+
+
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize(("status", "kind"), [(429, "too-many-requests"), (503, "storage-unavailable")])
+def test_a_busy_service_is_asked_again(
+    ask: Ask, service: Service, answers: SimpleNamespace, status: int, kind: str
+) -> None:
+    busy = problem(status, type=f"/problems/{kind}")
+    server = service(busy, busy, answers.material)
+    assert ask(server, "material", "paper").name == "paper"
+    server = service(busy)
+    with pytest.raises(ProblemError) as refusal:
+        ask(server, "material", "paper")
+    assert (len(server.requests), refusal.value.status) == (3, status)
+
+
+@pytest.mark.parametrize(("asked", "waited"), [("0.004", 0.004), ("-1", 0.0), ("Sun, 22 Nov 2026 08:49:37 GMT", 1e-6)])
+@pytest.mark.usefixtures("quick")
+def test_a_busy_service_is_left_alone_as_long_as_it_asks(asked: str, waited: float) -> None:
+    flow = flows.material("paper")
+    assert isinstance(flows.advance(flow, None), flows.Request)
+    busy = problem(503)
+    busy.headers["Retry-After"] = asked
+    assert flows.advance(flow, busy) == flows.Pause(waited)
+    assert isinstance(flows.advance(flow, None), flows.Request)
+
+
+def test_a_service_that_is_busy_for_long_is_not_waited_for(ask: Ask, service: Service) -> None:
+    busy = problem(429, type="/problems/too-many-requests")
+    busy.headers["Retry-After"] = "3600"
+    server = service(busy)
+    with pytest.raises(ProblemError):
+        ask(server, "material", "paper")
+    assert len(server.requests) == 1
+
+
+class Tagged:
+    """A service whose material has a tag; it can go away."""
+
+    def __init__(self, material: dict[str, Any]) -> None:
+        self.requests: list[httpx.Request] = []
+        self.away = False
+        self._material = material
+
+    def __call__(self, request: httpx.Request) -> httpx.Response:
+        if self.away:
+            raise httpx.ConnectError("gone")
+        self.requests.append(request)
+        if request.headers.get("if-none-match") == '"a"':
+            return httpx.Response(304, headers={"ETag": '"a"'})
+        return httpx.Response(200, json=self._material, headers={"ETag": '"a"'})
+
+
+def test_a_model_that_has_not_changed_is_not_sent_again(answers: SimpleNamespace) -> None:
+    service = Tagged(answers.material)
+    with FrictionClient("http://stiction", transport=httpx.MockTransport(service)) as client:
+        first, again = client.model("paper"), client.model("paper")
+    assert again is first
+    assert [request.headers.get("if-none-match") for request in service.requests] == [None, '"a"']
+
+
+def test_a_young_model_is_not_even_asked_for(answers: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
+    service, now = Tagged(answers.material), [100.0]
+    monkeypatch.setattr(flows.time, "monotonic", lambda: now[0])
+    with FrictionClient("http://stiction", transport=httpx.MockTransport(service), stale_after=60.0) as client:
+        client.model("paper")
+        now[0] += 59.0
+        client.model("paper")
+        assert len(service.requests) == 1
+        now[0] += 2.0
+        client.model("paper")
+        assert len(service.requests) == 2
+
+
+@pytest.mark.usefixtures("quick")
+def test_away_from_the_service_the_last_model_is_used_with_a_warning(
+    answers: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    service, now = Tagged(answers.material), [100.0]
+    monkeypatch.setattr(flows.time, "monotonic", lambda: now[0])
+    with FrictionClient("http://stiction", transport=httpx.MockTransport(service)) as client:
+        first = client.model("paper")
+        service.away, now[0] = True, 1000.0
+        with pytest.warns(StaleModel, match=r"gone; going on with the model of 'paper' from 900 s ago") as warned:
+            assert client.model("paper") is first
+        assert warned[0].filename == __file__
+        with pytest.raises(ConnectionFailed):
+            client.model("another")
+
+
+def test_url_and_key_are_those_of_the_environment(
+    answers: SimpleNamespace, service: Service, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("STICTION_URL", "http://elsewhere:9")
+    monkeypatch.setenv("STICTION_KEY", "stiction_x")
+    server = service(answers.material)
+    with FrictionClient(transport=httpx.MockTransport(server)) as client:
+        client.material("paper")
+    assert server.requests[0].url.host == "elsewhere"
+    assert server.requests[0].headers["authorization"] == "Bearer stiction_x"
+
+
+def test_materials_are_renamed_and_merged_and_logs_withdrawn(
+    ask: Ask, service: Service, answers: SimpleNamespace
+) -> None:
+    server = service(answers.material)
+    assert ask(server, "rename_material", "papre", "paper").name == "paper"
+    assert (server.requests[0].method, json.loads(server.requests[0].content)) == ("PATCH", {"name": "paper"})
+    server = service({"material": answers.material, "jobs": []})
+    assert ask(server, "merge_materials", "paper", "papre").name == "paper"
+    assert server.requests[0].url.path == "/v1/materials/paper/merges"
+    server = service({"grasp_log": answers.grasp_log, "jobs": []})
+    assert ask(server, "withdraw", answers.grasp_log["id"], "mislabelled").id == answers.grasp_log["id"]
+    assert json.loads(server.requests[0].content) == {"reason": "mislabelled"}
 
 
 @pytest.mark.parametrize("name", ["", ".", "..", "..."])

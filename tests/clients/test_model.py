@@ -1,5 +1,6 @@
 from collections.abc import Callable
 from dataclasses import fields
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -52,3 +53,29 @@ def test_leaving_the_data_is_named(make_model: Make) -> None:
     both = model.extrapolation(0.005, 0.5)
     assert both is not None
     assert both.endswith("; normal force extrapolated to 0.5 N an element, observed 0.002 to 0.3")
+
+
+def test_a_saved_model_comes_back_to_the_last_bit(make_model: Make, tmp_path: Path) -> None:
+    model = make_model(degrees_of_freedom=np.inf)
+    model.save(tmp_path / "paper.json")
+    again = FrictionModel.load(tmp_path / "paper.json")
+    assert again.to_json() == model.to_json()
+    assert again.degrees_of_freedom == np.inf
+    np.testing.assert_array_equal(again.covariance, model.covariance)
+    assert [path.name for path in tmp_path.iterdir()] == ["paper.json"]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("{", "one that FrictionModel.save wrote"),
+        ("[]", "one that FrictionModel.save wrote"),
+        ('{"format": "stiction-friction-model", "version": 2, "model": {}}', "of version 1; save it anew, or upgrade"),
+        ('{"format": "stiction-friction-model", "version": 1, "model": {}}', "a whole model"),
+        ('{"format": "stiction-friction-model", "version": 1, "model": null}', "a whole model"),
+    ],
+)
+def test_a_file_that_holds_no_model_is_refused(tmp_path: Path, content: str, message: str) -> None:
+    (tmp_path / "paper.json").write_text(content)
+    with pytest.raises(InvalidArgument, match=message):
+        FrictionModel.load(tmp_path / "paper.json")
