@@ -110,7 +110,8 @@ async def running(
                 poll_seconds=settings.poll_seconds,
                 shutdown_seconds=settings.shutdown_seconds,
             )
-            readers, streams = Readers(settings.read_seconds), Streams()
+            readers = Readers(settings.read_seconds)
+            streams = Streams(settings.stream_sessions_per_key, settings.stream_bytes)
             await runner.start()
             retention = Retention(
                 database,

@@ -77,6 +77,12 @@ class Settings(BaseSettings):
     max_connections_per_address: Annotated[int, Field(ge=1, le=100_000)] = Field(
         default=200, description="Connections of one address; beyond that its idle ones are closed."
     )
+    stream_sessions_per_key: Annotated[int, Field(ge=1, le=200)] = Field(
+        default=50, description="Live streams of one key, or of one address without a key, that may be open at once."
+    )
+    stream_bytes: Annotated[int, Field(ge=MIB, le=2**40)] = Field(
+        default=512 * MIB, description="Bytes of frames that all live streams together may hold."
+    )
     max_upload_bytes: Annotated[int, Field(ge=1, le=2**40)] = Field(
         default=256 * MIB, description="Largest grasp log that is accepted, in bytes."
     )

@@ -2,7 +2,6 @@
 
 import asyncio
 import logging
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -15,9 +14,18 @@ from service.domain.asker import Asker
 from service.domain.upload import Wish, check_target, store_made
 from service.http.problems import Problem
 from service.stream import live
-from service.stream.sessions import (
+from service.stream.messages import (
     DECODE_BINARY,
     DECODE_TEXT,
+    Finish,
+    FrameIn,
+    Incoming,
+    Open,
+    Resume,
+    packed,
+    packed_or_none,
+)
+from service.stream.sessions import (
     FINISHED,
     NOT_UNDERSTOOD,
     PATIENCE,
@@ -25,11 +33,6 @@ from service.stream.sessions import (
     SLOW_READER,
     STORAGE_AWAY,
     End,
-    Finish,
-    FrameIn,
-    Incoming,
-    Open,
-    Resume,
     Session,
 )
 from slipcore.errors import InvalidInput
@@ -80,26 +83,28 @@ class _Connection:
             first = await asyncio.wait_for(self._receive(), PATIENCE)
         except TimeoutError as error:
             raise End(NOT_UNDERSTOOD, f"nothing was said for {PATIENCE:g} s") from error
-        session = await self._begin(first)
-        session.connected = True
+        session, missed = await self._begin(first)
+        self._streams.join(session)
         try:
+            await self._greet(session, missed)
             await self._carry(session)
         finally:
-            session.connected, session.left = False, time.monotonic()
+            self._streams.leave(session)
 
-    async def _begin(self, first: Incoming) -> Session:
+    async def _begin(self, first: Incoming) -> tuple[Session, list[dict[str, Any]]]:
+        """The session, and the answers that its client has missed."""
         if isinstance(first, Open):
             await check_target(self._context, self._wish(first))
-            session, missed = await self._streams.open(first, self._asker.key_id), []
-        elif isinstance(first, Resume):
+            return await self._streams.open(first, self._asker.key_id, self._asker.address or ""), []
+        if isinstance(first, Resume):
             session = self._streams.find(first.session, self._asker.key_id)
-            missed = [answer for answer in session.recent if answer["number"] > first.last]
-        else:
-            raise End(NOT_UNDERSTOOD, "the first message must be of type open or resume")
+            return session, session.recent.after(first.last)
+        raise End(NOT_UNDERSTOOD, "the first message must be of type open or resume")
+
+    async def _greet(self, session: Session, missed: list[dict[str, Any]]) -> None:
         await self._send({"type": "opened", "session": session.id, "next": session.next})
         for answer in missed:
             await self._send(answer)
-        return session
 
     async def _carry(self, session: Session) -> None:
         """Read, work and write at once until one of them ends."""
@@ -136,28 +141,34 @@ class _Connection:
                 raise End(NOT_UNDERSTOOD, "the session is open already")
 
     async def _step(self, session: Session, frame: FrameIn) -> None:
-        if frame.number < session.next:  # sent again after a reconnect
+        if 0 <= frame.number < session.next:  # sent again after a reconnect
             return
         try:
-            answer = await self._streams.call(
-                live.step,
-                session.id,
-                frame.number,
-                frame.time,
-                frame.displacement,
-                frame.force,
-                frame.object_pose,
-                frame.normal,
-            )
+            if frame.number < 0:
+                raise InvalidInput("number", frame.number, "0 or more")
+            answer = await self._detect(session, frame)
         except InvalidInput as error:
             answer = {"type": "error", "number": frame.number}
             answer |= {"name": error.name, "value": str(error.value), "allowed": error.allowed}
-        session.next = frame.number + 1
-        session.recent.append(answer)
+        if frame.number >= 0:
+            session.next = frame.number + 1
+            session.recent.add(answer)
         try:
             self._outgoing.put_nowait(answer)
         except asyncio.QueueFull:
             raise End(SLOW_READER, f"{MOST_WAITING_OUT} answers wait to be read") from None
+
+    async def _detect(self, session: Session, frame: FrameIn) -> dict[str, Any]:
+        return await self._streams.call(
+            live.step,
+            session.id,
+            frame.number,
+            frame.time,
+            packed("displacement", frame.displacement),
+            packed_or_none("force", frame.force),
+            packed_or_none("object_pose", frame.object_pose),
+            packed_or_none("normal", frame.normal),
+        )
 
     async def _finish(self, session: Session, message: Finish) -> dict[str, Any]:
         """Store the kept frames through the same door as an upload; until the answer is there it may be said again."""

@@ -33,8 +33,8 @@ MAX_KEPT_BYTES = 64 * 2**20
 
 MAX_MARKERS = 4096
 
-Numbers = bytes | Sequence[Any]
-"""Numbers in a row, row-major: little-endian float32 or float64, or lists nested as they may be."""
+Numbers = bytes | Sequence[float]
+"""Numbers in a row, row-major: bytes of little-endian float32 or float64, or flat."""
 
 
 @dataclass(slots=True)
@@ -53,6 +53,8 @@ class Session:
     looked_until: float = -math.inf
     last: tuple[int, dict[str, Any]] = (-1, {})
     friction: dict[str, Any] | None = None
+    held_bytes: int = 0
+    most_bytes: int = 0
 
 
 _SESSIONS: dict[str, Session] = {}
@@ -61,14 +63,22 @@ _LOOKS = ThreadPoolExecutor(1)
 """Does the looks for friction, so that frames need not wait for them."""
 
 
-def open_session(name: str, position: Numbers, grid: tuple[int, int], area: float, method: str, keep: bool) -> None:
-    """Begin a session; raises ``InvalidInput`` for what cannot be a sensor."""
+def open_session(
+    name: str, position: Numbers, grid: tuple[int, int], area: float, method: str, keep: bool, most_bytes: int
+) -> None:
+    """Begin a session, for which there must be room in ``most_bytes`` of all sessions together.
+
+    Raises ``InvalidInput`` for what cannot be a sensor.
+    """
     rows, columns = grid
     if not 0 < rows * columns <= MAX_MARKERS or rows < 1:
         raise InvalidInput("grid", list(grid), f"1 to {MAX_MARKERS} markers")
     at_rest = _array("position", position, (rows, columns, 3))
-    detector = slipcore.SlipDetector(at_rest, area, method)
-    _SESSIONS[name] = Session(detector, at_rest, area, estimators.Moments.empty(area), [] if keep else None)
+    held = WINDOW * 3 * at_rest.nbytes  # of the frames that are looked at, each with forces and normals
+    _check_room(held, most_bytes)
+    detector, moments = slipcore.SlipDetector(at_rest, area, method), estimators.Moments.empty(area)
+    kept: list[Frame] | None = [] if keep else None
+    _SESSIONS[name] = Session(detector, at_rest, area, moments, kept, held_bytes=held, most_bytes=most_bytes)
 
 
 def step(
@@ -92,13 +102,11 @@ def step(
         None if object_pose is None else _array("object_pose", object_pose, (3,)),
         None if normal is None else _array("normal", normal, shape),
     )
-    _keep(session, frame)
-    try:
-        state = session.detector.step(*frame)
-    except InvalidInput:
-        if session.kept:
-            session.kept.pop()
-        raise
+    size = 0 if session.kept is None else _kept_bytes(session, frame)
+    state = session.detector.step(*frame)
+    if session.kept is not None:
+        session.kept.append(frame)
+        session.held_bytes += size
     _plan_look(session, frame, state)
     session.last = (number, _answer(session, number, state))
     return session.last[1]
@@ -121,15 +129,21 @@ def drop(name: str) -> None:
     _SESSIONS.pop(name, None)
 
 
-def _keep(session: Session, frame: Frame) -> None:
-    if session.kept is None:
-        return
+def _kept_bytes(session: Session, frame: Frame) -> int:
+    """What a frame takes that is to be kept; raises ``InvalidInput`` where there is no room for it."""
     size = frame.displacement.nbytes * (1 + (frame.force is not None) + (frame.normal is not None))
-    if (len(session.kept) + 1) * size > MAX_KEPT_BYTES:
-        raise InvalidInput(
-            "frames", len(session.kept) + 1, f"{MAX_KEPT_BYTES // size} of this size, where they are kept"
-        )
-    session.kept.append(frame)
+    count = len(session.kept or ()) + 1
+    if count * size > MAX_KEPT_BYTES:
+        raise InvalidInput("frames", count, f"{MAX_KEPT_BYTES // size} of this size, where they are kept")
+    _check_room(size, session.most_bytes)
+    return size
+
+
+def _check_room(size: int, most_bytes: int) -> None:
+    held = sum(each.held_bytes for each in _SESSIONS.values())
+    if held + size > most_bytes:
+        allowed = f"{most_bytes} of all live streams together; finish one, or set STICTION_STREAM_BYTES"
+        raise InvalidInput("bytes", held + size, allowed)
 
 
 def _plan_look(session: Session, frame: Frame, state: SlipState) -> None:
@@ -218,10 +232,6 @@ def _array(name: str, numbers: Numbers, shape: tuple[int, ...]) -> NDArray[np.fl
                 name, f"{len(numbers)} bytes", f"{4 * count} or {8 * count}: {list(shape)} as float32 or 64"
             )
         return np.frombuffer(numbers, "<f4" if len(numbers) == 4 * count else "<f8").astype(np.float64).reshape(shape)
-    try:
-        array = np.array(numbers, dtype=np.float64)
-    except (ValueError, TypeError) as error:
-        raise InvalidInput(name, f"no numbers ({str(error)[:60]})", f"numbers of shape {list(shape)}") from error
-    if array.size != count:
-        raise InvalidInput(name, f"of shape {list(array.shape)}", f"shape {list(shape)}")
-    return array.reshape(shape)
+    if len(numbers) != count:
+        raise InvalidInput(name, f"{len(numbers)} numbers", f"{count}: {list(shape)}")
+    return np.array(numbers, dtype=np.float64).reshape(shape)

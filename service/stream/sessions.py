@@ -1,10 +1,10 @@
-"""Sessions of the live stream: what is said in one, and the worker process that has their detectors."""
+"""Sessions of the live stream, their bounds, and the worker process that has their detectors."""
 
 import asyncio
-import time
 import uuid
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -12,60 +12,19 @@ import msgspec
 
 from service.processes.side_process import ProcessEnded, SideProcess
 from service.stream import live
+from service.stream.messages import Open, packed
 
 MOST_SESSIONS = 200
 PATIENCE = 60.0
 """s that a session waits for its client to come back, and a new connection may take to say what it wants."""
 
-ANSWERS_KEPT = 256
-"""Answers that a client who comes back may have missed."""
+ANSWERS_KEPT, ANSWER_BYTES_KEPT = 256, 256 * 1024
+"""Answers that a client who comes back may have missed; fewer where many elements slip."""
 
 FINISHED, NOT_UNDERSTOOD, DETECTOR_LOST = 1000, 1003, 1011
 UNKNOWN_SESSION, SLOW_READER, IN_USE, REFUSED, TOO_MANY, STORAGE_AWAY = 4404, 4408, 4409, 4422, 4429, 4503
 
 Result = TypeVar("Result")
-Numbers = bytes | list[Any]
-
-
-class Open(msgspec.Struct, tag="open", tag_field="type", forbid_unknown_fields=True):
-    """Begin: the sensor, its detector, and whether the frames are to be kept for a log of a material."""
-
-    position: Numbers
-    grid: tuple[int, int]
-    element_area: float
-    detector: str = "filter"
-    sensor: str = "stream"
-    material: str | None = None
-    keep: bool = False
-
-
-class Resume(msgspec.Struct, tag="resume", tag_field="type", forbid_unknown_fields=True):
-    """Go on with a session; ``last`` is the number of the last answer that arrived."""
-
-    session: str
-    last: int = -1
-
-
-class FrameIn(msgspec.Struct, tag="frame", tag_field="type", forbid_unknown_fields=True):
-    """A frame; numbers grow."""
-
-    number: int
-    time: float
-    displacement: Numbers
-    force: Numbers | None = None
-    object_pose: Numbers | None = None
-    normal: Numbers | None = None
-
-
-class Finish(msgspec.Struct, tag="finish", tag_field="type", forbid_unknown_fields=True):
-    """End; ``store`` the kept frames as a grasp log."""
-
-    store: bool = False
-
-
-Incoming = Open | Resume | FrameIn | Finish
-DECODE_BINARY = msgspec.msgpack.Decoder(Incoming).decode
-DECODE_TEXT = msgspec.json.Decoder(Incoming).decode
 
 
 class End(Exception):
@@ -76,39 +35,88 @@ class End(Exception):
         self.code, self.reason = code, reason
 
 
+class RecentAnswers:
+    """The last answers, packed, for a client who comes back."""
+
+    def __init__(self) -> None:
+        self._packed: deque[tuple[int, bytes]] = deque()
+        self._bytes = 0
+
+    def add(self, answer: dict[str, Any]) -> None:
+        """Keep one, and forget the oldest beyond the bounds."""
+        content = msgspec.msgpack.encode(answer)
+        self._packed.append((answer["number"], content))
+        self._bytes += len(content)
+        while len(self._packed) > ANSWERS_KEPT or self._bytes > ANSWER_BYTES_KEPT:
+            self._bytes -= len(self._packed.popleft()[1])
+
+    def after(self, number: int) -> list[dict[str, Any]]:
+        """Those of later frames."""
+        return [msgspec.msgpack.decode(content) for each, content in self._packed if each > number]
+
+
 @dataclass(slots=True)
 class Session:
-    """What the server knows of a session; the detector is in the worker."""
+    """What the server knows of a session; the detector is in the worker. ``owner`` is whose quota it counts in."""
 
     id: str
     opening: Open
     key_id: str | None
+    owner: str
     next: int = 0
-    recent: deque[dict[str, Any]] = field(default_factory=lambda: deque(maxlen=ANSWERS_KEPT))
+    recent: RecentAnswers = field(default_factory=RecentAnswers)
     connected: bool = False
-    left: float = field(default_factory=time.monotonic)
+    expiry: asyncio.TimerHandle | None = None
 
 
 class Streams:
-    """All sessions, and the worker process of their detectors, started with the first of them."""
+    """All sessions, and the worker process of their detectors, started with the first of them.
 
-    def __init__(self) -> None:
+    An owner, which is an access key or else an address, has at most ``per_owner`` of them, and what they keep has at
+    most ``most_bytes`` together.
+    """
+
+    def __init__(self, per_owner: int = 50, most_bytes: int = 512 * 2**20) -> None:
+        self._per_owner, self._most_bytes = per_owner, most_bytes
         self._process: SideProcess | None = None
         self._starting = asyncio.Lock()
         self._sessions: dict[str, Session] = {}
+        self._dropping: set[asyncio.Task[None]] = set()
 
-    async def open(self, opening: Open, key_id: str | None) -> Session:
+    async def open(self, opening: Open, key_id: str | None, address: str) -> Session:
         """A new session; raises ``InvalidInput`` for what cannot be a sensor, ``End`` where there are too many."""
-        await self._forget_the_lost()
+        session = Session(uuid.uuid4().hex, opening, key_id, key_id or f"address {address}")
+        self._check_room(session.owner)
+        position, opening.position = packed("position", opening.position), b""
+        self._sessions[session.id] = session  # before it is there, so that others who open one meanwhile count it
+        try:
+            await self.call(
+                live.open_session, session.id, position, opening.grid, opening.element_area, opening.detector,
+                opening.keep, self._most_bytes,
+            )  # fmt: skip
+        except BaseException:
+            self._forget(session)
+            raise
+        self.leave(session)
+        return session
+
+    def _check_room(self, owner: str) -> None:
         if len(self._sessions) >= MOST_SESSIONS:
             raise End(TOO_MANY, f"{MOST_SESSIONS} sessions are open")
-        session = Session(uuid.uuid4().hex, opening, key_id)
-        await self.call(
-            live.open_session, session.id, opening.position, opening.grid, opening.element_area, opening.detector,
-            opening.keep,
-        )  # fmt: skip
-        self._sessions[session.id] = session
-        return session
+        if sum(each.owner == owner for each in self._sessions.values()) >= self._per_owner:
+            raise End(TOO_MANY, f"{self._per_owner} sessions of this key, or of this address without one, are open")
+
+    def join(self, session: Session) -> None:
+        """A connection carries the session from now on."""
+        session.connected = True
+        if session.expiry is not None:
+            session.expiry.cancel()
+
+    def leave(self, session: Session) -> None:
+        """No connection does; the session is forgotten unless there is one in time."""
+        session.connected = False
+        if session.id in self._sessions:
+            session.expiry = asyncio.get_running_loop().call_later(PATIENCE, self._forget, session)
 
     def find(self, name: str, key_id: str | None) -> Session:
         """The session to go on with, of the same key; raises ``End``."""
@@ -121,8 +129,19 @@ class Streams:
 
     async def end(self, session: Session) -> None:
         """Forget a session."""
-        self._sessions.pop(session.id, None)
-        await self.call(live.drop, session.id)
+        if self._sessions.pop(session.id, None) is not None:
+            await self.call(live.drop, session.id)
+
+    def _forget(self, session: Session) -> None:
+        """The same at once, with the detector dropped soon after."""
+        if self._sessions.pop(session.id, None) is not None and self._process is not None:
+            task = asyncio.create_task(self._drop(session.id))
+            self._dropping.add(task)
+            task.add_done_callback(self._dropping.discard)
+
+    async def _drop(self, name: str) -> None:
+        with suppress(End):  # the process ended, and every session with it
+            await self.call(live.drop, name)
 
     async def call(self, do: Callable[..., Result], *arguments: Any) -> Result:
         """Do something in the worker; raises ``End`` where it died, and all detectors with it."""
@@ -145,8 +164,3 @@ class Streams:
         """End the worker."""
         if self._process is not None:
             await self._process.stop()
-
-    async def _forget_the_lost(self) -> None:
-        latest = time.monotonic() - PATIENCE
-        for session in [each for each in self._sessions.values() if not each.connected and each.left < latest]:
-            await self.end(session)

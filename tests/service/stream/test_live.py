@@ -10,7 +10,8 @@ from slipcore import GraspLog, collect_samples, detect_slip
 def feed(log: GraspLog, *, wait: bool) -> dict[str, object] | None:
     """All frames, with time for the looks between them or only at their end; the friction that was found."""
     assert log.force is not None
-    live.open_session("one", log.position.tolist(), log.grid, log.element_area, "filter", keep=False)
+    position = log.position.tobytes()
+    live.open_session("one", position, log.grid, log.element_area, "filter", keep=False, most_bytes=2**30)
     session = live._SESSIONS["one"]
     for k, time in enumerate(log.time.tolist()):
         live.step("one", k, time, log.displacement[k].tobytes(), log.force[k].tobytes(), None, None)

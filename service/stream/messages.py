@@ -1,0 +1,86 @@
+"""What is said in the live stream: its messages, and the numbers in them."""
+
+from array import array
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any
+
+import msgspec
+
+from slipcore.errors import InvalidInput
+
+Numbers = bytes | list[Any]
+"""Numbers in a row, row-major: little-endian float32 or float64, or lists nested as they may be."""
+
+DEEPEST = 8
+"""Lists in lists of numbers; three say all there is to say."""
+
+Number = Annotated[int, msgspec.Meta(ge=-(2**53), le=2**53)]
+"""An integer that every JSON library keeps as it is."""
+
+
+class Open(msgspec.Struct, tag="open", tag_field="type", forbid_unknown_fields=True):
+    """Begin: the sensor, its detector, and whether the frames are to be kept for a log of a material."""
+
+    position: Numbers
+    grid: tuple[Number, Number]
+    element_area: float
+    detector: str = "filter"
+    sensor: str = "stream"
+    material: str | None = None
+    keep: bool = False
+
+
+class Resume(msgspec.Struct, tag="resume", tag_field="type", forbid_unknown_fields=True):
+    """Go on with a session; ``last`` is the number of the last answer that arrived."""
+
+    session: str
+    last: Number = -1
+
+
+class FrameIn(msgspec.Struct, tag="frame", tag_field="type", forbid_unknown_fields=True):
+    """A frame; numbers grow from 0."""
+
+    number: Number
+    time: float
+    displacement: Numbers
+    force: Numbers | None = None
+    object_pose: Numbers | None = None
+    normal: Numbers | None = None
+
+
+class Finish(msgspec.Struct, tag="finish", tag_field="type", forbid_unknown_fields=True):
+    """End; ``store`` the kept frames as a grasp log."""
+
+    store: bool = False
+
+
+Incoming = Open | Resume | FrameIn | Finish
+DECODE_BINARY = msgspec.msgpack.Decoder(Incoming).decode
+DECODE_TEXT = msgspec.json.Decoder(Incoming).decode
+
+
+def packed(name: str, numbers: Numbers) -> bytes | Sequence[float]:
+    """Numbers as the detectors' process takes them: bytes as they are, lists flat; raises ``InvalidInput``."""
+    if isinstance(numbers, bytes):
+        return numbers
+    try:
+        return array("d", _flat(name, numbers, DEEPEST))
+    except OverflowError as error:
+        raise InvalidInput(name, str(error), "numbers of double precision") from error
+
+
+def packed_or_none(name: str, numbers: Numbers | None) -> bytes | Sequence[float] | None:
+    """The same for what need not be there."""
+    return None if numbers is None else packed(name, numbers)
+
+
+def _flat(name: str, numbers: list[Any], deepest: int) -> Iterator[float]:
+    for each in numbers:
+        if type(each) is list and deepest > 1:
+            yield from _flat(name, each, deepest - 1)
+        elif type(each) in (float, int):  # True is an int, too, but of another type
+            yield each
+        else:
+            raise InvalidInput(
+                name, f"one with a {type(each).__name__} in it", f"numbers, in lists at most {DEEPEST} deep"
+            )

@@ -1,0 +1,230 @@
+"""Live streams of somebody who means harm."""
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import suppress
+from types import SimpleNamespace
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from starlette.websockets import WebSocketDisconnect
+
+from service.domain.asker import Asker
+from service.stream import connection, live, sessions
+from service.stream.messages import Open
+from service.stream.sessions import REFUSED, TOO_MANY, UNKNOWN_SESSION, End, Streams
+from slipcore.errors import InvalidInput
+
+SIDE = 4
+POSITION = np.stack(np.meshgrid(1e-3 * np.arange(SIDE), 1e-3 * np.arange(SIDE), [0.0]), axis=-1).reshape(-1, 3)
+ZERO = np.zeros((SIDE * SIDE, 3))
+
+
+class InProcess:
+    """The worker's calls, done here."""
+
+    async def call(self, do: Callable[..., Any], *arguments: Any) -> Any:
+        return do(*arguments)
+
+    async def stop(self) -> None:
+        return
+
+
+@pytest.fixture
+def make(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Streams]]:
+    async def start() -> InProcess:
+        return InProcess()
+
+    monkeypatch.setattr(sessions.SideProcess, "start", start)
+    yield Streams
+    live._SESSIONS.clear()
+
+
+def opening(keep: bool = False) -> Open:
+    return Open(POSITION.tobytes(), (SIDE, SIDE), 1e-6, keep=keep)
+
+
+def run(do: Callable[[], Awaitable[None]]) -> None:
+    async def go() -> None:
+        await do()
+
+    asyncio.run(go())
+
+
+def test_a_key_has_a_part_of_the_sessions_only(make: Callable[..., Streams]) -> None:
+    async def go() -> None:
+        streams = make(per_owner=3)
+        results = await asyncio.gather(
+            *(streams.open(opening(), "greedy", "10.0.0.9") for _ in range(10)), return_exceptions=True
+        )
+        refused = [each for each in results if isinstance(each, End)]
+        assert len(refused) == 7
+        assert {each.code for each in refused} == {TOO_MANY}
+        await streams.open(opening(), "another", "10.0.0.9")
+        for _ in range(3):
+            await streams.open(opening(), None, "10.0.0.8")
+        with pytest.raises(End, match="of this address"):
+            await streams.open(opening(), None, "10.0.0.8")
+
+    run(go)
+
+
+def test_who_is_refused_holds_no_place(make: Callable[..., Streams]) -> None:
+    async def go() -> None:
+        streams = make(per_owner=1)
+        with pytest.raises(InvalidInput):
+            await streams.open(Open(POSITION.tobytes(), (0, 0), 1e-6), "key", "")
+        await streams.open(opening(), "key", "")
+
+    run(go)
+
+
+def test_an_abandoned_session_is_forgotten_though_nobody_opens_another(
+    make: Callable[..., Streams], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sessions, "PATIENCE", 0.05)
+
+    async def go() -> None:
+        streams = make()
+        left, joined = [await streams.open(opening(keep=True), None, "") for _ in range(2)]
+        streams.join(joined)
+        assert streams.find(left.id, None) is left
+        await asyncio.sleep(0.2)
+        assert set(live._SESSIONS) == {joined.id}  # with all its frames
+        with pytest.raises(End) as ended:
+            streams.find(left.id, None)
+        assert ended.value.code == UNKNOWN_SESSION
+
+    run(go)
+
+
+def test_all_sessions_together_hold_a_bounded_number_of_bytes(make: Callable[..., Streams]) -> None:
+    reserve = live.WINDOW * 3 * POSITION.nbytes
+    most = 2 * reserve + 3 * ZERO.nbytes
+
+    async def go() -> None:
+        streams = make(most_bytes=most)
+        first, second = [await streams.open(opening(keep=True), None, "") for _ in range(2)]
+        with pytest.raises(InvalidInput, match="STICTION_STREAM_BYTES"):
+            await streams.open(opening(), None, "")
+        taken = 0
+        with suppress(InvalidInput):
+            for number in range(100):
+                for session in (first, second):
+                    live.step(session.id, number, 0.1 * number, ZERO.tobytes(), None, None, None)
+                    taken += 1
+        assert taken == 3
+        await streams.end(first)
+        live.step(second.id, 50, 50.0, ZERO.tobytes(), None, None, None)
+
+    run(go)
+
+
+def test_answers_kept_for_a_return_are_bounded_in_bytes() -> None:
+    recent = sessions.RecentAnswers()
+    for number in range(300):
+        recent.add({"number": number, "slip": list(range(4096))})
+    kept = recent.after(-1)
+    assert 5 < len(kept) < 50
+    assert [each["number"] for each in kept] == list(range(300 - len(kept), 300))
+    assert recent.after(298) == [{"number": 299, "slip": list(range(4096))}]
+
+
+class Socket:
+    """A WebSocket whose client says one thing after the other and then goes."""
+
+    def __init__(self, *said: Any) -> None:
+        self._said = [{"type": "websocket.receive", "text": each} for each in said]
+        self.answers: list[dict[str, Any]] = []
+        self.closed: tuple[int, str] | None = None
+
+    async def receive(self) -> dict[str, Any]:
+        await asyncio.sleep(0.02)
+        return self._said.pop(0) if self._said else {"type": "websocket.disconnect"}
+
+    async def send_text(self, text: str) -> None:
+        self.answers.append(msgspec.json.decode(text))
+
+    async def close(self, code: int, reason: str) -> None:
+        self.closed = code, reason
+
+
+def converse(streams: Streams, *said: Any, raw: bool = False) -> Socket:
+    context: Any = SimpleNamespace(streams=streams, database=None)
+    socket: Any = Socket(*(said if raw else (json.dumps(each) for each in said)))
+
+    async def go() -> None:
+        with suppress(WebSocketDisconnect):
+            await connection.serve(socket, context, Asker())
+
+    asyncio.run(go())
+    return socket  # type: ignore[no-any-return]
+
+
+def first(**changes: Any) -> dict[str, Any]:
+    return {"type": "open", "position": POSITION.tolist(), "grid": [SIDE, SIDE], "element_area": 1e-6} | changes
+
+
+def frame(**changes: Any) -> dict[str, Any]:
+    return {"type": "frame", "number": 0, "time": 0.0, "displacement": ZERO.tolist()} | changes
+
+
+def nested(depth: int) -> list[Any]:
+    return [nested(depth - 1)] if depth else [1.0]
+
+
+@pytest.mark.parametrize(
+    "position",
+    [nested(400), [10**400] * 48, [False, *POSITION.ravel().tolist()[1:]], ["1"] * 48, [None] * 48, [{}] * 48],
+    ids=["nested", "large", "truth value", "text", "null", "object"],
+)
+def test_an_opening_without_numbers_is_refused_by_name(make: Callable[..., Streams], position: Any) -> None:
+    closed = converse(make(), first(position=position)).closed
+    assert closed is not None
+    assert closed[0] == REFUSED
+    assert closed[1].startswith("position is ")
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        json.dumps(frame(time=0)).replace('"time": 0', '"time": true'),
+        json.dumps(frame(number=True)),
+        json.dumps(frame(number=2**80)),
+        json.dumps(frame()).replace('"time": 0.0', '"time": 1' + "0" * 400),
+        '{"type": "frame", "displacement": ' + "[" * 900 + "]" * 900 + ', "number": "x"}',
+        "[" * 100_000,
+        '{"type": "open"}',
+    ],
+    ids=["time true", "number true", "number 2^80", "time 10^400", "900 deep and wrong", "100,000 deep", "no field"],
+)
+def test_a_message_that_is_none_has_its_documented_code(make: Callable[..., Streams], message: str) -> None:
+    closed = converse(make(), json.dumps(first()), message, raw=True).closed
+    assert closed is not None
+    assert closed[0] == sessions.NOT_UNDERSTOOD
+
+
+@pytest.mark.parametrize(
+    ("wrong", "name"),
+    [
+        ({"displacement": nested(400)}, "displacement"),
+        ({"displacement": [10**400] * 48}, "displacement"),
+        ({"displacement": [False] * 48}, "displacement"),
+        ({"displacement": [0.0] * 24}, "displacement"),  # the bytes of as many numbers of single precision
+        ({"force": [[1.0], ["2"]]}, "force"),
+        ({"object_pose": [0, 0, False]}, "object_pose"),
+        ({"number": -1}, "number"),
+        ({"number": -(2**53)}, "number"),
+    ],
+    ids=["nested", "large", "truth values", "half", "text", "truth value", "-1", "-2^53"],
+)
+def test_a_wrong_frame_is_answered_by_name_and_the_next_is_taken(
+    make: Callable[..., Streams], wrong: dict[str, Any], name: str
+) -> None:
+    number = wrong.get("number", 0)
+    opened, error, state = converse(make(), first(), frame(**wrong), frame(number=1, time=1.0)).answers
+    assert (opened["type"], error["type"], state["type"]) == ("opened", "error", "state")
+    assert (error["number"], error["name"], state["number"]) == (number, name, 1)
