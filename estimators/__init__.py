@@ -1,6 +1,7 @@
 """Friction samples to friction models (samples → friction_model → material)."""
 
 from importlib import import_module
+from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from estimators.errors import EstimatorError, InvalidSamples, TooFewSamples
@@ -28,6 +29,8 @@ _LAZY = {
     "recognise": "estimators.recognition",
 }
 """Names whose modules load scipy: who only handles errors, or passes models on, goes without."""
+
+__version__ = version("stiction")
 
 __all__ = [
     "ChangeDetector",

@@ -1,6 +1,7 @@
 """Tactile frames to friction samples: numerics only (frames → strain → events → slip_state → samples)."""
 
 from importlib import import_module
+from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from slipcore.defaults import (
@@ -33,6 +34,8 @@ _LAZY = {
     "METHODS": "slipcore.detection.methods",
 }
 """Names whose modules load compiled kernels, a second of work: who only holds logs and results goes without."""
+
+__version__ = version("stiction")
 
 __all__ = [
     "LOOKAHEAD",

@@ -1,6 +1,7 @@
 """Client of the Stiction friction service: what a grasp planner installs."""
 
 from importlib import import_module
+from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from stiction_client.errors import (
@@ -90,6 +91,8 @@ _LAZY = {
     "Recognition": "stiction_client.records",
 }
 """Names whose modules load httpx or numpy: a program pays for what it uses."""
+
+__version__ = version("stiction-client")
 
 __all__ = [
     "AsyncFrictionClient",
