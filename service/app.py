@@ -101,10 +101,16 @@ async def running(
     with closing(Database(settings.resolved_database_url)) as database:
         blobs = open_blobs(settings.data_folder, settings.blob_url, settings.blob_cache_bytes)
         with shared(settings.data_folder, partial(_enter, settings, database, blobs, check)):
-            place = Place(database.url, settings.data_folder, settings.blob_url, settings.blob_cache_bytes)
+            place = Place(
+                database.url,
+                settings.data_folder,
+                settings.blob_url,
+                settings.blob_cache_bytes,
+                settings.job_memory_bytes,
+            )
             runner = JobRunner(
                 database,
-                lanes(place, settings.workers, settings.dask_address),
+                lanes(place, settings.workers, settings.dask_address, settings.job_cpu_seconds),
                 attempts=settings.job_attempts,
                 lease_seconds=settings.lease_seconds,
                 poll_seconds=settings.poll_seconds,

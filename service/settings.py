@@ -110,6 +110,12 @@ class Settings(BaseSettings):
     job_attempts: Annotated[int, Field(ge=1, le=10)] = Field(
         default=3, description="How often a job may lose its worker process before it has failed."
     )
+    job_cpu_seconds: Annotated[float, Field(ge=1.0, le=1e6)] = Field(
+        default=300.0, description="CPU time that a job may take, in s; one that wants more is refused."
+    )
+    job_memory_bytes: Annotated[int, Field(ge=64 * MIB, le=2**50)] = Field(
+        default=4096 * MIB, description="Bytes of memory that a job may take; one that wants more is refused."
+    )
     lease_seconds: Annotated[float, Field(ge=0.5, le=600.0)] = Field(
         default=10.0, description="How long a process may be silent, in s, before others take its jobs over."
     )

@@ -171,6 +171,12 @@ def finish(
     _change_claimed(session, claim, runner_id=None, finished_at=now(), **changes)
 
 
+def refuse_greedy(session: Session, claim: Claim, want: str) -> None:
+    """Refuse a job that wants more than it may have, and say in which stage; raises ``ClaimLost``."""
+    stage = get(session, claim.job_id).stage or "first"
+    finish(session, claim, "refused", reason=f"stage {stage} wants {want}")
+
+
 def record(row: JobRow, material: str | None) -> Job:
     """The row as a plain record."""
     return Job(

@@ -10,9 +10,12 @@ from db.errors import DriverMissing
 from db.records import Claim
 from service.jobs import worker
 from service.jobs.worker import Place
-from service.processes import spawned
+from service.processes import limits, spawned
 
 logger = logging.getLogger(__name__)
+
+WATCH_SECONDS = 0.2
+"""s between two looks at what a job has taken."""
 
 RETRY_SECONDS = 1.0
 """s between two tries to start a worker that does not start."""
@@ -20,6 +23,10 @@ RETRY_SECONDS = 1.0
 
 class WorkerDied(Exception):
     """The worker process ended under its job."""
+
+
+class LimitReached(WorkerDied):
+    """The worker process was ended, for its job took more than it may; the message says what."""
 
 
 class Lane(Protocol):
@@ -34,7 +41,7 @@ class Lane(Protocol):
         """Make sure that there is a worker and that it is warm."""
 
     async def run(self, claim: Claim) -> None:
-        """Do one job; raises ``WorkerDied``, and ``StorageUnavailable``."""
+        """Do one job; raises ``WorkerDied``, ``LimitReached`` and ``StorageUnavailable``."""
 
     def kill(self) -> None:
         """End the worker at once, whatever it does."""
@@ -44,10 +51,10 @@ class Lane(Protocol):
 
 
 class ProcessLane:
-    """A worker process of its own on this machine."""
+    """A worker process of its own on this machine; a job may take so many ``cpu_seconds`` of it."""
 
-    def __init__(self, place: Place) -> None:
-        self._place = place
+    def __init__(self, place: Place, cpu_seconds: float) -> None:
+        self._place, self._cpu_seconds = place, cpu_seconds
         self._executor: Executor | None = None
         self.missing: str | None = None
 
@@ -68,11 +75,31 @@ class ProcessLane:
                 return
 
     async def run(self, claim: Claim) -> None:
-        """Do one job; raises ``WorkerDied``."""
+        """Do one job; raises ``WorkerDied``, and ``LimitReached`` where it took too long."""
+        watching = asyncio.create_task(self._end_at_limit())
+        died: BrokenProcessPool | None = None
         try:
             await asyncio.get_running_loop().run_in_executor(self._executor, worker.run_job, self._place, claim)
         except BrokenProcessPool as error:
-            raise WorkerDied from error
+            died = error
+        finally:
+            is_over = watching.done()
+            watching.cancel()
+        if is_over:  # the process is gone, even if the job was done at that very moment
+            raise LimitReached(f"more than {self._cpu_seconds:g} s of CPU (STICTION_JOB_CPU_SECONDS)") from died
+        if died is not None:
+            raise WorkerDied from died
+
+    async def _end_at_limit(self) -> None:
+        """End the worker process once it has taken the CPU time that a job may."""
+        worker_id = spawned.process_id(self._executor)
+        begin = limits.cpu_seconds(worker_id) if worker_id is not None else None
+        while True:
+            await asyncio.sleep(WATCH_SECONDS)
+            now = limits.cpu_seconds(worker_id) if worker_id is not None else None
+            if begin is not None and now is not None and now - begin > self._cpu_seconds:
+                self.kill()
+                return
 
     def kill(self) -> None:
         """End the worker process at once."""
@@ -85,13 +112,13 @@ class ProcessLane:
             await asyncio.to_thread(executor.shutdown, cancel_futures=True)
 
 
-def lanes(place: Place, count: int, dask_address: str | None) -> list[Lane]:
+def lanes(place: Place, count: int, dask_address: str | None, cpu_seconds: float) -> list[Lane]:
     """So many worker processes on this machine, or jobs at once on the workers of a Dask scheduler.
 
-    Raises ``DriverMissing`` for the latter without the library.
+    A job of this machine may take ``cpu_seconds``. Raises ``DriverMissing`` for the latter without the library.
     """
     if dask_address is None:
-        return [ProcessLane(place) for _ in range(count)]
+        return [ProcessLane(place, cpu_seconds) for _ in range(count)]
     try:
         from service.jobs.dask_lane import DaskLane  # an extra, and takes a second to load
     except ModuleNotFoundError as error:

@@ -21,7 +21,7 @@ from db.database import Database
 from db.errors import ClaimLost, SchemaMismatch, StorageUnavailable, StoreMismatch
 from db.records import Claim
 from db.repositories import jobs, runners, stores
-from service.jobs.lanes import Lane, WorkerDied
+from service.jobs.lanes import Lane, LimitReached, WorkerDied
 from service.observability import logs
 
 logger = logging.getLogger(__name__)
@@ -195,6 +195,9 @@ class JobRunner:
         is_lost = False
         try:
             await lane.run(claim)
+        except LimitReached as limit:
+            is_lost, want = not self._stopping, str(limit)
+            await self._try(lambda: self._refuse(claim, want))
         except WorkerDied:
             is_lost = not self._stopping
             if is_lost:
@@ -219,6 +222,11 @@ class JobRunner:
                 jobs.finish(session, claim, "failed", reason=reason)
         except ClaimLost:
             pass
+
+    def _refuse(self, claim: Claim, want: str) -> None:
+        logger.warning("job %s is refused: it wants %s", claim.job_id, want)
+        with self._database.write() as session, suppress(ClaimLost):
+            jobs.refuse_greedy(session, claim, want)
 
     def _count_death(self, claim: Claim) -> None:
         """Note that the job lost its worker, and end it if that was once too often."""

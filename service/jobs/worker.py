@@ -14,18 +14,23 @@ from db.records import Claim
 from db.repositories import jobs
 from service.domain.damage import record_damage
 from service.observability import logs
+from service.processes import limits
 
 logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a worker finds its work: database, folder of the blobs and, where they are in one, the object store."""
+    """Where a worker finds its work: database, folder of the blobs and, where they are in one, the object store.
+
+    ``job_memory_bytes``: how much memory a job may take beside what the process had before the first.
+    """
 
     database_url: str
     data_folder: Path
     blob_url: str | None = None
     blob_cache_bytes: int = 0
+    job_memory_bytes: int = 4 * 2**30
 
 
 def warm_up() -> None:
@@ -54,7 +59,8 @@ def _run(place: Place, claim: Claim) -> None:
 
     database, blobs = _stores(place)
     try:
-        pipeline.run_job(database, blobs, claim)
+        with limits.memory(place.job_memory_bytes):
+            pipeline.run_job(database, blobs, claim)
     except StorageUnavailable:
         raise
     except ClaimLost as lost:
@@ -63,10 +69,18 @@ def _run(place: Place, claim: Claim) -> None:
         record_damage(database, damage, f"job {claim.job_id}")
         with database.write() as session, suppress(ClaimLost):
             jobs.finish(session, claim, "failed", reason=str(damage))
+    except MemoryError:
+        _refuse(database, claim, f"more than {place.job_memory_bytes} bytes of memory (STICTION_JOB_MEMORY_BYTES)")
     except Exception as error:
         logger.exception("job failed")
         with database.write() as session, suppress(ClaimLost):
             jobs.finish(session, claim, "failed", reason=f"{type(error).__name__}: {error}")
+
+
+def _refuse(database: Database, claim: Claim, want: str) -> None:
+    with database.write() as session, suppress(ClaimLost):
+        jobs.refuse_greedy(session, claim, want)
+    logger.warning("job refused: it wants %s", want)
 
 
 @cache

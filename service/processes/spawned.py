@@ -26,6 +26,11 @@ def kill(pool: Executor | None) -> None:
         process.kill()
 
 
+def process_id(pool: Executor | None) -> int | None:
+    """The id of a pool's one process, once it has one."""
+    return next(iter(dict(getattr(pool, "_processes", None) or {})), None)
+
+
 def start(chosen: logs.Logs | None, prepare: Callable[[], None] | None = None) -> None:
     """Prepare the process: it ends when the server tells it to or is gone, not by a Ctrl-C meant for the server."""
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -160,6 +160,6 @@ def test_without_its_library_the_extra_is_named(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setitem(sys.modules, "distributed", None)
     monkeypatch.delitem(sys.modules, "service.jobs.dask_lane", raising=False)
     with pytest.raises(DriverMissing, match=r"Dask cluster is tcp://a:1, .* \(stiction\[dask\] brings one\)"):
-        lanes(Place("sqlite:///x", tmp_path), 1, "tcp://a:1")
+        lanes(Place("sqlite:///x", tmp_path), 1, "tcp://a:1", 300.0)
     with pytest.raises(DriverMissing, match=r"Dask cluster is tcp://a:1, "), campaign.workers(1, "tcp://a:1"):
         pass

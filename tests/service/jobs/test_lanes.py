@@ -14,7 +14,7 @@ def test_a_worker_that_still_warms_up_holds_no_stop_up(tmp_path: Path, monkeypat
     monkeypatch.setattr(worker, "warm_up", partial(time.sleep, 600.0))
 
     async def stop() -> float:
-        lane = ProcessLane(Place("sqlite:///x", tmp_path))
+        lane = ProcessLane(Place("sqlite:///x", tmp_path), 300.0)
         hiring = asyncio.create_task(lane.hire())
         await asyncio.sleep(2.0)  # by now the process sleeps, or starts still
         began = time.monotonic()

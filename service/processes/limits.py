@@ -1,0 +1,45 @@
+"""What a process takes of the machine, and how much memory it may take (Linux; elsewhere nothing is limited)."""
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+
+
+def cpu_seconds(process_id: int) -> float | None:
+    """CPU time that a process has taken with all its threads, s; None where nobody tells, or once it is gone."""
+    try:
+        stat = Path(f"/proc/{process_id}/stat").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return None
+    user, system = stat.rpartition(")")[2].split()[11:13]  # the name before may hold spaces
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+
+
+@contextmanager
+def memory(budget: int) -> Iterator[None]:
+    """Let this process take so many bytes beside what it had the first time; who asks for more gets a ``MemoryError``.
+
+    Memory that earlier work has freed and the process keeps counts as taken.
+    """
+    if sys.platform != "linux":
+        yield
+        return
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_DATA)
+    limit = _own_bytes() + budget
+    resource.setrlimit(resource.RLIMIT_DATA, (limit if before[1] < 0 else min(limit, before[1]), before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, before)
+
+
+@cache
+def _own_bytes() -> int:
+    """Bytes of private memory, as RLIMIT_DATA counts them, at the first call."""
+    lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
+    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmData:"))

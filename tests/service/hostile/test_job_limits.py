@@ -1,0 +1,104 @@
+"""A job that wants too much is ended once, says where and why, and the next one is done."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+
+from db.blobs import BlobStore
+from db.database import Database
+from db.records import NewGraspLog
+from db.repositories import grasp_logs, jobs, runners
+from service.jobs import lanes, pipeline, worker
+from service.processes import limits
+from service.settings import Settings
+from slipcore import GraspLog
+from stiction_client import container
+
+Serving = Callable[[Settings], AbstractContextManager[httpx.Client]]
+ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+
+
+def endless(log: GraspLog) -> bytes:
+    """Frames of which a detector in numpy takes a minute: each is a call of its own."""
+    times = -(-400_000 // len(log))
+    frames, corner = times * len(log), np.s_[:, :2, :2]
+    displacement, force = (np.tile(field[corner], (times, 1, 1, 1)) for field in (log.displacement, log.force))  # type: ignore[index]
+    time_ = log.time[1] * np.arange(frames)
+    return container.encode(GraspLog(time_, log.position[:2, :2], displacement, log.element_area, force=force))
+
+
+@pytest.mark.long
+def test_a_job_that_takes_too_long_is_refused_once_and_the_next_is_done(
+    serving: Serving, ramp: GraspLog, content: bytes, upload: Any, wait: Any, tmp_path: Path
+) -> None:
+    with serving(Settings(data_folder=tmp_path, job_cpu_seconds=1.0)) as client:
+        greedy = upload(client, endless(ramp), detector="rigid_fit").json()["job"]["id"]
+        honest = upload(client, content).json()["job"]["id"]
+        ended = wait(client, greedy)
+        assert (ended["status"], ended["stage"], ended["deaths"]) == ("refused", "slip_state", 0)
+        assert ended["reason"] == "stage slip_state wants more than 1 s of CPU (STICTION_JOB_CPU_SECONDS)"
+        assert wait(client, honest)["status"] == "done"
+
+
+@ONLY_SQLITE
+def test_a_job_that_wants_too_much_memory_is_refused_and_its_process_goes_on(
+    database: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = BlobStore(tmp_path)
+    with database.write() as session:
+        log = grasp_logs.add(session, NewGraspLog(store.put(b"log"), 3, "npz", "filter", None, "s", 2, 1.0, (1, 1)))
+        jobs.add(session, "ingest", "ols", material_id=None, grasp_log_id=log)
+        claim = jobs.claim(session, runners.add(session, "host"))
+        assert claim is not None
+        jobs.start_stage(session, claim, "frames", {})
+
+    def allocate(*_: object) -> None:
+        np.ones(2**28 // 8 * 2)  # twice what is allowed
+
+    monkeypatch.setattr(worker, "_stores", lambda _: (database, store))
+    monkeypatch.setattr(pipeline, "run_job", allocate)
+    worker.run_job(worker.Place(database.url, tmp_path, job_memory_bytes=2**28), claim)
+    with database.read() as session:
+        job = jobs.get(session, claim.job_id)
+    reason = "stage frames wants more than 268435456 bytes of memory (STICTION_JOB_MEMORY_BYTES)"
+    assert (job.status, job.reason) == ("refused", reason)
+    assert np.ones(2**28 // 8 * 2).all()  # the limit is the job's
+
+
+def spend(seconds: float) -> None:
+    until = time.process_time() + seconds
+    while time.process_time() < until:
+        pass
+
+
+def test_a_worker_that_takes_too_long_is_ended_and_another_one_begins_anew(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    async def run() -> None:
+        monkeypatch.setattr(worker, "warm_up", partial(spend, 0.0))
+        monkeypatch.setattr(worker, "run_job", spend_on_job)
+        lane = lanes.ProcessLane(worker.Place("sqlite:///x", tmp_path), 0.3)
+        await lane.hire()
+        try:
+            with pytest.raises(lanes.LimitReached, match=r"more than 0\.3 s of CPU"):
+                await lane.run(jobs.Claim("job", "runner"))
+            await lane.hire()  # another process, whose time counts from its job's begin
+            lane._cpu_seconds = 60.0
+            await lane.run(jobs.Claim("short", "runner"))
+        finally:
+            await lane.close()
+
+    asyncio.run(run())
+    assert limits.cpu_seconds(2**22 + 1) is None
+
+
+def spend_on_job(_: worker.Place, claim: jobs.Claim) -> None:
+    spend(0.0 if claim.job_id == "short" else 60.0)
