@@ -11,6 +11,7 @@ from db.paging import Window, windowed
 from db.records import Material, StoredModel
 from db.repositories import friction_models, grasp_logs, jobs
 from db.tables import GraspLogRow, MaterialNameRow, MaterialRow
+from db.text import is_storable
 
 BY_NAME = Window("name")
 
@@ -30,7 +31,8 @@ def create(session: Session, name: str, description: str) -> Material:
 
 def find_id(session: Session, name: str) -> int:
     """The key of the material that has this name or alias; raises ``NotFound``."""
-    found = session.scalar(select(MaterialNameRow.material_id).where(MaterialNameRow.name == name))
+    query = select(MaterialNameRow.material_id).where(MaterialNameRow.name == name)
+    found = session.scalar(query) if is_storable(name) else None
     if found is None:
         raise NotFound("material", name)
     return found

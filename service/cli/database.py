@@ -159,8 +159,10 @@ def opened(url: str | None, *, may_be_new: bool = False) -> Iterator["Database"]
     """
     from db.database import Database
     from db.errors import NotFound
+    from service.processes import private_files
     from service.settings import Settings
 
+    private_files.withhold()
     if url is None:
         settings = Settings()
         if may_be_new:

@@ -99,9 +99,19 @@ def as_array(name: str, value: Any) -> NDArray[Any]:
         array = np.asarray(value)
         if array.dtype == object:
             array = np.asarray(value, dtype=np.float64)
+        if array.dtype.kind in "iuf" and _has_truth_values(value):
+            raise ValueError("of numbers and truth values")  # which numpy takes for 0 and 1
     except (ValueError, TypeError, OverflowError, RecursionError) as error:
         raise InvalidInput(name, f"not an array ({str(error)[:80]})", "an array of real numbers") from error
     return array
+
+
+def _has_truth_values(value: Any) -> bool:
+    """Whether ``true`` or ``false`` is anywhere in nested lists."""
+    if not isinstance(value, list):
+        return isinstance(value, bool)
+    kinds = set(map(type, value))
+    return bool in kinds or (list in kinds and any(map(_has_truth_values, value)))
 
 
 def _in_si(name: str, array: NDArray[Any], origin: Origin, metadata: dict[str, str]) -> NDArray[Any]:

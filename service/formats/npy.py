@@ -1,6 +1,7 @@
 """One array in the .npy format, read from bytes that nobody vouches for."""
 
 import math
+import sys
 import threading
 from typing import Any, Protocol
 
@@ -49,7 +50,16 @@ def read_array(stream: Readable, name: str, size: int) -> NDArray[Any]:
     content = stream.read(claimed)
     if len(content) != claimed:
         raise InvalidInput(name, f"cut off after {len(content)} of {claimed} bytes", "a complete .npy array")
+    if dtype.kind == "U":
+        _check_text(content, dtype, name)
     return np.frombuffer(content, dtype).reshape(shape, order="F" if fortran_order else "C")
+
+
+def _check_text(content: bytes, dtype: np.dtype[Any], name: str) -> None:
+    """Python cannot even say what a number beyond the last code point is."""
+    largest = int(np.frombuffer(content, f"{dtype.byteorder}u4").max(initial=0))
+    if largest > sys.maxunicode:
+        raise InvalidInput(name, f"text with the code point {largest:#x}", f"code points up to {sys.maxunicode:#x}")
 
 
 HEADER_LOCK = threading.Lock()

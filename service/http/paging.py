@@ -5,7 +5,7 @@ import binascii
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import Annotated, Any, TypeVar
 from urllib.parse import quote
 
@@ -33,7 +33,7 @@ def _moment(value: Any) -> datetime:
     moment = datetime.fromisoformat(value)
     if moment.tzinfo is None:
         raise ValueError("no time zone")
-    return moment
+    return moment.astimezone(UTC)  # the first and the last day of the calendar may have no moment there
 
 
 def _text(value: Any) -> str:
@@ -81,7 +81,7 @@ class Page:
             if sort != self.sort:
                 raise ValueError("of another order")
             return READERS[self.sort.lstrip("-")](value), READERS[self.identity](identity)
-        except (binascii.Error, ValueError, TypeError) as error:
+        except (binascii.Error, ValueError, TypeError, OverflowError, RecursionError) as error:
             allowed = f"`next` of an answer sorted by {self.sort}"
             raise Problem.wrong_value(INVALID_REQUEST, "cursor", cursor, allowed) from error
 

@@ -72,6 +72,7 @@ INTERNAL_ERROR = ProblemType("internal-error", "The service failed", 500)
 TOO_MANY_CONNECTIONS = ProblemType("too-many-connections", "Too many connections", 503)
 STOPPING = ProblemType("stopping", "The server stops", 503)
 WORKERS_NOT_READY = ProblemType("workers-not-ready", "The workers take no jobs yet, or no longer", 503)
+FILE_MISSING = ProblemType("file-missing", "A stored file is missing", 503)
 STORAGE_UNAVAILABLE = ProblemType("storage-unavailable", "Database or blob folder cannot be used now", 503)
 
 PROBLEM_TYPES = {entry.name: entry for entry in list(globals().values()) if isinstance(entry, ProblemType)}
@@ -81,6 +82,7 @@ _UNKNOWN = {
     "alias": UNKNOWN_ALIAS,
     "grasp log": UNKNOWN_GRASP_LOG,
     "job": UNKNOWN_JOB,
+    "blob": FILE_MISSING,
 }
 _BY_STATUS = {404: UNKNOWN_ROUTE, 405: METHOD_NOT_ALLOWED, 408: REQUEST_TIMEOUT, 413: UPLOAD_TOO_LARGE}
 
@@ -164,7 +166,7 @@ async def _on_problem(request: Request, error: Exception) -> JSONResponse:
 async def _on_not_found(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, NotFound)
     kind = _UNKNOWN.get(error.kind, INTERNAL_ERROR)
-    if kind is INTERNAL_ERROR:
+    if kind in {INTERNAL_ERROR, FILE_MISSING}:
         logger.error("%s is referred to but missing", error.kind, exc_info=error)
     return answer(request, Problem.wrong_value(kind, error.kind, error.name, f"the name of a stored {error.kind}"))
 

@@ -7,6 +7,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 from pydantic.config import JsonDict
 
 from db.records import AuditEntry, Job, JobKind, JobStatus, Material, StoredGraspLog, StoredModel, Withdrawal
+from db.text import is_storable
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}$"
 ModelMethod = Literal["ols", "robust", "conjugate", "hierarchical", "bayes"]
@@ -96,55 +97,61 @@ _GRASP_LOG: JsonDict = {
 
 
 def _storable(text: str) -> str:
-    if "\0" in text or any("\ud800" <= letter <= "\udfff" for letter in text):
+    if not is_storable(text):
         raise ValueError("text without NUL and lone surrogates")
     return text
 
 
 Name = Annotated[str, Field(pattern=NAME_PATTERN, description="1 to 100 letters, digits, spaces and `._-`.")]
 Text = Annotated[str, Field(max_length=10_000), AfterValidator(_storable)]
+Reference = Annotated[str, AfterValidator(_storable)]
+"""The name or id of what may be stored."""
 
 
-class NewMaterial(BaseModel):
+class Body(BaseModel):
+    """What a request may say: known fields only, and of their own types: neither ``true`` nor ``"1"`` is a number."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class NewMaterial(Body):
     """A material to be made known."""
 
-    model_config = ConfigDict(
-        extra="forbid", json_schema_extra={"examples": [{"name": "paper", "description": "80 g/m²"}]}
-    )
+    model_config = ConfigDict(json_schema_extra={"examples": [{"name": "paper", "description": "80 g/m²"}]})
 
     name: Name
     description: Text = ""
 
 
-class MaterialChange(BaseModel):
+class MaterialChange(Body):
     """What is to be different about a material; what is left out stays."""
 
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"name": "cardboard brown"}]})
+    model_config = ConfigDict(json_schema_extra={"examples": [{"name": "cardboard brown"}]})
 
     name: Annotated[Name | None, Field(description="Its new name; the old one becomes an alias")] = None
     description: Text | None = None
 
 
-class NewMerge(BaseModel):
+class NewMerge(Body):
     """A merge that is asked for."""
 
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"source": "papre"}]})
+    model_config = ConfigDict(json_schema_extra={"examples": [{"source": "papre"}]})
 
-    source: Annotated[str, Field(max_length=100, description="The material whose logs and names move here")]
+    source: Annotated[Reference, Field(max_length=100, description="The material whose logs and names move here")]
 
 
-class NewWithdrawal(BaseModel):
+class NewWithdrawal(Body):
     """Why a log is to be withdrawn."""
 
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"reason": "the sensor was wet"}]})
+    model_config = ConfigDict(json_schema_extra={"examples": [{"reason": "the sensor was wet"}]})
 
     reason: Annotated[Text, Field(min_length=1)]
 
 
-class NewFit(BaseModel):
+class NewFit(Body):
     """A fit that is asked for."""
 
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"method": "bayes", "seed": 0}]})
+    model_config = ConfigDict(json_schema_extra={"examples": [{"method": "bayes", "seed": 0}]})
 
     method: Annotated[FitMethod, Field(description="`auto` takes the one that the data call for")] = "ols"
     seed: Annotated[int, Field(ge=0, lt=2**32, description="Of the sampler: the same seed gives the same fit.")] = 0
@@ -544,15 +551,14 @@ class LookUpQuery(BaseModel):
     method: Annotated[ModelMethod, Field(description="Whose current model answers")] = "ols"
 
 
-class NewGraspForce(BaseModel):
+class NewGraspForce(Body):
     """A contact that must hold."""
 
     model_config = ConfigDict(
-        extra="forbid",
         json_schema_extra={"examples": [{"material": "paper", "tangential_load": 1.5, "contact_area": 6.0e-5}]},
     )
 
-    material: str
+    material: Reference
     method: Annotated[ModelMethod, Field(description="Whose current model answers")] = "ols"
     tangential_load: Annotated[float, Field(ge=0.0, le=1e6, description="Of this contact, N")]
     contact_area: _Area
@@ -603,10 +609,10 @@ class GraspForceOut(BaseModel):
     warning: str | None
 
 
-class SamplesIn(BaseModel):
+class SamplesIn(Body):
     """Friction samples of one grasp, as `GET /v1/grasp-logs/{id}/samples` gives them."""
 
-    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [_SAMPLES]})
+    model_config = ConfigDict(json_schema_extra={"examples": [_SAMPLES]})
 
     friction_coefficient: list[Annotated[float, Field(ge=0.0, le=1e3, allow_inf_nan=False)]]
     tangential_velocity: list[_Velocity]
@@ -625,18 +631,17 @@ class SamplesIn(BaseModel):
         return self
 
 
-class NewRecognition(BaseModel):
+class NewRecognition(Body):
     """A grasp whose material is to be told: of a stored log, or of samples that are sent."""
 
     model_config = ConfigDict(
-        extra="forbid",
         json_schema_extra={"examples": [{"grasp_log": "7c9e6679742540de944be07fc1f90ae7"}, {"samples": _SAMPLES}]},
     )
 
-    grasp_log: Annotated[str | None, Field(max_length=32)] = None
+    grasp_log: Annotated[Reference | None, Field(max_length=32)] = None
     samples: SamplesIn | None = None
     materials: Annotated[
-        list[Annotated[str, Field(max_length=100)]] | None,
+        list[Annotated[Reference, Field(max_length=100)]] | None,
         Field(min_length=1, max_length=100, description="Which it may be; without, all that have a model"),
     ] = None
     method: Annotated[ModelMethod, Field(description="Whose current models are compared")] = "ols"
