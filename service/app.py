@@ -118,7 +118,7 @@ async def running(
                 poll_seconds=settings.poll_seconds,
                 shutdown_seconds=settings.shutdown_seconds,
             )
-            readers = Readers(settings.read_seconds)
+            readers = Readers(settings.read_seconds, settings.readers, settings.reading_bytes)
             streams = Streams(settings.stream_sessions_per_key, settings.stream_bytes)
             await runner.start()
             retention = Retention(

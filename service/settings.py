@@ -90,10 +90,17 @@ class Settings(BaseSettings):
         default=24.0, description="How long an Idempotency-Key counts, in hours."
     )
     max_expansion: Annotated[int, Field(ge=1, le=100_000)] = Field(
-        default=200, description="How many times its size a compressed body may unpack to, once that is over 16 MiB."
+        default=200,
+        description="How many times its size a body may unpack to, as an archive, too, once that is over 16 MiB.",
     )
     read_seconds: Annotated[float, Field(gt=0.0, le=3600.0)] = Field(
         default=60.0, description="How long reading a file of another library's format may take, in s."
+    )
+    readers: Annotated[int, Field(ge=1, le=64)] = Field(
+        default=2, description="Processes that read large files and those of other libraries' formats, at most."
+    )
+    reading_bytes: Annotated[int, Field(ge=1, le=2**40)] = Field(
+        default=256 * MIB, description="Memory that reading uploads may take of the server process at once, in bytes."
     )
     lookup_seconds: Annotated[float, Field(ge=0.0, le=60.0)] = Field(
         default=1.0, description="How old a model in memory may be before a look-up asks the database again, in s."

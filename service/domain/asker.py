@@ -25,6 +25,11 @@ class Asker:
         return Actor(name, self.address, self.request_id)
 
     @property
+    def share(self) -> str:
+        """Whose share of the server it takes: its key's, or without one its address's."""
+        return self.key_id or f"address {self.address}"
+
+    @property
     def owners(self) -> tuple[str, ...]:
         """As whom it may own materials."""
         own = {"key": self.key_id, "group": self.group}

@@ -19,8 +19,11 @@ class LogFile:
     close: ExitStack
 
 
-async def export(context: Context, log: StoredGraspLog, name: str) -> LogFile:
-    """The log as a file of format ``name``; raises ``Problem`` where there is none, or no library of that format."""
+async def export(context: Context, log: StoredGraspLog, name: str, owner: str = "") -> LogFile:
+    """The log as a file of format ``name``, made in the share of ``owner``.
+
+    Raises ``Problem`` where there is none, or no library of that format, and ``Crowded``.
+    """
     if not log.has_file:
         raise Problem(FILE_DELETED, f"the file of grasp log {log.id} was deleted, as old uploads are here")
     source = await asyncio.to_thread(context.blobs.path, log.sha256)
@@ -29,7 +32,7 @@ async def export(context: Context, log: StoredGraspLog, name: str) -> LogFile:
             return LogFile(source, spools.pop_all())
         spool = spools.enter_context(context.blobs.spool())
         try:
-            await context.readers.write(source, spool.path, name)
+            await context.readers.write(source, spool.path, name, owner)
         except formats.UnsupportedFormat as error:
             raise Problem.wrong_value(UNSUPPORTED_FORMAT, error.name, error.value, error.allowed) from error
         return LogFile(spool.path, spools.pop_all())

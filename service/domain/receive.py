@@ -4,7 +4,8 @@ import asyncio
 import gzip
 import sys
 import zlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
 
 from starlette.requests import ClientDisconnect
 
@@ -19,11 +20,22 @@ else:
 CHUNK_BYTES = 2**20
 """Bytes gathered before a thread hashes and writes them: about a millisecond of work."""
 
-UNPACKERS: dict[str, type[gzip.GzipFile] | type[zstd.ZstdFile]] = {"gzip": gzip.GzipFile, "zstd": zstd.ZstdFile}
-"""Content encodings that are undone; ``identity`` is none."""
+UNPACKING_BYTES = 2**24
+"""Memory of one body that is unpacked: the window of what packed it, and a few chunks."""
+
+WINDOW_LOG = 23
+"""log₂ of the memory that unpacking zstd may take; larger windows are not for HTTP (RFC 9659)."""
 
 EXPANSION_FROM = 16 * CHUNK_BYTES
 """Bytes unpacked before their ratio to the packed ones counts: a small log of zeros is no attack."""
+
+
+def _unpack_zstd(path: Path) -> zstd.ZstdFile:
+    return zstd.ZstdFile(path, options={zstd.DecompressionParameter.window_log_max: WINDOW_LOG})
+
+
+_UNPACKERS: dict[str, Callable[[Path], gzip.GzipFile | zstd.ZstdFile]] = {"gzip": gzip.GzipFile, "zstd": _unpack_zstd}
+"""Content encodings that are undone; ``identity`` is none."""
 
 
 def check_size(size: int, limit: int) -> None:
@@ -32,13 +44,20 @@ def check_size(size: int, limit: int) -> None:
         raise Problem.wrong_value(UPLOAD_TOO_LARGE, "body", f"{size} bytes or more", f"at most {limit} bytes")
 
 
+def check_expansion(packed: int, unpacked: int, most: int) -> None:
+    """Raises ``Problem`` for a body that unpacks, by its encoding or as an archive, to too many times its bytes."""
+    if unpacked > max(EXPANSION_FROM, most * packed):
+        value = f"{packed} bytes that unpack to {unpacked} or more"
+        raise Problem.wrong_value(UPLOAD_TOO_LARGE, "body", value, f"at most {most} times as many")
+
+
 def check_encoding(encoding: str) -> str:
     """The content encoding, empty where there is none; raises ``Problem`` for one that isn't known."""
     name = encoding.strip().lower()
     if name in ("", "identity"):
         return ""
-    if name not in UNPACKERS:
-        raise Problem.wrong_value(UNSUPPORTED_FORMAT, "content encoding", encoding, f"{', '.join(UNPACKERS)} or none")
+    if name not in _UNPACKERS:
+        raise Problem.wrong_value(UNSUPPORTED_FORMAT, "content encoding", encoding, f"{', '.join(_UNPACKERS)} or none")
     return name
 
 
@@ -66,13 +85,11 @@ def unpack(packed: Spool, spool: Spool, encoding: str, limit: int, expansion: in
     """Undo a content encoding, a chunk at a time; raises ``Problem`` for a bomb or a damaged stream."""
     packed.flush()
     try:
-        with UNPACKERS[encoding](packed.path) as stream:
+        with _UNPACKERS[encoding](packed.path) as stream:
             while chunk := stream.read(CHUNK_BYTES):
                 check_size(spool.size + len(chunk), limit)
                 spool.write(chunk)
-                if spool.size > max(EXPANSION_FROM, expansion * packed.size):
-                    value = f"{packed.size} bytes that unpack to {spool.size} or more"
-                    raise Problem.wrong_value(UPLOAD_TOO_LARGE, "body", value, f"at most {expansion} times as many")
+                check_expansion(packed.size, spool.size, expansion)
     except (EOFError, gzip.BadGzipFile, zlib.error, zstd.ZstdError) as error:
         value = f"not a complete {encoding} stream ({str(error)[:80]})"
         raise Problem.wrong_value(INVALID_REQUEST, "body", value, f"{encoding}, as content-encoding says") from error

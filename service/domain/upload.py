@@ -1,9 +1,10 @@
 """Take in a grasp log: stream it to disk, look whether it is one, store it with its ingest job."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 from sqlalchemy.orm import Session
 
@@ -15,13 +16,15 @@ from service import formats
 from service.context import Context
 from service.domain.asker import ANYBODY, Asker
 from service.domain.ownership import check_may_add
-from service.domain.receive import check_encoding, check_size, receive, unpack
-from service.formats.reading import Description, Settings, read_plain
+from service.domain.receive import UNPACKING_BYTES, check_encoding, check_expansion, check_size, receive, unpack
+from service.formats.archive import unpacked_bytes
+from service.formats.reading import Description, Settings, to_its_end
 from service.http.idempotency import Answer, Once, answer_once
 from service.http.problems import (
     INVALID_GRASP_LOG,
     INVALID_REQUEST,
     UNSUPPORTED_FORMAT,
+    UPLOAD_INTERRUPTED,
     Problem,
 )
 from service.http.schemas import GraspLogOut
@@ -30,6 +33,8 @@ from slipcore.defaults import METHOD_NAMES
 from slipcore.errors import InvalidInput
 
 LONGEST_SENSOR_NAME = 200
+
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,11 +54,18 @@ class Wish:
     asker: Asker = ANYBODY
 
 
-async def upload(context: Context, chunks: AsyncIterator[bytes], wish: Wish) -> Answer:
+async def never() -> None:
+    """Wait for somebody who does not go."""
+    await asyncio.Event().wait()
+
+
+async def upload(
+    context: Context, chunks: AsyncIterator[bytes], wish: Wish, gone: Callable[[], Coroutine[Any, Any, None]] = never
+) -> Answer:
     """Store a log and queue its ingest.
 
-    Raises ``Problem`` for what cannot be taken, ``NotFound`` for an unknown material. Nothing stays of a log that is
-    not taken.
+    ``gone`` ends when the client has gone: what is still to be read then is not. Raises ``Problem`` for what cannot be
+    taken, ``Crowded``, ``NotFound`` for an unknown material. Nothing stays of a log that is not taken.
     """
     limit, expansion = context.settings.max_upload_bytes, context.settings.max_expansion
     check_size(wish.content_length or 0, limit)
@@ -65,8 +77,9 @@ async def upload(context: Context, chunks: AsyncIterator[bytes], wish: Wish) -> 
         await receive(body, chunks, limit)
         if encoding:
             spool = spools.enter_context(context.blobs.spool())
-            await asyncio.to_thread(unpack, body, spool, encoding, limit, expansion)
-        kept, description = await _read(context, spools, spool, wish)
+            async with context.readers.room.turn(wish.asker.share, UNPACKING_BYTES):
+                await to_its_end(asyncio.to_thread(unpack, body, spool, encoding, limit, expansion))
+        kept, description = await _unless_gone(_read(context, spools, spool, wish, body.size), gone())
         log = _new_log(kept, description, wish, material_id)
         once = wish.once and wish.once.about(body.sha256)
         return await asyncio.to_thread(_store, context, kept, log, once, wish.asker)
@@ -83,6 +96,20 @@ async def store_made(context: Context, spool: Spool, found: Description, wish: W
     await asyncio.to_thread(spool.adopt)
     log = _new_log(spool, found, wish, material_id)
     return await asyncio.to_thread(_store, context, spool, log, None, wish.asker)
+
+
+async def _unless_gone(work: Coroutine[Any, Any, Result], gone: Coroutine[Any, Any, None]) -> Result:
+    """The result of ``work``; raises ``Problem`` where the client has gone before it is there."""
+    tasks = asyncio.create_task(work), asyncio.create_task(gone)
+    try:
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        if not tasks[0].done():
+            raise Problem(UPLOAD_INTERRUPTED, "the connection ended while the log was read")
+        return tasks[0].result()
+    finally:
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
 
 
 def _check(context: Context, wish: Wish) -> int | None:
@@ -108,33 +135,39 @@ def _check_type(content_type: str | None) -> None:
         raise Problem.wrong_value(UNSUPPORTED_FORMAT, "content type", "missing", allowed)
 
 
-def _identify(spool: Spool, wish: Wish) -> str:
-    """The body's format, which must take what was said beside it."""
+def _identify(spool: Spool, wish: Wish) -> tuple[str, int]:
+    """The body's format, which must take what was said beside it, and the bytes that it unpacks to."""
     spool.flush()
     try:
         name = formats.identify(spool.path, wish.content_type)
         formats.check_settings(name, wish.settings)
+        formats.check_start(spool.path, name)
+        return name, unpacked_bytes(spool.path)
     except formats.UnsupportedFormat as error:
         raise Problem.wrong_value(UNSUPPORTED_FORMAT, error.name, error.value, error.allowed) from error
     except formats.UnusedSetting as error:
         raise Problem.wrong_value(INVALID_REQUEST, error.name, error.value, error.allowed) from error
     except InvalidInput as error:
         raise Problem.wrong_value(INVALID_GRASP_LOG, error.name, error.value, error.allowed) from error
-    return name
 
 
-async def _read(context: Context, spools: ExitStack, spool: Spool, wish: Wish) -> tuple[Spool, Description]:
-    """What is to be stored, the body or a container made of it, with its description."""
-    name = await asyncio.to_thread(_identify, spool, wish)
+async def _read(
+    context: Context, spools: ExitStack, spool: Spool, wish: Wish, received: int
+) -> tuple[Spool, Description]:
+    """What is to be stored, the body or a container made of it, with its description; ``received``: bytes."""
+    expansion = context.settings.max_expansion
+    name, unpacked = await asyncio.to_thread(_identify, spool, wish)
+    check_expansion(received, unpacked, expansion)
     try:
         if formats.FORMATS[name].plain:
             found, _ = await asyncio.gather(  # the disk is slow while the reader computes
-                asyncio.to_thread(read_plain, spool.path, name), asyncio.to_thread(spool.sync)
+                context.readers.describe(spool.path, name, unpacked, wish.asker.share), asyncio.to_thread(spool.sync)
             )
             return spool, found
         made = spools.enter_context(context.blobs.spool())
-        description = await context.readers.convert(spool.path, made.path, name, wish.settings)
+        description = await context.readers.convert(spool.path, made.path, name, wish.settings, wish.asker.share)
         await asyncio.to_thread(made.adopt)
+        check_expansion(received, made.size, expansion)
     except formats.UnsupportedFormat as error:
         raise Problem.wrong_value(UNSUPPORTED_FORMAT, error.name, error.value, error.allowed) from error
     except InvalidInput as error:

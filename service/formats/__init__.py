@@ -21,6 +21,7 @@ __all__ = [
     "UnsupportedFormat",
     "UnusedSetting",
     "check_settings",
+    "check_start",
     "identify",
     "module_of",
     "parse_mapping",
@@ -33,6 +34,7 @@ class Format:
     """A format: its content type, where its reader is, how its files begin, and which settings it takes.
 
     ``plain``: read by our own bounded code; the others go through libraries, and so through a process of their own.
+    ``leads``: nothing may stand before the magic bytes.
     """
 
     content_type: str
@@ -40,6 +42,7 @@ class Format:
     magic: bytes = b""
     settings: tuple[str, ...] = ("mapping",)
     plain: bool = False
+    leads: bool = True
 
 
 FORMATS = {
@@ -49,7 +52,7 @@ FORMATS = {
     "mcap": Format("application/x-mcap", "mcap.read", b"\x89MCAP0\r\n"),
     "rosbag1": Format("application/x-rosbag", "rosbag.read_bag1", b"#ROSBAG V"),
     "rosbag2": Format("application/x-rosbag2", "rosbag.read_bag2", b"SQLite format 3\x00"),
-    "hdf5": Format("application/x-hdf5", "hdf5.read", b"\x89HDF\r\n\x1a\n"),
+    "hdf5": Format("application/x-hdf5", "hdf5.read", b"\x89HDF\r\n\x1a\n", leads=False),
     "parquet": Format("application/vnd.apache.parquet", "parquet.read", b"PAR1"),
     "json": Format("application/json", "json_log.read"),
 }
@@ -70,6 +73,9 @@ EXTRA = "formats"
 
 STORAGE = (".db3", ".mcap")
 """Names of rosbag2's storage files end so."""
+
+ZIP = b"PK\x03\x04"
+"""How a zip begins."""
 
 SNIFFED_BYTES = 4096
 """Enough for the lines before a table and its header."""
@@ -127,6 +133,15 @@ def identify(path: Path, content_type: str | None = None) -> str:
     return _sniff(path)
 
 
+def check_start(path: Path, name: str) -> None:
+    """Raises ``InvalidInput`` for a file that does not begin as its format does: no reader need look at it."""
+    magic = FORMATS[name].magic if FORMATS[name].leads else b""
+    with path.open("rb") as stream:
+        start = stream.read(max(len(magic), len(ZIP)))
+    if not start.startswith((magic, ZIP) if name == "rosbag2" else magic):  # its folder may be zipped
+        raise InvalidInput("file", f"no {name} (it starts with {start[:8]!r})", f"a file that starts with {magic!r}")
+
+
 def module_of(name: str) -> ModuleType:
     """The module of a format, imported only now, with its library; ``UnsupportedFormat`` where that is missing."""
     try:
@@ -149,7 +164,7 @@ def _sniff(path: Path) -> str:
     for name, each in FORMATS.items():
         if each.magic and start.startswith(each.magic):
             return name
-    if start.startswith(b"PK\x03\x04"):
+    if start.startswith(ZIP):
         return _sniff_zip(path)
     if start.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
         return "json"

@@ -37,6 +37,19 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
         yield archive
 
 
+def unpacked_bytes(path: Path) -> int:
+    """Bytes of a zip's members by its table of contents, which nothing is read beyond, or of any other file itself.
+
+    Raises ``InvalidInput`` for a zip that is none, or none that is taken.
+    """
+    with path.open("rb") as stream:
+        is_zip = stream.read(4) == b"PK\x03\x04"
+    if not is_zip:
+        return path.stat().st_size
+    with open_archive(path) as archive:
+        return sum(entry.file_size for entry in archive.infolist())
+
+
 def read_member(archive: zipfile.ZipFile, member: str, name: str) -> NDArray[Any]:
     """Read one .npy member as an array; errors call it ``name``."""
     with _sound():

@@ -1,25 +1,26 @@
-"""Read uploads: our own formats in a thread, those of other people's libraries in a process of their own.
+"""Read uploads: small logs of our own formats in a thread, large ones and other people's formats in processes.
 
-That process may take so much memory and time and no more, and if a library crashes on a hostile file, it takes only
-that process with it. What comes out is a Stiction container, so that nothing after it needs the library again.
+Such a process may take so much memory and time and no more, and if a library crashes on a hostile file, it takes only
+that process with it. Of another format comes a Stiction container, so that nothing after it needs the library again.
 """
 
 import asyncio
 import os
 import resource
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from db.blobs import disk_errors_named
 from db.errors import StorageUnavailable
 from service import formats
 from service.formats import writing
 from service.processes import spawned
+from service.processes.turns import Turns
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 from stiction_client import container
@@ -30,6 +31,13 @@ MEMORY_BYTES = 2 * 2**30
 LEAST_SECONDS, SLOWEST = 5.0, 1e6
 """s that any file may take, and bytes that earn it another; a table of markers, the slowest to read, does 3e6 a second.
 A damaged file can keep a library busy for ever."""
+
+IDLE_SECONDS = 60.0
+"""s that a process without work is kept."""
+
+WORKING_FACTOR = 6
+"""Bytes that reading takes at its height for each byte of the unpacked log: up to 4.3 of NPZ and 6 of Tac3D, both in
+single precision, and 1.6 of an NPZ in double precision as the client writes it."""
 
 Result = TypeVar("Result")
 Settings = Mapping[str, float | str | None]
@@ -57,70 +65,132 @@ def read_plain(path: Path, name: str) -> Description:
 
 
 class Readers:
-    """The process that reads all other formats, started when it is first needed and again when it is lost."""
+    """Reads what is uploaded: small logs of our own formats in a thread, all else in processes.
 
-    def __init__(self, seconds: float = 60.0) -> None:
+    ``room``: bytes that reading may take of this process at once. A log that would need a quarter of it or more is
+    read in a process, whose memory is bounded by itself. At most ``size`` processes are there, each started when it is
+    first needed and ended when it is lost or long idle; a file may take ``seconds`` there. One ``owner`` has half of
+    the room and of the processes (``Turns``); ``Crowded`` is raised where too many wait. Who is cancelled, since the
+    client has gone, gives up its place at once.
+    """
+
+    def __init__(self, seconds: float = 60.0, size: int = 2, room: int = 2**28) -> None:
+        self.room = Turns(room, "read")
+        self._most_here = room // 4
         self._seconds = seconds
-        self._executor: ProcessPoolExecutor | None = None
-        self._one_at_a_time = asyncio.Lock()
+        self._turns = Turns(size, "read")
+        self._idle: dict[ProcessPoolExecutor, asyncio.TimerHandle] = {}
 
-    async def convert(self, source: Path, target: Path, name: str, settings: Settings) -> Description:
+    async def describe(self, source: Path, name: str, unpacked: int, owner: str = "") -> Description:
+        """Read a log in one of our own formats, of so many bytes ``unpacked``; raises ``InvalidInput``."""
+        needed = WORKING_FACTOR * unpacked
+        if needed >= self._most_here:
+            return await self._do(partial(read_plain, source, name), name, self._seconds_for(source), owner)
+        async with self.room.turn(owner, needed):
+            return await to_its_end(asyncio.to_thread(read_plain, source, name))
+
+    async def convert(self, source: Path, target: Path, name: str, settings: Settings, owner: str = "") -> Description:
         """Read a log of format ``name`` and write it to ``target`` as a container; raises ``InvalidInput``."""
-        seconds = min(self._seconds, LEAST_SECONDS + source.stat().st_size / SLOWEST)
-        return await self._do(partial(convert, source, target, name, dict(settings)), name, seconds)
+        do = partial(convert, source, target, name, dict(settings))
+        return await self._do(do, name, self._seconds_for(source), owner)
 
-    async def write(self, source: Path, target: Path, name: str) -> None:
+    async def write(self, source: Path, target: Path, name: str, owner: str = "") -> None:
         """Write a stored log to ``target`` in the format ``name``; raises ``UnsupportedFormat``."""
-        await self._do(partial(rewrite, source, target, name), name, self._seconds)
-
-    async def _do(self, do: Callable[[], Result], name: str, seconds: float) -> Result:
-        async with self._one_at_a_time:
-            loop = asyncio.get_running_loop()
-            try:
-                executor = await self._started()
-                return await asyncio.wait_for(loop.run_in_executor(executor, do), seconds)
-            except TimeoutError as error:
-                await self._end()
-                raise InvalidInput("file", f"not read within {seconds:.3g} s", "a smaller or undamaged file") from error
-            except BrokenProcessPool as error:
-                await self._end()
-                raise InvalidInput("file", f"such that its {name} reader died of it", "an undamaged file") from error
-
-    async def _started(self) -> ProcessPoolExecutor:
-        """The process, once it runs: a new one in place of one that was lost between two files."""
-        for _ in range(2):
-            if self._executor is None:
-                self._executor = spawned.process(_bound)
-            try:
-                await asyncio.get_running_loop().run_in_executor(self._executor, os.getpid)
-            except BrokenProcessPool:
-                await self._end()
-            else:
-                return self._executor
-        raise StorageUnavailable("the process that reads uploads does not start")
+        await self._do(partial(rewrite, source, target, name), name, self._seconds, owner)
 
     async def stop(self) -> None:
-        """End the process, whatever it is doing."""
-        await self._end()
+        """End the processes that nobody uses; any other ends with the request that uses it."""
+        for executor in list(self._idle):
+            self._retire(executor)
 
-    async def _end(self) -> None:
-        if self._executor is None:
-            return
-        executor, self._executor = self._executor, None
-        spawned.kill(executor)
-        await asyncio.to_thread(executor.shutdown, cancel_futures=True)
+    def _seconds_for(self, source: Path) -> float:
+        return min(self._seconds, LEAST_SECONDS + source.stat().st_size / SLOWEST)
+
+    async def _do(self, do: Callable[[], Result], name: str, seconds: float, owner: str) -> Result:
+        async with self._turns.turn(owner):
+            executor = await self._take()
+            try:
+                done = asyncio.get_running_loop().run_in_executor(executor, _outcome, do)
+                result, error = await asyncio.wait_for(done, seconds)
+            except TimeoutError as lost:
+                _end(executor)
+                raise InvalidInput("file", f"not read within {seconds:.3g} s", "a smaller or undamaged file") from lost
+            except BrokenProcessPool as lost:
+                _end(executor)
+                raise InvalidInput("file", f"such that its {name} reader died of it", "an undamaged file") from lost
+            except BaseException:
+                _end(executor)
+                raise
+            self._keep(executor)
+        if error is not None:
+            raise error
+        return cast(Result, result)
+
+    async def _take(self) -> ProcessPoolExecutor:
+        """A process that runs: one that is idle, or a new one where those were lost or there is none."""
+        while self._idle:
+            executor, timer = self._idle.popitem()
+            timer.cancel()
+            if await _runs(executor):
+                return executor
+        executor = spawned.process(_bound)
+        if not await _runs(executor):
+            raise StorageUnavailable("the process that reads uploads does not start")
+        return executor
+
+    def _keep(self, executor: ProcessPoolExecutor) -> None:
+        self._idle[executor] = asyncio.get_running_loop().call_later(IDLE_SECONDS, self._retire, executor)
+
+    def _retire(self, executor: ProcessPoolExecutor) -> None:
+        self._idle.pop(executor).cancel()
+        executor.shutdown(wait=False)
+
+
+async def to_its_end(work: Awaitable[Result]) -> Result:
+    """The result of a thread's work. Cancelled, it still waits for it: until then the thread has its memory."""
+    future = asyncio.ensure_future(work)
+    try:
+        return await asyncio.shield(future)
+    except asyncio.CancelledError:
+        await asyncio.wait({future})
+        raise
+
+
+async def _runs(executor: ProcessPoolExecutor) -> bool:
+    """Whether the process answers, once it has started."""
+    try:
+        await asyncio.get_running_loop().run_in_executor(executor, os.getpid)
+    except BrokenProcessPool:
+        _end(executor)
+        return False
+    except BaseException:
+        _end(executor)
+        raise
+    return True
+
+
+def _end(executor: ProcessPoolExecutor) -> None:
+    """End a process, whatever it is doing."""
+    spawned.kill(executor)
+    executor.shutdown(wait=False, cancel_futures=True)
+
+
+def _outcome(do: Callable[[], Result]) -> tuple[Result | None, Exception | None]:
+    """In the reader's process: the result, or what was raised; what is raised here is the process's own end."""
+    try:
+        return do(), None
+    except MemoryError:
+        value = f"in need of more than {MEMORY_BYTES} bytes"
+        return None, InvalidInput("file", value, "a smaller or undamaged file")
+    except Exception as error:
+        return None, error
 
 
 def convert(source: Path, target: Path, name: str, settings: Settings) -> Description:
     """In the reader's process: a log of format ``name`` as a container at ``target``."""
-    try:
-        log = formats.read(source, formats.FORMATS[name].content_type, **settings)
-        with disk_errors_named():
-            container.write(log, target)
-    except MemoryError as error:
-        raise InvalidInput(
-            "file", f"in need of more than {MEMORY_BYTES} bytes", "a smaller or undamaged file"
-        ) from error
+    log = formats.read(source, formats.FORMATS[name].content_type, **settings)
+    with disk_errors_named():
+        container.write(log, target)
     return describe(name, log)
 
 

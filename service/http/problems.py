@@ -15,10 +15,14 @@ from starlette.routing import Match, Router
 
 from db.errors import AlreadyExists, BlobDamaged, NotFound, StorageUnavailable
 from service.domain.damage import record_damage
+from service.processes.turns import Crowded
 
 logger = logging.getLogger(__name__)
 
 MEDIA_TYPE = "application/problem+json"
+CROWD_SECONDS = "5"
+"""s, as text, after which a file may find room to be read; most take less."""
+
 LONGEST_VALUE = 200
 """Characters of an offending value that an answer repeats."""
 
@@ -70,6 +74,7 @@ HEADERS_TOO_LARGE = ProblemType("headers-too-large", "The headers are too large"
 FILE_DAMAGED = ProblemType("file-damaged", "A stored file is damaged", 500)
 INTERNAL_ERROR = ProblemType("internal-error", "The service failed", 500)
 TOO_MANY_CONNECTIONS = ProblemType("too-many-connections", "Too many connections", 503)
+TOO_MANY_UPLOADS = ProblemType("too-many-uploads", "Too many files are being read", 503)
 STOPPING = ProblemType("stopping", "The server stops", 503)
 WORKERS_NOT_READY = ProblemType("workers-not-ready", "The workers take no jobs yet, or no longer", 503)
 FILE_MISSING = ProblemType("file-missing", "A stored file is missing", 503)
@@ -123,6 +128,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(AlreadyExists, _on_already_exists)
     app.add_exception_handler(BlobDamaged, _on_blob_damaged)
     app.add_exception_handler(StorageUnavailable, _on_storage_unavailable)
+    app.add_exception_handler(Crowded, _on_crowded)
     app.add_exception_handler(RequestValidationError, _on_invalid_request)
     app.add_exception_handler(HTTPException, _on_http_exception)
 
@@ -188,6 +194,10 @@ async def _on_storage_unavailable(request: Request, error: Exception) -> JSONRes
     logger.error("storage unavailable", exc_info=error)
     assert isinstance(error, StorageUnavailable)
     return answer(request, storage_unavailable(error))
+
+
+async def _on_crowded(request: Request, error: Exception) -> JSONResponse:
+    return answer(request, Problem(TOO_MANY_UPLOADS, str(error), headers={"Retry-After": CROWD_SECONDS}))
 
 
 async def _on_invalid_request(request: Request, error: Exception) -> JSONResponse:

@@ -28,6 +28,12 @@ def description_of(*kinds: ProblemType) -> dict[int, str]:
     return {status: "; ".join(texts) for status, texts in by_status.items()}
 
 
+async def gone(request: Request) -> None:
+    """Wait until the client has closed its connection; the body must have been read."""
+    while (await request.receive())["type"] != "http.disconnect":
+        pass
+
+
 class JsonRoute(APIRoute):
     """A route whose body, if it takes one, is JSON of bounded size: the framework reads all of it into memory."""
 

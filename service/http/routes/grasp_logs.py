@@ -1,6 +1,7 @@
 """Grasp logs and what was found in them."""
 
 import asyncio
+from functools import partial
 from typing import Annotated, Any, Literal, TypeVar
 
 from fastapi import APIRouter, Query, Request, Response
@@ -28,6 +29,7 @@ from service.http.problems import (
     NOT_OWNER,
     NOT_READY,
     STORAGE_UNAVAILABLE,
+    TOO_MANY_UPLOADS,
     UNKNOWN_GRASP_LOG,
     UNKNOWN_MATERIAL,
     UNSUPPORTED_FORMAT,
@@ -35,7 +37,7 @@ from service.http.problems import (
     UPLOAD_TOO_LARGE,
     Problem,
 )
-from service.http.routes.common import problems
+from service.http.routes.common import gone, problems
 from service.http.schemas import EventsOfOneKind, EventsOut, GraspLogOut, GraspLogsOut, SamplesOut, StickRatioOut
 from slipcore.defaults import DEFAULT_METHOD, METHOD_NAMES
 
@@ -82,6 +84,7 @@ _RESULTS = problems(UNKNOWN_GRASP_LOG, NOT_READY, INVALID_REQUEST, FILE_DAMAGED,
         INVALID_REQUEST,
         IDEMPOTENCY_KEY_REUSED,
         STORAGE_UNAVAILABLE,
+        TOO_MANY_UPLOADS,
     ),
 )
 async def create_grasp_log(
@@ -127,7 +130,7 @@ async def create_grasp_log(
         once,
         asker,
     )
-    return (await upload(context, request.stream(), wish)).response()
+    return (await upload(context, request.stream(), wish, partial(gone, request))).response()
 
 
 @router.get(
@@ -207,10 +210,19 @@ def read_samples(context: Given, id: str) -> SamplesOut:  # noqa: A002
     summary="Download a grasp log",
     response_class=FileResponse,
     responses=_FILE
-    | problems(UNKNOWN_GRASP_LOG, FILE_DELETED, UNSUPPORTED_FORMAT, INVALID_REQUEST, FILE_DAMAGED, STORAGE_UNAVAILABLE),
+    | problems(
+        UNKNOWN_GRASP_LOG,
+        FILE_DELETED,
+        UNSUPPORTED_FORMAT,
+        INVALID_REQUEST,
+        FILE_DAMAGED,
+        STORAGE_UNAVAILABLE,
+        TOO_MANY_UPLOADS,
+    ),
 )
 async def read_file(
     context: Given,
+    asker: Asking,
     id: str,  # noqa: A002
     format: Annotated[  # noqa: A002
         str, Query(description="Of the file", json_schema_extra={"enum": list(writing.SUFFIXES)})
@@ -219,7 +231,7 @@ async def read_file(
     """As it was uploaded, or as NPZ, Parquet or MCAP made of it: each is read back bit for bit."""
     if format not in writing.SUFFIXES:
         raise Problem.wrong_value(INVALID_REQUEST, "format", format, ", ".join(writing.SUFFIXES))
-    file = await export(context, await asyncio.to_thread(_find, context, id), format)
+    file = await export(context, await asyncio.to_thread(_find, context, id), format, asker.share)
     return FileResponse(
         file.path,
         media_type=formats.FORMATS[format].content_type,

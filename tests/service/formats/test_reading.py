@@ -1,6 +1,8 @@
 import asyncio
 import os
+import time
 from collections.abc import Awaitable, Callable
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +10,9 @@ import pytest
 
 from db.errors import StorageUnavailable
 from service import formats
-from service.formats import parquet
+from service.formats import parquet, reading
 from service.formats.reading import Readers, convert, rewrite
+from service.processes import spawned
 from slipcore import GraspLog, InvalidInput
 from stiction_client.container import encode
 
@@ -30,21 +33,38 @@ def with_readers(seconds: float, do: Callable[[Readers], Awaitable[Any]]) -> Any
     return asyncio.run(run())
 
 
-def running(readers: Readers) -> list[Any]:
-    return list(dict(getattr(readers._executor, "_processes", None) or {}).values())
+@pytest.fixture(autouse=True)
+def executors(monkeypatch: pytest.MonkeyPatch) -> list[ProcessPoolExecutor]:
+    """Those that were made for readers."""
+    made: list[ProcessPoolExecutor] = []
+    start = spawned.process
+
+    def process(prepare: Callable[[], None] | None = None) -> ProcessPoolExecutor:
+        made.append(start(prepare))
+        return made[-1]
+
+    monkeypatch.setattr(spawned, "process", process)
+    return made
 
 
-def test_a_reader_that_dies_takes_only_its_file_with_it(ramp: GraspLog, tmp_path: Path) -> None:
+def running(executors: list[ProcessPoolExecutor]) -> list[Any]:
+    found = [process for each in executors for process in dict(getattr(each, "_processes", None) or {}).values()]
+    return [process for process in found if process.is_alive()]
+
+
+def test_a_reader_that_dies_takes_only_its_file_with_it(
+    ramp: GraspLog, tmp_path: Path, executors: list[ProcessPoolExecutor]
+) -> None:
     source, other, target = (tmp_path / name for name in ("source", "other", "target"))
     os.mkfifo(source)  # the reader waits for its bytes
     parquet.write(ramp, other)
 
     async def lose_one(readers: Readers) -> Any:
-        lost = asyncio.ensure_future(readers.convert(source, target, "tracked markers", {}))
-        waiting = asyncio.ensure_future(readers.convert(other, target, "parquet", {}))
+        lost = asyncio.ensure_future(readers.convert(source, target, "tracked markers", {}, "a key"))
+        waiting = asyncio.ensure_future(readers.convert(other, target, "parquet", {}, "a key"))
         while (pipe := opened(source)) is None:
             await asyncio.sleep(0.01)
-        for process in running(readers):
+        for process in running(executors):
             process.kill()
         with pytest.raises(InvalidInput, match="such that its tracked markers reader died of it"):
             await lost
@@ -64,13 +84,15 @@ def opened(pipe: Path) -> int | None:
         return None
 
 
-def test_a_reader_that_was_lost_between_two_files_is_no_fault_of_the_second(ramp: GraspLog, tmp_path: Path) -> None:
+def test_a_reader_that_was_lost_between_two_files_is_no_fault_of_the_second(
+    ramp: GraspLog, tmp_path: Path, executors: list[ProcessPoolExecutor]
+) -> None:
     source, target = tmp_path / "source", tmp_path / "target"
     parquet.write(ramp, source)
 
     async def lose_between(readers: Readers) -> Any:
         await readers.convert(source, target, "parquet", {})
-        for process in running(readers):
+        for process in running(executors):
             process.kill()
             process.join()
         return await readers.convert(source, target, "parquet", {})
@@ -78,14 +100,16 @@ def test_a_reader_that_was_lost_between_two_files_is_no_fault_of_the_second(ramp
     assert with_readers(60.0, lose_between).frames == len(ramp)
 
 
-def test_a_reader_that_takes_too_long_or_too_much_is_ended(tmp_path: Path) -> None:
+def test_a_reader_that_takes_too_long_or_too_much_is_ended(
+    tmp_path: Path, executors: list[ProcessPoolExecutor]
+) -> None:
     source, target = tmp_path / "source", tmp_path / "target"
     source.write_bytes(TABLE)
 
     async def hurry(readers: Readers) -> None:
         with pytest.raises(InvalidInput, match=r"file is not read within 0.01 s; allowed: a smaller"):
             await readers.convert(source, target, "tracked markers", {})
-        assert not running(readers)
+        assert not running(executors)
 
     with_readers(0.01, hurry)
 
@@ -121,3 +145,88 @@ def test_a_disk_that_takes_nothing_is_not_the_files_fault(content: bytes, tmp_pa
     source.write_bytes(content)
     with pytest.raises(StorageUnavailable, match="blob folder: "):
         convert(source, target, "npz", {}) if name == "npz" else rewrite(source, target, name)
+
+
+def test_readers_work_beside_each_other_and_one_key_has_half_of_them(ramp: GraspLog, tmp_path: Path) -> None:
+    first, second, other, target = (tmp_path / name for name in ("first", "second", "other", "target"))
+    for pipe in (first, second):
+        os.mkfifo(pipe)
+    parquet.write(ramp, other)
+
+    async def crowd(readers: Readers) -> Any:
+        endless = [
+            asyncio.create_task(readers.convert(pipe, target, "tracked markers", {}, "hostile"))
+            for pipe in (first, second)
+        ]
+        while (opened_first := opened(first)) is None:
+            await asyncio.sleep(0.01)
+        answer = await readers.convert(other, target, "parquet", {}, "honest")
+        assert opened(second) is None
+        for task in endless:
+            task.cancel()
+        await asyncio.gather(*endless, return_exceptions=True)
+        os.close(opened_first)
+        return answer
+
+    assert with_readers(60.0, crowd).frames == len(ramp)
+
+
+def test_a_client_that_is_gone_gives_its_reader_back_at_once(
+    ramp: GraspLog, tmp_path: Path, executors: list[ProcessPoolExecutor]
+) -> None:
+    source, other, target = (tmp_path / name for name in ("source", "other", "target"))
+    os.mkfifo(source)
+    parquet.write(ramp, other)
+
+    async def go(readers: Readers) -> Any:
+        left = asyncio.create_task(readers.convert(source, target, "tracked markers", {}))
+        while (pipe := opened(source)) is None:
+            await asyncio.sleep(0.01)
+        (process,) = running(executors)
+        left.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await left
+        await asyncio.to_thread(process.join, 10.0)
+        assert not process.is_alive()
+        os.close(pipe)
+        return await readers.convert(other, target, "parquet", {})
+
+    assert with_readers(60.0, go).frames == len(ramp)
+
+
+def test_a_reader_without_work_ends_after_a_while(
+    ramp: GraspLog, tmp_path: Path, executors: list[ProcessPoolExecutor], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reading, "IDLE_SECONDS", 0.2)
+    source, target = tmp_path / "source", tmp_path / "target"
+    parquet.write(ramp, source)
+
+    async def rest(readers: Readers) -> Any:
+        assert not executors
+        await readers.convert(source, target, "parquet", {})
+        (process,) = running(executors)
+        deadline = time.monotonic() + 30.0
+        while process.is_alive():
+            assert time.monotonic() < deadline
+            await asyncio.sleep(0.05)
+        return await readers.convert(source, target, "parquet", {})
+
+    assert with_readers(60.0, rest).frames == len(ramp)
+
+
+def test_a_large_log_is_read_in_a_process_and_a_small_one_here(
+    content: bytes, ramp: GraspLog, tmp_path: Path, executors: list[ProcessPoolExecutor]
+) -> None:
+    source = tmp_path / "source"
+    source.write_bytes(content)
+
+    async def read(readers: Readers) -> None:
+        assert (await readers.describe(source, "npz", len(content))).frames == len(ramp)
+        assert not executors
+        assert (await readers.describe(source, "npz", readers._most_here)).frames == len(ramp)
+        assert len(executors) == 1
+        source.write_bytes(content[:-100])
+        with pytest.raises(InvalidInput, match="not a complete zip"):
+            await readers.describe(source, "npz", readers._most_here)
+
+    with_readers(60.0, read)
