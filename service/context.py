@@ -8,6 +8,7 @@ from fastapi import Depends, Request
 from db.blobs import BlobStore
 from db.database import Database
 from service.domain.model_cache import ModelCache
+from service.domain.receive import Bodies
 from service.formats.reading import Readers
 from service.jobs.runner import JobRunner
 from service.jobs.scrub import Scrub
@@ -29,6 +30,7 @@ class Context:
     models: ModelCache = field(default_factory=ModelCache)
     scrub: Scrub | None = None
     watch: StoreWatch | None = None
+    bodies: Bodies = field(default_factory=Bodies)
 
 
 async def _context(request: Request) -> Context:

@@ -20,6 +20,9 @@ else:
 CHUNK_BYTES = 2**20
 """Bytes gathered before a thread hashes and writes them: about a millisecond of work."""
 
+LEAST_CHUNK_BYTES, BUFFER_BYTES = 2**16, 2**25
+"""Bytes gathered of each of very many bodies, and of all bodies together at most, as long as those allow it."""
+
 UNPACKING_BYTES = 2**24
 """Memory of one body that is unpacked: the window of what packed it, and a few chunks."""
 
@@ -61,15 +64,33 @@ def check_encoding(encoding: str) -> str:
     return name
 
 
-async def receive(spool: Spool, chunks: AsyncIterator[bytes], limit: int) -> None:
-    """Write a body to ``spool`` as it comes, a chunk while the next is received: no faster than the disk takes it."""
+class Bodies:
+    """Bodies on their way, which share the memory in which their bytes gather: any of them may stop and stay."""
+
+    def __init__(self) -> None:
+        self._count = 0
+
+    async def receive(self, spool: Spool, chunks: AsyncIterator[bytes], limit: int) -> None:
+        """Write a body to ``spool`` as it comes; raises ``Problem`` for one over the limit, or that breaks off."""
+        self._count += 1
+        try:
+            await _receive(spool, chunks, limit, self._chunk_bytes)
+        finally:
+            self._count -= 1
+
+    def _chunk_bytes(self) -> int:
+        return min(max(BUFFER_BYTES // self._count, LEAST_CHUNK_BYTES), CHUNK_BYTES)
+
+
+async def _receive(spool: Spool, chunks: AsyncIterator[bytes], limit: int, chunk_bytes: Callable[[], int]) -> None:
+    """A chunk is written while the next is received: no faster than the disk takes it."""
     size, waiting, writing = 0, bytearray(), None
     try:
         async for chunk in chunks:
             size += len(chunk)
             check_size(size, limit)
             waiting += chunk
-            if len(waiting) >= CHUNK_BYTES:
+            if len(waiting) >= chunk_bytes():
                 if writing is not None:
                     await writing
                 writing, waiting = asyncio.create_task(asyncio.to_thread(spool.write, waiting)), bytearray()

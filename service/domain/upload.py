@@ -16,7 +16,7 @@ from service import formats
 from service.context import Context
 from service.domain.asker import ANYBODY, Asker
 from service.domain.ownership import check_may_add
-from service.domain.receive import UNPACKING_BYTES, check_encoding, check_expansion, check_size, receive, unpack
+from service.domain.receive import UNPACKING_BYTES, check_encoding, check_expansion, check_size, unpack
 from service.formats.archive import unpacked_bytes
 from service.formats.reading import Description, Settings, to_its_end
 from service.http.idempotency import Answer, Once, answer_once
@@ -74,7 +74,7 @@ async def upload(
     material_id = await asyncio.to_thread(_check, context, wish)
     with ExitStack() as spools:
         body = spool = spools.enter_context(context.blobs.spool())
-        await receive(body, chunks, limit)
+        await context.bodies.receive(body, chunks, limit)
         if encoding:
             spool = spools.enter_context(context.blobs.spool())
             async with context.readers.room.turn(wish.asker.share, UNPACKING_BYTES):

@@ -1,5 +1,6 @@
+import asyncio
 import gzip
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
 import numpy as np
@@ -61,3 +62,37 @@ def test_a_damaged_stream_is_refused(spools: BlobStore, encoding: str, kept: int
             else:
                 with pytest.raises(Problem, match=f"not a complete {encoding} stream"):
                     receive.unpack(packed, spool, encoding, 2**20, 100)
+
+
+class Sink:
+    """What is asked of a spool while a body comes."""
+
+    def __init__(self) -> None:
+        self.size = 0
+
+    def write(self, content: bytes | bytearray) -> None:
+        self.size += len(content)
+
+
+@pytest.mark.parametrize(("count", "held"), [(1, receive.CHUNK_BYTES), (200, 2 * receive.BUFFER_BYTES)])
+def test_bodies_that_stop_on_their_way_hold_little_memory_together(count: int, held: int) -> None:
+    sinks, begun, stopped = [Sink() for _ in range(count)], asyncio.Barrier(count + 1), asyncio.Event()
+
+    async def slow_body() -> AsyncIterator[bytes]:
+        yield bytes(500_000)
+        await begun.wait()
+        yield bytes(400_000)
+        await stopped.wait()
+
+    async def check() -> None:
+        bodies = receive.Bodies()
+        tasks = [asyncio.create_task(bodies.receive(sink, slow_body(), 2**20)) for sink in sinks]  # type: ignore[arg-type]
+        await begun.wait()
+        async with asyncio.timeout(30.0):  # for the threads to write what is not to be held
+            while sum(900_000 - sink.size for sink in sinks) > held:
+                await asyncio.sleep(0.02)
+        stopped.set()
+        await asyncio.gather(*tasks)
+        assert all(sink.size == 900_000 for sink in sinks)
+
+    asyncio.run(check())
