@@ -55,7 +55,7 @@ class NewModel:
 
 @dataclass(frozen=True, slots=True)
 class StoredModel:
-    """One version of a material's friction model; ``outdated`` where a log behind it was withdrawn since."""
+    """One version of a material's friction model; ``outdated`` where the material's logs are others since."""
 
     id: int
     material: str

@@ -260,7 +260,7 @@ class SampleSummaryRow(Base):
 class FrictionModelRow(Base):
     """One version of a material's friction model; at most one a material and method is current.
 
-    It is ``outdated`` once a log behind it was withdrawn.
+    It is ``outdated`` once the material's logs are others than those that it was fitted to.
     """
 
     __tablename__ = "friction_models"

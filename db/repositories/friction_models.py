@@ -68,14 +68,24 @@ def current_methods(session: Session, material_ids: Sequence[int]) -> list[str]:
     return sorted(session.scalars(select(FrictionModelRow.method).where(of_them).distinct()))
 
 
-def mark_outdated(session: Session, material_id: int) -> None:
-    """Say of a material's current models that a log behind them was withdrawn."""
-    _change_current(session, material_id, outdated=True)
+def mark_outdated(session: Session, material_id: int, besides: str = "") -> None:
+    """Say of a material's current models, but that by the method ``besides``, that its logs are others since."""
+    lock(session, material_id)
+    of_it = (FrictionModelRow.material_id == material_id, FrictionModelRow.current, FrictionModelRow.method != besides)
+    session.execute(update(FrictionModelRow).where(*of_it).values(outdated=True))
+
+
+def outdated_methods(session: Session, material_id: int) -> list[str]:
+    """Methods by which a material's current model is outdated, in alphabetical order."""
+    of_it = (FrictionModelRow.material_id == material_id, FrictionModelRow.current, FrictionModelRow.outdated)
+    return sorted(session.scalars(select(FrictionModelRow.method).where(*of_it)))
 
 
 def retire(session: Session, material_id: int) -> None:
     """Let none of a material's models be current."""
-    _change_current(session, material_id, current=False)
+    lock(session, material_id)
+    of_it = (FrictionModelRow.material_id == material_id, FrictionModelRow.current)
+    session.execute(update(FrictionModelRow).where(*of_it).values(current=False))
 
 
 def versions(
@@ -94,12 +104,6 @@ def versions(
         query = query.where(FrictionModelRow.current.is_(current))
     found = session.execute(windowed(query, window, {"id": FrictionModelRow.id}, FrictionModelRow.id))
     return [_record(row, material) for row, material in found]
-
-
-def _change_current(session: Session, material_id: int, **values: bool) -> None:
-    lock(session, material_id)
-    of_it = (FrictionModelRow.material_id == material_id, FrictionModelRow.current)
-    session.execute(update(FrictionModelRow).where(*of_it).values(**values))
 
 
 def _models() -> Select[FrictionModelRow, str]:

@@ -82,6 +82,12 @@ def ended_since(session: Session, moment: datetime) -> list[Job]:
     return [record(*row) for row in session.execute(query.order_by(JobRow.finished_at))]
 
 
+def is_fit_queued(session: Session, material_id: int, method: str) -> bool:
+    """Whether a fit of this material by this method waits for a runner."""
+    same = (JobRow.material_id == material_id, JobRow.status == "queued", JobRow.kind == "fit", JobRow.method == method)
+    return session.scalar(select(JobRow.id).where(*same).limit(1)) is not None
+
+
 def any_queued(session: Session) -> bool:
     """Whether a job waits for a runner."""
     return session.scalar(select(JobRow.id).where(JobRow.status == "queued").limit(1)) is not None

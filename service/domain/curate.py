@@ -134,6 +134,7 @@ def _refit_without(session: Session, material_id: int | None, key_id: str | None
 def _queue_refits(session: Session, material_id: int, methods: Iterable[str], key_id: str | None) -> list[Job]:
     if not detections.any_samples(session, material_id):
         return []
+    friction_models.mark_outdated(session, material_id)
     ids = [
         queue(session, "fit", method, material_id=material_id, requested_by=key_id)
         for method in sorted({REFITTED, *methods})

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from service.domain.model_cache import KnownModel
 from service.http.schemas import FrictionOut
 
-OUTDATED = "a log behind the model was withdrawn, and the fit without it is not there"
+OUTDATED = "the model is outdated: the material's logs are others since, and it was not fitted again by this method"
 
 
 @dataclass(frozen=True, slots=True)

@@ -180,7 +180,7 @@ class FrictionModelOut(BaseModel):
     method: str
     version: int
     current: bool
-    outdated: Annotated[bool, Field(description="A log behind it was withdrawn; the fit without it is not there")]
+    outdated: Annotated[bool, Field(description="The material's logs are others since, and it is not fitted to them")]
     coefficients: Annotated[list[float], Field(description="β₀ [-], β₁ [s/m], β₂ [1/N]")]
     covariance: Annotated[list[list[float]], Field(description="Of the coefficients, 3×3")]
     scale: Annotated[float, Field(description="σ, standard deviation of ε [-]")]

@@ -30,6 +30,7 @@ from service.domain.stored_results import (
     summarise_samples,
     to_new_model,
 )
+from service.jobs.queueing import queue_cheap_refits
 from service.observability import logs, traces
 from slipcore import FrictionSamples, GraspLog, SlipcoreError, SlipHistory
 
@@ -125,7 +126,15 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
     with run.database.write() as session:
         jobs.start_stage(session, run.claim, "samples", run.seconds)  # nobody else has stored them meanwhile
         detections.add(session, log_id, detection, summary)
+        _mark_outdated(run, session, log_id, summary)
     return summary
+
+
+def _mark_outdated(run: Run, session: Session, log_id: str, samples: SampleSummary) -> None:
+    """Say that the material's models by other methods than this job's lack these samples."""
+    material_id = grasp_logs.material_id(session, log_id)
+    if material_id is not None and samples.none_because is None:
+        friction_models.mark_outdated(session, material_id, besides=run.job.method)
 
 
 def fit_material(run: Run, material: str) -> None:
@@ -203,4 +212,6 @@ def _store_model(run: Run, session: Session, material_id: int, model: FrictionMo
     with run.timed("material"):
         jobs.start_stage(session, run.claim, "material", run.seconds)  # before the model, which a job may have but once
         version = friction_models.add(session, material_id, run.job.id, to_new_model(model))
+        if run.job.kind == "ingest":
+            queue_cheap_refits(session, material_id, run.job.requested_by)
     jobs.finish(session, run.claim, "done", model_version=version, seconds=run.seconds)

@@ -5,10 +5,13 @@ import logging
 from sqlalchemy.orm import Session
 
 from db.records import JobKind
-from db.repositories import jobs
+from db.repositories import friction_models, jobs
 from service.observability import logs, traces
 
 logger = logging.getLogger(__name__)
+
+CHEAP_METHODS = frozenset({"ols", "conjugate"})
+"""Methods whose fit is a merge of moments, milliseconds for any logs: by these a material is always fitted again."""
 
 
 def queue(
@@ -37,3 +40,10 @@ def queue(
     )
     logger.info("job queued", extra=logs.of(job=job_id, kind=kind))
     return job_id
+
+
+def queue_cheap_refits(session: Session, material_id: int, requested_by: str | None) -> None:
+    """Let outdated models of a material be fitted again where that is cheap, and is not queued already."""
+    for method in friction_models.outdated_methods(session, material_id):
+        if method in CHEAP_METHODS and not jobs.is_fit_queued(session, material_id, method):
+            queue(session, "fit", method, material_id=material_id, requested_by=requested_by)
