@@ -132,7 +132,7 @@ METHODS = {
     "student_t": Method("Student-t", False, likelihood="student_t", **SAMPLED),
     "outlier": Method("outlier mixture", False, likelihood="outlier", **SAMPLED),
     "errors_in_variables": Method("noisy f_n", False, likelihood="errors_in_variables", **SAMPLED),
-    "grasp_effects": Method("grasps differ", True, likelihood="grasp_effects", **SAMPLED),
+    "hierarchical": Method("grasps differ", True, likelihood="hierarchical", **SAMPLED),
     "auto": Method("", True, method="auto", accuracy=0.1),
 }
 

@@ -257,8 +257,8 @@ def likelihood_part(options: argparse.Namespace) -> list[Row]:
             offsets = 0.03 * np.random.default_rng(4).standard_normal(400)
             grasps = [make(50, 100 + g) for g in range(400)]
             shifted = [with_friction(g, g.friction_coefficient + u) for g, u in zip(grasps, offsets, strict=True)]
-            cases["grasp_effects, 400 grasps"] = shifted
-            cases["grasp_effects, 400 moments"] = [estimators.Moments.from_samples(g) for g in shifted]
+            cases["hierarchical, 400 grasps"] = shifted
+            cases["hierarchical, 400 moments"] = [estimators.Moments.from_samples(g) for g in shifted]
         for name, given in cases.items():
             rows += against_long_run(n, name, given, (0.2, 0.08) if options.quick else (0.2, 0.08, 0.05, 0.02))
     return rows

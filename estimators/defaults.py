@@ -78,6 +78,8 @@ class ChainSettings:
     """Posterior standard deviations; Monte-Carlo error of mean, 5 % and 95 % quantile at which sampling stops."""
     accuracy_per_sample: float = 0.05
     """The same where each step of each walker reads all samples: an effective sample size of 2,000."""
+    accuracy_of_scales: float = 0.05
+    """The same where only scales are sampled: the coefficients, known exactly given them, are told ten times better."""
     max_steps: int = 3000
     """Steps after which a chain that does not converge is given up."""
     min_acceptance: float = 0.3
@@ -116,10 +118,6 @@ class Automatic:
     """0.011 to 1; part of the samples that Tukey's loss gives less than half weight (normal errors: 0.011)."""
     least_outliers: float = 3.0
     """> 0; so many samples that lie far off show more than chance in few samples."""
-    bias: float = 0.5
-    """> 0; bias of β₂ by noise in the forces, in its standard errors, from which it is taken out."""
-    significance: float = 3.0
-    """> 0; standard errors by which the noise in the forces must show in the residuals."""
 
 
 AUTOMATIC = Automatic()

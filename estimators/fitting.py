@@ -6,6 +6,7 @@ from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.linear.fit_data import FitData, GraspData, gather
 from estimators.methods import conjugate, hierarchical, ols, robust
+from estimators.methods.automatic import choose, compared
 
 METHODS = ("ols", "robust", "conjugate", "hierarchical", "bayes", "auto")
 
@@ -35,11 +36,12 @@ def fit(
     ``method``: "ols" (weighted least squares, cluster-robust), "robust" (M-estimate with the ``loss`` "tukey" or
     "huber", cluster-robust), "conjugate" (exact posterior for independent Gaussian errors), "hierarchical" (exact
     posterior with scatter between grasps, between places and within, told apart in ``scales``) or "bayes" (emcee),
-    whose ``likelihood`` is "grasp_effects" (the default wherever samples come in clusters), "gaussian", "student_t",
-    "outlier" (a part of false slip) or "errors_in_variables" (noise in the forces). "auto" takes the one that the data
-    call for; ``diagnostics["chosen_because"]`` says why. A sampled method stops once the Monte-Carlo error of its means
-    and 5/95 % quantiles is under ``accuracy`` posterior standard deviations, or after ``seconds``; ``seed`` makes it
-    repeatable.
+    whose ``likelihood`` is "hierarchical" (the default wherever samples come in clusters), "gaussian", "student_t",
+    "outlier" (a part of false slip) or "errors_in_variables" (noise in the forces). "auto", recommended, takes
+    "hierarchical", or "robust" where samples lie far off; ``diagnostics["chosen_because"]`` says why, and
+    ``diagnostics["check"]`` whether least squares agrees. A sampled method stops once the Monte-Carlo error of its
+    means and 5/95 % quantiles is under ``accuracy`` posterior standard deviations, or after ``seconds``; ``seed`` makes
+    it repeatable.
 
     Raises ``TooFewSamples`` where no slip or hardly any was seen, ``InvalidSamples`` naming what cannot be used, and
     ``NotConverged``, which carries its model, where a chain cannot be trusted.
@@ -54,11 +56,10 @@ def fit(
     data = gather(samples)
     if method != "auto":
         return _fit(data, method, accuracy, seconds, seed, likelihood, loss)
-    from estimators.methods.automatic import choose
-
     choice = choose(data)
-    model = _fit(data, choice.method, accuracy, seconds, seed, choice.likelihood, loss)
-    return replace(model, diagnostics={**model.diagnostics, "chosen_because": choice.reason})
+    model = _fit(data, choice.method, accuracy, seconds, seed, None, loss)
+    told = {"chosen_because": choice.reason, "check": compared(model, data)}
+    return replace(model, diagnostics={**model.diagnostics, **told})
 
 
 def _fit(

@@ -78,9 +78,9 @@ def _of_material(data: FitData, model: FrictionModel) -> float:
     triangle = whole_triangle(data.factor).astype(float)
     triangle[:, 2] *= model.element_area / data.element_area  # the same pressure on an element of the model's area
     covariance, scale = model.covariance.copy(), model.scale
-    if model.draws is not None and model.diagnostics.get("likelihood") == "grasp_effects":
-        scale = float(np.sqrt(np.mean(model.draws[:, 3] ** 2)))
-        covariance[0, 0] += float(np.mean(model.draws[:, 4] ** 2))
+    if model.scales is not None:
+        scale = float(np.hypot(model.scales.between_places.value, model.scales.within.value))
+        covariance += model.scales.between_grasps.value**2 * np.outer(model.coefficients, model.coefficients)
     freedom = model.n - 3.0 if model.scatter_degrees_of_freedom is None else model.scatter_degrees_of_freedom
     floor = 1e-6 * max(abs(float(data.mean_friction)), 1e-6)  # a model without scatter still meets rounded data
     return log_predictive(triangle, data.effective_n, model.coefficients, covariance, max(scale, floor), freedom)

@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.friction_model import Domain
+from estimators.friction_model import Domain, Scales
 from estimators.sampling.proposal import StudentMixture
 
 FloatArray = NDArray[np.float64]
@@ -22,6 +22,7 @@ class Summary:
     degrees_of_freedom: float
     draws: FloatArray
     scatter_degrees_of_freedom: float
+    scales: Scales | None = None
 
 
 class Posterior(Protocol):

@@ -167,11 +167,10 @@ def _means_of_blocks(data: FitData) -> ClusterMeans:
 
 def _statistics_of_samples(observations: Observations) -> tuple[GraspStatistics, ...]:
     values, order = observations.columns(), np.argsort(observations.grasp, kind="stable")
+    place = observations.cluster if observations.cluster_kind == "time block" else observations.element
     ends = np.flatnonzero(np.diff(observations.grasp[order])) + 1
     return tuple(
-        GraspStatistics.from_columns(
-            Columns(values[rows], observations.weight[rows], codes_of(observations.element[rows]))
-        )
+        GraspStatistics.from_columns(Columns(values[rows], observations.weight[rows], codes_of(place[rows])))
         for rows in np.split(order, ends)
     )
 

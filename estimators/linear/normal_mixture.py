@@ -12,7 +12,7 @@ MATCHED = (0.975, 0.999)
 """Quantiles at which a Student-t is matched: that of a 95 % interval, and one that a planner asks for."""
 MOST_FREEDOM = 1e4
 """Degrees of freedom from which a Student-t is taken as normal."""
-BISECTIONS = 40
+STEPS = 60
 
 
 class Student(NamedTuple):
@@ -23,17 +23,26 @@ class Student(NamedTuple):
 
 
 def mixture_quantile(weight: FloatArray, mean: FloatArray, deviation: FloatArray, level: ArrayLike) -> FloatArray:
-    """Quantiles at ``level`` [q] of a mixture of m normals, by bisection; ``weight`` [m] sums to 1."""
+    """Quantiles at ``level`` [q] of a mixture of m normals, by Newton's method kept within a bracket that closes.
+
+    ``weight`` [m] sums to 1. A quantile of the mixture lies between the least and the largest of its parts'.
+    """
     wanted = np.atleast_1d(np.asarray(level, dtype=float))
-    score = special.ndtri(wanted)[:, None]
-    at = mean + score * deviation  # the mixture's quantile lies between the least and the largest of its parts'
-    low, high = at.min(axis=1), at.max(axis=1)
     safe = np.maximum(deviation, np.finfo(float).tiny)
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        below = special.ndtr((middle[:, None] - mean) / safe) @ weight < wanted
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    return np.asarray(0.5 * (low + high))
+    ends = mean + special.ndtri(wanted)[:, None] * deviation
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    at, close = ends @ weight, 1e-10 * (np.abs(ends).max() + np.finfo(float).tiny)
+    for _ in range(STEPS):
+        score = (at[:, None] - mean) / safe
+        over = special.ndtr(score) @ weight - wanted
+        low, high = np.where(over < 0.0, at, low), np.where(over < 0.0, high, at)
+        slope = np.exp(-0.5 * score**2) @ (weight / safe) / np.sqrt(2.0 * np.pi)
+        step = at - over / np.maximum(slope, np.finfo(float).tiny)
+        moved = np.where((step > low) & (step < high), step, 0.5 * (low + high))
+        if np.abs(moved - at).max() <= close:
+            return np.asarray(moved)
+        at = moved
+    return np.asarray(at)
 
 
 def matched_student(weight: FloatArray, mean: FloatArray, deviation: FloatArray) -> Student:
@@ -45,7 +54,7 @@ def matched_student(weight: FloatArray, mean: FloatArray, deviation: FloatArray)
     if not inner > 0.0:
         return Student(0.0, MOST_FREEDOM)
     low, high = 0.0, float(np.log(MOST_FREEDOM))
-    for _ in range(BISECTIONS):
+    for _ in range(STEPS):
         middle = 0.5 * (low + high)
         near, far = special.stdtrit(np.exp(middle), levels)
         low, high = (middle, high) if far / near > outer / inner else (low, middle)

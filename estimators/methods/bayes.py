@@ -1,6 +1,7 @@
 """Bayesian fit by emcee: the posterior of a likelihood, sampled until its Monte-Carlo error is small enough."""
 
 import time
+import warnings
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -11,7 +12,7 @@ from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.likelihoods.errors_in_variables import errors_in_variables
 from estimators.likelihoods.gaussian import gaussian
-from estimators.likelihoods.grasp_effects import grasp_effects
+from estimators.likelihoods.hierarchical import hierarchical
 from estimators.likelihoods.outlier import outlier
 from estimators.likelihoods.posterior import Posterior
 from estimators.likelihoods.student_t import student_t
@@ -33,7 +34,7 @@ class Likelihood(NamedTuple):
 
 LIKELIHOODS = {
     "gaussian": Likelihood(gaussian, SAMPLING.accuracy),
-    "grasp_effects": Likelihood(grasp_effects, SAMPLING.accuracy),
+    "hierarchical": Likelihood(hierarchical, SAMPLING.accuracy_of_scales),
     "student_t": Likelihood(student_t, SAMPLING.accuracy_per_sample),
     "outlier": Likelihood(outlier, SAMPLING.accuracy_per_sample),
     "errors_in_variables": Likelihood(errors_in_variables, SAMPLING.accuracy_per_sample),
@@ -41,8 +42,16 @@ LIKELIHOODS = {
 
 
 def default_likelihood(data: FitData) -> str:
-    """A random intercept per cluster wherever there are clusters, else independent errors."""
-    return "grasp_effects" if 1 < data.clusters < data.n else "gaussian"
+    """Scatter between grasps and places wherever samples come in clusters, else independent errors."""
+    places = any(block.grasps for block in data.blocks)
+    return "hierarchical" if places or 1 < data.clusters < data.n else "gaussian"
+
+
+def _present_name(likelihood: str) -> str:
+    if likelihood == "grasp_effects":
+        warnings.warn('likelihood "grasp_effects" is now part of "hierarchical"', DeprecationWarning, stacklevel=4)
+        return "hierarchical"
+    return likelihood
 
 
 def fit(
@@ -61,7 +70,7 @@ def fit(
     know of no elements, and nothing is said of it then.
     """
     begin = time.perf_counter()
-    name = default_likelihood(data) if likelihood is None else likelihood
+    name = default_likelihood(data) if likelihood is None else _present_name(likelihood)
     if name not in LIKELIHOODS:
         raise InvalidSamples("likelihood", name, ", ".join(LIKELIHOODS))
     goal = LIKELIHOODS[name].accuracy if accuracy is None else accuracy
@@ -71,7 +80,8 @@ def fit(
     summary = posterior.summarise(chain.flat(), np.random.default_rng([seed, 1]))
     diagnostics: Diagnostics = {"likelihood": name, "prior": posterior.prior, "draws": ", ".join(posterior.names)}
     diagnostics |= _convergence(chain, posterior) | sensitivity(data, exact_posterior(data))
-    if data.observations is not None and data.cluster_kind != "element":  # moments cannot tell
+    independent = name != "hierarchical" and data.cluster_kind != "element"
+    if independent and data.observations is not None:  # moments cannot tell
         diagnostics["shared_by_elements"] = shared_by_elements(data)
     model = report(
         data,
@@ -85,6 +95,7 @@ def fit(
         monte_carlo_error=chain.monte_carlo_error,
         draws=summary.draws,
         scatter_degrees_of_freedom=summary.scatter_degrees_of_freedom,
+        scales=summary.scales,
     )
     if chain.trouble:
         raise NotConverged(chain.trouble, model)

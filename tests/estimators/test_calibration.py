@@ -28,24 +28,31 @@ def noise_of(likelihood: str, theta: np.ndarray, n: int, rng: np.random.Generato
     if likelihood == "outlier":
         part, wide, offset = rest
         return np.where(rng.random(n) < part, offset + wide * rng.standard_normal(n), normal)
-    return normal + (rest[0] * rng.standard_normal() if likelihood == "grasp_effects" else 0.0)
+    return normal
 
 
 def simulate(samples: Make, likelihood: str, theta: np.ndarray, seed: int, size: int) -> list[FrictionSamples]:
     rng = np.random.default_rng([seed, 11])
     if likelihood == "errors_in_variables":
         return [noisy_forces(samples, theta, seed, size, rng)]
-    grasps = range(3) if likelihood == "grasp_effects" else range(1)
+    if likelihood == "hierarchical":
+        return [scattered(samples, theta, 10_000 * (seed + 1) + g, size, rng) for g in range(3)]
     return [
         samples(
             size,
-            seed=10_000 * (seed + 1) + g,
+            seed=10_000 * (seed + 1),
             coefficients=theta[:3],
             scale=1.0,
             noise=noise_of(likelihood, theta, size, rng),
         )
-        for g in grasps
     ]
+
+
+def scattered(samples: Make, theta: np.ndarray, seed: int, size: int, rng: np.random.Generator) -> FrictionSamples:
+    sigma, tau, omega = theta[3:]
+    data = samples(size, seed=seed, coefficients=theta[:3] * (1.0 + tau * rng.standard_normal()), scale=sigma)
+    place = omega * rng.standard_normal(20)
+    return replace(data, friction_coefficient=data.friction_coefficient + place[data.element])
 
 
 def noisy_forces(samples: Make, theta: np.ndarray, seed: int, size: int, rng: np.random.Generator) -> FrictionSamples:
@@ -64,7 +71,7 @@ def ranks(samples: Make, likelihood: str, fits: int, first: np.ndarray, size: in
     found = np.empty((fits, prior.shape[1]), dtype=int)
     for k, theta in enumerate(chosen):
         grasps = start + simulate(samples, likelihood, theta, seed=k + 1, size=size)
-        data = grasps if likelihood == "grasp_effects" else FrictionSamples.concatenate(grasps)
+        data = grasps if likelihood == "hierarchical" else FrictionSamples.concatenate(grasps)
         draws = estimators.fit(data, seed=k, **options).draws
         every = draws[np.linspace(0, len(draws) - 1, RANKS).astype(int)]
         found[k] = np.sum(every < theta, axis=0)
@@ -79,7 +86,7 @@ def assert_uniform(found: np.ndarray) -> None:
 
 TRUTHS = {
     "gaussian": np.array([0.4, 2.0, -0.8, 0.02]),
-    "grasp_effects": np.array([0.4, 2.0, -0.8, 0.02, 0.03]),
+    "hierarchical": np.array([0.4, 2.0, -0.8, 0.02, 0.07, 0.01]),
     "student_t": np.array([0.4, 2.0, -0.8, 0.02, 4.0]),
     "outlier": np.array([0.4, 2.0, -0.8, 0.02, 0.15, 0.1, -0.15]),
     "errors_in_variables": np.array([0.4, 2.0, -0.8, 0.02, 3e-3]),

@@ -18,10 +18,11 @@ METHODS: dict[str, dict[str, object]] = {
     "ols": {"method": "ols"},
     "robust": {"method": "robust"},
     "conjugate": {"method": "conjugate"},
+    "on a grid": {"method": "hierarchical"},
     "auto": {"method": "auto", "accuracy": 0.2, "seconds": 0.5},
     **{
         name: {"method": "bayes", "likelihood": name, "accuracy": 0.2, "seconds": 0.5}
-        for name in ("gaussian", "grasp_effects", "student_t", "outlier", "errors_in_variables")
+        for name in ("gaussian", "hierarchical", "student_t", "outlier", "errors_in_variables")
     },
 }
 

@@ -27,7 +27,7 @@ def test_a_fit_from_moments_is_the_fit_from_samples(samples: Make) -> None:
     np.testing.assert_allclose(kept.covariance, raw.covariance, rtol=1e-10)  # the jackknife of small differences
     np.testing.assert_allclose(kept.scale, raw.scale, rtol=1e-12)
     assert (kept.n, kept.degrees_of_freedom, kept.domain) == (raw.n, raw.degrees_of_freedom, raw.domain)
-    for likelihood in ("gaussian", "grasp_effects"):
+    for likelihood in ("gaussian", "hierarchical"):
         raw, kept = (
             estimators.fit(data, method="bayes", likelihood=likelihood, seed=5).coefficients
             for data in (grasps, [Moments.from_samples(grasp) for grasp in grasps])

@@ -75,7 +75,7 @@ def test_alike_materials_share_the_probability_as_the_prior_says(samples: Make) 
     assert odd["a"] / odd["b"] == pytest.approx(3.0)
 
 
-def test_moments_of_a_grasp_do_as_well_and_grasp_effects_are_allowed_for(samples: Make) -> None:
+def test_moments_of_a_grasp_do_as_well_and_scatter_between_grasps_is_allowed_for(samples: Make) -> None:
     known = library(samples)
     grasp = samples(30, coefficients=np.array([0.4, 2.0, -0.8]))
     by_samples, by_moments = (recognise(data, known) for data in (grasp, estimators.Moments.from_samples(grasp)))
