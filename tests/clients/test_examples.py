@@ -1,0 +1,52 @@
+"""Every example runs, and prints what its grasp's true friction calls for."""
+
+import re
+import runpy
+from pathlib import Path
+
+import pytest
+
+import slipcore
+
+EXAMPLES = {path.stem: path for path in sorted((Path(__file__).parents[2] / "examples").glob("*.py"))}
+
+
+def printed(example: str, capsys: pytest.CaptureFixture[str]) -> str:
+    runpy.run_path(str(EXAMPLES[example]), run_name="__main__")
+    return capsys.readouterr().out
+
+
+def number(pattern: str, text: str) -> float:
+    found = re.search(pattern, text)
+    assert found, text
+    return float(found[1])
+
+
+def test_a_grip_is_planned_without_a_service(capsys: pytest.CaptureFixture[str]) -> None:
+    text = printed("detect_fit_plan", capsys)
+    assert number(r"friction ([\d.]+)", text) == pytest.approx(0.4, abs=0.02)
+    assert 1.5 / 0.4 < number(r"press with ([\d.]+) N", text) < 1.5 / 0.3
+
+
+def test_a_grip_is_planned_with_a_service(
+    service_url: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("STICTION_URL", service_url)
+    assert 1.5 / 0.4 < number(r"press with ([\d.]+) N", printed("use_a_service", capsys)) < 1.5 / 0.3
+
+
+def test_a_scene_is_simulated_to_an_accuracy(capsys: pytest.CaptureFixture[str]) -> None:
+    text = printed("simulate_to_an_accuracy", capsys)
+    assert 0.0 < number(r"([\d.]+) of the contact sticks", text) < 1.0
+    assert number(r"at most ([\d.]+) away", text) < 0.3
+
+
+def test_a_detector_is_added(capsys: pytest.CaptureFixture[str]) -> None:
+    try:
+        assert number(r"far_from_mean: right for (\d+) %", printed("add_a_detector", capsys)) > 60.0
+    finally:
+        slipcore.METHODS.pop("far_from_mean", None)
+
+
+def test_every_example_is_run_here() -> None:
+    assert set(re.findall(r'printed\("(\w+)"', Path(__file__).read_text())) == set(EXAMPLES)
