@@ -120,6 +120,12 @@ def test_a_quoted_module_exists(line: str) -> None:
     assert importlib.util.find_spec(line.split()[2])
 
 
+def test_before_a_commit_runs_what_lint_and_types_run() -> None:
+    recipe = (ROOT / "Makefile").read_text().split("\nlint:")[1].split("\nunit:")[0]
+    hooks = re.findall(r"entry: \.venv/bin/([^,]+),", (ROOT / ".pre-commit-config.yaml").read_text())
+    assert hooks == re.findall(r"^\t\$\(BIN\)/(.+)$", recipe, re.M)
+
+
 def test_each_metric_is_documented_and_nothing_else_is() -> None:
     page = (ROOT / "docs" / "operations.md").read_text(encoding="utf-8")
     source = (ROOT / "service" / "observability" / "metrics.py").read_text(encoding="utf-8")
