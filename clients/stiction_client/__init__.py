@@ -22,7 +22,7 @@ from stiction_client.errors import (
 
 if TYPE_CHECKING:
     from stiction_client.client import AsyncFrictionClient, FrictionClient
-    from stiction_client.contacts import Contact, Contacts, antipodal, n_fingers
+    from stiction_client.contacts import Contact, Contacts, antipodal, grasp, n_fingers
     from stiction_client.exports import (
         CoulombFriction,
         MujocoPair,
@@ -59,6 +59,7 @@ _LAZY = {
     "Contact": "stiction_client.contacts",
     "Contacts": "stiction_client.contacts",
     "antipodal": "stiction_client.contacts",
+    "grasp": "stiction_client.contacts",
     "n_fingers": "stiction_client.contacts",
     "CoulombFriction": "stiction_client.exports",
     "conservative_friction": "stiction_client.exports",
@@ -134,6 +135,7 @@ __all__ = [
     "dexnet_friction",
     "drake_friction",
     "friction_cone",
+    "grasp",
     "moveit_max_contact_force",
     "mujoco_friction",
     "mujoco_geom",

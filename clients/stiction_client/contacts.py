@@ -90,6 +90,17 @@ class Contacts:
     lever_arm: Number | None = None
 
 
+def grasp(area: float, round_at: float | None = None, fingers: int = 1, object_radius: float | None = None) -> Contacts:
+    """Equal fingers by what they are on a form: flat, or round with ``area`` m² under ``round_at`` N.
+
+    A torque is about the fingers' common normal, or about the axis of an object of ``object_radius`` m.
+    """
+    contact = Contact.flat(area) if round_at is None else Contact.round(area, round_at)
+    if object_radius is not None:
+        return n_fingers(fingers, contact, object_radius)
+    return Contacts(contact, int(within("fingers", fingers, 1, 100)))
+
+
 def antipodal(contact: Contact) -> Contacts:
     """Two fingers that press against each other; a torque is one about the line between them."""
     return Contacts(contact, 2)
@@ -97,5 +108,5 @@ def antipodal(contact: Contact) -> Contacts:
 
 def n_fingers(count: int, contact: Contact, object_radius: Number) -> Contacts:
     """Fingers evenly around an object of ``object_radius`` m, such as a lid; a torque is about the object's axis."""
-    fingers = int(within("count", count, 2, 100, "fingers"))
+    fingers = int(within("count", count, 1, 100, "fingers"))
     return Contacts(contact, fingers, within("object_radius", object_radius, 1e-6, 1e3, "m"))

@@ -92,7 +92,16 @@ def lookup(
 def plan(
     material: MaterialName,
     load: Annotated[float, typer.Option(help="Tangential load that the finger must hold, N.")],
-    contact_area: Annotated[float, typer.Option(help="Area of the contact, m².")],
+    contact_area: Annotated[float, typer.Option(help="Area of one finger's contact, m².")],
+    torque: Annotated[float, typer.Option(help="Torque beside the load, N·m.")] = 0.0,
+    fingers: Annotated[int, typer.Option(help="Equal fingers that share load and torque.")] = 1,
+    round_at: Annotated[
+        float | None, typer.Option(help="Of a round fingertip: normal force under which it has that area, N.")
+    ] = None,
+    object_radius: Annotated[
+        float | None, typer.Option(help="Radius of a round object, m, where the torque is about its axis.")
+    ] = None,
+    safety_factor: Annotated[float, typer.Option(help="Multiplies load and torque.")] = 1.0,
     slip_probability: Annotated[float, typer.Option(help="Largest probability of slip that is accepted.")] = 1e-3,
     velocity: Velocity = 0.0,
     limit: Annotated[float | None, typer.Option(help="Largest normal force that the object bears, N.")] = None,
@@ -102,7 +111,7 @@ def plan(
     json: Json = False,
 ) -> None:
     """Say how hard to grip so that slip stays improbable, with the model's uncertainty in the answer."""
-    from stiction_client import FrictionClient, required_normal_force
+    from stiction_client import FrictionClient, grasp, required_normal_force
 
     with FrictionClient(url, key=key) as client:
         model = client.model(material, method=method)
@@ -110,8 +119,10 @@ def plan(
         model,
         load,
         slip_probability=slip_probability,
-        contact_area=contact_area,
+        contacts=grasp(contact_area, round_at, fingers, object_radius),
+        torque=torque,
         tangential_velocity=velocity,
+        safety_factor=safety_factor,
         normal_force_limit=limit,
     )
     if json:

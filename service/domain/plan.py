@@ -45,7 +45,9 @@ def grasp_force(context: Context, wish: NewGraspForce) -> GraspForceOut:
             model,
             wish.tangential_load,
             wish.slip_probability,
-            contact_area=wish.contact_area,
+            contacts=stiction_client.grasp(wish.contact_area, wish.round_at, wish.fingers, wish.object_radius),
+            torque=wish.torque,
+            safety_factor=wish.safety_factor,
             tangential_velocity=wish.tangential_velocity,
             normal_force_limit=wish.normal_force_limit,
         )

@@ -552,7 +552,7 @@ class LookUpQuery(BaseModel):
 
 
 class NewGraspForce(Body):
-    """A contact that must hold."""
+    """A grasp that must hold."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [{"material": "paper", "tangential_load": 1.5, "contact_area": 6.0e-5}]},
@@ -560,8 +560,19 @@ class NewGraspForce(Body):
 
     material: Reference
     method: Annotated[ModelMethod, Field(description="Whose current model answers")] = "ols"
-    tangential_load: Annotated[float, Field(ge=0.0, le=1e6, description="Of this contact, N")]
-    contact_area: _Area
+    tangential_load: Annotated[float, Field(ge=0.0, le=1e6, description="Of all fingers together, N")]
+    torque: Annotated[float, Field(ge=0.0, le=1e6, description="Of all fingers together, N·m")] = 0.0
+    contact_area: Annotated[float, Field(ge=1e-12, le=1.0, description="Of one finger, m²")]
+    round_at: Annotated[
+        float | None,
+        Field(ge=1e-9, le=1e6, description="Of a round fingertip: normal force, N, under which it has that area"),
+    ] = None
+    fingers: Annotated[int, Field(ge=1, le=100, description="Equal contacts that share load and torque")] = 1
+    object_radius: Annotated[
+        float | None,
+        Field(ge=1e-6, le=1e3, description="m; where the torque is about the axis of a round object, such as a lid"),
+    ] = None
+    safety_factor: Annotated[float, Field(ge=1.0, le=100.0, description="Multiplies load and torque")] = 1.0
     slip_probability: Annotated[float, Field(ge=1e-12, le=0.5, description="The largest that is accepted")] = 1e-3
     tangential_velocity: Annotated[_Velocity, Field(description="m/s")] = 0.0
     normal_force_limit: Annotated[

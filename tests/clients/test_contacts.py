@@ -220,7 +220,7 @@ def test_what_is_no_number_in_range_is_refused_by_name(make_model: Make, name: s
     [
         (lambda: Contact.flat(1e30), "area"),
         (lambda: Contact.round(AREA, 0.0), "at_force"),
-        (lambda: n_fingers(1, Contact.flat(AREA), 0.03), "count"),
+        (lambda: n_fingers(0, Contact.flat(AREA), 0.03), "count"),
         (lambda: n_fingers(3, Contact.flat(AREA), 0.0), "object_radius"),
         (lambda: Contact.measured(np.zeros(3), np.zeros(3), np.zeros(3), 1e-6), "total pressure"),
     ],

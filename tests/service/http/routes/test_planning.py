@@ -4,7 +4,7 @@ from typing import Any
 import httpx
 import pytest
 
-from stiction_client import FrictionClient, required_normal_force
+from stiction_client import FrictionClient, grasp, required_normal_force
 
 Wait = Callable[[httpx.Client, str], dict[str, Any]]
 LOAD = {"material": "fitted", "tangential_load": 0.5, "contact_area": 1e-4}
@@ -13,14 +13,22 @@ pytestmark = pytest.mark.usefixtures("fitted")
 
 
 @pytest.mark.parametrize(
-    "more", [{}, {"slip_probability": 0.01, "tangential_velocity": 1e-4, "normal_force_limit": 50.0}]
+    ("more", "fingers"),
+    [
+        ({}, {}),
+        ({"slip_probability": 0.01, "tangential_velocity": 1e-4, "normal_force_limit": 50.0}, {}),
+        ({"torque": 1e-3, "safety_factor": 1.5}, {"fingers": 2, "round_at": 5.0}),
+        ({"torque": 1e-3}, {"fingers": 3, "object_radius": 0.03}),
+    ],
 )
-def test_the_grasp_force_is_the_planners_own(client: httpx.Client, more: dict[str, float]) -> None:
-    answer = client.post("/v1/grasp-force", json=LOAD | more)
+def test_the_grasp_force_is_the_planners_own(
+    client: httpx.Client, more: dict[str, float], fingers: dict[str, float]
+) -> None:
+    answer = client.post("/v1/grasp-force", json=LOAD | more | fingers)
     assert answer.status_code == 200, answer.text
     told = answer.json()
     with FrictionClient(str(client.base_url)) as planner:
-        expected = required_normal_force(planner.model("fitted"), 0.5, contact_area=1e-4, **more)
+        expected = required_normal_force(planner.model("fitted"), 0.5, contacts=grasp(1e-4, **fingers), **more)
     assert told["normal_force"] == expected.normal_force
     assert told["feasible_interval"][0] == expected.normal_force
     assert (told["material"], told["method"], told["version"]) == ("fitted", "ols", 1)
@@ -32,6 +40,7 @@ def test_a_load_that_no_force_holds_is_refused_with_the_most_that_is_held(client
     problem = answer.json()
     assert (answer.status_code, problem["type"]) == (409, "/problems/no-feasible-force")
     assert 0.0 < problem["largest_load"] < 1.0
+    assert problem["cause"] == "limit"
     assert problem["normal_force"] == pytest.approx(1.0)
 
 
@@ -42,6 +51,11 @@ def test_a_load_that_no_force_holds_is_refused_with_the_most_that_is_held(client
         ("grasp-force", LOAD | {"method": "conjugate"}, 409, "no-model"),
         ("grasp-force", LOAD | {"method": "auto"}, 422, "invalid-request"),
         ("grasp-force", LOAD | {"contact_area": 0.0}, 422, "invalid-request"),
+        ("grasp-force", LOAD | {"contact_area": 1e30}, 422, "invalid-request"),
+        ("grasp-force", LOAD | {"fingers": 0}, 422, "invalid-request"),
+        ("grasp-force", LOAD | {"fingers": True}, 422, "invalid-request"),
+        ("grasp-force", LOAD | {"object_radius": 0.0}, 422, "invalid-request"),
+        ("grasp-force", LOAD | {"safety_factor": 0.5}, 422, "invalid-request"),
         ("grasp-force", LOAD | {"tangential_load": -1.0}, 422, "invalid-request"),
         ("grasp-force", LOAD | {"slip_probability": 0.6}, 422, "invalid-request"),
         ("grasp-force", LOAD | {"force": 1.0}, 422, "invalid-request"),
