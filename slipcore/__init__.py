@@ -1,5 +1,6 @@
 """Tactile frames to friction samples: numerics only (frames → strain → events → slip_state → samples)."""
 
+import warnings
 from importlib import import_module
 from importlib.metadata import version
 from typing import TYPE_CHECKING
@@ -21,12 +22,12 @@ from slipcore.slip_state import EventList, SlipEvents, SlipHistory, SlipState
 from slipcore.warm_up import warm_up
 
 if TYPE_CHECKING:
-    from slipcore.detection.batch import Hindsight, collect_history, detect_slip
+    from slipcore.detection.batch import FixedLagSmoother, collect_history, detect_slip
     from slipcore.detection.detector import DetectorState, SlipDetector
     from slipcore.detection.methods import METHODS
 
 _LAZY = {
-    "Hindsight": "slipcore.detection.batch",
+    "FixedLagSmoother": "slipcore.detection.batch",
     "collect_history": "slipcore.detection.batch",
     "detect_slip": "slipcore.detection.batch",
     "DetectorState": "slipcore.detection.detector",
@@ -34,6 +35,8 @@ _LAZY = {
     "METHODS": "slipcore.detection.methods",
 }
 """Names whose modules load compiled kernels, a second of work: who only holds logs and results goes without."""
+_DEPRECATED = {"Hindsight": "FixedLagSmoother"}
+"""Former names, understood until the next version."""
 
 __version__ = version("stiction")
 
@@ -44,12 +47,12 @@ __all__ = [
     "ElementForces",
     "EventList",
     "FilterOptions",
+    "FixedLagSmoother",
     "Frame",
     "FrictionLaw",
     "FrictionSamples",
     "GraspLog",
     "GroundTruth",
-    "Hindsight",
     "InvalidInput",
     "NoForces",
     "Option",
@@ -75,6 +78,9 @@ __all__ = [
 
 def __getattr__(name: str) -> object:
     """A public name's module is loaded when the name is first asked for (PEP 562)."""
+    if name in _DEPRECATED:
+        warnings.warn(f"slipcore.{name} is now {_DEPRECATED[name]}", DeprecationWarning, stacklevel=2)
+        name = _DEPRECATED[name]
     if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = globals()[name] = getattr(import_module(_LAZY[name]), name)

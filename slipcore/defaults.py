@@ -91,6 +91,12 @@ class ContactOptions(Options):
     rim_curvature: Annotated[float, Option(0.0, 1.0, "-", "1: not looked at")] = 1.0
     """Without forces, elements where the indentation is hollow by more than this share of its peak (Laplacian times
     pitch squared) lie beyond the contact's rim."""
+    rim_noise: Annotated[float, Option(0.0, 100.0, "standard deviations", "tuning scenes")] = 2.0
+    """Least hollow at the rim over the noise of the curvature."""
+    rim_inside: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.68
+    """Share of the rim's least hollow up to which an element beside the contact still lies inside."""
+    rim_clear: Annotated[float, Option(0.0, 100.0, "standard deviations", "one gap would let the contact leak")] = 4.0
+    """How far that must be above noise for the contact to be followed to its rim."""
     contact_reach: Annotated[float, Option(0.0, 0.99, "-", "bonded gels of 4.5 to 8 mm among the tuning scenes")] = 0.2
     """Least share of the deepest indentation of elements between those found in contact and the rim."""
     contact_noise: Annotated[float, Option(0.0, 100.0, "standard deviations", "one false touch in 10⁶ frames")] = 5.0
@@ -140,6 +146,10 @@ class FilterOptions(ContactOptions):
     """Least standard deviation of a marker coordinate."""
     rigidity: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.012
     """How far a stuck element may stray from the object's motion, as a share of it."""
+    rigidity_of_fit: Annotated[float, Option(0.0, 10.0, "-", "fits are of many elements")] = 0.5
+    """The same of an element's marker in one step, as a share of ``rigidity``."""
+    rigidity_of_anchor: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 0.1
+    """Random walk of a stuck element's anchor under motion, as a share of ``rigidity``."""
     slip_share: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes; between 0 at the front and 1 at the rim")] = 0.37
     """Mean slip of a slipping element as a share of the object's motion."""
     slip_share_spread: Annotated[float, Option(0.01, 10.0, "-", "tuning scenes")] = 0.2
@@ -154,6 +164,8 @@ class FilterOptions(ContactOptions):
     """Onset rate amid sticking neighbours, relative to these."""
     onset_at_front: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 3.8
     """Onset rate that slipping neighbours, or the rim, add to it."""
+    onset_under_restick: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.02
+    """Factor on onset rates while everything sticks again under growing load."""
     end_length: Annotated[float, Option(1e-9, 1.0, "m", "tuning scenes")] = 0.0001
     """Motion of the object within which slip ends."""
     end_time: Annotated[float, Option(1e-3, 1e6, "s", "tuning scenes")] = 26.0
@@ -162,8 +174,28 @@ class FilterOptions(ContactOptions):
     """Weight of a surely slipping element in the fit of the object's motion."""
     outlier: Annotated[float, Option(0.1, 100.0, "-", "tuning scenes")] = 4.4
     """Squared misfit over its variance at which an element's weight falls to a quarter."""
+    outlier_gate: Annotated[float, Option(1.0, 1000000.0, "-", "5 σ: a marker lost and found elsewhere")] = 25.0
+    """Squared distance over its variance from both predictions beyond which a marker tells nothing."""
+    outlier_spread: Annotated[float, Option(0.0, 10.0, "-", "half of the distance")] = 0.25
+    """Share of that squared distance by which the variance of both predictions then grows."""
     motion_margin: Annotated[float, Option(0.0, 100.0, "-", "tuning scenes")] = 9.4
     """How many variances of the fit are taken off the squared motion."""
+    following_weight: Annotated[float, Option(0.0, 1000000.0, "-", "all of the motion, ± 0.2")] = 30.0
+    """Prior weight of a surface that follows all of a given motion."""
+    following_variance: Annotated[float, Option(0.0, 1.0, "-", "5 % of the motion")] = 0.0025
+    """Squared error of a step's share of the motion."""
+    following_learning: Annotated[float, Option(0.0, 1000000.0, "-", "tuning scenes")] = 50.0
+    """Prior weights within which the share is learnt from every step."""
+    following_least: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.15
+    """Least share that a step may show."""
+    following_stick: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.7
+    """Mean probability of stick above which the share is learnt later on."""
+    following_whole: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.9
+    """Share above which the surface follows all of the motion."""
+    following_deviations: Annotated[float, Option(0.0, 100.0, "standard deviations", "3 σ")] = 3.0
+    """Least distance of a share from 1 that counts."""
+    force_noise_margin: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 1.1
+    """Factor on the estimated noise of element forces."""
     force_smoothing: Annotated[float, Option(0.0, 10.0, "s", "tuning scenes")] = 0.036
     """Time constant of the low-pass on element forces."""
     ratio_spread: Annotated[float, Option(1e-4, 10.0, "-", "tuning scenes")] = 0.082
@@ -174,6 +206,18 @@ class FilterOptions(ContactOptions):
     """Time constant of what is learnt about it."""
     ratio_weight: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 1.2
     """Weight of the force ratio as evidence; 0 leaves it out."""
+    ratio_limit: Annotated[float, Option(0.0, 100.0, "log-odds", "tuning scenes")] = 6.0
+    """Most evidence of one force ratio."""
+    ratio_slip: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.85
+    """Least slip probability of an element whose ratio is learnt for all."""
+    ratio_slip_of_element: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.9
+    """The same for its own."""
+    ratio_variance: Annotated[float, Option(1e-12, 10.0, "-", "ratios scatter by 0.03 without noise")] = 0.001
+    """Least variance of a ratio that is learnt for all."""
+    ratio_variance_of_element: Annotated[float, Option(1e-12, 10.0, "-", "an element's own scatter by 0.01")] = 0.0001
+    """The same for its own."""
+    ratio_least_force: Annotated[float, Option(0.0, 1.0, "N", "resolution of force sensors")] = 0.0001
+    """Least normal force for a ratio."""
     force_to_noise: Annotated[float, Option(0.0, 1e3, "-", "tuning scenes")] = 10.0
     """Least normal force over its noise, for a ratio."""
     loading_smoothing: Annotated[float, Option(0.0, 10.0, "s", "tuning scenes")] = 0.01
@@ -184,8 +228,26 @@ class FilterOptions(ContactOptions):
     """Without forces, all stick while the tangential load (by stiffness) grows less than this share of the normal."""
     pressing_floor: Annotated[float, Option(0.0, 1.0, "m/s", "drift of a gel")] = 1e-5
     """Least rate of indentation that counts."""
+    pressing_force_floor: Annotated[float, Option(0.0, 1000.0, "N/s", "drift of a force sensor")] = 0.001
+    """Least standard deviation of the rate of forces."""
     pressing_rate: Annotated[float, Option(0.0, 1e6, "1/s", "within a frame at 30 fps")] = 100.0
     """Rate at which slip then ends."""
+    pressing_deviations: Annotated[float, Option(0.0, 100.0, "standard deviations", "3 σ")] = 3.0
+    """Least rate of indentation over its noise."""
+    pressing_force_deviations: Annotated[float, Option(0.0, 100.0, "standard deviations", "tuning scenes")] = 4.0
+    """Least rate of the normal force over its noise."""
+    pressing_sideways_variances: Annotated[float, Option(0.0, 100.0, "-", "two components of force and the moment")] = (
+        3.0
+    )
+    """Variances of noise taken off the squared tangential rate."""
+    stiffness_ratio: Annotated[float, Option(0.0, 10.0, "-", "2(1 − ν)/(2 − ν) at ν ≈ ½ (Mindlin)")] = 0.67
+    """Tangential over normal stiffness of a stuck contact."""
+    least_transition: Annotated[float, Option(1e-15, 0.1, "-", "numerics")] = 1e-06
+    """Least probability of slip and of stick that is predicted."""
+    largest_log_odds: Annotated[
+        float, Option(1.0, 30.0, "log-odds", "the way back takes too long from further out")
+    ] = 12.0
+    """Most that one frame can bring and that is held."""
     threshold: Annotated[float, Option(0.01, 0.99, "-", "tuning scenes; the reported probability is ½ there")] = 0.4
     """Least posterior of slip."""
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from slipcore.defaults import DEFAULT_METHOD, MOST_LOOKAHEAD
-from slipcore.detection.detector import DetectorState, init, masked, said, step
+from slipcore.detection.detector import DetectorState, init, masked, slip_state, step
 from slipcore.detection.methods import find_method
 from slipcore.detection.shared.answer import answer
 from slipcore.detection.shared.interface import CompiledMethod
@@ -19,18 +19,18 @@ from slipcore.slip_state import SlipHistory, SlipState, observed_over_time, slip
 def detect_slip(log: GraspLog, method: str = DEFAULT_METHOD, *, lookahead: int = 0, **options: float) -> SlipHistory:
     """Detect local slip in a whole log: the fold of ``step`` over its frames.
 
-    With a ``lookahead`` each frame is decided in the light of that many frames after it (see ``Hindsight``). Raises
-    ``InvalidInput`` as ``init`` does.
+    With a ``lookahead`` each frame is decided in the light of that many frames after it (see ``FixedLagSmoother``).
+    Raises ``InvalidInput`` as ``init`` does.
     """
     state = init(log.position, log.element_area, method, **options)
     if isinstance(find_method(method), CompiledMethod):
         return history_of(log, state, checked_lookahead(lookahead))
-    hindsight, answers = Hindsight(state, lookahead), []
+    smoother, answers = FixedLagSmoother(state, lookahead), []
     for frame in log.frames():
         state, now = step(state, frame)
-        if (settled := hindsight.take(state, now)) is not None:
+        if (settled := smoother.take(state, now)) is not None:
             answers.append(settled)
-    return collect_history([*answers, *hindsight.rest()], state)
+    return collect_history([*answers, *smoother.rest()], state)
 
 
 def checked_lookahead(lookahead: int) -> int:
@@ -41,7 +41,7 @@ def checked_lookahead(lookahead: int) -> int:
     return int(lookahead)
 
 
-class Hindsight:
+class FixedLagSmoother:
     """A running detector's answers, each ``lookahead`` frames late and revised by what came meanwhile.
 
     A fixed-lag smoother (Kim, 1994) of the two states of method "filter"; the answers of other methods, which keep no
@@ -49,11 +49,11 @@ class Hindsight:
     """
 
     def __init__(self, start: DetectorState, lookahead: int) -> None:
+        self._lookahead = checked_lookahead(lookahead)
         method = find_method(start.setup.method)
         self._revise = method.revise if lookahead and isinstance(method, CompiledMethod) else None
-        self._lookahead = checked_lookahead(lookahead)
         self._states, self._answers = deque([start]), deque[SlipState]()
-        self._slipped, self._likely = start.memory.masks[1], start.memory.probability
+        self._revised = start.memory
 
     def take(self, state: DetectorState, now: SlipState) -> SlipState | None:
         """The detector's state after a frame, and its answer: what is settled by it, if anything."""
@@ -66,33 +66,21 @@ class Hindsight:
         return [self._settle() for _ in range(len(self._answers))]
 
     def _settle(self) -> SlipState:
-        now, (setup, before, _) = self._answers.popleft(), self._states.popleft()
+        now, before = self._answers.popleft(), self._states.popleft()
         if self._revise is None:
             return now
-        memory = self._states[0].memory
-        contact = memory.masks[0]
-        decision = self._revise([state.memory.own for state in self._states], setup.settings)
-        slip, likely = np.empty_like(contact), np.empty_like(memory.probability)
+        after = self._states[0]
+        contact = after.memory.contact
+        decision = self._revise([state.memory.elements for state in self._states], before.setup.by_force.settings)
+        revised = after.memory._replace(slip=np.empty_like(contact), probability=np.empty(contact.shape))
         velocity = np.empty((*contact.shape, 2))
         touching, slipping = answer(
-            setup.lattice.position,
-            memory.time - before.time,
-            before.displacement,
-            memory.displacement,
-            before.object_pose,
-            memory.object_pose,
-            contact,
-            contact & before.masks[0],
-            *decision,
-            self._slipped,
-            self._likely,
-            slip,
-            likely,
-            velocity,
-        )
-        self._slipped, self._likely = slip, likely
-        settled = said(memory.time, contact, slip, likely, velocity, touching, slipping)
-        return masked(settled, memory.observed, before.observed)
+            before.setup.lattice.position, before.frame, after.frame, contact & before.memory.contact, decision,
+            self._revised, revised, velocity,
+        )  # fmt: skip
+        self._revised = revised
+        settled = slip_state(after.frame.time, revised, velocity, touching, slipping)
+        return masked(settled, after.observed, before.observed)
 
 
 def collect_history(answers: Sequence[SlipState], state: DetectorState) -> SlipHistory:

@@ -14,8 +14,9 @@ from slipcore.defaults import DEFAULT_METHOD, LIMITS, NOISE, ContactOptions, cho
 from slipcore.detection.methods import find_method
 from slipcore.detection.shared.answer import answer
 from slipcore.detection.shared.contact import Touch
-from slipcore.detection.shared.interface import CompiledMethod, Method, Observation, Start
+from slipcore.detection.shared.interface import CompiledMethod, Observation, Start
 from slipcore.detection.shared.observe import observe
+from slipcore.detection.shared.records import FrameArrays, Memory, Sensor
 from slipcore.detection.shared.strain import Lattice
 from slipcore.errors import InvalidInput
 from slipcore.frames import (
@@ -47,45 +48,31 @@ NO_FIELD, NO_MASK, NO_POSE = (_read_only(np.empty(s, t)) for s, t in (((0, 0, 3)
 
 
 class Setup(NamedTuple):
-    """What stays the same over a stream: the sensor's lattice and element area (m²), the method and its options; and
-    as arrays these options and what an element needs to touch by force and by shape (``kernels.contact.Touch``).
+    """What stays the same over a stream: lattice, element area (m²), method and its options; and what kernels take of
+    it where there are forces, and where the pressed shape alone tells which elements touch.
     """
 
     lattice: Lattice
     element_area: float
     method: str
     options: ContactOptions
-    settings: FloatArray
-    touch_by_force: FloatArray
-    touch_by_shape: FloatArray
-
-
-class Memory(NamedTuple):
-    """What a detector remembers of the last frame: what it saw; ``masks`` [2, n, m], contact and slip, and the
-    ``probability`` that it answered; of ``noise`` (``kernels.observe.step_noise``); and the method's own. Before the
-    first frame ``time`` is −∞ and nothing touches.
-    """
-
-    time: float
-    displacement: FloatArray
-    force: FloatArray
-    object_pose: FloatArray
-    observed: BoolArray | None
-    masks: BoolArray
-    probability: FloatArray
-    noise: FloatArray
-    own: FloatArray
-    numbers: FloatArray
-    other: Any
+    by_force: Sensor
+    by_shape: Sensor
 
 
 class DetectorState(NamedTuple):
-    """A detector between two frames, never written to; can be pickled. ``noise``: estimated standard deviation of one
-    marker coordinate, m; NaN while it cannot be estimated.
+    """A detector between two frames, never written to; can be pickled.
+
+    The last ``frame`` (before the first its time is −∞ and nothing touches), which elements were ``observed`` in it
+    (None: all), what is remembered beside it, and the state of a method in numpy. ``noise``: estimated standard
+    deviation of one marker coordinate, m; NaN while it cannot be estimated.
     """
 
     setup: Setup
+    frame: FrameArrays
+    observed: BoolArray | None
     memory: Memory
+    of_method: Any
     noise: float
 
 
@@ -97,160 +84,109 @@ def init(position: ArrayLike, element_area: float, method: str = DEFAULT_METHOD,
     found = find_method(method)
     chosen = choose_options(found.options, options)
     lattice, area = Lattice.at_rest(position), check_element_area(element_area)
+    start, of_method = Start(np.zeros(0), np.zeros((0, 0, 0)), np.zeros(0)), None
     if isinstance(found, CompiledMethod):
-        start, other = found.start(lattice, chosen), None
+        start = found.start(lattice, chosen)
     else:
-        start, other = Start(np.zeros(0), np.zeros((0, 0, 0)), np.zeros(0)), found.init(lattice, chosen)
-    setup = Setup(lattice, area, method, chosen, start.settings, *touch_thresholds(chosen, area))
+        of_method = found.init(lattice, chosen)
+    rest = lattice.position, lattice.steps, lattice.inverse_jacobian, lattice.orientation
+    by_force, by_shape = (Sensor(*rest, touch, start.settings) for touch in touch_thresholds(chosen, area))
     shape = lattice.position.shape
-    still, nothing, none = _read_only(np.zeros(shape)), np.zeros(shape[:2]), np.zeros((2, *shape[:2]), bool)
+    frame = FrameArrays(-math.inf, _read_only(np.zeros(shape)), NO_FIELD, NO_POSE, NO_FIELD, NO_MASK)
     noise = np.zeros((9, max(1 + NOISE.memory, NOISE.series)))
-    memory = Memory(-math.inf, still, NO_FIELD, NO_POSE, None, none, nothing, noise, start.own, start.numbers, other)
-    return DetectorState(setup, memory, math.nan)
+    nowhere, nothing = np.zeros(shape[:2], bool), np.zeros(shape[:2])
+    memory = Memory(nowhere, nowhere, nothing, noise, start.elements, start.common)
+    return DetectorState(
+        Setup(lattice, area, method, chosen, by_force, by_shape), frame, None, memory, of_method, math.nan
+    )
 
 
 def touch_thresholds(options: ContactOptions, element_area: float) -> tuple[FloatArray, FloatArray]:
-    """What an element of that area, m², needs to touch, by force and by shape: ``kernels.contact.Touch`` as arrays."""
-    least = options.contact_pressure * element_area
-    noise, release = options.contact_noise, options.release_share
-    by_force = Touch(least, options.contact_force_share, noise, release, 1.0, 1.0)
+    """What an element of that area, m², needs to touch, by force and by shape: ``contact.Touch`` as arrays."""
     by_shape = Touch(
-        options.contact_depth,
-        options.contact_depth_share,
-        noise,
-        release,
-        options.rim_curvature,
-        options.contact_reach,
+        least=options.contact_depth,
+        share=options.contact_depth_share,
+        noise=options.contact_noise,
+        release=options.release_share,
+        rim=options.rim_curvature,
+        rim_noise=options.rim_noise,
+        reach=options.contact_reach,
+        inside=options.rim_inside,
+        clear=options.rim_clear,
     )
+    least = options.contact_pressure * element_area
+    by_force = by_shape._replace(least=least, share=options.contact_force_share, rim=1.0, reach=1.0)
     return np.array(by_force), np.array(by_shape)
 
 
 def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
     """Take one valid frame, later than the last; on the first, every element in contact sticks."""
-    method, (setup, memory, _) = find_method(state.setup.method), state
-    force = NO_FIELD if frame.force is None else frame.force
-    pose = NO_POSE if frame.object_pose is None else frame.object_pose
-    shape = memory.probability.shape
-    after = Memory(
+    setup, seen, last = state.setup, frame_arrays(frame), _unwritten(state.frame)
+    method, memory = find_method(setup.method), state.memory
+    sensor = setup.by_shape if frame.force is None else setup.by_force
+    after, of_method = _room_like(memory), None
+    velocity = np.empty((*memory.probability.shape, 2))
+    if isinstance(method, CompiledMethod):
+        arguments = sensor, last, seen, memory, after
+        noise, touching, slipping = method.run(*map(tuple, arguments), velocity)  # numba is slow at named tuples
+    else:
+        surface = observe(sensor, seen, memory, after)
+        observation = Observation(seen.time - last.time, seen.displacement, seen.force, after.contact, *surface[:5])
+        of_method, decision = method.step(state.of_method, setup.lattice, observation, setup.options)
+        noise = surface.marker_noise
+        touching, slipping = answer(sensor.position, last, seen, surface.stays, decision, memory, after, velocity)
+    now = slip_state(frame.time, after, velocity, touching, slipping)
+    return DetectorState(setup, seen, frame.observed, after, of_method, noise), masked(
+        now, frame.observed, state.observed
+    )
+
+
+def frame_arrays(frame: Frame) -> FrameArrays:
+    """A frame as kernels take it, not to be written to; what it does not have is empty."""
+    return FrameArrays(
         frame.time,
         _read_only(frame.displacement),
-        _read_only(force),
-        _read_only(pose),
-        frame.observed,
-        np.empty((2, *shape), bool),
-        np.empty(shape),
+        NO_FIELD if frame.force is None else _read_only(frame.force),
+        NO_POSE if frame.object_pose is None else _read_only(frame.object_pose),
+        NO_FIELD if frame.normal is None else _read_only(frame.normal),
+        NO_MASK if frame.contact is None else _read_only(frame.contact),
+    )
+
+
+def _unwritten(frame: FrameArrays) -> FrameArrays:
+    """The same frame: unpickled arrays can be written to, and kernels are compiled for one type."""
+    return FrameArrays(
+        frame.time,
+        _read_only(frame.displacement),
+        _read_only(frame.force),
+        _read_only(frame.object_pose),
+        _read_only(frame.normal),
+        _read_only(frame.contact),
+    )
+
+
+def _room_like(memory: Memory) -> Memory:
+    """Arrays to fill, of the same shapes."""
+    return Memory(
+        np.empty_like(memory.contact),
+        np.empty_like(memory.slip),
+        np.empty_like(memory.probability),
         np.empty_like(memory.noise),
-        np.empty_like(memory.own),
-        np.empty_like(memory.numbers),
-        None,
-    )
-    velocity = np.empty((*shape, 2))
-    if isinstance(method, CompiledMethod):
-        noise, touching, slipping = _run(method, setup, memory, frame, after, velocity)
-    else:
-        after, noise, touching, slipping = _run_by_parts(method, setup, memory, frame, after, velocity)
-    now = said(frame.time, after.masks[0], after.masks[1], after.probability, velocity, touching, slipping)
-    return DetectorState(setup, after, noise), masked(now, frame.observed, memory.observed)
-
-
-def _run(
-    method: CompiledMethod[Any], setup: Setup, memory: Memory, frame: Frame, after: Memory, velocity: FloatArray
-) -> tuple[float, int, int]:
-    """Fill the arrays of ``after`` and ``velocity``; the marker noise, and how many elements touch and slip."""
-    lattice = setup.lattice
-    return method.run(
-        lattice.position,
-        lattice.steps,
-        lattice.inverse_jacobian,
-        lattice.orientation,
-        setup.touch_by_shape if frame.force is None else setup.touch_by_force,
-        setup.settings,
-        frame.time,
-        after.displacement,
-        after.force,
-        after.object_pose,
-        NO_FIELD if frame.normal is None else _read_only(frame.normal),
-        NO_MASK if frame.contact is None else _read_only(frame.contact),
-        memory.time,
-        _read_only(memory.displacement),
-        _read_only(memory.force),
-        _read_only(memory.object_pose),
-        memory.masks,
-        memory.probability,
-        memory.noise,
-        memory.own,
-        memory.numbers,
-        after.masks,
-        after.probability,
-        after.noise,
-        after.own,
-        after.numbers,
-        velocity,
+        np.empty_like(memory.elements),
+        np.empty_like(memory.common),
     )
 
 
-def _run_by_parts(
-    method: Method[Any, Any], setup: Setup, memory: Memory, frame: Frame, after: Memory, velocity: FloatArray
-) -> tuple[Memory, float, int, int]:
-    """The same for a method in numpy, and ``after`` with its state."""
-    shape = memory.probability.shape
-    normal, pressing, tangential = np.empty((*shape, 3)), np.empty(shape), np.empty(shape)
-    stays = np.empty(shape, bool)
-    noise, _ = observe(
-        setup.lattice.steps,
-        setup.lattice.orientation,
-        setup.touch_by_shape if frame.force is None else setup.touch_by_force,
-        frame.time,
-        after.displacement,
-        after.force,
-        NO_FIELD if frame.normal is None else _read_only(frame.normal),
-        NO_MASK if frame.contact is None else _read_only(frame.contact),
-        memory.masks[0],
-        memory.noise,
-        normal,
-        pressing,
-        tangential,
-        after.masks[0],
-        stays,
-        after.noise,
-    )
-    interval = frame.time - memory.time
-    seen = Observation(
-        interval, after.displacement, normal, after.force, pressing, tangential, after.masks[0], stays, noise
-    )
-    other, decision = method.step(memory.other, setup.lattice, seen, setup.options)
-    touching, slipping = answer(
-        setup.lattice.position,
-        interval,
-        _read_only(memory.displacement),
-        after.displacement,
-        _read_only(memory.object_pose),
-        after.object_pose,
-        after.masks[0],
-        stays,
-        *decision,
-        memory.masks[1],
-        memory.probability,
-        after.masks[1],
-        after.probability,
-        velocity,
-    )
-    return after._replace(other=other), noise, touching, slipping
-
-
-def said(
-    time: float,
-    contact: BoolArray,
-    slip: BoolArray,
-    probability: FloatArray,
-    velocity: FloatArray,
-    touching: int,
-    slipping: int,
-) -> SlipState:
-    """The answer, with the number of elements that touch and of those that slip."""
+def slip_state(time: float, memory: Memory, velocity: FloatArray, touching: int, slipping: int) -> SlipState:
+    """The answer of a step, with the number of elements that touch and of those that slip."""
     ratio = 1.0 - slipping / touching if touching else math.nan
-    fields = _read_only(contact), _read_only(slip), _read_only(probability), ratio, _read_only(velocity)
-    return SlipState(time, *fields, macro_slip=0 < touching == slipping)
+    contact, slip, probability = (
+        _read_only(memory.contact),
+        _read_only(memory.slip),
+        _read_only(memory.probability),
+    )
+    macro_slip = 0 < touching == slipping
+    return SlipState(time, contact, slip, probability, ratio, _read_only(velocity), macro_slip=macro_slip)
 
 
 def masked(now: SlipState, observed: BoolArray | None, before: BoolArray | None) -> SlipState:
@@ -312,7 +248,7 @@ def _checked(
     contact: ArrayLike | None,
     observed: ArrayLike | None,
 ) -> Frame:
-    shape, last = state.setup.lattice.position.shape, state.memory
+    shape, last = state.setup.lattice.position.shape, state.frame
     if not math.isfinite(time):
         raise InvalidInput("time", time, "finite seconds")
     if not time > last.time:

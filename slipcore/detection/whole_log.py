@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slipcore.detection.detector import NO_FIELD, NO_MASK, NO_POSE, DetectorState, Setup, step
-from slipcore.detection.fold import Answers, Recording, Remembered, Sensor, fold
+from slipcore.detection.detector import NO_FIELD, NO_MASK, NO_POSE, DetectorState, step
+from slipcore.detection.fold import Answers, Recording, fold
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.slip_state import SlipHistory, slip_events
 
@@ -16,12 +16,12 @@ def history_of(log: GraspLog, state: DetectorState, lookahead: int) -> SlipHisto
     setup, answers = state.setup, _room(log)
     state, first = step(state, next(log.frames()))
     memory = state.memory
-    answers.contact[0], answers.slip[0], answers.velocity[0] = memory.masks[0], memory.masks[1], first.velocity
+    answers.contact[0], answers.slip[0], answers.velocity[0] = memory.contact, memory.slip, first.velocity
     answers.probability[0] = memory.probability
-    answers.touching[0], answers.slipping[0] = memory.masks[0].sum(), memory.masks[1].sum()
-    start = Remembered(memory.masks, memory.probability, memory.noise, memory.own, memory.numbers)
+    answers.touching[0], answers.slipping[0] = memory.contact.sum(), memory.slip.sum()
     is_filter = setup.method == "filter"
-    noise = fold(is_filter, _sensor(setup, log), _recording(log), start, lookahead if is_filter else 0, answers)
+    sensor = setup.by_shape if log.force is None else setup.by_force
+    noise = fold(is_filter, sensor, _recording(log), memory, lookahead if is_filter else 0, answers)
     return _history(log, setup.method, noise, answers)
 
 
@@ -29,13 +29,6 @@ def _room(log: GraspLog) -> Answers:
     shape = log.displacement.shape[:3]
     counts = np.empty(len(log), np.int64), np.empty(len(log), np.int64)
     return Answers(np.empty(shape, bool), np.empty(shape, bool), np.empty(shape), np.empty((*shape, 2)), *counts)
-
-
-def _sensor(setup: Setup, log: GraspLog) -> Sensor:
-    touch = setup.touch_by_shape if log.force is None else setup.touch_by_force
-    lattice = setup.lattice
-    steps, inverse = lattice.steps, lattice.inverse_jacobian
-    return Sensor(lattice.position, steps, inverse, lattice.orientation, touch, setup.settings)
 
 
 def _recording(log: GraspLog) -> Recording:

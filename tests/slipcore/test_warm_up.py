@@ -1,7 +1,8 @@
 from slipcore import SlipDetector, detect_slip, warm_up
 from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.detection.filter.run import run_filter
-from slipcore.detection.filter.step import decide, look_back
+from slipcore.detection.filter.smoothing import look_back
+from slipcore.detection.filter.step import decide
 from slipcore.detection.shared.answer import answer
 
 KERNELS = (run_filter, look_back, decide, answer)

@@ -7,7 +7,8 @@ work finds it by exploring the surface before the grasp. Without forces nothing 
 import numpy as np
 
 from slipcore.defaults import ForceRatioOptions
-from slipcore.detection.shared.interface import Decision, Method, Observation
+from slipcore.detection.shared.interface import Method, Observation
+from slipcore.detection.shared.records import Decision
 from slipcore.detection.shared.strain import Lattice
 
 

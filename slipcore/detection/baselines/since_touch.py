@@ -7,7 +7,8 @@ from typing import TypeVar
 import numpy as np
 
 from slipcore.defaults import ContactOptions
-from slipcore.detection.shared.interface import Decision, Method, Observation
+from slipcore.detection.shared.interface import Method, Observation
+from slipcore.detection.shared.records import Decision
 from slipcore.detection.shared.strain import Lattice
 from slipcore.frames import BoolArray, FloatArray
 

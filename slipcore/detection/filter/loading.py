@@ -1,13 +1,13 @@
-"""How the load on the contact changes, and whether it presses everything home."""
+"""How the load on the contact changes, and whether its growth makes everything stick again."""
 
 import math
 from typing import NamedTuple
 
-from slipcore.compilation import compiled
+from slipcore.compilation import compiled, unpack
+from slipcore.detection.filter.pose import Anchors
+from slipcore.detection.filter.state import FRICTION, LOADING
+from slipcore.detection.filter.tuning import Tuning
 from slipcore.frames import FloatArray
-
-STIFFNESS = 0.67
-"""Tangential over normal stiffness of a stuck contact, 2(1 − ν)/(2 − ν) at ν ≈ ½ (Mindlin)."""
 
 
 class Loading(NamedTuple):
@@ -66,21 +66,58 @@ def step_loading(
 
 
 @compiled
-def forces_press_home(loading: Loading, count: int, sigma: float, interval: float, gain: float, slope: float) -> bool:
-    """Whether the normal force grows so much faster than the tangential one that all ``count`` elements stick again.
+def restick_under_load(
+    before: FloatArray,
+    after: FloatArray,
+    anchors: Anchors,
+    motion: tuple[FloatArray, FloatArray],
+    indentation: FloatArray,
+    force: FloatArray,
+    noise: tuple[float, float, float],
+    tuning: Tuning,
+) -> bool:
+    """Whether everything sticks again because the normal load grows (Mindlin and Deresiewicz, J. Appl. Mech. 20 (1953)
+    327); the loading goes from the filter's common state ``before`` to ``after``.
 
-    ``sigma`` of an element's force, N; ``slope``: least growth of F_T for that of F_N that can slip.
+    Changes since the last frame: of ``indentation`` [k] m and of ``force`` [3, k] N, empty without forces. ``noise``:
+    interval s, variance of a marker coordinate m², and deviation of an element's normal force N.
     """
-    noise = math.sqrt(2.0 * count) * sigma / interval * math.sqrt(gain / (2.0 - gain)) * gain + 1e-3
-    sideways = loading.force_x**2 + loading.force_y**2 + loading.twist**2
-    sideways = math.sqrt(max(0.0, sideways - 3.0 * noise * noise))
-    return loading.normal > 4.0 * noise and sideways < slope * loading.normal
+    interval, variance, force_noise = noise
+    gain = low_pass(interval, tuning.loading_smoothing)
+    loading = Loading(*unpack(before[LOADING : LOADING + 6], 6))
+    places = anchors.marker_x, anchors.marker_y
+    loading = step_loading(loading, places, motion, indentation, force, interval, gain)
+    for value in range(6):
+        after[LOADING + value] = loading[value]
+    count = len(indentation)
+    if count == 0:
+        return False
+    if force.size == 0:
+        return restick_by_depth(loading, count, variance, interval, gain, tuning)
+    friction = before[FRICTION] / before[FRICTION + 1] if before[FRICTION + 1] > 0.0 else 0.0
+    slope = tuning.pressing_share * friction if friction > 0.0 else tuning.pressing_slope
+    return restick_by_force(loading, math.sqrt(2.0 * count) * force_noise, interval, gain, slope, tuning)
 
 
 @compiled
-def depth_presses_home(
-    loading: Loading, count: int, variance: float, interval: float, gain: float, slope: float, floor: float
+def restick_by_force(
+    loading: Loading, noise: float, interval: float, gain: float, slope: float, tuning: Tuning
 ) -> bool:
-    """The same from indentation and motion, by the stiffness of a stuck contact."""
-    noise = math.sqrt(2.0 * variance / count) / interval * gain + floor
-    return loading.depth > 3.0 * noise and STIFFNESS * loading.motion < slope * loading.depth
+    """Whether the normal force grows so much faster than the tangential one that all elements stick again.
+
+    ``noise`` of a change of the resultant, N; ``slope``: least growth of F_T for that of F_N that can slip.
+    """
+    rate = noise / interval * math.sqrt(gain / (2.0 - gain)) * gain + tuning.pressing_force_floor
+    sideways = loading.force_x**2 + loading.force_y**2 + loading.twist**2
+    sideways = math.sqrt(max(0.0, sideways - tuning.pressing_sideways_variances * rate * rate))
+    return loading.normal > tuning.pressing_force_deviations * rate and sideways < slope * loading.normal
+
+
+@compiled
+def restick_by_depth(
+    loading: Loading, count: int, variance: float, interval: float, gain: float, tuning: Tuning
+) -> bool:
+    """The same from the indentation and motion of ``count`` elements, by the stiffness of a stuck contact."""
+    noise = math.sqrt(2.0 * variance / count) / interval * gain + tuning.pressing_floor
+    sideways = tuning.stiffness_ratio * loading.motion
+    return loading.depth > tuning.pressing_deviations * noise and sideways < tuning.pressing_slope * loading.depth

@@ -7,30 +7,33 @@ import numpy as np
 
 from slipcore.defaults import FilterOptions
 from slipcore.detection.filter.run import run_filter
-from slipcore.detection.filter.step import BODY, PROBABILITY, ROWS, STICK_VARIANCE, THRESHOLD, Tuning, decide, look_back
-from slipcore.detection.shared.interface import CompiledMethod, Decision, Start
+from slipcore.detection.filter.smoothing import look_back
+from slipcore.detection.filter.state import COMMON, POSE, PROBABILITY, ROWS, STICK_VARIANCE
+from slipcore.detection.filter.step import decide
+from slipcore.detection.filter.tuning import LEAST_TRANSITION, THRESHOLD, settings_of
+from slipcore.detection.shared.interface import CompiledMethod, Start
+from slipcore.detection.shared.records import Decision
 from slipcore.detection.shared.strain import Lattice
 from slipcore.frames import FloatArray
 
 
 def start(lattice: Lattice, options: FilterOptions) -> Start:
     """Nothing touches yet."""
-    elements = np.zeros((ROWS, *lattice.position.shape[:2]))
+    elements, common = np.zeros((ROWS, *lattice.position.shape[:2])), np.zeros(COMMON)
     elements[STICK_VARIANCE] = np.inf
-    body = np.zeros(BODY)
-    body[3] = 1.0
-    return Start(np.array([getattr(options, name) for name in Tuning._fields], float), elements, body)
+    common[POSE + 3] = 1.0  # not stretched
+    return Start(settings_of(options), elements, common)
 
 
-def revise(own: Sequence[FloatArray], settings: FloatArray) -> Decision:
+def revise(elements: Sequence[FloatArray], settings: FloatArray) -> Decision:
     """The decision on the first of these frames in the light of those after it."""
-    posterior = own[-1][PROBABILITY]
-    for before, after in reversed(list(pairwise(own))):
+    posterior, least = elements[-1][PROBABILITY], settings[LEAST_TRANSITION]
+    for before, after in reversed(list(pairwise(elements))):
         known, posterior = posterior, np.empty(posterior.shape)
-        look_back(before, after, known, posterior)
-    slip, probability = np.empty(posterior.shape, bool), np.empty(posterior.shape)
-    decide(posterior, settings[THRESHOLD], slip, probability)
-    return Decision(slip, probability)
+        look_back(before, after, known, least, posterior)
+    decision = Decision(np.empty(posterior.shape, bool), np.empty(posterior.shape))
+    decide(posterior, settings[THRESHOLD], decision)
+    return decision
 
 
 METHOD = CompiledMethod(FilterOptions, start, run_filter, revise)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.compilation import compiled
+from slipcore.detection.filter.tuning import Tuning
 from slipcore.frames import FloatArray
 
 
@@ -22,7 +23,7 @@ class Pose(NamedTuple):
     sine: float
 
 
-class Uncertainty(NamedTuple):
+class PoseVariance(NamedTuple):
     """Variance of a fitted pose: of the place of (x, y) m², and of the yaw about it rad²."""
 
     place: float
@@ -66,7 +67,7 @@ def place_of_object(pose: Pose, x: float, y: float) -> tuple[float, float]:
 
 
 @compiled
-def fit_pose(anchors: Anchors, weight: FloatArray, given: FloatArray) -> tuple[Pose, Uncertainty]:
+def fit_pose(anchors: Anchors, weight: FloatArray, given: FloatArray) -> tuple[Pose, PoseVariance]:
     """Weighted Procrustes fit of the pose that carries each anchor to its marker, and its variance.
 
     A stretch is allowed as far as linear theory of so large a rotation would make one; of a ``given`` pose (empty if
@@ -99,9 +100,11 @@ def fit_pose(anchors: Anchors, weight: FloatArray, given: FloatArray) -> tuple[P
         room = turned**6 / 9.0 + 1e-16
         difference = math.atan2(math.sin(yaw - turned), math.cos(yaw - turned))
         pose = pose_at(given[0], given[1], turned + difference * room / (room + variance), stretch)
-        return pose, Uncertainty(0.0, 0.0, mx, my)
+        return pose, PoseVariance(0.0, 0.0, mx, my)
     c, s = stretch * math.cos(yaw), stretch * math.sin(yaw)
-    return pose_at(mx - c * ax + s * ay, my - s * ax - c * ay, yaw, stretch), Uncertainty(1.0 / total, variance, mx, my)
+    return pose_at(mx - c * ax + s * ay, my - s * ax - c * ay, yaw, stretch), PoseVariance(
+        1.0 / total, variance, mx, my
+    )
 
 
 @compiled
@@ -110,31 +113,32 @@ def find_pose(
     before: Pose,
     given: FloatArray,
     variance: float,
-    least_weight: float,
-    rigidity: float,
-    outlier: float,
-) -> tuple[Pose, Uncertainty]:
-    """Pose of the object by iteratively reweighted fits to what most likely sticks; ``variance`` of a marker, m²."""
+    tuning: Tuning,
+) -> tuple[Pose, PoseVariance]:
+    """Pose of the object by iteratively reweighted fits to what most likely sticks; ``variance`` of a marker, m².
+
+    Weights fall with the squared misfit r² over its scale s as 1/(1 + r²/s)² (Geman and McClure, 1987).
+    """
     if len(anchors.x) < 2:
         known = pose_at(given[0], given[1], given[2], 1.0) if given.size else before
-        return known, Uncertainty(0.0, 1e-30, 0.0, 0.0)
-    base = np.maximum(anchors.stick * anchors.stick, least_weight) / (variance + anchors.variance)
-    pose, doubt = fit_pose(anchors, base, given)
+        return known, PoseVariance(0.0, 1e-30, 0.0, 0.0)
+    base = np.maximum(anchors.stick * anchors.stick, tuning.least_weight) / (variance + anchors.variance)
+    pose, spread = fit_pose(anchors, base, given)
     weight = np.empty(len(base))
     for _ in range(2):
         for e in range(len(base)):
             px, py = place_of_object(pose, anchors.x[e], anchors.y[e])
             bx, by = place_of_object(before, anchors.x[e], anchors.y[e])
-            scale = 2.0 * (variance + anchors.variance[e]) + rigidity**2 * ((px - bx) ** 2 + (py - by) ** 2)
-            misfit = ((px - anchors.marker_x[e]) ** 2 + (py - anchors.marker_y[e]) ** 2) / (outlier * scale)
+            scale = 2.0 * (variance + anchors.variance[e]) + tuning.rigidity**2 * ((px - bx) ** 2 + (py - by) ** 2)
+            misfit = ((px - anchors.marker_x[e]) ** 2 + (py - anchors.marker_y[e]) ** 2) / (tuning.outlier * scale)
             weight[e] = base[e] / (1.0 + misfit) ** 2
-        pose, doubt = fit_pose(anchors, weight, given)
-    return pose, doubt
+        pose, spread = fit_pose(anchors, weight, given)
+    return pose, spread
 
 
 @compiled
 def object_motion(
-    anchors: Anchors, before: Pose, pose: Pose, doubt: Uncertainty, margin: float
+    anchors: Anchors, before: Pose, pose: Pose, spread: PoseVariance, margin: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """How far the object carried each anchor, x and y in its own frame, m, and the variance of that, m²: [k] each.
 
@@ -146,7 +150,7 @@ def object_motion(
     for e in range(count):
         px, py = place_of_object(pose, anchors.x[e], anchors.y[e])
         bx, by = place_of_object(before, anchors.x[e], anchors.y[e])
-        noise[e] = doubt.place + doubt.yaw * ((px - doubt.x) ** 2 + (py - doubt.y) ** 2)
+        noise[e] = spread.place + spread.yaw * ((px - spread.x) ** 2 + (py - spread.y) ** 2)
         dx, dy = px - bx, py - by
         size = dx * dx + dy * dy
         share = max(0.0, 1.0 - margin * noise[e] / size) if size > 0.0 else 0.0

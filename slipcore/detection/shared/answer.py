@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from slipcore.compilation import compiled
+from slipcore.detection.shared.records import Decision, FrameArrays, Memory
 from slipcore.detection.shared.rigid_motion import Motion, fit_motion
 from slipcore.frames import BoolArray, FloatArray
 
@@ -12,41 +13,37 @@ from slipcore.frames import BoolArray, FloatArray
 @compiled
 def answer(
     position: FloatArray,
-    interval: float,
-    start: FloatArray,
-    end: FloatArray,
-    pose_before: FloatArray,
-    pose: FloatArray,
-    contact: BoolArray,
+    last: FrameArrays,
+    frame: FrameArrays,
     stays: BoolArray,
-    decided: BoolArray,
-    likely: FloatArray,
-    slipped: BoolArray,
-    was_likely: FloatArray,
-    slip: BoolArray,
-    probability: FloatArray,
+    decision: Decision,
+    before: Memory,
+    after: Memory,
     velocity: FloatArray,
 ) -> tuple[int, int]:
-    """Fill the last three and return how many elements touch and how many of them slip.
+    """Fill slip and ``probability`` of the memory ``after``, and ``velocity`` [n, m, 2]; how many elements touch and
+    how many of them slip.
 
-    What was not in contact before has not slipped. The velocity is that over the last ``interval``, from displacement
-    ``start`` to ``end`` [n, m, 3], of what was in contact all through it, relative to the object: this moves as its
-    poses say, or if one is empty as the elements do that stick before and after, the more surely the more. NaN where it
-    is unobservable.
+    What was not in contact before has not slipped. The velocity is that over the interval from the ``last`` frame, of
+    what was in contact all through it, relative to the object: this moves as its poses say, or if one is missing as the
+    elements do that stick before and after, the more surely the more. NaN where it is unobservable.
     """
+    contact, slip = after.contact, after.slip
+    start, end, pose_before, pose = last.displacement, frame.displacement, last.object_pose, frame.object_pose
+    interval = frame.time - last.time
     n, m = contact.shape
     touching = slipping = 0
     known = pose_before.size > 0 and pose.size > 0
     weight = np.zeros((n, m))
     for i in range(n):
         for j in range(m):
-            s = decided[i, j] and stays[i, j]
-            p = likely[i, j] if stays[i, j] else 0.0
-            slip[i, j], probability[i, j] = s, p
+            s = decision.slip[i, j] and stays[i, j]
+            p = decision.probability[i, j] if stays[i, j] else 0.0
+            slip[i, j], after.probability[i, j] = s, p
             touching += contact[i, j]
             slipping += s
-            if stays[i, j] and not s and not slipped[i, j]:
-                weight[i, j] = (1.0 - p) * (1.0 - was_likely[i, j])
+            if stays[i, j] and not s and not before.slip[i, j]:
+                weight[i, j] = (1.0 - p) * (1.0 - before.probability[i, j])
     if known:
         dx, dy, turn = pose[0] - pose_before[0], pose[1] - pose_before[1], pose[2] - pose_before[2]
         motion = Motion(pose_before[0], pose_before[1], dx, dy, turn)

@@ -15,8 +15,9 @@ _LEAST, _TO_SIGMA = NOISE.least_series, NOISE.deviation_to_sigma
 
 class Touch(NamedTuple):
     """What an element needs to touch: ``least`` N or m, ``share`` of the frame's peak, ``noise`` multiples of it; the
-    share of that under which it is released; the rim's least hollow, as a share of the peak (1: not looked at); and
-    the share of the peak that is enough inside the rim of a contact.
+    share of that under which it is released; the rim's least hollow, as a share of the peak (1: not looked at), and
+    ``rim_noise`` multiples of that of the curvature; the share of the peak that is enough inside the rim of a contact;
+    the share of the rim's hollow that still counts as inside, and the multiple of noise at which it is looked at.
     """
 
     least: float
@@ -24,15 +25,15 @@ class Touch(NamedTuple):
     noise: float
     release: float
     rim: float
+    rim_noise: float
     reach: float
+    inside: float
+    clear: float
 
 
+TOUCH = len(Touch._fields)
 CURVATURE_NOISE = 0.6374
 """Standard deviation of ``curvature`` for white noise of 1 (from the 25 weights of its stencil)."""
-INSIDE_RIM = 0.68
-"""The share of the rim's least hollow up to which an element beside the contact still lies inside (tuning scenes)."""
-CLEAR = 4.0
-"""How many standard deviations that must be for the contact to be followed to its rim: one gap would let it leak."""
 
 
 @compiled
@@ -57,12 +58,12 @@ def find_contact(pressing: FloatArray, sigma: float, before: BoolArray, touch: T
             contact[i, j] = p > threshold or (before[i, j] and p > touch.release * threshold)
     if touch.rim < 1.0 and min(n, m) >= 3:
         noise, bend = CURVATURE_NOISE * known, curvature(pressing)
-        hollow = max(2.0 * noise, touch.rim * peak)
+        hollow = max(touch.rim_noise * noise, touch.rim * peak)
         for i in range(n):
             for j in range(m):
                 contact[i, j] &= bend[i, j] <= hollow
-        inside = INSIDE_RIM * touch.rim * peak
-        if inside > CLEAR * noise:
+        inside = touch.inside * touch.rim * peak
+        if inside > touch.clear * noise:
             reach_rim(pressing, bend, max(touch.least, touch.noise * known, touch.reach * peak), inside, contact)
 
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Generic, NamedTuple, TypeVar
 
 from slipcore.defaults import ContactOptions
+from slipcore.detection.shared.records import Decision
 from slipcore.detection.shared.strain import Lattice
 from slipcore.frames import BoolArray, FloatArray
 
@@ -22,20 +23,13 @@ class Observation(NamedTuple):
 
     interval: float
     displacement: FloatArray
-    normal: FloatArray
     force: FloatArray
+    contact: BoolArray
+    normal: FloatArray
     pressing: FloatArray
     tangential: FloatArray
-    contact: BoolArray
     stays: BoolArray
     noise: float
-
-
-class Decision(NamedTuple):
-    """Slip of each element [n, m] and its probability [n, m]; only looked at where an element stays in contact."""
-
-    slip: BoolArray
-    probability: FloatArray
 
 
 class Method(NamedTuple, Generic[State, Options]):
@@ -50,18 +44,18 @@ class Method(NamedTuple, Generic[State, Options]):
 
 
 class Start(NamedTuple):
-    """What a compiled method begins with: its options as an array, and its memory (see its ``run`` module)."""
+    """What a compiled method begins with: its options as an array, and what it remembers (see ``records.Memory``)."""
 
     settings: FloatArray
-    own: FloatArray
-    numbers: FloatArray
+    elements: FloatArray
+    common: FloatArray
 
 
 class CompiledMethod(NamedTuple, Generic[Options]):
     """A detection method whose whole step is one compiled call, ``run_filter`` or ``run_strain_rate``.
 
-    ``revise``: the decision on a frame from its ``own`` memory and those of the frames after it, and the settings;
-    None for a method that later frames tell nothing.
+    ``revise``: the decision on a frame from the ``elements`` in its memory and in those of frames after it, and the
+    settings; None for a method that later frames tell nothing.
     """
 
     options: type[Options]

@@ -1,57 +1,42 @@
 """What all methods share of a frame: noise, normals, split forces, contact."""
 
+import numpy as np
+
 from slipcore.compilation import compiled, unpack
 from slipcore.defaults import NOISE
-from slipcore.detection.shared.contact import Touch, find_contact
+from slipcore.detection.shared.contact import TOUCH, Touch, find_contact
 from slipcore.detection.shared.noise import noise_of_three, recent_median, remember
+from slipcore.detection.shared.records import FrameArrays, Memory, Sensor, Surface
 from slipcore.detection.shared.surface import split_forces, surface_normals
-from slipcore.frames import BoolArray, FloatArray
+from slipcore.frames import FloatArray
 
 SERIES = NOISE.series
 
 
 @compiled
-def observe(
-    rest_steps: FloatArray,
-    orientation: float,
-    touch: FloatArray,
-    time: float,
-    displacement: FloatArray,
-    force: FloatArray,
-    given_normal: FloatArray,
-    known: BoolArray,
-    before: BoolArray,
-    noise: FloatArray,
-    normal: FloatArray,
-    pressing: FloatArray,
-    tangential: FloatArray,
-    contact: BoolArray,
-    stays: BoolArray,
-    next_noise: FloatArray,
-) -> tuple[float, float]:
-    """Fill the last six and return the noise of a marker coordinate, m, and of ``pressing``, N or m; NaN if unknown.
-
-    ``force``, ``given_normal`` and ``known`` contact are empty where there are none; ``before``: contact in the last
-    frame. ``stays``: in contact now and before. ``noise`` is ``step_noise``'s.
-    """
-    n, m = contact.shape
-    if given_normal.size:
-        normal[:] = given_normal
+def observe(sensor: Sensor, frame: FrameArrays, before: Memory, after: Memory) -> Surface:
+    """What all methods see of a frame; fills contact and the state of the noise estimate in the memory ``after``."""
+    n, m = after.probability.shape
+    normal, pressing, tangential = np.empty(frame.displacement.shape), np.empty((n, m)), np.zeros((n, m))
+    if frame.normal.size:
+        normal[:] = frame.normal
     else:
-        surface_normals(rest_steps, orientation, displacement, normal)
-    if force.size:
-        split_forces(force, normal, pressing, tangential)
+        surface_normals(sensor.rest_steps, sensor.orientation, frame.displacement, normal)
+    if frame.force.size:
+        split_forces(frame.force, normal, pressing, tangential)
     else:
-        pressing[:] = -displacement[..., 2]
-    marker_noise, pressing_noise = step_noise(noise, time, displacement, pressing, next_noise)
-    if known.size:
-        contact[:] = known
+        pressing[:] = -frame.displacement[..., 2]
+    noise = step_noise(before.noise, frame.time, frame.displacement, pressing, after.noise)
+    contact, was = after.contact, before.contact
+    if frame.contact.size:
+        contact[:] = frame.contact
     else:
-        find_contact(pressing, pressing_noise, before, Touch(*unpack(touch, 6)), contact)
+        find_contact(pressing, noise[1], was, Touch(*unpack(sensor.touch, TOUCH)), contact)
+    stays = np.empty((n, m), np.bool_)
     for i in range(n):
         for j in range(m):
-            stays[i, j] = contact[i, j] and before[i, j]
-    return marker_noise, pressing_noise
+            stays[i, j] = contact[i, j] and was[i, j]
+    return Surface(normal, pressing, tangential, stays, noise[0], noise[1])
 
 
 @compiled

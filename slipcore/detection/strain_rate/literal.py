@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from slipcore.defaults import StrainRateLiteralOptions
-from slipcore.detection.shared.interface import Decision, Method, Observation
+from slipcore.detection.shared.interface import Method, Observation
+from slipcore.detection.shared.records import Decision
 from slipcore.detection.shared.strain import (
     Lattice,
     displacement_gradient,

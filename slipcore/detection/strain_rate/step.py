@@ -7,6 +7,7 @@ import numpy as np
 
 from slipcore.compilation import compiled, unpack
 from slipcore.defaults import LIMITS
+from slipcore.detection.shared.records import Decision, Sensor, Surface
 from slipcore.detection.shared.surface import steps_at
 from slipcore.frames import BoolArray, FloatArray
 
@@ -54,21 +55,17 @@ def surface_strains(inverse_jacobian: FloatArray, displacement: FloatArray, norm
 
 @compiled
 def step_strain_rate(
-    elements: FloatArray,
-    settings: FloatArray,
-    inverse_jacobian: FloatArray,
+    sensor: Sensor,
     displacement: FloatArray,
-    normal: FloatArray,
-    stays: BoolArray,
+    surface: Surface,
     interval: float,
-    noise: float,
+    elements: FloatArray,
     after: FloatArray,
-    slip: BoolArray,
-    probability: FloatArray,
+    decision: Decision,
 ) -> None:
-    """Fill the last three; ``noise`` of a marker coordinate, m, NaN if unknown."""
-    chosen = Settings(*unpack(settings, SETTINGS))
-    strain = surface_strains(inverse_jacobian, displacement, normal)
+    """Fill the last two: the memory of the ``elements`` [11, n, m] after the step, and the decision."""
+    chosen, noise = Settings(*unpack(sensor.settings, SETTINGS)), surface.marker_noise
+    strain = surface_strains(sensor.inverse_jacobian, displacement, surface.normal)
     if math.isnan(noise):  # a rate that may be noise alone would live on in the low-pass
         after[:] = elements
         after[XX : XY + 1] = strain
@@ -76,12 +73,12 @@ def step_strain_rate(
         low_pass = smoothing_weight(noise * chosen.mean_noise, interval, chosen)
         gain = low_pass / interval * math.sqrt(2.0 / (2.0 - low_pass))
         floor = np.maximum(chosen.rate_floor, noise * gain * elements[NOISE])
-        flat = strain.reshape((3, floor.size)), stays.reshape(floor.size), floor.reshape(floor.size)
+        flat = strain.reshape((3, floor.size)), surface.stays.reshape(floor.size), floor.reshape(floor.size)
         old, new = elements.reshape((ROWS, floor.size)), after.reshape((ROWS, floor.size))
         step_elements(old, *flat, interval, low_pass, chosen, new)
         after[NOISE] = elements[NOISE]
-    probability[:] = after[SLIP]
-    slip[:] = after[SLIP] > 0.0
+    decision.probability[:] = after[SLIP]
+    decision.slip[:] = after[SLIP] > 0.0
 
 
 @compiled

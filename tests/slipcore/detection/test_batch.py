@@ -5,10 +5,20 @@ from itertools import product
 import numpy as np
 import pytest
 
-from slipcore import LOOKAHEAD, METHODS, GraspLog, Hindsight, InvalidInput, SlipHistory, collect_history, detect_slip
+from slipcore import (
+    LOOKAHEAD,
+    METHODS,
+    FixedLagSmoother,
+    GraspLog,
+    InvalidInput,
+    SlipHistory,
+    collect_history,
+    detect_slip,
+)
 from slipcore.detection.detector import init, step
 from slipcore.detection.filter.method import METHOD
-from slipcore.detection.filter.step import END, ONSET, PROBABILITY, ROWS, Tuning
+from slipcore.detection.filter.state import END, ONSET, PROBABILITY, ROWS
+from slipcore.detection.filter.tuning import Tuning
 
 Same = Callable[[SlipHistory, SlipHistory], None]
 Scene = Callable[..., GraspLog]
@@ -19,13 +29,13 @@ SETTINGS = Tuning._fields
 def late(log: GraspLog, method: str, lookahead: int) -> SlipHistory:
     """What a live user would do who can wait."""
     state = init(log.position, log.element_area, method)
-    hindsight, answers = Hindsight(state, lookahead), []
+    smoother, answers = FixedLagSmoother(state, lookahead), []
     for count, frame in enumerate(log.frames()):
         state, now = step(state, frame)
-        settled = hindsight.take(state, now)
+        settled = smoother.take(state, now)
         assert (settled is None) == (count < lookahead)
         answers += [] if settled is None else [settled]
-    return collect_history([*answers, *hindsight.rest()], state)
+    return collect_history([*answers, *smoother.rest()], state)
 
 
 def posterior_by_enumeration(first: float, steps: np.ndarray, likelihood: np.ndarray) -> np.ndarray:
@@ -55,7 +65,7 @@ def filtered(first: float, steps: np.ndarray, likelihood: np.ndarray) -> list[np
 
 
 @pytest.mark.parametrize("lookahead", [0, 1, 4])
-def test_hindsight_of_a_chain_is_the_sum_over_all_its_paths(lookahead: int) -> None:
+def test_smoother_of_a_chain_is_the_sum_over_all_its_paths(lookahead: int) -> None:
     rng = np.random.default_rng(lookahead)
     steps, likelihood = rng.uniform(0.02, 0.6, (lookahead, 2)), rng.uniform(0.1, 3.0, (lookahead, 2))
     settings = np.zeros(len(SETTINGS))
@@ -102,7 +112,7 @@ def test_more_lookahead_than_frames_is_all_there_is(short_ramp: GraspLog) -> Non
     assert ((history.probability >= 0.0) & (history.probability <= 1.0)).all()
 
 
-def test_what_was_not_observed_stays_unsaid_in_hindsight(short_ramp: GraspLog) -> None:
+def test_what_was_not_observed_stays_unsaid_in_smoother(short_ramp: GraspLog) -> None:
     observed = np.random.default_rng(0).random(short_ramp.displacement.shape[:3]) > 0.05
     history = detect_slip(replace(short_ramp, observed=observed), lookahead=2)
     assert not (history.contact | history.slip)[~observed].any()

@@ -7,13 +7,15 @@ from scipy.special import log_ndtr
 
 from slipcore import FilterOptions, GraspLog, SlipHistory, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
-from slipcore.detection.filter import step as kernels
+from slipcore.detection.filter import state
+from slipcore.detection.filter.element import Increment, Measurement, update_element
 from slipcore.detection.filter.force_ratio import log_normal_cdf, ratio_evidence
 from slipcore.detection.filter.pose import Anchors, find_pose, place_of_object, place_on_object, pose_at
+from slipcore.detection.filter.tuning import Tuning, settings_of
 
 Scene = Callable[..., GraspLog]
 Score = Callable[[GraspLog, SlipHistory], float]
-TUNING = kernels.Tuning(*(float(getattr(FilterOptions(), name)) for name in kernels.Tuning._fields))
+TUNING = Tuning(*settings_of(FilterOptions()))
 
 
 @pytest.mark.parametrize(
@@ -68,9 +70,9 @@ def test_a_fitted_pose_is_the_motion_of_what_sticks_though_a_third_slips() -> No
     moved_x[:12], moved_y[:12] = x[:12], y[:12]  # these stand still
     anchors = Anchors(x.copy(), y.copy(), np.zeros(36), moved_x, moved_y, np.ones(36))
     before = pose_at(0.0, 0.0, 0.0, 1.0)
-    fitted, doubt = find_pose(anchors, before, np.zeros(0), 1e-14, TUNING.least_weight, TUNING.rigidity, TUNING.outlier)
+    fitted, variance = find_pose(anchors, before, np.zeros(0), 1e-14, TUNING)
     np.testing.assert_allclose(fitted[:3], true[:3], rtol=0.0, atol=1e-5)  # 5 % of the motion
-    assert doubt.place > 0.0
+    assert variance.place > 0.0
 
 
 def test_the_log_of_the_normal_distribution_holds_far_out() -> None:
@@ -80,31 +82,19 @@ def test_the_log_of_the_normal_distribution_holds_far_out() -> None:
 
 
 def test_evidence_of_a_force_ratio_rises_to_the_one_that_slips() -> None:
-    evidence = [ratio_evidence(r, 1e-4, 0.0, 0.0, 0.4, 0.03, 0.1, 0.15) for r in (0.1, 0.25, 0.4, 0.5)]
+    tuning = TUNING._replace(ratio_spread=0.1, ratio_difference=0.15)
+    evidence = [ratio_evidence(r, 1e-4, 0.0, 0.0, 0.4, 0.03, tuning) for r in (0.1, 0.25, 0.4, 0.5)]
     assert evidence[0] < evidence[1] < 0.0 < evidence[2] <= evidence[3]
 
 
-def updated(p: float, motion: float, share: float, home: bool) -> float:
+def updated(p: float, motion: float, share: float, restick: bool) -> float:
     """Slip probability after the object went by ``motion`` and the element came along but for that share of it."""
-    old, new = np.zeros((kernels.ROWS, 1, 1)), np.zeros((kernels.ROWS, 1, 1))
-    old[kernels.PROBABILITY] = p
-    old[kernels.STICK_VARIANCE] = old[kernels.SLIP_VARIANCE] = 1e-12
-    kernels.update_element(
-        old,
-        0,
-        0,
-        (motion, 0.0),
-        0.0,
-        0.04 if home else 2.0,
-        home,
-        0.0,
-        (-share * motion, 0.0),
-        1e-12,
-        1.0 / 30.0,
-        TUNING,
-        new,
-    )
-    return float(new[kernels.PROBABILITY, 0, 0])
+    old, new = np.zeros((state.ROWS, 1, 1)), np.zeros((state.ROWS, 1, 1))
+    old[state.PROBABILITY] = p
+    old[state.STICK_VARIANCE] = old[state.SLIP_VARIANCE] = 1e-12
+    seen = Measurement(motion, 0.0, 0.0, 0.04 if restick else 2.0, 0.0, -share * motion, 0.0)
+    update_element(old, new, 0, 0, seen, Increment(1.0 / 30.0, 1e-12, restick), TUNING)
+    return float(new[state.PROBABILITY, 0, 0])
 
 
 def moved_element(share: float, p: float = 0.01) -> float:
@@ -117,6 +107,6 @@ def test_what_comes_along_sticks_and_what_stays_behind_slips() -> None:
     assert moved_element(0.0, p=0.99) < 0.5
 
 
-def test_pressing_home_ends_slip_without_motion() -> None:
-    for home, least, most in ((False, 0.95, 1.0), (True, 0.0, 0.1)):
-        assert least <= updated(0.99, 0.0, 0.0, home) <= most
+def test_restick_under_load_ends_slip_without_motion() -> None:
+    for restick, least, most in ((False, 0.95, 1.0), (True, 0.0, 0.1)):
+        assert least <= updated(0.99, 0.0, 0.0, restick) <= most

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from slipcore.detection.shared.answer import answer
+from slipcore.detection.shared.records import Decision, FrameArrays, Memory
 from slipcore.detection.shared.rigid_motion import fit_motion
 
 SHAPE = (4, 5)
@@ -9,7 +10,8 @@ RNG = np.random.default_rng(3)
 ROW, COLUMN = np.meshgrid(np.arange(4.0), np.arange(5.0), indexing="ij")
 POSITION = 1e-3 * np.stack([ROW, COLUMN, 0 * ROW], axis=-1)
 START = 1e-4 * RNG.standard_normal((*SHAPE, 3))
-NO_POSE = np.zeros(0)
+NO_POSE, NO_FIELD, NO_MASK = np.zeros(0), np.zeros((0, 0, 3)), np.zeros((0, 0), bool)
+NO_MEMORY = np.zeros((0, 0)), np.zeros((0, 0, 0)), np.zeros(0)
 
 
 def carried(displacement: np.ndarray, angle: float, shift: tuple[float, float]) -> np.ndarray:
@@ -25,12 +27,15 @@ def said(end: np.ndarray, slips: np.ndarray, poses: tuple[np.ndarray, np.ndarray
     contact[0, 0] = False
     stays = contact.copy()
     stays[1, 1] = False
-    slip, probability, velocity = np.empty(SHAPE, bool), np.empty(SHAPE), np.empty((*SHAPE, 2))
-    touching, slipping = answer(
-        POSITION, 0.1, START, end, *poses, contact, stays, slips, likely, nothing, likely * 0.0,
-        slip, probability, velocity,
-    )  # fmt: skip
-    return touching, slipping, slip, probability, velocity
+    last, frame = (
+        FrameArrays(time, displacement, NO_FIELD, pose, NO_FIELD, NO_MASK)
+        for time, displacement, pose in ((0.0, START, poses[0]), (0.1, end, poses[1]))
+    )
+    before = Memory(contact, nothing, likely * 0.0, *NO_MEMORY)
+    after = Memory(contact, np.empty(SHAPE, bool), np.empty(SHAPE), *NO_MEMORY)
+    velocity = np.empty((*SHAPE, 2))
+    counts = answer(POSITION, last, frame, stays, Decision(slips, likely), before, after, velocity)
+    return *counts, after.slip, after.probability, velocity
 
 
 def test_velocity_is_relative_to_what_sticks_and_unknown_of_what_has_just_touched() -> None:

@@ -72,14 +72,14 @@ def test_beyond_the_rim_the_shape_is_hollow() -> None:
     x, y = np.meshgrid(np.arange(-9.0, 10.0), np.arange(-9.0, 10.0))
     r = np.hypot(x, y) / 5.0
     outside = np.maximum(r, 1.0)
-    sunk = np.where(
+    indentation = np.where(
         r <= 1.0, 1.0 - r**2 / 2.0, ((2.0 - outside**2) * np.arcsin(1.0 / outside) + np.sqrt(outside**2 - 1.0)) / np.pi
     )  # Hertz: the surface beyond the contact follows it down
     found = contact_from_shape(
-        1e-3 * sunk, np.nan, None, replace(OPTIONS, contact_depth_share=0.3, rim_curvature=0.008)
+        1e-3 * indentation, np.nan, None, replace(OPTIONS, contact_depth_share=0.3, rim_curvature=0.008)
     )
     assert np.count_nonzero(found ^ (r <= 1.0)) <= 0.15 * np.count_nonzero(r <= 1.0)
-    deeper = contact_from_shape(1e-3 * sunk, np.nan, None, replace(OPTIONS, contact_depth_share=0.3))
+    deeper = contact_from_shape(1e-3 * indentation, np.nan, None, replace(OPTIONS, contact_depth_share=0.3))
     assert np.count_nonzero(deeper) > 1.5 * np.count_nonzero(r <= 1.0)
 
 
@@ -87,8 +87,8 @@ def test_beyond_the_rim_the_shape_is_hollow() -> None:
 def test_on_a_bonded_gel_the_contact_is_followed_to_its_rim_while_noise_allows(noise: float, part: float) -> None:
     x, y = np.meshgrid(np.arange(-9.0, 10.0), np.arange(-9.0, 10.0))
     r = np.hypot(x, y) / 6.0
-    sunk = 4e-4 * np.maximum(1.0 - r**2, 0.0)  # a thin layer sinks in under the object and nowhere else
-    seen = sunk + noise * np.random.default_rng(0).standard_normal(sunk.shape)
+    indentation = 4e-4 * np.maximum(1.0 - r**2, 0.0)  # a thin layer sinks in under the object and nowhere else
+    seen = indentation + noise * np.random.default_rng(0).standard_normal(indentation.shape)
     found = contact_from_shape(seen, noise, None, FilterOptions())
     assert np.count_nonzero(found & (r < 1.0)) > part * np.count_nonzero(r < 1.0)
     assert np.count_nonzero(found & (r < 1.0)) < (part + 0.15) * np.count_nonzero(r < 1.0)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from slipcore import GraspLog, StrainRateOptions, detect_slip
+from slipcore.detection.shared.records import Decision, Sensor, Surface
 from slipcore.detection.shared.strain import Lattice, frobenius, lattice_steps, signed_rate, surface_strain
 from slipcore.detection.strain_rate import step as kernel
 from slipcore.detection.strain_rate.method import start
@@ -29,19 +30,19 @@ def step(
     elements: np.ndarray, displacement: np.ndarray, stays: np.ndarray, interval: float, noise: float = 1e-9
 ) -> tuple[np.ndarray, np.ndarray]:
     normal = np.broadcast_to([0.0, 0.0, 1.0], displacement.shape).copy()
-    after, slip, probability = np.empty_like(elements), np.empty(stays.shape, bool), np.empty(stays.shape)
-    settings, jacobian = start(lattice(), OPTIONS).settings, lattice().inverse_jacobian
-    step_strain_rate(
-        elements, settings, jacobian, displacement, normal, stays, interval, noise, after, slip, probability
-    )
-    np.testing.assert_array_equal(probability, slip)
-    return after, slip
+    after, decision = np.empty_like(elements), Decision(np.empty(stays.shape, bool), np.empty(stays.shape))
+    rest, nothing = lattice(), np.zeros(stays.shape)
+    sensor = Sensor(rest.position, rest.steps, rest.inverse_jacobian, 1.0, np.zeros(0), start(rest, OPTIONS).settings)
+    surface = Surface(normal, nothing, nothing, stays, noise, np.nan)
+    step_strain_rate(sensor, displacement, surface, interval, elements, after, decision)
+    np.testing.assert_array_equal(decision.probability, decision.slip)
+    return after, decision.slip
 
 
 def play(stretches: list[float], stays_at_last: bool = True, interval: float = INTERVAL) -> tuple[np.ndarray, list]:
     """The state and the slip of one element while the surface is stretched uniformly, sticking at first."""
     everywhere = np.ones((5, 5), bool)
-    state, _ = step(start(lattice(), OPTIONS).own, stretched(stretches[0]), ~everywhere, np.inf)
+    state, _ = step(start(lattice(), OPTIONS).elements, stretched(stretches[0]), ~everywhere, np.inf)
     slips = []
     for k, stretch in enumerate(stretches[1:]):
         stays = everywhere & (stays_at_last or k < len(stretches) - 2)
@@ -166,7 +167,7 @@ def test_the_kernel_says_what_whole_arrays_say() -> None:
     wander = 4e-5 * np.cumsum(rng.standard_normal((80, 5, 5, 3)) * (np.arange(80) > 20)[:, None, None, None], axis=0)
     displacements = wander + noise * rng.standard_normal(wander.shape)
     everywhere, found = np.ones((5, 5), bool), []
-    state, _ = step(start(lattice(), OPTIONS).own, displacements[0], ~everywhere, np.inf, noise)
+    state, _ = step(start(lattice(), OPTIONS).elements, displacements[0], ~everywhere, np.inf, noise)
     for displacement in displacements[1:]:
         state, slip = step(state, displacement, everywhere, INTERVAL, noise)
         found.append(slip)

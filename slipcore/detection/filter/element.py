@@ -1,0 +1,126 @@
+"""One element's step: an interacting-multiple-model filter of its place on the object, stuck or slipping."""
+
+import math
+from typing import NamedTuple
+
+from slipcore.compilation import compiled
+from slipcore.detection.filter.state import (
+    END,
+    ONSET,
+    PROBABILITY,
+    SLIP_VARIANCE,
+    SLIP_X,
+    SLIP_Y,
+    STICK_VARIANCE,
+    STICK_X,
+    STICK_Y,
+)
+from slipcore.detection.filter.tuning import Tuning
+from slipcore.frames import FloatArray
+
+
+class Increment(NamedTuple):
+    """What is common to all elements of a step: its duration s, variance of a marker coordinate m², and whether the
+    growing normal load makes everything stick again.
+    """
+
+    interval: float
+    variance: float
+    restick: bool
+
+
+class Measurement(NamedTuple):
+    """What a step brings to an element: how far the object carried it, m, and the variance of that, m²; how much more
+    readily it begins to slip than ``onset_length`` and ``onset_time`` say; log-odds of slip from its forces; and where
+    its marker is in the object's frame, m.
+    """
+
+    motion_x: float
+    motion_y: float
+    motion_variance: float
+    readiness: float
+    force_evidence: float
+    x: float
+    y: float
+
+
+class Estimate(NamedTuple):
+    """A place in the object's frame, m, and the variance of each coordinate, m²."""
+
+    x: float
+    y: float
+    variance: float
+
+
+@compiled
+def update_element(
+    old: FloatArray, new: FloatArray, i: int, j: int, seen: Measurement, increment: Increment, tuning: Tuning
+) -> None:
+    """Mix, predict and correct the two states (Blom and Bar-Shalom, IEEE Trans. Autom. Control 33 (1988) 780).
+
+    With p the slip probability, a and b those that a sticking element begins to slip and a slipping one sticks:
+    predicted p' = p(1 − b) + (1 − p)a; log-odds += log N(z; slip) − log N(z; stick) + force evidence. A marker far
+    from both predictions was lost and found elsewhere: it tells nothing, but is believed if it stays there.
+    """
+    p, size2 = old[PROBABILITY, i, j], seen.motion_x * seen.motion_x + seen.motion_y * seen.motion_y
+    onset, end = transitions(math.sqrt(size2), seen.readiness, increment, tuning)
+    slip_probability = expected(p, onset, end, tuning.least_transition)
+    stick = Estimate(old[STICK_X, i, j], old[STICK_Y, i, j], old[STICK_VARIANCE, i, j])
+    slip = Estimate(old[SLIP_X, i, j], old[SLIP_Y, i, j], old[SLIP_VARIANCE, i, j])
+    kept_stick, kept_slip = (1.0 - p) * (1.0 - onset) / (1.0 - slip_probability), p * (1.0 - end) / slip_probability
+    drift = tuning.creep**2 * increment.interval
+    stuck = mix(stick, slip, kept_stick, drift, (tuning.rigidity_of_anchor * tuning.rigidity) ** 2 * size2)
+    slid = mix(slip, stick, kept_slip, drift, tuning.slip_share_spread**2 * size2)
+    slid = Estimate(
+        slid.x - tuning.slip_share * seen.motion_x, slid.y - tuning.slip_share * seen.motion_y, slid.variance
+    )
+    noise = increment.variance + seen.motion_variance + (tuning.rigidity_of_fit * tuning.rigidity) ** 2 * size2
+    stick2 = (seen.x - stuck.x) ** 2 + (seen.y - stuck.y) ** 2
+    slip2 = (seen.x - slid.x) ** 2 + (seen.y - slid.y) ** 2
+    stick_variance, slip_variance = stuck.variance + noise, slid.variance + noise
+    gained = 0.5 * stick2 / stick_variance - 0.5 * slip2 / slip_variance + math.log(stick_variance / slip_variance)
+    trust, most = 1.0, tuning.largest_log_odds
+    if stick2 > tuning.outlier_gate * stick_variance and slip2 > tuning.outlier_gate * slip_variance:
+        trust = 0.0
+        stuck = Estimate(stuck.x, stuck.y, stuck.variance + tuning.outlier_spread * stick2)
+        slid = Estimate(slid.x, slid.y, slid.variance + tuning.outlier_spread * slip2)
+    odds = math.log(slip_probability / (1.0 - slip_probability)) + trust * min(max(gained, -most), most)
+    odds = min(max(odds + seen.force_evidence, -most), most)
+    new[ONSET, i, j], new[END, i, j], new[PROBABILITY, i, j] = onset, end, 1.0 / (1.0 + math.exp(-odds))
+    new[STICK_X, i, j], new[STICK_Y, i, j], new[STICK_VARIANCE, i, j] = correct(stuck, seen, noise, trust)
+    new[SLIP_X, i, j], new[SLIP_Y, i, j], new[SLIP_VARIANCE, i, j] = correct(slid, seen, noise, trust)
+
+
+@compiled
+def transitions(motion: float, readiness: float, increment: Increment, tuning: Tuning) -> tuple[float, float]:
+    """Probability that a sticking element begins to slip in a step, and that a slipping one sticks again."""
+    interval = increment.interval
+    onset = -math.expm1(-(motion / tuning.onset_length + interval / tuning.onset_time) * readiness)
+    rate = motion / tuning.end_length + interval / tuning.end_time
+    if increment.restick:
+        rate += tuning.pressing_rate * interval
+    return onset, -math.expm1(-rate)
+
+
+@compiled
+def expected(p: float, onset: float, end: float, least: float) -> float:
+    """How probable slip is after a step in which a sticking element begins to slip, and a slipping one to stick, so."""
+    return min(max(p * (1.0 - end) + (1.0 - p) * onset, least), 1.0 - least)
+
+
+@compiled
+def mix(own: Estimate, other: Estimate, kept: float, drift: float, spread: float) -> Estimate:
+    """Mean of two estimates with weights ``kept`` and the rest; its variance grown by ``drift`` + ``spread``, m²."""
+    left = 1.0 - kept
+    apart = 0.5 * ((own.x - other.x) ** 2 + (own.y - other.y) ** 2)
+    variance = kept * own.variance + left * other.variance + kept * left * apart
+    return Estimate(kept * own.x + left * other.x, kept * own.y + left * other.y, variance + drift + spread)
+
+
+@compiled
+def correct(predicted: Estimate, seen: Measurement, noise: float, trust: float) -> tuple[float, float, float]:
+    """Kalman update of a prediction by what was seen with variance ``noise``, m²; none at no ``trust``."""
+    gain = trust * predicted.variance / (predicted.variance + noise)
+    x = predicted.x + gain * (seen.x - predicted.x)
+    y = predicted.y + gain * (seen.y - predicted.y)
+    return x, y, predicted.variance * (1.0 - gain)

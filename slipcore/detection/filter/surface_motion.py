@@ -1,0 +1,82 @@
+"""How the object's surface moves: as what sticks says, or as far as it follows the known motion of its body."""
+
+import math
+
+import numpy as np
+
+from slipcore.compilation import compiled
+from slipcore.detection.filter.pose import Anchors, Pose, PoseVariance, find_pose, place_of_object, place_on_object
+from slipcore.detection.filter.state import FOLLOWING, POSE
+from slipcore.detection.filter.tuning import Tuning
+from slipcore.detection.shared.records import FrameArrays
+from slipcore.frames import FloatArray
+
+NOT_GIVEN = np.zeros(0)
+
+
+@compiled
+def step_pose(
+    anchors: Anchors,
+    before: Pose,
+    last: FrameArrays,
+    frame: FrameArrays,
+    variance: float,
+    tuning: Tuning,
+    common: FloatArray,
+) -> tuple[Pose, PoseVariance]:
+    """Where the surface is now, put into ``common`` too; ``variance`` of a marker coordinate, m²."""
+    pose, spread = find_pose(anchors, before, NOT_GIVEN, variance, tuning)
+    if frame.object_pose.size and last.object_pose.size:
+        step = frame.object_pose - last.object_pose
+        step[2] = math.atan2(math.sin(step[2]), math.cos(step[2]))
+        if len(anchors.x) < 2:
+            common[FOLLOWING] = common[FOLLOWING + 1] = tuning.following_weight
+            known = frame.object_pose.copy()
+        else:
+            learn_following(anchors, before, pose, spread, body_motion(anchors, last.object_pose, step), tuning, common)
+            share = following_share(common, tuning)
+            known = np.array([before.x + share * step[0], before.y + share * step[1], before.yaw + share * step[2]])
+        pose, spread = find_pose(anchors, before, known, variance, tuning)
+    for value in range(4):
+        common[POSE + value] = pose[value]
+    return pose, spread
+
+
+@compiled
+def body_motion(anchors: Anchors, pose: FloatArray, step: FloatArray) -> tuple[float, float, float, float]:
+    """Centre of the anchors' markers, m, and how far a ``step`` of the body from its ``pose`` [3] carries it, m."""
+    x, y = anchors.marker_x.mean(), anchors.marker_y.mean()
+    return x, y, step[0] - step[2] * (y - pose[1]), step[1] + step[2] * (x - pose[0])
+
+
+@compiled
+def learn_following(
+    anchors: Anchors,
+    before: Pose,
+    fitted: Pose,
+    spread: PoseVariance,
+    carried: tuple[float, float, float, float],
+    tuning: Tuning,
+    common: FloatArray,
+) -> None:
+    """Learn the share of the body's motion that the surface of a soft object follows, while little slips."""
+    x, y, dx, dy = carried
+    ax, ay = place_on_object(before, x, y)
+    fx, fy = place_of_object(fitted, ax, ay)
+    size = dx * dx + dy * dy
+    weight = 1.0 / (spread.place + tuning.following_variance * size + 1e-30)
+    along = (fx - x) * dx + (fy - y) * dy
+    begins = common[FOLLOWING + 1] < tuning.following_learning * tuning.following_weight
+    if along > tuning.following_least * size and (begins or anchors.stick.mean() > tuning.following_stick):
+        common[FOLLOWING] += weight * along
+        common[FOLLOWING + 1] += weight * size
+
+
+@compiled
+def following_share(common: FloatArray, tuning: Tuning) -> float:
+    """The share learnt; all of it while it is not clearly less."""
+    known = common[FOLLOWING + 1]
+    share = common[FOLLOWING] / known if known > 0.0 else 1.0
+    if share > tuning.following_whole or (1.0 - share) ** 2 * known < tuning.following_deviations**2:
+        return 1.0
+    return float(share)
