@@ -299,7 +299,7 @@ def whitened_errors(draws: np.ndarray, long: np.ndarray) -> dict[str, float]:
 
 
 def ols_part(options: argparse.Namespace) -> list[Row]:
-    """Time and peak memory of least squares, with its cluster jackknife."""
+    """Time and peak memory of least squares, with its cluster-robust errors."""
     rows: list[Row] = []
     for n in (2_000, 200_000) if options.quick else (2_000, 200_000, 2_000_000):
         data = make(n, 1, elements=400)

@@ -1,4 +1,4 @@
-"""Standard errors where samples share errors: the cluster jackknife (CR3), from sums over clusters."""
+"""Standard errors where samples share errors (CR2) and their degrees of freedom, from sums over clusters."""
 
 from collections.abc import Iterable
 
@@ -9,7 +9,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 FEW = 3
-"""Clusters a direction from which the jackknife stands alone: 9 clusters for the three coefficients."""
+"""Clusters a direction from which the cluster-robust variance stands alone: 9 clusters for the three coefficients."""
 
 DOMINANT = 0.8
 """Share of the information on a direction above which the cluster that holds it is alone there."""
@@ -38,28 +38,51 @@ def _block_sums(
     return square, score
 
 
-def jackknife(square: FloatArray, score: FloatArray, scale: float) -> FloatArray:
+def cluster_robust(square: FloatArray, score: FloatArray, scale: float) -> FloatArray:
     """Covariance [r, r] of Qᵀy when errors are shared within clusters.
 
-    CR3 of Bell & McCaffrey (2002), (G − 1)/G Σ (I − Q_g'Q_g)⁻¹ s_g s_g' (I − Q_g'Q_g)⁻¹, is the jackknife over
-    clusters and errs on the wide side when there are few. But G clusters span G − 1 directions at most, and a
-    direction that one cluster alone determines has no jackknife: both would come out as *certain*. So with fewer than
-    ``FEW`` clusters a direction no direction is given less than the classical variance, with fewer clusters than
-    directions + 2 none less than the mean over directions; and however many they are, a direction that one of them
-    dominates is given no less than the worst has: how far a cluster is off as a whole, only the others tell.
+    CR2 of Bell & McCaffrey (2002), Σ A_g s_g s_g' A_g with A_g = (I − Q_g'Q_g)^{-1/2}, is unbiased where errors are
+    independent after all. But G clusters span G − 1 directions at most, and a direction that one cluster alone
+    determines leaves no residual: both would come out as *certain*. So with fewer than ``FEW`` clusters a direction no
+    direction is given less than the classical variance, with fewer clusters than directions + 2 none less than the
+    mean over directions; and however many they are, a direction that one of them dominates is given no less than the
+    worst has: how far a cluster is off as a whole, only the others tell.
     """
     count, size = score.shape
     values, vectors = np.linalg.eigh(square)
-    remainder = 1.0 - values
-    inverse = np.where(remainder > 1e-8, 1.0 / np.maximum(remainder, 1e-8), 0.0)
-    moved = np.einsum("gij,gj,gkj,gk->gi", vectors, inverse, vectors, score, optimize=True)
-    covariance = (count - 1) / count * moved.T @ moved
+    moved = np.einsum("gij,gj,gkj,gk->gi", vectors, _inverse_root(values), vectors, score, optimize=True)
+    covariance = moved.T @ moved
     worst = max(scale**2, float(np.linalg.eigvalsh(covariance)[-1]))
     if count < FEW * size:
         covariance = _raise_all(
             covariance, scale**2 if count >= size + 2 else max(scale**2, np.trace(covariance) / size)
         )
     return _raise_dominated(covariance, values[:, -1], vectors[..., -1], worst)
+
+
+def satterthwaite(square: FloatArray, contrasts: FloatArray) -> FloatArray:
+    """Degrees of freedom [k] of the CR2 variance of contrasts [k, r] of Qᵀy, were errors independent.
+
+    The variance is a quadratic form in normal errors, (tr Γ)²/tr Γ² χ² as Bell & McCaffrey (2002) and Pustejovsky &
+    Tipton (2018, eq. 11) match it; Γ_gh = δ_gh w_g'Q_g'Q_g w_g − z_g'z_h with w_g = A_g c and z_g = Q_g'Q_g w_g. Where
+    few clusters, or clusters that differ, tell a contrast, it is far below G − 1.
+    """
+    values, vectors = np.linalg.eigh(square)
+    along = np.einsum("gij,ki->kgj", vectors, contrasts)
+    turned = along * (values * _inverse_root(values))
+    own = np.einsum("kgj,kgj,gj->kg", along, along, values * _inverse_root(values) ** 2)
+    z = np.einsum("gij,kgj->kgi", vectors, turned)
+    shared = np.einsum("kgi,kgi->kg", z, z)
+    cross = np.einsum("kgi,kgj->kij", z, z)
+    trace = (own - shared).sum(axis=1)
+    squares = (own**2 - 2.0 * own * shared).sum(axis=1) + np.einsum("kij,kij->k", cross, cross)
+    return np.maximum(np.where(squares > 0.0, trace**2 / np.where(squares > 0.0, squares, 1.0), 1.0), 1.0)
+
+
+def _inverse_root(values: FloatArray) -> FloatArray:
+    """(1 − value)^{-1/2}, and 0 where a cluster alone determines a direction."""
+    remainder = 1.0 - values
+    return np.where(remainder > 1e-8, 1.0 / np.sqrt(np.maximum(remainder, 1e-8)), 0.0)
 
 
 def _raise_all(covariance: FloatArray, least: float) -> FloatArray:

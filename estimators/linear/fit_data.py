@@ -11,7 +11,7 @@ from estimators.defaults import MIN_SAMPLES
 from estimators.errors import InvalidSamples, TooFewSamples
 from estimators.friction_model import Domain
 from estimators.linear.grasp_statistics import Columns, GraspStatistics
-from estimators.linear.least_squares import Factor, factorise, upper_triangle
+from estimators.linear.least_squares import Factor, factorise
 from estimators.linear.observations import Observations, codes_of, observe
 from estimators.linear.statistics import SufficientStatistics
 
@@ -72,29 +72,11 @@ class FitData:
             return _statistics_of_samples(self.observations)
         return tuple(grasp for block in self.blocks for grasp in block.grasps or (_of_one_place(block),))
 
-    def cluster_means(self) -> "ClusterMeans":
-        """Weight and mean of each cluster, and the spread within clusters."""
-        if self.observations is None:
-            return _means_of_blocks(self)
-        return _means_of_samples(self.observations)
-
     def raw(self, method: str) -> Observations:
         """The samples; raises ``InvalidSamples`` where there are moments only."""
         if self.observations is None:
             raise InvalidSamples("samples", "moments only", f'the samples themselves, which "{method}" needs')
         return self.observations
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ClusterMeans:
-    """``weight`` [g] and ``mean`` [g, 3] of (v, f_n, μ) in each cluster, and the spread about those means.
-
-    ``within`` [3, 4]: rows in (1, v, f_n | μ) with all the sums of squares and products about the clusters' means.
-    """
-
-    weight: FloatArray
-    mean: FloatArray
-    within: FloatArray
 
 
 def gather(
@@ -148,23 +130,6 @@ def relative(factor: Factor, whole: SufficientStatistics) -> Factor:
     return Factor(factor.weight * unit, factor.mean, factor.triangle * np.sqrt(unit))
 
 
-def _means_of_samples(observations: Observations) -> ClusterMeans:
-    columns, cluster = observations.columns(), observations.cluster
-    weight = np.bincount(cluster, observations.weight).astype(float)
-    sums = [np.bincount(cluster, observations.weight * column) for column in columns.T]
-    mean = np.stack(sums, axis=1) / weight[:, None]
-    inside = factorise(columns - mean[cluster], observations.weight, intercept=False)
-    return ClusterMeans(weight, mean, _without_constant(inside.triangle))
-
-
-def _means_of_blocks(data: FitData) -> ClusterMeans:
-    whole = data.blocks[0].merge(*data.blocks[1:])
-    parts = [relative(block.factor, whole) for block in data.blocks]
-    inside = upper_triangle(np.concatenate([part.triangle for part in parts]))
-    weight, mean = np.array([part.weight for part in parts]), np.array([part.mean for part in parts], dtype=float)
-    return ClusterMeans(weight, mean, _without_constant(inside))
-
-
 def _statistics_of_samples(observations: Observations) -> tuple[GraspStatistics, ...]:
     values, order = observations.columns(), np.argsort(observations.grasp, kind="stable")
     place = observations.cluster if observations.cluster_kind == "time block" else observations.element
@@ -186,7 +151,3 @@ def _of_one_place(block: SufficientStatistics) -> GraspStatistics:
         total_weight=factor.weight,
         weight_square=block.weight_square,
     )
-
-
-def _without_constant(triangle: NDArray[np.floating]) -> FloatArray:
-    return np.column_stack([np.zeros(len(triangle)), triangle.astype(float)])

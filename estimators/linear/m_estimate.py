@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.defaults import REFERENCE
-from estimators.linear.cluster_errors import cluster_sums, jackknife
+from estimators.linear.cluster_errors import cluster_sums
+from estimators.linear.coefficient_errors import CoefficientErrors, clustered_errors
 from estimators.linear.fit_data import FitData
 from estimators.linear.least_squares import LinearFit, factorise, solve, triangular_inverse, upper_triangle
 from estimators.linear.observations import Observations
-from estimators.linear.orthonormal import in_coefficients, orthonormal
+from estimators.linear.orthonormal import orthonormal
 
 FloatArray = NDArray[np.float64]
 
@@ -61,14 +62,14 @@ class Plane(NamedTuple):
 
 
 class MEstimate(NamedTuple):
-    """The weighted least squares that an M-estimate is, ``linear``, with a cluster-robust ``covariance`` [3, 3].
+    """The weighted least squares that an M-estimate is, ``linear``, with cluster-robust ``errors``.
 
     ``scale`` of the errors; ``downweighted``: part of the samples with less than half weight; ``settled``: whether the
     iteration came to rest.
     """
 
     linear: LinearFit
-    covariance: FloatArray
+    errors: CoefficientErrors
     scale: float
     downweighted: float
     settled: bool
@@ -78,7 +79,7 @@ def m_estimate(data: FitData, observations: Observations, loss: Loss, seed: int 
     """MM-estimate (Yohai, 1987): least trimmed squares from random elemental fits, then an M-step with its scale fixed.
 
     It breaks down at half of the samples; outliers that lie clear of the plane hardly move it, be they one or 45 %.
-    The errors are the cluster jackknife of the weighted fit, times what the loss adds.
+    The errors are CR2 of the weighted fit, times what the loss adds, with Satterthwaite's degrees of freedom.
     """
     linear = solve(data.factor, REFERENCE.spans(data.element_area))
     design, _ = orthonormal(observations, linear)
@@ -182,6 +183,9 @@ def _weighted_fit(observations: Observations, weight: FloatArray, plane: Plane, 
     base = observations.weight[used]
     correction = float(base @ weight[used] / max(base @ loss.slope(u), 0.2 * (base @ weight[used])))
     scale = plane.scale * float(np.sqrt(np.average(u**2, weights=kept.weight) / normal_square(loss)))
-    covariance = jackknife(*cluster_sums([(design, residual, kept.cluster)], kept.clusters), scale) * correction**2
     downweighted = float(np.average(weight < 0.5, weights=observations.weight))
-    return MEstimate(linear, in_coefficients(linear, covariance), scale, downweighted, settled)
+    sums = cluster_sums([(design, residual, kept.cluster)], kept.clusters)
+    errors = clustered_errors(linear, *sums, scale, max(observations.effective_n - 1.0 - linear.rank, 1.0))
+    corrected = linear.prior_covariance + correction**2 * (errors.covariance - linear.prior_covariance)
+    errors = errors._replace(covariance=corrected, standard=correction * errors.standard)
+    return MEstimate(linear, errors, scale, downweighted, settled)

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from estimators.defaults import REFERENCE
 from estimators.friction_model import FrictionModel
-from estimators.linear.cluster_errors import cluster_sums, jackknife
+from estimators.linear.cluster_errors import cluster_sums
+from estimators.linear.coefficient_errors import CoefficientErrors, clustered_errors
 from estimators.linear.fit_data import FitData
 from estimators.linear.least_squares import LinearFit, solve
 from estimators.linear.observations import IntArray
@@ -23,29 +24,29 @@ STATSMODELS_LIMIT = 20_000
 
 
 def fit(data: FitData) -> FrictionModel:
-    """Least squares of μ on (1, v, f_n), weighted; the covariance is the cluster jackknife with t on G − 1 degrees.
+    """Least squares of μ on (1, v, f_n), weighted, with CR2 errors and Satterthwaite's degrees of freedom.
 
     Clusters are grasps where there are two or more, else elements, else stretches of time; the moments of a single
-    grasp know of none, and errors are then taken to be independent. The noise of μ = f_t/f_n grows as 1/f_n: the
-    jackknife is valid under it, the classical errors in the diagnostics are not.
+    grasp know of none, and errors are then taken to be independent. The noise of μ = f_t/f_n grows as 1/f_n: errors
+    from the clusters allow for it, the classical errors in the diagnostics do not.
     """
     begin = time.perf_counter()
     linear = solve(data.factor, REFERENCE.spans(data.element_area))
     residual_degrees = data.effective_n - 1.0 - linear.rank
     scale = float(linear.residual_norm / np.sqrt(residual_degrees))
-    covariance, errors = _cluster_robust(data, linear, scale)
-    degrees = residual_degrees if data.clusters < 2 else min(residual_degrees, float(data.clusters - 1))
-    diagnostics = errors | {
+    errors = _errors(data, linear, scale, residual_degrees)
+    diagnostics = {
         "r_squared": r_squared(data.factor.triangle, linear.residual_norm),
         **by_coefficient("standard_error_classical", np.sqrt(np.diag(classical(linear, scale)))),
+        **_of_clusters(data, linear, errors),
     }
     return report(
         data,
         "ols",
         linear.coefficients,
-        covariance,
+        errors.covariance,
         scale,
-        degrees,
+        errors.degrees_of_freedom,
         begin,
         diagnostics,
         linear,
@@ -64,20 +65,27 @@ def r_squared(triangle: NDArray[np.floating], residual_norm: float) -> float:
     return 1.0 - (residual_norm / total) ** 2 if total > 0.0 else 0.0
 
 
-def _cluster_robust(data: FitData, linear: LinearFit, scale: float) -> tuple[FloatArray, Diagnostics]:
-    """Covariance [3, 3] by the cluster jackknife where there are clusters, and what statsmodels says beside it."""
-    observations = data.observations
+def _errors(data: FitData, linear: LinearFit, scale: float, residual_degrees: float) -> CoefficientErrors:
+    """Errors from the clusters where there are any, else those of independent samples."""
     if data.clusters < 2:
-        return classical(linear, scale), {}
-    if observations is None:
-        blocks: Iterable[Rows] = [_of_blocks(data, linear)]
-    else:
-        blocks = orthonormal_blocks(observations, linear)
-    covariance = in_coefficients(linear, jackknife(*cluster_sums(blocks, data.clusters), scale))
-    errors = by_coefficient("standard_error_cluster", np.sqrt(np.diag(covariance)))
+        covariance = classical(linear, scale)
+        degrees = np.full(3, residual_degrees)
+        return CoefficientErrors(covariance, residual_degrees, degrees, np.sqrt(np.diag(covariance)))
+    seen = data.observations
+    blocks: Iterable[Rows] = [_of_blocks(data, linear)] if seen is None else orthonormal_blocks(seen, linear)
+    return clustered_errors(linear, *cluster_sums(blocks, data.clusters), scale, residual_degrees)
+
+
+def _of_clusters(data: FitData, linear: LinearFit, errors: CoefficientErrors) -> Diagnostics:
+    """The errors by coefficient, and what statsmodels says beside them."""
+    if data.clusters < 2:
+        return {}
+    told = by_coefficient("standard_error_cluster", errors.standard)
+    told |= by_coefficient("degrees_of_freedom", errors.degrees)
+    observations = data.observations
     if observations is not None and len(observations) <= STATSMODELS_LIMIT:
-        errors |= _statsmodels_errors(*orthonormal(observations, linear), observations.cluster, linear)
-    return covariance, errors
+        told |= _statsmodels_errors(*orthonormal(observations, linear), observations.cluster, linear)
+    return told
 
 
 def _of_blocks(data: FitData, linear: LinearFit) -> Rows:

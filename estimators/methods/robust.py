@@ -2,8 +2,6 @@
 
 import time
 
-import numpy as np
-
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.linear.fit_data import FitData
@@ -26,14 +24,15 @@ def fit(data: FitData, loss: str = "tukey", seed: int = 0) -> FrictionModel:
         data,
         "robust",
         found.linear.coefficients,
-        found.covariance,
+        found.errors.covariance,
         found.scale,
-        min(degrees, max(data.clusters - 1.0, 1.0)),
+        found.errors.degrees_of_freedom,
         begin,
         {
             "loss": loss,
             "downweighted": found.downweighted,
-            **by_coefficient("standard_error_cluster", np.sqrt(np.diag(found.covariance))),
+            **by_coefficient("standard_error_cluster", found.errors.standard),
+            **by_coefficient("degrees_of_freedom", found.errors.degrees),
         },
         scatter_degrees_of_freedom=degrees,
     )

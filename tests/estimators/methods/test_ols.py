@@ -41,14 +41,50 @@ def test_coefficients_and_errors_are_those_of_statsmodels(samples: Make) -> None
     np.testing.assert_allclose(model.diagnostics["r_squared"], reference.rsquared, rtol=1e-9)
 
 
-def test_cluster_errors_are_the_jackknife_over_clusters(samples: Make) -> None:
-    data = samples(300, elements=12)
+def inverse_root(matrix: np.ndarray) -> np.ndarray:
+    values, vectors = np.linalg.eigh(matrix)
+    return (vectors / np.sqrt(values)) @ vectors.T
+
+
+def dense_cr2(x: np.ndarray, residual: np.ndarray, cluster: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """CR2 standard errors [3] and Satterthwaite's degrees of freedom [3] with every matrix of size n written out."""
+    inverse = np.linalg.inv(x.T @ x)
+    left = np.eye(len(x)) - x @ inverse @ x.T
+    meat, columns = np.zeros((3, 3)), []
+    for code in np.unique(cluster):
+        rows = cluster == code
+        adjusted = inverse_root(left[np.ix_(rows, rows)])
+        score = x[rows].T @ adjusted @ residual[rows]
+        meat += np.outer(score, score)
+        columns.append(left[:, rows] @ adjusted @ x[rows] @ inverse)
+    degrees = []
+    for k in range(3):
+        g = np.stack([column[:, k] for column in columns], axis=1)
+        gamma = g.T @ g
+        degrees.append(np.trace(gamma) ** 2 / np.sum(gamma**2))
+    return np.sqrt(np.diag(inverse @ meat @ inverse)), np.array(degrees)
+
+
+@pytest.mark.parametrize("elements", [9, 30])
+def test_cluster_errors_and_their_degrees_of_freedom_are_those_of_cr2(samples: Make, elements: int) -> None:
+    data = samples(200, elements=elements)
     model = estimators.fit(data)
-    x, y = design(data), data.friction_coefficient
-    left_out = np.array([np.linalg.lstsq(x[data.element != g], y[data.element != g])[0] for g in range(12)])
-    moved = left_out - model.coefficients
-    np.testing.assert_allclose(model.covariance, 11 / 12 * moved.T @ moved, rtol=1e-7)  # lstsq squares no less
-    assert model.degrees_of_freedom == 11.0
+    x = design(data) * [1.0, 1e3, 10.0]  # well scaled, as the dense formula needs it
+    residual = data.friction_coefficient - design(data) @ model.coefficients
+    wanted, degrees = dense_cr2(x, residual, data.element)
+    found = np.array([model.diagnostics[f"degrees_of_freedom_beta{k}"] for k in range(3)])
+    np.testing.assert_allclose(standard_errors(model, "cluster"), wanted * [1.0, 1e3, 10.0], rtol=1e-7)
+    np.testing.assert_allclose(found, degrees, rtol=1e-7)
+    assert (found < elements - 1).all()
+    half = stats.t(degrees).ppf(0.975) * wanted * [1.0, 1e3, 10.0]
+    np.testing.assert_allclose(model.interval()[:, 1] - model.coefficients, half, rtol=1e-6)
+
+
+def test_degrees_of_freedom_fall_where_one_cluster_tells_most(samples: Make) -> None:
+    even = estimators.fit([samples(60, seed=g) for g in range(10)])
+    uneven = estimators.fit([samples(2000 if g == 0 else 30, seed=g) for g in range(10)])
+    assert even.degrees_of_freedom > 8.5
+    assert uneven.degrees_of_freedom < 3.0
 
 
 def test_intervals_cover_the_truth_and_predictions_a_new_observation(samples: Make, truth: np.ndarray) -> None:

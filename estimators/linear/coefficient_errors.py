@@ -1,0 +1,44 @@
+"""Errors of coefficients where samples share errors: a covariance and degrees of freedom that fit each coefficient."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from estimators.linear.cluster_errors import cluster_robust, satterthwaite
+from estimators.linear.least_squares import LinearFit
+from estimators.linear.orthonormal import in_coefficients
+
+FloatArray = NDArray[np.float64]
+
+
+class CoefficientErrors(NamedTuple):
+    """``covariance`` [3, 3], the scale matrix of a Student-t on ``degrees_of_freedom``, with which the 95 % interval of
+    each coefficient is that of its ``standard`` error [3] on its own ``degrees`` [3].
+
+    ``degrees_of_freedom`` are those of friction at the mean of the data.
+    """
+
+    covariance: FloatArray
+    degrees_of_freedom: float
+    degrees: FloatArray
+    standard: FloatArray
+
+
+def clustered_errors(
+    linear: LinearFit, square: FloatArray, score: FloatArray, scale: float, most: float
+) -> CoefficientErrors:
+    """CR2 errors with Satterthwaite's degrees of freedom, at ``most`` those of the residuals.
+
+    ``square`` [g, r, r] and ``score`` [g, r]: as from ``cluster_sums``.
+    """
+    root = linear.root.astype(float)
+    at_mean = np.eye(1, root.shape[1])
+    known = np.linalg.norm(root, axis=1, keepdims=True) > 0.0
+    found = satterthwaite(square, np.concatenate([at_mean, np.where(known, root, at_mean)]))
+    freedom, degrees = min(float(found[0]), most), np.minimum(found[1:], most)
+    covariance = cluster_robust(square, score, scale)
+    ratio = special.stdtrit(degrees, 0.975) / special.stdtrit(freedom, 0.975)
+    scaled = linear.prior_covariance + np.outer(ratio, ratio) * (root @ covariance @ root.T)
+    return CoefficientErrors(scaled, freedom, degrees, np.sqrt(np.diag(in_coefficients(linear, covariance))))
