@@ -178,7 +178,8 @@ class RunnerRow(Base):
 class JobRow(Base):
     """A durable job. A grasp log has exactly one, its ingest. A running one is claimed by its runner.
 
-    ``requested_by`` is the access key with which it was asked for, NULL without one.
+    ``requested_by`` is the access key with which it was asked for, NULL without one. The turns order the queue
+    (``repositories.turns``).
     """
 
     __tablename__ = "jobs"
@@ -191,6 +192,10 @@ class JobRow(Base):
         CheckConstraint("(status = 'running') = (runner_id IS NOT NULL)", name="runner"),
         CheckConstraint("status NOT IN ('failed', 'refused', 'cancelled') OR reason IS NOT NULL", name="reason"),
         Index(None, "status", "created_at", "id"),  # the next one is found without a look at the others
+        Index(None, "status", "turn"),
+        Index(None, "status", "requested_by", "turn"),
+        Index(None, "status", "requested_by", "turn_within_key"),
+        Index(None, "status", "requested_by", "material_id", "is_long", "turn_within_key"),
         Index(None, "finished_at"),  # and so is what ended since a monitor last asked
         Index(None, "created_at", "id"),
     )
@@ -210,6 +215,9 @@ class JobRow(Base):
     model_version: Mapped[int | None]
     trace: Mapped[str | None] = mapped_column(String(55))
     requested_by: Mapped[str | None] = mapped_column(ForeignKey("access_keys.id"))
+    is_long: Mapped[bool] = mapped_column(default=False)
+    turn: Mapped[int] = mapped_column(BigInteger, default=0)
+    turn_within_key: Mapped[int] = mapped_column(BigInteger, default=0)
     created_at: Mapped[datetime] = mapped_column(default=now)
     finished_at: Mapped[datetime | None]
 

@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 from db.errors import ClaimLost, NotFound
 from db.paging import Window, windowed
 from db.records import Claim, Job, JobKind, JobStatus
+from db.repositories import turns
 from db.tables import JobRow, MaterialRow, now
 
 
@@ -23,10 +24,12 @@ def add(
     seed: int = 0,
     trace: str | None = None,
     requested_by: str | None = None,
+    is_long: bool = False,
 ) -> str:
     """Store a queued job and return its id; ``trace`` tells where in a trace it was asked for (W3C traceparent).
 
-    ``requested_by`` is the id of the access key with which it was asked for.
+    ``requested_by`` is the id of the access key with which it was asked for; a job that ``is_long`` lets more of
+    others go before it.
     """
     row = JobRow(
         id=uuid.uuid4().hex,
@@ -39,6 +42,8 @@ def add(
         seconds={},
         trace=trace,
         requested_by=requested_by,
+        is_long=is_long,
+        **turns.new(session, requested_by, material_id, is_long=is_long),
     )
     session.add(row)
     session.flush()
@@ -94,18 +99,11 @@ def any_queued(session: Session) -> bool:
 
 
 def claim(session: Session, runner_id: str, besides: Collection[str] = ()) -> Claim | None:
-    """Give the oldest queued job to a runner, if there is one; runners that claim at once get different ones.
+    """Give the queued job whose turn it is to a runner, if there is one; runners that claim at once get different ones.
 
     ``besides``: jobs that the runner is still at, whatever a database that crashed remembers of its claims.
     """
-    oldest = (
-        select(JobRow.id)
-        .where(JobRow.status == "queued", JobRow.id.not_in(besides))
-        .order_by(JobRow.created_at, JobRow.id)
-        .limit(1)
-        .with_for_update(skip_locked=True)
-    )
-    job_id = session.scalar(oldest)
+    job_id = turns.first(session, JobRow.id.not_in(besides))
     if job_id is None:
         return None
     session.execute(update(JobRow).where(JobRow.id == job_id).values(status="running", runner_id=runner_id))
@@ -128,7 +126,9 @@ def start_stage(session: Session, claim: Claim, stage: str, seconds: Mapping[str
 def requeue(session: Session, job_id: str, requested_by: str | None = None) -> None:
     """Put a job that has ended back into the queue, as if it had just been added; nothing happens to another."""
     changes = {"status": "queued", "stage": None, "reason": None, "deaths": 0, "finished_at": None}
+    row = session.get_one(JobRow, job_id)
     changes |= {"requested_by": requested_by}
+    changes |= turns.new(session, requested_by, row.material_id, is_long=row.is_long)
     session.execute(update(JobRow).where(JobRow.id == job_id, JobRow.finished_at.is_not(None)).values(**changes))
 
 

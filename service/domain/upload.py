@@ -34,6 +34,9 @@ from slipcore.errors import InvalidInput
 
 LONGEST_SENSOR_NAME = 200
 
+LONG_FRAMES, LONG_ELEMENTS = 100_000, 1_000_000
+"""Frames, and elements of all frames, beyond which an ingest takes a second: such jobs let others go first."""
+
 Result = TypeVar("Result")
 
 
@@ -218,8 +221,15 @@ def _accept(session: Session, log: NewGraspLog, asker: Asker) -> Answer:
         log = replace(log, material_id=material_id)
     try:
         log_id, status = grasp_logs.add(session, log), 202
-        key_id = asker.key_id
-        queue(session, "ingest", "ols", material_id=log.material_id, grasp_log_id=log_id, requested_by=key_id)
+        queue(
+            session,
+            "ingest",
+            "ols",
+            material_id=log.material_id,
+            grasp_log_id=log_id,
+            requested_by=asker.key_id,
+            is_long=log.frames > LONG_FRAMES or log.frames * log.grid[0] * log.grid[1] > LONG_ELEMENTS,
+        )
     except AlreadyExists:
         log_id, status = grasp_logs.find_id(session, log.sha256, log.material_id, log.detector), 200
         job = grasp_logs.get(session, log_id).job

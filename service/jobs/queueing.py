@@ -23,10 +23,12 @@ def queue(
     grasp_log_id: str | None = None,
     seed: int = 0,
     requested_by: str | None,
+    is_long: bool = False,
 ) -> str:
     """Store a job and return its id; the log then has it beside the id of the request that asks for it.
 
-    ``requested_by`` is the id of the access key with which it is asked for, None without one.
+    ``requested_by`` is the id of the access key with which it is asked for, None without one. A fit that is not cheap
+    is long in any case.
     """
     job_id = jobs.add(
         session,
@@ -37,6 +39,7 @@ def queue(
         seed=seed,
         trace=traces.place(),
         requested_by=requested_by,
+        is_long=is_long or (kind == "fit" and method not in CHEAP_METHODS),
     )
     logger.info("job queued", extra=logs.of(job=job_id, kind=kind))
     return job_id
