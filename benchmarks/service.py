@@ -2,13 +2,13 @@
 
 Uploads, one after the other, of 200-frame logs of 20×20 elements with forces: seconds to the answer and to the stored
 fit by least squares; then fits of the same material, asked for one after the other: by `bayes`, and by `conjugate`,
-which is a job with next to nothing to compute. Then look-ups on 32 connections, beside a bare Starlette route that
-returns the same bytes by the same uvicorn: requests a second, CPU seconds a request of the server, and latencies,
-alone, while uploads run, and where each asks the database. Servers, workers and these callers share the machine.
+which is a job with next to nothing to compute. Then look-ups on 32 connections, beside bare Starlette routes that
+return the same bytes by the same uvicorn, without a log, on h11 and asyncio and on httptools and uvloop: requests a
+second, CPU seconds a request of the server, and latencies, alone, while uploads run, and where each asks the database.
+Each server has one core, the callers and the workers share the others.
 Writes service.json and service.png.
 """
 
-import asyncio
 import os
 import socket
 import subprocess
@@ -18,7 +18,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
@@ -26,6 +25,7 @@ import httpx
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks.http_load import CALLERS, CONNECTIONS, Load, Target, in_turn, load, pin
 from benchmarks.pages import options, picture_folder, save, write
 from benchmarks.postgresql import running_postgresql
 from slipcore.contact import RampSchedule, tangential_ramp
@@ -35,7 +35,8 @@ from stiction_client.container import encode
 MATERIAL = "benchmark"
 LOOK_UP = f"/v1/materials/{MATERIAL}/friction?v=0.001&fn=0.05&quantile=0.05"
 NPZ = {"content-type": "application/vnd.stiction.grasp-log+npz"}
-CONNECTIONS, REQUESTS, UNCACHED, UPLOADS = 32, 6400, 960, 30
+UPLOADS = 30
+FAST = "bare Starlette, httptools and uvloop"
 BARE = """
 import sys, uvicorn
 from starlette.applications import Starlette
@@ -44,19 +45,9 @@ from starlette.routing import Route
 body = sys.stdin.buffer.read()
 async def answer(request): return Response(body, media_type="application/json")
 routes = [Route("/v1/materials/{name}/friction", answer)]
-uvicorn.run(Starlette(routes=routes), port=int(sys.argv[1]), http="h11", server_header=False)
+options = {"http": sys.argv[2], "loop": sys.argv[3], "server_header": False, "access_log": False}
+uvicorn.run(Starlette(routes=routes), port=int(sys.argv[1]), **options)
 """
-
-
-@dataclass(frozen=True, slots=True)
-class Load:
-    """Look-ups of one server: requests a second, CPU seconds of its process a request, latencies in s."""
-
-    what: str
-    rate: float
-    cpu: float
-    p50: float
-    p99: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,44 +90,6 @@ def free_port() -> int:
     """One that nothing listens on now."""
     with socket.create_server(("127.0.0.1", 0)) as found:
         return int(found.getsockname()[1])
-
-
-def cpu_seconds(process: int) -> float:
-    """Processor time that a process has taken, without its children."""
-    fields = Path(f"/proc/{process}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-async def ask(port: int, header: str, count: int, latencies: list[float]) -> None:
-    """So many requests on one connection, by a client that costs next to nothing."""
-    reader, writer = await asyncio.open_connection("127.0.0.1", port)
-    request = f"GET {LOOK_UP} HTTP/1.1\r\nHost: localhost\r\n{header}\r\n".encode()
-    for _ in range(count):
-        begin = time.perf_counter()
-        writer.write(request)
-        head = (await reader.readuntil(b"\r\n\r\n")).lower()
-        assert head.startswith((b"http/1.1 200", b"http/1.1 304")), head
-        if b"content-length: " in head:
-            await reader.readexactly(int(head.split(b"content-length: ")[1].split(b"\r\n")[0]))
-        latencies.append(time.perf_counter() - begin)
-    writer.close()
-
-
-def load(what: str, port: int, process: int, header: str = "", requests: int = REQUESTS) -> Load:
-    """All connections at once."""
-
-    async def everybody() -> list[float]:
-        latencies: list[float] = []
-        await asyncio.gather(*(ask(port, header, requests // CONNECTIONS, latencies) for _ in range(CONNECTIONS)))
-        return latencies
-
-    asyncio.run(everybody())
-    cpu, begin = cpu_seconds(process), time.perf_counter()
-    latencies = asyncio.run(everybody())
-    seconds = time.perf_counter() - begin
-    cpu = cpu_seconds(process) - cpu
-    p50, p99 = np.percentile(latencies, [50, 99])
-    return Load(what, len(latencies) / seconds, cpu / len(latencies), float(p50), float(p99))
 
 
 def content(seed: int) -> bytes:
@@ -213,6 +166,7 @@ def serving(**settings: str) -> Iterator[tuple[str, int, int]]:
                 time.sleep(0.05)
             FrictionClient(url).create_material(MATERIAL)
             uploads(url, 3, first_seed=0)
+            pin(process)
             yield url, port, process
 
 
@@ -227,31 +181,38 @@ def measure() -> tuple[list[Requests], list[Load]]:
         loads = looked_up(url, port, process)
     uncached = {"STICTION_LOOKUP_SECONDS": "0"}
     with serving(**uncached) as (_, port, process):
-        loads.append(load("look-up, asking SQLite", port, process, requests=UNCACHED))
+        loads.append(load(Target("look-up, asking SQLite", port, process, LOOK_UP)))
     with (
         running_postgresql() as server,
         serving(STICTION_DATABASE_URL=server.create(), **uncached) as (url, port, process),
     ):
         found.append(fits(url, "conjugate", UPLOADS, where=" on PostgreSQL"))
-        loads.append(load("look-up, asking PostgreSQL", port, process, requests=UNCACHED))
+        loads.append(load(Target("look-up, asking PostgreSQL", port, process, LOOK_UP)))
     return found, loads
 
 
 def looked_up(url: str, port: int, process: int) -> list[Load]:
     """Look-ups of a model in memory, and of the same bytes from a bare route."""
     answer = httpx.get(url + LOOK_UP).raise_for_status()
-    tag = f"If-None-Match: {answer.headers['etag']}\r\n"
-    other = free_port()
-    with running([sys.executable, "-c", BARE, str(other)], other, answer.content) as bare:
-        return [
-            load("bare Starlette", other, bare),
-            load("look-up", port, process),
-            load("look-up, not modified", port, process, tag),
-            beside(
-                lambda k: uploads(url, 1, first_seed=300 + k),
-                lambda: load("look-up beside uploads and fits", port, process),
-            ),
+    with bare(answer.content, "h11", "asyncio") as slow, bare(answer.content, "httptools", "uvloop") as quick:
+        targets = [
+            Target(FAST, *quick, LOOK_UP),
+            Target("look-up", port, process, LOOK_UP),
+            Target("look-up, not modified", port, process, LOOK_UP, f"If-None-Match: {answer.headers['etag']}"),
+            Target("bare Starlette, h11 and asyncio", *slow, LOOK_UP),
         ]
+        alone = in_turn(targets)
+    busy = Target("look-up beside uploads and fits", port, process, LOOK_UP)
+    return [*alone, beside(lambda k: uploads(url, 1, first_seed=300 + k), lambda: load(busy, 10.0))]
+
+
+@contextmanager
+def bare(body: bytes, parser: str, loop: str) -> Iterator[tuple[int, int]]:
+    """A server of one route that always gives the same answer: its port and process."""
+    port = free_port()
+    with running([sys.executable, "-c", BARE, str(port), parser, loop], port, body) as process:
+        pin(process)
+        yield port, process
 
 
 def draw(found: list[Requests], loads: list[Load]) -> Figure:
@@ -280,9 +241,12 @@ def tables(found: list[Requests], loads: list[Load]) -> dict[str, str]:
         f"| {1e3 * max(e.fitted):.0f} ms |"
         for e in found
     ]
-    second = ["| 32 connections | requests/s | CPU a request | p50 | p99 |", "|---|---|---|---|---|"]
+    bare_rate = next(each.rate for each in loads if each.what == FAST)
+    head = f"| 32 connections of {CALLERS} | requests/s | of the first | CPU a request | p50 | p99 |"
+    second = [head, "|---|---|---|---|---|---|"]
     second += [
-        f"| {e.what} | {e.rate:.0f} | {1e6 * e.cpu:.0f} µs | {1e3 * e.p50:.0f} ms | {1e3 * e.p99:.0f} ms |"
+        f"| {e.what} | {e.rate:.0f} | {e.rate / bare_rate:.2f} | {1e6 * e.cpu:.0f} µs | {1e3 * e.p50:.1f} ms "
+        f"| {1e3 * e.p99:.1f} ms |"
         for e in loads
     ]
     return {"uploads": "\n".join(first), "look-ups": "\n".join(second)}

@@ -1,10 +1,11 @@
 """What surrounds every request: its id, the bounds of what is read of it, and the headers of its answer."""
 
 import asyncio
+import os
 import re
 import time
-import uuid
 from collections.abc import Mapping
+from itertools import chain
 
 from fastapi import Request
 from starlette.exceptions import HTTPException
@@ -87,7 +88,8 @@ class _Sender:
     async def __call__(self, message: Message) -> None:
         if message["type"] == "http.response.start":
             self.has_begun = True
-            message = {**message, "headers": completed(message["headers"], self._scope, self._request_id)}
+            said = completed(message["headers"], self._scope)
+            message = {**message, "headers": [id_header(self._request_id), *said]}
         await self._send(message)
 
 
@@ -114,14 +116,19 @@ class _Receiver:
         return message
 
 
-def completed(headers: Headers, scope: Scope, request_id: str) -> Headers:
+def completed(headers: Headers, scope: Scope) -> Headers:
     """The headers of an answer, and those that every one has, unless it says something else itself."""
     said = dict(headers)
-    return [*headers, *(header for header in _usual(scope, said, request_id) if header[0] not in said)]
+    return [*headers, *(header for header in _usual(scope, said) if header[0] not in said)]
 
 
-def _usual(scope: Scope, said: Mapping[bytes, bytes], request_id: str) -> Headers:
-    usual = [(b"x-request-id", request_id.encode()), *OF_ALL]
+def id_header(request_id: str) -> tuple[bytes, bytes]:
+    """The header by which an answer tells the id of its request."""
+    return b"x-request-id", request_id.encode()
+
+
+def _usual(scope: Scope, said: Mapping[bytes, bytes]) -> Headers:
+    usual = [*OF_ALL]
     if scope["scheme"] == "https":
         usual.append(OF_TLS)
     if said.get(b"content-type", b"").startswith(b"text/html"):
@@ -132,13 +139,13 @@ def _usual(scope: Scope, said: Mapping[bytes, bytes], request_id: str) -> Header
 
 def size_of_headers(scope: Scope) -> int:
     """Bytes of their names and values."""
-    return sum(len(name) + len(value) for name, value in scope["headers"])
+    return sum(map(len, chain.from_iterable(scope["headers"])))
 
 
 def request_id_of(scope: Scope) -> str:
     """The id that the client gave, if it is one that may stand in a log and a header."""
     given = next((value for name, value in scope["headers"] if name == b"x-request-id"), b"")
-    return given.decode() if _ID.fullmatch(given) else uuid.uuid4().hex
+    return given.decode() if _ID.fullmatch(given) else os.urandom(16).hex()
 
 
 def _check(scope: Scope) -> None:

@@ -3,6 +3,7 @@
 import math
 import re
 import time
+from functools import lru_cache
 
 from fastapi import Request
 from starlette.concurrency import run_in_threadpool
@@ -187,10 +188,15 @@ def _check_host(connection: HTTPConnection) -> None:
     A page of that name has been made to lead here, and a browser on this machine now asks for it (DNS rebinding).
     """
     host = connection.headers.get("host", "localhost")
-    name = host.rpartition(":")[0] if re.search(r":\d*$", host) else host
-    if _is_local(connection.scope) and not is_loopback(name.strip("[]").lower()):
+    if _is_local(connection.scope) and not _is_own_name(host):
         allowed = "localhost or a loopback address, or a request with a key"
         raise Problem.wrong_value(MISDIRECTED_REQUEST, "Host", host, allowed)
+
+
+@lru_cache(maxsize=256)
+def _is_own_name(host: str) -> bool:
+    name = host.rpartition(":")[0] if re.search(r":\d*$", host) else host
+    return is_loopback(name.strip("[]").lower())
 
 
 def _is_local(scope: Scope) -> bool:

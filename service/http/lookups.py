@@ -36,10 +36,16 @@ _PATH = re.compile(r"/v1/materials/([A-Za-z0-9][A-Za-z0-9 ._-]{0,99})/friction")
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """What is sent to who has an older answer or none, and to who has this one."""
+    """What is sent but for the request's id: status, headers and body."""
 
-    whole: Response
-    unchanged: Response
+    status: int
+    headers: envelope.Headers
+    body: bytes
+
+    @classmethod
+    def of(cls, response: Response, scope: Scope) -> "Answer":
+        """A response with the headers that every one has."""
+        return cls(response.status_code, envelope.completed(response.raw_headers, scope), bytes(response.body))
 
 
 class Lookups:
@@ -60,43 +66,48 @@ class Lookups:
             await self.app(scope, receive, send)
             return
         request_id = envelope.request_id_of(scope)
-        headers = envelope.completed(answer.raw_headers, scope, request_id)
-        await send({"type": "http.response.start", "status": answer.status_code, "headers": headers})
+        headers = [envelope.id_header(request_id), *answer.headers]
+        await send({"type": "http.response.start", "status": answer.status, "headers": headers})
         await send({"type": "http.response.body", "body": answer.body})
-        self._answered.note("GET", ROUTE.path, answer.status_code, time.perf_counter() - begin, request_id)
+        self._answered.note("GET", ROUTE.path, answer.status, time.perf_counter() - begin, request_id)
 
-    def _answer(self, scope: Scope) -> Response | None:
+    def _answer(self, scope: Scope) -> Answer | None:
         found = _PATH.fullmatch(scope["path"])
         asked = _read(scope["query_string"]) if found and len(scope["query_string"]) <= LONGEST_QUERY else None
         if found is None or asked is None or envelope.size_of_headers(scope) > MOST_HEADER_BYTES:
             return None
-        connection = HTTPConnection(scope)
+        connection, (method, question) = HTTPConnection(scope), asked
         context: Context = scope["app"].state.context
-        known = context.models.fresh(found[1], asked.method)
+        known = context.models.fresh(found[1], method)
         if known is None or not self._admission.admits_at_once(connection):
             return None
-        context.models.renew(context.database, known, found[1], asked.method)
-        answer = _answered_before(known, Question(asked.v, asked.fn, asked.quantile))
+        context.models.renew(context.database, known, found[1], method)
         traces.name_request("GET", ROUTE.path)
         listed = connection.headers.get("if-none-match")
-        return answer.whole if listed is None or not is_one_of(known.tag, listed) else answer.unchanged
+        has_it = listed is not None and is_one_of(known.tag, listed)
+        return _answered_before(known, None if has_it else question, scope)
 
 
-def _answered_before(known: KnownModel, question: Question) -> Answer:
-    """The answer to a question, made where nobody asked it yet."""
-    answer = known.answers.get(question)
+def _answered_before(known: KnownModel, question: Question | None, scope: Scope) -> Answer:
+    """The answer to a question, made where nobody asked it yet so; without one, to who has the answer already."""
+    key = None if question is None else scope["query_string"], scope["scheme"]
+    answer: Answer | None = known.answers.get(key)
     if answer is None:
-        body = look_up(known, question).model_dump_json()
-        answer = Answer(whole(known.tag, body), unchanged(known.tag))
+        if question is None:
+            response = unchanged(known.tag)
+        else:
+            response = whole(known.tag, look_up(known, question).model_dump_json())
+        answer = Answer.of(response, scope)
         if len(known.answers) < MOST_ANSWERS:
-            known.answers[question] = answer
+            known.answers[key] = answer
     return answer
 
 
 @lru_cache(maxsize=4096)
-def _read(query: bytes) -> LookUpQuery | None:
-    """What a query asks, None for one that the route has to refuse."""
+def _read(query: bytes) -> tuple[str, Question] | None:
+    """Method and question of a query, None for one that the route has to refuse."""
     try:
-        return LookUpQuery.model_validate(dict(parse_qsl(query.decode("latin-1"), keep_blank_values=True)))
+        asked = LookUpQuery.model_validate(dict(parse_qsl(query.decode("latin-1"), keep_blank_values=True)))
     except ValueError:  # pydantic's, or of the address
         return None
+    return asked.method, Question(asked.v, asked.fn, asked.quantile)
