@@ -13,7 +13,7 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import NamedTuple, TypeVar, cast
 
 from db.blobs import disk_errors_named
 from db.errors import StorageUnavailable
@@ -64,6 +64,13 @@ def read_plain(path: Path, name: str) -> Description:
     return describe(name, formats.read(path, formats.FORMATS[name].content_type))
 
 
+class _Idle(NamedTuple):
+    """A process without work: whose file it read last, and what will end it."""
+
+    owner: str
+    timer: asyncio.TimerHandle
+
+
 class Readers:
     """Reads what is uploaded: small logs of our own formats in a thread, all else in processes.
 
@@ -79,7 +86,8 @@ class Readers:
         self._most_here = room // 4
         self._seconds = seconds
         self._turns = Turns(size, "read")
-        self._idle: dict[ProcessPoolExecutor, asyncio.TimerHandle] = {}
+        self._size, self._busy = size, 0
+        self._idle: dict[ProcessPoolExecutor, _Idle] = {}
 
     async def describe(self, source: Path, name: str, unpacked: int, owner: str = "") -> Description:
         """Read a log in one of our own formats, of so many bytes ``unpacked``; raises ``InvalidInput``."""
@@ -108,29 +116,39 @@ class Readers:
 
     async def _do(self, do: Callable[[], Result], name: str, seconds: float, owner: str) -> Result:
         async with self._turns.turn(owner):
-            executor = await self._take()
+            self._busy += 1
             try:
-                done = asyncio.get_running_loop().run_in_executor(executor, _outcome, do)
-                result, error = await asyncio.wait_for(done, seconds)
-            except TimeoutError as lost:
-                _end(executor)
-                raise InvalidInput("file", f"not read within {seconds:.3g} s", "a smaller or undamaged file") from lost
-            except BrokenProcessPool as lost:
-                _end(executor)
-                raise InvalidInput("file", f"such that its {name} reader died of it", "an undamaged file") from lost
-            except BaseException:
-                _end(executor)
-                raise
-            self._keep(executor)
+                result, error = await self._in_process(do, name, seconds, owner)
+            finally:
+                self._busy -= 1
         if error is not None:
             raise error
         return cast(Result, result)
 
-    async def _take(self) -> ProcessPoolExecutor:
+    async def _in_process(
+        self, do: Callable[[], Result], name: str, seconds: float, owner: str
+    ) -> tuple[Result | None, Exception | None]:
+        """What came of it; the process is kept, or ended where the file keeps it or has ended it."""
+        executor = await self._take(owner)
+        try:
+            done = asyncio.get_running_loop().run_in_executor(executor, _outcome, do)
+            outcome = await asyncio.wait_for(done, seconds)
+        except TimeoutError as lost:
+            _end(executor)
+            raise InvalidInput("file", f"not read within {seconds:.3g} s", "a smaller or undamaged file") from lost
+        except BrokenProcessPool as lost:
+            _end(executor)
+            raise InvalidInput("file", f"such that its {name} reader died of it", "an undamaged file") from lost
+        except BaseException:
+            _end(executor)
+            raise
+        self._keep(executor, owner)
+        return outcome
+
+    async def _take(self, owner: str) -> ProcessPoolExecutor:
         """A process that runs: one that is idle, or a new one where those were lost or there is none."""
-        while self._idle:
-            executor, timer = self._idle.popitem()
-            timer.cancel()
+        while (executor := self._choose(owner)) is not None:
+            self._idle.pop(executor).timer.cancel()
             if await _runs(executor):
                 return executor
         executor = spawned.process(_bound)
@@ -138,11 +156,21 @@ class Readers:
             raise StorageUnavailable("the process that reads uploads does not start")
         return executor
 
-    def _keep(self, executor: ProcessPoolExecutor) -> None:
-        self._idle[executor] = asyncio.get_running_loop().call_later(IDLE_SECONDS, self._retire, executor)
+    def _choose(self, owner: str) -> ProcessPoolExecutor | None:
+        """The owner's last process; another's only where there may be no more: who loses his own waits for a new one.
+
+        Whoever sends files by which processes are lost would otherwise take those that others have warm.
+        """
+        own = next((executor for executor, idle in self._idle.items() if idle.owner == owner), None)
+        may_start = len(self._idle) + self._busy <= self._size  # who asks is counted and has none yet
+        return own if own is not None or may_start else next(iter(self._idle), None)
+
+    def _keep(self, executor: ProcessPoolExecutor, owner: str) -> None:
+        timer = asyncio.get_running_loop().call_later(IDLE_SECONDS, self._retire, executor)
+        self._idle[executor] = _Idle(owner, timer)
 
     def _retire(self, executor: ProcessPoolExecutor) -> None:
-        self._idle.pop(executor).cancel()
+        self._idle.pop(executor).timer.cancel()
         executor.shutdown(wait=False)
 
 

@@ -230,3 +230,27 @@ def test_a_large_log_is_read_in_a_process_and_a_small_one_here(
             await readers.describe(source, "npz", readers._most_here)
 
     with_readers(60.0, read)
+
+
+def test_who_loses_a_reader_does_not_take_the_one_that_another_key_has_warm(
+    ramp: GraspLog, tmp_path: Path, executors: list[ProcessPoolExecutor]
+) -> None:
+    source, other, target = (tmp_path / name for name in ("source", "other", "target"))
+    os.mkfifo(source)
+    parquet.write(ramp, other)
+
+    async def lose(readers: Readers) -> None:
+        await readers.convert(other, target, "parquet", {}, "honest")
+        lost = asyncio.create_task(readers.convert(source, target, "tracked markers", {}, "hostile"))
+        while (pipe := opened(source)) is None:
+            await asyncio.sleep(0.01)
+        await readers.convert(other, target, "parquet", {}, "honest")
+        assert len(executors) == 2
+        lost.cancel()
+        await asyncio.gather(lost, return_exceptions=True)
+        os.close(pipe)
+        await readers.convert(other, target, "parquet", {}, "third")
+        await readers.convert(other, target, "parquet", {}, "fourth")
+        assert len(executors) == 3, "as many as may be: the fourth takes one that is warm"
+
+    with_readers(60.0, lose)
