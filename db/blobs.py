@@ -61,7 +61,7 @@ class Spool:
 
     def adopt(self) -> None:
         """Take what another process wrote to ``path`` as what was written here."""
-        with self.path.open("rb") as stream:
+        with disk_errors_named(), self.path.open("rb") as stream:
             self._hash = hashlib.file_digest(stream, hashlib.sha256)
             self.size = stream.tell()
 
@@ -87,7 +87,8 @@ class Spool:
             with disk_errors_named():
                 self._file.close()  # what is still buffered may find the disk full once more
         finally:
-            self.path.unlink(missing_ok=True)
+            with suppress(OSError):  # what is stored is stored; a start clears what could not be removed
+                self.path.unlink(missing_ok=True)
 
 
 class BlobStore:

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from sqlalchemy.orm import Session
 
-from db.blobs import Spool
+from db.blobs import Spool, disk_errors_named
 from db.errors import AlreadyExists, StorageUnavailable
 from db.records import NewGraspLog, StoredGraspLog
 from db.repositories import audit, grasp_logs, jobs, materials, stores, uploads
@@ -142,10 +142,11 @@ def _identify(spool: Spool, wish: Wish) -> tuple[str, int]:
     """The body's format, which must take what was said beside it, and the bytes that it unpacks to."""
     spool.flush()
     try:
-        name = formats.identify(spool.path, wish.content_type)
-        formats.check_settings(name, wish.settings)
-        formats.check_start(spool.path, name)
-        return name, unpacked_bytes(spool.path)
+        with disk_errors_named():
+            name = formats.identify(spool.path, wish.content_type)
+            formats.check_settings(name, wish.settings)
+            formats.check_start(spool.path, name)
+            return name, unpacked_bytes(spool.path)
     except formats.UnsupportedFormat as error:
         raise Problem.wrong_value(UNSUPPORTED_FORMAT, error.name, error.value, error.allowed) from error
     except formats.UnusedSetting as error:

@@ -61,7 +61,8 @@ def describe(name: str, log: GraspLog) -> Description:
 
 def read_plain(path: Path, name: str) -> Description:
     """Read a log in one of our own formats; raises ``InvalidInput``."""
-    return describe(name, formats.read(path, formats.FORMATS[name].content_type))
+    with disk_errors_named():
+        return describe(name, formats.read(path, formats.FORMATS[name].content_type))
 
 
 class _Idle(NamedTuple):

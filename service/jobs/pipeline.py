@@ -16,7 +16,7 @@ from sqlalchemy.orm import Session
 
 import estimators
 import slipcore
-from db.blobs import BlobStore
+from db.blobs import BlobStore, disk_errors_named
 from db.database import Database
 from db.records import Claim, Job, SamplesOfLog, SampleSummary
 from db.repositories import detections, friction_models, grasp_logs, jobs, materials
@@ -114,7 +114,7 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         stored = grasp_logs.get(session, log_id)
     if stored.samples is not None:
         return stored.samples
-    with run.stage("frames"):
+    with run.stage("frames"), disk_errors_named():
         log = formats.read(run.blobs.path(stored.sha256))
     with run.stage("slip_state"):
         history = slipcore.detect_slip(log, method=stored.detector, lookahead=slipcore.LOOKAHEAD)
