@@ -123,6 +123,15 @@ class Settings(BaseSettings):
     job_memory_bytes: Annotated[int, Field(ge=64 * MIB, le=2**50)] = Field(
         default=4096 * MIB, description="Bytes of memory that a job may take; one that wants more is refused."
     )
+    key_queued_jobs: Annotated[int, Field(ge=1, le=10**9)] | None = Field(
+        default=None, description="Jobs of one key that may be queued at once. Default: any number."
+    )
+    key_logs_a_day: Annotated[int, Field(ge=1, le=10**9)] | None = Field(
+        default=None, description="Logs that one key may store in 24 hours. Default: any number."
+    )
+    key_stored_bytes: Annotated[int, Field(ge=1, le=2**60)] | None = Field(
+        default=None, description="Bytes of uploads that one key may have stored. Default: any number."
+    )
     lease_seconds: Annotated[float, Field(ge=0.5, le=600.0)] = Field(
         default=10.0, description="How long a process may be silent, in s, before others take its jobs over."
     )

@@ -2,6 +2,7 @@
 
 from db.repositories import audit, jobs, materials
 from service.context import Context
+from service.domain import quotas
 from service.domain.asker import ANYBODY, Asker
 from service.domain.ownership import check_may_add
 from service.http.idempotency import Answer, Once, answer_once
@@ -18,6 +19,7 @@ def request_fit(
         def ask() -> Answer:
             material_id = materials.find_id(session, material)
             check_may_add(session, material_id, asker)
+            quotas.check_job(session, context.settings, asker.key_id)
             job_id = queue(session, "fit", method, material_id=material_id, seed=seed, requested_by=asker.key_id)
             job = jobs.get(session, job_id)
             audit.add(session, asker.actor, "fit.requested", material, {"job": job_id, "method": method, "seed": seed})

@@ -14,6 +14,7 @@ from db.records import NewGraspLog, StoredGraspLog
 from db.repositories import audit, grasp_logs, jobs, materials, stores, uploads
 from service import formats
 from service.context import Context
+from service.domain import quotas
 from service.domain.asker import ANYBODY, Asker
 from service.domain.ownership import check_may_add
 from service.domain.receive import UNPACKING_BYTES, check_encoding, check_expansion, check_size, unpack
@@ -123,9 +124,10 @@ def _check(context: Context, wish: Wish) -> int | None:
         formats.parse_mapping(wish.settings)
     except InvalidInput as error:
         raise Problem.wrong_value(INVALID_REQUEST, error.name, error.value, error.allowed) from error
-    if wish.material is None:
-        return None
     with context.database.read() as session:
+        quotas.check_upload(session, context.settings, wish.asker.key_id)
+        if wish.material is None:
+            return None
         material_id = materials.find_id(session, wish.material)
         check_may_add(session, material_id, wish.asker)
     return material_id

@@ -70,6 +70,7 @@ INVALID_SAMPLES = ProblemType("invalid-samples", "The samples tell nothing", 422
 INVALID_REQUEST = ProblemType("invalid-request", "A value in the request is not allowed", 422)
 IDEMPOTENCY_KEY_REUSED = ProblemType("idempotency-key-reused", "The key stands for another request", 422)
 TOO_MANY_REQUESTS = ProblemType("too-many-requests", "Requests come too often", 429)
+QUOTA_EXCEEDED = ProblemType("quota-exceeded", "The key has asked for as much as it may", 429)
 HEADERS_TOO_LARGE = ProblemType("headers-too-large", "The headers are too large", 431)
 FILE_DAMAGED = ProblemType("file-damaged", "A stored file is damaged", 500)
 INTERNAL_ERROR = ProblemType("internal-error", "The service failed", 500)
@@ -78,6 +79,7 @@ TOO_MANY_UPLOADS = ProblemType("too-many-uploads", "Too many files are being rea
 STOPPING = ProblemType("stopping", "The server stops", 503)
 WORKERS_NOT_READY = ProblemType("workers-not-ready", "The workers take no jobs yet, or no longer", 503)
 FILE_MISSING = ProblemType("file-missing", "A stored file is missing", 503)
+STORAGE_QUOTA_EXCEEDED = ProblemType("storage-quota-exceeded", "The key has stored as much as it may", 507)
 STORAGE_UNAVAILABLE = ProblemType("storage-unavailable", "Database or blob folder cannot be used now", 503)
 
 PROBLEM_TYPES = {entry.name: entry for entry in list(globals().values()) if isinstance(entry, ProblemType)}

@@ -19,6 +19,9 @@ UNSET = {
     "database_url": "SQLite file",
     "blob_url": "the data folder",
     "dask_address": "none",
+    "key_queued_jobs": "none",
+    "key_logs_a_day": "none",
+    "key_stored_bytes": "none",
 }
 """What holds in place of a setting without a default."""
 

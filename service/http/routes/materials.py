@@ -20,6 +20,7 @@ from service.http.problems import (
     MATERIAL_EXISTS,
     NO_MODEL,
     NOT_OWNER,
+    QUOTA_EXCEEDED,
     STORAGE_UNAVAILABLE,
     UNKNOWN_MATERIAL,
     UNSUPPORTED_FORMAT,
@@ -131,7 +132,7 @@ async def read_friction(
     summary="Fit a material's model",
     status_code=202,
     response_model=JobOut,
-    responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, *_BODY),
+    responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, QUOTA_EXCEEDED, *_BODY),
 )
 def create_fit(context: Given, name: str, wish: NewFit, once: OnceGiven, asker: Asking) -> Response:
     """Over the samples of all its logs. Answers at once; the job at `Location` tells how it went."""
