@@ -1,5 +1,6 @@
 """Friction samples at slipping points (stage 5: samples)."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import NamedTuple, TypeVar
@@ -23,7 +24,8 @@ class FrictionSamples:
 
     ``friction_coefficient`` f_t/f_n [-], ``tangential_velocity`` m/s (≥ 0), ``normal_force`` N and
     ``tangential_force`` N of the element (paper, eq. 38–39, as magnitudes), ``time`` s, ``element`` row-major index,
-    ``weight`` probability that the element did slip, ``element_area`` m².
+    ``weight`` probability that the element did slip, ``element_area`` m², ``normal_force_noise`` N: standard deviation
+    of the noise that is still in ``normal_force``.
     """
 
     friction_coefficient: FloatArray
@@ -34,13 +36,19 @@ class FrictionSamples:
     element: NDArray[np.int64]
     weight: FloatArray
     element_area: float
+    normal_force_noise: float = 0.0
 
     def __post_init__(self) -> None:
         count = len(self.friction_coefficient)
-        for entry in fields(self)[:-1]:
-            shape = np.shape(getattr(self, entry.name))
+        for name in self.arrays():
+            shape = np.shape(getattr(self, name))
             if shape != (count,):
-                raise InvalidInput(entry.name, f"of shape {list(shape)}", f"shape [{count}]")
+                raise InvalidInput(name, f"of shape {list(shape)}", f"shape [{count}]")
+
+    @classmethod
+    def arrays(cls) -> tuple[str, ...]:
+        """Names of the arrays [k]."""
+        return tuple(entry.name for entry in fields(cls)[:-2])
 
     def __len__(self) -> int:
         return len(self.friction_coefficient)
@@ -53,6 +61,7 @@ class FrictionSamples:
             normal_force=self.normal_force * factor,
             tangential_force=self.tangential_force * factor,
             element_area=element_area,
+            normal_force_noise=self.normal_force_noise * factor,
         )
 
     @classmethod
@@ -62,10 +71,10 @@ class FrictionSamples:
             raise InvalidInput("parts", "none", "at least one")
         area = min(part.element_area for part in parts)
         alike = [part.at_element_area(area) for part in parts]
-        joined = {
-            entry.name: np.concatenate([getattr(part, entry.name) for part in alike]) for entry in fields(cls)[:-1]
-        }
-        return cls(**joined, element_area=area)
+        joined = {name: np.concatenate([getattr(part, name) for part in alike]) for name in cls.arrays()}
+        squares = sum(len(part) * part.normal_force_noise**2 for part in alike)
+        noise = math.sqrt(squares / max(sum(map(len, alike)), 1))
+        return cls(**joined, element_area=area, normal_force_noise=noise)
 
 
 def collect_samples(log: GraspLog, history: SlipHistory, **options: float) -> FrictionSamples:
@@ -111,6 +120,7 @@ def collect_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
         element=element.astype(np.int64),
         weight=weight[keep],
         element_area=log.element_area,
+        normal_force_noise=noise.normal / math.sqrt(2.0),  # the mean of two frames
     )
 
 

@@ -135,7 +135,10 @@ def _statistics_of_samples(observations: Observations) -> tuple[GraspStatistics,
     place = observations.cluster if observations.cluster_kind == "time block" else observations.element
     ends = np.flatnonzero(np.diff(observations.grasp[order])) + 1
     return tuple(
-        GraspStatistics.from_columns(Columns(values[rows], observations.weight[rows], codes_of(place[rows])))
+        GraspStatistics.from_columns(
+            Columns(values[rows], observations.weight[rows], codes_of(place[rows])),
+            float(observations.normal_force_noise[observations.grasp[rows[0]]]),
+        )
         for rows in np.split(order, ends)
     )
 

@@ -27,7 +27,7 @@ class Observations:
     ``friction`` μ [-], ``tangential_velocity`` m/s, ``normal_force`` N, ``tangential_force`` N; ``weight`` relative,
     scaled so that it sums to the effective number of samples (Kish); ``element`` as labelled in its grasp; ``grasp``
     and ``cluster``: codes from 0, where a cluster is what errors are taken to be shared in (``cluster_kind``);
-    ``element_area`` m².
+    ``element_area`` m²; ``normal_force_noise`` [grasps] N, that still in the normal forces of each.
     """
 
     friction: FloatArray
@@ -40,6 +40,7 @@ class Observations:
     cluster: IntArray
     cluster_kind: str
     element_area: float
+    normal_force_noise: FloatArray
 
     def __len__(self) -> int:
         return len(self.friction)
@@ -100,7 +101,14 @@ def observe(samples: "FrictionSamples | Sequence[FrictionSamples]") -> Observati
     names = {"friction_coefficient": "friction"}
     columns = {names.get(name, name): value[used] for name, value in values.items()}
     return Observations(
-        **columns, weight=weight, element=element, grasp=grasp, cluster=cluster, cluster_kind=kind, element_area=area
+        **columns,
+        weight=weight,
+        element=element,
+        grasp=grasp,
+        cluster=cluster,
+        cluster_kind=kind,
+        element_area=area,
+        normal_force_noise=np.array([part.normal_force_noise for part in parts]),
     )
 
 

@@ -54,7 +54,8 @@ class SufficientStatistics:
             return cls.empty(area)
         domain = Domain((float(v.min()), float(v.max())), (float(f_n.min()), float(f_n.max())))
         values = np.stack([v, f_n, mu]).T
-        grasp = (GraspStatistics.from_columns(Columns(values, weight, codes_of(samples.element[used]))),)
+        place = codes_of(samples.element[used])
+        grasp = (GraspStatistics.from_columns(Columns(values, weight, place), samples.normal_force_noise),)
         factor = factorise(values, weight)
         return cls(factor, float(weight @ weight), len(weight), domain, area, grasp if places else ())
 

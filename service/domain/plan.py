@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -116,7 +116,9 @@ def _samples(context: Context, wish: NewRecognition) -> "FrictionSamples | Momen
 
 
 def _given(samples: SamplesIn) -> FrictionSamples:
-    arrays = {name: np.array(value, float) for name, value in samples if name not in {"element", "element_area"}}
+    arrays: dict[str, Any] = {
+        name: np.array(value, float) for name, value in samples if name not in {"element", "element_area"}
+    }
     return FrictionSamples(**arrays, element=np.array(samples.element), element_area=samples.element_area)
 
 

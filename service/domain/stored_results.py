@@ -3,7 +3,7 @@
 import io
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from estimators import FrictionModel
 
 EVENT_KINDS = ("onset", "end", "touch", "release")
-SAMPLE_ARRAYS = tuple(entry.name for entry in fields(FrictionSamples) if entry.name != "element_area")
+SAMPLE_ARRAYS = FrictionSamples.arrays()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,13 +48,17 @@ def decode_history(path: Path) -> StoredHistory:
 
 def encode_samples(samples: FrictionSamples) -> bytes:
     """Samples as bytes, the same for the same samples."""
-    return _pack([*(getattr(samples, name) for name in SAMPLE_ARRAYS), np.array(samples.element_area)])
+    common = np.array([samples.element_area, samples.normal_force_noise])
+    return _pack([*(getattr(samples, name) for name in SAMPLE_ARRAYS), common])
 
 
 def decode_samples(path: Path) -> FrictionSamples:
-    """The samples in a blob."""
-    *arrays, element_area = _unpack(path, len(SAMPLE_ARRAYS) + 1)
-    return FrictionSamples(**dict(zip(SAMPLE_ARRAYS, arrays, strict=True)), element_area=float(element_area))
+    """The samples in a blob; those stored by older versions tell no noise of f_n."""
+    *arrays, common = _unpack(path, len(SAMPLE_ARRAYS) + 1)
+    element_area, noise = (*np.atleast_1d(common).tolist(), 0.0)[:2]
+    return FrictionSamples(
+        **dict(zip(SAMPLE_ARRAYS, arrays, strict=True)), element_area=element_area, normal_force_noise=noise
+    )
 
 
 def summarise_history(history: SlipHistory, seconds: float, blob: str, *, is_scaled: bool = True) -> Detection:

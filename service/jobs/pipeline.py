@@ -191,17 +191,19 @@ def _fit(run: Run, parts: Sequence[SamplesOfLog]) -> FrictionModel:
 
 
 def _moments(run: Run, part: SamplesOfLog) -> Moments:
-    if part.moments is not None:
-        return Moments.from_bytes(part.moments)
+    """Those stored, unless by a version that did not yet keep each place."""
+    known = None if part.moments is None else Moments.from_bytes(part.moments)
+    if known is not None and known.grasps:
+        return known
     return Moments.from_samples(decode_samples(run.blobs.path(part.samples_blob)))
 
 
 def _note_missing_moments(run: Run, material: str) -> None:
-    """Of samples that an older version stored without."""
+    """Of samples that an older version stored without, or without their places."""
     with run.database.read() as session:
         parts = detections.samples_of_material(session, materials.find_id(session, material))
     for part in parts:
-        if part.moments is None:
+        if part.moments is None or not Moments.from_bytes(part.moments).grasps:
             content = _moments(run, part).to_bytes()
             with run.database.write(durable=False) as session:
                 detections.set_moments(session, part.grasp_log_id, content)

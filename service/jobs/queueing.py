@@ -10,7 +10,7 @@ from service.observability import logs, traces
 
 logger = logging.getLogger(__name__)
 
-CHEAP_METHODS = frozenset({"ols", "conjugate"})
+CHEAP_METHODS = frozenset({"ols", "conjugate", "hierarchical"})
 """Methods whose fit is a merge of moments, milliseconds for any logs: by these a material is always fitted again."""
 
 

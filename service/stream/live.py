@@ -4,7 +4,7 @@ import logging
 import math
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -174,7 +174,7 @@ def _find_friction(session: Session, frames: list[Frame], answers: list[SlipStat
     end = frames[-1].time  # which has no next frame yet, so it is the next look's
     new = (samples.time >= session.looked_until) & (samples.time < end)
     session.looked_until = end
-    part = {entry.name: getattr(samples, entry.name)[new] for entry in fields(samples) if entry.name != "element_area"}
+    part = {name: getattr(samples, name)[new] for name in samples.arrays()}
     found = FrictionSamples(**part, element_area=samples.element_area)
     session.moments = session.moments.merge(estimators.Moments.from_samples(found, places=False))
     session.friction = _fitted(session.moments)

@@ -181,7 +181,7 @@ def test_an_offset_of_a_billion_costs_no_more_than_its_own_rounding(samples: Mak
     far = replace(base, tangential_velocity=v)
     near = replace(base, tangential_velocity=v - 1e9)
     take = [slice(k, k + 50) for k in range(0, 400, 50)]
-    names = [name for name in FrictionSamples.__slots__ if name != "element_area"]
+    names = FrictionSamples.arrays()
 
     def cut(whole: FrictionSamples, rows: slice) -> Moments:
         columns = {name: getattr(whole, name)[rows] for name in names}

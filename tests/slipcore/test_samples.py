@@ -47,7 +47,7 @@ def test_friction_of_a_ramp_without_noise_is_exact() -> None:
 
 
 def check_samples(samples: FrictionSamples, log: GraspLog, history: SlipHistory) -> None:
-    for entry in fields(samples)[:-1]:
+    for entry in fields(samples)[:-2]:
         values = getattr(samples, entry.name)
         assert values.shape == (len(samples),)
         assert values.dtype == (np.int64 if entry.name == "element" else np.float64)
@@ -183,3 +183,11 @@ def test_samples_join_as_the_same_pressures_on_the_smallest_elements(ramp: tuple
         FrictionSamples.concatenate([])
     with pytest.raises(InvalidInput, match="weight is of shape"):
         replace(samples, weight=samples.weight[1:])
+
+
+def test_joined_samples_carry_the_noise_of_all() -> None:
+    one, none = np.ones(1), np.zeros(1, dtype=np.int64)
+    first, second = (FrictionSamples(one, one, one, one, one, none, one, 1e-6, noise) for noise in (3e-3, 4e-3))
+    joined = FrictionSamples.concatenate([first, second])
+    assert joined.normal_force_noise == pytest.approx(np.sqrt(12.5) * 1e-3)
+    assert joined.at_element_area(2e-6).normal_force_noise == pytest.approx(2.0 * joined.normal_force_noise)

@@ -1,6 +1,7 @@
 """Statistics of a grasp by place: compact, free of order, and with the noise of f_n taken out of what varies within."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -117,3 +118,20 @@ def test_what_is_all_noise_says_nothing() -> None:
     triangle = np.array([[1.0, 0.2, 0.3], [0.0, 0.5, 0.1], [0.0, 0.0, 0.4]])
     assert grasp_statistics.calibrated(triangle, 100.0, 1.0)[1, 1] == 0.0
     np.testing.assert_array_equal(grasp_statistics.calibrated(triangle, 100.0, 0.0), triangle)
+
+
+def test_the_noise_that_samples_carry_is_taken_out_of_every_fit(samples: Make) -> None:
+    """Also where grasps of other areas are brought to one: the noise of a force scales as the force does."""
+    rng, grasps = np.random.default_rng(3), []
+    for seed in range(6):
+        data = samples(1500, seed=seed, normal_force=0.06 + 0.01 * rng.standard_normal(1500))
+        noisy = replace(
+            data, normal_force=data.normal_force + 0.01 * rng.standard_normal(1500), normal_force_noise=0.01
+        )
+        grasps.append(noisy.at_element_area(2e-6) if seed % 2 else noisy)
+    told = estimators.fit(grasps, method="hierarchical")
+    unaware = estimators.fit([replace(part, normal_force_noise=0.0) for part in grasps], method="hierarchical")
+    kept = estimators.fit([Moments.from_samples(part) for part in grasps], method="hierarchical")
+    assert abs(told.coefficients[2] + 0.8) < 4.0 * told.standard_errors[2]
+    assert abs(unaware.coefficients[2] + 0.8) > 6.0 * unaware.standard_errors[2]  # half of the slope
+    np.testing.assert_allclose(kept.coefficients, told.coefficients, rtol=1e-7)

@@ -14,7 +14,7 @@ Make = Callable[..., FrictionSamples]
 
 
 def take(samples: FrictionSamples, rows: object) -> FrictionSamples:
-    names = [name for name in FrictionSamples.__slots__ if name != "element_area"]
+    names = FrictionSamples.arrays()
     return FrictionSamples(**{name: getattr(samples, name)[rows] for name in names}, element_area=samples.element_area)
 
 

@@ -85,3 +85,12 @@ def test_a_stored_model_predicts_as_the_fitted_one(samples: FrictionSamples, deg
 def test_diagnostics_that_json_cannot_say_are_left_empty(samples: FrictionSamples) -> None:
     fitted = replace(estimators.fit(samples), diagnostics={"rhat": math.nan, "why": "short", "n": 3.0})
     assert stored_results.to_new_model(fitted).diagnostics == {"rhat": None, "why": "short", "n": 3.0}
+
+
+def test_samples_stored_without_their_noise_are_still_read(samples: FrictionSamples, tmp_path: Path) -> None:
+    path = tmp_path / "samples"
+    arrays = [getattr(samples, name) for name in stored_results.SAMPLE_ARRAYS]
+    path.write_bytes(stored_results._pack([*arrays, np.array(samples.element_area)]))
+    found = stored_results.decode_samples(path)
+    assert (found.element_area, found.normal_force_noise) == (samples.element_area, 0.0)
+    np.testing.assert_array_equal(found.normal_force, samples.normal_force)

@@ -219,12 +219,17 @@ def test_a_fit_reads_moments_where_its_method_needs_no_more_one_part_a_grasp(
     ]
 
 
-def test_moments_that_an_older_version_did_not_store_are_made_up_for(shop: Shop, content: bytes) -> None:
+@pytest.mark.parametrize("places", [None, False])
+def test_moments_that_an_older_version_did_not_store_are_made_up_for(
+    shop: Shop, content: bytes, places: bool | None
+) -> None:
+    """Neither those stored without moments, nor those whose moments do not tell their places."""
     for suffix in (b"", b"\0"):
         shop.run(shop.ingest(content + suffix)[1])
     with shop.database.write() as session:
         before = detections.samples_of_material(session, shop.material_id)
-        session.execute(update(SampleSummaryRow).values(moments=None))
+        older_moments = None if places is None else replace(Moments.from_bytes(before[0].moments), grasps=()).to_bytes()
+        session.execute(update(SampleSummaryRow).values(moments=older_moments))
     assert shop.run(shop.fit()).status == "done"
     with shop.database.read() as session:
         assert detections.samples_of_material(session, shop.material_id) == before
