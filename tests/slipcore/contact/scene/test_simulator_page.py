@@ -10,7 +10,7 @@ import pytest
 from slipcore.contact.effects import EFFECTS
 from slipcore.contact.scene import Scene, library
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 PAGE = (ROOT / "docs" / "simulator.md").read_text(encoding="utf-8")
 
 

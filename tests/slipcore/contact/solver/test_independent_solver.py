@@ -12,7 +12,7 @@ from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.solver.problem import HeightField, Problem, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
 
-SCENES = Path(__file__).parents[2] / "data" / "contact"
+SCENES = Path(__file__).parents[3] / "data" / "contact"
 YOUNG, FRICTION = 1e6, 0.4
 GRID = Grid.square(64, 16e-3)
 
