@@ -42,16 +42,23 @@ def choose(data: FitData) -> Choice:
 
 
 def outlying(data: FitData, observations: Observations) -> float:
-    """Part of the samples that Tukey's loss would give less than half weight, what is their place's taken away."""
+    """Part of the samples that Tukey's loss would give less than half weight, what is their place's taken away.
+
+    Where most samples are of places with many, these alone are judged; else all of them, by their distance from the
+    plane: a place that few samples tell of cannot be told from them.
+    """
     linear = m_estimate(data, observations, LOSSES["tukey"]).linear
-    residual = observations.friction - plane(linear, observations)
+    residual, weight = observations.friction - plane(linear, observations), observations.weight
     place = observations.place()
     known = np.bincount(place)[place] >= FEWEST
-    residual = residual - np.where(known, _medians(place, residual)[place], 0.0)
-    scale = float(np.median(np.abs(residual))) / NORMAL_MAD
-    return (
-        float(np.average(np.abs(residual) > HALF_WEIGHT * scale, weights=observations.weight)) if scale > 0.0 else 0.0
-    )
+    if 2 * np.count_nonzero(known) > len(known):
+        residual = residual - _medians(place, residual)[place]
+        judged = known & (residual != 0.0)  # a median's own distance of 0 says nothing of the scatter
+        residual, weight = residual[judged], weight[judged]
+    scale = float(np.median(np.abs(residual))) / NORMAL_MAD if len(residual) else 0.0
+    if not scale > 0.0:
+        return 0.0
+    return float(np.average(np.abs(residual) > HALF_WEIGHT * scale, weights=weight))
 
 
 def _medians(codes: IntArray, values: FloatArray) -> FloatArray:

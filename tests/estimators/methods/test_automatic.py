@@ -9,7 +9,7 @@ from scipy import stats
 
 import estimators
 from estimators.linear.fit_data import gather
-from estimators.methods.automatic import choose, compared
+from estimators.methods.automatic import choose, compared, outlying
 from slipcore.samples import FrictionSamples
 
 Make = Callable[..., FrictionSamples]
@@ -52,6 +52,21 @@ def test_places_that_differ_are_no_outliers(samples: Make) -> None:
     data = samples(3000, elements=100)
     friction = data.friction_coefficient + 0.2 * (data.element < 5)
     assert choose(gather(replace(data, friction_coefficient=friction))).method == "hierarchical"
+
+
+def test_places_of_few_samples_are_not_taken_for_outliers_beside_those_of_many(samples: Make) -> None:
+    """Places that differ by three times the scatter within: those that few samples tell of cannot be corrected."""
+    data, rng = samples(2000, elements=60), np.random.default_rng(0)
+    element = np.where(np.arange(2000) < 300, 60 + np.arange(2000) // 5, data.element)
+    friction = data.friction_coefficient + 0.06 * rng.standard_normal(500)[element]
+    assert choose(gather(replace(data, friction_coefficient=friction, element=element))).method == "hierarchical"
+
+
+def test_normal_errors_show_no_outliers_however_few_samples_a_place_has(samples: Make) -> None:
+    for elements in (8, 40, 55, 200):
+        grasps = [gather([samples(500, seed=10 * k + g, elements=elements) for g in range(3)]) for k in range(4)]
+        parts = [outlying(data, data.raw("a test")) for data in grasps]
+        assert 0.006 < np.mean(parts) < 0.018, elements
 
 
 def test_the_reason_and_the_check_are_told(samples: Make) -> None:
