@@ -38,7 +38,7 @@ def fit(
     posterior with scatter between grasps, between places and within, told apart in ``scales``) or "bayes" (emcee),
     whose ``likelihood`` is "hierarchical" (the default wherever samples come in clusters), "gaussian", "student_t",
     "outlier" (a part of false slip) or "errors_in_variables" (noise in the forces). "auto", recommended, takes
-    "hierarchical", or "robust" where samples lie far off; ``diagnostics["chosen_because"]`` says why, and
+    "hierarchical", without what lies far off its place; ``diagnostics["chosen_because"]`` says why, and
     ``diagnostics["check"]`` whether least squares agrees. A sampled method stops once the Monte-Carlo error of its
     means and 5/95 % quantiles is under ``accuracy`` posterior standard deviations, or after ``seconds``; ``seed`` makes
     it repeatable.
@@ -57,8 +57,8 @@ def fit(
     if method != "auto":
         return _fit(data, method, accuracy, seconds, seed, likelihood, loss)
     choice = choose(data)
-    model = _fit(data, choice.method, accuracy, seconds, seed, None, loss)
-    told = {"chosen_because": choice.reason, "check": compared(model, data)}
+    model = hierarchical.fit(choice.data)
+    told = {"chosen_because": choice.reason, "check": compared(model, choice.data)}
     return replace(model, diagnostics={**model.diagnostics, **told})
 
 

@@ -72,6 +72,11 @@ class FitData:
             return _statistics_of_samples(self.observations)
         return tuple(grasp for block in self.blocks for grasp in block.grasps or (_of_one_place(block),))
 
+    def kept(self, rows: NDArray[np.bool_]) -> "FitData":
+        """The data of some of the samples only."""
+        observations = self.raw("a choice of samples")
+        return _from_samples(observations.take(rows, observations.weight[rows]))
+
     def raw(self, method: str) -> Observations:
         """The samples; raises ``InvalidSamples`` where there are moments only."""
         if self.observations is None:

@@ -17,48 +17,52 @@ FloatArray = NDArray[np.float64]
 
 HALF_WEIGHT = 2.535
 """Standard deviations from which Tukey's loss gives a sample less than half weight; 1.1 % of normal errors do so."""
+FAR = 3.0
+"""Standard deviations from which samples are left out where too many lie far off; 0.3 % of normal errors do."""
 FEWEST = 8
 """Samples of a place from which its median says what is the place's."""
 
 
 class Choice(NamedTuple):
-    """A method of ``fit``, and the reason in words and numbers."""
+    """The data for the hierarchical model, all or without what lies far off, and the reason in words and numbers."""
 
-    method: str
+    data: FitData
     reason: str
 
 
 def choose(data: FitData) -> Choice:
-    """The hierarchical model, or the robust method where a part of the samples is no friction at all.
+    """All data for the hierarchical model, or those that are friction at all.
 
     What is shared within a grasp or a place widens the hierarchical model's scales and nothing else; false slip biases
-    it. Only samples tell of it: moments lead to the hierarchical model.
+    it. Only samples tell of it: moments are taken as they are.
     """
     if data.observations is not None:
-        part = outlying(data, data.observations)
+        distance = distances(data, data.observations)
+        part = float(np.average(distance > HALF_WEIGHT, weights=data.observations.weight))
         if part > AUTOMATIC.downweighted and part * data.n >= AUTOMATIC.least_outliers:
-            return Choice("robust", f"{part:.1%} of the samples lie far off their place; normal errors leave 1.1%")
-    return Choice("hierarchical", "friction may scatter between grasps, between places and within them")
+            near = distance <= FAR
+            told = f"{part:.1%} of the samples lie far off their place; normal errors leave 1.1%"
+            return Choice(data.kept(near), f"{told}; without the {np.count_nonzero(~near)} beyond {FAR:g} deviations")
+    return Choice(data, "friction may scatter between grasps, between places and within them")
 
 
-def outlying(data: FitData, observations: Observations) -> float:
-    """Part of the samples that Tukey's loss would give less than half weight, what is their place's taken away.
+def distances(data: FitData, observations: Observations) -> FloatArray:
+    """How far each sample [k] lies from the robust plane, in standard deviations, what is its place's taken away.
 
-    Where most samples are of places with many, these alone are judged; else all of them, by their distance from the
-    plane: a place that few samples tell of cannot be told from them.
+    Where most samples are of places with many, the others count as near; else all are judged by their distance from
+    the plane: a place that few samples tell of cannot be told from them.
     """
     linear = m_estimate(data, observations, LOSSES["tukey"]).linear
-    residual, weight = observations.friction - plane(linear, observations), observations.weight
+    residual = observations.friction - plane(linear, observations)
     place = observations.place()
     known = np.bincount(place)[place] >= FEWEST
     if 2 * np.count_nonzero(known) > len(known):
-        residual = residual - _medians(place, residual)[place]
-        judged = known & (residual != 0.0)  # a median's own distance of 0 says nothing of the scatter
-        residual, weight = residual[judged], weight[judged]
-    scale = float(np.median(np.abs(residual))) / NORMAL_MAD if len(residual) else 0.0
-    if not scale > 0.0:
-        return 0.0
-    return float(np.average(np.abs(residual) > HALF_WEIGHT * scale, weights=weight))
+        residual = np.where(known, residual - _medians(place, residual)[place], 0.0)
+        known &= residual != 0.0  # a median's own distance of 0 says nothing of the scatter
+    else:
+        known = np.ones(len(known), dtype=bool)
+    scale = float(np.median(np.abs(residual[known]))) / NORMAL_MAD if known.any() else 0.0
+    return np.asarray(np.abs(residual) / scale if scale > 0.0 else np.zeros(len(residual)))
 
 
 def _medians(codes: IntArray, values: FloatArray) -> FloatArray:

@@ -94,7 +94,7 @@ def with_outlier(data: FrictionSamples, value: float) -> FrictionSamples:
 
 
 def strided(data: FrictionSamples) -> FrictionSamples:
-    columns = {name: np.repeat(getattr(data, name), 2)[::2] for name in FrictionSamples.__slots__[:-1]}
+    columns = {name: np.repeat(getattr(data, name), 2)[::2] for name in FrictionSamples.arrays()}
     for column in columns.values():
         column.setflags(write=False)
     return FrictionSamples(**columns, element_area=data.element_area)
