@@ -1,6 +1,7 @@
 """Every default of slipcore, with unit, source and valid range."""
 
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Annotated, NamedTuple, TypeVar, get_type_hints
@@ -158,8 +159,6 @@ class FilterOptions(ContactOptions):
     """Random walk of an element's place on the object."""
     onset_length: Annotated[float, Option(1e-9, 1.0, "m", "tuning scenes")] = 0.0001
     """Motion of the object within which an element at the front begins to slip."""
-    onset_time: Annotated[float, Option(1e-3, 1e6, "s", "tuning scenes")] = 23.0
-    """Time within which it does without motion."""
     onset_inside: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 0.005
     """Onset rate amid sticking neighbours, relative to these."""
     onset_at_front: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 3.8
@@ -168,8 +167,8 @@ class FilterOptions(ContactOptions):
     """Factor on onset rates while everything sticks again under growing load."""
     end_length: Annotated[float, Option(1e-9, 1.0, "m", "tuning scenes")] = 0.0001
     """Motion of the object within which slip ends."""
-    end_time: Annotated[float, Option(1e-3, 1e6, "s", "tuning scenes")] = 26.0
-    """Time within which it ends without motion."""
+    hold_time: Annotated[float, Option(0.0, 1e6, "s", "tuning scenes")] = 0.5
+    """Without motion for so long, where markers are tells nothing more of slip."""
     least_weight: Annotated[float, Option(0.0, 1.0, "-", "slipping points still tell that all stand still")] = 0.003
     """Weight of a surely slipping element in the fit of the object's motion."""
     outlier: Annotated[float, Option(0.1, 100.0, "-", "tuning scenes")] = 4.4
@@ -178,8 +177,10 @@ class FilterOptions(ContactOptions):
     """Squared distance over its variance from both predictions beyond which a marker tells nothing."""
     outlier_spread: Annotated[float, Option(0.0, 10.0, "-", "half of the distance")] = 0.25
     """Share of that squared distance by which the variance of both predictions then grows."""
-    motion_margin: Annotated[float, Option(0.0, 100.0, "-", "tuning scenes")] = 9.4
-    """How many variances of the fit are taken off the squared motion."""
+    motion_play: Annotated[
+        float, Option(0.0, 100.0, "standard deviations", "tuning scenes: 3 to 6 differ by 0.001")
+    ] = 4.0
+    """How far the fitted pose may stray before it counts as motion."""
     following_weight: Annotated[float, Option(0.0, 1000000.0, "-", "all of the motion, ± 0.2")] = 30.0
     """Prior weight of a surface that follows all of a given motion."""
     following_variance: Annotated[float, Option(0.0, 1.0, "-", "5 % of the motion")] = 0.0025
@@ -349,6 +350,9 @@ LOOKAHEAD = 2
 MOST_LOOKAHEAD = 100
 """Frames; each one costs time and memory, and what lies further ahead tells nothing."""
 
+FORMER_OPTIONS = frozenset({"onset_time", "end_time", "motion_margin"})
+"""Of method ``filter`` until slip began and ended by motion and load alone; ignored with a warning for one version."""
+
 Kind = TypeVar("Kind", bound=Options)
 
 
@@ -364,6 +368,9 @@ def choose_options(kind: type[Kind], given: Mapping[str, float]) -> Kind:
     Raises ``InvalidInput`` naming an option that does not exist, is not a number or lies outside its range.
     """
     known = describe_options(kind)
+    for name in sorted(FORMER_OPTIONS & given.keys() - known.keys()):
+        warnings.warn(f"option {name} has no effect any more", DeprecationWarning, stacklevel=3)
+    given = {name: value for name, value in given.items() if name in known or name not in FORMER_OPTIONS}
     for name, value in given.items():
         if name not in known:
             raise InvalidInput("option", name, ", ".join(sorted(known)))

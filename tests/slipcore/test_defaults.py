@@ -2,7 +2,7 @@ from dataclasses import fields
 
 import pytest
 
-from slipcore import METHODS, InvalidInput, SampleOptions, describe_options
+from slipcore import METHODS, FilterOptions, InvalidInput, SampleOptions, describe_options
 from slipcore.defaults import METHOD_NAMES, Options, choose_options
 
 KINDS = [SampleOptions, *(method.options for method in METHODS.values())]
@@ -32,3 +32,8 @@ def test_ends_of_the_range_are_allowed_and_what_lies_beyond_is_refused(kind: typ
 
 def test_the_names_of_the_methods_are_those_of_the_table() -> None:
     assert tuple(METHODS) == METHOD_NAMES
+
+
+def test_a_former_option_is_ignored_with_a_warning() -> None:
+    with pytest.warns(DeprecationWarning, match="option onset_time has no effect"):
+        assert choose_options(FilterOptions, {"onset_time": 10.0, "creep": 1e-6}) == FilterOptions(creep=1e-6)

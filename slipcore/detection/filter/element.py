@@ -20,18 +20,19 @@ from slipcore.frames import FloatArray
 
 
 class Increment(NamedTuple):
-    """What is common to all elements of a step: its duration s, variance of a marker coordinate m², and whether the
-    growing normal load makes everything stick again.
+    """What is common to all elements of a step: its duration s, variance of a marker coordinate m², whether the growing
+    normal load makes everything stick again, and whether nothing has moved for so long that places tell nothing new.
     """
 
     interval: float
     variance: float
     restick: bool
+    held: bool
 
 
 class Measurement(NamedTuple):
     """What a step brings to an element: how far the object carried it, m, and the variance of that, m²; how much more
-    readily it begins to slip than ``onset_length`` and ``onset_time`` say; log-odds of slip from its forces; and where
+    readily it begins to slip than ``onset_length`` says; log-odds of slip from its forces; and where
     its marker is in the object's frame, m.
     """
 
@@ -80,6 +81,8 @@ def update_element(
     stick_variance, slip_variance = stuck.variance + noise, slid.variance + noise
     gained = 0.5 * stick2 / stick_variance - 0.5 * slip2 / slip_variance + math.log(stick_variance / slip_variance)
     trust, most = 1.0, tuning.largest_log_odds
+    if increment.held:
+        gained = 0.0
     if stick2 > tuning.outlier_gate * stick_variance and slip2 > tuning.outlier_gate * slip_variance:
         trust = 0.0
         stuck = Estimate(stuck.x, stuck.y, stuck.variance + tuning.outlier_spread * stick2)
@@ -93,12 +96,15 @@ def update_element(
 
 @compiled
 def transitions(motion: float, readiness: float, increment: Increment, tuning: Tuning) -> tuple[float, float]:
-    """Probability that a sticking element begins to slip in a step, and that a slipping one sticks again."""
-    interval = increment.interval
-    onset = -math.expm1(-(motion / tuning.onset_length + interval / tuning.onset_time) * readiness)
-    rate = motion / tuning.end_length + interval / tuning.end_time
+    """Probability that a sticking element begins to slip in a step, and that a slipping one sticks again.
+
+    Both are hazards of an increment of motion and load, 1 − exp(−|motion|/length), and not of time: what nothing
+    speaks for must not change, and rates of time would take every hold to their own ratio.
+    """
+    onset = -math.expm1(-motion / tuning.onset_length * readiness)
+    rate = motion / tuning.end_length
     if increment.restick:
-        rate += tuning.pressing_rate * interval
+        rate += tuning.pressing_rate * increment.interval
     return onset, -math.expm1(-rate)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from slipcore.defaults import FilterOptions
 from slipcore.detection.filter.run import run_filter
 from slipcore.detection.filter.smoothing import look_back
-from slipcore.detection.filter.state import COMMON, POSE, PROBABILITY, ROWS, STICK_VARIANCE
+from slipcore.detection.filter.state import COMMON, POSE, PROBABILITY, REFERENCE, ROWS, STICK_VARIANCE
 from slipcore.detection.filter.step import decide
 from slipcore.detection.filter.tuning import LEAST_TRANSITION, THRESHOLD, settings_of
 from slipcore.detection.shared.interface import CompiledMethod, Start
@@ -21,7 +21,7 @@ def start(lattice: Lattice, options: FilterOptions) -> Start:
     """Nothing touches yet."""
     elements, common = np.zeros((ROWS, *lattice.position.shape[:2])), np.zeros(COMMON)
     elements[STICK_VARIANCE] = np.inf
-    common[POSE + 3] = 1.0  # not stretched
+    common[POSE + 3] = common[REFERENCE + 3] = 1.0  # not stretched
     return Start(settings_of(options), elements, common)
 
 

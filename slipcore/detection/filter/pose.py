@@ -138,21 +138,40 @@ def find_pose(
 
 @compiled
 def object_motion(
-    anchors: Anchors, before: Pose, pose: Pose, spread: PoseVariance, margin: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """How far the object carried each anchor, x and y in its own frame, m, and the variance of that, m²: [k] each.
+    anchors: Anchors, reference: Pose, pose: Pose, spread: PoseVariance, play: float
+) -> tuple[FloatArray, FloatArray, FloatArray, Pose]:
+    """How far the object carried each anchor, x and y in its own frame, m, and the variance of that, m²: [k] each; and
+    the reference of the next step.
 
-    Taken from each squared motion is what noise alone makes of it, ``margin`` times over.
+    A fitted pose jitters though nothing moves. What it strays from the ``reference`` by less than ``play`` standard
+    deviations (root mean square over the anchors) is no motion; the rest is, and takes the reference with it. So all
+    of a long motion counts, however many frames it is cut into, and of a jitter nothing.
     """
     count = len(anchors.x)
-    motion_x, motion_y, noise = np.zeros(count), np.zeros(count), np.empty(count)
+    motion_x, motion_y, variance = np.zeros(count), np.zeros(count), np.empty(count)
     cosine, sine = pose.cosine, pose.sine
+    strayed = jitter = 0.0
     for e in range(count):
         px, py = place_of_object(pose, anchors.x[e], anchors.y[e])
-        bx, by = place_of_object(before, anchors.x[e], anchors.y[e])
-        noise[e] = spread.place + spread.yaw * ((px - spread.x) ** 2 + (py - spread.y) ** 2)
-        dx, dy = px - bx, py - by
-        size = dx * dx + dy * dy
-        share = max(0.0, 1.0 - margin * noise[e] / size) if size > 0.0 else 0.0
-        motion_x[e], motion_y[e] = share * (cosine * dx + sine * dy), share * (cosine * dy - sine * dx)
-    return motion_x, motion_y, noise
+        rx, ry = place_of_object(reference, anchors.x[e], anchors.y[e])
+        variance[e] = spread.place + spread.yaw * ((px - spread.x) ** 2 + (py - spread.y) ** 2)
+        dx, dy = px - rx, py - ry
+        motion_x[e], motion_y[e] = cosine * dx + sine * dy, cosine * dy - sine * dx
+        strayed += dx * dx + dy * dy
+        jitter += variance[e]
+    share = max(0.0, 1.0 - play * math.sqrt(jitter / strayed)) if strayed > 0.0 else 0.0
+    for e in range(count):
+        motion_x[e] *= share
+        motion_y[e] *= share
+    return motion_x, motion_y, variance, between(reference, pose, share)
+
+
+@compiled
+def between(one: Pose, other: Pose, share: float) -> Pose:
+    """The pose at that ``share`` of the way from one to the other."""
+    return pose_at(
+        one.x + share * (other.x - one.x),
+        one.y + share * (other.y - one.y),
+        one.yaw + share * math.atan2(math.sin(other.yaw - one.yaw), math.cos(other.yaw - one.yaw)),
+        one.stretch + share * (other.stretch - one.stretch),
+    )

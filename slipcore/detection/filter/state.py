@@ -5,8 +5,9 @@ be if it stuck (x, y m, variance m²) and if it slipped (the same); its force lo
 force ratio that it slipped at with the weight of that knowledge; and how probable it was, before this frame was seen,
 that it began to slip if it stuck and that it stuck again if it slipped.
 
-``common`` [14] is what elements share: the pose; the loading; the slipping force ratio (weighted sum, weight); and the
-share in which the surface follows the known motion (the same).
+``common`` [19] is what elements share: the pose; the loading; the slipping force ratio (weighted sum, weight); the
+share in which the surface follows the known motion (the same); the pose from which motion counts; and for how long
+there has been none, s.
 """
 
 ROWS = 13
@@ -14,4 +15,4 @@ ROWS = 13
     PROBABILITY, STICK_X, STICK_Y, STICK_VARIANCE, SLIP_X, SLIP_Y, SLIP_VARIANCE, NORMAL, TANGENTIAL, RATIO,
     RATIO_WEIGHT, ONSET, END,
 ) = range(ROWS)  # fmt: skip
-POSE, LOADING, FRICTION, FOLLOWING, COMMON = 0, 4, 10, 12, 14
+POSE, LOADING, FRICTION, FOLLOWING, REFERENCE, STILL, COMMON = 0, 4, 10, 12, 14, 18, 19

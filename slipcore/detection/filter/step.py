@@ -8,20 +8,22 @@ from slipcore.compilation import compiled
 from slipcore.detection.filter.element import Increment, Measurement, update_element
 from slipcore.detection.filter.force_ratio import follow_forces, weigh_forces
 from slipcore.detection.filter.loading import low_pass, restick_under_load
-from slipcore.detection.filter.pose import Anchors, Pose, object_motion, place_on_object, pose_at
+from slipcore.detection.filter.pose import Anchors, Pose, object_motion, place_on_object
 from slipcore.detection.filter.state import (
     END,
     ONSET,
     POSE,
     PROBABILITY,
+    REFERENCE,
     SLIP_VARIANCE,
     SLIP_X,
     SLIP_Y,
     STICK_VARIANCE,
     STICK_X,
     STICK_Y,
+    STILL,
 )
-from slipcore.detection.filter.surface_motion import step_pose
+from slipcore.detection.filter.surface_motion import step_pose, store_pose, stored_pose
 from slipcore.detection.filter.tuning import Tuning, tuning_of
 from slipcore.detection.shared.observe import same
 from slipcore.detection.shared.records import Decision, FrameArrays, Memory, Sensor, Surface
@@ -66,11 +68,15 @@ def step_elements(
     force_noise = tuning.force_noise_margin * pressing_noise
     interval, has_force = frame.time - last.time, frame.force.size > 0
     common, elements = before.common, before.elements
-    last_pose = pose_at(common[POSE], common[POSE + 1], common[POSE + 2], common[POSE + 3])
+    last_pose = stored_pose(common, POSE)
     places = places_of(elements, surface.stays)
     anchors = anchors_of(elements, places, position, frame.displacement)
     pose, spread = step_pose(anchors, last_pose, last, frame, variance, tuning, after.common)
-    motion_x, motion_y, motion_variance = object_motion(anchors, last_pose, pose, spread, tuning.motion_margin)
+    reference = stored_pose(common, REFERENCE)
+    motion_x, motion_y, motion_variance, reference = object_motion(anchors, reference, pose, spread, tuning.motion_play)
+    store_pose(after.common, REFERENCE, reference)
+    moves = motion_x.any() or motion_y.any()
+    after.common[STILL] = 0.0 if moves else common[STILL] + interval
     change = force_change(places, last.force, frame.force)
     deeper = indentation_change(places, last.displacement, frame.displacement)
     noise = interval, variance, force_noise
@@ -83,7 +89,7 @@ def step_elements(
     if change.size:
         evidence = weigh_forces(elements, places, force_noise, interval, tuning, after.elements, after.common)
     start_elements(position, frame.displacement, after.contact, surface.stays, pose, variance, after.elements)
-    increment = Increment(interval, variance, restick)
+    increment = Increment(interval, variance, restick, after.common[STILL] > tuning.hold_time)
     for e in range(len(places)):
         i, j = places[e]
         near = tuning.onset_inside + tuning.onset_at_front * slip_of_neighbours(elements, after.contact, i, j)

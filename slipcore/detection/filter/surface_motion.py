@@ -5,7 +5,15 @@ import math
 import numpy as np
 
 from slipcore.compilation import compiled
-from slipcore.detection.filter.pose import Anchors, Pose, PoseVariance, find_pose, place_of_object, place_on_object
+from slipcore.detection.filter.pose import (
+    Anchors,
+    Pose,
+    PoseVariance,
+    find_pose,
+    place_of_object,
+    place_on_object,
+    pose_at,
+)
 from slipcore.detection.filter.state import FOLLOWING, POSE
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.detection.shared.records import FrameArrays
@@ -37,9 +45,21 @@ def step_pose(
             share = following_share(common, tuning)
             known = np.array([before.x + share * step[0], before.y + share * step[1], before.yaw + share * step[2]])
         pose, spread = find_pose(anchors, before, known, variance, tuning)
-    for value in range(4):
-        common[POSE + value] = pose[value]
+    store_pose(common, POSE, pose)
     return pose, spread
+
+
+@compiled
+def stored_pose(common: FloatArray, at: int) -> Pose:
+    """The pose that the common state holds at an index."""
+    return pose_at(common[at], common[at + 1], common[at + 2], common[at + 3])
+
+
+@compiled
+def store_pose(common: FloatArray, at: int, pose: Pose) -> None:
+    """Put a pose into the common state."""
+    for value in range(4):
+        common[at + value] = pose[value]
 
 
 @compiled

@@ -22,17 +22,16 @@ class Tuning(NamedTuple):
     slip_share_spread: float
     creep: float
     onset_length: float
-    onset_time: float
     onset_inside: float
     onset_at_front: float
     onset_under_restick: float
     end_length: float
-    end_time: float
+    hold_time: float
     least_weight: float
     outlier: float
     outlier_gate: float
     outlier_spread: float
-    motion_margin: float
+    motion_play: float
     following_weight: float
     following_variance: float
     following_learning: float

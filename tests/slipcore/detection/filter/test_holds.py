@@ -1,0 +1,82 @@
+"""No evidence, no transition: while nothing moves, noise alone begins no slip and moves no probability."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from slipcore import GraspLog, SlipHistory, detect_slip
+from slipcore.contact import RampSchedule, tangential_ramp
+
+INPUTS = ("forces", "displacement", "motion")
+PRESS = RampSchedule(rest=0.2, press=0.5, settle=0.2, shear=0.0, hold=0.0)
+SHEAR = RampSchedule(rest=0.2, press=0.5, settle=0.2, shear=0.6, hold=0.0)
+
+
+def held(log: GraspLog, frames: int, rate: float, marker_noise: float, inputs: str) -> GraspLog:
+    """The log with its last frame held at a frame rate, 1/s, under white noise, m, and 2 mN where there are forces."""
+    rng = np.random.default_rng(4)
+
+    def lasting(field: np.ndarray, noise: float) -> np.ndarray:
+        whole = np.concatenate([field, np.repeat(field[-1:], frames, axis=0)])
+        return whole + noise * rng.standard_normal(whole.shape)
+
+    return GraspLog(
+        np.concatenate([log.time, log.time[-1] + np.arange(1, frames + 1) / rate]),
+        log.position,
+        lasting(log.displacement, marker_noise),
+        element_area=log.element_area,
+        force=None if inputs == "displacement" else lasting(log.force, 2e-3),
+        object_pose=lasting(log.object_pose, 0.0) if inputs == "motion" else None,
+    )
+
+
+def ramp(schedule: RampSchedule, frame_rate: float = 30.0) -> GraspLog:
+    return tangential_ramp(
+        tangential_force=0.6 if schedule.shear else 0.0, schedule=schedule, points=10, pitch=2e-3, frame_rate=frame_rate
+    )
+
+
+def share(history: SlipHistory) -> np.ndarray:
+    """Share of the elements in contact that slip, [t]."""
+    return history.slip.sum(axis=(1, 2)) / np.maximum(history.contact.sum(axis=(1, 2)), 1)
+
+
+@pytest.mark.parametrize("inputs", INPUTS)
+@pytest.mark.parametrize("marker_noise", [1e-6, 1e-5])
+@pytest.mark.parametrize(("frames", "rate"), [(1800, 30.0), (20_000, 1000.0)])
+def test_a_grasp_that_only_presses_never_slips(inputs: str, marker_noise: float, frames: int, rate: float) -> None:
+    history = detect_slip(held(ramp(PRESS), frames, rate, marker_noise, inputs))
+    assert history.slip.sum() <= 0.005 * history.contact.sum()
+    assert share(history)[-1] <= 0.005
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("inputs", INPUTS)
+def test_nor_in_a_hundred_thousand_frames(inputs: str) -> None:
+    history = detect_slip(held(ramp(PRESS), 100_000, 30.0, 1e-6, inputs))
+    assert share(history)[-1] <= 0.005
+
+
+@pytest.mark.parametrize("inputs", INPUTS)
+@pytest.mark.parametrize("marker_noise", [1e-6, 1e-5])
+def test_what_slipped_before_a_hold_is_still_said_at_its_end(inputs: str, marker_noise: float) -> None:
+    slip = share(detect_slip(held(ramp(SHEAR), 1800, 30.0, marker_noise, inputs)))
+    settled, end = slip[-1500], slip[-1]
+    assert settled > 0.2
+    assert abs(end - settled) <= 0.08  # an element or two of 28 to 36, whose places noise had not told apart
+
+
+def test_interpolated_frames_change_nothing() -> None:
+    log = replace(ramp(SHEAR), truth=None, object_pose=None)
+
+    def between(field: np.ndarray) -> np.ndarray:
+        dense = np.repeat(field, 2, axis=0)[:-1]
+        dense[1::2] = 0.5 * (field[:-1] + field[1:])
+        return dense
+
+    dense = replace(
+        log, time=between(log.time), displacement=between(log.displacement), force=between(log.force), normal=None
+    )
+    plain, finer = detect_slip(replace(log, normal=None)), detect_slip(dense)
+    assert (plain.slip ^ finer.slip[::2]).sum() <= 0.01 * plain.contact.sum()
