@@ -163,6 +163,8 @@ def object_motion(
     for e in range(count):
         motion_x[e] *= share
         motion_y[e] *= share
+    if count == 0:  # what moves without touching carries nothing
+        return motion_x, motion_y, variance, pose
     return motion_x, motion_y, variance, between(reference, pose, share)
 
 
