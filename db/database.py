@@ -173,7 +173,12 @@ def _prepare_sqlite(engine: Engine, busy_timeout: float, file: SqliteFile) -> No
             "foreign_keys = ON",
         ):
             connection.execute(f"PRAGMA {pragma}")
-        file.note_opened()
+        connection.execute("SELECT count(*) FROM sqlite_master")  # from now on the files beside it stay, too
+        file.note_opened(connection)
+
+    @event.listens_for(engine, "close")
+    def note_closing(connection: DBAPIConnection, _record: object) -> None:
+        file.note_closing(connection)
 
     @event.listens_for(engine, "begin")
     def begin(connection: Connection) -> None:

@@ -48,6 +48,24 @@ def database_files(folder: Path) -> list[Path]:
     return list(folder.glob("stiction.sqlite3*"))
 
 
+@pytest.mark.parametrize("suffixes", [("-wal",), ("-shm",), ("-wal", "-shm")])
+def test_no_upload_is_accepted_into_a_deleted_write_ahead_log(
+    running: httpx.Client, tmp_path: Path, content: bytes, suffixes: tuple[str, ...]
+) -> None:
+    log = send(running, content).raise_for_status().json()
+    files = [tmp_path / "data" / f"stiction.sqlite3{suffix}" for suffix in suffixes]
+    for file in files:
+        file.rename(tmp_path / file.name)
+    again = send(running, content)
+    assert told(again) == UNAVAILABLE
+    assert files[0].name in again.json()["detail"]
+    assert told(running.get("/readyz")) == UNAVAILABLE
+    assert not any(file.exists() for file in files)
+    for file in files:
+        (tmp_path / file.name).rename(file)
+    assert send(running, content).raise_for_status().json()["id"] == log["id"]
+
+
 @pytest.mark.parametrize("is_replaced", [False, True])
 def test_no_upload_is_accepted_into_a_deleted_or_replaced_database(
     running: httpx.Client, tmp_path: Path, content: bytes, sqlite_template: Path, *, is_replaced: bool
