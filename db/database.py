@@ -9,7 +9,14 @@ from typing import Any
 
 from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
-from sqlalchemy.exc import DatabaseError, DBAPIError, InterfaceError, OperationalError
+from sqlalchemy.exc import (
+    ArgumentError,
+    DatabaseError,
+    DBAPIError,
+    InterfaceError,
+    NoSuchModuleError,
+    OperationalError,
+)
 from sqlalchemy.exc import TimeoutError as PoolTimeout
 from sqlalchemy.orm import Session
 
@@ -42,7 +49,7 @@ class Database:
 
     def __init__(self, url: str | URL, lock_timeout: float = LOCK_TIMEOUT) -> None:
         self.url = url if isinstance(url, str) else url.render_as_string(hide_password=False)
-        self.engine = _engine(make_url(url))
+        self.engine = _engine(_parsed(url))
         # a deferred transaction that reads first cannot always be upgraded to writing: take the write lock at once
         self._writing = self.engine.execution_options(**{_BEGIN: "BEGIN IMMEDIATE"})
         self._noting = self._writing.execution_options(**{_DURABLE: False})
@@ -134,6 +141,15 @@ def _says_unavailable(error: DBAPIError) -> bool:
     return getattr(error.orig, "sqlstate", None) == _READ_ONLY
 
 
+def _parsed(url: str | URL) -> URL:
+    """The URL in its parts, none of which an error repeats, for one may be a password."""
+    try:
+        return make_url(url)
+    except (ArgumentError, ValueError) as error:
+        allowed = "such as sqlite:////var/lib/stiction/stiction.sqlite3 or postgresql://user:password@host/database"
+        raise InvalidUrl(f"database URL is no SQLAlchemy URL; allowed: {allowed}") from error
+
+
 def _engine(url: URL) -> Engine:
     if "@" in (url.host or ""):  # what follows the first one would be told to everybody as a host that is not found
         raise InvalidUrl("database URL has an @ in its user or password; allowed: %40")
@@ -147,6 +163,9 @@ def _engine(url: URL) -> Engine:
         return create_engine(url, hide_parameters=True, **options)  # errors are logged; what callers sent is not
     except ModuleNotFoundError as error:
         raise DriverMissing(url.render_as_string(hide_password=True), error.name or str(error)) from error
+    except NoSuchModuleError as error:
+        allowed = "sqlite:// or postgresql://"
+        raise InvalidUrl(f"database URL begins with {url.drivername}://; allowed: {allowed}") from error
 
 
 def _prepare_postgresql(engine: Engine, lock_timeout: float) -> None:

@@ -9,7 +9,7 @@ from sqlalchemy import text
 from sqlalchemy.exc import StatementError
 
 from db.database import Database
-from db.errors import DriverMissing, StorageUnavailable
+from db.errors import DriverMissing, InvalidUrl, StorageUnavailable
 from db.records import Claim, NewGraspLog, NewModel
 from db.repositories import friction_models, grasp_logs, jobs, materials
 from db.tables import JobRow
@@ -254,3 +254,12 @@ def test_names_that_differ_in_case_are_two_and_stand_in_the_order_of_their_bytes
             materials.create(session, name, "")
     with database.read() as session:
         assert [material.name for material in materials.list_all(session)] == ["Paper", "Zinc", "brass", "paper"]
+
+
+@pytest.mark.parametrize(
+    "url", ["stiction", "hush@", "postgresql://user:hush@host:port/name", "nosql://user:hush@host/name"]
+)
+def test_what_is_no_url_of_a_database_is_refused_without_being_repeated(url: str) -> None:
+    with pytest.raises(InvalidUrl, match=r"database URL .*; allowed: .*sqlite://") as refusal:
+        Database(url)
+    assert "hush" not in str(refusal.value)
