@@ -6,6 +6,7 @@ hold all connections, and a request that two parsers could read differently is r
 
 import asyncio
 import json
+from http import HTTPStatus
 from typing import Any
 
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -24,6 +25,10 @@ RECEIVED_BYTES = 512 * 1024
 """Taken from a socket at once at most. With asyncio's own 256 KiB a body of 4 MB takes 11 ms to receive, not 7."""
 
 VERSIONS = frozenset({"1.0", "1.1"})
+BODY_HEADERS = frozenset({b"content-length", b"transfer-encoding"})
+
+Refusal = tuple[ProblemType, str]
+"""What a request is refused as, and why."""
 
 
 class BoundedConnection(asyncio.Protocol):
@@ -39,6 +44,7 @@ class BoundedConnection(asyncio.Protocol):
     connections: set[Any]
     tasks: set[Any]
     cycle: Any
+    scope: Any
     app: Any
     limit_concurrency: int | None
 
@@ -77,9 +83,13 @@ class BoundedConnection(asyncio.Protocol):
             self._stop_waiting()
 
     def handle_websocket_upgrade(self, *event: Any) -> None:
-        """Hand the connection on."""
+        """Hand the connection on, unless the request for it is refused as any other would be."""
         self._stop_waiting()
-        super().handle_websocket_upgrade(*event)  # type: ignore[misc]  # of the server's protocol
+        refusal = self._refusal(self.scope) or _fault_of_handshake(self.scope)
+        if refusal is None and self.is_idle:
+            super().handle_websocket_upgrade(*event)  # type: ignore[misc]  # of the server's protocol
+        else:
+            self._end(*(refusal or (BAD_REQUEST, "a WebSocket is asked for before another answer is whole")))
 
     def on_response_complete(self) -> None:
         """Begin to be idle."""
@@ -102,10 +112,15 @@ class BoundedConnection(asyncio.Protocol):
             self.transport.abort()
 
     def send_400_response(self, msg: str) -> None:
-        """Refuse what is not HTTP, and close; say so where that cannot be taken for the answer to another request."""
+        """Refuse what is not HTTP."""
+        self._end(BAD_REQUEST, msg)
+
+    def _end(self, kind: ProblemType, detail: str) -> None:
+        """Close; say why where that cannot be taken for the answer to another request."""
         if self.is_idle or self._is_receiving():
-            content = _problem(BAD_REQUEST, msg)
-            lines = [b"HTTP/1.1 400 Bad Request", *(name + b": " + value for name, value in _headers(content))]
+            content = _problem(kind, detail)
+            status = f"HTTP/1.1 {kind.status} {HTTPStatus(kind.status).phrase}".encode()
+            lines = [status, *(name + b": " + value for name, value in _headers(kind, content))]
             self.transport.write(b"\r\n".join([*lines, b"", content]))
         self.transport.close()
 
@@ -134,14 +149,19 @@ class BoundedConnection(asyncio.Protocol):
             self._header_timer = None
 
     async def _serve(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if self._is_beyond:
-            await _refuse(TOO_MANY_CONNECTIONS, "this address has as many as it may; try again later", scope, send)
-        elif self._most is not None and max(len(self.connections) - 1, len(self.tasks) - 1) >= self._most:
-            await _refuse(TOO_MANY_CONNECTIONS, "as many connections are open as may be; try again later", scope, send)
-        elif (fault := ambiguity(scope)) is not None:
-            await _refuse(BAD_REQUEST, fault, scope, send)
-        else:
+        refusal = self._refusal(scope)
+        if refusal is None:
             await self._served(scope, receive, send)
+        else:
+            await _refuse(*refusal, scope, send)
+
+    def _refusal(self, scope: Scope) -> Refusal | None:
+        if self._is_beyond:
+            return TOO_MANY_CONNECTIONS, "this address has as many as it may; try again later"
+        if self._most is not None and max(len(self.connections) - 1, len(self.tasks) - 1) >= self._most:
+            return TOO_MANY_CONNECTIONS, "as many connections are open as may be; try again later"
+        fault = ambiguity(scope)
+        return None if fault is None else (BAD_REQUEST, fault)
 
 
 class H11Connection(BoundedConnection, H11Protocol):
@@ -167,11 +187,17 @@ def ambiguity(scope: Scope) -> str | None:
     return None if codings in ([], [b"chunked"]) else "a Transfer-Encoding other than chunked; allowed: chunked"
 
 
+def _fault_of_handshake(scope: Scope) -> Refusal | None:
+    """The WebSocket's own protocol would wait for ever for the end of a body, which none has (RFC 6455, 4.1)."""
+    if any(name in BODY_HEADERS for name, _ in scope["headers"]):
+        return BAD_REQUEST, "a WebSocket is asked for with a body; allowed: none"
+    return None
+
+
 async def _refuse(kind: ProblemType, detail: str, scope: Scope, send: Send) -> None:
     """Answer before anything else of the service sees the request, and close."""
     content = _problem(kind, detail, scope["path"])
-    retry = [(b"retry-after", b"1")] if kind is TOO_MANY_CONNECTIONS else []
-    await send({"type": "http.response.start", "status": kind.status, "headers": [*_headers(content), *retry]})
+    await send({"type": "http.response.start", "status": kind.status, "headers": _headers(kind, content)})
     await send({"type": "http.response.body", "body": content})
 
 
@@ -180,6 +206,12 @@ def _problem(kind: ProblemType, detail: str, instance: str = "/") -> bytes:
     return json.dumps(problem).encode()
 
 
-def _headers(content: bytes) -> list[tuple[bytes, bytes]]:
+def _headers(kind: ProblemType, content: bytes) -> list[tuple[bytes, bytes]]:
     length = str(len(content)).encode()
-    return [(b"content-type", MEDIA_TYPE.encode()), (b"content-length", length), (b"connection", b"close")]
+    retry = [(b"retry-after", b"1")] if kind is TOO_MANY_CONNECTIONS else []
+    return [
+        (b"content-type", MEDIA_TYPE.encode()),
+        (b"content-length", length),
+        (b"connection", b"close"),
+        *retry,
+    ]

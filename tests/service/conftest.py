@@ -40,7 +40,7 @@ Members = dict[str, Any]
 @contextmanager
 def serve(settings: Settings) -> Iterator[httpx.Client]:
     """A real server on a free loopback port, in a thread of this process (its workers are processes)."""
-    server = uvicorn.Server(configuration(settings.model_copy(update={"port": 0}), log_level="warning", ws="none"))
+    server = uvicorn.Server(configuration(settings.model_copy(update={"port": 0}), log_level="warning"))
     thread = threading.Thread(target=server.run)
     thread.start()
     while not server.started:

@@ -131,3 +131,35 @@ def test_an_address_whose_connections_are_all_busy_is_told_so(address: Address) 
         assert json.loads(body)["type"] == "/problems/too-many-connections"
     time.sleep(0.3)
     assert told(address, b"GET /healthz HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n").startswith(b"HTTP/1.1 200")
+
+
+HANDSHAKE = (
+    b"GET /v1/stream HTTP/1.1\r\nHost: localhost\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+    b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+)
+
+
+@pytest.mark.parametrize(
+    "odd",
+    [b"Content-Length: 5\r\n\r\nabcde", b"Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n", b"Host: elsewhere\r\n\r\n"],
+    ids=["body", "chunks", "two hosts"],
+)
+def test_an_odd_request_for_a_websocket_is_refused_at_once(address: Address, odd: bytes) -> None:
+    began = time.monotonic()
+    head, _, body = told(address, HANDSHAKE + odd).partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.1 400")
+    assert json.loads(body)["type"] == "/problems/bad-request"
+    assert time.monotonic() - began < 5.0
+
+
+def test_websockets_count_among_the_connections_of_an_address(address: Address) -> None:
+    with ExitStack() as opened:
+        for _ in range(MOST_OF_ONE):
+            socket_ = opened.enter_context(socket.create_connection(address, timeout=5.0))
+            socket_.sendall(HANDSHAKE + b"\r\n")
+            assert socket_.recv(65536).startswith(b"HTTP/1.1 101")
+        head, _, body = told(address, HANDSHAKE + b"\r\n").partition(b"\r\n\r\n")
+        assert head.startswith(b"HTTP/1.1 503")
+        assert b"retry-after: 1" in head
+        assert json.loads(body)["type"] == "/problems/too-many-connections"
+    time.sleep(0.3)
