@@ -19,11 +19,11 @@ AuditAction = Literal[
     "grasp_log.uploaded",
     "grasp_log.withdrawn",
     "grasp_log.restored",
+    "grasp_log.file_deleted",
     "fit.requested",
     "job.cancelled",
     "key.created",
     "key.revoked",
-    "uploads.deleted",
     "audit.deleted",
     "blob.damaged",
 ]

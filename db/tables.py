@@ -346,6 +346,7 @@ class AuditEntryRow(Base):
         Index(None, "at"),
         Index(None, "actor", "id"),
         Index(None, "subject", "id"),
+        Index(None, "action", "id"),
     )
 
     id: Mapped[int] = mapped_column(primary_key=True)

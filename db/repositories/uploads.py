@@ -63,14 +63,20 @@ def spare_needed(session: Session, hashes: Collection[str]) -> list[str]:
     return sorted(set(hashes) - needed)
 
 
-def note_gone(session: Session, hashes: Iterable[str]) -> None:
-    """That the marked files are deleted."""
-    _set_state(session, hashes, "gone")
+def note_gone(session: Session, hashes: Iterable[str]) -> list[tuple[str, str]]:
+    """That the marked files are deleted; returns their logs, each by id and hash."""
+    deleted = list(hashes)
+    logs = session.execute(select(GraspLogRow.id, GraspLogRow.sha256).where(*_marked(deleted))).all()
+    _set_state(session, deleted, "gone")
+    return [(log_id, sha256) for log_id, sha256 in logs]
 
 
 def _set_state(session: Session, hashes: Iterable[str], state: str | None) -> None:
-    marked = (GraspLogRow.sha256.in_(list(hashes)), GraspLogRow.file_state == "leaving")
-    session.execute(update(GraspLogRow).where(*marked).values(file_state=state))
+    session.execute(update(GraspLogRow).where(*_marked(hashes)).values(file_state=state))
+
+
+def _marked(hashes: Iterable[str]) -> tuple[ColumnElement[bool], ...]:
+    return GraspLogRow.sha256.in_(list(hashes)), GraspLogRow.file_state == "leaving"
 
 
 def _old(before: datetime) -> Select[str]:

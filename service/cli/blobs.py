@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from db.defaults import QUARANTINE_AGE
-from service.cli.database import Url, opened, opened_blobs
+from service.cli.database import Url, command_actor, opened, opened_blobs
 from service.cli.durations import duration
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def _prune_uploads(database: "Database", blobs: "BlobStore", age: timedelta, *, 
     with database.read() as session:
         count, size = uploads.count_old(session, before)
     if delete:
-        typer.echo(f"deleted {delete_old(database, blobs, before)} uploads ({size} bytes)")
+        typer.echo(f"deleted {delete_old(database, blobs, before, actor=command_actor())} uploads ({size} bytes)")
     else:
         typer.echo(f"{count} uploads ({size} bytes) would be deleted")
 

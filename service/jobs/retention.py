@@ -13,6 +13,7 @@ from datetime import datetime, timedelta
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import DatabaseError
+from db.records import Actor
 from db.repositories import audit, uploads
 from db.tables import now
 from service.jobs import garbage
@@ -29,23 +30,30 @@ FILES_AT_ONCE = 100
 """Files deleted in one transaction: others who write to SQLite wait for it."""
 
 
-def prune(database: Database, blobs: BlobStore, before: datetime, stop: Callable[[], bool] = lambda: False) -> int:
+def prune(
+    database: Database,
+    blobs: BlobStore,
+    before: datetime,
+    stop: Callable[[], bool] = lambda: False,
+    actor: Actor = audit.SERVICE,
+) -> int:
     """Delete the files of all logs older than ``before`` whose jobs have ended; returns how many.
 
+    The audit trail tells that ``actor`` did so.
     Ends early once ``stop`` says so. May run at any number of places at once, and be killed at any moment.
     """
     deleted = 0
     while not stop():
         with database.write(durable=False) as session:
             marked = uploads.mark(session, before, FILES_AT_ONCE)
-        count = _delete_marked(database, blobs)
+        count = _delete_marked(database, blobs, actor)
         deleted += count
         if not marked and not count:
             break
     return deleted
 
 
-def _delete_marked(database: Database, blobs: BlobStore) -> int:
+def _delete_marked(database: Database, blobs: BlobStore, actor: Actor) -> int:
     """The files that were marked, by us or by one who died since."""
     with database.read() as session:
         marked = uploads.leaving(session, FILES_AT_ONCE)
@@ -55,7 +63,8 @@ def _delete_marked(database: Database, blobs: BlobStore) -> int:
         uploads.lock(session, marked)
         free = uploads.spare_needed(session, marked)
         blobs.remove(free)
-        uploads.note_gone(session, free)
+        for log_id, sha256 in uploads.note_gone(session, free):
+            audit.add(session, actor, "grasp_log.file_deleted", log_id, {"sha256": sha256})
     return len(free)
 
 

@@ -65,6 +65,10 @@ def test_a_change_that_is_rolled_back_leaves_no_entry(database: Database) -> Non
         update(AuditEntryRow).values(actor="somebody else"),
         delete(AuditEntryRow),
         text("UPDATE audit_entries SET at = '2000-01-01'"),
+        text(
+            "INSERT INTO audit_entries SELECT * FROM audit_entries WHERE true "
+            "ON CONFLICT (id) DO UPDATE SET actor = 'x'"
+        ),
     ],
     ids=str,
 )
@@ -73,6 +77,20 @@ def test_the_database_refuses_to_change_or_delete_an_entry(database: Database, c
     with pytest.raises(DBAPIError, match="audit entries"), database.write() as session:
         session.execute(change)  # type: ignore[call-overload]
     assert len(entries(database)) == 1
+
+
+def test_an_entry_is_not_replaced_by_an_older_one_that_may_be_deleted(database: Database) -> None:
+    if not database.is_sqlite:
+        pytest.skip("only SQLite knows REPLACE, which no trigger on deletion sees")
+    store(database, timedelta(0))
+    (entry,) = entries(database)
+    replaced = text(
+        "REPLACE INTO audit_entries (id, at, actor, action, subject, details) "
+        f"VALUES ({entry.id}, '2000-01-01 00:00:00.000000', 'nobody', 'x', 'y', '{{}}')"
+    )
+    with pytest.raises(DBAPIError, match="audit entries"), database.write() as session:
+        session.execute(replaced)
+    assert entries(database) == [entry]
 
 
 def test_the_trail_is_not_emptied_at_once(database: Database) -> None:

@@ -94,6 +94,8 @@ def test_an_old_upload_goes_and_comes_back_while_its_log_stays(shelf: Shelf, con
     assert "stiction_deleted_uploads 1.0" in figures
     assert "stiction_upload_bytes 0.0" in figures
     assert shelf.is_sound()
+    (entry,) = shelf.client.get("/v1/audit?action=grasp_log.file_deleted").json()["items"]
+    assert (entry["actor"], entry["subject"], entry["details"]) == ("service", log_id, {"sha256": log["sha256"]})
 
     again = shelf.upload(content)
     assert (again.status_code, again.json()["id"], again.json()["has_file"]) == (200, log_id, True)
