@@ -3,7 +3,7 @@
 import asyncio
 import json
 from collections.abc import Awaitable, Callable, Iterator
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,6 +13,7 @@ import pytest
 from starlette.websockets import WebSocketDisconnect
 
 from service.domain.asker import Asker
+from service.settings import Settings
 from service.stream import connection, live, sessions
 from service.stream.messages import Open
 from service.stream.sessions import REFUSED, TOO_MANY, UNKNOWN_SESSION, End, Streams
@@ -153,7 +154,8 @@ class Socket:
 
 
 def converse(streams: Streams, *said: Any, raw: bool = False) -> Socket:
-    context: Any = SimpleNamespace(streams=streams, database=None)
+    database = SimpleNamespace(read=lambda: nullcontext())  # nothing is looked up without a key and a material
+    context: Any = SimpleNamespace(streams=streams, database=database, settings=Settings())
     socket: Any = Socket(*(said if raw else (json.dumps(each) for each in said)))
 
     async def go() -> None:

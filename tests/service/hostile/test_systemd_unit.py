@@ -27,6 +27,7 @@ NOBODY = "65534"
 
 RESTRICTED = """
 set -e
+umask 022
 mount --make-rprivate /
 mount -t tmpfs tmpfs /opt
 mkdir -p /opt/python /opt/stiction
