@@ -19,6 +19,7 @@ from service.formats import writing
 from service.formats.tracked_markers import FRAME_RATE, SCALE
 from service.http.access import READ, UPLOAD, Asking
 from service.http.idempotency import OnceWithoutBody
+from service.http.long_json import long_json
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import (
     FILE_DAMAGED,
@@ -199,13 +200,19 @@ def read_events(context: Given, id: str) -> EventsOut:  # noqa: A002
     )
 
 
-@router.get("/{id}/samples", dependencies=[READ], summary="Look at the friction samples", responses=_RESULTS)
-def read_samples(context: Given, id: str) -> SamplesOut:  # noqa: A002
+@router.get(
+    "/{id}/samples",
+    dependencies=[READ],
+    summary="Look at the friction samples",
+    response_model=SamplesOut,
+    responses=_RESULTS,
+)
+def read_samples(context: Given, id: str) -> Response:  # noqa: A002
     """One entry an element and frame; empty where no slip gave one."""
     log = _find(context, id)
     samples = decode_samples(context.blobs.path(_ready(log.samples, log).samples_blob))
-    arrays = {name: getattr(samples, name).tolist() for name in SAMPLE_ARRAYS}
-    return SamplesOut(**arrays, element_area=samples.element_area)
+    arrays = {name: getattr(samples, name) for name in SAMPLE_ARRAYS}
+    return long_json(arrays, element_area=samples.element_area)
 
 
 @router.get(
