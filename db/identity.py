@@ -61,6 +61,14 @@ def verify(database: Database, blobs: BlobStore) -> None:
     database.store_id = blobs.store_id = known
 
 
+def verify_before_upgrade(database: Database, blobs: BlobStore) -> None:
+    """The same for a database of any older schema: that of another store must not be brought to a newer one."""
+    with database.read() as session:
+        known = stores.find_id(session) if stores.has_table(session) else None
+    if known is not None or next(blobs.hashes(), None) is not None:
+        _require_same(database, blobs, known, blobs.read_store_id())
+
+
 def adopt(database: Database, blobs: BlobStore) -> Adopted:
     """Join two because somebody says so, under a new id: whatever else worked with either is refused from then on."""
     store_id = uuid.uuid4().hex

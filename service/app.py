@@ -152,6 +152,7 @@ def _enter(
     alone: bool,
 ) -> None:
     if settings.migrate_at_start:
+        identity.verify_before_upgrade(database, blobs)
         migrate.upgrade(database)
     else:
         migrate.check(database)

@@ -1,6 +1,6 @@
 """The id of the store that the database belongs to."""
 
-from sqlalchemy import select, text, update
+from sqlalchemy import inspect, select, text, update
 from sqlalchemy.orm import Session
 
 from db.errors import StorageUnavailable
@@ -11,6 +11,11 @@ def lock(session: Session) -> None:
     """Let others who would give the database an id wait until the end of the transaction (SQLite has one writer)."""
     if session.connection().dialect.name == "postgresql":
         session.execute(text("SELECT pg_advisory_xact_lock(hashtext('stiction store'))"))
+
+
+def has_table(session: Session) -> bool:
+    """Whether the database's schema has store ids yet."""
+    return inspect(session.connection()).has_table(StoreRow.__tablename__)
 
 
 def find_id(session: Session) -> str | None:

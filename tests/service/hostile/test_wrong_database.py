@@ -10,6 +10,7 @@ from typing import Any
 import httpx
 import pytest
 
+from db import migrate
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import StoreMismatch
@@ -143,3 +144,15 @@ def test_the_same_holds_for_an_object_store(s3: Any, tmp_path: Path, serving: Se
         start(Settings(data_folder=tmp_path / "other", blob_url="s3://grasps/lab", workers=0))
     assert set(s3.objects) == before
     start(right)
+
+
+@pytest.mark.parametrize("revision", ["0005", "0011"])
+def test_a_refused_start_leaves_the_schema_of_the_wrong_database(
+    right: Settings, tmp_path: Path, revision: str
+) -> None:
+    wrong = right.model_copy(update={"database_url": f"sqlite:///{tmp_path / 'wrong.sqlite3'}"})
+    with closing(Database(wrong.resolved_database_url)) as database:
+        migrate.upgrade(database, revision)
+        with pytest.raises(StoreMismatch):
+            start(wrong)
+        assert migrate.current(database) == revision
