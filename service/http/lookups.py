@@ -105,7 +105,9 @@ def _answered_before(known: KnownModel, question: Question | None, scope: Scope)
 
 @lru_cache(maxsize=4096)
 def _read(query: bytes) -> tuple[str, Question] | None:
-    """Method and question of a query, None for one that the route has to refuse."""
+    """Method and question of a query, None for one that has to be refused."""
+    if b"%00" in query:
+        return None
     try:
         asked = LookUpQuery.model_validate(dict(parse_qsl(query.decode("latin-1"), keep_blank_values=True)))
     except ValueError:  # pydantic's, or of the address

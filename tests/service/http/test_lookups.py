@@ -66,6 +66,7 @@ fn=0.05&quantile=1e-12
 fn=0&v=1000
 """
 OTHER = """
+fn=0.05&x=%00
 v=0
 fn=
 fn=x
