@@ -47,6 +47,14 @@ def revoke(session: Session, key_id: str) -> AccessKey:
     return get(session, key_id)
 
 
+def lock(session: Session, key_id: str) -> None:
+    """Make others that lock the key wait for this transaction (SQLite has one writer anyway).
+
+    Rows that refer to the key may come in meanwhile.
+    """
+    session.execute(select(AccessKeyRow.id).where(AccessKeyRow.id == key_id).with_for_update(key_share=True))
+
+
 def any_valid(session: Session) -> bool:
     """Whether some key is neither revoked nor expired."""
     is_live = or_(AccessKeyRow.expires_at.is_(None), AccessKeyRow.expires_at > now())

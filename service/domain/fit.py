@@ -19,6 +19,7 @@ def request_fit(
         def ask() -> Answer:
             material_id = materials.find_id(session, material)
             check_may_add(session, material_id, asker)
+            quotas.lock(session, context.settings, asker.key_id)
             quotas.check_job(session, context.settings, asker.key_id)
             job_id = queue(session, "fit", method, material_id=material_id, seed=seed, requested_by=asker.key_id)
             job = jobs.get(session, job_id)

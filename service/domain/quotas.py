@@ -1,16 +1,28 @@
-"""How much one access key may have: jobs queued, logs a day, bytes of uploads. Without a key nothing is limited."""
+"""How much one access key may have: jobs queued, logs a day, bytes of uploads. Without a key nothing is limited.
+
+An upload is checked twice: before its body is received, and in the transaction that stores it, for others of the same
+key may have been stored meanwhile. Fits that the service itself queues, after an upload or a curation, are counted but
+never refused: without them a material would keep a model that its logs contradict.
+"""
 
 from datetime import timedelta
 
 from sqlalchemy.orm import Session
 
-from db.repositories import usage
+from db.repositories import access_keys, usage
 from db.tables import now
 from service.http.problems import QUOTA_EXCEEDED, STORAGE_QUOTA_EXCEEDED, Problem
 from service.settings import Settings
 
 DAY = timedelta(days=1)
 JOBS_RETRY_SECONDS, LOGS_RETRY_SECONDS = 10, 3600
+
+
+def lock(session: Session, settings: Settings, key_id: str | None) -> None:
+    """Let what is counted stay true to the end of this transaction, in which something is stored for the key."""
+    quotas = (settings.key_queued_jobs, settings.key_logs_a_day, settings.key_stored_bytes)
+    if key_id is not None and any(most is not None for most in quotas):
+        access_keys.lock(session, key_id)
 
 
 def check_upload(session: Session, settings: Settings, key_id: str | None) -> None:

@@ -211,13 +211,18 @@ def _store(context: Context, spool: Spool, log: NewGraspLog, once: Once | None, 
         uploads.lock(session, [log.sha256])
         if uploads.bring_back(session, log.sha256) and not context.blobs.has(log.sha256):
             raise StorageUnavailable("the file was old and about to be deleted when it came in again")
-        answer = answer_once(session, once, lambda: _accept(session, log, asker))
+        answer = answer_once(session, once, lambda: _accept(context, session, log, asker))
     context.jobs.wake()
     return answer
 
 
-def _accept(session: Session, log: NewGraspLog, asker: Asker) -> Answer:
-    """Store a new log with its job; a known one whose job failed, which is our fault, or was cancelled gets another."""
+def _accept(context: Context, session: Session, log: NewGraspLog, asker: Asker) -> Answer:
+    """Store a new log with its job; a known one whose job failed, which is our fault, or was cancelled gets another.
+
+    Quotas are looked at once more: others of the same key may have been stored since this one's body began.
+    """
+    quotas.lock(session, context.settings, asker.key_id)
+    quotas.check_upload(session, context.settings, asker.key_id)
     if log.material_id is not None:  # it may have been merged into another while the log came in
         material_id = materials.still(session, log.material_id)
         check_may_add(session, material_id, asker)

@@ -1,11 +1,20 @@
+import asyncio
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from threading import Barrier, BrokenBarrierError
 from typing import Any
 
+import numpy as np
 import pytest
 
 from db.database import Database
-from db.repositories import access_keys
+from db.repositories import access_keys, usage
+from service.domain import upload
+from service.domain.asker import Asker
+from service.formats.reading import Description
 from service.http import access
+from service.http.problems import Problem
 
 HEADERS = {"content-type": "application/vnd.stiction.grasp-log+npz"}
 ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -50,3 +59,56 @@ def test_fits_count_as_queued_jobs(reach: Callable[..., Any], key: str) -> None:
     client.request("POST", "/v1/materials", json={"name": "paper"})
     answers = [client.request("POST", "/v1/materials/paper/fits", json={"method": "ols"}) for _ in range(2)]
     assert [answer.status_code for answer in answers] == [202, 429]
+
+
+@pytest.fixture
+def counting_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two requests that count what a key has wait for each other, so that neither sees what the other stores."""
+    both, count = Barrier(2), usage.queued_jobs
+
+    def count_together(*given: Any) -> int:
+        found = count(*given)
+        with suppress(BrokenBarrierError):  # the other one waits until this one has stored
+            both.wait(timeout=0.5)
+        return found
+
+    monkeypatch.setattr(usage, "queued_jobs", count_together)
+
+
+@pytest.mark.usefixtures("counting_at_once")
+def test_uploads_at_the_same_time_do_not_pass_a_quota_together(
+    reach: Callable[..., Any], key: str, members: dict[str, Any], repack: Callable[..., bytes]
+) -> None:
+    clients = [reach(key=key, key_queued_jobs=1) for _ in range(2)]
+    contents = [repack(members | {"sensor": np.str_(f"finger {number}")}) for number in range(2)]
+    with ThreadPoolExecutor(2) as pool:
+        answers = list(pool.map(send, clients, contents))
+    assert sorted(answer.status_code for answer in answers) == [202, 429]
+
+
+@pytest.mark.usefixtures("counting_at_once")
+def test_fits_at_the_same_time_do_not_pass_a_quota_together(reach: Callable[..., Any], key: str) -> None:
+    clients = [reach(key=key, key_queued_jobs=1) for _ in range(2)]
+    clients[0].request("POST", "/v1/materials", json={"name": "paper"})
+
+    def ask(client: Any) -> int:
+        return int(client.request("POST", "/v1/materials/paper/fits", json={"method": "ols"}).status_code)
+
+    with ThreadPoolExecutor(2) as pool:
+        assert sorted(pool.map(ask, clients)) == [202, 429]
+
+
+@pytest.mark.parametrize("setting", ["key_queued_jobs", "key_logs_a_day", "key_stored_bytes"])
+def test_a_log_that_a_stream_stores_keeps_to_the_quotas(
+    reach: Callable[..., Any], key: str, content: bytes, monkeypatch: pytest.MonkeyPatch, setting: str
+) -> None:
+    client = reach(key=key, **{setting: 1})
+    assert send(client, content).status_code == 202
+    context, key_id = client.app.state.context, access.key_id(key)
+    monkeypatch.setattr(upload, "_check", lambda *_: None)  # that look was before the log above was stored
+    found = Description("npz", "finger", 2, 1.0, (1, 1))
+    with context.blobs.spool() as spool:
+        spool.path.write_bytes(b"frames")
+        wish = upload.Wish(None, None, "filter", None, None, asker=Asker(key_id=key_id))
+        with pytest.raises(Problem, match=setting.upper()):
+            asyncio.run(upload.store_made(context, spool, found, wish))
