@@ -112,6 +112,7 @@ class Claim:
 
     job_id: str
     runner_id: str
+    is_long: bool = False
 
 
 @dataclass(frozen=True, slots=True)

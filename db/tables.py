@@ -193,6 +193,7 @@ class JobRow(Base):
         CheckConstraint("status NOT IN ('failed', 'refused', 'cancelled') OR reason IS NOT NULL", name="reason"),
         Index(None, "status", "created_at", "id"),  # the next one is found without a look at the others
         Index(None, "status", "turn"),
+        Index(None, "status", "is_long", "turn"),  # a short one, among however many long ones
         Index(None, "status", "requested_by", "turn"),
         Index(None, "status", "requested_by", "turn_within_key"),
         Index(None, "status", "requested_by", "material_id", "is_long", "turn_within_key"),

@@ -20,7 +20,7 @@ from service.http.head_requests import HeadRequests
 from service.http.lookups import Lookups
 from service.http.routes import audit, curation, grasp_logs, health, jobs, materials, metrics, owners, planning, stream
 from service.http.start_refusal import StartRefusal
-from service.jobs.lanes import lanes
+from service.jobs.lanes import lane_for_short_jobs, lanes
 from service.jobs.retention import Retention
 from service.jobs.runner import JobRunner
 from service.jobs.scrub import Scrub
@@ -110,9 +110,11 @@ async def running(
                 settings.blob_cache_bytes,
                 settings.job_memory_bytes,
             )
+            chosen = place, settings.workers, settings.dask_address, settings.job_cpu_seconds
             runner = JobRunner(
                 database,
-                lanes(place, settings.workers, settings.dask_address, settings.job_cpu_seconds),
+                lanes(*chosen),
+                lane_for_short_jobs(*chosen),
                 attempts=settings.job_attempts,
                 lease_seconds=settings.lease_seconds,
                 poll_seconds=settings.poll_seconds,

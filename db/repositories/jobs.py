@@ -4,7 +4,7 @@ import uuid
 from collections.abc import Collection, Mapping
 from datetime import datetime
 
-from sqlalchemy import func, select, update
+from sqlalchemy import ColumnElement, false, func, select, update
 from sqlalchemy.orm import Session
 
 from db.errors import ClaimLost, NotFound
@@ -93,21 +93,27 @@ def is_fit_queued(session: Session, material_id: int, method: str) -> bool:
     return session.scalar(select(JobRow.id).where(*same).limit(1)) is not None
 
 
-def any_queued(session: Session) -> bool:
+def any_queued(session: Session, *, only_short: bool = False) -> bool:
     """Whether a job waits for a runner."""
-    return session.scalar(select(JobRow.id).where(JobRow.status == "queued").limit(1)) is not None
+    wanted = (JobRow.status == "queued", *_of_size(only_short=only_short))
+    return session.scalar(select(JobRow.id).where(*wanted).limit(1)) is not None
 
 
-def claim(session: Session, runner_id: str, besides: Collection[str] = ()) -> Claim | None:
+def claim(session: Session, runner_id: str, besides: Collection[str] = (), *, only_short: bool = False) -> Claim | None:
     """Give the queued job whose turn it is to a runner, if there is one; runners that claim at once get different ones.
 
     ``besides``: jobs that the runner is still at, whatever a database that crashed remembers of its claims.
     """
-    job_id = turns.first(session, JobRow.id.not_in(besides))
+    job_id = turns.first(session, JobRow.id.not_in(besides), *_of_size(only_short=only_short))
     if job_id is None:
         return None
-    session.execute(update(JobRow).where(JobRow.id == job_id).values(status="running", runner_id=runner_id))
-    return Claim(job_id, runner_id)
+    claimed = update(JobRow).where(JobRow.id == job_id).values(status="running", runner_id=runner_id)
+    is_long = session.scalar(claimed.returning(JobRow.is_long))
+    return Claim(job_id, runner_id, bool(is_long))
+
+
+def _of_size(*, only_short: bool) -> tuple[ColumnElement[bool], ...]:
+    return (JobRow.is_long == false(),) if only_short else ()
 
 
 def claimed(session: Session, runner_id: str) -> set[str]:

@@ -59,12 +59,14 @@ class ProcessLane:
         self.missing: str | None = None
 
     async def hire(self) -> None:
-        """Start a worker process and warm it up, in place of the one before."""
+        """Start a worker process and warm it up, in place of the one before; only then it gives way, for jobs wait."""
+        run = asyncio.get_running_loop().run_in_executor
         while True:
             await self.close()
-            self._executor = spawned.process(spawned.give_way)
+            self._executor = spawned.process()
             try:
-                await asyncio.get_running_loop().run_in_executor(self._executor, worker.warm_up)
+                await run(self._executor, worker.warm_up)
+                await run(self._executor, spawned.give_way)
             except asyncio.CancelledError:  # nobody waits for what it compiles
                 self.kill()
                 raise
@@ -124,3 +126,11 @@ def lanes(place: Place, count: int, dask_address: str | None, cpu_seconds: float
     except ModuleNotFoundError as error:
         raise DriverMissing(dask_address, error.name or str(error), "Dask cluster", "dask") from error
     return [DaskLane(place, dask_address) for _ in range(count)]
+
+
+def lane_for_short_jobs(place: Place, count: int, dask_address: str | None, cpu_seconds: float) -> Lane | None:
+    """One more worker process beside the ``count`` of ``lanes``, started when somebody hires it.
+
+    None without lanes, and on a Dask cluster: a lane more would get no worker of it while long jobs have them all.
+    """
+    return None if count == 0 or dask_address is not None else ProcessLane(place, cpu_seconds)

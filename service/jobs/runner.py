@@ -32,6 +32,9 @@ RETRY_SECONDS = 1.0
 WAKE_SECONDS = 0.003
 """s from a job's storing to the look for it, for the answer goes first: both take the interpreter."""
 
+IDLE_SECONDS = 60.0
+"""s without a short job to do, after which the worker process that is there for them ends."""
+
 LOOKS = 5
 """Looks at another runner's heartbeat, as many in one lease, that must all be the same before it counts as dead."""
 
@@ -59,30 +62,34 @@ class Watch:
 
 
 class JobRunner:
-    """Lanes of one worker process each, so that the death of a process is the death of one known job."""
+    """Lanes of one worker process each, so that the death of a process is the death of one known job.
+
+    ``short_lane`` does short jobs while long ones hold all the others; it has a worker only when that is needed.
+    """
 
     def __init__(
         self,
         database: Database,
         lanes: list[Lane],
+        short_lane: Lane | None = None,
         *,
         attempts: int,
         lease_seconds: float,
         poll_seconds: float,
         shutdown_seconds: float,
     ) -> None:
-        self._database, self._lanes, self._attempts = database, lanes, attempts
+        self._database, self._lanes, self._short_lane, self._attempts = database, lanes, short_lane, attempts
         self._beat_seconds, self._poll_seconds = lease_seconds / LOOKS, poll_seconds
         self._shutdown_seconds = shutdown_seconds
         self._watch = Watch(LOOKS)
         self._id = ""
-        self._at: set[str] = set()  # jobs in the lanes
+        self._at: dict[str, Claim] = {}  # jobs in the lanes
         self._strays: set[str] = set()  # jobs that were ours in the database at the last beat, but in no lane
         self._warming = len(lanes)
         self._hiring: set[asyncio.Task[None]] = set()
         self._outdated: SchemaMismatch | None = None
         self._stopping = self._leads = False
-        self._woken = asyncio.Event()
+        self._woken = {lane: asyncio.Event() for lane in self._all_lanes}
         self._endings: WeakValueDictionary[str, asyncio.Event] = WeakValueDictionary()  # of jobs that somebody awaits
 
     @property
@@ -107,10 +114,12 @@ class JobRunner:
             self._id = await asyncio.to_thread(self._register)
         self._beating = asyncio.create_task(self._beat())
         self._working = [asyncio.create_task(self._work(lane)) for lane in self._lanes]
+        if self._short_lane is not None:
+            self._working.append(asyncio.create_task(self._work_beside_long_jobs(self._short_lane)))
 
     def wake(self) -> None:
         """Look for a job soon, since one has just been stored; may be called from any thread."""
-        self._loop.call_soon_threadsafe(self._loop.call_later, WAKE_SECONDS, self._woken.set)
+        self._loop.call_soon_threadsafe(self._loop.call_later, WAKE_SECONDS, self._wake_lanes)
 
     def ending(self, job_id: str) -> asyncio.Event:
         """Set once a lane of this runner has done with the job; jobs of other runners end unheard."""
@@ -125,12 +134,12 @@ class JobRunner:
     async def stop(self) -> None:
         """Let running jobs end within the time allowed, then end their workers; others can take the jobs up."""
         self._stopping = True
-        self._woken.set()
+        self._wake_lanes()
         for task in self._hiring:  # no job waits for a worker that is not there yet
             task.cancel()
         if self._working:
             _, late = await asyncio.wait(self._working, timeout=self._shutdown_seconds)
-            for lane in self._lanes:
+            for lane in self._all_lanes:
                 lane.kill()
             for task in late:
                 task.cancel()
@@ -143,16 +152,64 @@ class JobRunner:
         try:
             await self._hire(lane)
             self._warming -= 1
-            while not self._stopping and self._outdated is None:
-                self._woken.clear()
-                claim = await self._try(self._claim)
-                if claim is None:
-                    await self._wait(self._poll_seconds)
-                    continue
-                with logs.about(job=claim.job_id):
-                    await self._do(lane, claim)
+            while self._goes_on:
+                if not await self._do_next(lane):
+                    await self._wait(lane)
         finally:
             await lane.close()
+
+    async def _work_beside_long_jobs(self, lane: Lane) -> None:
+        """Hire when a short job waits for long ones, and let the worker go after a time without any such job."""
+        try:
+            while self._goes_on:
+                if not (self._is_held_up and await self._try(self._short_job_waits)):
+                    await self._wait(lane)
+                    continue
+                await self._hire(lane)
+                await self._do_short_jobs(lane)
+                await lane.close()
+        finally:
+            await lane.close()
+
+    async def _do_short_jobs(self, lane: Lane) -> None:
+        busy_at = self._loop.time()
+        while self._goes_on and self._loop.time() - busy_at < IDLE_SECONDS:
+            if self._is_held_up and await self._do_next(lane, only_short=True):
+                busy_at = self._loop.time()
+            else:
+                await self._wait(lane)
+
+    async def _do_next(self, lane: Lane, *, only_short: bool = False) -> bool:
+        """Do the job whose turn it is; False where there is none."""
+        claim = await self._try(lambda: self._claim(only_short=only_short))
+        if claim is None:
+            return False
+        if claim.is_long:  # what waits behind it may be short
+            self._wake_lanes()
+        with logs.about(job=claim.job_id):
+            await self._do(lane, claim)
+        return True
+
+    @property
+    def _all_lanes(self) -> list[Lane]:
+        return self._lanes if self._short_lane is None else [*self._lanes, self._short_lane]
+
+    @property
+    def _goes_on(self) -> bool:
+        return not self._stopping and self._outdated is None
+
+    @property
+    def _is_held_up(self) -> bool:
+        """Whether long jobs hold all lanes but the one for short jobs."""
+        return sum(claim.is_long for claim in list(self._at.values())) >= len(self._lanes)
+
+    def _short_job_waits(self) -> bool:
+        with self._database.read() as session:
+            return jobs.any_queued(session, only_short=True)
+
+    def _wake_lanes(self) -> None:
+        for woken in self._woken.values():
+            woken.set()
 
     async def _hire(self, lane: Lane) -> None:
         hiring = asyncio.create_task(lane.hire())
@@ -160,9 +217,10 @@ class JobRunner:
         hiring.add_done_callback(self._hiring.discard)
         await hiring
 
-    async def _wait(self, seconds: float) -> None:
+    async def _wait(self, lane: Lane) -> None:
         with suppress(TimeoutError):
-            await asyncio.wait_for(self._woken.wait(), seconds)
+            await asyncio.wait_for(self._woken[lane].wait(), self._poll_seconds)
+        self._woken[lane].clear()  # only now: whatever is stored during a look is looked for once more
 
     async def _try(self, step: Callable[[], Result]) -> Result | None:
         """A step that needs the database, in a thread; None where it cannot be had now."""
@@ -179,16 +237,16 @@ class JobRunner:
             await asyncio.sleep(RETRY_SECONDS)
         return None
 
-    def _claim(self) -> Claim | None:
+    def _claim(self, *, only_short: bool) -> Claim | None:
         with self._database.read() as session:  # does not wait for a writer
-            if not jobs.any_queued(session):
+            if not jobs.any_queued(session, only_short=only_short):
                 return None
         with self._database.write(durable=False) as session:
             migrate.require_head(session)
             stores.require(session, self._database.store_id)
-            claim = jobs.claim(session, self._id, besides=self._at)
+            claim = jobs.claim(session, self._id, besides=self._at.keys(), only_short=only_short)
         if claim is not None:
-            self._at.add(claim.job_id)
+            self._at[claim.job_id] = claim
         return claim
 
     async def _do(self, lane: Lane, claim: Claim) -> None:
@@ -210,7 +268,7 @@ class JobRunner:
             reason = f"{type(error).__name__}: {error}"
             await self._try(lambda: self._fail(claim, reason))
         finally:
-            self._at.discard(claim.job_id)  # where it is still ours in the database, it is a stray
+            self._at.pop(claim.job_id, None)  # where it is still ours in the database, it is a stray
             if (ending := self._endings.pop(claim.job_id, None)) is not None:
                 ending.set()
         if is_lost and not self._stopping:  # only now: meanwhile another lane may take the job up
@@ -246,7 +304,7 @@ class JobRunner:
         while True:
             await asyncio.sleep(self._beat_seconds)
             if await self._try(self._beat_once if self._lanes else self._check_schema):
-                self._woken.set()
+                self._wake_lanes()
 
     def _check_schema(self) -> None:
         with self._database.read() as session:
@@ -270,7 +328,7 @@ class JobRunner:
 
     def _free_strays(self, session: Session) -> bool:
         """Put jobs that the database says are ours, but that no lane does, back: a commit's answer can be lost."""
-        strays = jobs.claimed(session, self._id) - self._at
+        strays = jobs.claimed(session, self._id) - self._at.keys()
         stay = strays & self._strays
         self._strays = strays
         for job_id in stay:

@@ -5,6 +5,7 @@ from sqlalchemy import insert
 from sqlalchemy.orm import Session
 
 from db.database import Database
+from db.records import Claim
 from db.repositories import access_keys, jobs, materials, runners
 from db.tables import JobRow
 
@@ -75,6 +76,20 @@ def test_short_jobs_do_not_wait_behind_long_ones(database: Database, paper: int)
         order = served(session)
         assert order[:6] == [*short, long[0]] or order[:6] == [long[0], *short]
         assert order[6:] == long[1:]
+
+
+def test_a_claim_of_short_jobs_passes_over_long_ones_of_every_key(database: Database, paper: int) -> None:
+    with database.write() as session:
+        add(session, paper, 3, LARGE, is_long=True)
+        add(session, paper, 1, SMALL, is_long=True)
+        short, runner = add(session, paper, 2, LARGE), runners.add(session, "host:1")
+        assert jobs.any_queued(session, only_short=True)
+        claims = [jobs.claim(session, runner, only_short=True) for _ in range(3)]
+        assert claims == [Claim(job, runner, is_long=False) for job in short] + [None]
+        assert not jobs.any_queued(session, only_short=True)
+        rest = jobs.claim(session, runner)
+        assert rest is not None
+        assert rest.is_long
 
 
 def test_a_job_that_is_tried_again_waits_as_a_new_one(database: Database, paper: int) -> None:

@@ -2,6 +2,7 @@ import asyncio
 import time
 from collections import Counter
 from collections.abc import Callable
+from threading import Event
 from typing import Any
 
 import pytest
@@ -25,7 +26,7 @@ class ThreadLane:
 
     def __init__(self, do: Do) -> None:
         self._do = do
-        self.hired = 0
+        self.hired = self.closed = 0
         self.missing = None
 
     async def hire(self) -> None:
@@ -38,7 +39,7 @@ class ThreadLane:
         pass
 
     async def close(self) -> None:
-        pass
+        self.closed += 1
 
 
 @pytest.fixture
@@ -340,3 +341,78 @@ def test_a_job_that_lost_its_worker_does_not_wait_for_the_next_one(
     monkeypatch.setattr(ThreadLane, "run", run)
     working(finish, until_finished(database, queued), lease_seconds=10.0)
     assert sorted(get(database, job_id).deaths for job_id in queued) == [0, 0, 0, 1]
+
+
+class HeldLanes:
+    """Long jobs that hold their lane until they may end, and short ones that end at once; one lane more for these."""
+
+    def __init__(self, database: Database) -> None:
+        self.database, self.begun, self.may_end = database, set[str](), Event()
+        self.short_lane = ThreadLane(self.do)
+        with database.write() as session:
+            self.material_id = materials.create(session, "paper", "").id
+
+    def add(self, *, is_long: bool) -> str:
+        with self.database.write() as session:
+            return jobs.add(session, "fit", "ols", material_id=self.material_id, is_long=is_long)
+
+    def do(self, claim: Claim) -> None:
+        self.begun.add(claim.job_id)
+        if claim.is_long:
+            assert self.may_end.wait(30.0)
+        finish(self.database, claim)
+
+    def until_done(self, *ids: str) -> None:
+        until_finished(self.database, list(ids))()
+
+
+@pytest.fixture
+def held(database: Database) -> HeldLanes:
+    return HeldLanes(database)
+
+
+def test_short_jobs_do_not_wait_for_long_ones_that_hold_all_lanes(
+    held: HeldLanes, working: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("service.jobs.runner.IDLE_SECONDS", 0.1)
+    long = [held.add(is_long=True) for _ in range(3)]
+
+    def meanwhile(_: JobRunner) -> None:
+        wait_until(lambda: len(held.begun) == 2)
+        for _ in range(2):  # a worker that was idle ends, and there is another one when it is needed again
+            short = [held.add(is_long=False) for _ in range(3)]
+            closed = held.short_lane.closed
+            held.until_done(*short)
+            wait_until(lambda closed=closed: held.short_lane.closed > closed)  # type: ignore[misc]
+        assert held.begun & set(long) == set(long[:2])
+        held.may_end.set()
+        held.until_done(*long)
+
+    working(held.do, meanwhile, short_lane=held.short_lane)
+    assert held.short_lane.hired == 2
+
+
+def test_no_worker_is_hired_for_short_jobs_that_have_a_lane(held: HeldLanes, working: Callable[..., None]) -> None:
+    long = held.add(is_long=True)
+
+    def meanwhile(_: JobRunner) -> None:
+        held.until_done(*(held.add(is_long=False) for _ in range(5)))
+        held.may_end.set()
+        held.until_done(long, held.add(is_long=True))
+
+    working(held.do, meanwhile, short_lane=held.short_lane)
+    assert held.short_lane.hired == 0
+
+
+def test_short_jobs_that_were_there_first_are_begun_when_a_long_one_takes_the_lane(
+    held: HeldLanes, working: Callable[..., None]
+) -> None:
+    long, short = held.add(is_long=True), held.add(is_long=False)
+
+    def meanwhile(_: JobRunner) -> None:
+        held.until_done(short)
+        held.may_end.set()
+        held.until_done(long)
+
+    working(held.do, meanwhile, workers=1, short_lane=held.short_lane, poll_seconds=60.0, lease_seconds=600.0)
+    assert held.short_lane.hired == 1

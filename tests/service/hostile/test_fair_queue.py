@@ -1,0 +1,208 @@
+"""An honest key's uploads beside an attacker's, who has one key and sends long logs as fast as they are taken."""
+
+import asyncio
+import itertools
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+
+import httpx
+import numpy as np
+import pytest
+
+from db.database import Database
+from db.records import Claim
+from service.domain import upload
+from service.jobs import lanes, worker
+from service.settings import Settings
+from slipcore import GraspLog
+from stiction_client import container
+
+NPZ = "application/vnd.stiction.grasp-log+npz"
+TIMES = 5.0
+"""How many times its quiet time an honest upload may take beside the attacker."""
+
+UPLOADS = 5
+
+Serving = Callable[[Settings], AbstractContextManager[httpx.Client]]
+Logs = Callable[[], bytes]
+
+
+@dataclass(frozen=True)
+class Times:
+    """Seconds from an upload's begin to its answer, and to the end of its job."""
+
+    answer: float
+    job: float
+
+
+def send(client: httpx.Client, content: bytes, **query: str) -> httpx.Response:
+    return client.post("/v1/grasp-logs", params=query, content=content, headers={"content-type": NPZ})
+
+
+def timed(client: httpx.Client, content: bytes) -> Times:
+    """Upload a short log and wait for its job, as somebody who asks how far it is."""
+    began = time.monotonic()
+    answer = send(client, content).raise_for_status()
+    answered = time.monotonic() - began
+    job_id = answer.json()["job"]["id"]
+    while (job := client.get(f"/v1/jobs/{job_id}").raise_for_status().json())["finished_at"] is None:
+        assert time.monotonic() < began + 60.0, job
+        time.sleep(0.01)
+    assert job["status"] == "done", job
+    return Times(answered, time.monotonic() - began)
+
+
+def typical(client: httpx.Client, honest: Logs) -> Times:
+    """The medians of some uploads."""
+    found = [timed(client, honest()) for _ in range(UPLOADS)]
+    return Times(median(each.answer for each in found), median(each.job for each in found))
+
+
+@contextmanager
+def flood(url: str, key: str, long: Logs, connections: int) -> Iterator[None]:
+    """Several connections with one key, each of which sends the next long log as soon as one is answered."""
+    ended, taken = threading.Event(), threading.Semaphore(0)
+
+    def attack() -> None:
+        with httpx.Client(base_url=url, headers={"Authorization": f"Bearer {key}"}, timeout=60.0) as client:
+            while not ended.is_set():
+                if send(client, long(), detector="rigid_fit").status_code == httpx.codes.ACCEPTED:
+                    taken.release()
+
+    threads = [threading.Thread(target=attack) for _ in range(connections)]
+    for thread in threads:
+        thread.start()
+    try:
+        for _ in range(2 * connections):  # some run and some wait
+            assert taken.acquire(timeout=60.0)
+        yield
+    finally:
+        ended.set()
+        for thread in threads:
+            thread.join()
+
+
+def numbered(content: bytes) -> Logs:
+    """The same log in ever other bytes: a ZIP archive ends with a comment, which is empty as yet."""
+    numbers = itertools.count(1)
+
+    def make() -> bytes:
+        comment = str(next(numbers)).encode()
+        return content[:-2] + len(comment).to_bytes(2, "little") + comment
+
+    return make
+
+
+def small_and_many(ramp: GraspLog, frames: int) -> bytes:
+    """A log of 2×2 elements and so many frames."""
+    times, corner = -(-frames // len(ramp)), np.s_[:, :2, :2]
+    displacement, force = (np.tile(field[corner], (times, 1, 1, 1)) for field in (ramp.displacement, ramp.force))  # type: ignore[index]
+    time_ = ramp.time[1] * np.arange(times * len(ramp))
+    return container.encode(GraspLog(time_, ramp.position[:2, :2], displacement, ramp.element_area, force=force))
+
+
+class ThreadLane:
+    """A lane whose long jobs do not end before the test, and whose short ones are done in a thread."""
+
+    test_ended = threading.Event()
+    missing = None
+
+    def __init__(self, place: worker.Place, _cpu_seconds: float) -> None:
+        self._place = place
+
+    async def hire(self) -> None:
+        pass
+
+    async def run(self, claim: Claim) -> None:
+        if claim.is_long:
+            await asyncio.to_thread(self.test_ended.wait)
+        await asyncio.to_thread(worker.run_job, self._place, claim)
+
+    def kill(self) -> None:
+        self.test_ended.set()
+
+    async def close(self) -> None:
+        pass
+
+
+def test_an_honest_upload_and_its_job_are_done_beside_an_attacker(
+    database: Database,
+    make: Callable[..., str],
+    serving: Serving,
+    ramp: GraspLog,
+    content: bytes,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(lanes, "ProcessLane", ThreadLane)
+    monkeypatch.setattr(ThreadLane, "test_ended", threading.Event())
+    monkeypatch.setattr(upload, "LONG_FRAMES", 1000)
+    honest, long = numbered(content), numbered(small_and_many(ramp, 2000))
+    own, attackers = make("upload"), make("upload")
+    worker.warm_up()  # the kernels may have to be compiled
+    with serving(Settings(data_folder=tmp_path, database_url=database.url, access="keys")) as client:
+        client.headers["Authorization"] = f"Bearer {own}"
+        timed(client, honest())
+        quiet = typical(client, honest)
+        with flood(str(client.base_url), attackers, long, 2):
+            beside = typical(client, honest)
+        ThreadLane.test_ended.set()
+    tolerated = 1.0  # s: server, worker, attackers and caller share one interpreter here
+    assert beside.answer < TIMES * quiet.answer + tolerated, (quiet, beside)
+    assert beside.job < TIMES * quiet.job + tolerated, (quiet, beside)
+
+
+@pytest.mark.long
+def test_so_it_is_with_real_worker_processes(
+    database: Database, make: Callable[..., str], ramp: GraspLog, content: bytes, tmp_path: Path
+) -> None:
+    honest, long = numbered(content), numbered(small_and_many(ramp, 100_000))
+    own, attackers, began = make("upload"), make("upload"), time.monotonic()
+    with server(tmp_path, database.url) as client:
+        start = time.monotonic() - began  # of a server and its worker process
+        client.headers["Authorization"] = f"Bearer {own}"
+        timed(client, honest())
+        quiet = typical(client, honest)
+        with flood(str(client.base_url), attackers, long, 4):
+            first = timed(client, honest())
+            beside = typical(client, honest)
+    tolerated = 0.2  # s: two looks of a runner at the queue, whatever the quiet time is
+    assert first.job < TIMES * (quiet.job + start), (start, quiet, first)  # it waits for one more worker process
+    assert beside.answer < TIMES * quiet.answer + tolerated, (quiet, beside)
+    assert beside.job < TIMES * quiet.job + tolerated, (quiet, beside)
+
+
+@contextmanager
+def server(folder: Path, database_url: str) -> Iterator[httpx.Client]:
+    """A server with its one worker, in processes of their own, once it is ready."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    settings = {"DATA_FOLDER": str(folder / "data"), "DATABASE_URL": database_url, "ACCESS": "keys", "PORT": str(port)}
+    environment = os.environ | {f"STICTION_{name}": value for name, value in settings.items()}
+    process = subprocess.Popen([sys.executable, "-m", "service.cli", "serve"], env=environment)
+    try:
+        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=120.0) as client:
+            while not is_ready(client):
+                assert process.poll() is None
+                time.sleep(0.02)
+            yield client
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def is_ready(client: httpx.Client) -> bool:
+    try:
+        return client.get("/readyz").status_code == httpx.codes.OK
+    except httpx.TransportError:
+        return False
