@@ -52,6 +52,12 @@ def set_moments(session: Session, log_id: str, moments: bytes) -> None:
     session.execute(update(SampleSummaryRow).where(SampleSummaryRow.grasp_log_id == log_id).values(moments=moments))
 
 
+def has_samples(session: Session, log_id: str) -> bool:
+    """Whether a log, withdrawn or not, has samples."""
+    of_it = (SampleSummaryRow.grasp_log_id == log_id, SampleSummaryRow.count > 0)
+    return session.scalar(select(SampleSummaryRow.grasp_log_id).where(*of_it)) is not None
+
+
 def any_samples(session: Session, material_id: int) -> bool:
     """Whether some log of a material, not withdrawn, has samples."""
     query = select(GraspLogRow.id).join(SampleSummaryRow).where(*_that_count(material_id)).limit(1)

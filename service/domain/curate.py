@@ -82,7 +82,8 @@ def withdraw(context: Context, log_id: str, because: str, asker: Asker = ANYBODY
         material_id = _material_to_change(session, log_id, asker)
         is_new = grasp_logs.withdraw(session, log_id, because, asker.key_id)
         audit.add(session, asker.actor, "grasp_log.withdrawn", log_id, {"reason": because})
-        queued = _refit_without(session, material_id, asker.key_id) if is_new else []
+        had_part = is_new and detections.has_samples(session, log_id)
+        queued = _refit_without(session, material_id, asker.key_id) if had_part else []
         log = grasp_logs.get(session, log_id)
     return log, _follow_up(context, queued)
 
@@ -95,7 +96,7 @@ def restore(context: Context, log_id: str, asker: Asker = ANYBODY) -> tuple[Stor
         if was_withdrawn:
             audit.add(session, asker.actor, "grasp_log.restored", log_id)
         queued: list[Job] = []
-        if was_withdrawn and material_id is not None:
+        if was_withdrawn and material_id is not None and detections.has_samples(session, log_id):
             methods = friction_models.current_methods(session, [material_id])
             queued = _queue_refits(session, material_id, methods, asker.key_id)
         log = grasp_logs.get(session, log_id)

@@ -131,9 +131,14 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
 
 
 def _mark_outdated(run: Run, session: Session, log_id: str, samples: SampleSummary) -> None:
-    """Say that the material's models by other methods than this job's lack these samples."""
+    """Say that the material's models by other methods than this job's lack these samples.
+
+    They do not where the log was withdrawn meanwhile; who withdraws it now waits for the rows that refer to it.
+    """
+    if samples.none_because is not None or grasp_logs.get(session, log_id).withdrawal is not None:
+        return
     material_id = grasp_logs.material_id(session, log_id)
-    if material_id is not None and samples.none_because is None:
+    if material_id is not None:
         friction_models.mark_outdated(session, material_id, besides=run.job.method)
 
 

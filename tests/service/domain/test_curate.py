@@ -50,6 +50,12 @@ class Shop:
 
     def ingest(self, material: str, number: int, method: str = "ols") -> str:
         """A log of the material, with its model fitted."""
+        log_id = self.store(material, number, method)
+        assert {(job.status, job.reason) for job in self.work()} == {("done", None)}
+        return log_id
+
+    def store(self, material: str, number: int, method: str = "ols") -> str:
+        """A log of the material whose ingest waits."""
         content = self.contents[number]
         with self.database.write() as session:
             try:
@@ -59,7 +65,6 @@ class Shop:
             log = NewGraspLog(self.blobs.put(content), len(content), "npz", "filter", material_id, "s", 82, 2.7, (8, 8))
             log_id = grasp_logs.add(session, log)
             jobs.add(session, "ingest", method, material_id=material_id, grasp_log_id=log_id)
-        assert {(job.status, job.reason) for job in self.work()} == {("done", None)}
         return log_id
 
     def friction(self, material: str, method: str = "ols") -> FrictionOut:
@@ -125,6 +130,34 @@ def test_a_withdrawn_log_leaves_every_fit_and_comes_back(shop: Shop) -> None:
     assert len(queued) == len(shop.work()) == 2
     assert shop.model("paper", "ols") == (4, both, False)
     assert curate.restore(shop.context, good)[1] == []
+
+
+@pytest.mark.parametrize("withdrawn_at", ["once it is stored", "while it is detected"])
+def test_a_log_that_is_withdrawn_before_its_samples_are_stored_outdates_no_model(
+    shop: Shop, monkeypatch: pytest.MonkeyPatch, withdrawn_at: str
+) -> None:
+    shop.ingest("paper", 0)
+    with shop.database.write() as session:
+        jobs.add(session, "fit", "robust", material_id=materials.find_id(session, "paper"))
+    shop.work()
+    before, detect = shop.model("paper", "robust"), pipeline.slipcore.detect_slip
+    log_id = shop.store("paper", 1)
+
+    def withdraw() -> None:
+        assert curate.withdraw(shop.context, log_id, "wrong finger")[1] == []
+
+    def withdraw_and_detect(*given: Any, **options: Any) -> Any:
+        withdraw()
+        return detect(*given, **options)
+
+    if withdrawn_at == "once it is stored":
+        withdraw()
+        assert shop.model("paper", "robust") == before
+    else:
+        monkeypatch.setattr(pipeline.slipcore, "detect_slip", withdraw_and_detect)
+    shop.work()
+    assert shop.model("paper", "robust") == before
+    assert [job.method for job in curate.restore(shop.context, log_id)[1]] == ["ols", "robust"]
 
 
 def test_a_material_without_its_only_log_has_no_model(shop: Shop) -> None:
