@@ -122,9 +122,9 @@ def log_prior(log_sigma: FloatArray, log_tau: FloatArray, log_omega: FloatArray)
 
 
 def hierarchical(
-    grasps: Sequence[GraspStatistics], pooled: NormalInverseGamma, spans: FloatArray, about: FloatArray
+    grasps: Sequence[GraspStatistics], pooled: NormalInverseGamma, spans: FloatArray, centre: FloatArray
 ) -> Hierarchical:
-    """The model of these grasps; ``about`` [3]: b̂; the prior's slopes are weak over ``spans`` [2]."""
+    """The model of these grasps, b̂ the pooled fit; the prior is of friction at ``centre`` and slopes over ``spans``."""
     total = sum(grasp.total_weight for grasp in grasps)
     unit = total / sum(grasp.weight_square for grasp in grasps)
     group = np.concatenate([_group_squares(grasp, pooled) for grasp in grasps])
@@ -135,8 +135,8 @@ def hierarchical(
         weight=unit * np.concatenate([grasp.weight for grasp in grasps]),
         start=np.concatenate([[0], np.cumsum(sizes)[:-1]]),
         within=unit * np.stack([_squares(_rows(grasp.within, pooled)).sum(axis=0) for grasp in grasps]),
-        prior=_prior_square(pooled, spans),
-        direction=_direction(pooled, about),
+        prior=_prior_square(pooled, spans, centre),
+        direction=_direction(pooled, pooled.mean),
         effective_n=unit * total,
         pooled=pooled,
     )
@@ -167,8 +167,12 @@ def _squares(rows: FloatArray) -> FloatArray:
     return np.asarray(rows[:, FIRST] * rows[:, SECOND])
 
 
-def _prior_square(pooled: NormalInverseGamma, spans: FloatArray) -> FloatArray:
-    """The prior β ~ N((μ₀, 0, 0), width² diag(1, 1/span²)) as sums of squares [10] in (γ | residual)."""
-    scale = np.concatenate([[1.0], spans]) / PRIOR.width
-    away = np.array([REFERENCE.friction, 0.0, 0.0]) - pooled.mean
-    return np.asarray(_squares(scale[:, None] * np.column_stack([pooled.root, away])).sum(axis=0))
+def _prior_square(pooled: NormalInverseGamma, spans: FloatArray, centre: FloatArray) -> FloatArray:
+    """The prior x·β ~ N(μ₀, width²) at ``centre``, slopes ~ N(0, width²/span²), as squares [10] in (γ | residual).
+
+    At f_n = 0, far from data in a narrow range, a prior of β₀ would pull where noise makes the slope.
+    """
+    rows = np.diag(np.concatenate([[1.0], spans]))
+    rows[0] = centre
+    away = np.array([REFERENCE.friction, 0.0, 0.0]) - rows @ pooled.mean
+    return np.asarray(_squares(np.column_stack([rows @ pooled.root, away]) / PRIOR.width).sum(axis=0))

@@ -65,7 +65,7 @@ def posterior_grid(data: FitData) -> PosteriorGrid:
     """
     grasps = data.grasp_statistics()
     pooled = exact_posterior(data)
-    model = hierarchical(grasps, pooled, weak_spans(data.domain, data.element_area), pooled.mean)
+    model = hierarchical(grasps, pooled, weak_spans(data.domain, data.element_area), data.mean_row())
     box = _widest(model)
     for turn in range(ROUNDS):
         grid = _evaluated(model, box, COARSE if turn < 2 else FINE)

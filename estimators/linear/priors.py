@@ -8,6 +8,9 @@ from estimators.friction_model import Domain
 
 FloatArray = NDArray[np.float64]
 
+LEAST_SPAN = 1e-3
+"""Least part of the largest value that counts as the range seen: where all are equal, any prior of a slope is one."""
+
 
 def prior_rows(element_area: float, prior: Prior = PRIOR) -> FloatArray:
     """The prior of β as rows [3, 4] of a least-squares problem in (1, v, f_n | μ), each with error σ."""
@@ -21,11 +24,12 @@ def prior_rows(element_area: float, prior: Prior = PRIOR) -> FloatArray:
 def weak_spans(domain: Domain, element_area: float) -> FloatArray:
     """Spans [2] of v and f_n over which a slope has the prior's width: the reference's, or less where less was seen.
 
-    Over a sliver of v a prior made for millimetres a second would be strong.
+    Over a sliver of v or f_n a prior made for millimetres a second and for newtons would be strong.
     """
-    largest = np.array([domain.tangential_velocity[1], domain.normal_force[1]])
+    seen = np.array([domain.tangential_velocity, domain.normal_force])
+    width = np.maximum(seen[:, 1] - seen[:, 0], LEAST_SPAN * seen[:, 1])
     spans = REFERENCE.spans(element_area)
-    return np.where(largest > 0.0, np.minimum(spans, largest), spans)
+    return np.where(width > 0.0, np.minimum(spans, width), spans)
 
 
 def log_half_student(value: FloatArray, scale: float, degrees: float = PRIOR.effect_degrees_of_freedom) -> FloatArray:
@@ -51,10 +55,10 @@ def positive_friction() -> str:
 def structured() -> str:
     """The prior of the hierarchical model in words and numbers."""
     return (
-        f"beta0 ~ N({REFERENCE.friction:g}, {PRIOR.width:g}^2), each slope times its span ~ N(0, {PRIOR.width:g}^2), "
-        f"the spans {REFERENCE.tangential_velocity:g} m/s and {REFERENCE.pressure:g} Pa times the element area, or the "
-        f"largest seen if less; between grasps tau ~ half-Student-t on {PRIOR.grasp_degrees_of_freedom:g} degrees of "
-        f"freedom with scale {PRIOR.grasp_scatter:g}; between places omega ~ half-Student-t on "
-        f"{PRIOR.effect_degrees_of_freedom:g} with scale {REFERENCE.scatter:g}; sigma^2 ~ "
+        f"friction at the mean of the data ~ N({REFERENCE.friction:g}, {PRIOR.width:g}^2), each slope times its span "
+        f"~ N(0, {PRIOR.width:g}^2), the spans {REFERENCE.tangential_velocity:g} m/s and {REFERENCE.pressure:g} Pa "
+        f"times the element area, or the range seen if less; between grasps tau ~ half-Student-t on "
+        f"{PRIOR.grasp_degrees_of_freedom:g} degrees of freedom with scale {PRIOR.grasp_scatter:g}; between places "
+        f"omega ~ half-Student-t on {PRIOR.effect_degrees_of_freedom:g} with scale {REFERENCE.scatter:g}; sigma^2 ~ "
         f"IG({PRIOR.degrees_of_freedom / 2:g}, {PRIOR.degrees_of_freedom / 2 * REFERENCE.scatter**2:g})"
     )

@@ -41,11 +41,14 @@ def dense(
     noise = np.diag(sigma**2 / seen.weight)
     noise += omega**2 * (place[:, None] == place)
     noise += tau**2 * (seen.grasp[:, None] == seen.grasp) * np.outer(expected, expected)
-    width = PRIOR.width / np.concatenate([[1.0], weak_spans(data.domain, data.element_area)])
-    centre = np.array([REFERENCE.friction, 0.0, 0.0])
-    marginal = stats.multivariate_normal(x @ centre, noise + (x * width**2) @ x.T)
-    covariance = np.linalg.inv(np.diag(width**-2.0) + x.T @ np.linalg.solve(noise, x))
-    mean = covariance @ (centre / width**2 + x.T @ np.linalg.solve(noise, seen.friction))
+    rows = np.diag(np.concatenate([[1.0], weak_spans(data.domain, data.element_area)]))
+    rows[0] = data.mean_row()
+    width = PRIOR.width * np.linalg.inv(rows)
+    centre = np.linalg.solve(rows, [REFERENCE.friction, 0.0, 0.0])
+    marginal = stats.multivariate_normal(x @ centre, noise + x @ width @ width.T @ x.T)
+    precision = np.linalg.inv(width @ width.T)
+    covariance = np.linalg.inv(precision + x.T @ np.linalg.solve(noise, x))
+    mean = covariance @ (precision @ centre + x.T @ np.linalg.solve(noise, seen.friction))
     return float(marginal.logpdf(seen.friction)), mean, covariance
 
 
@@ -54,7 +57,8 @@ def test_density_and_coefficients_are_those_of_the_dense_model(count: int) -> No
     data = gather([grasp(k) for k in range(count)])
     pooled = exact_posterior(data)
     about = np.array([0.42, 6.0, -0.5])
-    model = hierarchical(data.grasp_statistics(), pooled, weak_spans(data.domain, data.element_area), about)
+    spans = weak_spans(data.domain, data.element_area)
+    model = hierarchical(data.grasp_statistics(), pooled, spans, data.mean_row()).about(about)
     points = [(0.03, 0.05, 0.02), (0.02, 0.2, 0.001), (0.05, 0.001, 0.05), (0.03, 0.5, 0.3)]
     ours, theirs = [], []
     for sigma, tau, omega in points:
@@ -158,3 +162,16 @@ def test_the_quantile_of_a_mixture_is_where_its_distribution_says() -> None:
     weight, mean, deviation = np.array([0.2, 0.5, 0.3]), np.array([-1.0, 0.0, 2.0]), np.array([0.5, 0.1, 1.0])
     at = mixture_quantile(weight, mean, deviation, [1e-3, 0.3, 0.9])
     np.testing.assert_allclose(stats.norm(mean, deviation).cdf(at[:, None]) @ weight, [1e-3, 0.3, 0.9], atol=1e-9)
+
+
+def test_a_narrow_range_of_force_far_from_zero_pulls_nothing() -> None:
+    """Of forces of 5 N that vary by noise alone, the intercept at 0 N is anything, and friction at 5 N is known."""
+    rng = np.random.default_rng(0)
+    f_n, v = 5.0 + 2e-3 * rng.standard_normal(4000), rng.uniform(1e-4, 3e-4, 4000)
+    mu = 0.43 + 0.9 * (f_n - 5.0) + 0.05 * rng.standard_normal(4000)
+    one = np.ones(4000)
+    record = FrictionSamples(mu, v, f_n, mu * f_n, np.arange(4000.0), np.zeros(4000, dtype=np.int64), one, 1e-6)
+    model = estimators.fit(record, method="hierarchical")
+    assert model.predict(2e-4, 5.0) == pytest.approx(0.43, abs=0.02)
+    assert model.scales is not None
+    assert model.scales.between_grasps.value < 0.15
