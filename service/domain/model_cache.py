@@ -6,8 +6,8 @@ import math
 import time
 from collections import OrderedDict
 from collections.abc import Hashable
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 from db.database import Database
 from db.records import StoredModel
@@ -30,7 +30,7 @@ which costs a look at the database."""
 class KnownModel:
     """A material's current model as it was at a moment, with the tag that stands for what it answers.
 
-    ``read_at`` and ``until`` are s of the clock that nobody sets; ``answers`` are those that were given, by question.
+    ``read_at`` and ``until`` are s of the clock that nobody sets.
     """
 
     stored: StoredModel
@@ -38,7 +38,6 @@ class KnownModel:
     tag: str
     read_at: float
     until: float
-    answers: dict[Hashable, Any] = field(default_factory=dict)
 
 
 class _Reading(NamedTuple):
@@ -108,7 +107,7 @@ class ModelCache:
                 detail = f"material {material!r} has no model fitted by {method!r} yet"
                 raise Problem(NO_MODEL, detail, name="method", value=method, allowed="a method that was fitted")
         known = self._known.get((material, method))
-        if known is not None and known.tag == _tag(stored):  # with its answers
+        if known is not None and known.tag == _tag(stored):
             known = replace(known, read_at=read_at, until=until)
         else:
             known = KnownModel(stored, to_friction_model(stored.model), _tag(stored), read_at, until)

@@ -2,16 +2,24 @@
 
 from typing import Any
 
+import httptools
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from service.http.connections import BoundedConnection
 
+OFFER = frozenset({b"upgrade", b"http2-settings"})
+"""Headers of an offer to speak another protocol from here on, and what ``Connection`` says of them (RFC 9110, 7.8)."""
+
 
 class HttpToolsConnection(BoundedConnection, HttpToolsProtocol):
-    """Refuses headers, trailers and extensions of chunks that do not end within ``h11_max_incomplete_event_size``."""
+    """Refuses headers, trailers and extensions of chunks that do not end within ``h11_max_incomplete_event_size``.
+
+    An offer of another protocol, such as h2c, is passed over and the request answered, as whoever offers it expects.
+    """
 
     def __init__(self, *given: Any, **options: Any) -> None:
         super().__init__(*given, **options)
+        self.parser = _PassingParser(self)  # type: ignore[assignment]  # with the few methods that are used of it
         self._unfinished = 0  # bytes since the last that were made use of
 
     def data_received(self, data: bytes) -> None:
@@ -24,6 +32,8 @@ class HttpToolsConnection(BoundedConnection, HttpToolsProtocol):
 
     def on_headers_complete(self) -> None:
         """Begin to answer; trailers of the body are not added to its headers."""
+        if self.offers_another_protocol():
+            return  # the request is read once more, without the offer
         self._unfinished = 0
         super().on_headers_complete()
         if not self.parser.should_upgrade():
@@ -36,8 +46,63 @@ class HttpToolsConnection(BoundedConnection, HttpToolsProtocol):
 
     def on_message_complete(self) -> None:
         """Begin to wait for the next request."""
+        if self.offers_another_protocol():
+            return
         self._unfinished = 0
         super().on_message_complete()
 
+    def offers_another_protocol(self) -> bool:
+        """Whether the request under way offers one that is not spoken here, so that its parser left it."""
+        return self.parser.should_upgrade() and self._get_upgrade() is not None and not self._should_upgrade()
+
+    def head_without_offer(self) -> bytes:
+        """The request line and headers as they were sent, without the offer."""
+        line = b" ".join([self.parser.get_method(), self.url, b"HTTP/" + self.parser.get_http_version().encode()])
+        kept = [name + b": " + value for name, value in self.headers if name not in OFFER | {b"connection"}]
+        options = [
+            option.strip() for name, value in self.headers if name == b"connection" for option in value.split(b",")
+        ]
+        kept += [b"connection: " + option for option in options if option.lower() not in OFFER]
+        return b"\r\n".join([line, *kept, b"", b""])
+
     def _is_receiving(self) -> bool:
         return not self.pipeline and super()._is_receiving()
+
+
+class _PassingParser:
+    """httptools' parser; it leaves a request that offers another protocol before its body, so another reads that."""
+
+    def __init__(self, connection: HttpToolsConnection) -> None:
+        self._connection = connection
+        self._begin()
+
+    def feed_data(self, data: bytes) -> None:
+        """Read; raises ``HttpParserUpgrade`` for a WebSocket only."""
+        try:
+            self._parser.feed_data(data)
+        except httptools.HttpParserUpgrade as left:
+            if not self._connection.offers_another_protocol():
+                raise
+            head = self._connection.head_without_offer()
+            self._begin()
+            self._parser.feed_data(head + data[left.args[0] :])
+
+    def get_method(self) -> bytes:
+        """The request's method."""
+        return bytes(self._parser.get_method())
+
+    def get_http_version(self) -> str:
+        """The request's version, such as "1.1"."""
+        return str(self._parser.get_http_version())
+
+    def should_upgrade(self) -> bool:
+        """Whether the request ends HTTP on this connection."""
+        return bool(self._parser.should_upgrade())
+
+    def should_keep_alive(self) -> bool:
+        """Whether the connection may serve another request."""
+        return bool(self._parser.should_keep_alive())
+
+    def _begin(self) -> None:
+        self._parser = httptools.HttpRequestParser(self._connection)
+        self._parser.set_dangerous_leniencies(lenient_data_after_close=True)  # as the server's own

@@ -22,8 +22,9 @@ from service.http.schemas import LookUpQuery
 from service.observability import traces
 from service.observability.answered import Answered
 
-MOST_ANSWERS = 1000
-"""Answers kept with a model, 3 kB each: planners ask the same again and again."""
+MOST_ANSWERS = 10_000
+"""Answers kept of all models together, 3 kB each: planners ask the same again and again. When there are more, all are
+made anew."""
 
 LONGEST_QUERY = 200
 """Bytes; what is longer is no question that many ask, and is not remembered."""
@@ -57,6 +58,7 @@ class Lookups:
     def __init__(self, app: ASGIApp, admission: Admission, answered: Answered) -> None:
         self.app = app
         self._admission, self._answered = admission, answered
+        self._kept: dict[tuple[str, bytes | None, str], Answer] = {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
@@ -85,22 +87,21 @@ class Lookups:
         traces.name_request("GET", ROUTE.path)
         listed = connection.headers.get("if-none-match")
         has_it = listed is not None and is_one_of(known.tag, listed)
-        return _answered_before(known, None if has_it else question, scope)
+        return self._kept_or_made(known, None if has_it else question, scope)
 
-
-def _answered_before(known: KnownModel, question: Question | None, scope: Scope) -> Answer:
-    """The answer to a question, made where nobody asked it yet so; without one, to who has the answer already."""
-    key = None if question is None else scope["query_string"], scope["scheme"]
-    answer: Answer | None = known.answers.get(key)
-    if answer is None:
-        if question is None:
-            response = unchanged(known.tag)
-        else:
-            response = whole(known.tag, look_up(known, question).model_dump_json())
-        answer = Answer.of(response, scope)
-        if len(known.answers) < MOST_ANSWERS:
-            known.answers[key] = answer
-    return answer
+    def _kept_or_made(self, known: KnownModel, question: Question | None, scope: Scope) -> Answer:
+        """The answer to a question, made where nobody asked it yet so; without one, to who has the answer already."""
+        key = known.tag, None if question is None else scope["query_string"], scope["scheme"]
+        answer = self._kept.get(key)
+        if answer is None:
+            if question is None:
+                response = unchanged(known.tag)
+            else:
+                response = whole(known.tag, look_up(known, question).model_dump_json())
+            if len(self._kept) >= MOST_ANSWERS:
+                self._kept.clear()
+            answer = self._kept[key] = Answer.of(response, scope)
+        return answer
 
 
 @lru_cache(maxsize=4096)

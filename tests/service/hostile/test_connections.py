@@ -94,6 +94,46 @@ def test_what_does_not_end_is_not_kept(address: Address, endless: tuple[bytes, .
     assert time.monotonic() - began < 5.0
 
 
+OFFERS = (
+    b"Connection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\nHTTP2-Settings: AAMAAABkAAQAAP__\r\n",
+    b"Connection: upgrade\r\nUpgrade: something/1\r\n",
+)
+RECOGNISE = b"POST /v1/recognise HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+NEXT = b"GET /healthz HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
+
+
+@pytest.mark.parametrize("offer", OFFERS, ids=["h2c", "unknown"])
+@pytest.mark.parametrize("is_chunked", [False, True])
+@pytest.mark.parametrize("pieces", [1, 40])
+def test_a_body_behind_an_offer_of_another_protocol_is_read(
+    address: Address, offer: bytes, is_chunked: bool, pieces: int
+) -> None:
+    """Java's client and `curl --http2` offer h2c with their first request, whatever it is."""
+    body = b'{"grasp_log": "nothing"}'
+    framed = b"%x\r\n%b\r\n0\r\n\r\n" % (len(body), body) if is_chunked else body
+    length = b"Transfer-Encoding: chunked\r\n" if is_chunked else b"Content-Length: %d\r\n" % len(body)
+    sent = RECOGNISE + length + offer + b"\r\n" + framed + NEXT
+    step = -(-len(sent) // pieces)
+    answer = told(address, *(sent[k : k + step] for k in range(0, len(sent), step)))
+    assert answer.startswith(b"HTTP/1.1 409"), answer[:200]
+    assert b"/problems/no-model" in answer  # so that the question was understood
+    assert answer.count(b"HTTP/1.1 ") == 2
+
+
+def test_an_offer_does_not_hide_an_ambiguous_body(address: Address) -> None:
+    sent = RECOGNISE + OFFERS[0] + b"Content-Length: 5\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n" + HIDDEN
+    answer = told(address, sent)
+    assert answer.startswith(b"HTTP/1.1 400")
+    assert answer.count(b"HTTP/1.1 ") == 1
+
+
+def test_a_connection_that_offers_another_protocol_and_is_to_close_closes(address: Address) -> None:
+    offer = b"Connection: close, Upgrade\r\nUpgrade: h2c\r\n"
+    answer = told(address, b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n" + offer + b"\r\n" + HIDDEN)
+    assert answer.startswith(b"HTTP/1.1 200")
+    assert b"hidden" not in answer
+
+
 def test_trailers_do_not_become_headers(address: Address) -> None:
     sent = CHUNKED + b"Content-Type: application/json\r\n\r\n0\r\nX-Request-ID: from-a-trailer\r\n\r\n"
     answer = told(address, sent, HIDDEN.replace(b"\r\n\r\n", b"\r\nConnection: close\r\n\r\n"))

@@ -127,11 +127,19 @@ def test_the_shortest_way_is_counted_as_the_route(client: Any) -> None:
     assert sum(bucket.get() for bucket in counted._buckets) == 3
 
 
+def answers_kept(layer: Any) -> dict[Any, Any]:
+    """Of the layer that answers look-ups, whatever surrounds it."""
+    while not isinstance(layer, Lookups):
+        layer = layer.app
+    return layer._kept
+
+
 def test_the_answers_kept_are_bounded(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lookups, "MOST_ANSWERS", 3)
     values = [client.get(f"{PATH}fn=0.0{number}").json()["normal_force"] for number in range(10)]
     assert values == [number / 100.0 for number in range(10)]
-    assert len(client.app.state.context.models.fresh("copy paper", "ols").answers) == 3
+    kept = answers_kept(client.app.middleware_stack)
+    assert 0 < len(kept) <= 3
 
 
 def test_the_shortest_way_leads_through_the_gate(reach: Callable[..., Any], client: Any) -> None:
