@@ -1,10 +1,11 @@
 """Settings of the service, each from an environment variable of the same name with the prefix ``STICTION_``."""
 
 import ipaddress
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, ValidationError, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 from sqlalchemy import URL
 
@@ -12,11 +13,15 @@ from service.observability import logs
 
 MIB = 2**20
 
+PREFIX = "STICTION_"
+OF_CLIENTS = frozenset({"URL", "KEY"})
+"""What clients read: the address of a service, and an access key for it."""
+
 
 class Settings(BaseSettings):
     """Everything that can be set, with its valid range (docs/settings.md)."""
 
-    model_config = SettingsConfigDict(env_prefix="STICTION_", frozen=True, extra="forbid")
+    model_config = SettingsConfigDict(env_prefix=PREFIX, env_ignore_empty=True, frozen=True, extra="forbid")
 
     data_folder: Path = Field(
         default=Path("stiction-data"),
@@ -158,14 +163,14 @@ class Settings(BaseSettings):
     @classmethod
     def _shared_by_processes(cls, url: str | None) -> str | None:
         if url is not None and (":memory:" in url or url in {"sqlite://", "sqlite:///"}):
-            raise ValueError("a database in memory is not seen by the worker processes; allowed: a file or a server")
+            raise ValueError("a file or a server: a database in memory is not seen by the worker processes")
         return url
 
     @field_validator("blob_url")
     @classmethod
     def _kept(cls, url: str | None) -> str | None:
         if url is not None and ("://" not in url or url.startswith("memory:")):
-            raise ValueError("no URL of a store that keeps anything; allowed: s3://bucket/prefix and others of obstore")
+            raise ValueError("s3://bucket/prefix and other URLs of obstore for stores that keep what they get")
         return url
 
     @property
@@ -173,3 +178,21 @@ class Settings(BaseSettings):
         """The database's URL: the one that was set, or that of the SQLite file in the data folder."""
         file = self.data_folder.resolve() / "stiction.sqlite3"
         return self.database_url or URL.create("sqlite", database=str(file)).render_as_string()
+
+
+def unknown_variables(environment: Iterable[str]) -> list[str]:
+    """Names of the environment that look like settings and are none: misspelt, or of another version."""
+    known = {PREFIX + name for name in OF_CLIENTS | {field.upper() for field in Settings.model_fields}}
+    return sorted(name for name in environment if name.upper().startswith(PREFIX) and name.upper() not in known)
+
+
+def complaints(error: ValidationError) -> str:
+    """What is wrong with settings, a line each; the value of none that may hold a secret is told."""
+    return "\n".join(_complaint(str(each["loc"][0]), each["input"], each["msg"]) for each in error.errors())
+
+
+def _complaint(name: str, value: object, message: str) -> str:
+    field = Settings.model_fields.get(name)
+    told = repr(str(value))[:100] if field is not None and field.repr else "not one that is allowed"
+    allowed = message.removeprefix("Input should be ").removeprefix("Value error, ")
+    return f"{PREFIX}{name.upper()} is {told}; allowed: {allowed} (docs/settings.md)"

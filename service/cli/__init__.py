@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import typer
 
 from service.cli import audit, blobs, database, jobs, keys, local, owners, remote, running, simulation
-from service.cli.exit_codes import exit_code
+from service.cli.exit_codes import exit_code, message
 
 app = typer.Typer(
     name="stiction",
@@ -47,5 +47,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
         code = exit_code(error)
         if code is None:
             raise
-        typer.echo(f"stiction: {error}", err=True)
+        typer.echo(f"stiction: {message(error)}", err=True)
         sys.exit(code)

@@ -6,6 +6,15 @@ SERVICE_REFUSED = 4
 NOT_FEASIBLE = 5
 
 
+def message(error: Exception) -> str:
+    """What is said of an error before the command ends."""
+    from pydantic import ValidationError
+
+    from service.settings import complaints
+
+    return complaints(error) if isinstance(error, ValidationError) else str(error)
+
+
 def exit_code(error: Exception) -> int | None:
     """Exit code of an error that a user can act upon; None for one that is ours (a traceback is due)."""
     from pydantic import ValidationError

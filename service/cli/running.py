@@ -1,5 +1,7 @@
 """Commands that run a service: serve, worker, demo."""
 
+import logging
+import os
 import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,6 +12,8 @@ from service.cli.exit_codes import FAILURE, exit_code
 
 if TYPE_CHECKING:
     from service.settings import Settings
+
+logger = logging.getLogger(__name__)
 
 
 DataFolder = Annotated[Path | None, typer.Option(help="Folder of the raw uploads and the SQLite file.")]
@@ -86,8 +90,11 @@ def demo(
 def _prepare(settings: "Settings") -> None:
     from service.observability import logs
     from service.processes import freed_memory
+    from service.settings import unknown_variables
 
     logs.configure(logs.Logs(settings.log_format, settings.log_level))
+    for name in unknown_variables(os.environ):
+        logger.warning("%s is set and is no setting; allowed: those of docs/settings.md", name)
     freed_memory.keep()
 
 

@@ -176,7 +176,8 @@ async def _on_not_found(request: Request, error: Exception) -> JSONResponse:
     kind = _UNKNOWN.get(error.kind, INTERNAL_ERROR)
     if kind in {INTERNAL_ERROR, FILE_MISSING}:
         logger.error("%s is referred to but missing", error.kind, exc_info=error)
-    return answer(request, Problem.wrong_value(kind, error.kind, error.name, f"the name of a stored {error.kind}"))
+    allowed = f"the name of a stored {error.kind}" if kind is not FILE_MISSING else "its copy from a backup, put back"
+    return answer(request, Problem.wrong_value(kind, error.kind, error.name, allowed))
 
 
 async def _on_already_exists(request: Request, error: Exception) -> JSONResponse:

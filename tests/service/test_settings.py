@@ -5,7 +5,7 @@ import pytest
 from pydantic import ValidationError
 from sqlalchemy import make_url
 
-from service.settings import Settings
+from service.settings import Settings, complaints, unknown_variables
 
 DOCUMENTED = dict(
     re.findall(r"^\| `STICTION_(\w+)` \| (.+?) \|", (Path(__file__).parents[2] / "docs/settings.md").read_text(), re.M)
@@ -91,3 +91,27 @@ def test_the_database_stands_in_the_data_folder_whatever_its_name(tmp_path: Path
     folder = tmp_path / "we?ird#100%"
     url = make_url(Settings(data_folder=folder).resolved_database_url)
     assert url.database == str(folder / "stiction.sqlite3")
+
+
+def test_an_empty_variable_counts_as_not_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("STICTION_DATA_FOLDER", "")
+    monkeypatch.setenv("STICTION_READERS", "")
+    assert Settings() == Settings(data_folder=Settings.model_fields["data_folder"].default)
+
+
+def test_a_variable_that_is_no_setting_is_noticed() -> None:
+    environment = ["STICTION_READER", "STICTION_READERS", "STICTION_URL", "STICTION_KEY", "PATH", "stiction_port"]
+    assert unknown_variables(environment) == ["STICTION_READER"]
+
+
+def test_a_wrong_setting_is_told_by_its_name_and_without_secrets(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("STICTION_READERS", "0")
+    monkeypatch.setenv("STICTION_DATABASE_URL", "sqlite:///:memory:?password=hush")
+    with pytest.raises(ValidationError) as refusal:
+        Settings()
+    lines = sorted(complaints(refusal.value).splitlines())
+    assert lines[0].startswith(
+        "STICTION_DATABASE_URL is not one that is allowed; allowed: a file or a server: a database in memory"
+    )
+    assert lines[1] == "STICTION_READERS is '0'; allowed: greater than or equal to 1 (docs/settings.md)"
+    assert "hush" not in "".join(lines)
