@@ -54,6 +54,7 @@ class Database:
         self._writing = self.engine.execution_options(**{_BEGIN: "BEGIN IMMEDIATE"})
         self._noting = self._writing.execution_options(**{_DURABLE: False})
         self._reading = self.engine
+        self._is_closed = False
         self._file = SqliteFile(self.engine.url.database if self.is_sqlite else None)
         self.store_id: str | None = None  # that of the blob store that it works with, once somebody has compared them
         if self.is_sqlite:
@@ -111,7 +112,10 @@ class Database:
             self._file.check_pages()
 
     def close(self) -> None:
-        """Close every connection."""
+        """Close every connection; one that a thread still has is closed once it gives it back."""
+        if not self._is_closed:  # nobody else would: the pool that gets it back is no longer this engine's
+            self._is_closed = True
+            event.listen(self.engine, "checkin", lambda _, record: record.invalidate())
         self.engine.dispose()
 
 

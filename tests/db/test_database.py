@@ -263,3 +263,18 @@ def test_what_is_no_url_of_a_database_is_refused_without_being_repeated(url: str
     with pytest.raises(InvalidUrl, match=r"database URL .*; allowed: .*sqlite://") as refusal:
         Database(url)
     assert "hush" not in str(refusal.value)
+
+
+def test_a_connection_that_a_thread_has_when_all_are_closed_is_closed_when_it_is_given_back(
+    new_url: Callable[..., str], tmp_path: Path
+) -> None:
+    """As those of a server's watchers are, whose threads go on for a moment after it has stopped."""
+    database = Database(new_url(tmp_path))
+    with database.read() as session:
+        connection = session.connection().connection.dbapi_connection
+        database.close()
+        assert session.execute(text("SELECT 1")).scalar() == 1
+    with pytest.raises(Exception, match="closed"):
+        connection.cursor().execute("SELECT 1")  # type: ignore[union-attr]
+    database.ping()  # who goes on with it all the same gets another
+    database.close()
