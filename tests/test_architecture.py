@@ -5,6 +5,8 @@ import importlib
 import importlib.metadata
 import subprocess
 import sys
+from collections.abc import Collection, Mapping
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -41,6 +43,35 @@ def imported_modules(path: Path) -> set[str]:
     return names
 
 
+def imported_here(path: Path, known: Collection[str]) -> set[str]:
+    """Which of the ``known`` modules a file imports: at its top, inside of functions, and for types only."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names if alias.name in known)
+        elif isinstance(node, ast.ImportFrom):
+            full = {alias.name: f"{node.module}.{alias.name}" for alias in node.names}
+            found.update(name if name in known else str(node.module) for name in full.values())
+    return found & set(known)
+
+
+def modules_of(folder: Path, package: str) -> dict[str, Path]:
+    """Every module of a package, by dotted name; a package's own names stand for its ``__init__``."""
+    files = sorted((folder / package).rglob("*.py"))
+    parts = {path: path.relative_to(folder).with_suffix("").parts for path in files}
+    return {".".join(name[:-1] if name[-1] == "__init__" else name): path for path, name in parts.items()}
+
+
+def circle(modules: Mapping[str, Path]) -> list[str]:
+    """Modules that import one another in a circle, if there are such."""
+    graph = {name: imported_here(path, modules) - {name} for name, path in modules.items()}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
 def third_party(path: Path) -> set[str]:
     return {name.split(".")[0] for name in imported_modules(path)} - set(sys.stdlib_module_names)
 
@@ -63,6 +94,29 @@ def test_estimators_know_of_slipcore_only_its_samples_and_its_compiler() -> None
 def test_one_module_decides_how_kernels_are_compiled_and_kept() -> None:
     paths = (path for package in ALLOWED for path in (ROOT / package).rglob("*.py"))
     assert [path for path in paths if "numba" in third_party(path)] == [ROOT / "slipcore/compilation.py"]
+
+
+@pytest.mark.parametrize("package", [*ALLOWED, "service"])
+def test_no_modules_import_one_another_in_a_circle(package: str) -> None:
+    folder = ROOT / package
+    modules = modules_of(folder.parent, folder.name)
+    assert modules
+    assert circle(modules) == []
+
+
+@pytest.mark.parametrize(
+    "back",
+    [
+        "import house.hall",
+        "def lazily():\n    from house import hall",
+        "if TYPE_CHECKING:\n    from house.hall import x",
+    ],
+)
+def test_a_circle_is_found_however_it_is_closed(tmp_path: Path, back: str) -> None:
+    (tmp_path / "house").mkdir()
+    for name, text in {"__init__": "", "hall": "from house.stairs import up", "stairs": back}.items():
+        (tmp_path / "house" / f"{name}.py").write_text(text)
+    assert set(circle(modules_of(tmp_path, "house"))) == {"house.hall", "house.stairs"}
 
 
 ESTIMATOR_ROOMS = ("linear", "sampling", "likelihoods", "methods")

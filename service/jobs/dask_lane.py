@@ -14,7 +14,7 @@ from distributed import Client, KilledWorker
 
 from db.records import Claim
 from service.jobs import worker
-from service.jobs.lanes import RETRY_SECONDS, WorkerDied
+from service.jobs.lane import RETRY_SECONDS, WorkerDied
 from service.jobs.worker import Place
 
 logger = logging.getLogger(__name__)

@@ -21,7 +21,7 @@ from db.database import Database
 from db.errors import ClaimLost, SchemaMismatch, StorageUnavailable, StoreMismatch
 from db.records import Claim
 from db.repositories import jobs, runners, stores
-from service.jobs.lanes import Lane, LimitReached, WorkerDied
+from service.jobs.lane import Lane, LimitReached, WorkerDied
 from service.observability import logs
 
 logger = logging.getLogger(__name__)

@@ -23,7 +23,7 @@ from db.errors import SchemaMismatch
 from db.repositories import jobs
 from db.tables import FrictionModelRow, JobRow
 from service.app import create_app, running
-from service.jobs.lanes import ProcessLane
+from service.jobs.process_lane import ProcessLane
 from service.settings import Settings
 from slipcore.contact.tiers.ramp import tangential_ramp
 from stiction_client.container import encode

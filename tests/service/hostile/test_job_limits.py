@@ -16,7 +16,8 @@ from db.blobs import BlobStore
 from db.database import Database
 from db.records import NewGraspLog
 from db.repositories import grasp_logs, jobs, runners
-from service.jobs import lanes, pipeline, worker
+from service.jobs import pipeline, process_lane, worker
+from service.jobs.lane import LimitReached
 from service.processes import limits
 from service.settings import Settings
 from slipcore import GraspLog
@@ -85,10 +86,10 @@ def test_a_worker_that_takes_too_long_is_ended_and_another_one_begins_anew(
     async def run() -> None:
         monkeypatch.setattr(worker, "warm_up", partial(spend, 0.0))
         monkeypatch.setattr(worker, "run_job", spend_on_job)
-        lane = lanes.ProcessLane(worker.Place("sqlite:///x", tmp_path), 0.3)
+        lane = process_lane.ProcessLane(worker.Place("sqlite:///x", tmp_path), 0.3)
         await lane.hire()
         try:
-            with pytest.raises(lanes.LimitReached, match=r"more than 0\.3 s of CPU"):
+            with pytest.raises(LimitReached, match=r"more than 0\.3 s of CPU"):
                 await lane.run(jobs.Claim("job", "runner"))
             await lane.hire()  # another process, whose time counts from its job's begin
             lane._cpu_seconds = 60.0

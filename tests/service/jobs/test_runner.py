@@ -13,7 +13,7 @@ from db.errors import ClaimLost, StorageUnavailable
 from db.records import Claim, Job
 from db.repositories import jobs, materials, runners
 from db.tables import JobRow
-from service.jobs.lanes import WorkerDied
+from service.jobs.lane import WorkerDied
 from service.jobs.runner import LOOKS, JobRunner, Watch
 
 Do = Callable[[Claim], None]

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from service.jobs import worker
-from service.jobs.lanes import ProcessLane
+from service.jobs.process_lane import ProcessLane
 from service.jobs.worker import Place
 
 
