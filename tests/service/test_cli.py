@@ -245,7 +245,7 @@ def test_wrong_usage_is_told_from_refused_input(run: Run, arguments: tuple[objec
 def test_a_setting_out_of_range_is_refused_by_name(run: Run) -> None:
     code, _, err = run("serve", "--port", 99999)
     assert code == INPUT_REFUSED
-    assert "port" in err
+    assert "STICTION_PORT is '99999'; allowed: less than or equal to 65535" in err
 
 
 def test_a_worker_without_workers_is_wrong_usage(run: Run) -> None:

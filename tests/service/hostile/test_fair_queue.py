@@ -18,6 +18,7 @@ import httpx
 import numpy as np
 import pytest
 
+from db.blobs import BlobStore
 from db.database import Database
 from db.records import Claim
 from service.domain import upload
@@ -144,6 +145,7 @@ def test_an_honest_upload_and_its_job_are_done_beside_an_attacker(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(lanes, "ProcessLane", ThreadLane)
+    monkeypatch.setattr(worker, "_stores", lambda _: (database, BlobStore(tmp_path)))
     monkeypatch.setattr(ThreadLane, "test_ended", threading.Event())
     monkeypatch.setattr(upload, "LONG_FRAMES", 1000)
     honest, long = numbered(content), numbered(small_and_many(ramp, 2000))

@@ -62,7 +62,7 @@ async def answer_to(error: Exception) -> httpx.Response:
     [
         (RuntimeError("a secret path"), "internal-error", "an unexpected error; the server's log has it"),
         (StorageUnavailable("database: disk full"), "storage-unavailable", "database: disk full"),
-        (NotFound("blob", "00"), "file-missing", "blob is 00; allowed: the name of a stored blob"),
+        (NotFound("blob", "00"), "file-missing", "blob is 00; allowed: its copy from a backup, put back"),
         (NotFound("idea", "00"), "internal-error", "idea is 00; allowed: the name of a stored idea"),
         (Problem(problems.NOT_READY, "wait"), "not-ready", "wait"),
     ],
