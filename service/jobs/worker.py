@@ -3,7 +3,6 @@
 import logging
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 from db import identity
@@ -17,6 +16,8 @@ from service.observability import logs
 from service.processes import limits
 
 logger = logging.getLogger(__name__)
+
+_OPEN: dict["Place", tuple[Database, BlobStore]] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,9 +84,21 @@ def _refuse(database: Database, claim: Claim, want: str) -> None:
     logger.warning("job refused: it wants %s", want)
 
 
-@cache
+def close_stores() -> None:
+    """Close what jobs were done with; the next one opens its stores anew."""
+    while _OPEN:
+        _OPEN.popitem()[1][0].close()
+
+
 def _stores(place: Place) -> tuple[Database, BlobStore]:
-    database = Database(place.database_url)
-    blobs = open_blobs(place.data_folder, place.blob_url, place.blob_cache_bytes)
-    identity.verify(database, blobs)
-    return database, blobs
+    """The stores of a place, opened once and kept; raises ``StoreMismatch``."""
+    if place not in _OPEN:
+        database = Database(place.database_url)
+        blobs = open_blobs(place.data_folder, place.blob_url, place.blob_cache_bytes)
+        try:
+            identity.verify(database, blobs)
+        except BaseException:
+            database.close()
+            raise
+        _OPEN[place] = database, blobs
+    return _OPEN[place]

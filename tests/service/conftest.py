@@ -25,6 +25,7 @@ from service.context import Context
 from service.domain.model_cache import ModelCache
 from service.http import access
 from service.http.serving import configuration
+from service.jobs import worker
 from service.observability import logs
 from service.settings import Settings
 from slipcore import GraspLog
@@ -96,6 +97,13 @@ class Caller:
         if sent[0]["type"] == "websocket.accept":
             return httpx.Response(101)
         return httpx.Response(sent[0]["status"], headers=sent[0]["headers"], content=sent[1]["body"])
+
+
+@pytest.fixture(autouse=True)
+def no_open_stores() -> Iterator[None]:
+    """Jobs that a test does in its own process keep their stores open, which are no other test's."""
+    yield
+    worker.close_stores()
 
 
 @pytest.fixture(autouse=True)

@@ -22,11 +22,7 @@ def mine(database: Database, claim: Callable[[], Claim]) -> Claim:
 
 def run(database: Database, tmp_path: Path, claim: Claim) -> None:
     place = Place(database.url, tmp_path)
-    try:
-        worker.run_job(place, claim)
-    finally:
-        worker._stores(place)[0].close()
-        worker._stores.cache_clear()
+    worker.run_job(place, claim)
 
 
 def test_a_defect_ends_the_job_with_its_name(
