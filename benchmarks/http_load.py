@@ -18,6 +18,11 @@ import numpy as np
 CONNECTIONS = 32
 WRK = shutil.which("wrk")
 CALLERS = "wrk, on a core of its own" if WRK else "callers in Python"
+CORES = sorted(os.sched_getaffinity(0))
+ON_LAST_CORE = ["nice", "-n", "-15", "taskset", "-c", str(CORES[-1])]
+"""How the load generator is started: before the workers on that core, else it would measure how long it waits for them;
+who may not ask for that is told so by ``nice``, and goes on without."""
+
 REPORT = """
 done = function(summary, latency)
   local wrong = summary.errors.status + summary.errors.connect + summary.errors.read + summary.errors.timeout
@@ -70,10 +75,17 @@ def in_turn(targets: list[Target], rounds: int = 5) -> list[Load]:
     ]
 
 
+def leave_first_core() -> None:
+    """Keep this process, and all that it starts from now on, off the core that ``pin`` gives to a server."""
+    if len(CORES) > 1:
+        os.sched_setaffinity(0, CORES[1:])
+
+
 def pin(process: int) -> None:
-    """Give a server the first core, where there are others for the callers and its workers."""
-    if len(os.sched_getaffinity(0)) > 1:
-        os.sched_setaffinity(process, {min(os.sched_getaffinity(0))})
+    """Give the first core to all threads of a server, where there are others for the callers and its workers."""
+    if len(CORES) > 1:
+        for thread in Path(f"/proc/{process}/task").iterdir():
+            os.sched_setaffinity(int(thread.name), CORES[:1])
 
 
 def cpu_seconds(process: int) -> float:
@@ -91,8 +103,7 @@ def _ask_by_wrk(target: Target, seconds: float) -> tuple[int, float, float, floa
     with tempfile.NamedTemporaryFile("w", suffix=".lua") as script:
         script.write(REPORT)
         script.flush()
-        core = str(max(os.sched_getaffinity(0)))
-        command = ["taskset", "-c", core, WRK or "wrk", "-t1", f"-c{CONNECTIONS}", f"-d{max(1, round(seconds))}s"]
+        command = [*ON_LAST_CORE, WRK or "wrk", "-t1", f"-c{CONNECTIONS}", f"-d{max(1, round(seconds))}s"]
         command += ["-s", script.name, *(["-H", target.header] if target.header else [])]
         url = f"http://127.0.0.1:{target.port}{target.path}"
         told = subprocess.run([*command, url], check=True, capture_output=True, text=True).stdout

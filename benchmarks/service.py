@@ -25,7 +25,7 @@ import httpx
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks.http_load import CALLERS, CONNECTIONS, Load, Target, in_turn, load, pin
+from benchmarks.http_load import CALLERS, CONNECTIONS, Load, Target, in_turn, leave_first_core, load, pin
 from benchmarks.pages import options, picture_folder, save, write
 from benchmarks.postgresql import running_postgresql
 from slipcore.contact import RampSchedule, tangential_ramp
@@ -36,6 +36,9 @@ MATERIAL = "benchmark"
 LOOK_UP = f"/v1/materials/{MATERIAL}/friction?v=0.001&fn=0.05&quantile=0.05"
 NPZ = {"content-type": "application/vnd.stiction.grasp-log+npz"}
 UPLOADS = 30
+MOST_BESIDE = 200
+"""Logs made before look-ups are measured beside their uploads: to make them takes the same cores."""
+
 FAST = "bare Starlette, httptools and uvloop"
 BARE = """
 import sys, uvicorn
@@ -100,14 +103,14 @@ def content(seed: int) -> bytes:
     return encode(replace(log, normal=None, truth=None))
 
 
-def uploads(url: str, count: int, first_seed: int) -> Requests:
+def uploads(url: str, bodies: list[bytes]) -> Requests:
     """Grasp logs one after the other, each awaited to its stored fit."""
 
     def ask(client: httpx.Client, body: bytes) -> str:
         answer = client.post("/v1/grasp-logs", params={"material": MATERIAL}, content=body, headers=NPZ)
         return str(answer.raise_for_status().json()["job"]["id"])
 
-    return requests(url, "upload, then fit by ols", ask, [content(first_seed + k) for k in range(count)])
+    return requests(url, "upload, then fit by ols", ask, bodies)
 
 
 def fits(url: str, method: str, count: int, where: str = "") -> Requests:
@@ -135,15 +138,13 @@ def requests(url: str, what: str, ask: Callable[[httpx.Client, Any], str], bodie
     return Requests(what, accepted, fitted)
 
 
-def beside(work: Callable[[int], object], measured: Callable[[], Load]) -> Load:
+def beside(work: Callable[[], object], measured: Callable[[], Load]) -> Load:
     """A measurement while other work goes on."""
     done = Event()
 
     def go_on() -> None:
-        k = 0
         while not done.is_set():
-            work(k)
-            k += 1
+            work()
 
     thread = Thread(target=go_on)
     thread.start()
@@ -165,7 +166,7 @@ def serving(**settings: str) -> Iterator[tuple[str, int, int]]:
             while httpx.get(f"{url}/readyz").status_code != httpx.codes.OK:
                 time.sleep(0.05)
             FrictionClient(url).create_material(MATERIAL)
-            uploads(url, 3, first_seed=0)
+            uploads(url, [content(seed) for seed in range(3)])
             pin(process)
             yield url, port, process
 
@@ -174,7 +175,7 @@ def measure() -> tuple[list[Requests], list[Load]]:
     """A service on SQLite with a bare server beside it; then services that ask the database each time."""
     with serving() as (url, port, process):
         found = [
-            uploads(url, UPLOADS, first_seed=100),
+            uploads(url, [content(100 + k) for k in range(UPLOADS)]),
             fits(url, "bayes", UPLOADS // 3),
             fits(url, "conjugate", UPLOADS),
         ]
@@ -203,7 +204,8 @@ def looked_up(url: str, port: int, process: int) -> list[Load]:
         ]
         alone = in_turn(targets)
     busy = Target("look-up beside uploads and fits", port, process, LOOK_UP)
-    return [*alone, beside(lambda k: uploads(url, 1, first_seed=300 + k), lambda: load(busy, 10.0))]
+    bodies = iter([content(300 + k) for k in range(MOST_BESIDE)])
+    return [*alone, beside(lambda: uploads(url, [next(bodies)]), lambda: load(busy, 10.0))]
 
 
 @contextmanager
@@ -256,6 +258,7 @@ def main() -> None:
     """Measure, print, write."""
     arguments = options(__doc__).parse_args()
     pictures = picture_folder(arguments)
+    leave_first_core()
     found, loads = measure()
     made = tables(found, loads)
     print("\n\n".join(made.values()))

@@ -32,5 +32,5 @@ def _look(context: Context, job_id: str) -> Job:
     with context.database.read() as session:
         job = jobs.get(session, job_id)
     if job.finished_at is not None:
-        context.models.seen((job.id, job.finished_at))
+        context.models.has_ended(context.database, job)
     return job

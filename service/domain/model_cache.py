@@ -5,12 +5,14 @@ import hashlib
 import math
 import time
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from db.database import Database
-from db.records import StoredModel
+from db.errors import NotFound, StorageUnavailable
+from db.records import Job, StoredModel
 from db.repositories import friction_models, materials
 from service.domain.stored_results import to_friction_model
 from service.http.problems import NO_MODEL, Problem
@@ -48,7 +50,7 @@ class _Reading(NamedTuple):
 class ModelCache:
     """Models by a material's name and a method, each believed for ``seconds`` after it was read.
 
-    What another process stores in that time is missed, unless this one gets to know of it (``seen``).
+    What another process stores in that time is missed, unless this one gets to know of it (``seen``, ``has_ended``).
     """
 
     def __init__(self, seconds: float = 0.0) -> None:
@@ -56,6 +58,8 @@ class ModelCache:
         self._known: dict[tuple[str, str], KnownModel] = {}
         self._readings: dict[tuple[str, str], _Reading] = {}
         self._changed_at = -math.inf
+        self._material_changed_at: dict[str, float] = {}
+        self._last_change_at = -math.inf
         self._changes: OrderedDict[Hashable, None] = OrderedDict()
 
     async def get(self, database: Database, material: str, method: str) -> KnownModel:
@@ -77,7 +81,7 @@ class ModelCache:
     def _read_once(self, database: Database, material: str, method: str) -> asyncio.Task[KnownModel]:
         key = material, method
         reading = self._readings.get(key)
-        if reading is None or reading.began_at <= self._changed_at or self._seconds == 0.0:
+        if reading is None or reading.began_at <= self._last_change_at or self._seconds == 0.0:
             task = asyncio.create_task(asyncio.to_thread(self.read, database, material, method))
             reading = self._readings[key] = _Reading(time.monotonic(), task)
             task.add_done_callback(lambda _: self._forget(key, reading))
@@ -92,9 +96,14 @@ class ModelCache:
     def fresh(self, material: str, method: str) -> KnownModel | None:
         """The model in memory, if it may still be believed."""
         known = self._known.get((material, method))
-        if known is None or known.until < time.monotonic() or known.read_at <= self._changed_at:
+        if known is None or known.until < time.monotonic():
             return None
-        return known
+        changed_at = max(self._changed_at, self._material_changed_at.get(known.stored.material, -math.inf))
+        return known if known.read_at > changed_at else None
+
+    def has_known(self, material: str, method: str) -> bool:
+        """Whether there was a model when it was last read, however long ago."""
+        return (material, method) in self._known
 
     def read(self, database: Database, material: str, method: str) -> KnownModel:
         """The model in the database; raises ``NotFound``, and ``Problem`` where the material has none."""
@@ -113,7 +122,9 @@ class ModelCache:
             known = KnownModel(stored, to_friction_model(stored.model), _tag(stored), read_at, until)
         if len(self._known) >= MOST:
             self._known.clear()
-        self._known[material, method] = known
+        newer = self._known.get((material, method))
+        if newer is None or newer.read_at < read_at:
+            self._known[material, method] = known
         return known
 
     def seen(self, *changes: Hashable) -> None:
@@ -122,13 +133,36 @@ class ModelCache:
         ``changes`` are what tells so, such as jobs that have ended: none of them counts a second time. They are told
         apart by what they are and not by when they were, since clocks differ and are set.
         """
-        new = [each for each in changes if each not in self._changes]  # not by a set, which would walk over all of them
-        if changes and not new:
+        if not changes or self._has_new(changes):
+            self._changed_at = self._last_change_at = time.monotonic()
+            self._remember(changes)
+
+    def has_ended(self, database: Database, job: Job) -> None:
+        """That a job has ended, as can be seen in the database by now; to be called before anybody is told.
+
+        The models of its material are read anew by the caller, at once: until then who looks one up has the one before
+        and nobody waits, and models of other materials stay.
+        """
+        change = job.id, job.finished_at
+        if job.material is None or not self._has_new([change]):
             return
-        self._changes.update(dict.fromkeys(new))
+        changed_at = time.monotonic()
+        for (name, method), known in list(self._known.items()):
+            if known.stored.material == job.material and self._seconds > 0.0:
+                with suppress(NotFound, Problem, StorageUnavailable):  # who looks it up will be told
+                    self.read(database, name, method)
+        if len(self._material_changed_at) >= MOST:
+            self._material_changed_at, self._changed_at = {}, changed_at
+        self._material_changed_at[job.material] = self._last_change_at = changed_at
+        self._remember([change])  # not before: who comes next would take it for done
+
+    def _has_new(self, changes: Sequence[Hashable]) -> bool:
+        return any(each not in self._changes for each in changes)  # not by a set, which would walk over all of them
+
+    def _remember(self, changes: Sequence[Hashable]) -> None:
+        self._changes.update({each: None for each in changes if each not in self._changes})
         while len(self._changes) > MOST_CHANGES:
             self._changes.popitem(last=False)
-        self._changed_at = time.monotonic()
 
 
 def _tag(stored: StoredModel) -> str:

@@ -13,6 +13,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn.config import Config
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from service.http.joined_writes import JoinedWrites
 from service.http.problems import BAD_REQUEST, MEDIA_TYPE, TOO_MANY_CONNECTIONS, ProblemType
 
 HEADER_SECONDS = 10.0
@@ -65,7 +66,7 @@ class BoundedConnection(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Begin to wait for a request."""
-        super().connection_made(transport)
+        super().connection_made(JoinedWrites(transport, self.loop))  # type: ignore[arg-type]  # in a transport's place
         if hasattr(transport, "max_size"):  # asyncio's own; other event loops choose by themselves
             transport.max_size = RECEIVED_BYTES
         self._make_room()

@@ -115,15 +115,20 @@ class Admission:
 
     def admits_at_once(self, connection: HTTPConnection) -> bool:
         """Whether somebody may ask who is known without waiting; for all others ``admit`` has to say."""
+        known = self.known(connection)
+        who = None if known is None else _counted_as(known, connection)
+        return known is not None and (who is None or self._rate.wait(who) == 0.0)
+
+    def known(self, connection: HTTPConnection) -> Access | None:
+        """Who asks, where that is known without waiting and they may; does not count."""
         try:
             text = self._sent_key(connection)
         except Problem:
-            return False
-        found = None if text is None else self._ring.find_kept(text)
-        if text is not None and found is None:
-            return False
-        who = _counted_as(EVERYTHING if found is None else Access(found.id, found.scope), connection)
-        return who is None or self._rate.wait(who) == 0.0
+            return None
+        if text is None:
+            return EVERYTHING
+        found = self._ring.find_kept(text)
+        return None if found is None else Access(found.id, found.scope)
 
     def _count(self, who: str | None) -> None:
         seconds = 0.0 if who is None else self._rate.wait(who)

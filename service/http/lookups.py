@@ -11,6 +11,7 @@ from fastapi import Response
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from db.errors import NotFound, StorageUnavailable
 from service.context import Context
 from service.domain.look_up import Question, look_up
 from service.domain.model_cache import KnownModel
@@ -18,6 +19,7 @@ from service.http import envelope
 from service.http.conditional import is_one_of, unchanged, whole
 from service.http.envelope import MOST_HEADER_BYTES
 from service.http.gate import Admission
+from service.http.problems import Problem
 from service.http.schemas import LookUpQuery
 from service.observability import traces
 from service.observability.answered import Answered
@@ -50,9 +52,11 @@ class Answer:
 
 
 class Lookups:
-    """Answers a well-formed look-up of a model in memory; hands anything else on to the route, which says the same.
+    """Answers a well-formed look-up of a model that is or was in memory; hands all else on to the route, which says
+    the same.
 
-    Who asks is admitted, counted and logged as by the layers that are passed over.
+    Who asks is admitted, counted and logged as by the layers that are passed over. When a model has changed all who
+    ask for it wait for one reading; each through the route, they would keep everybody waiting for ten times as long.
     """
 
     def __init__(self, app: ASGIApp, admission: Admission, answered: Answered) -> None:
@@ -63,7 +67,7 @@ class Lookups:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
         begin = time.perf_counter()
-        answer = self._answer(scope) if scope["type"] == "http" and scope["method"] == "GET" else None
+        answer = await self._answer(scope) if scope["type"] == "http" and scope["method"] == "GET" else None
         if answer is None:
             await self.app(scope, receive, send)
             return
@@ -73,21 +77,32 @@ class Lookups:
         await send({"type": "http.response.body", "body": answer.body})
         self._answered.note("GET", ROUTE.path, answer.status, time.perf_counter() - begin, request_id)
 
-    def _answer(self, scope: Scope) -> Answer | None:
+    async def _answer(self, scope: Scope) -> Answer | None:
         found = _PATH.fullmatch(scope["path"])
         asked = _read(scope["query_string"]) if found and len(scope["query_string"]) <= LONGEST_QUERY else None
         if found is None or asked is None or envelope.size_of_headers(scope) > MOST_HEADER_BYTES:
             return None
         connection, (method, question) = HTTPConnection(scope), asked
-        context: Context = scope["app"].state.context
-        known = context.models.fresh(found[1], method)
+        known = await self._model(connection, found[1], method)
         if known is None or not self._admission.admits_at_once(connection):
             return None
-        context.models.renew(context.database, known, found[1], method)
         traces.name_request("GET", ROUTE.path)
         listed = connection.headers.get("if-none-match")
         has_it = listed is not None and is_one_of(known.tag, listed)
         return self._kept_or_made(known, None if has_it else question, scope)
+
+    async def _model(self, connection: HTTPConnection, material: str, method: str) -> KnownModel | None:
+        """The model, read anew where it has to be; None where that is not ours to do, or fails."""
+        context: Context = connection.app.state.context
+        models = context.models
+        if models.fresh(material, method) is None and (
+            not models.has_known(material, method) or self._admission.known(connection) is None
+        ):
+            return None
+        try:
+            return await models.get(context.database, material, method)
+        except (NotFound, Problem, StorageUnavailable):
+            return None
 
     def _kept_or_made(self, known: KnownModel, question: Question | None, scope: Scope) -> Answer:
         """The answer to a question, made where nobody asked it yet so; without one, to who has the answer already."""

@@ -172,7 +172,7 @@ def read_grasp_log(context: Given, id: str) -> GraspLogOut:  # noqa: A002  (the 
     """With its job and, once there, what was found in it."""
     log = _find(context, id)
     if log.job.finished_at is not None:
-        context.models.seen((log.job.id, log.job.finished_at))
+        context.models.has_ended(context.database, log.job)
     return GraspLogOut.of(log)
 
 

@@ -4,11 +4,15 @@ import asyncio
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
 from db.database import Database
 from db.errors import NotFound
+from db.paging import Window
+from db.records import Job
+from db.repositories import jobs, materials
 from service.domain import model_cache
 from service.domain.model_cache import KnownModel, ModelCache
 
@@ -105,3 +109,73 @@ def test_a_change_counts_once_whenever_it_was(database: Database, monkeypatch: p
     assert [forgets("a"), forgets("a"), forgets("b", "a"), forgets("a", "b")] == [True, False, True, False]
     assert [forgets(), forgets()] == [True, True]
     assert [forgets("c", "d"), forgets("b", "c", "d"), forgets("a")] == [True, False, True]
+
+
+@pytest.fixture
+def ended(database: Database) -> Job:
+    """A job of the material "paper" that has ended."""
+    with database.read() as session:
+        found = next(iter(jobs.list_all(session, Window("created_at"))))
+    return replace(found, finished_at=found.created_at)
+
+
+def test_the_end_of_a_job_renews_the_models_of_its_material_only(
+    database: Database, store: Callable[[], None], ended: Job, read: list[str]
+) -> None:
+    cache = ModelCache(60.0)
+    other = cache.read(database, "paper", "ols")
+    cache._known["card", "ols"] = replace(other, stored=replace(other.stored, material="card"))
+    store()
+    cache.has_ended(database, ended)
+    renewed, kept = cache.fresh("paper", "ols"), cache.fresh("card", "ols")
+    assert renewed is not None
+    assert renewed.stored.version == 2
+    assert kept is not None
+    assert kept.read_at == other.read_at
+    cache.has_ended(database, ended)
+    cache.has_ended(database, replace(ended, material=None))
+    assert read == ["paper", "paper"]
+
+
+def test_the_end_of_a_job_is_not_missed_by_joining_a_reading_begun_before(
+    database: Database, store: Callable[[], None], ended: Job
+) -> None:
+    async def run() -> None:
+        cache = ModelCache(60.0)
+        before = asyncio.create_task(cache.get(database, "paper", "ols"))
+        await asyncio.sleep(0)
+        store()
+        cache.has_ended(database, ended)
+        assert (await cache.get(database, "paper", "ols")).stored.version == 2
+        await before
+        assert (await cache.get(database, "paper", "ols")).stored.version == 2
+
+    asyncio.run(run())
+
+
+def test_whoever_is_told_of_the_end_meanwhile_does_not_get_ahead_of_the_reading(
+    database: Database, ended: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cache, depths = ModelCache(60.0), list[int]()
+    cache.read(database, "paper", "ols")
+    original = ModelCache.read
+
+    def told_meanwhile(*given: Any) -> KnownModel:
+        depths.append(len(depths))
+        if len(depths) == 1:
+            cache.has_ended(database, ended)
+        return original(*given)
+
+    monkeypatch.setattr(ModelCache, "read", told_meanwhile)
+    cache.has_ended(database, ended)
+    assert depths == [0, 1]
+
+
+def test_a_model_that_cannot_be_renewed_is_not_believed(database: Database, ended: Job) -> None:
+    cache = ModelCache(60.0)
+    cache.read(database, "paper", "ols")
+    with database.write() as session:
+        materials.rename(session, materials.find_id(session, "paper"), "card")
+        materials.remove_alias(session, materials.find_id(session, "card"), "paper")
+    cache.has_ended(database, ended)
+    assert cache.fresh("paper", "ols") is None

@@ -7,6 +7,7 @@ import pytest
 from db.database import Database
 from db.records import NewModel
 from db.repositories import access_keys, friction_models, jobs, materials
+from service.domain.model_cache import ModelCache
 from service.http import access, lookups
 from service.http.lookups import Lookups
 from service.http.routes import materials as route
@@ -45,13 +46,17 @@ def told(answer: httpx.Response) -> tuple[int, Any, dict[str, str]]:
     )
 
 
+async def no_answer(*_: object) -> None:
+    """Instead of the shortest way."""
+
+
 def both_ways(client: Any, queries: str, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, Any, Any]]:
     """Each query with its answer by the shortest way, where it gives one, and by the route."""
     asked = ["", *queries.split()]
     client.get(f"{PATH}fn=0.05")
     client.get(f"{PATH}fn=0.05&method=bayes")
     short = [told(client.get(PATH + query)) for query in asked]
-    monkeypatch.setattr(Lookups, "_answer", lambda *_: None)
+    monkeypatch.setattr(Lookups, "_answer", no_answer)
     return list(zip(asked, short, [told(client.get(PATH + query)) for query in asked], strict=True))
 
 
@@ -120,6 +125,22 @@ def test_a_simple_question_does_not_reach_the_route(client: Any, monkeypatch: py
     assert client.request("POST", f"{PATH}fn=0.05").status_code == 405
 
 
+def test_a_model_that_changed_is_read_without_the_route(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    client.get(f"{PATH}fn=0.05")
+    monkeypatch.setattr(route, "look_up", lambda *_: pytest.fail("the route was asked"))
+    client.app.state.context.models.seen()
+    assert client.get(f"{PATH}fn=0.05").status_code == 200
+
+
+def test_what_cannot_be_read_anew_is_refused_by_the_route(client: Any, database: Database) -> None:
+    client.get(f"{PATH}fn=0.05")
+    with database.write() as session:
+        materials.rename(session, materials.find_id(session, "copy paper"), "paper")
+        materials.remove_alias(session, materials.find_id(session, "paper"), "copy paper")
+    client.app.state.context.models.seen()
+    assert client.get(f"{PATH}fn=0.05").status_code == 404
+
+
 def test_the_shortest_way_is_counted_as_the_route(client: Any) -> None:
     for _ in range(3):
         client.get(f"{PATH}fn=0.05")
@@ -142,10 +163,15 @@ def test_the_answers_kept_are_bounded(client: Any, monkeypatch: pytest.MonkeyPat
     assert 0 < len(kept) <= 3
 
 
-def test_the_shortest_way_leads_through_the_gate(reach: Callable[..., Any], client: Any) -> None:
+def test_the_shortest_way_leads_through_the_gate(
+    reach: Callable[..., Any], client: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     stranger = reach("keys", lookup_seconds=60.0)
     stranger.app.state.context = client.app.state.context
     client.get(f"{PATH}fn=0.05")
+    assert stranger.get(f"{PATH}fn=0.05").status_code == 401
+    stranger.app.state.context.models.seen()
+    monkeypatch.setattr(ModelCache, "read", lambda *_: pytest.fail("the model was read for a stranger"))
     assert stranger.get(f"{PATH}fn=0.05").status_code == 401
 
 

@@ -1,0 +1,70 @@
+"""What is written together leaves together, in order, and never later than a close."""
+
+import asyncio
+from typing import cast
+
+import pytest
+
+from service.http import joined_writes
+from service.http.joined_writes import JoinedWrites
+
+
+class Sent:
+    """A transport that notes what it is told."""
+
+    def __init__(self) -> None:
+        self.told: list[bytes | str] = []
+
+    def write(self, data: bytes) -> None:
+        self.told.append(data)
+
+    def get_write_buffer_size(self) -> int:
+        return 5
+
+    def __getattr__(self, name: str) -> object:
+        return lambda: self.told.append(name)
+
+
+def told(*steps: str) -> list[bytes | str]:
+    """What the transport is told when ``steps`` are taken: bytes to write, ``turn`` of the loop, or a method's name."""
+
+    async def take() -> list[bytes | str]:
+        sent = Sent()
+        joined = JoinedWrites(cast(asyncio.Transport, sent), asyncio.get_running_loop())
+        for step in steps:
+            if step == "turn":
+                await asyncio.sleep(0)
+            elif hasattr(JoinedWrites, step) or step == "pause_reading":
+                getattr(joined, step)()
+            else:
+                joined.write(step.encode())
+        return sent.told
+
+    return asyncio.run(take())
+
+
+def test_what_is_written_in_one_turn_is_sent_in_one_piece() -> None:
+    assert told("head", "body", "turn", "next", "turn") == [b"headbody", b"next"]
+
+
+def test_nothing_is_overtaken_by_the_end() -> None:
+    assert told("head", "body", "close", "turn") == [b"headbody", "close"]
+    assert told("head", "write_eof", "turn") == [b"head", "write_eof"]
+    assert told("head", "abort", "turn") == ["abort"]
+    assert told("head", "pause_reading", "turn") == ["pause_reading", b"head"]
+
+
+def test_a_long_body_does_not_gather_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(joined_writes, "MOST_WAITING_BYTES", 5)
+    assert told("head", "body", "more", "turn") == [b"headbody", b"more"]
+
+
+def test_what_waits_counts_as_not_sent() -> None:
+    async def waiting() -> list[int]:
+        joined = JoinedWrites(cast(asyncio.Transport, Sent()), asyncio.get_running_loop())
+        joined.writelines([b"he", b"ad"])
+        sizes = [joined.get_write_buffer_size()]
+        await asyncio.sleep(0)
+        return [*sizes, joined.get_write_buffer_size()]
+
+    assert asyncio.run(waiting()) == [9, 5]
