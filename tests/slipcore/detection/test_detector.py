@@ -7,119 +7,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from slipcore import METHODS, GraspLog, InvalidInput, SlipDetector, SlipHistory, collect_history, detect_slip
+from slipcore import GraspLog, InvalidInput, SlipDetector, SlipHistory, collect_history, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
-from slipcore.defaults import ContactOptions
 from slipcore.detection.detector import DetectorState, init, step
-from slipcore.detection.shared.interface import Decision, Method, Observation
-from slipcore.detection.shared.strain import Lattice
 
 Score = Callable[[GraspLog, SlipHistory], float]
 Same = Callable[[SlipHistory, SlipHistory], None]
 Scene = Callable[..., GraspLog]
 
-EACH_METHOD = pytest.mark.parametrize("method", METHODS)
 QUIET = {"displacement": np.zeros((4, 5, 3)), "force": np.zeros((4, 5, 3))}
 
 
 def lattice() -> np.ndarray:
     i, j = np.meshgrid(np.arange(4.0), np.arange(5.0), indexing="ij")
     return 1e-3 * np.stack([i, j, 0 * i], axis=-1)
-
-
-def stream(log: GraspLog, method: str) -> SlipHistory:
-    """What a live sensor's loop would do, frame by frame, through the public class."""
-    detector = SlipDetector(log.position, log.element_area, method)
-    answers = [
-        detector.step(frame.time, frame.displacement, frame.force, frame.object_pose, frame.normal)
-        for frame in log.frames()
-    ]
-    return collect_history(answers, detector.state)
-
-
-def cut_everywhere(log: GraspLog, method: str) -> tuple[SlipHistory, list[bytes]]:
-    """The same stream, but its state is stored and loaded again before every frame."""
-    state, answers, stored = init(log.position, log.element_area, method), [], []
-    for frame in log.frames():
-        stored.append(pickle.dumps(state))
-        state, answer = step(pickle.loads(stored[-1]), frame)
-        answers.append(answer)
-    return collect_history(answers, state), stored
-
-
-def resumed(log: GraspLog, stored: bytes, start: int, whole: SlipHistory, method: str) -> SlipHistory:
-    """The first part of ``whole`` as it is, and the rest from a stored state."""
-    detector = SlipDetector.resume(pickle.loads(stored))
-    frames = list(log.frames())[start:]
-    rest = [detector.step(f.time, f.displacement, f.force, f.object_pose, f.normal) for f in frames]
-    tail = collect_history(rest, detector.state)
-    joined = {
-        name: np.concatenate([getattr(whole, name)[:start], getattr(tail, name)])
-        for name in ("time", "contact", "slip", "probability", "stick_ratio", "velocity", "macro_slip")
-    }
-    return replace(whole, **joined, noise=tail.noise, method=method)
-
-
-def check_streaming_is_batch(log: GraspLog, method: str, same_history: Same) -> None:
-    batch = detect_slip(log, method)
-    same_history(stream(log, method), batch)
-    cut, stored = cut_everywhere(log, method)
-    same_history(cut, batch)
-    for start in (1, len(log) // 3, len(log) - 1):
-        same_history(resumed(log, stored[start], start, batch, method), batch)
-
-
-@EACH_METHOD
-def test_streaming_equals_batch_and_a_cut_stream_goes_on_as_if_it_were_whole(
-    short_ramp: GraspLog, method: str, same_history: Same
-) -> None:
-    check_streaming_is_batch(short_ramp, method, same_history)
-    check_streaming_is_batch(replace(short_ramp, force=None, object_pose=None, normal=None), method, same_history)
-
-
-@EACH_METHOD
-def test_streaming_equals_batch_on_real_recordings_cut_at_every_frame(
-    recording: GraspLog, method: str, same_history: Same
-) -> None:
-    check_streaming_is_batch(recording, method, same_history)
-
-
-@EACH_METHOD
-def test_a_history_keeps_its_invariants_on_real_recordings(recording: GraspLog, method: str) -> None:
-    check_invariants(recording, detect_slip(recording, method))
-
-
-@EACH_METHOD
-def test_a_history_keeps_its_invariants_on_a_ramp(short_ramp: GraspLog, method: str) -> None:
-    check_invariants(short_ramp, detect_slip(short_ramp, method))
-
-
-def check_invariants(log: GraspLog, history: SlipHistory) -> None:
-    touching = history.contact.any(axis=(1, 2))
-    assert not (history.slip & ~history.contact).any()
-    assert ((history.probability >= 0.0) & (history.probability <= 1.0)).all()
-    assert not history.probability[~history.contact].any()
-    np.testing.assert_array_equal(np.isnan(history.stick_ratio), ~touching)
-    sticking = (history.contact & ~history.slip).any(axis=(1, 2))
-    np.testing.assert_array_equal(history.macro_slip, touching & ~sticking)
-    touched = history.contact[1:] & ~history.contact[:-1]
-    assert not (history.slip[1:] & touched).any()
-    known = np.isfinite(history.velocity).all(axis=-1)
-    assert not (known[1:] & ~(history.contact[1:] & history.contact[:-1])).any()
-    assert not known[0].any()
-    check_events(log, history)
-
-
-def check_events(log: GraspLog, history: SlipHistory) -> None:
-    """Replaying the events on the first frame gives every later frame."""
-    contact, slip = history.contact[0].ravel().copy(), history.slip[0].ravel().copy()
-    for k in range(1, len(log)):
-        now = {name: getattr(history.events, name) for name in ("touch", "release", "onset", "end")}
-        at = {name: events.element[events.time == log.time[k]] for name, events in now.items()}
-        contact[at["touch"]], contact[at["release"]] = True, False
-        slip[at["release"]], slip[at["onset"]], slip[at["end"]] = False, True, False
-        np.testing.assert_array_equal(contact, history.contact[k].ravel())
-        np.testing.assert_array_equal(slip, history.slip[k].ravel())
 
 
 RAMPS = {
@@ -210,75 +111,11 @@ def test_dropped_frames_change_little() -> None:
     assert np.count_nonzero(different) < 0.05 * np.count_nonzero(both)
 
 
-@EACH_METHOD
-def test_a_huge_gap_is_survived(short_ramp: GraspLog, method: str) -> None:
-    late = short_ramp.time + np.where(np.arange(len(short_ramp)) >= 40, 1e7, 0.0)
-    history = detect_slip(replace(short_ramp, time=late, truth=None), method)
-    check_invariants(replace(short_ramp, time=late), history)
-    assert np.abs(history.velocity[40][history.contact[40] & history.contact[39]]).max() < 1e-9
-
-
-@EACH_METHOD
-def test_without_contact_there_is_no_stick_ratio_no_slip_and_no_event(method: str) -> None:
-    rng = np.random.default_rng(14)
-    log = GraspLog(
-        time=np.arange(30) / 30.0,
-        position=lattice(),
-        displacement=1e-7 * rng.standard_normal((30, 4, 5, 3)),
-        element_area=1e-6,
-        force=np.zeros((30, 4, 5, 3)),
-    )
-    for forces in (log.force, None):
-        history = detect_slip(replace(log, force=forces), method)
-        assert not history.contact.any()
-        assert not history.slip.any()
-        assert not history.macro_slip.any()
-        assert np.isnan(history.stick_ratio).all()
-        assert np.isnan(history.velocity).all()
-        assert all(len(getattr(history.events, kind)) == 0 for kind in ("onset", "end", "touch", "release"))
-
-
-@EACH_METHOD
-def test_with_every_element_in_contact_and_none_moving_all_stick(method: str) -> None:
-    force = np.zeros((30, 4, 5, 3))
-    force[..., 2] = -0.1
-    log = GraspLog(np.arange(30) / 30.0, lattice(), np.zeros_like(force), 1e-6, force)
-    history = detect_slip(log, method)
-    assert history.contact.all()
-    np.testing.assert_array_equal(history.stick_ratio, 1.0)
-    np.testing.assert_array_equal(history.velocity[1:], 0.0)
-    assert np.isnan(history.noise)
-
-
-def test_no_method_can_make_slip_of_a_fresh_touch_or_out_of_contact(monkeypatch: pytest.MonkeyPatch) -> None:
-    def everything_slips(state: None, _: Lattice, seen: Observation, __: ContactOptions) -> tuple[None, Decision]:
-        return state, Decision(np.ones(seen.contact.shape, bool), np.ones(seen.contact.shape))
-
-    reckless = Method(ContactOptions, lambda *_: None, everything_slips)
-    monkeypatch.setitem(METHODS, "reckless", reckless)
-    log = tangential_ramp(points=8, schedule=RampSchedule(0.1, 0.3, 0.0, 0.0, 0.1))
-    history = detect_slip(log, "reckless")
-    check_invariants(log, history)
-    assert history.macro_slip[-1]
-
-
 def test_a_pull_is_not_a_contact() -> None:
     force = np.zeros((5, 4, 5, 3))
     force[..., 2] = 0.1
     log = GraspLog(np.arange(5) / 30.0, lattice(), np.zeros_like(force), 1e-6, force)
     assert not detect_slip(log).contact.any()
-
-
-@EACH_METHOD
-def test_a_single_frame_sticks_where_it_touches(short_ramp: GraspLog, method: str) -> None:
-    detector = SlipDetector(short_ramp.position, short_ramp.element_area, method)
-    frame = list(short_ramp.frames())[-1]
-    state = detector.step(frame.time, frame.displacement, frame.force)
-    assert state.contact.any()
-    assert not state.slip.any()
-    assert state.stick_ratio == 1.0
-    assert np.isnan(state.velocity).all()
-    assert np.isnan(detector.noise)
 
 
 def test_macro_slip_without_known_motion_leaves_the_velocity_unobservable() -> None:

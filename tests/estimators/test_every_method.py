@@ -1,0 +1,107 @@
+"""What every method of estimation keeps to; a new one comes under these checks by being in ``METHODS``."""
+
+import pickle
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from estimators import FrictionModel, InvalidSamples, Moments, TooFewSamples, fit, needs_samples
+from estimators.fitting import METHODS
+from slipcore.samples import FrictionSamples
+
+Make = Callable[..., FrictionSamples]
+pytestmark = pytest.mark.parametrize("method", METHODS)
+
+OPTIONS: dict[str, dict[str, Any]] = {"bayes": {"accuracy": 0.1}}
+"""What keeps a method quick here."""
+
+ROUNDING = 1e-6
+TOLERANCE = {
+    "robust": 1e-3,  # its iteration starts from subsets drawn by place in the list, and ends within its own tolerance
+    "bayes": 0.5,  # a chain that takes one step differently goes on as another chain; each errs by 0.1
+}
+"""Standard errors by which a model may move when nothing but the order of sums or a unit has changed."""
+
+
+def grasps_of(samples: Make) -> list[FrictionSamples]:
+    """Four grasps that differ a little, of different length."""
+    return [samples(120 + 20 * k, seed=k, offset=0.01 * (k - 1.5)) for k in range(4)]
+
+
+def fitted(data: Sequence[FrictionSamples | Moments], method: str, seed: int = 3) -> FrictionModel:
+    return fit(data, method=method, seed=seed, **OPTIONS.get(method, {}))
+
+
+def distance(one: FrictionModel, other: FrictionModel, units: Sequence[float] = (1.0, 1.0, 1.0)) -> float:
+    """Largest distance of coefficients in standard errors, and of the errors and the scatter in parts of themselves;
+    ``units``: what the other's coefficients have to be multiplied by.
+    """
+    moved = (other.coefficients * units - one.coefficients) / one.standard_errors
+    widths = np.log(other.standard_errors * units / one.standard_errors)
+    return float(max(np.abs([*moved, *widths, np.log(other.scale / one.scale)])))
+
+
+def test_a_seed_repeats_a_fit_to_the_last_bit_and_its_data_stay(samples: Make, method: str) -> None:
+    grasps = grasps_of(samples)
+    before = pickle.dumps(grasps)
+    one, other = fitted(grasps, method), fitted(grasps, method)
+    np.testing.assert_array_equal(one.coefficients, other.coefficients)
+    np.testing.assert_array_equal(one.covariance, other.covariance)
+    assert (one.scale, one.scales) == (other.scale, other.scales)
+    assert pickle.dumps(grasps) == before
+
+
+def test_a_model_survives_pickling(samples: Make, method: str) -> None:
+    model = fitted(grasps_of(samples), method)
+    read = pickle.loads(pickle.dumps(model))
+    np.testing.assert_array_equal(read.predict(2e-3, 0.05, 0.05), model.predict(2e-3, 0.05, 0.05))
+    assert (read.method, read.n, read.domain, read.scales) == (model.method, model.n, model.domain, model.scales)
+
+
+def test_the_order_of_samples_and_of_grasps_says_nothing(samples: Make, method: str) -> None:
+    grasps = grasps_of(samples)
+    rng = np.random.default_rng(5)
+    mixed = [shuffled(grasp, rng) for grasp in grasps[::-1]]
+    assert distance(fitted(grasps, method), fitted(mixed, method)) < TOLERANCE.get(method, ROUNDING)
+
+
+def shuffled(grasp: FrictionSamples, rng: np.random.Generator) -> FrictionSamples:
+    order = rng.permutation(len(grasp))
+    return replace(grasp, **{name: getattr(grasp, name)[order] for name in FrictionSamples.arrays()})
+
+
+@pytest.mark.parametrize("factor", [0.01, 100.0])
+def test_elements_of_another_area_have_the_same_friction(samples: Make, method: str, factor: float) -> None:
+    """The same pressures: forces scale with the area, and with them the slope over force and its prior."""
+    grasps = grasps_of(samples)
+    scaled = [grasp.at_element_area(factor * grasp.element_area) for grasp in grasps]
+    assert distance(fitted(grasps, method), fitted(scaled, method), (1.0, 1.0, factor)) < TOLERANCE.get(
+        method, ROUNDING
+    )
+
+
+def test_what_merges_is_fitted_as_if_it_had_come_together(samples: Make, method: str) -> None:
+    grasps = grasps_of(samples)
+    if needs_samples(method, len(grasps)):
+        pytest.skip(f"{method} looks at samples, which moments do not hold")
+    stored = [Moments.from_bytes(Moments.from_samples(grasp).to_bytes()) for grasp in grasps]
+    assert distance(fitted(grasps, method), fitted(stored, method)) < ROUNDING
+
+
+def test_too_few_samples_are_refused_as_such(samples: Make, method: str) -> None:
+    for data in ([], [samples(0)], [samples(1)], samples(3)):
+        with pytest.raises(TooFewSamples):
+            fit(data, method=method)
+
+
+@pytest.mark.parametrize("name", ["friction_coefficient", "tangential_velocity", "normal_force", "weight"])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_what_is_no_number_is_refused_by_name(samples: Make, method: str, name: str, value: float) -> None:
+    grasp = samples(100)
+    column = getattr(grasp, name).copy()
+    column[7] = value
+    with pytest.raises(InvalidSamples, match=name):
+        fit(replace(grasp, **{name: column}), method=method)
