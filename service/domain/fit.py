@@ -6,7 +6,7 @@ from service.domain import quotas
 from service.domain.asker import ANYBODY, Asker
 from service.domain.ownership import check_may_add
 from service.http.idempotency import Answer, Once, answer_once
-from service.http.schemas import JobOut
+from service.http.schemas.jobs import JobOut
 from service.jobs.queueing import queue
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from service.domain.model_cache import KnownModel
-from service.http.schemas import FrictionOut
+from service.http.schemas.models import FrictionOut
 
 OUTDATED = "the model is outdated: the material's logs are others since, and it was not fitted again by this method"
 

@@ -16,9 +16,9 @@ from service.context import Context
 from service.domain.look_up import OUTDATED
 from service.domain.stored_results import decode_samples, to_friction_model
 from service.http.problems import INVALID_REQUEST, INVALID_SAMPLES, NO_FEASIBLE_FORCE, NO_MODEL, NOT_READY, Problem
-from service.http.schemas import (
+from service.http.schemas.models import FrictionModelOut
+from service.http.schemas.planning import (
     CandidateOut,
-    FrictionModelOut,
     GraspForceOut,
     NewGraspForce,
     NewRecognition,

@@ -28,7 +28,7 @@ from service.http.problems import (
     UPLOAD_INTERRUPTED,
     Problem,
 )
-from service.http.schemas import GraspLogOut
+from service.http.schemas.grasp_logs import GraspLogOut
 from service.jobs.queueing import queue
 from slipcore.defaults import METHOD_NAMES
 from slipcore.errors import InvalidInput

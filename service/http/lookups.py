@@ -20,7 +20,7 @@ from service.http.conditional import is_one_of, unchanged, whole
 from service.http.envelope import MOST_HEADER_BYTES
 from service.http.gate import Admission
 from service.http.problems import Problem
-from service.http.schemas import LookUpQuery
+from service.http.schemas.models import LookUpQuery
 from service.observability import traces
 from service.observability.answered import Answered
 

@@ -11,7 +11,7 @@ from service.http.access import ADMIN
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import INVALID_REQUEST, STORAGE_UNAVAILABLE
 from service.http.routes.common import problems
-from service.http.schemas import AuditEntryOut, AuditOut
+from service.http.schemas.audit import AuditEntryOut, AuditOut
 
 router = APIRouter(prefix="/v1/audit", tags=["audit"])
 

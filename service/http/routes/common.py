@@ -9,7 +9,7 @@ from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive
 
 from service.http.problems import UNSUPPORTED_FORMAT, Problem, ProblemType
-from service.http.schemas import ProblemOut
+from service.http.schemas.problems import ProblemOut
 
 MAX_JSON_BYTES = 64 * 1024
 """Bytes of a JSON body; the longest description is 10,000 characters."""

@@ -19,17 +19,10 @@ from service.http.problems import (
     UPLOAD_TOO_LARGE,
 )
 from service.http.routes.common import JsonRoute, problems
-from service.http.schemas import (
-    NAME_PATTERN,
-    GraspLogOut,
-    JobOut,
-    MaterialChange,
-    MaterialOut,
-    MergedOut,
-    NewMerge,
-    NewWithdrawal,
-    WithdrawnOut,
-)
+from service.http.schemas.common import NAME_PATTERN
+from service.http.schemas.grasp_logs import GraspLogOut, NewWithdrawal, WithdrawnOut
+from service.http.schemas.jobs import JobOut
+from service.http.schemas.materials import MaterialChange, MaterialOut, MergedOut, NewMerge
 
 router = APIRouter(prefix="/v1", route_class=JsonRoute)
 

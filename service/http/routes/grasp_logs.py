@@ -41,7 +41,8 @@ from service.http.problems import (
     Problem,
 )
 from service.http.routes.common import gone, problems
-from service.http.schemas import EventsOfOneKind, EventsOut, GraspLogOut, GraspLogsOut, SamplesOut, StickRatioOut
+from service.http.schemas.grasp_logs import GraspLogOut, GraspLogsOut
+from service.http.schemas.results import EventsOfOneKind, EventsOut, SamplesOut, StickRatioOut
 from slipcore.defaults import DEFAULT_METHOD, METHOD_NAMES
 
 router = APIRouter(prefix="/v1/grasp-logs", tags=["grasp logs"])

@@ -13,7 +13,7 @@ from service.http.access import ADMIN, READ, Asking
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import INVALID_REQUEST, JOB_ENDED, STORAGE_UNAVAILABLE, UNKNOWN_JOB
 from service.http.routes.common import problems
-from service.http.schemas import JobOut, JobsOut
+from service.http.schemas.jobs import JobOut, JobsOut
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 

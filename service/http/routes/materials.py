@@ -27,17 +27,15 @@ from service.http.problems import (
     UPLOAD_TOO_LARGE,
 )
 from service.http.routes.common import JsonRoute, problems
-from service.http.schemas import (
+from service.http.schemas.jobs import JobOut
+from service.http.schemas.materials import MaterialOut, MaterialsOut, NewMaterial
+from service.http.schemas.models import (
     FrictionModelOut,
     FrictionModelsOut,
     FrictionOut,
-    JobOut,
     LookUpQuery,
-    MaterialOut,
-    MaterialsOut,
     ModelMethod,
     NewFit,
-    NewMaterial,
 )
 
 router = APIRouter(prefix="/v1/materials", tags=["materials"], route_class=JsonRoute)

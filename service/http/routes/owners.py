@@ -15,7 +15,7 @@ from service.http.problems import (
     UNKNOWN_OWNER,
 )
 from service.http.routes.common import problems
-from service.http.schemas import OwnersOut
+from service.http.schemas.owners import OwnersOut
 
 router = APIRouter(prefix="/v1/materials/{name}/owners", tags=["materials"])
 

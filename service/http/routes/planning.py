@@ -18,7 +18,7 @@ from service.http.problems import (
     UPLOAD_TOO_LARGE,
 )
 from service.http.routes.common import LongJsonRoute, problems
-from service.http.schemas import GraspForceOut, NewGraspForce, NewRecognition, RecognitionOut
+from service.http.schemas.planning import GraspForceOut, NewGraspForce, NewRecognition, RecognitionOut
 
 router = APIRouter(prefix="/v1", tags=["planning"], route_class=LongJsonRoute)
 

@@ -15,7 +15,7 @@ from service.context import Context
 from service.domain import curate
 from service.domain.look_up import Question, look_up
 from service.http.problems import Problem
-from service.http.schemas import FrictionOut
+from service.http.schemas.models import FrictionOut
 from service.jobs import pipeline
 from service.settings import Settings
 

@@ -1,8 +1,11 @@
+import importlib
+import pkgutil
 import re
 from pathlib import Path
 from typing import Any
 
 import pytest
+from pydantic import BaseModel
 
 from service.app import create_app
 from service.http import schemas
@@ -51,15 +54,20 @@ def test_each_parameter_is_described(operation: dict[str, Any]) -> None:
         assert parameter["in"] == "path" or parameter["description"], parameter["name"]
 
 
+SCHEMAS = {
+    name: schema
+    for module in pkgutil.iter_modules(schemas.__path__, f"{schemas.__name__}.")
+    for name, schema in vars(importlib.import_module(module.name)).items()
+}
 EXAMPLES = [
-    (getattr(schemas, name), example)
+    (SCHEMAS[name], example)
     for name in DESCRIPTION["components"]["schemas"]
-    for example in getattr(schemas, name).model_json_schema().get("examples", [])
+    for example in SCHEMAS[name].model_json_schema().get("examples", [])
 ]
 
 
 @pytest.mark.parametrize(("schema", "example"), EXAMPLES, ids=lambda value: getattr(value, "__name__", ""))
-def test_each_example_is_valid(schema: type[schemas.BaseModel], example: dict[str, Any]) -> None:
+def test_each_example_is_valid(schema: type[BaseModel], example: dict[str, Any]) -> None:
     assert schema.model_validate(example).model_dump(mode="json", exclude_unset=True) == example
 
 

@@ -1,0 +1,159 @@
+"""Grasp logs, what was found in them, and their withdrawal."""
+
+from datetime import datetime
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic.config import JsonDict
+
+from db.records import StoredGraspLog, Withdrawal
+from service.http.schemas.common import MOMENT_EXAMPLE, Body, Next, Text
+from service.http.schemas.jobs import JOB_EXAMPLE, JobOut
+
+DETECTION_EXAMPLE: JsonDict = {
+    "method": "filter",
+    "noise": 1.1e-6,
+    "stick_ratio_min": 0.12,
+    "contact_frames": 240,
+    "macro_slip_frames": 0,
+    "events": {"onset": 181, "end": 40, "touch": 203, "release": 0},
+    "samples": 1932,
+    "seconds": 0.06,
+}
+GRASP_LOG_EXAMPLE: JsonDict = {
+    "id": "7c9e6679742540de944be07fc1f90ae7",
+    "sha256": "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08",
+    "bytes": 4806144,
+    "format": "npz",
+    "material": "paper",
+    "sensor": "AD2-0065L",
+    "frames": 250,
+    "duration": 8.3,
+    "grid": [20, 20],
+    "created_at": MOMENT_EXAMPLE,
+    "has_file": True,
+    "uploaded_by": "3f9c2a7b51de",
+    "withdrawal": None,
+    "job": JOB_EXAMPLE,
+    "detection": DETECTION_EXAMPLE,
+}
+
+
+class NewWithdrawal(Body):
+    """Why a log is to be withdrawn."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"reason": "the sensor was wet"}]})
+
+    reason: Annotated[Text, Field(min_length=1)]
+
+
+class WithdrawalOut(BaseModel):
+    """That a log counts in no fit."""
+
+    at: datetime
+    reason: str
+    by: Annotated[str | None, Field(description="Id of the access key with which it was withdrawn")]
+
+    @classmethod
+    def of(cls, withdrawal: Withdrawal) -> "WithdrawalOut":
+        """The stored withdrawal as an answer."""
+        return cls(at=withdrawal.at, reason=withdrawal.because, by=withdrawal.by)
+
+
+class EventCounts(BaseModel):
+    """How many events of each kind a log has."""
+
+    onset: int
+    end: int
+    touch: int
+    release: int
+
+
+class DetectionOut(BaseModel):
+    """What the detector found in a log."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [DETECTION_EXAMPLE]})
+
+    method: str
+    noise: Annotated[float | None, Field(description="Estimated noise of a marker coordinate, m")]
+    stick_ratio_min: Annotated[float | None, Field(description="Least stick area over contact area; null: no contact")]
+    contact_frames: int
+    macro_slip_frames: Annotated[int, Field(description="Frames in which no element in contact sticks")]
+    events: EventCounts
+    samples: Annotated[int, Field(description="Number of friction samples")]
+    seconds: Annotated[float, Field(description="What the detection took")]
+
+
+class GraspLogOut(BaseModel):
+    """A stored grasp log, its ingest job and, once there, what was found in it."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [GRASP_LOG_EXAMPLE]})
+
+    id: str
+    sha256: Annotated[str, Field(description="Of what is stored: the uploaded bytes, or the container made of them")]
+    bytes: int
+    format: str
+    material: str | None
+    sensor: str
+    frames: int
+    duration: Annotated[float, Field(description="s")]
+    grid: Annotated[tuple[int, int], Field(description="Markers along the two axes")]
+    created_at: datetime
+    has_file: Annotated[bool, Field(description="Whether the upload can still be downloaded")]
+    uploaded_by: Annotated[str | None, Field(description="Id of the access key with which it was first sent")]
+    withdrawal: WithdrawalOut | None
+    job: JobOut
+    detection: DetectionOut | None
+
+    @classmethod
+    def of(cls, log: StoredGraspLog) -> "GraspLogOut":
+        """The stored log as an answer."""
+        return cls(
+            id=log.id,
+            sha256=log.sha256,
+            bytes=log.bytes,
+            format=log.format,
+            material=log.material,
+            sensor=log.sensor,
+            frames=log.frames,
+            duration=log.duration,
+            grid=log.grid,
+            created_at=log.created_at,
+            has_file=log.has_file,
+            uploaded_by=log.uploaded_by,
+            withdrawal=WithdrawalOut.of(log.withdrawal) if log.withdrawal else None,
+            job=JobOut.of(log.job),
+            detection=_detection_out(log),
+        )
+
+
+def _detection_out(log: StoredGraspLog) -> DetectionOut | None:
+    found = log.detection
+    if found is None or log.samples is None:
+        return None
+    return DetectionOut(
+        method=found.method,
+        noise=found.noise,
+        stick_ratio_min=found.stick_ratio_min,
+        contact_frames=found.contact_frames,
+        macro_slip_frames=found.macro_slip_frames,
+        events=EventCounts(onset=found.onsets, end=found.ends, touch=found.touches, release=found.releases),
+        samples=log.samples.count,
+        seconds=found.seconds,
+    )
+
+
+class GraspLogsOut(BaseModel):
+    """Grasp logs in the order that was asked for."""
+
+    items: list[GraspLogOut]
+    next: Next
+
+
+class WithdrawnOut(BaseModel):
+    """A log after its withdrawal or its return, and the fits that follow from it."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"grasp_log": GRASP_LOG_EXAMPLE, "jobs": [JOB_EXAMPLE]}]})
+
+    grasp_log: GraspLogOut
+    jobs: list[JobOut]

@@ -1,0 +1,166 @@
+"""Friction models, and the fits and look-ups that are asked of them."""
+
+from datetime import datetime
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+from pydantic.config import JsonDict
+
+from db.records import StoredModel
+from service.http.schemas.common import MOMENT_EXAMPLE, Body, Force, Next, Velocity
+
+ModelMethod = Literal["ols", "robust", "conjugate", "hierarchical", "bayes"]
+FitMethod = Literal["ols", "robust", "conjugate", "hierarchical", "bayes", "auto"]
+
+MODEL_EXAMPLE: JsonDict = {
+    "material": "paper",
+    "method": "ols",
+    "version": 3,
+    "current": True,
+    "outdated": False,
+    "coefficients": [0.41, -0.8, -0.35],
+    "covariance": [[1.0e-5, 0.0, 0.0], [0.0, 1.0e-2, 0.0], [0.0, 0.0, 4.0e-3]],
+    "scale": 0.021,
+    "n": 5120,
+    "degrees_of_freedom": 11.0,
+    "scatter_degrees_of_freedom": 5117.0,
+    "domain": {"tangential_velocity": [0.0, 0.004], "normal_force": [0.002, 0.11]},
+    "identifiable": [True, True, False],
+    "element_area": 1.0e-6,
+    "diagnostics": {"r_squared": 0.31, "cluster_kind": "grasp"},
+    "cost": {"seconds": 0.012, "monte_carlo_error": 0.0},
+    "created_at": MOMENT_EXAMPLE,
+}
+
+
+class NewFit(Body):
+    """A fit that is asked for."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"method": "bayes", "seed": 0}]})
+
+    method: Annotated[FitMethod, Field(description="`auto` takes the one that the data call for")] = "ols"
+    seed: Annotated[int, Field(ge=0, lt=2**32, description="Of the sampler: the same seed gives the same fit.")] = 0
+
+
+class DomainOut(BaseModel):
+    """Range of the samples behind a model."""
+
+    tangential_velocity: Annotated[tuple[float, float], Field(description="m/s")]
+    normal_force: Annotated[tuple[float, float], Field(description="N on an element")]
+
+
+class CostOut(BaseModel):
+    """What a fit cost."""
+
+    seconds: float
+    monte_carlo_error: Annotated[float, Field(description="In posterior standard deviations; 0 for an exact method.")]
+
+
+class FrictionModelOut(BaseModel):
+    """One version of a material's model μ = β₀ + β₁ v + β₂ f_n + ε."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [MODEL_EXAMPLE]})
+
+    material: str
+    method: str
+    version: int
+    current: bool
+    outdated: Annotated[bool, Field(description="The material's logs are others since, and it is not fitted to them")]
+    coefficients: Annotated[list[float], Field(description="β₀ [-], β₁ [s/m], β₂ [1/N]")]
+    covariance: Annotated[list[list[float]], Field(description="Of the coefficients, 3×3")]
+    scale: Annotated[float, Field(description="σ, standard deviation of ε [-]")]
+    n: Annotated[int, Field(description="Samples behind the model")]
+    degrees_of_freedom: Annotated[float | None, Field(description="Of the coefficients' Student-t; null: normal")]
+    scatter_degrees_of_freedom: Annotated[float | None, Field(description="Of the scatter's Student-t; null: normal")]
+    domain: DomainOut
+    identifiable: Annotated[list[bool], Field(description="Whether the data tell β₀, β₁, β₂")]
+    element_area: Annotated[float, Field(description="m²")]
+    diagnostics: dict[str, float | str | None]
+    cost: CostOut
+    created_at: datetime
+
+    @classmethod
+    def of(cls, stored: StoredModel) -> "FrictionModelOut":
+        """The stored model as an answer."""
+        model = stored.model
+        return cls(
+            material=stored.material,
+            method=model.method,
+            version=stored.version,
+            current=stored.current,
+            outdated=stored.outdated,
+            coefficients=list(model.coefficients),
+            covariance=[list(line) for line in model.covariance],
+            scale=model.scale,
+            n=model.n,
+            degrees_of_freedom=model.degrees_of_freedom,
+            scatter_degrees_of_freedom=model.scatter_degrees_of_freedom,
+            domain=DomainOut(tangential_velocity=model.tangential_velocity, normal_force=model.normal_force),
+            identifiable=list(model.identifiable),
+            element_area=model.element_area,
+            diagnostics=dict(model.diagnostics),
+            cost=CostOut(seconds=model.cost_seconds, monte_carlo_error=model.monte_carlo_error),
+            created_at=stored.created_at,
+        )
+
+
+class FrictionModelsOut(BaseModel):
+    """Versions of a material's models, newest first."""
+
+    items: list[FrictionModelOut]
+    next: Next
+
+
+SMALLEST_TAIL = 1e-12
+"""As the planner's smallest slip probability; a Student-t quantile further out says nothing of friction."""
+
+
+class LookUpQuery(BaseModel):
+    """What a look-up asks: the parameters of its address."""
+
+    fn: Annotated[Force, Field(description="Normal force on an element, N", examples=[0.05])]
+    v: Annotated[Velocity, Field(description="Tangential velocity, m/s", examples=[0.0])] = 0.0
+    quantile: Annotated[
+        float | None,
+        Field(
+            ge=SMALLEST_TAIL,
+            le=1.0 - SMALLEST_TAIL,
+            description="Of a new observation of μ; the mean without",
+            examples=[0.05],
+        ),
+    ] = None
+    method: Annotated[ModelMethod, Field(description="Whose current model answers")] = "ols"
+
+
+class FrictionOut(BaseModel):
+    """Friction coefficient of a material at a tangential velocity and an element's normal force."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "material": "paper",
+                    "method": "ols",
+                    "version": 3,
+                    "tangential_velocity": 0.0,
+                    "normal_force": 0.05,
+                    "quantile": 0.05,
+                    "friction_coefficient": 0.36,
+                    "mean": 0.39,
+                    "within_domain": True,
+                    "warning": None,
+                }
+            ]
+        }
+    )
+
+    material: str
+    method: str
+    version: int
+    tangential_velocity: Annotated[float, Field(description="m/s")]
+    normal_force: Annotated[float, Field(description="N on an element")]
+    quantile: float | None
+    friction_coefficient: Annotated[float, Field(description="The quantile that was asked for; without one, the mean")]
+    mean: float
+    within_domain: Annotated[bool, Field(description="Whether the model's samples reach there")]
+    warning: str | None
