@@ -17,6 +17,8 @@ from db.blobs import BlobStore
 from db.database import Database
 from db.errors import BlobDamaged, NotEmpty, NotFound
 from db.quarantine import sync_folder
+from db.records import Actor
+from db.repositories import audit, stores
 from db.tables import Base, IdempotencyKeyRow, RunnerRow, StoreRow
 
 FILE = "stiction.sqlite3"
@@ -51,26 +53,29 @@ def backup(database: Database, blobs: BlobStore, folder: Path, report: Report) -
     sync_folder(folder)
 
 
-def restore(folder: Path, database: Database, blobs: BlobStore, report: Report, *, take_over: bool = False) -> None:
+def restore(
+    folder: Path, database: Database, blobs: BlobStore, report: Report, *, taken_over_by: Actor | None = None
+) -> None:
     """Fill an empty database and blob store from a backup; they become a store of their own, with an id of its own.
 
-    Every blob must have the bytes that it is named for. A blob store of another database is only filled to
-    ``take_over`` from that one, which is refused there from then on. Raises ``NotEmpty`` for a database that has any
-    rows, ``StoreMismatch``, ``NotFound`` for a blob that is missing, ``BlobDamaged`` for one whose bytes have changed.
+    Every blob must have the bytes that it is named for. A blob store of another database is only filled where it is
+    ``taken_over_by`` somebody, as the audit trail then tells; that database is refused there from then on. Raises
+    ``NotEmpty`` for a database that has any rows, ``StoreMismatch``, ``NotFound`` for a blob that is missing,
+    ``BlobDamaged`` for one whose bytes have changed.
     """
     file = folder / FILE
     if not file.is_file():
         raise FileNotFoundError(f"backup {file} is not there")
     migrate.upgrade(database)
     _refuse_rows(database)
-    if take_over:
-        identity.adopt(database, blobs)
+    if taken_over_by is not None:
+        identity.adopt(database, blobs, None)
     else:
         identity.join(database, blobs, alone=True, to_fill=True)
     with TemporaryDirectory() as own, closing(_opened(_copied(file, Path(own)))) as copy:
         migrate.check(copy)
         _copy_blobs(copy, BlobStore(folder), blobs, report)
-        _copy_rows(copy, database, report)
+        _copy_rows(copy, database, report, taken_over_by)
 
 
 def damaged(database: Database, blobs: BlobStore, *, deep: bool) -> Iterator[str]:
@@ -106,11 +111,15 @@ def _refuse_rows(database: Database) -> None:
                 raise NotEmpty(f"table {table.name} ({count} rows)", "an empty database")
 
 
-def _copy_rows(source: Database, target: Database, report: Report) -> None:
+def _copy_rows(source: Database, target: Database, report: Report, taken_over_by: Actor | None = None) -> None:
+    copied: dict[str, int] = {}
     with source.read() as reading, target.write() as writing:
         for table in Base.metadata.sorted_tables:
             if table.name not in LEFT_OUT:
-                report(table.name, _copy_table(table, reading, writing))
+                copied[table.name] = _copy_table(table, reading, writing)
+                report(table.name, copied[table.name])
+        if taken_over_by is not None:  # behind the entries of the backup
+            audit.add(writing, taken_over_by, "store.taken_over", stores.find_id(writing) or "", {"rows": copied})
 
 
 def _copy_table(table: Table, reading: Session, writing: Session) -> int:

@@ -17,8 +17,9 @@ from db.blobs import BlobStore
 from db.database import Database
 from db.defaults import HASHES_PER_QUERY
 from db.errors import StoreMismatch
+from db.records import Actor
+from db.repositories import audit, stores
 from db.repositories import blobs as references
-from db.repositories import stores
 
 REMEDY = "name the database and the data folder (or object store) of one service, or join these by `stiction db adopt`"
 
@@ -69,14 +70,19 @@ def verify_before_upgrade(database: Database, blobs: BlobStore) -> None:
         _require_same(database, blobs, known, blobs.read_store_id())
 
 
-def adopt(database: Database, blobs: BlobStore) -> Adopted:
-    """Join two because somebody says so, under a new id: whatever else worked with either is refused from then on."""
+def adopt(database: Database, blobs: BlobStore, actor: Actor | None) -> Adopted:
+    """Join two because somebody says so, under a new id: whatever else worked with either is refused from then on.
+
+    The audit trail tells that ``actor`` did so; None: the caller, who is about to fill the tables, adds that entry.
+    """
     store_id = uuid.uuid4().hex
     with database.write() as session:
         stores.lock(session)
         referenced, missing = count_missing(session, blobs)
         blobs.write_store_id(store_id)
         stores.set_id(session, store_id)
+        if actor is not None:
+            audit.add(session, actor, "store.adopted", store_id, {"referenced": referenced, "missing": missing})
     database.store_id = blobs.store_id = store_id
     return Adopted(store_id, referenced, missing)
 

@@ -26,6 +26,9 @@ AuditAction = Literal[
     "key.revoked",
     "audit.deleted",
     "blob.damaged",
+    "quarantine.deleted",
+    "store.adopted",
+    "store.taken_over",
 ]
 """What is recorded of changes: the kind of thing, and what was done to it."""
 

@@ -73,7 +73,7 @@ def _prune_unreferenced(database: "Database", blobs: "BlobStore", grace: timedel
     from service.jobs import garbage
 
     if delete:
-        typer.echo(f"deleted {garbage.delete_set_aside(database, blobs, grace)} unreferenced files")
+        typer.echo(f"deleted {garbage.delete_set_aside(database, blobs, grace, command_actor())} unreferenced files")
         typer.echo(f"set {garbage.set_aside(database, blobs)} unreferenced files aside")
         return
     old, new = garbage.find_deletable(database, blobs, grace), garbage.find_unreferenced(database, blobs)

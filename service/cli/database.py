@@ -107,7 +107,7 @@ def restore(
     from db.backup import restore as copy_in
 
     with opened(database_url, may_be_new=True) as database:
-        copy_in(folder, database, opened_blobs(), _tell, take_over=take_over)
+        copy_in(folder, database, opened_blobs(), _tell, taken_over_by=command_actor() if take_over else None)
     typer.echo(f"restored from {folder}")
 
 
@@ -118,7 +118,7 @@ def adopt(database_url: Url = None) -> None:
 
     with opened(database_url) as database:
         migrate.check(database)
-        adopted = identity.adopt(database, opened_blobs())
+        adopted = identity.adopt(database, opened_blobs(), command_actor())
     found = f"{adopted.referenced - adopted.missing} of {adopted.referenced} files that rows refer to are there"
     typer.echo(f"joined as store {adopted.store_id}: {found}")
 

@@ -13,6 +13,8 @@ from db.blobs import BlobStore
 from db.database import Database
 from db.defaults import HASHES_PER_QUERY, ORPHAN_AGE
 from db.errors import StoreMismatch
+from db.records import Actor
+from db.repositories import audit
 from db.repositories import blobs as references
 
 
@@ -46,10 +48,13 @@ def find_deletable(database: Database, blobs: BlobStore, grace: timedelta) -> It
         yield from sorted(set(some) - needed)
 
 
-def delete_set_aside(database: Database, blobs: BlobStore, grace: timedelta) -> int:
-    """Delete them for good; returns how many."""
+def delete_set_aside(database: Database, blobs: BlobStore, grace: timedelta, actor: Actor = audit.SERVICE) -> int:
+    """Delete them for good; returns how many. The audit trail tells that ``actor`` did so, before it is done."""
     count = 0
     for some in _portions(find_deletable(database, blobs, grace)):
+        details = {"files": len(some), "grace_seconds": grace.total_seconds()}
+        with database.write() as session:
+            audit.add(session, actor, "quarantine.deleted", blobs.store_id or "", details)
         blobs.quarantine.delete(some)
         count += len(some)
     return count

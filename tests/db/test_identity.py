@@ -9,9 +9,11 @@ from db.backup import backup, restore
 from db.blobs import BlobStore, open_blobs
 from db.database import Database
 from db.errors import StorageUnavailable, StoreMismatch
-from db.records import NewGraspLog
-from db.repositories import grasp_logs, stores
+from db.paging import Window
+from db.records import Actor, AuditEntry, AuditFilter, NewGraspLog
+from db.repositories import audit, grasp_logs, stores
 
+OPERATOR = Actor("command:operator")
 NewLog = Callable[..., NewGraspLog]
 
 
@@ -45,6 +47,11 @@ def refer(new_log: NewLog) -> Callable[[Database, BlobStore, bytes], str]:
 
 def nothing(what: str, count: int) -> None:
     pass
+
+
+def last_entry(database: Database) -> AuditEntry:
+    with database.read() as session:
+        return audit.list_all(session, Window("id", descending=True, limit=1), AuditFilter())[0]
 
 
 def store_id(database: Database) -> str | None:
@@ -135,14 +142,17 @@ def test_a_person_can_join_two_and_what_worked_with_them_is_refused(
 ) -> None:
     join(database, blobs)
     refer(database, blobs, b"tactile")
-    adopted = identity.adopt(other, blobs)
+    adopted = identity.adopt(other, blobs, OPERATOR)
     assert (adopted.referenced, adopted.missing) == (0, 0)
     join(other, blobs)
     with pytest.raises(StoreMismatch):
         join(database, blobs)
-    adopted = identity.adopt(database, blobs)
+    adopted = identity.adopt(database, blobs, OPERATOR)
     assert (adopted.referenced, adopted.missing) == (1, 0)
     join(database, blobs)
+    entry = last_entry(database)
+    assert (entry.actor, entry.action, entry.subject) == (OPERATOR, "store.adopted", adopted.store_id)
+    assert entry.details == {"referenced": 1, "missing": 0}
 
 
 def test_a_database_that_was_replaced_is_noticed_inside_a_transaction(database: Database, blobs: BlobStore) -> None:
@@ -176,9 +186,14 @@ def test_a_restore_can_take_the_files_over(
     blobs = BlobStore(tmp_path / "data")
     join(database, blobs)
     sha256 = refer(database, blobs, b"tactile")
+    with database.write() as session:
+        audit.add(session, OPERATOR, "material.created", "paper")
     backup(database, blobs, tmp_path / "copy", nothing)
-    restore(tmp_path / "copy", other, blobs, nothing, take_over=True)
+    restore(tmp_path / "copy", other, blobs, nothing, taken_over_by=OPERATOR)
     join(other, blobs)
+    entry = last_entry(other)
+    assert (entry.actor, entry.action, entry.subject) == (OPERATOR, "store.taken_over", store_id(other))
+    assert entry.details["rows"]["grasp_logs"] == 1
     assert blobs.path(sha256).read_bytes() == b"tactile"
     with pytest.raises(StoreMismatch):
         join(database, blobs)

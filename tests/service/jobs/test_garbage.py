@@ -11,7 +11,11 @@ from db import identity
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import StoreMismatch
+from db.paging import Window
+from db.records import AuditEntry, AuditFilter
+from db.repositories import audit
 from service.cli import main
+from service.cli.database import command_actor
 from service.jobs import garbage
 from service.jobs.retention import Retention
 
@@ -36,6 +40,11 @@ def grow_old(path: Path, days: float) -> None:
     os.utime(path, (moment, moment))
 
 
+def recorded(database: Database) -> list[AuditEntry]:
+    with database.read() as session:
+        return audit.list_all(session, Window("id"), AuditFilter(action="quarantine.deleted"))
+
+
 def test_what_nothing_refers_to_is_set_aside_and_deleted_after_the_grace(
     orphan: str, database: Database, blobs: BlobStore, tmp_path: Path
 ) -> None:
@@ -46,8 +55,12 @@ def test_what_nothing_refers_to_is_set_aside_and_deleted_after_the_grace(
     grace = timedelta(days=7)
     assert garbage.delete_set_aside(database, blobs, grace) == 0
     grow_old(tmp_path / "quarantine" / orphan, days=8.0)
+    assert recorded(database) == []
     assert garbage.delete_set_aside(database, blobs, grace) == 1
     assert list(blobs.quarantine.hashes()) == []
+    (entry,) = recorded(database)
+    assert (entry.actor.name, entry.subject) == ("service", blobs.store_id)
+    assert entry.details == {"files": 1, "grace_seconds": 7 * 86400.0}
 
 
 def test_what_is_young_stays_in_its_place(orphan: str, database: Database, blobs: BlobStore) -> None:
@@ -123,4 +136,5 @@ def test_the_command_tells_and_only_with_delete_does(
     assert run("--delete") == (0, ["deleted 0 unreferenced files", "set 1 unreferenced files aside"])
     assert run("--delete", "--grace", "0h") == (0, ["deleted 1 unreferenced files", "set 0 unreferenced files aside"])
     assert list(blobs.quarantine.hashes()) == []
+    assert [(entry.actor.name, entry.details["files"]) for entry in recorded(database)] == [(command_actor().name, 1)]
     assert run("--delete", "--dry-run")[0] == 2
