@@ -23,6 +23,14 @@ from stiction_client.errors import (
 if TYPE_CHECKING:
     from stiction_client.client import AsyncFrictionClient, FrictionClient
     from stiction_client.contacts import Contact, Contacts, antipodal, grasp, n_fingers
+    from stiction_client.controller import (
+        Command,
+        ControllerState,
+        ControlSettings,
+        GraspController,
+        Observation,
+        SlipSamples,
+    )
     from stiction_client.exports import (
         CoulombFriction,
         MujocoPair,
@@ -61,6 +69,12 @@ _LAZY = {
     "antipodal": "stiction_client.contacts",
     "grasp": "stiction_client.contacts",
     "n_fingers": "stiction_client.contacts",
+    "Command": "stiction_client.controller",
+    "ControlSettings": "stiction_client.controller",
+    "ControllerState": "stiction_client.controller",
+    "GraspController": "stiction_client.controller",
+    "Observation": "stiction_client.controller",
+    "SlipSamples": "stiction_client.controller",
     "CoulombFriction": "stiction_client.exports",
     "conservative_friction": "stiction_client.exports",
     "drake_friction": "stiction_client.exports",
@@ -98,9 +112,12 @@ __version__ = version("stiction-client")
 __all__ = [
     "AsyncFrictionClient",
     "AuditEntry",
+    "Command",
     "ConnectionFailed",
     "Contact",
     "Contacts",
+    "ControlSettings",
+    "ControllerState",
     "Cost",
     "CoulombFriction",
     "Detection",
@@ -108,6 +125,7 @@ __all__ = [
     "FrictionAnswer",
     "FrictionClient",
     "FrictionModel",
+    "GraspController",
     "GraspLogReceipt",
     "InvalidArgument",
     "Job",
@@ -120,11 +138,13 @@ __all__ = [
     "MujocoPair",
     "NoFeasibleForce",
     "NoModel",
+    "Observation",
     "PhysxMaterial",
     "ProblemError",
     "Recognition",
     "RequiredForce",
     "RequiredForces",
+    "SlipSamples",
     "StaleModel",
     "StictionError",
     "UnexpectedAnswer",

@@ -54,6 +54,11 @@ with FrictionClient("{service_url}") as client:
     assert f"{names['grip'].normal_force}" in capsys.readouterr().out
 
 
+def test_the_code_of_the_control_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(code_blocks("docs/control.md"))["command"].mode == "feel"
+    assert capsys.readouterr().out.count("press with") == 3
+
+
 def test_the_code_of_the_formats_page_writes_a_valid_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     run(code_blocks("docs/formats.md"))

@@ -1,0 +1,147 @@
+"""The grip controller as pure functions: ``init`` and ``step`` (Li et al., Fig. 18)."""
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+from stiction_client.controller.friction import KnownFriction, LearnedFriction
+from stiction_client.controller.load import Load
+from stiction_client.controller.records import Command, Mode, Observation, check
+from stiction_client.controller.settings import ControlSettings
+from stiction_client.controller.stick_ratio import Felt
+from stiction_client.model import FrictionModel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ControllerState:
+    """A controller between two frames, never written to.
+
+    ``known``: the friction that ``hold`` goes by, None while there is none; ``learned``: what slipping elements told;
+    ``contradictions``: frames in a row that speak against ``known``; ``since``: when ``mode`` began, s.
+    """
+
+    settings: ControlSettings
+    known: KnownFriction | None
+    mode: Mode
+    normal_force: float
+    time: float = -math.inf
+    since: float = -math.inf
+    load: Load = field(default_factory=Load)
+    felt: Felt = field(default_factory=Felt)
+    learned: LearnedFriction = field(default_factory=LearnedFriction)
+    contradictions: int = 0
+
+
+class _Demand(NamedTuple):
+    """A normal force, N, and what asks for it."""
+
+    force: float
+    reason: str
+
+
+def init(settings: ControlSettings, model: FrictionModel | None = None) -> ControllerState:
+    """A controller that has seen nothing; ``model``: of the object's material, where that is known."""
+    known = None if model is None else KnownFriction.of_model(model, settings)
+    return ControllerState(settings, known, "feel" if known is None else "hold", settings.least_force)
+
+
+def step(state: ControllerState, observation: Observation) -> tuple[ControllerState, Command]:
+    """Take one frame, later than the last, and say how hard to grip.
+
+    Raises ``InvalidArgument`` for an observation that cannot be; the state before it can still be used.
+    """
+    check(observation, state.time)
+    elapsed = observation.time - state.time
+    seen = _decide(_sense(state, observation, elapsed), observation)
+    demand = max(_demands(seen, observation), key=lambda each: each.force)
+    force = _limited(seen, demand.force, elapsed)
+    limited = demand.force > state.settings.most_force
+    reason = f"{demand.reason}, more than most_force" if limited else demand.reason
+    return replace(seen, normal_force=force), Command(force, seen.mode, reason)
+
+
+def _sense(state: ControllerState, observation: Observation, elapsed: float) -> ControllerState:
+    """What the frame tells of load and friction."""
+    load = state.load.step(observation, elapsed, state.settings)
+    felt = state.felt.step(observation, load.size, state.settings)
+    friction = math.nan if observation.slip_samples is None else observation.slip_samples.contact_friction()
+    learned = state.learned if math.isnan(friction) else state.learned.with_frame(friction)
+    against = _contradicts(state, felt, observation.normal, load.size, friction)
+    contradictions = state.contradictions if against is None else state.contradictions + 1 if against else 0
+    return replace(state, time=observation.time, load=load, felt=felt, learned=learned, contradictions=contradictions)
+
+
+def _contradicts(state: ControllerState, felt: Felt, normal: float, size: float, friction: float) -> bool | None:
+    """Whether a frame speaks against the friction that is known; None where it tells nothing of it.
+
+    Friction of slipping elements outside of what the model permits, or slip under a load that it says is held.
+    """
+    if state.known is None or normal == 0.0:
+        return None
+    low, high = state.known.bounds(normal)
+    share = state.settings.contradiction_share
+    if not math.isnan(friction) and not low * (1.0 - share) <= friction <= high * (1.0 + share):
+        return True
+    if felt.slips(state.settings) and 0.0 < size < low * normal:
+        return True
+    return None if math.isnan(friction) and math.isnan(felt.stick_ratio) else False
+
+
+def _decide(state: ControllerState, observation: Observation) -> ControllerState:
+    """The mode after a frame. Evidence against what is known discards it, and all that was learnt with it."""
+    settings = state.settings
+    if state.known is not None and state.contradictions >= settings.contradiction_frames:
+        return _enter(replace(state, known=None, learned=LearnedFriction(), contradictions=0), "alarm")
+    if state.known is not None:
+        return _enter(state, "hold")
+    if (state.felt.slips(settings) and state.load.size > 0.0) or _blind(state):
+        return _enter(replace(state, since=state.time), "alarm")
+    if state.mode == "alarm" and state.time - state.since < settings.settle_time:
+        return state
+    known = state.learned.known(settings)
+    if known is not None:
+        return _enter(replace(state, known=known), "hold")
+    settled = observation.stick_ratio >= 0.0 and state.time - state.load.steady >= settings.settle_time
+    return _enter(state, "learn" if settled else "feel")
+
+
+def _enter(state: ControllerState, mode: Mode) -> ControllerState:
+    return state if mode == state.mode else replace(state, mode=mode, since=state.time)
+
+
+def _blind(state: ControllerState) -> bool:
+    """Whether neither a model nor the stick ratio tells how hard to hold a load."""
+    settings = state.settings
+    loaded = state.load.size > settings.blind_friction * settings.least_force
+    return state.known is None and loaded and state.time - state.felt.told > settings.dropout_time
+
+
+def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
+    """All that asks for a force; the largest is followed."""
+    settings = state.settings
+    demands = [_Demand(settings.least_force, "least force")]
+    slips = state.felt.slips(settings) and state.load.size > 0.0
+    growth = 1.0 if slips else state.load.growth(settings)  # in slip, what is measured grows with the grip
+    if slips:
+        demands.append(_Demand(observation.normal * (1.0 + settings.reflex_gain), "slip"))
+    if state.known is not None:
+        asked = state.known.required(observation.tangential * growth, observation.torque * growth, settings.most_force)
+        return [*demands, _Demand(asked, "friction model" if growth == 1.0 else "friction model, growing load")]
+    load = state.load.size * growth
+    if _blind(state):
+        demands.append(_Demand(load / settings.blind_friction, "no stick ratio"))
+    target = settings.learn_stick_ratio if state.mode == "learn" else settings.feel_stick_ratio
+    demands.append(_Demand(state.felt.required(load, target), "stick ratio"))
+    if state.mode != "learn":
+        demands.append(_Demand(state.normal_force, "friction unknown"))
+    return demands
+
+
+def _limited(state: ControllerState, force: float, elapsed: float) -> float:
+    """The force on the way from the last one: no faster than the rates allow, over a gap no further than one frame."""
+    settings, last = state.settings, state.normal_force
+    time = min(elapsed, settings.dropout_time) if math.isfinite(elapsed) else 0.0
+    rate = settings.relax_rate if state.mode == "learn" else settings.fall_rate
+    slowest = last * max(1.0 - rate * time, 0.0)
+    risen = min(max(force, slowest), last + settings.rise_rate * time)
+    return min(max(risen, settings.least_force), settings.most_force)

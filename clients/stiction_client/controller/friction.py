@@ -1,0 +1,84 @@
+"""What a grip controller knows of friction: a model, or what it learnt in this grasp."""
+
+import math
+from dataclasses import dataclass
+
+from stiction_client.contacts import Contact
+from stiction_client.controller.settings import ControlSettings
+from stiction_client.holding import LoadedContact
+from stiction_client.model import FrictionModel
+from stiction_client.quantile import FrictionQuantile
+
+NORMAL_DEVIATIONS = 3.0902
+"""Standard deviations of a normal quantile of 1e-3, the default bound: what is learnt in one grasp has no better."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KnownFriction:
+    """A conservative ``quantile`` of a contact's friction over the normal force of its elements, ``unit``·F^(1/n) N."""
+
+    contact: Contact
+    quantile: FrictionQuantile
+    unit: float
+
+    @classmethod
+    def of_model(cls, model: FrictionModel, settings: ControlSettings) -> "KnownFriction":
+        """What the planner's answers are computed from (``required_normal_force``)."""
+        quantile = FrictionQuantile.of(model, 0.0, settings.slip_probability)
+        return cls(settings.contact, quantile, float(settings.contact.element_force(1.0, model.element_area)))
+
+    @classmethod
+    def learned(cls, low: float, mean: float, contact: Contact) -> "KnownFriction":
+        """One friction coefficient at any force: one grasp tells no slopes."""
+        return cls(contact, FrictionQuantile(a=mean, c=0.0, s=mean - low, k=0.0, g=0.0), 1.0)
+
+    def required(self, tangential: float, torque: float, most: float) -> float:
+        """Least normal force, N, that holds the load; infinite where none up to ``most`` N does."""
+        power = self.contact.power
+        loaded = LoadedContact(self.quantile, tangential, self._twist(torque), self.unit, power)
+        least, _, holds = loaded.interval(loaded.root(most))
+        return float(loaded.force(least)) if holds else math.inf
+
+    def bounds(self, force: float) -> tuple[float, float]:
+        """The quantile under ``force`` N, and its mirror image above the mean."""
+        element = self.unit * (force if self.contact.power == 1 else force ** (1.0 / 3.0))
+        low, mean = float(self.quantile(element)[0]), float(self.quantile.expected()(element)[0])
+        return low, 2.0 * mean - low
+
+    def _twist(self, torque: float) -> float:
+        return torque / float(self.contact.arm(1.0)) if torque > 0.0 else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class LearnedFriction:
+    """Mean and sum of squared deviations of the contact's friction over ``frames`` in which some of it slipped."""
+
+    frames: int = 0
+    mean: float = 0.0
+    squares: float = 0.0
+
+    def with_frame(self, friction: float) -> "LearnedFriction":
+        """The same after one more frame (Welford 1962)."""
+        frames = self.frames + 1
+        off = friction - self.mean
+        mean = self.mean + off / frames
+        return LearnedFriction(frames, mean, self.squares + off * (friction - mean))
+
+    def known(self, settings: ControlSettings) -> KnownFriction | None:
+        """A model of it once there are ``learn_frames``.
+
+        Frames of one grasp share their errors, so that their spread is not divided by their number.
+        """
+        if self.frames < settings.learn_frames:
+            return None
+        spread = math.hypot(math.sqrt(self.squares / (self.frames - 1)), settings.learned_error * self.mean)
+        low = self.mean - NORMAL_DEVIATIONS * spread
+        return KnownFriction.learned(low, self.mean, settings.contact) if low > 0.0 else None
+
+
+def utilisation(stick_ratio: float) -> float:
+    """Load over what a contact can hold, of the area that sticks: 1 − sr^(3/2) (Cattaneo 1938, Mindlin 1949).
+
+    Exact for a Hertzian contact whose load grew, or whose normal force fell, alone.
+    """
+    return 1.0 - stick_ratio * math.sqrt(stick_ratio)

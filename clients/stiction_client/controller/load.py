@@ -1,0 +1,46 @@
+"""The load on a contact, its rate, and what it will be when the gripper has followed."""
+
+import math
+from dataclasses import dataclass, replace
+
+from stiction_client.controller.records import Observation
+from stiction_client.controller.settings import ControlSettings
+from stiction_client.errors import InvalidArgument
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """``size`` N of tangential force and torque together, its ``rate`` N/s, and since when it is ``steady`` (s)."""
+
+    size: float = 0.0
+    rate: float = 0.0
+    steady: float = math.inf
+
+    def step(self, observation: Observation, elapsed: float, settings: ControlSettings) -> "Load":
+        """The load after a frame; over a gap its rate is not known, and taken as 0."""
+        size = size_of(observation, settings)
+        if not elapsed <= settings.dropout_time:
+            return Load(size, 0.0, observation.time)
+        share = elapsed / (elapsed + settings.rate_time)
+        rate = self.rate + share * ((size - self.size) / elapsed - self.rate)
+        moving = Load(size, rate)
+        changes = abs(moving.lead(settings) - size) > settings.steady_share * size or size == 0.0
+        return replace(moving, steady=math.inf if changes else min(self.steady, observation.time))
+
+    def lead(self, settings: ControlSettings) -> float:
+        """Size in ``lead_time``, N, if it grows; else as it is."""
+        return self.size + max(self.rate - settings.rate_floor, 0.0) * settings.lead_time
+
+    def growth(self, settings: ControlSettings) -> float:
+        """Factor by which the load will have grown in ``lead_time``."""
+        return self.lead(settings) / self.size if self.size > 0.0 else 1.0
+
+
+def size_of(observation: Observation, settings: ControlSettings) -> float:
+    """√(T² + (M/b)²) N, with the torque arm b under the measured normal force (elliptic limit surface)."""
+    if observation.torque == 0.0 or observation.normal == 0.0:
+        return observation.tangential
+    arm = float(settings.contact.arm(observation.normal))
+    if arm == 0.0:
+        raise InvalidArgument("torque", observation.torque, "0 where the contact has no torque_arm")
+    return math.hypot(observation.tangential, observation.torque / arm)

@@ -1,0 +1,72 @@
+"""What the grip controller is told, and what it answers."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from stiction_client.errors import InvalidArgument
+from stiction_client.model import FloatArray
+
+Mode = Literal["feel", "learn", "hold", "alarm"]
+"""feel: friction unknown, regulated by the stick ratio; learn: the same, and the force falls until enough slips to be
+sampled; hold: by a friction model; alarm: slip, evidence against the model, or nothing told."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SlipSamples:
+    """Friction at the elements that slip in one frame: ``friction_coefficient`` [k] -, ``normal_force`` [k] N."""
+
+    friction_coefficient: FloatArray
+    normal_force: FloatArray
+
+    def contact_friction(self) -> float:
+        """What the contact's friction would be if all elements were like these: Σ μf / Σ f; NaN without samples."""
+        normal = float(self.normal_force.sum())
+        return float(self.friction_coefficient @ self.normal_force) / normal if normal > 0.0 else math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """One frame of one contact: ``time`` s, ``normal`` and ``tangential`` force N and ``torque`` N·m as magnitudes.
+
+    ``stick_ratio``: NaN where the detector tells none. ``slip_samples``: None where there are none.
+    """
+
+    time: float
+    normal: float
+    tangential: float
+    torque: float = 0.0
+    stick_ratio: float = math.nan
+    slip_samples: SlipSamples | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """``normal_force`` N that the contact shall be pressed with, the controller's ``mode``, and the ``reason``."""
+
+    normal_force: float
+    mode: Mode
+    reason: str
+
+
+def check(observation: Observation, last: float) -> None:
+    """Refuse an observation that cannot be, or is no later than ``last`` s; raises ``InvalidArgument``."""
+    if not last < observation.time < math.inf:
+        raise InvalidArgument("time", observation.time, f"finite, later than {last:.9g} s")
+    for name in ("normal", "tangential", "torque"):
+        value = getattr(observation, name)
+        if not 0.0 <= value < math.inf:
+            raise InvalidArgument(name, value, "a finite magnitude of 0 or more; without one, leave the frame out")
+    if not (math.isnan(observation.stick_ratio) or 0.0 <= observation.stick_ratio <= 1.0):
+        raise InvalidArgument("stick_ratio", observation.stick_ratio, "0 to 1, or NaN where none is told")
+    if observation.slip_samples is not None:
+        _check_samples(observation.slip_samples)
+
+
+def _check_samples(samples: SlipSamples) -> None:
+    for name in ("friction_coefficient", "normal_force"):
+        values = getattr(samples, name)
+        if values.shape != samples.friction_coefficient.shape or values.ndim != 1:
+            raise InvalidArgument(f"slip_samples.{name}", f"of shape {list(values.shape)}", "two arrays [k]")
+        if values.size and not 0.0 <= float(values.min()) <= float(values.max()) < math.inf:
+            raise InvalidArgument(f"slip_samples.{name}", values.tolist(), "finite numbers of 0 or more")

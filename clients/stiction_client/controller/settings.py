@@ -1,0 +1,98 @@
+"""Every gain of the grip controller, with unit, range and reason."""
+
+from dataclasses import dataclass, fields
+from typing import Annotated, NamedTuple, get_type_hints
+
+from stiction_client.arguments import within
+from stiction_client.contacts import Contact
+from stiction_client.errors import InvalidArgument
+from stiction_client.planner import SLIP_PROBABILITIES, SLIP_PROBABILITY
+
+
+class Gain(NamedTuple):
+    """Permitted range, unit, and why the default is what it is."""
+
+    low: float
+    high: float
+    unit: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ControlSettings:
+    """What a grip controller is set to; forces are those of one contact, the ``contact`` that the sensor looks at."""
+
+    contact: Contact
+    least_force: Annotated[float, Gain(1e-3, 1e3, "N", "keeps the sensor in touch; also the force of the first touch")]
+    most_force: Annotated[float, Gain(1e-3, 1e4, "N", "what the gripper, or the object before it breaks, can bear")]
+    slip_probability: Annotated[
+        float, Gain(*SLIP_PROBABILITIES, "-", "the planner's: one slip in a thousand loads")
+    ] = SLIP_PROBABILITY
+    rise_rate: Annotated[float, Gain(1e-3, 1e6, "N/s", "5 N within the lag of a gripper, 30 ms")] = 150.0
+    fall_rate: Annotated[
+        float, Gain(1e-3, 100.0, "1/s", "half of the force in 1.4 s: a load that comes back within a task finds a grip")
+    ] = 0.5
+    relax_rate: Annotated[
+        float, Gain(1e-3, 10.0, "1/s", "1 % a frame at 30 frames/s: a detector late by three frames costs 3 %")
+    ] = 0.3
+    lead_time: Annotated[
+        float, Gain(0.0, 1.0, "s", "lag of a gripper, 30 ms, and two frames of sensing at 30 frames/s")
+    ] = 0.1
+    rate_time: Annotated[float, Gain(0.0, 1.0, "s", "two frames: a third of the load's rise in 0.1 s")] = 0.03
+    rate_floor: Annotated[float, Gain(0.0, 1e3, "N/s", "0.02 N of noise at 60 frames/s, filtered so")] = 0.8
+    feel_stick_ratio: Annotated[float, Gain(0.05, 0.95, "-", "0.6 of what the contact can hold (Cattaneo-Mindlin)")] = (
+        0.55
+    )
+    learn_stick_ratio: Annotated[
+        float, Gain(0.05, 0.95, "-", "0.79 of what it can hold: a ring that slips is wide enough to be sampled")
+    ] = 0.35
+    told_stick_ratio: Annotated[
+        float, Gain(0.05, 1.0, "-", "a thinner ring is of one element, and tells nothing of friction")
+    ] = 0.9
+    reflex_stick_ratio: Annotated[
+        float, Gain(0.0, 0.5, "-", "0.97 of what it can hold; detectors err by 0.1 in the stick ratio")
+    ] = 0.1
+    reflex_gain: Annotated[
+        float, Gain(0.0, 5.0, "-", "on top of the measured force: twice of it after two lags of a gripper")
+    ] = 0.5
+    reflex_frames: Annotated[int, Gain(1, 100, "frames", "a frame's error alone does not start it; 17 ms more")] = 2
+    settle_time: Annotated[float, Gain(0.0, 10.0, "s", "several lags of a gripper")] = 0.2
+    steady_share: Annotated[float, Gain(0.0, 1.0, "-", "load may change by that much within the lead")] = 0.05
+    learn_frames: Annotated[
+        int, Gain(2, 1000, "frames", "spread among fewer frames is not known to half of itself")
+    ] = 8
+    learned_error: Annotated[
+        float, Gain(0.0, 1.0, "-", "relative bias of friction from detected slip, one standard deviation")
+    ] = 0.03
+    contradiction_frames: Annotated[
+        int, Gain(1, 100, "frames", "50 ms at 60 frames/s; one frame is wrong too often")
+    ] = 3
+    contradiction_share: Annotated[
+        float, Gain(0.0, 1.0, "-", "beyond the model's quantile: samples of one frame err by that much")
+    ] = 0.05
+    dropout_time: Annotated[float, Gain(1e-3, 10.0, "s", "three frames at 30 frames/s")] = 0.1
+    blind_friction: Annotated[
+        float, Gain(0.01, 10.0, "-", "of what robots lift, little is more slippery: the usual fixed value")
+    ] = 0.2
+
+    def __post_init__(self) -> None:
+        for name, gain in gains().items():
+            value = getattr(self, name)
+            if not isinstance(within(name, value, gain.low, gain.high, gain.unit), float):
+                raise InvalidArgument(name, "an array", "one number")
+        if self.least_force >= self.most_force:
+            raise InvalidArgument("least_force", self.least_force, f"less than most_force, {self.most_force:g} N")
+        if not self.reflex_stick_ratio < self.learn_stick_ratio <= self.feel_stick_ratio < self.told_stick_ratio:
+            asked = "reflex_stick_ratio < learn_stick_ratio <= feel_stick_ratio < told_stick_ratio"
+            raise InvalidArgument("learn_stick_ratio", self.learn_stick_ratio, asked)
+
+
+def gains() -> dict[str, Gain]:
+    """Range, unit and reason of each number in ``ControlSettings``, by name."""
+    return dict(_GAINS)
+
+
+_HINTS = get_type_hints(ControlSettings, include_extras=True)
+_GAINS = {
+    entry.name: _HINTS[entry.name].__metadata__[0] for entry in fields(ControlSettings) if entry.name != "contact"
+}

@@ -1,0 +1,248 @@
+import dataclasses
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from slipcore.contact.reference import CattaneoMindlin, HertzContact, half_space
+from stiction_client import (
+    Contact,
+    ControlSettings,
+    FrictionModel,
+    GraspController,
+    InvalidArgument,
+    Observation,
+    SlipSamples,
+    required_normal_force,
+)
+from stiction_client.controller import gains
+from stiction_client.controller.friction import LearnedFriction, utilisation
+from tests.clients.point_contact import FRAME, Episode, PointContact, ramp, run
+
+Make = Callable[..., FrictionModel]
+
+SETTINGS = ControlSettings(contact=Contact.round(6e-5, at_force=5.0), least_force=0.5, most_force=40.0)
+LIFT = ramp((1.5, 0.5, 0.3))
+SEEDS = range(4)
+
+
+def model_of(make: Make, friction: float, slope: float = 0.0) -> FrictionModel:
+    """A model that knows its friction to 1 % and scatters by 0.02."""
+    covariance = np.diag([1e-5, 0.0, 0.0])
+    return make(coefficients=(friction, 0.0, slope), covariance=covariance, scale=0.02, degrees_of_freedom=50.0)
+
+
+def fell_or_rose_too_fast(episode: Episode) -> bool:
+    force = np.array([command.normal_force for command in episode.commands])
+    elapsed = np.minimum(np.diff(episode.time), SETTINGS.dropout_time)
+    rise, fall = SETTINGS.rise_rate * elapsed, SETTINGS.fall_rate * elapsed * force[:-1]
+    change = np.diff(force)
+    return bool((change > rise + 1e-9).any() or (change < -fall - 1e-9).any())
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_an_unknown_object_is_held_and_then_gripped_by_what_was_learnt(seed: int) -> None:
+    episode = run(PointContact(LIFT, seed=seed), GraspController.init(SETTINGS))
+    assert episode.plant.slipped < 1e-5
+    assert episode.modes() == ["feel", "hold"]
+    assert 1.0 < episode.normal[-1] / episode.least < 1.25
+    assert max(episode.normal) / episode.least < 2.0
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_known_object_is_held_with_the_planner_s_force(seed: int, make_model: Make) -> None:
+    model = model_of(make_model, 0.45)
+    episode = run(PointContact(LIFT, seed=seed), GraspController.init(SETTINGS, model))
+    asked = required_normal_force(model, 1.5, contacts=SETTINGS.contact).normal_force
+    assert episode.modes() == ["hold"]
+    assert episode.plant.slipped == 0.0
+    assert episode.normal[-1] == pytest.approx(asked, rel=0.02)  # 10 mN of noise of the load of 1.5 N
+
+
+@pytest.mark.parametrize("error", [-0.4, 0.4])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_wrong_model_is_discarded_and_the_object_held(seed: int, error: float, make_model: Make) -> None:
+    state = GraspController.init(SETTINGS, model_of(make_model, 0.45 * (1.0 + error)))
+    episode = run(PointContact(LIFT, seed=seed), state)
+    assert episode.modes()[:2] == ["hold", "alarm"]
+    assert episode.modes()[-1] == "hold"
+    assert episode.plant.slipped < 1e-3
+    assert 1.0 < episode.normal[-1] / episode.least < 1.25
+
+
+def test_a_wrong_model_is_discarded_by_the_stick_ratio_alone(make_model: Make) -> None:
+    state = GraspController.init(SETTINGS, model_of(make_model, 0.63))
+    episode = run(PointContact(LIFT, sampled_below=0.0), state)
+    assert episode.modes()[:2] == ["hold", "alarm"]
+    assert episode.plant.slipped < 1e-3
+    assert episode.normal[-1] > episode.least
+
+
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_load_that_rises_within_150_ms_is_held(seed: int, known: bool, make_model: Make) -> None:
+    plant = PointContact(ramp((1.5, 0.5, 0.3), (1.0, 3.0, 0.15)), seed=seed)
+    episode = run(plant, GraspController.init(SETTINGS, model_of(make_model, 0.45) if known else None))
+    assert plant.slipped < 3e-3
+    assert 1.0 < episode.normal[-1] / episode.least < 1.25
+
+
+def test_a_force_falls_after_its_load(make_model: Make) -> None:
+    plant = PointContact(ramp((1.5, 0.5, 0.3), (-1.0, 2.0, 0.3)))
+    episode = run(plant, GraspController.init(SETTINGS, model_of(make_model, 0.45)), seconds=8.0)
+    assert 1.0 < episode.normal[-1] / episode.least < 1.3  # 0.5 N with 10 mN of noise
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_without_a_stick_ratio_an_unknown_object_is_gripped_for_little_friction(seed: int) -> None:
+    plant = PointContact(LIFT, told=lambda time: not 0.6 < time < 3.0, seed=seed)
+    episode = run(plant, GraspController.init(SETTINGS), seconds=8.0)
+    blind = [command for command in episode.commands if command.reason == "no stick ratio"]
+    assert {command.mode for command in blind} == {"alarm"}
+    before = np.searchsorted(episode.time, 3.0) - 1
+    assert episode.normal[before] >= 0.98 * 1.5 / SETTINGS.blind_friction
+    assert plant.slipped < 1e-5
+    assert episode.normal[-1] / episode.least < 1.25
+
+
+def test_a_gap_of_frames_under_a_steady_load_changes_nothing(make_model: Make) -> None:
+    state = GraspController.init(SETTINGS, model_of(make_model, 0.45))
+    episode = run(PointContact(LIFT), state, seen=lambda time: not 3.0 < time < 3.5)
+    after = int(np.searchsorted(episode.time, 3.25))
+    assert abs(episode.commands[after].normal_force / episode.commands[after - 1].normal_force - 1.0) < 0.05
+    assert episode.plant.slipped == 0.0
+
+
+def test_over_a_gap_the_force_falls_no_further_than_within_a_dropout(make_model: Make) -> None:
+    state = GraspController.init(SETTINGS, model_of(make_model, 0.45))
+    for frame in range(1, 60):
+        state, command = GraspController.step(state, Observation(frame * FRAME, 5.0, 2.0, 0.0, 0.5))
+    _, after = GraspController.step(state, Observation(60.0, 5.0, 0.1, 0.0, 0.9))
+    least = command.normal_force * (1.0 - SETTINGS.fall_rate * SETTINGS.dropout_time)
+    assert after.normal_force == pytest.approx(least, rel=1e-12)
+
+
+def test_the_force_relaxes_until_enough_slips_to_be_sampled() -> None:
+    plant = PointContact(LIFT, sampled_below=0.45)
+    episode = run(plant, GraspController.init(SETTINGS), seconds=8.0)
+    assert episode.modes()[:3] == ["feel", "learn", "hold"]
+    learning = [force for force, told in zip(episode.normal, episode.commands, strict=True) if told.mode == "learn"]
+    assert learning[-1] < 0.9 * learning[0]
+    assert plant.slipped < 1e-5
+    assert 1.0 < episode.normal[-1] / episode.least < 1.25
+
+
+@pytest.mark.parametrize("friction", [None, 0.63])
+def test_no_command_jumps_at_a_change_of_mode(friction: float | None, make_model: Make) -> None:
+    plant = PointContact(ramp((1.5, 0.5, 0.3), (1.0, 2.0, 0.15), (-1.5, 3.0, 0.02)), sampled_below=0.5)
+    model = None if friction is None else model_of(make_model, friction)
+    episode = run(plant, GraspController.init(SETTINGS, model))
+    assert len(set(episode.modes())) > 1
+    assert not fell_or_rose_too_fast(episode)
+
+
+def test_what_no_gripper_bears_is_asked_for_up_to_its_limit(make_model: Make) -> None:
+    settings = dataclasses.replace(SETTINGS, most_force=3.0)
+    episode = run(PointContact(LIFT), GraspController.init(settings, model_of(make_model, 0.45)), seconds=2.0)
+    assert max(command.normal_force for command in episode.commands) == 3.0
+    assert episode.commands[-1].reason.endswith("more than most_force")
+
+
+@pytest.mark.parametrize("slope", [0.0, -0.3])
+def test_torque_is_borne_as_the_planner_has_it(slope: float, make_model: Make) -> None:
+    model = model_of(make_model, 0.45, slope)
+    state = GraspController.init(SETTINGS, model)
+    for frame in range(1, 200):
+        state, command = GraspController.step(state, Observation(frame * FRAME, 5.0, 1.2, 1e-3, 0.4))
+    asked = required_normal_force(model, 1.2, contacts=SETTINGS.contact, torque=1e-3)
+    assert command.normal_force == pytest.approx(asked.normal_force, rel=1e-9)
+
+
+def test_a_step_changes_nothing_that_it_was_given() -> None:
+    plant = PointContact(LIFT)
+    state = GraspController.init(SETTINGS)
+    for frame in range(1, 60):
+        plant.advance(frame * FRAME, 4.0)
+        seen = plant.observe(frame * FRAME)
+        after, command = GraspController.step(state, seen)
+        assert GraspController.step(state, seen)[1] == command
+        state = after
+
+
+@pytest.mark.parametrize(
+    ("wrong", "name"),
+    [
+        ({"time": math.nan}, "time"),
+        ({"time": 1.0}, "time"),
+        ({"time": 0.5}, "time"),
+        ({"time": math.inf}, "time"),
+        ({"normal": -0.1}, "normal"),
+        ({"normal": math.nan}, "normal"),
+        ({"tangential": -1.0}, "tangential"),
+        ({"tangential": math.inf}, "tangential"),
+        ({"torque": math.nan}, "torque"),
+        ({"stick_ratio": 1.1}, "stick_ratio"),
+        ({"stick_ratio": -0.1}, "stick_ratio"),
+        ({"slip_samples": SlipSamples(np.ones(2), np.ones(3))}, "slip_samples.normal_force"),
+        ({"slip_samples": SlipSamples(np.array([math.nan]), np.ones(1))}, "slip_samples.friction_coefficient"),
+        ({"slip_samples": SlipSamples(np.ones(1), np.array([-1.0]))}, "slip_samples.normal_force"),
+    ],
+)
+def test_an_observation_that_cannot_be_is_refused_by_name(wrong: dict[str, Any], name: str) -> None:
+    state, _ = GraspController.step(GraspController.init(SETTINGS), Observation(1.0, 1.0, 0.1, 0.0, 0.9))
+    with pytest.raises(InvalidArgument) as refusal:
+        GraspController.step(state, dataclasses.replace(Observation(1.1, 1.0, 0.1, 0.0, 0.9), **wrong))
+    assert refusal.value.name == name
+    GraspController.step(state, Observation(1.1, 1.0, 0.1, 0.0, 0.9))
+
+
+def test_torque_on_a_contact_without_an_arm_is_refused() -> None:
+    state = GraspController.init(dataclasses.replace(SETTINGS, contact=Contact(6e-5)))
+    with pytest.raises(InvalidArgument, match="torque"):
+        GraspController.step(state, Observation(1.0, 1.0, 0.1, 1e-3, 0.9))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "name"),
+    [
+        ({"rise_rate": math.nan}, "rise_rate"),
+        ({"lead_time": -1.0}, "lead_time"),
+        ({"most_force": 0.5}, "least_force"),
+        ({"learn_stick_ratio": 0.6}, "learn_stick_ratio"),
+        ({"fall_rate": np.ones(2)}, "fall_rate"),
+    ],
+)
+def test_a_setting_outside_of_its_range_is_refused_by_name(wrong: dict[str, Any], name: str) -> None:
+    with pytest.raises(InvalidArgument) as refusal:
+        dataclasses.replace(SETTINGS, **wrong)
+    assert refusal.value.name == name
+
+
+def test_utilisation_is_cattaneo_s_and_mindlin_s() -> None:
+    contact = HertzContact(0.015, 10.0, half_space(1e6, 0.0))
+    for share in (0.1, 0.5, 0.9):
+        stick = CattaneoMindlin(contact, 0.4, share * 4.0).stick_radius / contact.contact_radius
+        assert utilisation(stick**2) == pytest.approx(share, rel=1e-12)
+
+
+def test_mean_and_spread_of_what_is_learnt_are_those_of_its_frames() -> None:
+    values = 0.4 + 0.02 * np.random.default_rng(1).standard_normal(30)
+    learned = LearnedFriction()
+    for value in values:
+        learned = learned.with_frame(float(value))
+    assert learned.mean == pytest.approx(values.mean(), rel=1e-12)
+    assert learned.squares == pytest.approx(values.var() * 30, rel=1e-10)
+
+
+def test_every_setting_is_documented_with_its_default() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "control.md").read_text(encoding="utf-8")
+    rows = dict(re.findall(r"^\| `(\w+)` \| ([^|]+) \|", page, re.MULTILINE))
+    defaults = {entry.name: entry.default for entry in dataclasses.fields(ControlSettings)}
+    for name, gain in gains().items():
+        default = defaults[name]
+        assert rows[name].strip() == ("needed" if default is dataclasses.MISSING else f"{default:g}"), name
+        assert gain.reason
