@@ -89,16 +89,17 @@ def material_id(session: Session, log_id: str) -> int | None:
     return found[0]
 
 
-def withdraw(session: Session, log_id: str, because: str, by: str | None = None) -> bool:
-    """Take a log out of the fits, or only renew the reason; True if that was the first time. Raises ``NotFound``.
+def withdraw(session: Session, log_id: str, because: str, by: str | None = None) -> Withdrawal | None:
+    """Take a log out of the fits, or only renew the reason; returns its earlier withdrawal. Raises ``NotFound``.
 
-    ``by`` is the id of the access key with which that is asked for.
+    ``by`` is the id of the access key with which that is asked for. The reason that it has already changes nothing.
     """
     row = _locked(session, log_id)
-    is_new = row.withdrawn_at is None
-    row.withdrawn_at, row.withdrawn_because, row.withdrawn_by = row.withdrawn_at or now(), because, by
-    session.flush()
-    return is_new
+    before = _withdrawal(row)
+    if before is None or before.because != because:
+        row.withdrawn_at, row.withdrawn_because, row.withdrawn_by = row.withdrawn_at or now(), because, by
+        session.flush()
+    return before
 
 
 def restore(session: Session, log_id: str) -> bool:

@@ -71,14 +71,16 @@ def rename(session: Session, material_id: int, name: str) -> None:
     session.execute(update(MaterialRow).where(MaterialRow.id == material_id).values(name=name))
 
 
-def add_alias(session: Session, material_id: int, name: str) -> None:
-    """Let a material be found by one more name; raises ``AlreadyExists`` where another material has it."""
+def add_alias(session: Session, material_id: int, name: str) -> bool:
+    """Let a material be found by one more name; False if it has it. Raises ``AlreadyExists`` where another has it."""
     try:
         with session.begin_nested():
             session.add(MaterialNameRow(name=name, material_id=material_id))
     except IntegrityError as error:
         if find_id(session, name) != material_id:
             raise AlreadyExists("material", name) from error
+        return False
+    return True
 
 
 def remove_alias(session: Session, material_id: int, name: str) -> None:

@@ -36,7 +36,11 @@ def change(
     """
     with context.database.write() as session:
         material_id = _changeable(session, material, asker)
-        audit.add(session, asker.actor, "material.changed", material, {"name": name, "description": description})
+        before = materials.get(session, material)
+        name = None if name == before.name else name
+        description = None if description == before.description else description
+        if (name, description) != (None, None):
+            audit.add(session, asker.actor, "material.changed", material, {"name": name, "description": description})
         if description is not None:
             materials.describe(session, material_id, description)
         if name is not None:
@@ -49,8 +53,8 @@ def change(
 def add_alias(context: Context, material: str, alias: str, asker: Asker = ANYBODY) -> Material:
     """Let a material be found by one more name; raises as ``change``."""
     with context.database.write() as session:
-        materials.add_alias(session, _changeable(session, material, asker), alias)
-        audit.add(session, asker.actor, "alias.added", material, {"alias": alias})
+        if materials.add_alias(session, _changeable(session, material, asker), alias):
+            audit.add(session, asker.actor, "alias.added", material, {"alias": alias})
         return materials.get(session, material)
 
 
@@ -80,9 +84,10 @@ def withdraw(context: Context, log_id: str, because: str, asker: Asker = ANYBODY
     """Take a log out of its material's fits, and fit again without it; raises as ``change``."""
     with context.database.write() as session:
         material_id = _material_to_change(session, log_id, asker)
-        is_new = grasp_logs.withdraw(session, log_id, because, asker.key_id)
-        audit.add(session, asker.actor, "grasp_log.withdrawn", log_id, {"reason": because})
-        had_part = is_new and detections.has_samples(session, log_id)
+        before = grasp_logs.withdraw(session, log_id, because, asker.key_id)
+        if before is None or before.because != because:
+            audit.add(session, asker.actor, "grasp_log.withdrawn", log_id, {"reason": because})
+        had_part = before is None and detections.has_samples(session, log_id)
         queued = _refit_without(session, material_id, asker.key_id) if had_part else []
         log = grasp_logs.get(session, log_id)
     return log, _follow_up(context, queued)

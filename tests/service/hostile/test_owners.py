@@ -127,7 +127,7 @@ def test_a_log_tells_who_sent_and_who_withdrew_it(lab: Lab) -> None:
 
 def test_the_trail_tells_each_change_and_from_where(lab: Lab, content: bytes) -> None:
     said = {"X-Request-ID": "withdrawal-1"}
-    lab.friend.request("PUT", f"{lab.log}/withdrawal", json={"reason": "wet"}, headers=said)
+    lab.friend.request("PUT", f"{lab.log}/withdrawal", json={"reason": "torn"}, headers=said)
     changes(lab.maker, lab, content)
     changes(lab.other, lab, content)
     job = lab.maker.get("/v1/jobs?limit=1").json()["items"][0]["id"]
@@ -152,7 +152,31 @@ def test_the_trail_tells_each_change_and_from_where(lab: Lab, content: bytes) ->
     ]
     withdrawn = entries[::-1][2]
     assert (withdrawn["address"], withdrawn["request_id"]) == ("10.0.0.9", "withdrawal-1")
-    assert (withdrawn["subject"], withdrawn["details"]) == (lab.log.rpartition("/")[2], {"reason": "wet"})
+    assert (withdrawn["subject"], withdrawn["details"]) == (lab.log.rpartition("/")[2], {"reason": "torn"})
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "wish", "other"),
+    [
+        ("PATCH", "/v1/materials/paper", {"description": "smooth"}, {"description": "rough"}),
+        ("PATCH", "/v1/materials/paper", {"name": "paper", "description": "smooth"}, {"name": "card"}),
+        ("PUT", "/v1/materials/paper/aliases/sheet", {}, None),
+        ("PUT", "LOG/withdrawal", {"reason": "wet"}, {"reason": "torn"}),
+    ],
+)
+def test_the_trail_has_no_entry_where_nothing_changed(
+    lab: Lab, method: str, path: str, wish: dict[str, str], other: dict[str, str] | None
+) -> None:
+    def entries_after(body: dict[str, str]) -> list[Any]:
+        sent = lab.maker.request(method, path.replace("LOG", lab.log), json=body)
+        assert sent.status_code in {OK, httpx.codes.CREATED}
+        entries: list[Any] = lab.admin.get("/v1/audit").json()["items"]
+        return entries
+
+    first = entries_after(wish)
+    assert entries_after(wish) == first
+    if other is not None:
+        assert len(entries_after(other)) == len(first) + 1
 
 
 def test_the_trail_is_for_admins_and_comes_in_pages(lab: Lab, content: bytes) -> None:
