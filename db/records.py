@@ -34,10 +34,28 @@ AuditAction = Literal[
 
 
 @dataclass(frozen=True, slots=True)
+class Scale:
+    """A standard deviation, and the degrees of freedom of the Student-t that it scales, None where infinite."""
+
+    value: float
+    degrees_of_freedom: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Scales:
+    """How friction scatters: between grasps, as a part of friction itself; between places and within, as friction."""
+
+    between_grasps: Scale
+    between_places: Scale
+    within: Scale
+
+
+@dataclass(frozen=True, slots=True)
 class NewModel:
     """A fitted friction model about to be stored; coefficients β₀ [-], β₁ [s/m], β₂ [1/N], ranges in m/s and N.
 
-    ``degrees_of_freedom`` of the coefficients and ``scatter_degrees_of_freedom`` of ε are None where infinite.
+    ``degrees_of_freedom`` of the coefficients and ``scatter_degrees_of_freedom`` of ε are None where infinite;
+    ``scales`` is None where the method does not tell them apart, or the model was stored before they were kept.
     """
 
     method: str
@@ -54,6 +72,7 @@ class NewModel:
     diagnostics: Mapping[str, float | str | None]
     cost_seconds: float
     monte_carlo_error: float
+    scales: Scales | None = None
 
 
 @dataclass(frozen=True, slots=True)

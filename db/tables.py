@@ -299,6 +299,7 @@ class FrictionModelRow(Base):
     n: Mapped[int] = mapped_column(BigInteger)
     degrees_of_freedom: Mapped[float | None]
     scatter_degrees_of_freedom: Mapped[float | None]
+    scales: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
     tangential_velocity_min: Mapped[float]
     tangential_velocity_max: Mapped[float]
     normal_force_min: Mapped[float]

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
         sdf_surface,
         urdf_gazebo,
     )
-    from stiction_client.model import Cost, Domain, FrictionModel
+    from stiction_client.model import Cost, Domain, FrictionModel, Scale, Scales
     from stiction_client.planner import RequiredForce, RequiredForces, required_normal_force
     from stiction_client.records import (
         AuditEntry,
@@ -94,6 +94,8 @@ _LAZY = {
     "Cost": "stiction_client.model",
     "Domain": "stiction_client.model",
     "FrictionModel": "stiction_client.model",
+    "Scale": "stiction_client.model",
+    "Scales": "stiction_client.model",
     "RequiredForce": "stiction_client.planner",
     "RequiredForces": "stiction_client.planner",
     "required_normal_force": "stiction_client.planner",
@@ -144,6 +146,8 @@ __all__ = [
     "Recognition",
     "RequiredForce",
     "RequiredForces",
+    "Scale",
+    "Scales",
     "SlipSamples",
     "StaleModel",
     "StictionError",

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stiction_client.quantile import FrictionQuantile, Number, Truth
+from stiction_client.model import Number
+from stiction_client.quantile import FrictionQuantile, Truth
 
 MOST_STEPS = 200
 """Steps of a search; a root that only touches takes 50, any other fewer than 20."""

@@ -4,9 +4,9 @@ import json
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 from stiction_client.errors import InvalidArgument
 
 FloatArray = NDArray[np.float64]
+
+Number = float | FloatArray
+"""One float, or an array of any shape that broadcasts with the others."""
+
+KINDS = ("element", "contact")
+"""Whose friction a quantile may be of."""
 
 FILE_FORMAT, FILE_VERSION = "stiction-friction-model", 1
 
@@ -24,6 +30,49 @@ class Domain:
 
     tangential_velocity: tuple[float, float]
     normal_force: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """A standard deviation as data tell it: ``value`` times a Student-t on ``degrees_of_freedom`` is what it draws."""
+
+    value: float
+    degrees_of_freedom: float
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "Scale":
+        """The scale in the service's answer."""
+        return cls(float(record["value"]), _freedom(record["degrees_of_freedom"]))
+
+    def to_json(self) -> dict[str, float | None]:
+        """What ``from_json`` reads."""
+        return {"value": self.value, "degrees_of_freedom": _finite(self.degrees_of_freedom)}
+
+    def quantile(self, level: Number) -> Number:
+        """Quantile of one draw, in the shape of ``level``."""
+        from scipy import special  # takes longer to import than all else of this package
+
+        return cast(Number, self.value * special.stdtrit(self.degrees_of_freedom, level))
+
+
+@dataclass(frozen=True, slots=True)
+class Scales:
+    """How friction scatters: ``between_grasps`` τ, as a part of friction itself; ``between_places`` ω of a grasp and
+    ``within`` a place σ, as friction [-].
+    """
+
+    between_grasps: Scale
+    between_places: Scale
+    within: Scale
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "Scales":
+        """The scales in the service's answer."""
+        return cls(*(Scale.from_json(record[each.name]) for each in fields(cls)))
+
+    def to_json(self) -> dict[str, dict[str, float | None]]:
+        """What ``from_json`` reads."""
+        return {each.name: getattr(self, each.name).to_json() for each in fields(self)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +89,9 @@ class FrictionModel:
 
     ``coefficients`` [3]: β₀ [-], β₁ [s/m], β₂ [1/N]; ``covariance`` [3, 3] of them; ``scale``: standard deviation of
     ε [-]; ``n`` samples of elements of ``element_area`` m²; ``degrees_of_freedom`` of the Student-t distribution that
-    the coefficients follow, ``scatter_degrees_of_freedom`` of that which ε/σ follows; ``identifiable`` [3] bool.
+    the coefficients follow, ``scatter_degrees_of_freedom`` of that which ε/σ follows; ``identifiable`` [3] bool;
+    ``scales`` of the scatter where the method tells them apart, when σ is all of it, as one element in a new grasp
+    shows it; None also of a model that an older version stored.
     """
 
     material: str
@@ -59,6 +110,7 @@ class FrictionModel:
     current: bool = True
     diagnostics: Mapping[str, float | str | None] = field(default_factory=dict)
     created_at: str = ""
+    scales: Scales | None = None
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "FrictionModel":
@@ -81,6 +133,7 @@ class FrictionModel:
             current=bool(record["current"]),
             diagnostics=dict(record["diagnostics"]),
             created_at=record["created_at"],
+            scales=None if record.get("scales") is None else Scales.from_json(record["scales"]),
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -105,6 +158,7 @@ class FrictionModel:
             "current": self.current,
             "diagnostics": dict(self.diagnostics),
             "created_at": self.created_at,
+            "scales": None if self.scales is None else self.scales.to_json(),
         }
 
     def save(self, path: Path | str) -> None:
@@ -145,16 +199,26 @@ class FrictionModel:
         return np.stack([self.coefficients - half, self.coefficients + half], axis=1)
 
     def predict(
-        self, tangential_velocity: ArrayLike, normal_force: ArrayLike, quantile: float | None = None
+        self,
+        tangential_velocity: ArrayLike,
+        normal_force: ArrayLike,
+        quantile: float | None = None,
+        of: str = "element",
+        elements: float | None = None,
     ) -> FloatArray:
-        """Friction coefficient expected at v (m/s) and f_n (N an element), or a quantile of a new observation of it.
+        """Friction coefficient expected at v (m/s) and f_n (N an element), or a quantile of what a new grasp shows.
 
-        The quantile includes the scatter ε and the uncertainty of the coefficients, whose distances from the mean add
+        ``of``: one "element", or a "contact", whose friction is the mean over its ``elements``: scatter between grasps
+        stays, that between places and within them averages out. A model without ``scales`` takes all of its scatter
+        as shared.
+
+        The quantile includes the scatter and the uncertainty of the coefficients, whose distances from the mean add
         as root of squares (Graybill & Wang 1980), as in the service. Shapes broadcast. Raises ``InvalidArgument`` for
-        a quantile outside (0, 1).
+        a quantile outside (0, 1) and for a contact of no elements.
         """
         from scipy import special
 
+        count = averaged_elements(of, elements)
         v, f_n = np.broadcast_arrays(np.asarray(tangential_velocity, float), np.asarray(normal_force, float))
         x = np.stack([np.ones_like(v), v, f_n], axis=-1)
         mean = x @ self.coefficients
@@ -162,9 +226,23 @@ class FrictionModel:
             return mean
         check_probability("quantile", quantile)
         error = np.sqrt(np.maximum(np.einsum("...i,ij,...j->...", x, self.covariance, x), 0.0))
-        scatter = special.stdtrit(self.scatter_degrees_of_freedom, quantile) * self.scale
+        shared, own = self.scatter(quantile, count)
+        scatter = np.hypot(shared * mean, own)
         distance = np.hypot(scatter, special.stdtrit(self.degrees_of_freedom, quantile) * error)
         return np.asarray(mean + np.sign(quantile - 0.5) * distance)
+
+    def scatter(self, quantile: Number, elements: Number = 1.0) -> tuple[Number, Number]:
+        """How far scatter takes the mean over so many elements of a new grasp: a part of friction, and what adds [-].
+
+        The two add as root of squares. Shapes broadcast.
+        """
+        from scipy import special
+
+        if self.scales is None:
+            return 0.0, cast(Number, special.stdtrit(self.scatter_degrees_of_freedom, quantile) * self.scale)
+        place, within = self.scales.between_places.quantile(quantile), self.scales.within.quantile(quantile)
+        own = ((place * place + within * within) / elements) ** 0.5
+        return self.scales.between_grasps.quantile(quantile), own
 
     def extrapolation(self, tangential_velocity: float, normal_force: float) -> str | None:
         """Which of v (m/s) and f_n (N an element) lies outside the data behind the model; None where neither does.
@@ -187,6 +265,17 @@ def check_probability(name: str, value: float) -> None:
     """Refuse what is not a probability strictly between 0 and 1."""
     if not 0.0 < value < 1.0:
         raise InvalidArgument(name, value, "above 0 and below 1")
+
+
+def averaged_elements(of: str, elements: float | None) -> float:
+    """Over how many elements the scatter of places averages out."""
+    if of not in KINDS:
+        raise InvalidArgument("of", of, " or ".join(KINDS))
+    if of == "element":
+        return 1.0
+    if elements is None or not 1.0 <= elements < math.inf:
+        raise InvalidArgument("elements", elements, "the number of elements of the contact, at least 1")
+    return float(elements)
 
 
 def _freedom(value: float | None) -> float:

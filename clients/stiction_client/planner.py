@@ -11,8 +11,8 @@ from stiction_client.arguments import within
 from stiction_client.contacts import AREAS, Contact, Contacts
 from stiction_client.errors import Cause, InvalidArgument, NoFeasibleForce
 from stiction_client.holding import LoadedContact
-from stiction_client.model import FloatArray, FrictionModel
-from stiction_client.quantile import FrictionQuantile, Number
+from stiction_client.model import FloatArray, FrictionModel, Number
+from stiction_client.quantile import FrictionQuantile
 
 SLIP_PROBABILITY = 1e-3
 """Default bound: one slip in a thousand grasps that bear the full load."""

@@ -8,10 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction_client.errors import InvalidArgument
-from stiction_client.model import FloatArray, FrictionModel
-
-Number = float | FloatArray
-"""One float, or an array of any shape that broadcasts with the others."""
+from stiction_client.model import FloatArray, FrictionModel, Number
 
 Truth = bool | np.bool_ | NDArray[np.bool_]
 

@@ -1,18 +1,20 @@
 """Queries on friction models: versions only grow, and one a material and method is current."""
 
-from collections.abc import Sequence
-from dataclasses import fields
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields
+from typing import Any
 
 from sqlalchemy import Select, func, select, update
 from sqlalchemy.orm import Session
 
 from db.paging import Window, windowed
-from db.records import NewModel, StoredModel
+from db.records import NewModel, Scale, Scales, StoredModel
 from db.tables import FrictionModelRow, MaterialNameRow, MaterialRow
 
 NEWEST_FIRST = Window("id", descending=True)
 
-_PLAIN = tuple(entry.name for entry in fields(NewModel) if entry.name not in {"tangential_velocity", "normal_force"})
+_OTHERWISE = {"tangential_velocity", "normal_force", "scales"}
+_PLAIN = tuple(entry.name for entry in fields(NewModel) if entry.name not in _OTHERWISE)
 
 
 def add(session: Session, material_id: int, job_id: str, model: NewModel) -> int:
@@ -120,6 +122,7 @@ def _row(material_id: int, job_id: str, version: int, model: NewModel) -> Fricti
         tangential_velocity_max=model.tangential_velocity[1],
         normal_force_min=model.normal_force[0],
         normal_force_max=model.normal_force[1],
+        scales=None if model.scales is None else asdict(model.scales),
         **{name: getattr(model, name) for name in _PLAIN},
     )
 
@@ -140,5 +143,10 @@ def _record(row: FrictionModelRow, material: str) -> StoredModel:
         diagnostics=row.diagnostics,
         cost_seconds=row.cost_seconds,
         monte_carlo_error=row.monte_carlo_error,
+        scales=None if row.scales is None else _scales(row.scales),
     )
     return StoredModel(row.id, material, row.version, row.current, row.outdated, row.created_at, model)
+
+
+def _scales(kept: Mapping[str, Any]) -> Scales:
+    return Scales(**{name: Scale(**scale) for name, scale in kept.items()})

@@ -1,5 +1,6 @@
 """Commands that work on files, without a service: detect, fit."""
 
+from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
@@ -130,6 +131,7 @@ def model_record(model: "FrictionModel") -> dict[str, Any]:
         "n": model.n,
         "degrees_of_freedom": model.degrees_of_freedom,
         "scatter_degrees_of_freedom": model.scatter_degrees_of_freedom,
+        "scales": None if model.scales is None else asdict(model.scales),
         "domain": {
             "tangential_velocity": model.domain.tangential_velocity,
             "normal_force": model.domain.normal_force,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import estimators
-from db.records import Detection, NewModel, SampleSummary
+from db.records import Detection, NewModel, SampleSummary, Scale, Scales
 from service.formats.npy import HEADER_LOCK
 from slipcore.frames import FloatArray
 from slipcore.samples import FrictionSamples
@@ -111,11 +111,12 @@ def to_new_model(model: "FrictionModel") -> NewModel:
         diagnostics={name: _plain(value) for name, value in model.diagnostics.items()},
         cost_seconds=float(model.cost.seconds),
         monte_carlo_error=float(model.cost.monte_carlo_error),
+        scales=None if model.scales is None else _stored_scales(model.scales),
     )
 
 
 def to_friction_model(stored: NewModel) -> "FrictionModel":
-    """A stored model as one that predicts; its draws are not kept."""
+    """A stored model as one that predicts; its draws are not kept, nor scales by versions that stored none."""
     return estimators.FrictionModel(
         method=stored.method,
         coefficients=np.array(stored.coefficients),
@@ -128,7 +129,19 @@ def to_friction_model(stored: NewModel) -> "FrictionModel":
         identifiable=np.array(stored.identifiable),
         element_area=stored.element_area,
         cost=estimators.Cost(stored.cost_seconds, stored.monte_carlo_error),
+        diagnostics={name: _or_nan(value) for name, value in stored.diagnostics.items()},
+        scales=None if stored.scales is None else _scales(stored.scales),
     )
+
+
+def _stored_scales(scales: "estimators.Scales") -> Scales:
+    each = (scales.between_grasps, scales.between_places, scales.within)
+    return Scales(*(Scale(float(scale.value), finite_or_none(scale.degrees_of_freedom)) for scale in each))
+
+
+def _scales(stored: Scales) -> "estimators.Scales":
+    each = (stored.between_grasps, stored.between_places, stored.within)
+    return estimators.Scales(*(estimators.Scale(scale.value, _or_infinite(scale.degrees_of_freedom)) for scale in each))
 
 
 def _or_infinite(degrees_of_freedom: float | None) -> float:
@@ -142,6 +155,10 @@ def finite_or_none(value: float) -> float | None:
 
 def _plain(value: float | str) -> float | str | None:
     return value if isinstance(value, str) else finite_or_none(value)
+
+
+def _or_nan(value: float | str | None) -> float | str:
+    return math.nan if value is None else value
 
 
 def _range(values: FloatArray) -> tuple[float, float] | None:

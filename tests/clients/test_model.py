@@ -1,12 +1,17 @@
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import fields, replace
+from datetime import UTC, datetime
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import estimators
-from stiction_client import FrictionModel, InvalidArgument
+from db.records import StoredModel
+from service.domain.stored_results import to_friction_model, to_new_model
+from service.http.schemas.models import FrictionModelOut
+from stiction_client import FrictionModel, InvalidArgument, Scale, Scales
 
 Make = Callable[..., FrictionModel]
 
@@ -15,7 +20,14 @@ def on_the_service(model: FrictionModel) -> estimators.FrictionModel:
     shared = {field.name for field in fields(estimators.FrictionModel)} & {
         field.name for field in fields(FrictionModel)
     }
-    return estimators.FrictionModel(**{name: getattr(model, name) for name in shared})
+    there = {name: getattr(model, name) for name in shared}
+    if model.scales is not None:
+        each = [getattr(model.scales, field.name) for field in fields(Scales)]
+        there["scales"] = estimators.Scales(*(estimators.Scale(s.value, s.degrees_of_freedom) for s in each))
+    return estimators.FrictionModel(**there)
+
+
+SCALES = Scales(Scale(0.07, 3.5), Scale(0.02, np.inf), Scale(0.03, 1e4))
 
 
 @pytest.mark.parametrize("degrees_of_freedom", [1.0, 2.5, 11.0, 1e6, np.inf])
@@ -28,6 +40,42 @@ def test_client_and_estimators_predict_the_same(
     expected = on_the_service(model).predict(v, f_n, quantile)
     np.testing.assert_allclose(model.predict(v, f_n, quantile), expected, rtol=1e-12, atol=0)
     assert expected.shape == (7, 5)
+
+
+@pytest.mark.parametrize(("of", "elements"), [("element", None), ("contact", 1), ("contact", 50)])
+@pytest.mark.parametrize("quantile", [None, 1e-3, 0.05, 0.95])
+def test_client_and_estimators_predict_the_same_of_contacts(
+    make_model: Make, of: str, elements: int | None, quantile: float | None
+) -> None:
+    model = replace(make_model(), scales=SCALES)
+    v, f_n = np.linspace(0.0, 0.01, 7)[:, None], np.linspace(0.0, 1.0, 5)
+    expected = on_the_service(model).predict(v, f_n, quantile, of=of, elements=elements)
+    np.testing.assert_allclose(model.predict(v, f_n, quantile, of=of, elements=elements), expected, rtol=1e-12, atol=0)
+
+
+@pytest.mark.parametrize(("of", "elements"), [("grasp", 5), ("contact", None), ("contact", 0), ("contact", np.nan)])
+def test_what_is_predicted_must_be_known(make_model: Make, of: str, elements: float | None) -> None:
+    with pytest.raises(InvalidArgument, match=r"^(of|elements) is"):
+        make_model().predict(0.0, 0.1, 0.01, of=of, elements=elements)
+
+
+@pytest.mark.parametrize("scales", [None, SCALES])
+def test_a_model_is_the_same_after_the_way_from_a_fit_to_a_planner_and_back(
+    make_model: Make, scales: Scales | None
+) -> None:
+    model = replace(make_model(), scales=scales, diagnostics={"rank": 3.0, "kind": "grasp", "rhat": None})
+    fitted = replace(on_the_service(model), diagnostics=model.diagnostics | {"rhat": np.nan})
+    once_stored = to_friction_model(to_new_model(fitted))
+    stored = StoredModel(7, model.material, model.version, True, False, datetime.now(UTC), to_new_model(once_stored))
+    told = FrictionModelOut.of(stored).model_dump(mode="json")
+    again = FrictionModel.from_json(told)
+    assert again.to_json() == model.to_json() | {"created_at": again.created_at}
+    assert FrictionModel.from_json(again.to_json()).to_json() == again.to_json()
+
+
+def test_a_model_that_an_older_service_tells_has_no_scales(answers: SimpleNamespace) -> None:
+    assert "scales" not in answers.model
+    assert FrictionModel.from_json(answers.model).scales is None
 
 
 @pytest.mark.parametrize("level", [0.5, 0.95, 0.999])
@@ -56,11 +104,12 @@ def test_leaving_the_data_is_named(make_model: Make) -> None:
 
 
 def test_a_saved_model_comes_back_to_the_last_bit(make_model: Make, tmp_path: Path) -> None:
-    model = make_model(degrees_of_freedom=np.inf)
+    model = replace(make_model(degrees_of_freedom=np.inf), scales=SCALES)
     model.save(tmp_path / "paper.json")
     again = FrictionModel.load(tmp_path / "paper.json")
     assert again.to_json() == model.to_json()
     assert again.degrees_of_freedom == np.inf
+    assert again.scales == SCALES
     np.testing.assert_array_equal(again.covariance, model.covariance)
     assert [path.name for path in tmp_path.iterdir()] == ["paper.json"]
 

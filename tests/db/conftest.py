@@ -6,7 +6,7 @@ import pytest
 from sqlalchemy import event
 
 from db.database import Database
-from db.records import Detection, NewGraspLog, NewModel, SampleSummary
+from db.records import Detection, NewGraspLog, NewModel, SampleSummary, Scale, Scales
 
 HASH = "{:064x}"
 
@@ -38,7 +38,7 @@ def new_log() -> Callable[..., NewGraspLog]:
 
 @pytest.fixture
 def new_model() -> Callable[..., NewModel]:
-    def make(method: str = "ols", mean: float = 0.4) -> NewModel:
+    def make(method: str = "ols", mean: float = 0.4, scales: Scales | None = None) -> NewModel:
         return NewModel(
             method=method,
             coefficients=(mean, 0.1 + 0.2, -1e-17),
@@ -54,9 +54,15 @@ def new_model() -> Callable[..., NewModel]:
             diagnostics={"r_squared": 0.5, "covariance": "clustered", "condition_number": None},
             cost_seconds=0.01,
             monte_carlo_error=0.0,
+            scales=scales,
         )
 
     return make
+
+
+@pytest.fixture
+def scales() -> Scales:
+    return Scales(Scale(0.1 + 0.2, 4.5), Scale(1e-17, None), Scale(0.03, 1e4))
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from contextlib import closing
+from dataclasses import asdict, replace
 from datetime import timedelta
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from db import migrate
 from db.database import Database
 from db.errors import SchemaMismatch, StorageUnavailable
 from db.paging import Window
-from db.records import Claim, Detection, NewGraspLog, NewModel, SampleSummary
+from db.records import Claim, Detection, NewGraspLog, NewModel, SampleSummary, Scales
 from db.repositories import (
     access_keys,
     audit,
@@ -52,10 +53,16 @@ def tables(database: Database) -> set[str]:
     return set(inspect(database.engine).get_table_names()) - {"alembic_version"}
 
 
-def indexed(database: Database) -> dict[str, set[str | None]]:
-    """The tables, each with the names of its indexes."""
+def shape(database: Database) -> dict[str, tuple[set[str], set[str | None]]]:
+    """The tables, each with the names of its columns and indexes."""
     found = inspect(database.engine)
-    return {name: {index["name"] for index in found.get_indexes(name)} for name in tables(database)}
+    return {
+        name: (
+            {column["name"] for column in found.get_columns(name)},
+            {index["name"] for index in found.get_indexes(name)},
+        )
+        for name in tables(database)
+    }
 
 
 def test_models_and_migrations_agree(database: Database) -> None:
@@ -85,12 +92,12 @@ def test_revisions_stand_in_one_line() -> None:
 @pytest.mark.parametrize("revision", REVISIONS)
 def test_every_migration_goes_up_and_down_and_up(empty_database: Database, revision: str) -> None:
     migrate.upgrade(empty_database, revision)
-    there = indexed(empty_database)
+    there = shape(empty_database)
     migrate.downgrade(empty_database, "-1")
-    assert indexed(empty_database) != there
+    assert shape(empty_database) != there
     migrate.upgrade(empty_database, revision)
     assert migrate.current(empty_database) == revision
-    assert indexed(empty_database) == there
+    assert shape(empty_database) == there
 
 
 def test_migrations_go_down_and_up_with_data_in_every_table(
@@ -122,7 +129,7 @@ def test_materials_of_before_aliases_are_found_by_name_and_merged_ones_stop_the_
             session.execute(text("INSERT INTO materials VALUES (:id, :name, :description, :created_at)"), row)
     migrate.upgrade(empty_database, "0003")
     with empty_database.write() as session:
-        assert materials.get(session, "paper").description == "old"
+        assert materials.find_id(session, "paper") == 1
         materials.merge(session, 1, 2)
     with pytest.raises(RuntimeError, match="1 materials were merged"):
         migrate.downgrade(empty_database, "0002")
@@ -157,6 +164,31 @@ def test_a_database_of_before_claims_keeps_its_jobs_and_models(
         assert [found.moments for found in stored] == [None]
         detections.set_moments(session, stored[0].grasp_log_id, b"moments")
         assert detections.samples_of_material(session, material)[0].moments == b"moments"
+
+
+def test_models_of_before_scales_are_read_with_those_that_their_diagnostics_tell(
+    database: Database,
+    new_log: Callable[..., NewGraspLog],
+    detection: Detection,
+    samples: SampleSummary,
+    new_model: Callable[..., NewModel],
+    scales: Scales,
+) -> None:
+    told: dict[str, float | str | None] = {}
+    for name, scale in asdict(scales).items():
+        told |= {f"scale_{name}": scale["value"], f"scale_{name}_degrees_of_freedom": scale["degrees_of_freedom"]}
+    fill(database, new_log(material_id=1), detection, samples, new_model())
+    with database.write() as session:
+        job = jobs.add(session, "fit", "hierarchical", material_id=1)
+        structured = replace(new_model("hierarchical", scales=scales), diagnostics=told)
+        friction_models.add(session, 1, job, structured)
+    migrate.downgrade(database, "0014")
+    migrate.upgrade(database)
+    with database.read() as session:
+        hierarchical, ols = friction_models.versions(session, 1)
+    assert hierarchical.model == structured
+    assert ols.model == new_model()
+    assert ols.model.scales is None
 
 
 def test_a_database_of_a_newer_version_is_refused_by_name(database: Database) -> None:

@@ -1,5 +1,6 @@
 """Friction models, and the fits and look-ups that are asked of them."""
 
+from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated, Literal
 
@@ -30,6 +31,7 @@ MODEL_EXAMPLE: JsonDict = {
     "diagnostics": {"r_squared": 0.31, "cluster_kind": "grasp"},
     "cost": {"seconds": 0.012, "monte_carlo_error": 0.0},
     "created_at": MOMENT_EXAMPLE,
+    "scales": None,
 }
 
 
@@ -56,6 +58,21 @@ class CostOut(BaseModel):
     monte_carlo_error: Annotated[float, Field(description="In posterior standard deviations; 0 for an exact method.")]
 
 
+class ScaleOut(BaseModel):
+    """A standard deviation as the data tell it."""
+
+    value: float
+    degrees_of_freedom: Annotated[float | None, Field(description="Of the Student-t that it scales; null: normal")]
+
+
+class ScalesOut(BaseModel):
+    """How friction scatters."""
+
+    between_grasps: Annotated[ScaleOut, Field(description="As a part of friction itself")]
+    between_places: Annotated[ScaleOut, Field(description="Of one grasp, as friction [-]")]
+    within: Annotated[ScaleOut, Field(description="A place, as friction [-]")]
+
+
 class FrictionModelOut(BaseModel):
     """One version of a material's model μ = β₀ + β₁ v + β₂ f_n + ε."""
 
@@ -78,6 +95,10 @@ class FrictionModelOut(BaseModel):
     diagnostics: dict[str, float | str | None]
     cost: CostOut
     created_at: datetime
+    scales: Annotated[
+        ScalesOut | None,
+        Field(description="Of the scatter; null: the method does not tell them apart, or it was stored without them"),
+    ] = None
 
     @classmethod
     def of(cls, stored: StoredModel) -> "FrictionModelOut":
@@ -101,6 +122,7 @@ class FrictionModelOut(BaseModel):
             diagnostics=dict(model.diagnostics),
             cost=CostOut(seconds=model.cost_seconds, monte_carlo_error=model.monte_carlo_error),
             created_at=stored.created_at,
+            scales=None if model.scales is None else ScalesOut.model_validate(asdict(model.scales)),
         )
 
 

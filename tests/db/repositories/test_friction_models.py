@@ -1,9 +1,10 @@
 from collections.abc import Callable
 
 import pytest
+from sqlalchemy import text
 
 from db.database import Database
-from db.records import NewModel
+from db.records import NewModel, Scales
 from db.repositories import friction_models, jobs, materials
 
 
@@ -28,6 +29,24 @@ def test_a_model_comes_back_to_the_last_bit(
     assert found is not None
     assert found.model == new_model()
     assert (found.material, found.version, found.current) == ("paper", 1, True)
+
+
+def test_scales_come_back_to_the_last_bit(
+    database: Database, material: int, new_model: Callable[..., NewModel], scales: Scales
+) -> None:
+    store(database, material, new_model("hierarchical", scales=scales))
+    with database.read() as session:
+        found = friction_models.current(session, "paper", "hierarchical")
+    assert found is not None
+    assert found.model.scales == scales
+
+
+def test_a_model_without_scales_holds_no_json_in_their_place(
+    database: Database, material: int, new_model: Callable[..., NewModel]
+) -> None:
+    store(database, material, new_model())
+    with database.read() as session:
+        assert session.scalar(text("SELECT count(*) FROM friction_models WHERE scales IS NULL")) == 1
 
 
 def test_versions_count_up_for_each_method_and_the_newest_is_current(

@@ -81,6 +81,8 @@ def test_what_goes_over_the_wire_has_an_example() -> None:
         "GraspLogsOut",
         "DomainOut",
         "CostOut",
+        "ScaleOut",
+        "ScalesOut",
         "WithdrawalOut",
         "EventCounts",
         "EventsOfOneKind",
