@@ -49,12 +49,16 @@ def add(session: Session, log: NewGraspLog) -> str:
 
 def find_id(session: Session, sha256: str, material_id: int | None, detector: str) -> str:
     """The log of this content, material and detector; raises ``NotFound``."""
-    same_material = GraspLogRow.material_id.is_(None) if material_id is None else GraspLogRow.material_id == material_id
-    query = select(GraspLogRow.id).where(GraspLogRow.sha256 == sha256, same_material, GraspLogRow.detector == detector)
-    found = session.scalar(query)
+    found = _find_id(session, sha256, material_id, detector)
     if found is None:
         raise NotFound("grasp log", sha256)
     return found
+
+
+def is_stored(session: Session, sha256: str, material_id: int | None, detector: str) -> bool:
+    """Whether there is a log of this content, material and detector, with its file."""
+    found = _find_id(session, sha256, material_id, detector)
+    return found is not None and session.get_one(GraspLogRow, found).file_state is None
 
 
 def get(session: Session, log_id: str) -> StoredGraspLog:
@@ -147,6 +151,12 @@ def _record(
         detection=detections.detection_record(detection),
         samples=detections.samples_record(samples),
     )
+
+
+def _find_id(session: Session, sha256: str, material_id: int | None, detector: str) -> str | None:
+    same_material = GraspLogRow.material_id.is_(None) if material_id is None else GraspLogRow.material_id == material_id
+    query = select(GraspLogRow.id).where(GraspLogRow.sha256 == sha256, same_material, GraspLogRow.detector == detector)
+    return session.scalar(query)
 
 
 def _locked(session: Session, log_id: str) -> GraspLogRow:

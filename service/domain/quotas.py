@@ -1,7 +1,8 @@
 """How much one access key may have: jobs queued, logs a day, bytes of uploads. Without a key nothing is limited.
 
-An upload is checked twice: before its body is received, and in the transaction that stores it, for others of the same
-key may have been stored meanwhile. Fits that the service itself queues, after an upload or a curation, are counted but
+An upload is checked twice: before its file is kept, and in the transaction that stores it, for others of the same key
+may have been stored meanwhile. What is stored already takes nothing of a quota, and that is known by the content only:
+the body is received first. Fits that the service itself queues, after an upload or a curation, are counted but
 never refused: without them a material would keep a model that its logs contradict.
 """
 
@@ -9,7 +10,8 @@ from datetime import timedelta
 
 from sqlalchemy.orm import Session
 
-from db.repositories import access_keys, usage
+from db.records import NewGraspLog
+from db.repositories import access_keys, grasp_logs, usage
 from db.tables import now
 from service.http.problems import QUOTA_EXCEEDED, STORAGE_QUOTA_EXCEEDED, Problem
 from service.settings import Settings
@@ -20,9 +22,16 @@ JOBS_RETRY_SECONDS, LOGS_RETRY_SECONDS = 10, 3600
 
 def lock(session: Session, settings: Settings, key_id: str | None) -> None:
     """Let what is counted stay true to the end of this transaction, in which something is stored for the key."""
-    quotas = (settings.key_queued_jobs, settings.key_logs_a_day, settings.key_stored_bytes)
-    if key_id is not None and any(most is not None for most in quotas):
+    if key_id is not None and _any_is_set(settings):
         access_keys.lock(session, key_id)
+
+
+def check_log(session: Session, settings: Settings, key_id: str | None, log: NewGraspLog) -> None:
+    """Raises ``Problem`` where a key may send no more logs and this one is not stored yet."""
+    if key_id is None or not _any_is_set(settings):
+        return
+    if not grasp_logs.is_stored(session, log.sha256, log.material_id, log.detector):
+        check_upload(session, settings, key_id)
 
 
 def check_upload(session: Session, settings: Settings, key_id: str | None) -> None:
@@ -42,6 +51,11 @@ def check_job(session: Session, settings: Settings, key_id: str | None) -> None:
     most = settings.key_queued_jobs
     if key_id is not None and most is not None and usage.queued_jobs(session, key_id) >= most:
         raise _exceeded("queued jobs", most, "STICTION_KEY_QUEUED_JOBS", JOBS_RETRY_SECONDS)
+
+
+def _any_is_set(settings: Settings) -> bool:
+    quotas = (settings.key_queued_jobs, settings.key_logs_a_day, settings.key_stored_bytes)
+    return any(most is not None for most in quotas)
 
 
 def _exceeded(what: str, most: int, setting: str, seconds: int) -> Problem:

@@ -94,8 +94,9 @@ async def upload(
 
 
 async def check_target(context: Context, wish: Wish) -> None:
-    """Raises ``Problem`` or ``NotFound`` for what a log could not be stored for."""
+    """Raises ``Problem`` or ``NotFound`` for what a new log could not be stored for."""
     await asyncio.to_thread(_check, context, wish)
+    await asyncio.to_thread(_check_quotas, context, wish.asker)
 
 
 async def store_made(context: Context, spool: Spool, found: Description, wish: Wish) -> Answer:
@@ -129,12 +130,16 @@ def _check(context: Context, wish: Wish) -> int | None:
     except InvalidInput as error:
         raise Problem.wrong_value(INVALID_REQUEST, error.name, error.value, error.allowed) from error
     with context.database.read() as session:
-        quotas.check_upload(session, context.settings, wish.asker.key_id)
         if wish.material is None:
             return None
         material_id = materials.find_id(session, wish.material)
         check_may_add(session, material_id, wish.asker)
     return material_id
+
+
+def _check_quotas(context: Context, asker: Asker) -> None:
+    with context.database.read() as session:
+        quotas.check_upload(session, context.settings, asker.key_id)
 
 
 def _check_type(content_type: str | None) -> None:
@@ -208,7 +213,9 @@ def _sensor_name(name: str) -> str:
 
 
 def _store(context: Context, spool: Spool, log: NewGraspLog, once: Once | None, asker: Asker) -> Answer:
-    """First the blob, durably, then the rows that refer to it."""
+    """First the blob, durably, then the rows that refer to it; neither where a quota forbids them."""
+    with context.database.read() as session:
+        quotas.check_log(session, context.settings, asker.key_id, log)
     spool.keep()
     with context.database.write() as session:
         stores.require(session, context.database.store_id)
@@ -226,11 +233,11 @@ def _accept(context: Context, session: Session, log: NewGraspLog, asker: Asker) 
     Quotas are looked at once more: others of the same key may have been stored since this one's body began.
     """
     quotas.lock(session, context.settings, asker.key_id)
-    quotas.check_upload(session, context.settings, asker.key_id)
     if log.material_id is not None:  # it may have been merged into another while the log came in
         material_id = materials.still(session, log.material_id)
         check_may_add(session, material_id, asker)
         log = replace(log, material_id=material_id)
+    quotas.check_log(session, context.settings, asker.key_id, log)
     try:
         log_id, status = grasp_logs.add(session, log), 202
         queue(
@@ -247,6 +254,7 @@ def _accept(context: Context, session: Session, log: NewGraspLog, asker: Asker) 
         job = grasp_logs.get(session, log_id).job
         if job.status not in {"failed", "cancelled"}:
             return _stored(status, grasp_logs.get(session, log_id))
+        quotas.check_job(session, context.settings, asker.key_id)
         jobs.requeue(session, job.id, requested_by=asker.key_id)
     stored = grasp_logs.get(session, log_id)
     told = {"material": stored.material, "sha256": stored.sha256, "bytes": stored.bytes, "new": status == 202}

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from db.blobs import BlobStore
 from db.database import Database
 from db.repositories import access_keys, usage
 from service.domain import upload
@@ -28,6 +29,12 @@ def key(database: Database) -> str:
     return text
 
 
+@pytest.fixture
+def contents(members: dict[str, Any], repack: Callable[..., bytes]) -> list[bytes]:
+    """Two logs that differ."""
+    return [repack(members | {"sensor": np.str_(f"finger {number}")}) for number in range(2)]
+
+
 def send(client: Any, content: bytes) -> Any:
     return client.request("POST", "/v1/grasp-logs", content=content, headers={**client.headers, **HEADERS})
 
@@ -42,15 +49,47 @@ def send(client: Any, content: bytes) -> Any:
     ],
 )
 def test_a_key_that_has_its_quota_stores_no_more(
-    reach: Callable[..., Any], key: str, content: bytes, setting: str, status: int, kind: str
+    reach: Callable[..., Any],
+    key: str,
+    contents: list[bytes],
+    blobs: BlobStore,
+    setting: str,
+    status: int,
+    kind: str,
 ) -> None:
     client, free = reach(key=key, **{setting: 1}), reach("open", **{setting: 1})
-    assert send(client, content).status_code == 202
-    refused = send(client, content)
+    assert send(client, contents[0]).status_code == 202
+    refused = send(client, contents[1])
     assert (refused.status_code, refused.json()["type"]) == (status, f"/problems/{kind}")
     assert ("retry-after" in refused.headers) == (status == 429)
     assert f"STICTION_{setting.upper()}" in refused.json()["detail"]
-    assert send(free, content).status_code == 200  # without a key nothing is limited
+    assert len(list(blobs.hashes())) == 1  # nothing is kept of what is refused
+    assert send(free, contents[1]).status_code == 202  # without a key nothing is limited
+
+
+@ONLY_SQLITE
+@pytest.mark.parametrize("setting", ["key_queued_jobs", "key_logs_a_day", "key_stored_bytes"])
+def test_a_known_log_takes_nothing_of_a_quota_while_its_file_is_there(
+    reach: Callable[..., Any], key: str, contents: list[bytes], database: Database, setting: str
+) -> None:
+    client = reach(key=key, **{setting: 1})
+    first = send(client, contents[0]).json()
+    again = send(client, contents[0])
+    assert (again.status_code, again.json()["id"]) == (200, first["id"])
+    with database.write() as session:
+        session.connection().exec_driver_sql("UPDATE grasp_logs SET file_state = 'gone'")
+    assert (send(client, contents[0]).status_code == 200) == (setting == "key_stored_bytes")
+
+
+@ONLY_SQLITE
+def test_a_known_log_whose_job_is_queued_anew_keeps_to_the_quota(
+    reach: Callable[..., Any], key: str, contents: list[bytes]
+) -> None:
+    client = reach(key=key, key_queued_jobs=1)
+    job = send(client, contents[0]).json()["job"]["id"]
+    reach("open").request("POST", f"/v1/jobs/{job}/cancel").raise_for_status()
+    assert send(client, contents[1]).status_code == 202
+    assert send(client, contents[0]).status_code == 429
 
 
 @ONLY_SQLITE
@@ -77,10 +116,9 @@ def counting_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("counting_at_once")
 def test_uploads_at_the_same_time_do_not_pass_a_quota_together(
-    reach: Callable[..., Any], key: str, members: dict[str, Any], repack: Callable[..., bytes]
+    reach: Callable[..., Any], key: str, contents: list[bytes]
 ) -> None:
     clients = [reach(key=key, key_queued_jobs=1) for _ in range(2)]
-    contents = [repack(members | {"sensor": np.str_(f"finger {number}")}) for number in range(2)]
     with ThreadPoolExecutor(2) as pool:
         answers = list(pool.map(send, clients, contents))
     assert sorted(answer.status_code for answer in answers) == [202, 429]
@@ -100,12 +138,11 @@ def test_fits_at_the_same_time_do_not_pass_a_quota_together(reach: Callable[...,
 
 @pytest.mark.parametrize("setting", ["key_queued_jobs", "key_logs_a_day", "key_stored_bytes"])
 def test_a_log_that_a_stream_stores_keeps_to_the_quotas(
-    reach: Callable[..., Any], key: str, content: bytes, monkeypatch: pytest.MonkeyPatch, setting: str
+    reach: Callable[..., Any], key: str, content: bytes, setting: str
 ) -> None:
     client = reach(key=key, **{setting: 1})
     assert send(client, content).status_code == 202
     context, key_id = client.app.state.context, access.key_id(key)
-    monkeypatch.setattr(upload, "_check", lambda *_: None)  # that look was before the log above was stored
     found = Description("npz", "finger", 2, 1.0, (1, 1))
     with context.blobs.spool() as spool:
         spool.path.write_bytes(b"frames")
