@@ -5,8 +5,10 @@ from importlib import import_module
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
+from slipcore.checks import Finding, check_log
 from slipcore.defaults import (
     LOOKAHEAD,
+    CheckOptions,
     FilterOptions,
     Option,
     SampleOptions,
@@ -43,10 +45,12 @@ __version__ = version("stiction")
 __all__ = [
     "LOOKAHEAD",
     "METHODS",
+    "CheckOptions",
     "DetectorState",
     "ElementForces",
     "EventList",
     "FilterOptions",
+    "Finding",
     "FixedLagSmoother",
     "Frame",
     "FrictionLaw",
@@ -65,6 +69,7 @@ __all__ = [
     "StrainRateLiteralOptions",
     "StrainRateOptions",
     "UnknownScale",
+    "check_log",
     "collect_history",
     "collect_samples",
     "contact_factor",

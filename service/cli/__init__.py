@@ -24,6 +24,7 @@ for command in (
     simulation.simulate,
     simulation.campaign,
     local.detect,
+    local.check,
     local.fit,
     local.convert,
     remote.upload,

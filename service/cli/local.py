@@ -1,4 +1,4 @@
-"""Commands that work on files, without a service: detect, fit."""
+"""Commands that work on files, without a service: detect, check, fit, convert."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -71,6 +71,30 @@ def detect(
         )
 
 
+def check(
+    log: Log,
+    method: Annotated[str | None, typer.Option(help=DETECTOR_HELP)] = None,
+    scale: Scale = None,
+    frame_rate: FrameRate = None,
+    mapping: Mapping = None,
+    json: Json = False,
+) -> None:
+    """Look for what makes the friction of a grasp log doubtful, and say what to do (docs/checks.md)."""
+    from service import formats
+    from slipcore import LOOKAHEAD, check_log, detect_slip
+    from slipcore.defaults import DEFAULT_METHOD
+
+    grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
+    findings = check_log(grasp, detect_slip(grasp, method=method or DEFAULT_METHOD, lookahead=LOOKAHEAD))
+    if json:
+        print_json({"log": log.name, "findings": [asdict(finding) for finding in findings]})
+    elif findings:
+        for finding in findings:
+            typer.echo(f"{finding.name}: {finding.evidence}\n  {finding.remedy}")
+    else:
+        typer.echo(f"{log.name}: nothing found against it")
+
+
 def fit(
     logs: Logs,
     method: Annotated[str, typer.Option("--method", help=METHOD_HELP)] = "ols",
@@ -82,13 +106,15 @@ def fit(
     """Fit the stochastic linear friction model to the slip seen in one or more grasp logs."""
     from estimators import fit as fit_model
     from service import formats
-    from slipcore import LOOKAHEAD, collect_samples, detect_slip
+    from slipcore import LOOKAHEAD, check_log, collect_samples, detect_slip
     from slipcore.defaults import DEFAULT_METHOD
 
     grasps = []
     for path in logs:
         grasp = formats.read(path, mapping=mapping_text(mapping))
         history = detect_slip(grasp, method=detector or DEFAULT_METHOD, lookahead=LOOKAHEAD)
+        for finding in check_log(grasp, history):
+            typer.echo(f"{path.name}: {finding.name}: {finding.evidence}", err=True)
         grasps.append(collect_samples(grasp, history))
     model = fit_model(grasps, method=method, seed=seed)
     if json:

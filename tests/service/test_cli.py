@@ -4,6 +4,7 @@ import itertools
 import json
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +89,19 @@ def test_detect_tells_a_program_what_was_seen(run: Run, ramps: list[Path], tmp_p
     assert seen["slip_onsets"] > 0
     assert len(seen["time"]) == len(seen["stick_ratio"]) == seen["frames"]
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_check_says_what_is_doubtful_and_fit_says_it_beside_its_model(
+    run: Run, ramps: list[Path], tmp_path: Path
+) -> None:
+    assert "nothing found against it" in run("check", ramps[0])[1]
+    log, doubtful = formats.read(ramps[0]), tmp_path / "doubtful.npz"
+    container.write(replace(log, time=1e3 * log.time), doubtful)
+    found = json.loads(run("check", doubtful, "--json")[1])["findings"]
+    assert [each["name"] for each in found] == ["slow frames"]
+    assert "times are in s, not ms" in run("check", doubtful)[1]
+    code, _, told = run("fit", *ramps[1:], doubtful)
+    assert (code, told.count("slow frames")) == (0, 1)
 
 
 def test_detect_reads_tracked_markers_and_says_what_it_cannot_know(run: Run, tmp_path: Path) -> None:

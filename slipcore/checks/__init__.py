@@ -1,0 +1,53 @@
+"""What is wrong with a log, or with what was found in it: findings with their evidence and what to do.
+
+Most recordings that give a wrong friction break no rule of their format. These checks look at what a sensor cannot
+have measured, and at what a friction coefficient cannot depend on.
+"""
+
+import numpy as np
+
+from slipcore.checks import contact, friction, recording
+from slipcore.checks.subject import Check, Finding, Subject
+from slipcore.defaults import CheckOptions, choose_options
+from slipcore.element_forces import element_forces
+from slipcore.errors import NoForces, UnknownScale
+from slipcore.frames import GraspLog
+from slipcore.samples import FrictionSamples, collect_samples, normals_of
+from slipcore.slip_state import SlipHistory
+
+__all__ = ["Finding", "check_log"]
+
+CHECKS: tuple[Check, ...] = (
+    recording.time_unit,
+    recording.still_markers,
+    recording.repeated_frames,
+    recording.force_unit,
+    recording.force_sign,
+    recording.saturation,
+    recording.rest_in_contact,
+    contact.load_free_tangential_force,
+    contact.moving_contact,
+    friction.friction_by_force,
+    friction.friction_by_place,
+)
+"""In the order in which findings are told: the recording first, then what was found in it."""
+
+
+def check_log(log: GraspLog, history: SlipHistory, **options: float) -> list[Finding]:
+    """Look for what makes friction from this log doubtful; an empty list is no proof that all is well.
+
+    ``history``: what a detector found in it. ``options``: see ``defaults.CheckOptions``. Raises ``InvalidInput`` for an
+    option that does not exist or is out of its range.
+    """
+    limits = choose_options(CheckOptions, options)
+    forces = None if log.force is None else element_forces(log.force, normals_of(log))
+    pressing = np.zeros(log.displacement.shape[:3]) if forces is None else np.maximum(forces.pressing, 0.0)
+    subject = Subject(log, history, forces, pressing, _samples(log, history), limits)
+    return [finding for check in CHECKS for finding in check(subject)]
+
+
+def _samples(log: GraspLog, history: SlipHistory) -> FrictionSamples | None:
+    try:
+        return collect_samples(log, history)
+    except (NoForces, UnknownScale):
+        return None

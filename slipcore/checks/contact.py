@@ -1,0 +1,52 @@
+"""Checks of the contact as a whole: what it feels without load, and whether its markers go with it."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from slipcore.checks.subject import Finding, Subject
+from slipcore.frames import FloatArray
+
+
+def load_free_tangential_force(seen: Subject) -> Iterator[Finding]:
+    """Crosstalk, or wrong normals: elements feel what the whole contact does not."""
+    if seen.forces is None or not seen.held.any():
+        return
+    load = _load_ratio(seen)
+    free = seen.held & (load < seen.limits.no_load)
+    if not free.any():
+        return
+    sideways = (seen.forces.tangential * seen.forces.compressive).sum(axis=(1, 2))
+    ratio = float(np.median(sideways[free] / seen.total[free]))
+    if ratio > seen.limits.sideways_share:
+        evidence = f"elements feel {ratio:.2f} of the normal force sideways while the whole contact feels none"
+        remedy = "calibrate normals and crosstalk by a pure press; single elements' f_t/f_n are not friction here"
+        yield Finding("sideways force without load", evidence, remedy)
+
+
+def _load_ratio(seen: Subject) -> FloatArray:
+    """|ΣF_t|/F_n and |M_z|/Σ(r f_n) together, [t]: 0 without load, about μ where all slips."""
+    assert seen.log.force is not None
+    weight = seen.pressing / np.maximum(seen.total, np.finfo(float).tiny)[:, None, None]
+    centre = np.einsum("tnm,nmi->ti", weight, seen.log.position[..., :2])
+    arm = seen.log.position[None, ..., :2] - centre[:, None, None]
+    along = seen.log.force[..., :2]
+    moment = (arm[..., 0] * along[..., 1] - arm[..., 1] * along[..., 0]).sum(axis=(1, 2))
+    limit = (np.hypot(arm[..., 0], arm[..., 1]) * seen.pressing).sum(axis=(1, 2))
+    force = np.hypot(*along.sum(axis=(1, 2)).T)
+    tiny = np.finfo(float).tiny
+    return np.asarray(np.hypot(force / np.maximum(seen.total, tiny), moment / np.maximum(limit, tiny)))
+
+
+def moving_contact(seen: Subject) -> Iterator[Finding]:
+    """An object that rolls or rocks takes its contact along and leaves the markers."""
+    if not seen.held.any():
+        return
+    weight = seen.pressing[seen.held] / seen.total[seen.held][:, None, None]
+    centre = np.einsum("tnm,nmi->ti", weight, seen.log.position[..., :2])
+    below = np.einsum("tnm,tnmi->ti", weight, seen.log.displacement[seen.held][..., :2])
+    travel, moved = float(np.ptp(centre, axis=0).max()), float(np.ptp(below, axis=0).max())
+    if travel > moved + seen.limits.travel * np.sqrt(seen.log.element_area):
+        evidence = f"the contact travels {1e3 * travel:.2g} mm while the markers under it move {1e3 * moved:.2g} mm"
+        remedy = "hold the object so that it slides; one that rolls or rocks tells no friction"
+        yield Finding("contact travels", evidence, remedy)

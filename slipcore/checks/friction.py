@@ -1,0 +1,46 @@
+"""Checks of the friction that elements show: it is a material's, not a place's nor a force's."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from slipcore.checks.subject import Finding, Subject
+
+LEAST_OF_A_PLACE, LEAST_PLACES = 5, 4
+"""Samples of an element, and such elements, from which scatter between places is told from noise."""
+
+
+def friction_by_force(seen: Subject) -> Iterator[Finding]:
+    """Friction that depends on the element's force more than any law does."""
+    samples = seen.samples
+    if samples is None or len(samples) < seen.limits.least_samples:
+        return
+    low, high = np.quantile(samples.normal_force, [0.25, 0.75])
+    weakly, strongly = (
+        float(np.median(samples.friction_coefficient[chosen]))
+        for chosen in (samples.normal_force <= low, samples.normal_force >= high)
+    )
+    middle = float(np.median(samples.friction_coefficient))
+    if abs(strongly - weakly) > seen.limits.friction_change * middle:
+        evidence = f"friction is {weakly:.2f} where elements press least and {strongly:.2f} where they press most"
+        remedy = "forces that are smoothed over neighbours look so; believe the whole contact's ratio, not elements'"
+        yield Finding("friction follows force", evidence, remedy)
+
+
+def friction_by_place(seen: Subject) -> Iterator[Finding]:
+    """Friction that is a property of elements rather than of the material."""
+    if seen.samples is None or len(seen.samples) < seen.limits.least_samples:
+        return
+    friction = seen.samples.friction_coefficient
+    _, place, count = np.unique(seen.samples.element, return_inverse=True, return_counts=True)
+    mean = np.bincount(place, friction) / count
+    within = np.bincount(place, (friction - mean[place]) ** 2)
+    enough = count >= LEAST_OF_A_PLACE
+    if np.count_nonzero(enough) < LEAST_PLACES:
+        return
+    noise = within[enough] / (count[enough] - 1) / count[enough]
+    between = float(np.sqrt(max(np.var(mean[enough], ddof=1) - noise.mean(), 0.0)))
+    share = between / float(np.mean(friction))
+    if share > seen.limits.place_scatter:
+        evidence = f"friction differs by {share:.0%} from element to element, and stays so"
+        yield Finding("friction differs by place", evidence, "calibrate the sensor's elements, or clean its surface")

@@ -1,0 +1,75 @@
+"""Checks of what was recorded: units, signs, clocks, ranges."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from slipcore.checks.subject import Finding, Subject
+
+
+def time_unit(seen: Subject) -> Iterator[Finding]:
+    """Frames too far apart for slip."""
+    interval = float(np.median(np.diff(seen.log.time)))
+    if interval > seen.limits.longest_interval:
+        evidence = f"frames lie {interval:.3g} s apart; slip passes an element within a tenth of a second"
+        yield Finding("slow frames", evidence, "make sure that times are in s, not ms; record at 20 Hz or more")
+
+
+def still_markers(seen: Subject) -> Iterator[Finding]:
+    """A log without displacement."""
+    if not np.ptp(seen.log.displacement, axis=0).any():
+        evidence = "no marker ever moves"
+        yield Finding("no displacement", evidence, "map the field of displacements; forces alone tell no slip here")
+
+
+def repeated_frames(seen: Subject) -> Iterator[Finding]:
+    """A sensor that is slower than its recorder, or frozen."""
+    fields = [field for field in (seen.log.displacement, seen.log.force) if field is not None and field.any()]
+    if not fields or len(seen.log) < 3:
+        return
+    same = np.logical_and.reduce([(field[1:] == field[:-1]).all(axis=(1, 2, 3)) for field in fields])
+    if same.mean() > seen.limits.repeated_share:
+        evidence = f"{same.mean():.0%} of the frames are copies of the one before"
+        yield Finding("repeated frames", evidence, "record each frame once, with the time at which the sensor took it")
+
+
+def force_unit(seen: Subject) -> Iterator[Finding]:
+    """Forces beyond what gels stand."""
+    if seen.forces is None:
+        return
+    largest = float(seen.forces.normal.max()) / seen.log.element_area
+    if largest > seen.limits.largest_pressure:
+        evidence = f"{1e-6 * largest:.3g} MPa on an element"
+        yield Finding("force too large", evidence, "make sure of N (not mN, g or raw counts) and of the element's area")
+
+
+def force_sign(seen: Subject) -> Iterator[Finding]:
+    """Forces with the wrong sign."""
+    if seen.forces is None:
+        return
+    signed = seen.forces.pressing.sum(axis=(1, 2))
+    strongest = float(signed[np.argmax(np.abs(signed))])
+    if strongest < 0.0:
+        evidence = f"the object pulls with {-strongest:.3g} N where forces are largest"
+        remedy = "turn the sign of the forces: those of the object on the sensor, whose z points outwards"
+        yield Finding("force pulls", evidence, remedy)
+
+
+def saturation(seen: Subject) -> Iterator[Finding]:
+    """Readings at the end of their range."""
+    for name, field in (("displacement", seen.log.displacement), ("force", seen.log.force)):
+        if field is None or not field.any():
+            continue
+        size = np.abs(field).max(axis=-1)[seen.history.contact]
+        share = float(np.mean(size == size.max(initial=0.0))) if size.size else 0.0
+        if share > seen.limits.saturated_share:
+            evidence = f"{share:.1%} of the readings in contact have the largest {name}, to the last digit"
+            yield Finding("saturation", evidence, "press less, or choose a wider range of the sensor")
+
+
+def rest_in_contact(seen: Subject) -> Iterator[Finding]:
+    """A recording that begins after the touch."""
+    touching = int(np.count_nonzero(seen.history.contact[0]))
+    if touching:
+        evidence = f"{touching} elements touch in the first frame"
+        yield Finding("no rest", evidence, "begin the recording before the touch: what was before is not known")

@@ -1,0 +1,48 @@
+"""What the checks look at, and what they find."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from slipcore.defaults import CheckOptions
+from slipcore.element_forces import ElementForces
+from slipcore.frames import BoolArray, FloatArray, GraspLog
+from slipcore.samples import FrictionSamples
+from slipcore.slip_state import SlipHistory
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something that makes the friction found in a log doubtful: its ``name`` in docs/checks.md, what was seen, and
+    what to do about it.
+    """
+
+    name: str
+    evidence: str
+    remedy: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Subject:
+    """What the checks look at; ``forces``, with pressing parts [t, n, m] N, and ``samples`` where there are any."""
+
+    log: GraspLog
+    history: SlipHistory
+    forces: ElementForces | None
+    pressing: FloatArray
+    samples: FrictionSamples | None
+    limits: CheckOptions
+
+    @property
+    def total(self) -> FloatArray:
+        """Normal force of all elements, [t] N."""
+        return np.asarray(self.pressing.sum(axis=(1, 2)))
+
+    @property
+    def held(self) -> BoolArray:
+        """Frames with at least half of the largest normal force, [t]."""
+        return np.asarray(self.total > 0.5 * self.total.max(initial=0.0))
+
+
+Check = Callable[[Subject], Iterator[Finding]]

@@ -1,0 +1,150 @@
+"""Faults put into a log on purpose are found by name; a log without them is left alone."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from slipcore import GraspLog, InvalidInput, check_log, detect_slip
+from slipcore.contact import RampSchedule, tangential_ramp
+
+Scene = Callable[..., GraspLog]
+
+
+def names(log: GraspLog, **options: float) -> set[str]:
+    """Of all that is found."""
+    return {finding.name for finding in check_log(log, detect_slip(log, lookahead=2), **options)}
+
+
+@pytest.fixture(scope="module")
+def long_ramp() -> GraspLog:
+    """With friction samples enough to be compared."""
+    schedule = RampSchedule(rest=0.2, press=0.5, settle=0.2, shear=4.0, hold=0.3)
+    made = tangential_ramp(points=20, pitch=0.75e-3, schedule=schedule, marker_noise=1e-6, force_noise=5e-4, seed=3)
+    return replace(made, truth=None)
+
+
+def pressing(log: GraspLog) -> np.ndarray:
+    """Normal force of each element, [t, n, m] N, 0 where it does not press."""
+    assert log.force is not None
+    return np.maximum(-log.force[..., 2], 0.0)
+
+
+def with_force(log: GraspLog, force: np.ndarray) -> GraspLog:
+    return replace(log, force=force)
+
+
+def with_sideways(log: GraspLog) -> GraspLog:
+    """Each element also feels 0.4 of its normal force towards the middle."""
+    assert log.force is not None
+    inward = -log.position[..., :2] / np.maximum(np.linalg.norm(log.position[..., :2], axis=-1), 1e-9)[..., None]
+    force = log.force.copy()
+    force[..., :2] += 0.4 * pressing(log)[..., None] * inward
+    return with_force(log, force)
+
+
+def with_smoothed_normal(log: GraspLog) -> GraspLog:
+    """Normal forces as an inverse problem gives them that spreads each over its neighbours, tangential ones exact."""
+    assert log.force is not None
+    force = log.force.copy()
+    for axis in (1, 2):
+        for _ in range(4):
+            force[..., 2] = 0.5 * force[..., 2] + 0.25 * (
+                np.roll(force[..., 2], 1, axis) + np.roll(force[..., 2], -1, axis)
+            )
+    return with_force(log, force)
+
+
+def with_gains(log: GraspLog) -> GraspLog:
+    """Tangential gains that differ by 30 % from element to element."""
+    assert log.force is not None
+    force = log.force.copy()
+    force[..., :2] *= np.random.default_rng(2).uniform(0.5, 1.5, (*log.grid, 1))
+    return with_force(log, force)
+
+
+def rolling(log: GraspLog) -> GraspLog:
+    """The same forces, as they would be seen by a sensor over which the contact moves four elements."""
+    assert log.force is not None
+    steps = np.linspace(0.0, 4.0, len(log)).astype(int)
+    return with_force(
+        log, np.stack([np.roll(field, step, axis=0) for field, step in zip(log.force, steps, strict=True)])
+    )
+
+
+def saturated(log: GraspLog) -> GraspLog:
+    assert log.force is not None
+    most = 0.6 * float(np.abs(log.force).max())
+    return with_force(log, np.clip(log.force, -most, most))
+
+
+def doubled(log: GraspLog) -> GraspLog:
+    """A recorder of twice the sensor's rate."""
+    kept = np.arange(len(log)) // 2
+    return replace(
+        log,
+        displacement=log.displacement[kept],
+        force=None if log.force is None else log.force[kept],
+        normal=None if log.normal is None else log.normal[kept],
+        object_pose=None if log.object_pose is None else log.object_pose[kept],
+    )
+
+
+def without_beginning(log: GraspLog) -> GraspLog:
+    fields = {
+        name: getattr(log, name)[30:]
+        for name in ("time", "displacement", "force", "normal", "object_pose")
+        if getattr(log, name) is not None
+    }
+    return replace(log, **fields)
+
+
+FAULTS: dict[str, Callable[[GraspLog], GraspLog]] = {
+    "slow frames": lambda log: replace(log, time=1e3 * log.time),
+    "no displacement": lambda log: replace(log, displacement=np.zeros_like(log.displacement)),
+    "repeated frames": doubled,
+    "force too large": lambda log: with_force(log, 1e2 * np.asarray(log.force)),
+    "force pulls": lambda log: with_force(log, -np.asarray(log.force)),
+    "saturation": saturated,
+    "no rest": without_beginning,
+    "sideways force without load": with_sideways,
+    "contact travels": rolling,
+    "friction follows force": with_smoothed_normal,
+    "friction differs by place": with_gains,
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_is_found_by_name(long_ramp: GraspLog, fault: str) -> None:
+    assert fault in names(FAULTS[fault](long_ramp))
+
+
+def test_nothing_is_found_in_a_log_without_fault(long_ramp: GraspLog, short_ramp: GraspLog) -> None:
+    assert names(long_ramp) == set()
+    assert names(short_ramp) == set()
+    assert names(replace(long_ramp, force=None, normal=None, object_pose=None)) == set()
+
+
+@pytest.mark.parametrize("name", ["cond1", "cond1_layer5c", "reversal", "ring"])
+def test_nothing_but_its_beginning_is_found_in_scenes_of_another_solver(name: str, scene: Scene) -> None:
+    assert names(scene(name, marker_noise=3e-6, force_noise=2e-3)) <= {"no rest"}
+
+
+def test_of_real_recordings_it_is_said_why_their_friction_is_wrong(recording: GraspLog) -> None:
+    """Their elements' friction falls with force by half and more; two of them pivot, one rolls."""
+    found = names(recording)
+    assert {"friction follows force", "friction differs by place"} <= found
+    assert found & {"sideways force without load", "contact travels"}
+
+
+def test_a_limit_can_be_moved_and_a_wrong_one_is_refused(long_ramp: GraspLog) -> None:
+    assert "slow frames" in names(long_ramp, longest_interval=0.01)
+    with pytest.raises(InvalidInput, match="place_scatter"):
+        names(long_ramp, place_scatter=-1.0)
+
+
+def test_every_finding_is_documented() -> None:
+    page = Path("docs/checks.md").read_text(encoding="utf-8")
+    assert all(f"| {fault} |" in page for fault in FAULTS)
