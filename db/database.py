@@ -5,6 +5,7 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
@@ -71,6 +72,11 @@ class Database:
     def is_sqlite(self) -> bool:
         """Whether this is the embedded database."""
         return self.engine.dialect.name == "sqlite"
+
+    @property
+    def is_missing(self) -> bool:
+        """Whether there is no file of the embedded database; whoever opens it makes an empty one."""
+        return self.is_sqlite and not Path(self.engine.url.database or "").is_file()
 
     @contextmanager
     def connect(self) -> Iterator[Connection]:

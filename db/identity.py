@@ -18,7 +18,7 @@ from db.database import Database
 from db.defaults import HASHES_PER_QUERY
 from db.errors import StoreMismatch
 from db.records import Actor
-from db.repositories import audit, stores
+from db.repositories import audit, grasp_logs, stores
 from db.repositories import blobs as references
 
 REMEDY = "name the database and the data folder (or object store) of one service, or join these by `stiction db adopt`"
@@ -26,9 +26,10 @@ REMEDY = "name the database and the data folder (or object store) of one service
 
 @dataclass(frozen=True, slots=True)
 class Adopted:
-    """What was joined by hand: how many files the database refers to, and how many of them are missing."""
+    """What was joined by hand: how many files are there, to how many the database refers, and how many of them miss."""
 
     store_id: str
+    present: int
     referenced: int
     missing: int
 
@@ -63,11 +64,20 @@ def verify(database: Database, blobs: BlobStore) -> None:
 
 
 def verify_before_upgrade(database: Database, blobs: BlobStore) -> None:
-    """The same for a database of any older schema: that of another store must not be brought to a newer one."""
-    with database.read() as session:
-        known = stores.find_id(session) if stores.has_table(session) else None
-    if known is not None or next(blobs.hashes(), None) is not None:
+    """The same for a database of any older schema, or of none: it must not be changed beside the files of another.
+
+    One that is not there is not made either.
+    """
+    known, has_logs = None, False
+    if not database.is_missing:
+        with database.read() as session:
+            known = stores.find_id(session) if stores.has_table(session) else None
+            has_logs = grasp_logs.any_in_older_schema(session)
+    has_files = next(blobs.hashes(), None) is not None
+    if known is not None or has_files:
         _require_same(database, blobs, known, blobs.read_store_id())
+    if known is None and has_files and not has_logs:
+        raise _refers_to_none(database, blobs)
 
 
 def adopt(database: Database, blobs: BlobStore, actor: Actor | None) -> Adopted:
@@ -78,22 +88,22 @@ def adopt(database: Database, blobs: BlobStore, actor: Actor | None) -> Adopted:
     store_id = uuid.uuid4().hex
     with database.write() as session:
         stores.lock(session)
-        referenced, missing = count_missing(session, blobs)
+        present, referenced, missing = count_files(session, blobs)
         blobs.write_store_id(store_id)
         stores.set_id(session, store_id)
         if actor is not None:
             audit.add(session, actor, "store.adopted", store_id, {"referenced": referenced, "missing": missing})
     database.store_id = blobs.store_id = store_id
-    return Adopted(store_id, referenced, missing)
+    return Adopted(store_id, present, referenced, missing)
 
 
-def count_missing(session: Session, blobs: BlobStore) -> tuple[int, int]:
-    """How many blobs the database refers to, and how many of them are not there."""
+def count_files(session: Session, blobs: BlobStore) -> tuple[int, int, int]:
+    """How many blobs are there, to how many the database refers, and how many of those are not there."""
     present, count, missing = set(blobs.hashes()), 0, 0
     for sha256 in wanted(session):
         count += 1
         missing += sha256 not in present
-    return count, missing
+    return len(present), count, missing
 
 
 def wanted(session: Session) -> Iterator[str]:
@@ -110,12 +120,17 @@ def _is_new(session: Session, blobs: BlobStore) -> bool:
 
 def _require_consistent(session: Session, database: Database, blobs: BlobStore) -> None:
     """That two of before there were ids are of one service."""
-    referenced, missing = count_missing(session, blobs)
+    present, referenced, missing = count_files(session, blobs)
     if missing:
         what = f"{missing} of the {referenced} files that {database} refers to are not in {blobs}"
         raise StoreMismatch(f"{what}; allowed: {REMEDY}")
-    if not referenced and next(blobs.hashes(), None) is not None:
-        raise StoreMismatch(f"{blobs} has files, and {database} refers to none; allowed: {REMEDY}")
+    if present and not referenced:
+        raise _refers_to_none(database, blobs)
+
+
+def _refers_to_none(database: Database, blobs: BlobStore) -> StoreMismatch:
+    allowed = f"{REMEDY}, or, where the database is lost, fill an empty one by `stiction db restore --take-over`"
+    return StoreMismatch(f"{blobs} has files, and {database} refers to none; allowed: {allowed}")
 
 
 def _require_same(database: Database, blobs: BlobStore, known: str | None, found: str | None) -> None:

@@ -2,7 +2,7 @@
 
 import uuid
 
-from sqlalchemy import exists, func, select, update
+from sqlalchemy import exists, func, inspect, select, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, aliased
 
@@ -59,6 +59,12 @@ def is_stored(session: Session, sha256: str, material_id: int | None, detector: 
     """Whether there is a log of this content, material and detector, with its file."""
     found = _find_id(session, sha256, material_id, detector)
     return found is not None and session.get_one(GraspLogRow, found).file_state is None
+
+
+def any_in_older_schema(session: Session) -> bool:
+    """Whether any log is stored, in a database of whatever schema or of none."""
+    has_table = inspect(session.connection()).has_table(GraspLogRow.__tablename__)
+    return has_table and session.scalar(select(GraspLogRow.id).limit(1)) is not None
 
 
 def get(session: Session, log_id: str) -> StoredGraspLog:

@@ -20,6 +20,12 @@ Url = Annotated[
     str | None, typer.Option("--database-url", help="SQLAlchemy URL; by default the one that the service uses.")
 ]
 
+REFERS_TO_NONE = (
+    "the database refers to no file: the service starts without any log, and the {} files there belong to none. They "
+    "are kept as long as that is so. If their database is lost, fill a new, empty one from a backup by "
+    "`stiction db restore --take-over BACKUP`; if you named a wrong database, name theirs and adopt them with that"
+)
+
 
 @app.command()
 def upgrade(database_url: Url = None) -> None:
@@ -121,6 +127,8 @@ def adopt(database_url: Url = None) -> None:
         adopted = identity.adopt(database, opened_blobs(), command_actor())
     found = f"{adopted.referenced - adopted.missing} of {adopted.referenced} files that rows refer to are there"
     typer.echo(f"joined as store {adopted.store_id}: {found}")
+    if adopted.present and not adopted.referenced:
+        typer.echo(REFERS_TO_NONE.format(adopted.present), err=True)
 
 
 def opened_blobs() -> "BlobStore":
@@ -169,9 +177,8 @@ def opened(url: str | None, *, may_be_new: bool = False) -> Iterator["Database"]
             settings.data_folder.mkdir(parents=True, exist_ok=True)
         url = settings.resolved_database_url
     database = Database(url)
-    file = database.engine.url.database
-    if database.is_sqlite and not may_be_new and not Path(file or "").is_file():
-        raise NotFound("database", str(file))
+    if database.is_missing and not may_be_new:
+        raise NotFound("database", str(database.engine.url.database))
     try:
         yield database
     finally:

@@ -9,6 +9,7 @@ from typing import Any
 
 import httpx
 import pytest
+from sqlalchemy import inspect
 
 from db import migrate
 from db.blobs import BlobStore
@@ -57,6 +58,16 @@ def test_a_start_with_a_wrong_database_is_refused_and_loses_nothing(
     with pytest.raises(StoreMismatch, match=r"wrong\.sqlite3 .*allowed: name the database and the data folder"):
         start(wrong)
     assert files(right) == before
+    assert not (tmp_path / "wrong.sqlite3").exists()
+
+
+def test_an_empty_database_beside_files_stays_empty(right: Settings, tmp_path: Path) -> None:
+    (right.data_folder / "blobs" / "store-id").unlink()
+    wrong = right.model_copy(update={"database_url": f"sqlite:///{tmp_path / 'wrong.sqlite3'}"})
+    with closing(Database(wrong.resolved_database_url)) as database, database.connect() as connection:
+        with pytest.raises(StoreMismatch, match=r"refers to none; allowed: .*stiction db restore --take-over"):
+            start(wrong)
+        assert inspect(connection).get_table_names() == []
 
 
 def test_a_lost_database_in_the_folder_is_not_made_anew(right: Settings) -> None:
@@ -132,6 +143,23 @@ def test_a_store_can_be_joined_by_hand(
     assert ending.value.code == 0
     assert "1 of 1 files that rows refer to are there" in capsys.readouterr().out
     start(Settings(workers=0))
+
+
+def test_joining_an_empty_database_tells_what_that_means_and_what_to_do(
+    right: Settings,
+    tmp_path: Path,
+    sqlite_template: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    shutil.copyfile(sqlite_template, tmp_path / "wrong.sqlite3")
+    monkeypatch.setenv("STICTION_DATA_FOLDER", str(right.data_folder))
+    with pytest.raises(SystemExit) as ending:
+        main(["db", "adopt", "--database-url", f"sqlite:///{tmp_path / 'wrong.sqlite3'}"])
+    told = capsys.readouterr()
+    assert (ending.value.code, "0 of 0 files that rows refer to are there" in told.out) == (0, True)
+    assert "the 1 files there belong to none" in told.err
+    assert "stiction db restore --take-over" in told.err
 
 
 def test_the_same_holds_for_an_object_store(s3: Any, tmp_path: Path, serving: Serving, content: bytes) -> None:
