@@ -19,12 +19,12 @@ from db.errors import BlobDamaged, NotEmpty, NotFound
 from db.quarantine import sync_folder
 from db.records import Actor
 from db.repositories import audit, stores
-from db.tables import Base, IdempotencyKeyRow, RunnerRow, StoreRow
+from db.tables import Base, BrowserSessionRow, IdempotencyKeyRow, RunnerRow, StoreRow
 
 FILE = "stiction.sqlite3"
-LEFT_OUT = {RunnerRow.__tablename__, IdempotencyKeyRow.__tablename__, StoreRow.__tablename__}
-"""Tables of what is not copied: running processes, answers to repeated requests, and the store id: what is restored is
-a store of its own, so that two that grow apart are never taken for one."""
+LEFT_OUT = {table.__tablename__ for table in (RunnerRow, BrowserSessionRow, IdempotencyKeyRow, StoreRow)}
+"""Tables of what is not copied: running processes, sessions, answers to repeated requests, and the store id: what is
+restored is a store of its own, so that two that grow apart are never taken for one."""
 
 ROWS_AT_ONCE = 500
 

@@ -328,6 +328,17 @@ class AccessKeyRow(Base):
     group: Mapped[str | None] = mapped_column(String(100))
 
 
+class BrowserSessionRow(Base):
+    """A browser that somebody has logged in with an access key; of its token only the digest is kept."""
+
+    __tablename__ = "browser_sessions"
+
+    sha256: Mapped[str] = mapped_column(String(64), primary_key=True)
+    key_id: Mapped[str] = mapped_column(ForeignKey("access_keys.id"), index=True)
+    created_at: Mapped[datetime] = mapped_column(default=now)
+    expires_at: Mapped[datetime] = mapped_column(index=True)
+
+
 class IdempotencyKeyRow(Base):
     """A key under which somebody (an access key's id, or nobody's) asked for something, and what was answered."""
 

@@ -33,6 +33,8 @@ from service.processes import private_files
 from service.processes.folder_lock import shared
 from service.settings import Settings
 from service.stream.sessions import Streams
+from service.web import pages
+from service.web.problem_pages import ProblemPages
 
 UNTRACED = access.PUBLIC_PATHS | {"/metrics"}
 """Paths of which a monitor asks all the time."""
@@ -78,12 +80,15 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     for module in (health, metrics, materials, owners, grasp_logs, curation, planning, jobs, stream, audit):
         app.include_router(module.router)
+    app.include_router(pages.router)
     access.check_routes(app)
     app.state.metrics = Metrics()
-    answered, admission = Answered(app.state.metrics.requests), Admission(chosen)
+    answered = Answered(app.state.metrics.requests)
+    admission = app.state.admission = Admission(chosen)
     app.add_middleware(Gate, admission=admission)
     app.add_middleware(HeadRequests)
     app.add_middleware(Envelope)
+    app.add_middleware(ProblemPages)
     app.add_middleware(Metering, answered=answered)
     app.add_middleware(Lookups, admission=admission, answered=answered)
     app.add_middleware(StartRefusal)

@@ -133,6 +133,16 @@ def test_the_rooms_of_estimators_import_one_way() -> None:
             assert not upward, f"{path.relative_to(ROOT)} imports {sorted(upward)}"
 
 
+def test_only_the_application_knows_the_pages_and_these_ask_no_tables() -> None:
+    """A page asks use cases and repositories, as a REST route does, and nothing depends on how it looks."""
+    for path in sorted((ROOT / "service").rglob("*.py")):
+        modules = imported_modules(path)
+        if ROOT / "service" / "web" in path.parents:
+            assert not {name for name in modules if name.startswith(("sqlalchemy", "db.tables", "db.database"))}, path
+        elif path.name != "app.py":
+            assert not {name for name in modules if name.startswith("service.web")}, path
+
+
 def test_nothing_but_the_service_knows_a_web_framework() -> None:
     for package in ("slipcore", "estimators", "db", "migrations"):
         for path in (ROOT / package).rglob("*.py"):

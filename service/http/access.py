@@ -27,8 +27,10 @@ SCOPES: tuple[Scope, ...] = get_args(Scope)
 """What keys are for; each scope implies those before it."""
 
 CHALLENGE = 'Bearer realm="stiction"'
-PUBLIC_PATHS = frozenset({"/healthz", "/readyz", "/openapi.json", "/docs", "/docs/oauth2-redirect", "/redoc"})
-"""What anybody may see: whether the service lives, and its description, which is the same everywhere."""
+_PUBLIC_PAGES = ("/docs", "/docs/oauth2-redirect", "/redoc", "/login", "/logout", "/problems")
+PUBLIC_PATHS = frozenset({"/healthz", "/readyz", "/openapi.json", *_PUBLIC_PAGES})
+PUBLIC_FOLDERS = ("/assets/", "/problems/")
+"""What anybody may see: whether the service lives, how to log in, and what is the same everywhere."""
 
 LONGEST_ADDRESS = 100
 """Characters of a network address that the audit trail keeps: one of IPv6 with its zone has some 60."""
@@ -77,10 +79,17 @@ def digest(text: str) -> str:
 
 def is_key(text: str, stored: AccessKey) -> bool:
     """Whether ``text`` is this key, neither revoked nor expired; takes as long wherever they differ."""
-    is_same = hmac.compare_digest(digest(text), stored.sha256)
-    return (
-        is_same and stored.revoked_at is None and (stored.expires_at is None or datetime.now(UTC) < stored.expires_at)
-    )
+    return hmac.compare_digest(digest(text), stored.sha256) and is_valid(stored)
+
+
+def is_valid(stored: AccessKey) -> bool:
+    """Whether a key is neither revoked nor expired."""
+    return stored.revoked_at is None and (stored.expires_at is None or datetime.now(UTC) < stored.expires_at)
+
+
+def is_public(path: str) -> bool:
+    """Whether anybody may ask for this path."""
+    return path in PUBLIC_PATHS or path.startswith(PUBLIC_FOLDERS)
 
 
 @lru_cache(maxsize=1024)
@@ -135,7 +144,7 @@ def scopes_of_routes(app: FastAPI) -> dict[str, set[str]]:
     return {
         f"{'/'.join(sorted(route.methods or {'WS'}))} {route.path}": set(_scopes(getattr(route, "dependant", None)))
         for route in iter_route_contexts(app.routes)
-        if route.path not in PUBLIC_PATHS
+        if not is_public(str(route.path))
     }
 
 

@@ -15,8 +15,8 @@ from db.errors import NotFound, StorageUnavailable
 from db.records import AccessKey
 from db.repositories import access_keys
 from service.context import Context
-from service.http import access, origin, problems
-from service.http.access import CHALLENGE, EVERYTHING, NO_KEY, PUBLIC_PATHS, Access, is_loopback
+from service.http import access, origin, problems, sessions
+from service.http.access import CHALLENGE, EVERYTHING, NO_KEY, Access, is_loopback, is_public
 from service.http.problems import INVALID_KEY, KEY_REQUIRED, MISDIRECTED_REQUEST, TOO_MANY_REQUESTS, Problem
 from service.http.rate_limit import RateLimit
 from service.settings import Settings
@@ -51,6 +51,7 @@ class KeyRing:
 
     def __init__(self) -> None:
         self._kept: dict[str, tuple[AccessKey, float]] = {}
+        self._sessions: dict[str, tuple[AccessKey, float]] = {}
 
     async def find(self, database: Database, text: str) -> AccessKey | None:
         """The key with this text, if it is a valid one."""
@@ -63,10 +64,21 @@ class KeyRing:
         known = await run_in_threadpool(_read, database, key_id)
         if not access.is_key(text, known):
             return None
-        if len(self._kept) >= MOST_KEPT:
-            self._kept.clear()
-        self._kept[key_id] = (known, time.monotonic() + KEPT_SECONDS)
+        _keep(self._kept, key_id, known)
         return known
+
+    async def find_of_session(self, database: Database, token: str) -> AccessKey | None:
+        """The key with which somebody logged in whose browser has this token, if it is valid still."""
+        known, until = self._sessions.get(token, (None, 0.0))
+        if time.monotonic() > until:
+            known = await run_in_threadpool(sessions.find_key, database, token)
+            if known is not None:
+                _keep(self._sessions, token, known)
+        return known if known is not None and access.is_valid(known) else None
+
+    def forget_session(self, token: str) -> None:
+        """Believe a token no longer: somebody has logged out."""
+        self._sessions.pop(token, None)
 
     def find_kept(self, text: str) -> AccessKey | None:
         """The same without a question to the database: None, too, where one would be needed."""
@@ -83,7 +95,7 @@ class Gate:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
-        if scope["type"] not in {"http", "websocket"} or scope["path"] in PUBLIC_PATHS:
+        if scope["type"] not in {"http", "websocket"} or is_public(scope["path"]):
             await self.app(scope, receive, send)
             return
         connection = HTTPConnection(scope)
@@ -121,6 +133,8 @@ class Admission:
 
     def known(self, connection: HTTPConnection) -> Access | None:
         """Who asks, where that is known without waiting and they may; does not count."""
+        if sessions.sent_token(connection) is not None:
+            return None
         try:
             text = self._sent_key(connection)
         except Problem:
@@ -137,10 +151,39 @@ class Admission:
             detail = f"more than {self._settings.rate_limit:g} requests a second; try again in {seconds:.3f} s"
             raise Problem(TOO_MANY_REQUESTS, detail, headers=headers)
 
+    async def find_key(self, connection: HTTPConnection, text: str) -> AccessKey:
+        """The key with this text; raises ``Problem`` for what is none, or where an address asks too often."""
+        self._count(_address(connection))
+        return await self._find(connection, text)
+
+    def forget_session(self, token: str) -> None:
+        """Believe a token no longer: somebody has logged out."""
+        self._ring.forget_session(token)
+
     async def _identify(self, connection: HTTPConnection) -> Access:
-        text = self._sent_key(connection)
-        if text is None:
-            return EVERYTHING
+        found = await self._key_of_session(connection)
+        if found is None:
+            text = self._sent_key(connection)
+            if text is None:
+                return EVERYTHING
+            found = await self._find(connection, text)
+        return Access(found.id, found.scope, found.group)
+
+    async def _key_of_session(self, connection: HTTPConnection) -> AccessKey | None:
+        """The key of a browser's session; one that has ended is as if none was sent."""
+        token = sessions.sent_token(connection)
+        if token is None:
+            return None
+        context: Context = connection.app.state.context
+        try:
+            found = await self._ring.find_of_session(context.database, token)
+        except StorageUnavailable as error:
+            raise problems.storage_unavailable(error) from error
+        if found is not None:
+            origin.check_site(connection, is_browser=True)
+        return found
+
+    async def _find(self, connection: HTTPConnection, text: str) -> AccessKey:
         context: Context = connection.app.state.context
         try:
             found = await self._ring.find(context.database, text)
@@ -149,7 +192,7 @@ class Admission:
         if found is None:
             headers = {"WWW-Authenticate": f'{CHALLENGE}, error="invalid_token"'}
             raise Problem(INVALID_KEY, "the access key is unknown, revoked, expired or garbled", headers=headers)
-        return Access(found.id, found.scope, found.group)
+        return found
 
     def _sent_key(self, connection: HTTPConnection) -> str | None:
         """The key that was sent, which counts even where none is needed; None where none was and that is well."""
@@ -167,6 +210,12 @@ class Admission:
         if self._settings.access == "auto":
             return not _is_local(scope) or origin.is_forwarded(scope)
         return self._settings.access == "keys"
+
+
+def _keep(kept: dict[str, tuple[AccessKey, float]], name: str, known: AccessKey) -> None:
+    if len(kept) >= MOST_KEPT:
+        kept.clear()
+    kept[name] = (known, time.monotonic() + KEPT_SECONDS)
 
 
 def _counted_as(admitted: Access, connection: HTTPConnection) -> str | None:

@@ -31,11 +31,12 @@ def is_forwarded(scope: Scope) -> bool:
     return any(name in FORWARDING or name.startswith(b"x-forwarded-") for name, _ in scope["headers"])
 
 
-def check_site(connection: HTTPConnection) -> None:
+def check_site(connection: HTTPConnection, *, is_browser: bool = False) -> None:
     """Refuse what a page of another site asks for in the name of its visitor: a change, or a live stream.
 
     A browser sends such requests with the right of whoever sits before it, and says where they come from by headers
-    that no page can forge: ``Sec-Fetch-Site``, and ``Origin``. Raises ``Problem``.
+    that no page can forge: ``Sec-Fetch-Site``, and ``Origin``; one that is known to be a browser (``is_browser``) has
+    to. Raises ``Problem``.
     """
     if connection.scope["type"] == "http" and connection.scope["method"] in SAFE_METHODS:
         return
@@ -43,6 +44,8 @@ def check_site(connection: HTTPConnection) -> None:
     allowed = "a page of this service, or no browser; another site's page needs an access key"
     if site is not None and site not in {"same-origin", "none"}:
         raise Problem.wrong_value(CROSS_SITE_REQUEST, "Sec-Fetch-Site", site, allowed)
+    if is_browser and site is None and origin is None:
+        raise Problem.wrong_value(CROSS_SITE_REQUEST, "Origin", "missing", allowed)
     if site is None and origin is not None and not _is_own(origin, connection.headers.get("host", "")):
         raise Problem.wrong_value(CROSS_SITE_REQUEST, "Origin", origin, allowed)
 

@@ -18,6 +18,7 @@ from db.records import Claim, Detection, NewGraspLog, NewModel, SampleSummary, S
 from db.repositories import (
     access_keys,
     audit,
+    browser_sessions,
     detections,
     friction_models,
     grasp_logs,
@@ -45,6 +46,7 @@ def fill(database: Database, log: NewGraspLog, detection: Detection, samples: Sa
         stores.set_id(session, "0" * 32)
         idempotency_keys.claim(session, "", "once", log.sha256, timedelta(hours=1))
         access_keys.add(session, "0" * 12, "robot", "read", log.sha256)
+        browser_sessions.add(session, log.sha256, "0" * 12, now() + timedelta(hours=1))
         audit.add(session, audit.SERVICE, "material.created", "paper")
         assert jobs.claim(session, runners.add(session, "host:1")) == Claim(job, runners.list_all(session)[0].id)
 

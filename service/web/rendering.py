@@ -1,0 +1,46 @@
+"""Templates made into answers: whatever somebody typed is escaped, and a page may load nothing but our own files."""
+
+from functools import cache
+from typing import Any
+from urllib.parse import quote
+
+from fastapi import Request
+from fastapi.responses import HTMLResponse
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from service.http.access import EVERYTHING, Access
+from service.http.sessions import sent_token
+from service.web import formatting
+from service.web.assets import path_of
+
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; form-action 'self'; "
+    "base-uri 'none'; frame-ancestors 'none'"
+)
+HEADERS = {"Content-Security-Policy": POLICY, "Referrer-Policy": "same-origin"}
+"""Of every page. Without a referrer a browser would not even tell where a form comes from (``Origin: null``)."""
+
+
+def render(request: Request, template: str, status: int = 200, **given: Any) -> HTMLResponse:
+    """A page; its template sees what is ``given``, who asks, and whether a browser's session lets it."""
+    access: Access = getattr(request.state, "access", EVERYTHING)
+    page = _environment().get_template(template)
+    text = page.render(request=request, access=access, in_session=sent_token(request) is not None, **given)
+    return HTMLResponse(text, status, HEADERS)
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("service.web", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    for filter_ in (formatting.number, formatting.interval, formatting.age, formatting.moment, formatting.size):
+        environment.filters[filter_.__name__] = filter_
+    environment.filters["grouped"] = formatting.grouped
+    environment.filters["segment"] = lambda text: quote(str(text), safe="")
+    environment.globals["asset"] = path_of
+    return environment

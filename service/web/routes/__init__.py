@@ -1,0 +1,1 @@
+"""Pages, one module a subject: they ask the same use cases and repositories as the REST routes, and render."""

@@ -1,0 +1,61 @@
+"""Log in with an access key, and out."""
+
+import asyncio
+from typing import Annotated
+
+from fastapi import APIRouter, Request, Response
+from fastapi.params import Form
+from fastapi.responses import RedirectResponse
+
+from service.context import Given
+from service.http import origin, sessions
+from service.http.gate import Admission
+from service.http.problems import Problem
+from service.web.rendering import render
+
+router = APIRouter(include_in_schema=False)
+
+SEE_OTHER = 303
+
+
+@router.get("/login")
+async def show_login(request: Request, next: str = "/") -> Response:  # noqa: A002  (the field's own name)
+    """The form that takes a key."""
+    return render(request, "login.html", next=_own_path(next), problem=None)
+
+
+@router.post("/login")
+async def log_in(
+    context: Given,
+    request: Request,
+    key: Annotated[str, Form(max_length=1000)] = "",
+    next: Annotated[str, Form(max_length=2000)] = "/",  # noqa: A002
+) -> Response:
+    """Begin a session of this key; raises ``Problem`` for a form of another site's page."""
+    origin.check_site(request, is_browser=True)
+    admission: Admission = request.app.state.admission
+    try:
+        found = await admission.find_key(request, key.strip())
+    except Problem as problem:
+        return render(request, "login.html", problem.kind.status, next=_own_path(next), problem=problem)
+    response = RedirectResponse(_own_path(next), SEE_OTHER)
+    await asyncio.to_thread(sessions.begin, context.database, found, request, response)
+    return response
+
+
+@router.post("/logout")
+async def log_out(context: Given, request: Request) -> Response:
+    """End the session, if there is one; raises ``Problem`` for a form of another site's page."""
+    origin.check_site(request, is_browser=True)
+    response, token = RedirectResponse("/login", SEE_OTHER), sessions.sent_token(request)
+    if token is not None:
+        admission: Admission = request.app.state.admission
+        admission.forget_session(token)
+        await asyncio.to_thread(sessions.end, context.database, token, response)
+    return response
+
+
+def _own_path(path: str) -> str:
+    """The path where to go on, if it is one of this service's pages: ``//host`` and ``/\\host`` lead elsewhere."""
+    is_own = path.startswith("/") and not path.startswith(("//", "/\\")) and path.isprintable()
+    return path if is_own else "/"

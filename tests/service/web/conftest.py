@@ -1,0 +1,64 @@
+from collections.abc import Callable
+from html.parser import HTMLParser
+from typing import Any
+
+import pytest
+
+from db.database import Database
+from db.repositories import materials
+
+HTML = {"accept": "text/html"}
+HOSTILE = [
+    "<script>alert(1)</script>",
+    "'\"><img src=x onerror=alert(1)>",
+    "x" * 10_000,
+    "\u202eشبكة مطاطية",
+    "🧤🖐🏽",
+    "{{ 7*7 }}",
+]
+
+
+class Elements(HTMLParser):
+    """The elements of a page, each with its attributes, and its text."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.text = ""
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attributes: Any) -> None:
+        self.found.append((tag, dict(attributes)))
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+    def foreign(self) -> list[str]:
+        """Elements and attributes that none of our templates has: markup that somebody typed."""
+        scripts = [given.get("src") or "" for tag, given in self.found if tag in {"script", "img"}]
+        handlers = [name for _, given in self.found for name in given if name.startswith("on") or name == "style"]
+        return [source for source in scripts if not source.startswith("/assets/")] + handlers
+
+
+@pytest.fixture(scope="session")
+def elements() -> Callable[[str], Elements]:
+    return Elements
+
+
+@pytest.fixture
+def browser(reach: Any) -> Any:
+    """Somebody at this machine's browser, of whom no key is asked."""
+    caller = reach("open")
+    caller.headers |= HTML
+    return caller
+
+
+@pytest.fixture
+def add(database: Database) -> Callable[..., int]:
+    """Make a material known."""
+
+    def add_material(name: str, description: str = "") -> int:
+        with database.write() as session:
+            return materials.create(session, name, description).id
+
+    return add_material

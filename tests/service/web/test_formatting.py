@@ -1,0 +1,37 @@
+from datetime import UTC, datetime, timedelta
+
+import pytest
+
+from service.web import formatting
+from service.web.assets import all_assets
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.4, "0.400"),
+        (-0.12345, "−0.123"),
+        (1234.5, "1230"),
+        (181.0, "181"),
+        (2.5e-7, "2.50 × 10⁻⁷"),
+        (3e9, "3.00 × 10⁹"),
+        (0.0, "0"),
+        (float("nan"), "–"),
+        (None, "–"),
+    ],
+)
+def test_numbers_have_sensible_digits(value: float | None, text: str) -> None:
+    assert formatting.number(value) == text
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [(5, "just now"), (60, "1 minute ago"), (7300, "2 hours ago"), (864000, "10 days ago"), (4e7, "1 year ago")],
+)
+def test_an_age_is_told_in_its_largest_unit(seconds: float, text: str) -> None:
+    now = datetime.now(UTC)
+    assert formatting.age(now - timedelta(seconds=seconds), now) == text
+
+
+def test_style_and_scripts_are_light() -> None:
+    assert sum(len(asset.content) for asset in all_assets().values()) <= 150_000

@@ -1,0 +1,85 @@
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from tests.service.web.conftest import HOSTILE
+
+pytestmark = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+OWN = {"sec-fetch-site": "same-origin"}
+
+
+def test_an_empty_database_greets_with_two_next_steps(browser: Any, elements: Callable[..., Any]) -> None:
+    page = elements(browser.get("/").text)
+    assert [tag for tag, _ in page.found].count("li") == 2
+    assert "stiction simulate" in page.text
+    assert ("form", {"method": "post", "action": "/materials", "class": "fields narrow"}) in page.found
+
+
+@pytest.mark.usefixtures("store")
+def test_a_material_is_listed_with_friction_and_interval(browser: Any) -> None:
+    page = browser.get("/").text
+    assert '<a href="/materials/paper">' in page
+    assert "<strong>0.400</strong>" in page  # β₀ of the stored model
+    assert "0.362 … 0.438" in page  # 0.4 ± √((1.645·0.02)² + 1.833²·(1e-4 + 0.05²·1e-4))
+    assert "ols v1" in page
+
+
+@pytest.mark.usefixtures("store")
+def test_a_working_point_outside_the_data_is_marked(browser: Any) -> None:
+    assert "outside the data" not in browser.get("/?fn=0.05").text
+    assert "outside the data" in browser.get("/?fn=5").text
+
+
+def test_a_search_finds_parts_of_names_and_says_when_there_are_none(browser: Any, add: Callable[..., int]) -> None:
+    for name in ("paper", "cardboard"):
+        add(name)
+    assert "cardboard" not in browser.get("/?search=PAP").text
+    assert "No material's name has" in browser.get("/?search=wood").text
+
+
+def test_a_long_list_comes_in_parts_that_lead_on(
+    browser: Any, add: Callable[..., int], elements: Callable[..., Any]
+) -> None:
+    for number in range(70):
+        add(f"m{number:02}")
+    seen: list[str] = []
+    path = "/?sort=-name&fn="
+    while path:
+        found = elements(browser.get(path).text).found
+        links = [attributes["href"] for tag, attributes in found if tag == "a"]
+        seen += [link for link in links if link.startswith("/materials/")]
+        path = next((link for link in links if "cursor=" in link), "")
+    assert seen == [f"/materials/m{number:02}" for number in reversed(range(70))]
+
+
+@pytest.mark.parametrize("typed", HOSTILE)
+def test_what_somebody_typed_is_text_and_never_markup(
+    browser: Any, add: Callable[..., int], elements: Callable[..., Any], typed: str
+) -> None:
+    add("plain", typed)
+    for path in ("/", f"/?search={typed[:90]}"):
+        assert elements(browser.get(path).text).foreign() == []
+    assert typed[:100] in elements(browser.get("/").text).text
+
+
+def test_a_form_makes_a_material_known_and_leads_to_it(browser: Any) -> None:
+    answer = browser.request("POST", "/materials", data={"name": " sheet 1 ", "description": "80 g/m²"}, headers=OWN)
+    assert (answer.status_code, answer.headers["location"]) == (303, "/materials/sheet%201")
+    assert "80 g/m²" in browser.get("/").text
+
+
+@pytest.mark.parametrize(
+    ("data", "told"),
+    [
+        ({"name": "<b>"}, "name is &lt;b&gt;"),
+        ({}, "name is missing"),
+        ({"name": "paper"}, "The material exists already"),
+    ],
+)
+def test_a_refused_form_is_told_as_a_page(browser: Any, add: Callable[..., int], data: Any, told: str) -> None:
+    add("paper")
+    answer = browser.request("POST", "/materials", data=data, headers=OWN)
+    assert answer.status_code in {409, 422}
+    assert answer.headers["content-type"] == "text/html; charset=utf-8"
+    assert told in answer.text

@@ -1,0 +1,149 @@
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from http.cookies import SimpleCookie
+from typing import Any
+
+import pytest
+
+from db.database import Database
+from db.repositories import access_keys, browser_sessions
+from service.http import access, gate, sessions
+from tests.service.web.conftest import HTML
+
+pytestmark = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+OWN = {"origin": "http://10.0.0.5"}
+
+
+def log_in(caller: Any, key: str, **headers: str) -> Any:
+    return caller.request("POST", "/login", data={"key": key, "next": "/?sort=-name"}, headers=headers or OWN)
+
+
+@pytest.fixture
+def caller(reach: Any) -> Any:
+    """A browser on another machine, of which a key is asked."""
+    found = reach("keys")
+    found.headers |= HTML
+    return found
+
+
+@pytest.fixture
+def cookie(caller: Any, make: Callable[..., str]) -> str:
+    """The cookie of a session whose key may upload."""
+    return str(log_in(caller, make("upload")).headers["set-cookie"].partition(";")[0])
+
+
+def test_who_has_no_key_is_led_to_the_login_and_back(caller: Any, make: Callable[..., str]) -> None:
+    answer = caller.get("/?sort=-name")
+    assert (answer.status_code, answer.headers["location"]) == (303, "/login?next=%2F%3Fsort%3D-name")
+    assert 'name="next" value="/?sort=-name"' in caller.get(answer.headers["location"]).text
+    answer = log_in(caller, make())
+    assert (answer.status_code, answer.headers["location"]) == (303, "/?sort=-name")
+    page = caller.get("/", headers={"cookie": answer.headers["set-cookie"].partition(";")[0]})
+    assert page.status_code == 200
+    assert "Log out" in page.text
+
+
+def test_programs_are_refused_as_ever(caller: Any) -> None:
+    for headers in ({"accept": "application/json"}, {"accept": "*/*"}):
+        answer = caller.get("/", headers=headers)
+        assert (answer.status_code, answer.headers["content-type"]) == (401, "application/problem+json")
+    assert caller.get("/v1/materials").headers["content-type"] == "application/problem+json"
+
+
+def test_the_cookie_is_no_key_and_is_kept_from_scripts_and_other_sites(
+    caller: Any, make: Callable[..., str], database: Database
+) -> None:
+    key = make()
+    found = SimpleCookie(log_in(caller, key).headers["set-cookie"])[sessions.COOKIE]
+    assert (found["httponly"], found["samesite"], found["path"], found["secure"]) == (True, "strict", "/", "")
+    assert key not in found.value
+    with database.read() as session:
+        assert browser_sessions.find_key(session, found.value) is None
+        assert browser_sessions.find_key(session, access.digest(found.value)) is not None
+
+
+def test_over_tls_the_cookie_goes_over_tls_only(caller: Any, make: Callable[..., str]) -> None:
+    caller.server = "10.0.0.5"
+    answer = caller.request(
+        "POST", "https://10.0.0.5/login", data={"key": make()}, headers={"origin": "https://10.0.0.5"}
+    )
+    assert "Secure" in answer.headers["set-cookie"]
+
+
+@pytest.mark.parametrize("key", ["", "nonsense", "stiction_0123456789ab_" + "0" * 64])
+def test_what_is_no_key_begins_no_session(caller: Any, key: str) -> None:
+    answer = log_in(caller, key)
+    assert answer.status_code == 401
+    assert "set-cookie" not in answer.headers
+    assert "unknown, revoked, expired or garbled" in answer.text
+
+
+@pytest.mark.parametrize("path", ["//elsewhere.org/", "/\\elsewhere.org", "https://elsewhere.org", "javascript:1", ""])
+def test_the_login_leads_nowhere_else(caller: Any, make: Callable[..., str], path: str) -> None:
+    answer = caller.request("POST", "/login", data={"key": make(), "next": path}, headers=OWN)
+    assert answer.headers["location"] == "/"
+
+
+@pytest.mark.parametrize(
+    "headers", [{"origin": "http://elsewhere.org"}, {"sec-fetch-site": "cross-site"}, {"origin": "null"}, {}]
+)
+@pytest.mark.parametrize("path", ["/login", "/logout", "/materials"])
+def test_a_form_of_another_site_changes_nothing(
+    caller: Any, make: Callable[..., str], cookie: str, path: str, headers: dict[str, str]
+) -> None:
+    data = {"key": make(), "name": "paper"}
+    answer = caller.request("POST", path, data=data, headers={**headers, "cookie": cookie})
+    assert answer.status_code == 403
+    assert "set-cookie" not in answer.headers
+    assert "The request is of another site" in answer.text
+
+
+def test_a_session_may_do_what_its_key_may_and_the_change_is_the_keys(caller: Any, cookie: str) -> None:
+    answer = caller.request("POST", "/materials", data={"name": "paper"}, headers={**OWN, "cookie": cookie})
+    assert answer.status_code == 303
+    own = caller.get("/v1/materials/paper/owners", headers={"cookie": cookie}).json()["owners"]
+    assert own[0].startswith("key:")
+    assert caller.get("/v1/audit", headers={"cookie": cookie}).status_code == 403  # that is for admins
+
+
+def test_a_session_of_a_key_that_may_only_read_changes_nothing(caller: Any, make: Callable[..., str]) -> None:
+    cookie = log_in(caller, make("read")).headers["set-cookie"].partition(";")[0]
+    answer = caller.request("POST", "/materials", data={"name": "paper"}, headers={**OWN, "cookie": cookie})
+    assert answer.status_code == 403
+    assert "may only read" in caller.get("/", headers={"cookie": cookie}).text
+
+
+def test_logging_out_ends_the_session_at_once(caller: Any, cookie: str) -> None:
+    assert caller.get("/", headers={"cookie": cookie}).status_code == 200
+    answer = caller.request("POST", "/logout", headers={**OWN, "cookie": cookie})
+    assert (answer.status_code, answer.headers["location"]) == (303, "/login")
+    assert caller.get("/", headers={"cookie": cookie}).status_code == 303
+
+
+def test_a_session_ends_with_its_key(
+    caller: Any, make: Callable[..., str], database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    key = make()
+    headers = {"cookie": log_in(caller, key).headers["set-cookie"].partition(";")[0]}
+    assert caller.get("/", headers=headers).status_code == 200
+    with database.write() as session:
+        access_keys.revoke(session, str(access.key_id(key)))
+    soon = time.monotonic() + gate.KEPT_SECONDS + 0.1
+    monkeypatch.setattr(gate.time, "monotonic", lambda: soon)
+    assert caller.get("/", headers=headers).status_code == 303
+
+
+def test_a_session_that_is_over_is_forgotten(database: Database, make: Callable[..., str]) -> None:
+    key_id = str(access.key_id(make()))
+    now = datetime.now(UTC)
+    with database.write() as session:
+        browser_sessions.add(session, "a" * 64, key_id, now - timedelta(seconds=1))
+        assert browser_sessions.find_key(session, "a" * 64) is None
+        browser_sessions.add(session, "b" * 64, key_id, now + timedelta(hours=1))
+        assert browser_sessions.find_key(session, "b" * 64) is not None
+
+
+def test_a_key_in_the_header_counts_before_the_cookie(caller: Any, make: Callable[..., str], cookie: str) -> None:
+    headers = {"cookie": cookie, "authorization": f"Bearer {make('admin')}"}
+    assert caller.get("/v1/audit", headers=headers).status_code == 200
