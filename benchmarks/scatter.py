@@ -106,10 +106,10 @@ def oracle_widths(kind: Kind, data: list[FrictionSamples]) -> np.ndarray:
     return np.asarray(2.0 * special.ndtri(0.975) * np.sqrt(np.diag(np.linalg.inv(information))))
 
 
-def achieved(kind: Kind, told: float) -> float:
-    """Probability that the mean friction of a new grasp's contact is below what was told."""
+def achieved(kind: Kind, told: float, at: tuple[float, float] = WORKING_POINT) -> float:
+    """Probability that the mean friction of a new grasp's contact is below what was told ``at`` v and f_n."""
     nodes, weights = np.polynomial.hermite_e.hermegauss(60)
-    v, f_n = WORKING_POINT
+    v, f_n = at
     mean = factor(kind, nodes) * (TRUTH @ [1.0, v, f_n])
     deviation = np.sqrt((kind.between_places**2 + kind.within**2) / CONTACT)
     return float(weights @ special.ndtr((told - mean) / deviation) / weights.sum())

@@ -123,10 +123,22 @@ class FrictionClient:
         return self._run(flows.model(name, method, self._kept, self._stale_after))
 
     def friction(
-        self, name: str, v: float, fn: float, quantile: float | None = None, method: str | None = None
+        self,
+        name: str,
+        v: float,
+        fn: float,
+        quantile: float | None = None,
+        method: str | None = None,
+        *,
+        of: str | None = None,
+        elements: int | None = None,
     ) -> FrictionAnswer:
-        """Friction at velocity ``v`` m/s and ``fn`` N an element: the mean, or a quantile of a new observation."""
-        return self._run(flows.friction(name, v, fn, quantile, method))
+        """Friction at velocity ``v`` m/s and ``fn`` N an element: the mean, or a quantile of what a new grasp shows.
+
+        The quantile is ``of`` one "element", or of the mean over the ``elements`` of a "contact" (the default where
+        these are given).
+        """
+        return self._run(flows.friction(name, v, fn, quantile, method, of, elements))
 
     def recognise(self, grasp: Any, materials: Sequence[str] | None = None, method: str = "ols") -> Recognition:
         """Which material a grasp was of: a stored log (its receipt or id), or friction samples as slipcore gives them.
@@ -271,10 +283,18 @@ class AsyncFrictionClient:
         return await self._run(flows.model(name, method, self._kept, self._stale_after))
 
     async def friction(
-        self, name: str, v: float, fn: float, quantile: float | None = None, method: str | None = None
+        self,
+        name: str,
+        v: float,
+        fn: float,
+        quantile: float | None = None,
+        method: str | None = None,
+        *,
+        of: str | None = None,
+        elements: int | None = None,
     ) -> FrictionAnswer:
         """As ``FrictionClient.friction``."""
-        return await self._run(flows.friction(name, v, fn, quantile, method))
+        return await self._run(flows.friction(name, v, fn, quantile, method, of, elements))
 
     async def recognise(self, grasp: Any, materials: Sequence[str] | None = None, method: str = "ols") -> Recognition:
         """As ``FrictionClient.recognise``."""

@@ -61,8 +61,12 @@ class Contact:
 
     def element_force(self, force: Number, element_area: Number) -> Number:
         """Normal force of an element of ``element_area`` m², each weighted with itself, under ``force`` N; N."""
+        return force / self.elements(force, element_area)
+
+    def elements(self, force: Number, element_area: Number) -> Number:
+        """(Σf)²/Σf²: over how many elements of ``element_area`` m² friction under ``force`` N averages."""
         grown = 1.0 if self.reference_force is None else (force / self.reference_force) ** (2.0 / 3.0)
-        return self.pressure_square * force * element_area / (self.area * grown)
+        return self.area * grown / (element_area * self.pressure_square)
 
     def arm(self, force: Number) -> Number:
         """Friction moment over μF under ``force`` N, m."""

@@ -240,10 +240,16 @@ def withdraw(log_id: str, reason: str) -> Flow[GraspLogReceipt]:
 
 
 def friction(
-    name: str, tangential_velocity: float, normal_force: float, quantile: float | None, method: str | None
+    name: str,
+    tangential_velocity: float,
+    normal_force: float,
+    quantile: float | None,
+    method: str | None,
+    of: str | None,
+    elements: int | None,
 ) -> Flow[FrictionAnswer]:
     """Look friction up."""
-    params = _given(v=tangential_velocity, fn=normal_force, quantile=quantile, method=method)
+    params = _given(v=tangential_velocity, fn=normal_force, quantile=quantile, method=method, of=of, elements=elements)
     answer = yield from _get(f"/v1/materials/{_part(name)}/friction", params)
     return _record(FrictionAnswer.from_json, answer)
 

@@ -1,6 +1,7 @@
 """How hard to grip: the smallest normal force that keeps the probability of slip under a bound."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, overload
 
@@ -10,8 +11,8 @@ from numpy.typing import NDArray
 from stiction_client.arguments import within
 from stiction_client.contacts import AREAS, Contact, Contacts
 from stiction_client.errors import Cause, InvalidArgument, NoFeasibleForce
-from stiction_client.holding import LoadedContact
-from stiction_client.model import FloatArray, FrictionModel, Number
+from stiction_client.holding import LoadedContact, least, select
+from stiction_client.model import KINDS, FloatArray, FrictionModel, Number
 from stiction_client.quantile import FrictionQuantile
 
 SLIP_PROBABILITY = 1e-3
@@ -26,6 +27,9 @@ LARGEST = 1e9
 
 SAFETY_FACTORS = (1.0, 100.0)
 
+COUNTS = (1.0, 1e12)
+"""Elements in one contact."""
+
 Outcome = Literal["held", "held within bounds", Cause]
 """One root, so that any greater force holds as well; two roots, between which all forces hold; or why there is none."""
 
@@ -39,7 +43,8 @@ class RequiredForce:
     ``largest_load``: the most tangential load on one contact, in the ratio to the torque that was asked for, that any
     force holds so (infinite where unbounded); ``element_force``: mean normal force of one element at the answer;
     ``friction_coefficient``: the conservative quantile there; ``within_domain``: whether velocity and element force lie
-    where the model was observed; ``warning``: which of them does not, or None.
+    where the model was observed; ``warning``: which of them does not, or None; ``of``: whether the quantile is that of
+    one "element" or of the mean over the contact's ``elements``.
     """
 
     normal_force: float
@@ -51,6 +56,8 @@ class RequiredForce:
     slip_probability: float
     within_domain: bool
     warning: str | None
+    of: str = "element"
+    elements: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,6 +73,8 @@ class RequiredForces:
     friction_coefficient: FloatArray
     within_domain: NDArray[np.bool_]
     outcome: NDArray[np.str_]
+    of: str
+    elements: FloatArray
 
 
 @overload
@@ -80,6 +89,8 @@ def required_normal_force(
     tangential_velocity: float = ...,
     safety_factor: float = ...,
     normal_force_limit: float | None = ...,
+    of: str | None = ...,
+    elements: float | None = ...,
 ) -> RequiredForce: ...
 
 
@@ -95,6 +106,8 @@ def required_normal_force(
     tangential_velocity: Number = ...,
     safety_factor: Number = ...,
     normal_force_limit: Number | None = ...,
+    of: str | None = ...,
+    elements: Number | None = ...,
 ) -> RequiredForces: ...
 
 
@@ -109,6 +122,8 @@ def required_normal_force(
     tangential_velocity: Number = 0.0,
     safety_factor: Number = 1.0,
     normal_force_limit: Number | None = None,
+    of: str | None = None,
+    elements: Number | None = None,
 ) -> RequiredForce | RequiredForces:
     """Smallest normal force F (N) of each contact at which a grasp slips with at most ``slip_probability``.
 
@@ -121,8 +136,10 @@ def required_normal_force(
 
     with its share T of the load and M of the torque, its torque arm b, and q the ``slip_probability``-quantile of the
     predictive distribution of μ at its elements' normal force f, each weighted with itself: what a contact holds is
-    Σ μ(fᵢ)·fᵢ. The scatter ε and the uncertainty of all coefficients are in q; ε is taken as common to all elements,
-    which is conservative: were it independent, it would average out.
+    Σ μ(fᵢ)·fᵢ. The uncertainty of all coefficients is in q, and the scatter ``of`` the "contact", which has a grasp's
+    whole scatter and the mean of its ``elements``' own (as many as its area has, where None), or of one "element",
+    which is conservative. None: of the contact where the model tells its ``scales``, else of an element; without
+    scales all scatter counts as common to the elements in any case.
 
     Any argument but the model may be an array; all broadcast, and the answer is then ``RequiredForces``. For one
     grasp, raises ``NoFeasibleForce`` where no force holds. Raises ``InvalidArgument`` for an argument that cannot be.
@@ -135,15 +152,16 @@ def required_normal_force(
     if normal_force_limit is not None:
         limit = within("normal_force_limit", normal_force_limit, 1e-9, LARGEST, "N")
     unit = together.contact.element_force(1.0, model.element_area)
-    loaded = LoadedContact(
-        FrictionQuantile.of(model, velocity, probability),
-        load,
-        moment,
-        unit,
-        together.contact.power,
-    )
-    question = _Question(model, together, velocity, probability, limit, loaded)
-    given = (load, moment, loaded.unit, velocity, probability, limit)
+
+    def loaded_with(count: Number) -> LoadedContact:
+        quantile = FrictionQuantile.of(model, velocity, probability, count)
+        return LoadedContact(quantile, load, moment, unit, together.contact.power)
+
+    kind = _kind(model, of)
+    count = _averaged(kind, elements, together.contact, model.element_area, loaded_with)
+    loaded = loaded_with(count)
+    question = _Question(model, together, velocity, probability, limit, loaded, kind, count)
+    given = (load, moment, loaded.unit, velocity, probability, limit, count)
     if any(isinstance(each, np.ndarray) for each in given):
         return _many(question, given)
     return _one(question, tangential_load)
@@ -159,10 +177,48 @@ class _Question:
     probability: Number
     limit: Number
     loaded: LoadedContact
+    of: str
+    elements: Number
 
     def element_force(self, x: Number) -> Number:
         """Mean normal force of the contact's elements, N."""
         return self.loaded.unit * x / self.contacts.contact.pressure_square
+
+
+def _kind(model: FrictionModel, of: str | None) -> str:
+    """Whose friction is meant."""
+    if of is None:
+        return "element" if model.scales is None else "contact"
+    if of not in KINDS:
+        raise InvalidArgument("of", of, " or ".join(KINDS))
+    return of
+
+
+def _averaged(
+    kind: str,
+    elements: Number | None,
+    contact: Contact,
+    element_area: float,
+    loaded_with: Callable[[Number], LoadedContact],
+) -> Number:
+    """Over how many elements scatter averages out.
+
+    A round contact has the more of them the harder it is pressed: they are counted under the force that would hold if
+    scatter averaged out wholly, which is less than any that does hold.
+    """
+    if elements is not None:
+        elements = within("elements", elements, *COUNTS)
+    if kind == "element":
+        return 1.0
+    if elements is not None:
+        return elements
+    force: Number = 1.0
+    if contact.power > 1:
+        most_averaged = loaded_with(math.inf)
+        with np.errstate(all="ignore"):  # entries that are settled take part in the steps of the others
+            force = most_averaged.force(most_averaged.interval(math.inf)[0])
+    count = contact.elements(force, element_area)
+    return least(select(count > COUNTS[0], count, COUNTS[0]), COUNTS[1])
 
 
 def _contacts(contact_area: Number | None, contacts: Contact | Contacts | None) -> Contacts:
@@ -217,6 +273,8 @@ def _one(question: _Question, tangential_load: Number) -> RequiredForce:
         slip_probability=float(question.probability),
         within_domain=warning is None,
         warning=warning,
+        of=question.of,
+        elements=float(question.elements),
     )
 
 
@@ -238,6 +296,8 @@ def _many(question: _Question, given: tuple[Number, ...]) -> RequiredForces:
             friction_coefficient=np.asarray(loaded.quantile(loaded.unit * low)[0]),
             within_domain=np.asarray(inside & (question.velocity <= domain.tangential_velocity[1])),
             outcome=outcome,
+            of=question.of,
+            elements=np.broadcast_to(question.elements, low.shape),
         )
 
 

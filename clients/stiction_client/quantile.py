@@ -20,7 +20,8 @@ class FrictionQuantile:
     It is the quantile of ``FrictionModel.predict`` at one velocity and probability. With Σ = L·Lᵀ, u = Lᵀ(1, v, 0),
     r = Lᵀ(0, 0, 1) and Student's quantiles t of scatter and coefficients, the spread is
     √(t₁²σ² + t₂²|u + f·r|²), and |u + f·r|² = (u·r̂ + |r| f)² + |u − (u·r̂)r̂|²: a sum of squares, which can't turn
-    negative by rounding as xᵀΣx can. q is concave. Each field is a float, or an array.
+    negative by rounding as xᵀΣx can. Scatter between grasps, t₃²τ²(a + c·f)², adds one more square that is linear in
+    f, and joins the other in the same way. q is concave. Each field is a float, or an array.
     """
 
     a: Number
@@ -30,13 +31,19 @@ class FrictionQuantile:
     g: Number
 
     @classmethod
-    def of(cls, model: FrictionModel, tangential_velocity: Number, probability: Number) -> "FrictionQuantile":
-        """The quantile at ``tangential_velocity`` m/s; raises ``InvalidArgument`` for a model not finite there."""
+    def of(
+        cls, model: FrictionModel, tangential_velocity: Number, probability: Number, elements: Number = 1.0
+    ) -> "FrictionQuantile":
+        """The quantile at ``tangential_velocity`` m/s of what so many ``elements`` of a new grasp show on average.
+
+        Raises ``InvalidArgument`` for a model not finite there.
+        """
         from scipy import special  # takes longer to import than all else of this package
 
-        scatter = -special.stdtrit(model.scatter_degrees_of_freedom, probability) * model.scale
+        shared, own = model.scatter(probability, elements)
         error = -special.stdtrit(model.degrees_of_freedom, probability)
-        if not np.isfinite([*model.coefficients, *model.covariance.flat, np.sum(scatter), np.sum(error)]).all():
+        spread = [np.sum(shared), np.sum(own), np.sum(error)]
+        if not np.isfinite([*model.coefficients, *model.covariance.flat, *spread]).all():
             raise InvalidArgument("model", "not finite at this slip probability", "finite coefficients and quantile")
         variance, axes = np.linalg.eigh(model.covariance)
         factor = axes * np.sqrt(np.maximum(variance, 0.0))
@@ -45,13 +52,26 @@ class FrictionQuantile:
         along = factor[:2] @ direction
         across = factor[:2] - np.outer(along, direction)
         apart = ((across[0] + np.multiply.outer(tangential_velocity, across[1])) ** 2).sum(axis=-1) ** 0.5
-        return cls(
+        without_grasps = cls(
             a=_plain(model.coefficients[0] + tangential_velocity * model.coefficients[1]),
             c=_plain(model.coefficients[2]),
-            s=_plain(np.hypot(scatter, error * apart)),
+            s=_plain(np.hypot(own, error * apart)),
             k=_plain(error * (along[0] + tangential_velocity * along[1])),
             g=_plain(error * growth),
         )
+        return without_grasps if model.scales is None else without_grasps._with_grasps(shared)
+
+    def _with_grasps(self, part: Number) -> "FrictionQuantile":
+        """The same with scatter of the whole law by a ``part`` of it: (p₁ + q₁f)² + (p₂ + q₂f)² as one such square.
+
+        With r = (q₁, q₂), it is (p·r̂ + |r| f)² + (p × r̂)².
+        """
+        constant, slope = part * self.a, part * self.c
+        growth = np.hypot(slope, self.g)
+        safe = growth + (growth == 0.0)
+        along = (constant * slope + self.k * self.g) / safe
+        across = np.where(growth == 0.0, np.hypot(constant, self.k), (constant * self.g - self.k * slope) / safe)
+        return replace(self, s=_plain(np.hypot(self.s, across)), k=_plain(along), g=_plain(growth))
 
     def __call__(self, force: Number) -> tuple[Number, Number]:
         """The quantile [-] and its slope, 1/N."""

@@ -1,7 +1,7 @@
 """What the service answers, as small frozen records."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields
 from typing import Any
 
 from stiction_client.errors import JobCancelled, JobFailed, JobRefused
@@ -125,7 +125,8 @@ class GraspLogReceipt:
 class FrictionAnswer:
     """Friction of a material at one velocity (m/s) and normal force of an element (N).
 
-    ``friction_coefficient`` is the quantile asked for, or the mean; ``warning`` says what was extrapolated.
+    ``friction_coefficient`` is the mean, or the quantile asked for ``of`` one "element", or of the mean over the
+    ``elements`` of a "contact"; ``warning`` says what was extrapolated.
     """
 
     material: str
@@ -138,6 +139,8 @@ class FrictionAnswer:
     mean: float
     within_domain: bool
     warning: str | None
+    of: str = "element"
+    elements: int = 1
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "FrictionAnswer":
@@ -183,4 +186,6 @@ class AuditEntry:
 
 
 def _values(kind: type[Any], record: Mapping[str, Any]) -> dict[str, Any]:
-    return {entry.name: record[entry.name] for entry in fields(kind)}  # what a newer service adds is passed over
+    """Its fields; what a newer service adds is passed over, what an older one does not tell has its default."""
+    known = (entry.name for entry in fields(kind) if entry.default is MISSING or entry.name in record)
+    return {name: record[name] for name in known}

@@ -72,6 +72,9 @@ def lookup(
     velocity: Velocity = 0.0,
     normal_force: Annotated[float | None, typer.Option(help="Normal force of one element, N.")] = None,
     quantile: Annotated[float | None, typer.Option(help="A quantile of μ, such as 0.05, in place of its mean.")] = None,
+    elements: Annotated[
+        int | None, typer.Option(min=1, help="The quantile of a contact of so many elements, not of one element.")
+    ] = None,
     method: Method = "ols",
     url: Url = DEFAULT_URL,
     key: Key = None,
@@ -82,7 +85,7 @@ def lookup(
 
     with FrictionClient(url, key=key) as client:
         force = normal_force if normal_force is not None else _middle_force(client.model(material, method=method))
-        answer = asdict(client.friction(material, velocity, force, quantile=quantile, method=method))
+        answer = asdict(client.friction(material, velocity, force, quantile, method, elements=elements))
     if json:
         print_json(answer)
     else:
@@ -105,6 +108,15 @@ def plan(
     slip_probability: Annotated[float, typer.Option(help="Largest probability of slip that is accepted.")] = 1e-3,
     velocity: Velocity = 0.0,
     limit: Annotated[float | None, typer.Option(help="Largest normal force that the object bears, N.")] = None,
+    of: Annotated[
+        str | None,
+        typer.Option(
+            help="Whose scatter counts: element or contact; by default the contact's where the model tells it."
+        ),
+    ] = None,
+    elements: Annotated[
+        float | None, typer.Option(min=1.0, help="Elements of one contact, where its area does not tell them.")
+    ] = None,
     method: Method = "ols",
     url: Url = DEFAULT_URL,
     key: Key = None,
@@ -124,6 +136,8 @@ def plan(
         tangential_velocity=velocity,
         safety_factor=safety_factor,
         normal_force_limit=limit,
+        of=of,
+        elements=elements,
     )
     if json:
         print_json(asdict(answer))

@@ -3,18 +3,23 @@
 from dataclasses import dataclass
 
 from service.domain.model_cache import KnownModel
-from service.http.schemas.models import FrictionOut
+from service.http.schemas.models import Averaged, FrictionOut
 
 OUTDATED = "the model is outdated: the material's logs are others since, and it was not fitted again by this method"
 
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """Tangential velocity m/s, normal force of an element N, and a quantile in (0, 1) or None for the mean."""
+    """Tangential velocity m/s, normal force of an element N, and a quantile in (0, 1) or None for the mean.
+
+    ``of``: one "element", or the mean over the ``elements`` of a "contact".
+    """
 
     tangential_velocity: float
     normal_force: float
     quantile: float | None
+    of: Averaged = "element"
+    elements: int = 1
 
 
 def look_up(known: KnownModel, question: Question) -> FrictionOut:
@@ -22,7 +27,7 @@ def look_up(known: KnownModel, question: Question) -> FrictionOut:
     v, f_n = question.tangential_velocity, question.normal_force
     stored, model = known.stored, known.model
     mean = float(model.predict(v, f_n))
-    asked = mean if question.quantile is None else float(model.predict(v, f_n, quantile=question.quantile))
+    asked = float(model.predict(v, f_n, question.quantile, question.of, question.elements))
     outside = model.extrapolation(v, f_n)
     outdated = OUTDATED if stored.outdated else None
     nothing = "the answer is not above 0: nothing is known of the friction there" if asked <= 0.0 else None
@@ -33,6 +38,8 @@ def look_up(known: KnownModel, question: Question) -> FrictionOut:
         tangential_velocity=v,
         normal_force=f_n,
         quantile=question.quantile,
+        of=question.of,
+        elements=question.elements,
         friction_coefficient=asked,
         mean=mean,
         within_domain=outside is None,

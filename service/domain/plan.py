@@ -50,6 +50,8 @@ def grasp_force(context: Context, wish: NewGraspForce) -> GraspForceOut:
             safety_factor=wish.safety_factor,
             tangential_velocity=wish.tangential_velocity,
             normal_force_limit=wish.normal_force_limit,
+            of=wish.of,
+            elements=wish.elements,
         )
     except NoFeasibleForce as refusal:
         more = {"largest_load": refusal.largest_load, "normal_force": refusal.normal_force, "cause": refusal.cause}

@@ -128,4 +128,4 @@ def _read(query: bytes) -> tuple[str, Question] | None:
         asked = LookUpQuery.model_validate(dict(parse_qsl(query.decode("latin-1"), keep_blank_values=True)))
     except ValueError:  # pydantic's, or of the address
         return None
-    return asked.method, Question(asked.v, asked.fn, asked.quantile)
+    return asked.method, Question(asked.v, asked.fn, asked.quantile, *asked.averaged())

@@ -1,5 +1,6 @@
 import pickle
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -7,7 +8,16 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from stiction_client import FrictionModel, InvalidArgument, NoFeasibleForce, required_normal_force
+from stiction_client import (
+    Contact,
+    FrictionModel,
+    InvalidArgument,
+    NoFeasibleForce,
+    Scale,
+    Scales,
+    required_normal_force,
+)
+from stiction_client.quantile import FrictionQuantile
 
 Make = Callable[..., FrictionModel]
 
@@ -107,6 +117,67 @@ def test_scatter_and_velocity_enter_the_quantile(make_model: Make) -> None:
     model = make_model((0.5, -10.0, 0.0), ZERO, scale=0.05, scatter_degrees_of_freedom=np.inf)
     answer = required_normal_force(model, 1.0, 0.05, contact_area=AREA, tangential_velocity=0.01)
     assert answer.normal_force == pytest.approx(1.0 / (0.5 - 0.1 - 1.6448536269514722 * 0.05), rel=1e-12)
+
+
+SCALES = Scales(Scale(0.07, 5.0), Scale(0.02, np.inf), Scale(0.03, 1e3))
+
+
+@search
+@given(models(), velocities, probabilities, st.sampled_from([1.0, 60.0, 1e6]), st.floats(0.0, 2.0))
+def test_the_hyperbola_is_the_models_own_quantile_of_a_contact(
+    model: FrictionModel, velocity: float, probability: float, elements: float, force: float
+) -> None:
+    scattering = replace(model, scales=SCALES)
+    expected = scattering.predict(velocity, force, probability, of="contact", elements=elements)
+    found, _ = FrictionQuantile.of(scattering, velocity, probability, elements)(force)
+    size = abs(float(scattering.predict(velocity, force))) + abs(float(expected))
+    assert abs(found - expected) <= 1e-12 * (size + 1.0)
+
+
+def test_a_contact_is_the_default_where_the_model_tells_its_scales(make_model: Make) -> None:
+    without, scattering = make_model(), replace(make_model(), scales=SCALES)
+    answers = {
+        of: required_normal_force(scattering, 1.5, contact_area=AREA, of=of) for of in (None, "contact", "element")
+    }
+    assert answers[None] == answers["contact"]
+    assert (answers[None].of, answers[None].elements) == ("contact", pytest.approx(ELEMENTS))
+    assert (answers["element"].of, answers["element"].elements) == ("element", 1.0)
+    assert answers[None].normal_force < answers["element"].normal_force
+    assert required_normal_force(without, 1.5, contact_area=AREA).of == "element"
+    of_contact, of_element = (
+        required_normal_force(without, 1.5, contact_area=AREA, of=of) for of in ("contact", "element")
+    )
+    assert of_contact.normal_force == of_element.normal_force  # all scatter is taken as shared
+
+
+def test_a_flat_contact_holds_its_own_quantile_times_the_force(make_model: Make) -> None:
+    model = replace(make_model(), scales=SCALES)
+    told = required_normal_force(model, 1.5, 0.01, contact_area=AREA)
+    friction = model.predict(0.0, told.normal_force / ELEMENTS, 0.01, of="contact", elements=ELEMENTS)
+    assert float(friction) == pytest.approx(told.friction_coefficient, rel=1e-12)
+    assert told.normal_force * float(friction) == pytest.approx(1.5, rel=1e-12)
+
+
+@pytest.mark.parametrize("load", [0.05, 1.5, 4.0])
+def test_a_round_contact_never_counts_more_elements_than_it_has(make_model: Make, load: float) -> None:
+    model = replace(make_model(), scales=SCALES)
+    contact = Contact.round(AREA, at_force=5.0)
+    told = required_normal_force(model, load, 0.01, contacts=contact)
+    there = contact.elements(told.normal_force, model.element_area)
+    assert 0.5 * there < told.elements <= there
+    element = contact.element_force(told.normal_force, model.element_area)
+    held = told.normal_force * float(model.predict(0.0, element, 0.01, of="contact", elements=there))
+    assert load <= held < 1.02 * load
+    many = required_normal_force(model, np.array([load, 1e6]), 0.01, contacts=contact)
+    assert many.normal_force[0] == pytest.approx(told.normal_force, rel=1e-12)
+    assert many.elements[0] == pytest.approx(told.elements, rel=1e-9)
+    assert (many.of, many.outcome[1]) == ("contact", "physics")
+
+
+@pytest.mark.parametrize(("of", "elements", "name"), [("grasp", None, "of"), (None, 0.5, "elements")])
+def test_who_slips_must_be_known(make_model: Make, of: str | None, elements: float | None, name: str) -> None:
+    with pytest.raises(InvalidArgument, match=f"^{name} is"):
+        required_normal_force(make_model(), 1.0, contact_area=AREA, of=of, elements=elements)
 
 
 def test_a_load_above_the_peak_is_refused_with_the_most_that_can_be_held(make_model: Make) -> None:

@@ -120,7 +120,7 @@ async def read_friction(
     who has it.
     """
     known = await context.models.get(context.database, name, asked.method)
-    question = Question(asked.v, asked.fn, asked.quantile)
+    question = Question(asked.v, asked.fn, asked.quantile, *asked.averaged())
     return conditional(request, known.tag, lambda: look_up(known, question).model_dump_json())
 
 

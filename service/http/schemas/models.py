@@ -2,9 +2,9 @@
 
 from dataclasses import asdict
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.config import JsonDict
 
 from db.records import StoredModel
@@ -12,6 +12,7 @@ from service.http.schemas.common import MOMENT_EXAMPLE, Body, Force, Next, Veloc
 
 ModelMethod = Literal["ols", "robust", "conjugate", "hierarchical", "bayes"]
 FitMethod = Literal["ols", "robust", "conjugate", "hierarchical", "bayes", "auto"]
+Averaged = Literal["element", "contact"]
 
 MODEL_EXAMPLE: JsonDict = {
     "material": "paper",
@@ -152,6 +153,25 @@ class LookUpQuery(BaseModel):
         ),
     ] = None
     method: Annotated[ModelMethod, Field(description="Whose current model answers")] = "ols"
+    of: Annotated[
+        Averaged | None,
+        Field(description="Whose friction the quantile is of; the contact's where `elements` is given, else one's"),
+    ] = None
+    elements: Annotated[
+        int | None, Field(ge=1, le=10**9, description="Elements of the contact, over which scatter averages out")
+    ] = None
+
+    @model_validator(mode="after")
+    def _counted(self) -> Self:
+        if self.of == "contact" and self.elements is None:
+            raise ValueError("of=contact with the number of its elements")
+        return self
+
+    def averaged(self) -> tuple[Averaged, int]:
+        """Whose friction is asked for, and over how many elements."""
+        if self.elements is None or self.of == "element":
+            return "element", 1
+        return "contact", self.elements
 
 
 class FrictionOut(BaseModel):
@@ -167,6 +187,8 @@ class FrictionOut(BaseModel):
                     "tangential_velocity": 0.0,
                     "normal_force": 0.05,
                     "quantile": 0.05,
+                    "of": "element",
+                    "elements": 1,
                     "friction_coefficient": 0.36,
                     "mean": 0.39,
                     "within_domain": True,
@@ -182,6 +204,8 @@ class FrictionOut(BaseModel):
     tangential_velocity: Annotated[float, Field(description="m/s")]
     normal_force: Annotated[float, Field(description="N on an element")]
     quantile: float | None
+    of: Annotated[Averaged, Field(description="Whose friction the quantile is of")] = "element"
+    elements: Annotated[int, Field(description="Over how many elements its scatter averages out")] = 1
     friction_coefficient: Annotated[float, Field(description="The quantile that was asked for; without one, the mean")]
     mean: float
     within_domain: Annotated[bool, Field(description="Whether the model's samples reach there")]

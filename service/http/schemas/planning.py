@@ -5,7 +5,7 @@ from typing import Annotated, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from service.http.schemas.common import Area, Body, Force, Reference, Velocity
-from service.http.schemas.models import ModelMethod
+from service.http.schemas.models import Averaged, ModelMethod
 from service.http.schemas.results import SAMPLES_EXAMPLE
 
 
@@ -36,6 +36,15 @@ class NewGraspForce(Body):
     normal_force_limit: Annotated[
         float | None, Field(gt=0.0, le=1e6, description="The most that object and gripper bear, N")
     ] = None
+    of: Annotated[
+        Averaged | None,
+        Field(
+            description="Whose scatter counts; without, the contact's where the model has `scales`, else an element's"
+        ),
+    ] = None
+    elements: Annotated[
+        float | None, Field(ge=1.0, le=1e12, description="Of a contact; without, as many as its area has")
+    ] = None
 
 
 class GraspForceOut(BaseModel):
@@ -57,6 +66,8 @@ class GraspForceOut(BaseModel):
                     "slip_probability": 0.001,
                     "within_domain": True,
                     "warning": None,
+                    "of": "element",
+                    "elements": 1.0,
                 }
             ]
         }
@@ -76,6 +87,8 @@ class GraspForceOut(BaseModel):
     slip_probability: float
     within_domain: bool
     warning: str | None
+    of: Annotated[Averaged, Field(description="Whose scatter is in the quantile")]
+    elements: Annotated[float, Field(description="Over how many elements it averages out")]
 
 
 class SamplesIn(Body):

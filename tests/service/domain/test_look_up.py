@@ -41,6 +41,18 @@ def test_the_answer_is_the_models(ask: Callable[..., Any], model: estimators.Fri
     assert (answer.within_domain, answer.warning, answer.version) == (True, None, 1)
 
 
+@pytest.mark.parametrize(("of", "elements"), [("element", 1), ("contact", 60)])
+def test_a_quantile_is_of_what_was_asked_for(
+    ask: Callable[..., Any], model: estimators.FrictionModel, of: str, elements: int
+) -> None:
+    scales = estimators.Scales(*(estimators.Scale(value, 9.0) for value in (0.07, 0.02, 0.03)))
+    scattering = replace(model, scales=scales)
+    f_n = sum(model.domain.normal_force) / 2.0
+    answer = ask(scattering, Question(1e-5, f_n, 0.05, of, elements))
+    assert answer.friction_coefficient == float(scattering.predict(1e-5, f_n, 0.05, of=of, elements=elements))
+    assert (answer.of, answer.elements) == (of, elements)
+
+
 def test_slower_than_the_samples_is_inside_and_faster_is_not(
     ask: Callable[..., Any], model: estimators.FrictionModel
 ) -> None:

@@ -69,9 +69,16 @@ fn=10000
 fn=5e3&quantile=0.999
 fn=0.05&quantile=1e-12
 fn=0&v=1000
+fn=0.05&quantile=0.05&elements=60
+fn=0.05&quantile=0.05&of=contact&elements=60
+fn=0.05&quantile=0.05&of=element
 """
 OTHER = """
 fn=0.05&x=%00
+fn=0.05&of=contact
+fn=0.05&of=grasp
+fn=0.05&elements=0
+fn=0.05&elements=1.5
 v=0
 fn=
 fn=x

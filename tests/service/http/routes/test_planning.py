@@ -19,10 +19,11 @@ pytestmark = pytest.mark.usefixtures("fitted")
         ({"slip_probability": 0.01, "tangential_velocity": 1e-4, "normal_force_limit": 50.0}, {}),
         ({"torque": 1e-3, "safety_factor": 1.5}, {"fingers": 2, "round_at": 5.0}),
         ({"torque": 1e-3}, {"fingers": 3, "object_radius": 0.03}),
+        ({"of": "contact", "elements": 30.0}, {}),
     ],
 )
 def test_the_grasp_force_is_the_planners_own(
-    client: httpx.Client, more: dict[str, float], fingers: dict[str, float]
+    client: httpx.Client, more: dict[str, Any], fingers: dict[str, float]
 ) -> None:
     answer = client.post("/v1/grasp-force", json=LOAD | more | fingers)
     assert answer.status_code == 200, answer.text
@@ -32,6 +33,7 @@ def test_the_grasp_force_is_the_planners_own(
     assert told["normal_force"] == expected.normal_force
     assert told["feasible_interval"][0] == expected.normal_force
     assert (told["material"], told["method"], told["version"]) == ("fitted", "ols", 1)
+    assert (told["of"], told["elements"]) == (expected.of, expected.elements)
     assert told["friction_coefficient"] == pytest.approx(expected.friction_coefficient)
 
 
@@ -52,6 +54,8 @@ def test_a_load_that_no_force_holds_is_refused_with_the_most_that_is_held(client
         ("grasp-force", LOAD | {"method": "auto"}, 422, "invalid-request"),
         ("grasp-force", LOAD | {"contact_area": 0.0}, 422, "invalid-request"),
         ("grasp-force", LOAD | {"contact_area": 1e30}, 422, "invalid-request"),
+        ("grasp-force", LOAD | {"of": "grasp"}, 422, "invalid-request"),
+        ("grasp-force", LOAD | {"elements": 0.5}, 422, "invalid-request"),
         ("grasp-force", LOAD | {"fingers": 0}, 422, "invalid-request"),
         ("grasp-force", LOAD | {"fingers": True}, 422, "invalid-request"),
         ("grasp-force", LOAD | {"object_radius": 0.0}, 422, "invalid-request"),
