@@ -29,7 +29,7 @@ from service.observability import traces
 from service.observability.answered import Answered
 from service.observability.metrics import Metering, Metrics
 from service.observability.store_watch import StoreWatch
-from service.processes import private_files
+from service.processes import data_folder, private_files
 from service.processes.folder_lock import shared
 from service.settings import Settings
 from service.stream.sessions import Streams
@@ -105,6 +105,7 @@ async def running(
     ``check`` may raise what stops the start.
     """
     private_files.withhold()
+    data_folder.prepare(settings.data_folder)
     with closing(Database(settings.resolved_database_url)) as database:
         blobs = open_blobs(settings.data_folder, settings.blob_url, settings.blob_cache_bytes)
         with shared(settings.data_folder, partial(_enter, settings, database, blobs, check)):

@@ -134,9 +134,11 @@ def adopt(database_url: Url = None) -> None:
 def opened_blobs() -> "BlobStore":
     """The service's own blob store."""
     from db.blobs import open_blobs
+    from service.processes import data_folder
     from service.settings import Settings
 
     settings = Settings()
+    data_folder.prepare(settings.data_folder)
     return open_blobs(settings.data_folder, settings.blob_url, settings.blob_cache_bytes)
 
 
@@ -163,18 +165,21 @@ def _tell(what: str, count: int) -> None:
 def opened(url: str | None, *, may_be_new: bool = False) -> Iterator["Database"]:
     """The database at this URL, or the service's own; raises ``NotFound`` for a file that isn't there.
 
-    SQLite would make one: in a folder that was named wrongly, a command should not leave a database behind.
+    SQLite would make one: in a folder that was named wrongly, a command should not leave a database behind. Raises
+    ``UnusableFolder`` where no folder can have that name.
     """
     from db.database import Database
     from db.errors import NotFound
-    from service.processes import private_files
+    from service.processes import data_folder, private_files
     from service.settings import Settings
 
     private_files.withhold()
     if url is None:
         settings = Settings()
         if may_be_new:
-            settings.data_folder.mkdir(parents=True, exist_ok=True)
+            data_folder.prepare(settings.data_folder)
+        elif settings.database_url is None:
+            data_folder.require_possible(settings.data_folder)
         url = settings.resolved_database_url
     database = Database(url)
     if database.is_missing and not may_be_new:

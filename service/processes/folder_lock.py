@@ -11,11 +11,10 @@ from pathlib import Path
 
 @contextmanager
 def shared(folder: Path, enter: Callable[[bool], None]) -> Iterator[None]:
-    """Work in the folder, after ``enter`` was called with whether nobody else does.
+    """Work in the folder, which is there, after ``enter`` was called with whether nobody else does.
 
     The locks end with the process, however that ends.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     with (folder / "server.lock").open("w") as work:
         with (folder / "start.lock").open("w") as start:
             fcntl.flock(start, fcntl.LOCK_EX)

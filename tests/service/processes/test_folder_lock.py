@@ -7,11 +7,10 @@ from service.processes.folder_lock import shared
 
 
 def test_a_process_knows_whether_it_is_alone_in_a_folder(tmp_path: Path) -> None:
-    folder = tmp_path / "new"
     alone: list[bool] = []
-    with shared(folder, alone.append), shared(folder, alone.append), shared(folder, alone.append):
-        assert folder.is_dir()
-    with shared(folder, alone.append):
+    with shared(tmp_path, alone.append), shared(tmp_path, alone.append), shared(tmp_path, alone.append):
+        pass
+    with shared(tmp_path, alone.append):
         pass
     assert alone == [True, False, False, True]
 
