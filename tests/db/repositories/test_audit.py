@@ -1,5 +1,6 @@
 from contextlib import suppress
 from datetime import timedelta
+from random import Random
 
 import pytest
 from sqlalchemy import delete, text, update
@@ -109,3 +110,22 @@ def test_old_entries_go_and_the_trail_tells_so(database: Database) -> None:
         assert audit.delete_before(session, now() - timedelta(days=90)) == 0
     told, young = entries(database)
     assert (told.action, told.details["entries"], young.subject) == ("audit.deleted", 2, "y")
+
+
+@pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+def test_an_upload_takes_the_room_in_the_trail_that_operations_md_states(database: Database) -> None:
+    def size() -> int:
+        with database.read() as session:
+            pages, page = (
+                session.connection().exec_driver_sql(f"PRAGMA {name}") for name in ("page_count", "page_size")
+            )
+            return int(pages.scalar_one()) * int(page.scalar_one())
+
+    random, count, before = Random(0), 2000, size()
+    with database.write() as session:
+        for number in range(count):
+            made = f"{random.getrandbits(256):064x}"
+            actor = Actor("key:3f9c2a7b51de", "192.168.100.17", f"{random.getrandbits(128):032x}")
+            told = {"material": "paper", "sha256": made, "bytes": 1_000_000 + number, "new": True}
+            audit.add(session, actor, "grasp_log.uploaded", f"{random.getrandbits(128):032x}", told)
+    assert (size() - before) / count == pytest.approx(440.0, rel=0.03)
