@@ -33,10 +33,11 @@ def test_every_scene_is_documented_as_it_describes_itself(name: str) -> None:
 
 
 def test_the_code_on_the_page_says_what_it_prints(capsys: pytest.CaptureFixture[str]) -> None:
-    (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    (printed,) = re.findall(r"```text\n(.*?)```", PAGE, re.DOTALL)
-    exec(code, {})
-    assert capsys.readouterr().out == printed
+    blocks = re.findall(r"```python\n(.*?)```.*?```text\n(.*?)```", PAGE, re.DOTALL)
+    assert len(blocks) == PAGE.count("```python") == 2
+    for code, printed in blocks:
+        exec(code, {})
+        assert capsys.readouterr().out == printed
 
 
 def test_the_scene_file_on_the_page_can_be_read() -> None:
