@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import estimators
 from db.records import Detection, NewModel, SampleSummary, Scale, Scales
 from service.formats.npy import HEADER_LOCK
-from slipcore.frames import FloatArray
+from slipcore.frames import BoolArray, FloatArray
 from slipcore.samples import FrictionSamples
 from slipcore.slip_state import EventList, SlipEvents, SlipHistory
 
@@ -26,24 +26,35 @@ SAMPLE_ARRAYS = FrictionSamples.arrays()
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StoredHistory:
-    """What is kept of a slip history: ``time`` [t] s, ``stick_ratio`` [t] (NaN without contact) and the events."""
+    """What is kept of a slip history: ``time`` [t] s, ``stick_ratio`` [t] (NaN without contact), the events, and which
+    elements were in ``contact`` and in ``slip`` [t, n, m]; older versions kept no such maps (None).
+    """
 
     time: FloatArray
     stick_ratio: FloatArray
     events: SlipEvents
+    contact: BoolArray | None
+    slip: BoolArray | None
 
 
 def encode_history(history: SlipHistory) -> bytes:
     """A history as bytes, the same for the same history."""
     events = [getattr(history.events, kind) for kind in EVENT_KINDS]
-    return _pack([history.time, history.stick_ratio, *(part for each in events for part in (each.element, each.time))])
+    parts = [part for each in events for part in (each.element, each.time)]
+    maps = [np.array(history.contact.shape), np.packbits(history.contact), np.packbits(history.slip)]
+    return _pack([history.time, history.stick_ratio, *parts, *maps])
 
 
 def decode_history(path: Path) -> StoredHistory:
     """The history in a blob."""
-    time, stick_ratio, *parts = _unpack(path, 2 + 2 * len(EVENT_KINDS))
-    events = [EventList(*pair) for pair in zip(parts[0::2], parts[1::2], strict=True)]
-    return StoredHistory(time, stick_ratio, SlipEvents(*events))
+    time, stick_ratio, *parts = _unpack(path)
+    lists, maps = parts[: 2 * len(EVENT_KINDS)], parts[2 * len(EVENT_KINDS) :]
+    events = SlipEvents(*(EventList(*pair) for pair in zip(lists[0::2], lists[1::2], strict=True)))
+    if not maps:
+        return StoredHistory(time, stick_ratio, events, None, None)
+    shape = tuple(maps[0].tolist())
+    contact, slip = (np.unpackbits(bits, count=math.prod(shape)).reshape(shape).astype(bool) for bits in maps[1:])
+    return StoredHistory(time, stick_ratio, events, contact, slip)
 
 
 def encode_samples(samples: FrictionSamples) -> bytes:
@@ -54,7 +65,7 @@ def encode_samples(samples: FrictionSamples) -> bytes:
 
 def decode_samples(path: Path) -> FrictionSamples:
     """The samples in a blob; those stored by older versions tell no noise of f_n."""
-    *arrays, common = _unpack(path, len(SAMPLE_ARRAYS) + 1)
+    *arrays, common = _unpack(path)
     element_area, noise = (*np.atleast_1d(common).tolist(), 0.0)[:2]
     return FrictionSamples(
         **dict(zip(SAMPLE_ARRAYS, arrays, strict=True)), element_area=element_area, normal_force_noise=noise
@@ -173,6 +184,9 @@ def _pack(arrays: Sequence[NDArray[Any]]) -> bytes:
     return buffer.getvalue()
 
 
-def _unpack(path: Path, count: int) -> list[NDArray[Any]]:
+def _unpack(path: Path) -> list[NDArray[Any]]:
+    arrays = []
     with path.open("rb") as stream, HEADER_LOCK:
-        return [np.load(stream, allow_pickle=False) for _ in range(count)]
+        while stream.peek(1):
+            arrays.append(np.load(stream, allow_pickle=False))
+    return arrays

@@ -107,6 +107,10 @@ class Readers:
         """Write a stored log to ``target`` in the format ``name``; raises ``UnsupportedFormat``."""
         await self._do(partial(rewrite, source, target, name), name, self._seconds, owner)
 
+    async def derive(self, do: Callable[[], None], name: str, owner: str = "") -> None:
+        """Do something with a stored log of format ``name``; what is done can be pickled, as can what it raises."""
+        await self._do(do, name, self._seconds, owner)
+
     async def stop(self) -> None:
         """End the processes that nobody uses; any other ends with the request that uses it."""
         for executor in list(self._idle):

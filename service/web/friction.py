@@ -3,13 +3,29 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from db.records import Material, StoredModel
 from service.domain.stored_results import to_friction_model
 from service.http.schemas.models import LookUpQuery
+from service.web.charts import Chart, Curve, draw
 
 USUAL_METHOD = LookUpQuery.model_fields["method"].default
 LEVELS = (0.05, 0.95)
 """Quantiles between which 90 % of new observations are expected."""
+
+POINTS = 61
+"""At which a section is computed."""
+
+BEYOND = 1.25
+"""How far past the data a section is drawn, as a factor."""
+
+COEFFICIENTS = (
+    ("β₀", "friction at rest and without load", "no unit"),
+    ("β₁", "change of friction with velocity", "per metre a second (s/m)"),
+    ("β₂", "change of friction with the normal force on an element", "per newton (1/N)"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,3 +78,56 @@ def listed(material: Material, normal_force: float | None) -> Listed:
     """A material as a list tells of it."""
     stored = usual_model(material.models)
     return Listed(material, stored, None if stored is None else friction_at(stored, normal_force))
+
+
+@dataclass(frozen=True, slots=True)
+class Coefficient:
+    """A coefficient of a model with its meaning, its 95 % interval, and whether the data tell it."""
+
+    symbol: str
+    meaning: str
+    unit: str
+    value: float
+    interval: tuple[float, float]
+    is_told: bool
+
+
+def coefficients(stored: StoredModel) -> list[Coefficient]:
+    """What μ = β₀ + β₁ v + β₂ f_n + ε is made of."""
+    model = to_friction_model(stored.model)
+    numbers = zip(model.coefficients.tolist(), model.interval(0.95).tolist(), model.identifiable.tolist(), strict=True)
+    return [
+        Coefficient(*words, value, (low, high), told)
+        for words, (value, (low, high), told) in zip(COEFFICIENTS, numbers, strict=True)
+    ]
+
+
+def sections(stored: StoredModel, at: Friction) -> list[Chart]:
+    """Friction over normal force and over velocity, each through the working point ``at``."""
+    forces, velocities = stored.model.normal_force, stored.model.tangential_velocity
+    f_n = np.linspace(0.0, max(BEYOND * forces[1], at.normal_force), POINTS)
+    v = np.linspace(0.0, max(BEYOND * velocities[1], at.tangential_velocity), POINTS)
+    over_force = _Section(f_n, forces, at.normal_force, "normal force on an element, N")
+    over_velocity = _Section(v, velocities, at.tangential_velocity, "tangential velocity, m/s")
+    return [
+        _chart(stored, over_force, at.tangential_velocity, f_n, f"At velocity {at.tangential_velocity:g} m/s"),
+        _chart(stored, over_velocity, v, at.normal_force, f"At a normal force of {at.normal_force:.3g} N"),
+    ]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Section:
+    """Along what a section runs: values ``x`` [n], the range of the data, the working point, and the axis' label."""
+
+    x: NDArray[np.float64]
+    seen: tuple[float, float]
+    marked: float
+    label: str
+
+
+def _chart(stored: StoredModel, along: _Section, v: ArrayLike, f_n: ArrayLike, title: str) -> Chart:
+    model = to_friction_model(stored.model)
+    low, high = (model.predict(v, f_n, quantile=level).tolist() for level in LEVELS)
+    mean = model.predict(v, f_n).tolist()
+    x = along.x.tolist()
+    return draw(Curve(x, mean, low, high, along.seen, along.marked, along.label, "friction coefficient μ", title))

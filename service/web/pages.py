@@ -2,8 +2,8 @@
 
 from fastapi import APIRouter
 
-from service.web.routes import assets, login, materials
+from service.web.routes import assets, login, logs, materials
 
 router = APIRouter()
-for module in (assets, login, materials):
+for module in (assets, login, logs, materials):
     router.include_router(module.router)

@@ -7,22 +7,28 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.params import Form
 from fastapi.responses import RedirectResponse
 
-from db.repositories import materials
+from db.paging import Window
+from db.records import LogFilter
+from db.repositories import friction_models, grasp_logs, materials
 from service.context import Given
 from service.domain import curate
 from service.http.access import READ, UPLOAD, Asking
 from service.http.paging import CursorText, Page
-from service.http.schemas.common import Force
+from service.http.schemas.common import Force, Velocity
 from service.http.schemas.materials import NewMaterial
+from service.http.schemas.models import ModelMethod
 from service.web.forms import EMPTY_IS_NONE, checked
-from service.web.friction import listed
+from service.web.friction import coefficients, friction_at, listed, sections, usual_model
 from service.web.rendering import render
 
 router = APIRouter(include_in_schema=False)
 
 ON_A_PAGE = 50
+LOGS_ON_A_PAGE = 25
+NEWEST_VERSIONS = Window("id", descending=True, limit=20)
 
 ForceOrEmpty = Annotated[Force | None, EMPTY_IS_NONE, Query()]
+VelocityOrEmpty = Annotated[Velocity | None, EMPTY_IS_NONE, Query()]
 
 
 @router.get("/", dependencies=[READ])
@@ -57,3 +63,36 @@ def create_material(
     with context.database.write() as session:
         curate.create(session, new.name, new.description, asker)
     return RedirectResponse(f"/materials/{quote(new.name, safe='')}", 303)
+
+
+@router.get("/materials/{name}", dependencies=[READ])
+def show_material(
+    context: Given,
+    request: Request,
+    name: str,
+    fn: ForceOrEmpty = None,
+    v: VelocityOrEmpty = None,
+    method: ModelMethod | None = None,
+    cursor: CursorText = None,
+) -> Response:
+    """Its model at a working point, the versions before it, and its logs; raises ``NotFound``."""
+    page = Page("-created_at", LOGS_ON_A_PAGE, cursor, identity="hex")
+    with context.database.read() as session:
+        found = materials.get(session, name)
+        versions = friction_models.versions(session, found.id, method, window=NEWEST_VERSIONS)
+        logs, after = page.cut(grasp_logs.list_all(session, page.window(), LogFilter(material_id=found.id)))
+    stored = usual_model(found.models, method)
+    shown = None if stored is None else friction_at(stored, fn, v or 0.0)
+    return render(
+        request,
+        "material.html",
+        material=found,
+        stored=stored,
+        friction=shown,
+        coefficients=[] if stored is None else coefficients(stored),
+        charts=[] if stored is None or shown is None else sections(stored, shown),
+        asked={"fn": fn, "v": v, "method": method},
+        versions=versions,
+        logs=logs,
+        after=after,
+    )

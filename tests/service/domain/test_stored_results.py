@@ -38,9 +38,25 @@ def test_a_history_comes_back_to_the_last_bit(history: SlipHistory, tmp_path: Pa
     found = stored_results.decode_history(path)
     np.testing.assert_array_equal(found.time, history.time)
     np.testing.assert_array_equal(found.stick_ratio, history.stick_ratio)
+    assert found.contact is not None
+    assert found.slip is not None
+    np.testing.assert_array_equal(found.contact, history.contact)
+    np.testing.assert_array_equal(found.slip, history.slip)
     for kind in stored_results.EVENT_KINDS:
         np.testing.assert_array_equal(getattr(found.events, kind).element, getattr(history.events, kind).element)
         np.testing.assert_array_equal(getattr(found.events, kind).time, getattr(history.events, kind).time)
+
+
+def test_a_history_of_an_older_version_has_no_maps(history: SlipHistory, tmp_path: Path) -> None:
+    events = [getattr(history.events, kind) for kind in stored_results.EVENT_KINDS]
+    arrays = [history.time, history.stick_ratio, *(part for each in events for part in (each.element, each.time))]
+    path = tmp_path / "history"
+    with path.open("wb") as stream:
+        for array in arrays:
+            np.save(stream, array, allow_pickle=False)
+    found = stored_results.decode_history(path)
+    assert (found.contact, found.slip) == (None, None)
+    np.testing.assert_array_equal(found.events.release.time, history.events.release.time)
 
 
 def test_the_same_results_are_the_same_bytes(samples: FrictionSamples, history: SlipHistory) -> None:

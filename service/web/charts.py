@@ -1,0 +1,94 @@
+"""Pictures of lines with bands, as the numbers that an SVG is drawn from."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+WIDTH, HEIGHT = 480.0, 300.0
+LEFT, RIGHT, TOP, BOTTOM = 62.0, 12.0, 12.0, 48.0
+"""Of the picture and of the margins around its axes, in units of the SVG."""
+
+MOST_TICKS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """A mark on an axis: where it stands, and what is written there."""
+
+    place: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """What is to be drawn: a line ``y`` [n] over ``x`` [n], between ``low`` and ``high`` [n]; ``seen`` is the range of
+    ``x`` in which data lie, ``marked`` a value of ``x``.
+    """
+
+    x: Sequence[float]
+    y: Sequence[float]
+    low: Sequence[float]
+    high: Sequence[float]
+    seen: tuple[float, float]
+    marked: float
+    x_label: str
+    y_label: str
+    title: str
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """The numbers of an SVG: points as its polygons and lines take them."""
+
+    title: str
+    x_label: str
+    y_label: str
+    line: str
+    band: str
+    seen: tuple[float, float]
+    marked: float
+    x_ticks: Sequence[Tick]
+    y_ticks: Sequence[Tick]
+
+    width, height, left, right, top, bottom = WIDTH, HEIGHT, LEFT, WIDTH - RIGHT, TOP, HEIGHT - BOTTOM
+
+
+def ticks(low: float, high: float, most: int = MOST_TICKS) -> list[float]:
+    """Round numbers from ``low`` to ``high``, 1, 2 or 5 times a power of ten apart, at most so many."""
+    raw = (high - low) / max(most - 1, 1)
+    power = 10.0 ** math.floor(math.log10(raw))
+    step = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= raw * (1.0 - 1e-9))
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [count * step for count in range(first, last + 1)]
+
+
+def draw(curve: Curve) -> Chart:
+    """A chart from 0 up to what has to be seen on both axes; what lies below 0, no friction does, is cut off."""
+    x_most = max(*curve.x, 1e-12)
+    y_most = 1.05 * max(*curve.high, *curve.y, 1e-12)
+
+    def across(x: float) -> float:
+        return LEFT + (WIDTH - LEFT - RIGHT) * min(max(x / x_most, 0.0), 1.0)
+
+    def up(y: float) -> float:
+        return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * min(max(y / y_most, 0.0), 1.0)
+
+    def points(xs: Sequence[float], ys: Sequence[float]) -> str:
+        return " ".join(f"{across(x):.1f},{up(y):.1f}" for x, y in zip(xs, ys, strict=True))
+
+    return Chart(
+        title=curve.title,
+        x_label=curve.x_label,
+        y_label=curve.y_label,
+        line=points(curve.x, curve.y),
+        band=f"{points(curve.x, curve.high)} {points(curve.x[::-1], curve.low[::-1])}",
+        seen=(across(curve.seen[0]), across(curve.seen[1])),
+        marked=across(curve.marked),
+        x_ticks=[Tick(across(x), f"{x:g}") for x in _rounded(ticks(0.0, x_most))],
+        y_ticks=[Tick(up(y), f"{y:g}") for y in _rounded(ticks(0.0, y_most))],
+    )
+
+
+def _rounded(values: Sequence[float]) -> list[float]:
+    """Without what binary fractions leave behind."""
+    return [float(f"{value:.10g}") for value in values]

@@ -1,0 +1,95 @@
+"""What the player shows of one log, in one compact file: a JSON header and plain arrays behind it.
+
+The first four bytes are the header's length (little-endian). It tells ``rows`` and ``columns`` of the lattice, how many
+frames of the log one frame shown stands for (``step``), what 127 means in ``displacement`` (m) and ``force`` (N), and
+of each array its ``name``, ``type`` (of a JavaScript array), ``offset`` behind the header, and ``length``. What is not
+known, because the upload was deleted or the log has no forces, is left out.
+"""
+
+import json
+import struct
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service import formats
+from service.domain.stored_results import StoredHistory, decode_history
+from slipcore.frames import GraspLog
+
+MOST_CELLS = 1_500_000
+"""Elements of all frames shown, 5 bytes each; of a log with more only every second, third … frame is shown."""
+
+MOST_EVENTS = 100_000
+"""Onsets marked on the time axis, at most."""
+
+FULL_SCALE = 127
+ALIGNMENT = 4
+TYPES = {"float32": "Float32Array", "uint8": "Uint8Array", "int8": "Int8Array"}
+
+Arrays = dict[str, NDArray[Any]]
+
+
+def write_frames(history: Path, upload: Path | None, target: Path) -> None:
+    """Write the file of a log with this history; ``upload`` is the log itself, None where it was deleted."""
+    found = decode_history(history)
+    log = None if upload is None else formats.read(upload)
+    target.write_bytes(pack(found, log))
+
+
+def pack(history: StoredHistory, log: GraspLog | None) -> bytes:
+    """The content of the file."""
+    grid = log.grid if log is not None else history.contact.shape[1:] if history.contact is not None else (0, 0)
+    frames = len(history.time)
+    step = max(1, -(-frames * grid[0] * grid[1] // MOST_CELLS))
+    shown = slice(None, None, step)
+    arrays: Arrays = {"time": _single(history.time[shown]), "stick_ratio": _single(history.stick_ratio[shown])}
+    arrays["onset"] = _single(history.events.onset.time[:MOST_EVENTS])
+    header: dict[str, Any] = {"rows": grid[0], "columns": grid[1], "step": step, "frames": frames}
+    if history.contact is not None and history.slip is not None:
+        arrays["state"] = (history.contact[shown].astype(np.uint8) + (history.contact & history.slip)[shown]).ravel()
+    if log is not None:
+        _add_vectors(arrays, header, log, shown)
+    return _packed(header, arrays)
+
+
+def _add_vectors(arrays: Arrays, header: dict[str, Any], log: GraspLog, shown: slice) -> None:
+    """Displacement and force of each element along columns and rows of the lattice, and the resultants, N."""
+    axes = lattice_axes(log.position)
+    if log.displacement is not None:
+        arrays["displacement"], header["displacement"] = _scaled(log.displacement[shown, ..., :2] @ axes)
+    if log.force is not None:
+        arrays["force"], header["force"] = _scaled(log.force[shown, ..., :2] @ axes)
+        total = np.nansum(log.force[shown], axis=(1, 2))
+        arrays["normal_force"] = _single(np.abs(total[:, 2]))
+        arrays["tangential_force"] = _single(np.hypot(total[:, 0], total[:, 1]))
+
+
+def lattice_axes(position: NDArray[Any]) -> NDArray[Any]:
+    """Directions [2, 2], x and y of each in a column, in which columns and rows of a lattice [n, m, 3] are counted."""
+    along = [np.diff(position[..., :2], axis=axis).reshape(-1, 2).sum(axis=0) for axis in (1, 0)]
+    return np.stack([step / (float(np.hypot(*step)) or 1.0) for step in along], axis=1)
+
+
+def _single(values: NDArray[Any]) -> NDArray[np.float32]:
+    return np.ascontiguousarray(values, dtype="<f4")
+
+
+def _scaled(vectors: NDArray[Any]) -> tuple[NDArray[np.int8], float]:
+    """Vectors as bytes, and what their full scale is; the unknown are shown as zero."""
+    known = np.nan_to_num(vectors)
+    largest = float(np.abs(known).max(initial=0.0)) or 1.0
+    return np.rint(known * (FULL_SCALE / largest)).astype(np.int8).ravel(), largest
+
+
+def _packed(header: Mapping[str, Any], arrays: Arrays) -> bytes:
+    listed, offset = [], 0
+    for name, array in arrays.items():
+        listed.append({"name": name, "type": TYPES[array.dtype.name], "offset": offset, "length": array.size})
+        offset += -(-array.nbytes // ALIGNMENT) * ALIGNMENT
+    text = json.dumps({**header, "arrays": listed}).encode()
+    text += b" " * (-len(text) % ALIGNMENT)
+    padded = (array.tobytes() + bytes(-array.nbytes % ALIGNMENT) for array in arrays.values())
+    return struct.pack("<I", len(text)) + text + b"".join(padded)

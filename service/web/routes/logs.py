@@ -1,0 +1,52 @@
+"""One grasp log: what became of it, and the frames that its player shows."""
+
+import asyncio
+from contextlib import ExitStack
+from functools import partial
+
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import FileResponse
+from starlette.background import BackgroundTask
+
+from db.records import StoredGraspLog
+from db.repositories import grasp_logs
+from service.context import Context, Given
+from service.http.access import READ, Asking
+from service.http.conditional import KEEP_AND_ASK, is_one_of, unchanged
+from service.http.problems import NOT_READY, Problem
+from service.web.frames import write_frames
+from service.web.rendering import render
+
+router = APIRouter(include_in_schema=False)
+
+
+@router.get("/logs/{id}", dependencies=[READ])
+def show_log(context: Given, request: Request, id: str) -> Response:  # noqa: A002  (the path's own name)
+    """State, findings and player of a log; raises ``NotFound``."""
+    log = _find(context, id)
+    is_kept = log.detection is not None and context.blobs.has(log.detection.history_blob)
+    return render(request, "log.html", log=log, is_kept=is_kept)
+
+
+@router.get("/logs/{id}/frames", dependencies=[READ])
+async def read_frames(context: Given, request: Request, asker: Asking, id: str) -> Response:  # noqa: A002
+    """What the player shows (``service.web.frames``), made in a reader's process; raises ``Problem``."""
+    log = await asyncio.to_thread(_find, context, id)
+    if log.detection is None:
+        raise Problem(NOT_READY, f"job {log.job.id} is {log.job.status}; its results are not there")
+    tag = f'"{log.detection.history_blob[:32]}{"" if log.has_file else "-"}"'
+    if is_one_of(tag, request.headers.get("if-none-match", "")):
+        return unchanged(tag)
+    history = await asyncio.to_thread(context.blobs.path, log.detection.history_blob)
+    upload = await asyncio.to_thread(context.blobs.path, log.sha256) if log.has_file else None
+    with ExitStack() as spools:
+        spool = spools.enter_context(context.blobs.spool())
+        await context.readers.derive(partial(write_frames, history, upload, spool.path), log.format, asker.share)
+        closing = BackgroundTask(spools.pop_all().close)
+    headers = {"ETag": tag, "Cache-Control": KEEP_AND_ASK}
+    return FileResponse(spool.path, headers=headers, media_type="application/octet-stream", background=closing)
+
+
+def _find(context: Context, log_id: str) -> StoredGraspLog:
+    with context.database.read() as session:
+        return grasp_logs.get(session, log_id)

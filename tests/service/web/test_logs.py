@@ -1,0 +1,106 @@
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.service.web.conftest import HTML
+
+ON_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+
+
+@pytest.fixture
+def page_of(client: httpx.Client, elements: Callable[..., Any]) -> Callable[[str], Any]:
+    """The elements of a page of the server that all tests share."""
+
+    def read(path: str) -> Any:
+        answer = client.get(path, headers=HTML)
+        assert answer.status_code == 200, answer.text
+        return elements(answer.text)
+
+    return read
+
+
+@ON_SQLITE
+def test_a_log_that_went_all_the_way_has_a_player_with_frames(
+    client: httpx.Client, fitted: Any, page_of: Callable[[str], Any]
+) -> None:
+    page = page_of(f"/logs/{fitted['id']}")
+    (player,) = [given for tag, given in page.found if given.get("class") == "player"]
+    answer = client.get(player["data-frames"])
+    assert answer.status_code == 200
+    assert len(answer.content) > fitted["frames"] * 64 * 5
+    again = client.get(player["data-frames"], headers={"if-none-match": answer.headers["etag"]})
+    assert again.status_code == 304
+    assert "done" in page.text
+
+
+@ON_SQLITE
+def test_a_material_with_a_model_shows_its_sections_coefficients_and_logs(
+    fitted: Any, page_of: Callable[[str], Any]
+) -> None:
+    page = page_of("/materials/fitted?fn=0.1&v=0.001&method=ols")
+    tags = [tag for tag, _ in page.found]
+    assert tags.count("svg") == 2
+    assert tags.count("polyline") == 2
+    assert "per newton (1/N)" in page.text
+    assert f"/logs/{fitted['id']}" in [given.get("href") for _, given in page.found]
+    assert page.foreign() == []
+
+
+@ON_SQLITE
+@pytest.mark.parametrize("query", ["fn=-1", "fn=x", "v=1e9", "method=none", "cursor=x"])
+def test_a_material_is_not_shown_where_nothing_can_be(client: httpx.Client, fitted: Any, query: str) -> None:
+    answer = client.get(f"/materials/{fitted['material']}?{query}", headers=HTML)
+    assert answer.status_code == 422
+    assert "not allowed" in answer.text
+
+
+@ON_SQLITE
+def test_what_a_sensor_is_named_is_text(
+    client: httpx.Client, content: bytes, upload: Any, page_of: Callable[[str], Any], material: str
+) -> None:
+    name = "<img src=x onerror=alert(1)> شبكة 🧤"
+    log = upload(client, content, material=material, sensor=name).json()
+    for path in (f"/logs/{log['id']}", f"/materials/{material}"):
+        page = page_of(path)
+        assert page.foreign() == []
+        assert name[:40] in page.text
+
+
+@ON_SQLITE
+def test_a_log_whose_slip_history_is_missing_says_so(
+    client: httpx.Client,
+    repack: Any,
+    members: Any,
+    upload: Any,
+    wait: Any,
+    page_of: Callable[[str], Any],
+) -> None:
+    other = repack({**members, "time": members["time"] + 5.0})  # a history of its own
+    log = upload(client, other).json()
+    wait(client, log["job"]["id"])
+    assert "Stick–slip map" in str(page_of(f"/logs/{log['id']}").found)
+    folder = Path(client.headers["x-data-folder"])
+    before = time.time() - 20.0
+    newest = [path for path in folder.rglob("*") if path.is_file() and len(path.name) == 64]
+    hidden = [(path, path.read_bytes()) for path in newest if path.stat().st_mtime > before]
+    for path, _ in hidden:
+        path.unlink()
+    try:
+        page = page_of(f"/logs/{log['id']}")
+        assert "is missing" in page.text
+        assert client.get(f"/logs/{log['id']}/frames").json()["type"] == "/problems/file-missing"
+    finally:
+        for path, held in hidden:
+            path.write_bytes(held)
+
+
+@ON_SQLITE
+@pytest.mark.parametrize("path", ["/logs/nothing", "/logs/" + "0" * 32, "/materials/nothing"])
+def test_what_is_not_there_is_told_by_a_page(client: httpx.Client, path: str) -> None:
+    answer = client.get(path, headers=HTML)
+    assert answer.status_code == 404
+    assert "No such" in answer.text
