@@ -170,9 +170,15 @@ class H11Connection(BoundedConnection, H11Protocol):
 
 
 def ambiguity(scope: Scope) -> str | None:
-    """Why a request could be read differently by another parser on its way (RFC 9112: 2.3, 3.2, 6.1), None if not."""
+    """Why a request could be read differently by another parser on its way (RFC 9112: 2.3, 3.2, 6.1), None if not.
+
+    ``raw_path`` is the target as it was sent, without the query.
+    """
     if scope["http_version"] not in VERSIONS:
         return f"HTTP version {scope['http_version']}; allowed: 1.0, 1.1"
+    target = scope["raw_path"]
+    if (not target.startswith(b"/") and target != b"*") or b"#" in target:
+        return "a target other than a path, which would name a host beside the header Host; allowed: such as /healthz"
     hosts, lengths, codings = 0, 0, []
     for name, value in scope["headers"]:
         if name == b"host":
@@ -189,7 +195,9 @@ def ambiguity(scope: Scope) -> str | None:
 
 
 def _fault_of_handshake(scope: Scope) -> Refusal | None:
-    """The WebSocket's own protocol would wait for ever for the end of a body, which none has (RFC 6455, 4.1)."""
+    """What RFC 6455, 4.1 forbids; the WebSocket's own protocol would wait for ever for the end of a body."""
+    if scope["http_version"] != "1.1":
+        return BAD_REQUEST, f"a WebSocket is asked for by HTTP {scope['http_version']}; allowed: 1.1"
     if any(name in BODY_HEADERS for name, _ in scope["headers"]):
         return BAD_REQUEST, "a WebSocket is asked for with a body; allowed: none"
     return None

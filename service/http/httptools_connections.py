@@ -36,6 +36,7 @@ class HttpToolsConnection(BoundedConnection, HttpToolsProtocol):
             return  # the request is read once more, without the offer
         self._unfinished = 0
         super().on_headers_complete()
+        self.scope["raw_path"] = self.url.partition(b"?")[0]  # not only what the parser took for the path
         if not self.parser.should_upgrade():
             self.headers = []
 

@@ -67,6 +67,12 @@ HIDDEN = b"GET /v1/hidden HTTP/1.1\r\nHost: localhost\r\n\r\n"
         b"GET /healthz HTTP/2.0\r\nHost: localhost\r\n\r\n" + HIDDEN,
         b"GET /healthz HTTP/0.9\r\nHost: localhost\r\n\r\n" + HIDDEN,
         b"GET /healthz HTTP/9.9\r\nHost: localhost\r\n\r\n" + HIDDEN,
+        b"GET http://elsewhere/healthz HTTP/1.1\r\nHost: localhost\r\n\r\n" + HIDDEN,
+        b"GET http://localhost HTTP/1.1\r\nHost: localhost\r\n\r\n" + HIDDEN,
+        b"GET localhost:80 HTTP/1.1\r\nHost: localhost\r\n\r\n" + HIDDEN,
+        b"CONNECT localhost:80 HTTP/1.1\r\nHost: localhost\r\n\r\n" + HIDDEN,
+        b"GET healthz HTTP/1.1\r\nHost: localhost\r\n\r\n" + HIDDEN,
+        b"GET /healthz#there HTTP/1.1\r\nHost: localhost\r\n\r\n" + HIDDEN,
     ],
     ids=lambda sent: sent[:80].decode(),
 )
@@ -181,12 +187,18 @@ HANDSHAKE = (
 
 @pytest.mark.parametrize(
     "odd",
-    [b"Content-Length: 5\r\n\r\nabcde", b"Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n", b"Host: elsewhere\r\n\r\n"],
-    ids=["body", "chunks", "two hosts"],
+    [
+        HANDSHAKE + b"Content-Length: 5\r\n\r\nabcde",
+        HANDSHAKE + b"Transfer-Encoding: chunked\r\n\r\n0\r\n\r\n",
+        HANDSHAKE + b"Host: elsewhere\r\n\r\n",
+        HANDSHAKE.replace(b"HTTP/1.1", b"HTTP/1.0") + b"\r\n",
+        HANDSHAKE.replace(b" /v1", b" http://elsewhere/v1") + b"\r\n",
+    ],
+    ids=["body", "chunks", "two hosts", "HTTP 1.0", "absolute form"],
 )
 def test_an_odd_request_for_a_websocket_is_refused_at_once(address: Address, odd: bytes) -> None:
     began = time.monotonic()
-    head, _, body = told(address, HANDSHAKE + odd).partition(b"\r\n\r\n")
+    head, _, body = told(address, odd).partition(b"\r\n\r\n")
     assert head.startswith(b"HTTP/1.1 400")
     assert json.loads(body)["type"] == "/problems/bad-request"
     assert time.monotonic() - began < 5.0
