@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import tracemalloc
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import nullcontext, suppress
 from types import SimpleNamespace
@@ -230,3 +231,33 @@ def test_a_wrong_frame_is_answered_by_name_and_the_next_is_taken(
     opened, error, state = converse(make(), first(), frame(**wrong), frame(number=1, time=1.0)).answers
     assert (opened["type"], error["type"], state["type"]) == ("opened", "error", "state")
     assert (error["number"], error["name"], state["number"]) == (number, name, 1)
+
+
+def test_messages_wait_as_they_were_sent_and_not_as_lists() -> None:
+    """8 frames of 1 MB of empty lists would take 400 MiB, which no bound counts."""
+    content = msgspec.msgpack.encode({"type": "frame", "number": 0, "time": 0.0, "displacement": [[]] * 1_000_000})
+    ended = asyncio.Event()
+
+    class Socket:
+        left = connection.MOST_WAITING_IN
+
+        async def receive(self) -> dict[str, Any]:
+            if not self.left:
+                ended.set()
+                await asyncio.Event().wait()
+            self.left -= 1
+            return {"type": "websocket.receive", "bytes": bytes(content)}
+
+    async def fill() -> int:
+        given: Any = (Socket(), SimpleNamespace(streams=None), None)
+        reading = asyncio.create_task(connection._Connection(*given)._read())
+        await ended.wait()
+        held = tracemalloc.get_traced_memory()[0]
+        reading.cancel()
+        return held
+
+    tracemalloc.start()
+    try:
+        assert asyncio.run(fill()) < 2 * connection.MOST_WAITING_IN * len(content)
+    finally:
+        tracemalloc.stop()
