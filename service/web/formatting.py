@@ -27,6 +27,14 @@ def number(value: float | None, digits: int = 3) -> str:
     return text.replace("-", MINUS)
 
 
+def at_least(value: float, digits: int = 3) -> str:
+    """So many significant digits, rounded up: for what must not be too small, as a force that holds."""
+    if not math.isfinite(value) or value <= 0.0:
+        return number(value, digits)
+    unit = 10.0 ** (math.floor(math.log10(value)) - digits + 1)
+    return number(math.ceil(value / unit - 1e-9) * unit, digits)
+
+
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 

@@ -33,6 +33,7 @@ class ProblemPages:
         if not _wants_page(scope):
             await self.app(scope, receive, send)
             return
+        scope.setdefault("state", {})  # which those inside share
         await self.app(scope, receive, _Sender(scope, receive, send))
 
 
@@ -76,4 +77,5 @@ def _page(request: Request, status: int, problem: dict[str, Any]) -> Response:
     if status == 401 and request.method == "GET":
         asked = request.url.path + (f"?{request.url.query}" if request.url.query else "")
         return RedirectResponse(f"/login?next={quote(asked, safe='')}", 303)
-    return render(request, "problem.html", status, problem=problem)
+    template, given = getattr(request.state, "on_problem", ("problem.html", {}))
+    return render(request, template, status, problem=problem, **given)

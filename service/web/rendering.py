@@ -21,12 +21,17 @@ HEADERS = {"Content-Security-Policy": POLICY, "Referrer-Policy": "same-origin"}
 """Of every page. Without a referrer a browser would not even tell where a form comes from (``Origin: null``)."""
 
 
-def render(request: Request, template: str, status: int = 200, **given: Any) -> HTMLResponse:
+def render(request: Request, template: str, status_code: int = 200, **given: Any) -> HTMLResponse:
     """A page; its template sees what is ``given``, who asks, and whether a browser's session lets it."""
     access: Access = getattr(request.state, "access", EVERYTHING)
     page = _environment().get_template(template)
     text = page.render(request=request, access=access, in_session=sent_token(request) is not None, **given)
-    return HTMLResponse(text, status, HEADERS)
+    return HTMLResponse(text, status_code, HEADERS)
+
+
+def on_problem(request: Request, template: str, **given: Any) -> None:
+    """Show a problem of this request, if one comes, on a page of its own form, so that nobody types it anew."""
+    request.state.on_problem = template, given
 
 
 @cache
@@ -40,7 +45,7 @@ def _environment() -> Environment:
     )
     for filter_ in (formatting.number, formatting.interval, formatting.age, formatting.moment, formatting.size):
         environment.filters[filter_.__name__] = filter_
-    environment.filters["grouped"] = formatting.grouped
+    environment.filters |= {"grouped": formatting.grouped, "at_least": formatting.at_least}
     environment.filters["segment"] = lambda text: quote(str(text), safe="")
     environment.globals["asset"] = path_of
     return environment

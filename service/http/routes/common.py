@@ -49,7 +49,7 @@ class JsonRoute(APIRoute):
             given = request.headers.get("content-type", "")
             if given.partition(";")[0].strip().lower() != "application/json":
                 raise Problem.wrong_value(UNSUPPORTED_FORMAT, "content type", given or "missing", "application/json")
-            return await handle(Request(request.scope, _limited(request.receive, self.most_bytes)))
+            return await handle(Request(request.scope, limited(request.receive, self.most_bytes)))
 
         return handle_json
 
@@ -60,7 +60,8 @@ class LongJsonRoute(JsonRoute):
     most_bytes = 2**20
 
 
-def _limited(receive: Receive, most: int) -> Receive:
+def limited(receive: Receive, most: int) -> Receive:
+    """What receives a body, and raises ``HTTPException`` beyond so many bytes."""
     received = 0
 
     async def receive_some() -> Message:

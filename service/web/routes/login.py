@@ -10,8 +10,7 @@ from fastapi.responses import RedirectResponse
 from service.context import Given
 from service.http import origin, sessions
 from service.http.gate import Admission
-from service.http.problems import Problem
-from service.web.rendering import render
+from service.web.rendering import on_problem, render
 
 router = APIRouter(include_in_schema=False)
 
@@ -31,13 +30,11 @@ async def log_in(
     key: Annotated[str, Form(max_length=1000)] = "",
     next: Annotated[str, Form(max_length=2000)] = "/",  # noqa: A002
 ) -> Response:
-    """Begin a session of this key; raises ``Problem`` for a form of another site's page."""
+    """Begin a session of this key; raises ``Problem`` for what is none, and for a form of another site's page."""
     origin.check_site(request, is_browser=True)
     admission: Admission = request.app.state.admission
-    try:
-        found = await admission.find_key(request, key.strip())
-    except Problem as problem:
-        return render(request, "login.html", problem.kind.status, next=_own_path(next), problem=problem)
+    on_problem(request, "login.html", next=_own_path(next))
+    found = await admission.find_key(request, key.strip())
     response = RedirectResponse(_own_path(next), SEE_OTHER)
     await asyncio.to_thread(sessions.begin, context.database, found, request, response)
     return response

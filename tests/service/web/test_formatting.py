@@ -25,6 +25,13 @@ def test_numbers_have_sensible_digits(value: float | None, text: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("value", "text"), [(3.7501, "3.76"), (3.75, "3.75"), (9.999, "10.0"), (0.0, "0"), (1234.0, "1240")]
+)
+def test_a_force_that_holds_is_rounded_up(value: float, text: str) -> None:
+    assert formatting.at_least(value) == text
+
+
+@pytest.mark.parametrize(
     ("seconds", "text"),
     [(5, "just now"), (60, "1 minute ago"), (7300, "2 hours ago"), (864000, "10 days ago"), (4e7, "1 year ago")],
 )

@@ -1,0 +1,33 @@
+"""Jobs: what is waiting, under way and done, and how far."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+
+from db.records import JobStatus
+from db.repositories import jobs
+from service.context import Given
+from service.http.access import READ
+from service.http.paging import CursorText, Page
+from service.web.forms import EMPTY_IS_NONE
+from service.web.rendering import render
+
+router = APIRouter(include_in_schema=False)
+
+ON_A_PAGE = 50
+STAGES = {"ingest": ("frames", "slip_state", "samples", "friction_model", "material"), "fit": ("friction_model",)}
+"""In their order, by the kind of the job (``service.jobs.pipeline``)."""
+
+
+@router.get("/jobs", dependencies=[READ])
+def list_jobs(
+    context: Given,
+    request: Request,
+    status: Annotated[JobStatus | None, EMPTY_IS_NONE, Query()] = None,
+    cursor: CursorText = None,
+) -> Response:
+    """Newest first."""
+    page = Page("-created_at", ON_A_PAGE, cursor, identity="hex")
+    with context.database.read() as session:
+        found, after = page.cut(jobs.list_all(session, page.window(), status))
+    return render(request, "jobs.html", jobs=found, after=after, status=status, stages=STAGES, is_first=cursor is None)

@@ -1,0 +1,103 @@
+"""Upload a grasp log by a form."""
+
+from collections.abc import AsyncIterator
+from typing import Any
+
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import RedirectResponse
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import FormData, UploadFile
+
+from db.errors import AlreadyExists
+from service import formats
+from service.context import Context, Given
+from service.domain import curate
+from service.domain.asker import Asker
+from service.domain.receive import CHUNK_BYTES
+from service.domain.upload import Wish, upload
+from service.formats.tracked_markers import FRAME_RATE, SCALE
+from service.http.access import READ, UPLOAD, Asking
+from service.http.problems import INVALID_REQUEST, Problem
+from service.http.routes.common import limited
+from service.http.schemas.materials import NewMaterial
+from service.web.forms import checked
+from service.web.materials import names
+from service.web.rendering import on_problem, render
+from slipcore.defaults import DEFAULT_METHOD, METHOD_NAMES
+
+router = APIRouter(include_in_schema=False)
+
+BESIDE_THE_FILE = 2**20
+"""Bytes of a form that are not its file: fields, and what stands between them."""
+
+FIELDS = ("material", "create", "sensor", "detector", "format", "scale", "frame_rate", "mapping")
+
+
+class NewUpload(BaseModel):
+    """What the form says beside the file; what was left empty is None."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    material: str | None = None
+    create: bool = False
+    sensor: str | None = None
+    detector: str = DEFAULT_METHOD
+    format: str = formats.UNSPECIFIC_TYPES[1]
+    scale: float | None = Field(default=None, ge=SCALE[0], le=SCALE[1])
+    frame_rate: float | None = Field(default=None, ge=FRAME_RATE[0], le=FRAME_RATE[1])
+    mapping: str | None = None
+
+
+@router.get("/upload", dependencies=[READ])
+def show_upload(context: Given, request: Request, material: str = "") -> Response:
+    """The form."""
+    return render(request, "upload.html", **_form(context, {"material": material}), problem=None)
+
+
+@router.post("/upload", dependencies=[UPLOAD])
+async def receive_upload(context: Given, request: Request, asker: Asking) -> Response:
+    """Store the file with its job, and lead to the log; raises as the API's route does."""
+    on_problem(request, "upload.html", **await run_in_threadpool(_form, context, {}))
+    most = context.settings.max_upload_bytes + BESIDE_THE_FILE
+    async with Request(request.scope, limited(request.receive, most)).form(max_files=1, max_fields=len(FIELDS)) as form:
+        fields = {name: text.strip() for name in FIELDS if isinstance(text := form.get(name), str)}
+        on_problem(request, "upload.html", **await run_in_threadpool(_form, context, fields))
+        file, wanted = _file(form), checked(NewUpload, fields)
+        if wanted.create and wanted.material is not None:
+            await run_in_threadpool(_make_known, context, wanted.material, asker)
+        answer = await upload(context, _chunks(file), _wish(wanted, file, asker))
+    return RedirectResponse(f"/logs/{answer.body['id']}", 303)
+
+
+def _form(context: Context, fields: dict[str, str]) -> dict[str, Any]:
+    """What the template needs beside a problem."""
+    return {"fields": fields, "names": names(context), "formats": formats.FORMATS, "detectors": METHOD_NAMES}
+
+
+def _file(form: FormData) -> UploadFile:
+    file = form.get("file")
+    if not isinstance(file, UploadFile) or not file.size:
+        raise Problem.wrong_value(INVALID_REQUEST, "file", "missing or empty", "the file of a grasp log")
+    return file
+
+
+def _make_known(context: Context, material: str, asker: Asker) -> None:
+    """Make a material known, unless it is."""
+    new = checked(NewMaterial, {"name": material})
+    try:
+        with context.database.write() as session:
+            curate.create(session, new.name, "", asker)
+    except AlreadyExists:
+        return
+
+
+def _wish(wanted: NewUpload, file: UploadFile, asker: Asker) -> Wish:
+    settings = {"scale": wanted.scale, "frame_rate": wanted.frame_rate, "mapping": wanted.mapping}
+    said = (wanted.material, wanted.sensor, wanted.detector, wanted.format)
+    return Wish(*said, file.size, settings=settings, asker=asker)
+
+
+async def _chunks(file: UploadFile) -> AsyncIterator[bytes]:
+    while chunk := await file.read(CHUNK_BYTES):
+        yield chunk

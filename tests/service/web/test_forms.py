@@ -1,0 +1,137 @@
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from service.http.problem_meanings import MEANINGS
+from service.http.problems import PROBLEM_TYPES
+from tests.service.web.conftest import HOSTILE, HTML
+
+ON_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+DOCS = Path(__file__).parents[3] / "docs"
+
+
+@ON_SQLITE
+def test_a_form_stores_a_log_and_leads_to_it(client: httpx.Client, content: bytes, wait: Any) -> None:
+    data = {"material": "sent by form", "create": "true", "sensor": "tac 1", "format": "", "scale": ""}
+    answer = client.post("/upload", data=data, files={"file": ("grasp.npz", content)}, headers=HTML)
+    assert answer.status_code == 303, answer.text
+    log = client.get(f"/v1{answer.headers['location'].replace('logs', 'grasp-logs')}").json()
+    assert (log["material"], log["sensor"]) == ("sent by form", "tac 1")
+    assert wait(client, log["job"]["id"])["status"] == "done"
+    again = client.post("/upload", data=data, files={"file": ("grasp.npz", content)}, headers=HTML)
+    assert again.headers["location"] == answer.headers["location"]
+
+
+@ON_SQLITE
+@pytest.mark.parametrize(
+    ("data", "file", "told"),
+    [
+        ({}, b"no log at all", "The format is not supported"),
+        ({"format": "application/vnd.stiction.grasp-log+npz"}, b"no log at all", "The grasp log is not valid"),
+        ({}, b"", "file is missing or empty"),
+        ({"material": "nobody knows it"}, b"x", "No such material"),
+        ({"material": "<b>", "create": "true"}, b"x", "name is &lt;b&gt;"),
+        ({"scale": "-1"}, b"x", "scale is -1"),
+        ({"detector": "magic"}, b"x", "detector is magic"),
+        ({}, b"x" * (4 * 2**20), "The body is too large"),
+    ],
+)
+def test_a_refused_upload_is_told_above_its_form(
+    client: httpx.Client, data: dict[str, str], file: bytes, told: str
+) -> None:
+    answer = client.post("/upload", data=data, files={"file": ("grasp", file)}, headers=HTML)
+    assert answer.status_code in {404, 413, 415, 422}
+    assert told in answer.text
+    assert '<form id="upload"' in answer.text
+    kept = {name: text for name, text in data.items() if name in {"scale"}}
+    assert all(f'value="{text}"' in answer.text for text in kept.values())
+
+
+@ON_SQLITE
+def test_who_may_only_read_uploads_nothing(reach: Any, make: Callable[..., str], content: bytes) -> None:
+    caller = reach("keys", key=make("read"))
+    caller.headers |= HTML
+    answer = caller.request("POST", "/upload", files={"file": ("grasp.npz", content)})
+    assert answer.status_code == 403
+    assert "may only read" in caller.get("/upload").text
+
+
+@ON_SQLITE
+@pytest.mark.usefixtures("fitted")
+def test_the_calculator_says_what_the_api_says(client: httpx.Client) -> None:
+    asked = {"material": "fitted", "tangential_load": 1.5, "contact_area": 6e-5, "torque": 0.001, "fingers": 2}
+    told = client.post("/v1/grasp-force", json=asked).json()
+    page = client.get("/plan", params={**asked, "round_at": ""}, headers=HTML)
+    assert page.status_code == 200
+    shown = re.search(r"<strong>([\d.]+) N</strong> of each finger", page.text)
+    assert shown is not None
+    assert told["normal_force"] <= float(shown[1]) <= 1.01 * told["normal_force"]
+    assert 'name="torque" inputmode="decimal" value="0.001"' in page.text
+
+
+@ON_SQLITE
+@pytest.mark.parametrize(
+    ("query", "status", "told"),
+    [
+        ("material=fitted&tangential_load=x&contact_area=6e-5", 422, "tangential_load is x"),
+        ("material=fitted&tangential_load=1&contact_area=", 422, "contact_area is missing"),
+        ("material=nobody&tangential_load=1&contact_area=6e-5", 404, "No such material"),
+        ("material=fitted&tangential_load=1&contact_area=6e-5&method=bayes", 409, "no fitted model yet"),
+        ("material=fitted&tangential_load=9&contact_area=6e-5&normal_force_limit=0.1", 409, "No normal force holds"),
+    ],
+)
+def test_a_question_without_an_answer_stays_in_its_form(
+    client: httpx.Client, fitted: Any, query: str, status: int, told: str
+) -> None:
+    assert fitted["material"] == "fitted"
+    answer = client.get(f"/plan?{query}", headers=HTML)
+    assert answer.status_code == status
+    assert told in answer.text
+    assert 'name="tangential_load" inputmode="decimal" value="' in answer.text
+
+
+@ON_SQLITE
+@pytest.mark.parametrize("typed", HOSTILE)
+def test_what_a_form_was_sent_comes_back_as_text(browser: Any, elements: Callable[..., Any], typed: str) -> None:
+    for path in ("/plan", "/upload", "/jobs"):
+        answer = browser.get(path, params={"material": typed, "tangential_load": typed[:100], "status": typed[:100]})
+        assert elements(answer.text).foreign() == []
+
+
+@ON_SQLITE
+def test_jobs_are_listed_with_their_state_and_reason(client: httpx.Client, fitted: Any, elements: Any) -> None:
+    page = elements(client.get("/jobs", headers=HTML).text)
+    assert f"/logs/{fitted['id']}" in [given.get("href") for _, given in page.found]
+    assert any("data-refresh" in given for _, given in page.found)
+    assert f"/logs/{fitted['id']}" not in client.get("/jobs?status=failed", headers=HTML).text
+
+
+@ON_SQLITE
+def test_each_type_of_problem_has_a_page_at_its_address(browser: Any, elements: Callable[..., Any]) -> None:
+    everything = elements(browser.get("/problems").text).text
+    for kind in PROBLEM_TYPES.values():
+        answer = browser.get(kind.uri, headers={"accept": "*/*"})
+        page = elements(answer.text).text
+        assert (answer.status_code, kind.title in page, MEANINGS[kind.name].when in page) == (200, True, True)
+        assert kind.title in everything
+    assert browser.get("/problems/nothing").status_code == 404
+
+
+def test_the_pages_of_problems_say_what_the_documentation_says() -> None:
+    rows = re.findall(
+        r"^\| `/problems/([\w-]+)` \| [^|]+ \| (.*) \| (.*?) ?\|$", (DOCS / "problems.md").read_text(), re.M
+    )
+    said = {name: tuple(re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text).strip() for text in row) for name, *row in rows}
+    assert said == {name: tuple(meaning) for name, meaning in MEANINGS.items()}
+    assert {*said} == {*PROBLEM_TYPES}
+
+
+@ON_SQLITE
+def test_a_problem_names_an_address_that_is_there(browser: Any) -> None:
+    told = json.loads(browser.get("/v1/materials/nobody").text)
+    assert browser.get(told["type"]).status_code == 200
