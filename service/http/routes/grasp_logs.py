@@ -13,7 +13,7 @@ from db.repositories import grasp_logs, materials
 from service import formats
 from service.context import Context, Given
 from service.domain.export import export
-from service.domain.stored_results import EVENT_KINDS, SAMPLE_ARRAYS, decode_history, decode_samples, finite_or_none
+from service.domain.stored_results import EVENT_KINDS, SAMPLE_ARRAYS, decode_history, decode_samples
 from service.domain.upload import Wish, upload
 from service.formats import writing
 from service.formats.tracked_markers import FRAME_RATE, SCALE
@@ -177,14 +177,18 @@ def read_grasp_log(context: Given, id: str) -> GraspLogOut:  # noqa: A002  (the 
     return GraspLogOut.of(log)
 
 
-@router.get("/{id}/stick-ratio", dependencies=[READ], summary="Look at the stick ratio over time", responses=_RESULTS)
-def read_stick_ratio(context: Given, id: str) -> StickRatioOut:  # noqa: A002
+@router.get(
+    "/{id}/stick-ratio",
+    dependencies=[READ],
+    summary="Look at the stick ratio over time",
+    response_model=StickRatioOut,
+    responses=_RESULTS,
+)
+def read_stick_ratio(context: Given, id: str) -> Response:  # noqa: A002
     """One value a frame."""
     log = _find(context, id)
     history = decode_history(context.blobs.path(_ready(log.detection, log).history_blob))
-    return StickRatioOut(
-        time=history.time.tolist(), stick_ratio=[finite_or_none(value) for value in history.stick_ratio.tolist()]
-    )
+    return long_json({"time": history.time, "stick_ratio": history.stick_ratio})
 
 
 @router.get("/{id}/events", dependencies=[READ], summary="Look at slip and contact events", responses=_RESULTS)
