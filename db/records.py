@@ -148,10 +148,20 @@ class Runner:
 
 
 @dataclass(frozen=True, slots=True)
+class Finding:
+    """Something that makes the friction found in a log doubtful: its name, what was seen, and what to do about it."""
+
+    name: str
+    evidence: str
+    remedy: str
+
+
+@dataclass(frozen=True, slots=True)
 class Detection:
     """What a detector said of a log, in numbers; the histories are in the blob of hash ``history_blob``.
 
-    ``noise`` m; ``seconds`` that the detection took; ``onsets`` … ``releases`` count events.
+    ``noise`` m; ``seconds`` that the detection took; ``onsets`` … ``releases`` count events; ``findings`` against the
+    log, None where an older version did not look for any.
     """
 
     method: str
@@ -165,6 +175,7 @@ class Detection:
     releases: int
     seconds: float
     history_blob: str
+    findings: tuple[Finding, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from stiction_client.records import (
         AuditEntry,
         Detection,
+        Finding,
         FrictionAnswer,
         GraspLogReceipt,
         Job,
@@ -101,6 +102,7 @@ _LAZY = {
     "required_normal_force": "stiction_client.planner",
     "AuditEntry": "stiction_client.records",
     "Detection": "stiction_client.records",
+    "Finding": "stiction_client.records",
     "FrictionAnswer": "stiction_client.records",
     "GraspLogReceipt": "stiction_client.records",
     "Job": "stiction_client.records",
@@ -124,6 +126,7 @@ __all__ = [
     "CoulombFriction",
     "Detection",
     "Domain",
+    "Finding",
     "FrictionAnswer",
     "FrictionClient",
     "FrictionModel",

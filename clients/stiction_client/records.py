@@ -70,8 +70,19 @@ class Job:
 
 
 @dataclass(frozen=True, slots=True)
+class Finding:
+    """Something that makes the friction found in a log doubtful: its name, what was seen, and what to do about it."""
+
+    name: str
+    evidence: str
+    remedy: str
+
+
+@dataclass(frozen=True, slots=True)
 class Detection:
-    """What was seen in a grasp log: events of each kind, friction samples, frames, smallest stick ratio."""
+    """What was seen in a grasp log: events of each kind, friction samples, frames, smallest stick ratio, and findings
+    against it (None where the service did not look for any).
+    """
 
     method: str
     noise: float | None
@@ -81,11 +92,15 @@ class Detection:
     events: dict[str, int]
     samples: int
     seconds: float
+    findings: tuple[Finding, ...] | None = None
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "Detection":
         """The detection in the service's answer."""
-        return cls(**_values(cls, record))
+        values = _values(cls, record)
+        if values.get("findings") is not None:
+            values["findings"] = tuple(Finding(**_values(Finding, each)) for each in values["findings"])
+        return cls(**values)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from dataclasses import asdict, fields
 from sqlalchemy import ColumnElement, select, update
 from sqlalchemy.orm import Session
 
-from db.records import Detection, SamplesOfLog, SampleSummary
+from db.records import Detection, Finding, SamplesOfLog, SampleSummary
 from db.tables import DetectionRow, GraspLogRow, SampleSummaryRow
 
 
@@ -76,7 +76,9 @@ def detection_record(row: DetectionRow | None) -> Detection | None:
     """The row as a plain record."""
     if row is None:
         return None
-    return Detection(**{entry.name: getattr(row, entry.name) for entry in fields(Detection)})
+    found = {entry.name: getattr(row, entry.name) for entry in fields(Detection)}
+    findings = None if row.findings is None else tuple(Finding(**each) for each in row.findings)
+    return Detection(**found | {"findings": findings})
 
 
 def samples_record(row: SampleSummaryRow | None) -> SampleSummary | None:

@@ -162,7 +162,11 @@ def _upload(client: "FrictionClient", path: Path, wait: bool, **said: Any) -> di
     except ProblemError as problem:
         return {"file": path.name, "status": "rejected", "reason": str(problem)}
     job = client.wait(receipt.job) if wait else receipt.job
-    return {"file": path.name, "grasp_log": receipt.id, **asdict(job)}
+    detection = client.grasp_log(receipt.id).detection if wait else receipt.detection
+    findings = () if detection is None else detection.findings or ()
+    for finding in findings:
+        typer.echo(f"{path.name}: {finding.name}: {finding.evidence}; {finding.remedy}", err=True)
+    return {"file": path.name, "grasp_log": receipt.id, **asdict(job), "findings": [asdict(each) for each in findings]}
 
 
 def _middle_force(model: "FrictionModel") -> float:

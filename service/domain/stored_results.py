@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import estimators
-from db.records import Detection, NewModel, SampleSummary, Scale, Scales
+import slipcore
+from db.records import Detection, Finding, NewModel, SampleSummary, Scale, Scales
 from service.formats.npy import HEADER_LOCK
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.samples import FrictionSamples
@@ -72,8 +73,17 @@ def decode_samples(path: Path) -> FrictionSamples:
     )
 
 
-def summarise_history(history: SlipHistory, seconds: float, blob: str, *, is_scaled: bool = True) -> Detection:
-    """A history in numbers; a length only where the log is in metres (``is_scaled``)."""
+def summarise_history(
+    history: SlipHistory,
+    seconds: float,
+    blob: str,
+    findings: Sequence[slipcore.Finding] = (),
+    *,
+    is_scaled: bool = True,
+) -> Detection:
+    """A history in numbers, with the ``findings`` against its log; a length only where that is in metres
+    (``is_scaled``).
+    """
     in_contact = ~np.isnan(history.stick_ratio)
     events = history.events
     return Detection(
@@ -88,6 +98,7 @@ def summarise_history(history: SlipHistory, seconds: float, blob: str, *, is_sca
         releases=len(events.release),
         seconds=seconds,
         history_blob=blob,
+        findings=tuple(Finding(each.name, each.evidence, each.remedy) for each in findings),
     )
 
 

@@ -120,8 +120,9 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         history = slipcore.detect_slip(log, method=stored.detector, lookahead=slipcore.LOOKAHEAD)
     with run.stage("samples"):
         samples, none_because = _collect(log, history)
+        findings = slipcore.check_log(log, history, samples)
         blob = run.blobs.put(encode_history(history))
-        detection = summarise_history(history, run.seconds["slip_state"], blob, is_scaled=log.is_scaled)
+        detection = summarise_history(history, run.seconds["slip_state"], blob, findings, is_scaled=log.is_scaled)
         summary = summarise_samples(samples, none_because, run.blobs.put(encode_samples(samples)))
     with run.database.write() as session:
         jobs.start_stage(session, run.claim, "samples", run.seconds)  # nobody else has stored them meanwhile

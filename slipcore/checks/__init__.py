@@ -33,16 +33,18 @@ CHECKS: tuple[Check, ...] = (
 """In the order in which findings are told: the recording first, then what was found in it."""
 
 
-def check_log(log: GraspLog, history: SlipHistory, **options: float) -> list[Finding]:
+def check_log(
+    log: GraspLog, history: SlipHistory, samples: FrictionSamples | None = None, **options: float
+) -> list[Finding]:
     """Look for what makes friction from this log doubtful; an empty list is no proof that all is well.
 
-    ``history``: what a detector found in it. ``options``: see ``defaults.CheckOptions``. Raises ``InvalidInput`` for an
-    option that does not exist or is out of its range.
+    ``history``: what a detector found in it; ``samples`` that were collected from it, else they are; ``options``: see
+    ``defaults.CheckOptions``. Raises ``InvalidInput`` for an option that does not exist or is out of its range.
     """
     limits = choose_options(CheckOptions, options)
     forces = None if log.force is None else element_forces(log.force, normals_of(log))
     pressing = np.zeros(log.displacement.shape[:3]) if forces is None else np.maximum(forces.pressing, 0.0)
-    subject = Subject(log, history, forces, pressing, _samples(log, history), limits)
+    subject = Subject(log, history, forces, pressing, samples or _samples(log, history), limits)
     return [finding for check in CHECKS for finding in check(subject)]
 
 

@@ -13,6 +13,7 @@ import stiction_client
 from stiction_client import (
     AsyncFrictionClient,
     ConnectionFailed,
+    Finding,
     FrictionClient,
     GraspLogReceipt,
     InvalidArgument,
@@ -158,7 +159,11 @@ def test_a_folder_without_fields_is_refused_here(ask: Ask, service: Service, tmp
 
 def test_a_grasp_log_is_asked_for(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
     server = service(answers.grasp_log)
-    assert ask(server, "grasp_log", "g1").detection.events["onset"] == 181
+    seen = ask(server, "grasp_log", "g1").detection
+    assert (seen.events["onset"], seen.findings) == (181, None)  # of a service that does not look for any
+    told = {"name": "no rest", "evidence": "e", "remedy": "r", "of a newer service": 1}
+    newer = {**answers.grasp_log, "detection": {**answers.grasp_log["detection"], "findings": [told]}}
+    assert ask(service(newer), "grasp_log", "g1").detection.findings == (Finding("no rest", "e", "r"),)
     assert server.requests[0].url.path == "/v1/grasp-logs/g1"
 
 

@@ -1,5 +1,6 @@
 """Grasp logs, what was found in them, and their withdrawal."""
 
+from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated
 
@@ -10,6 +11,11 @@ from db.records import StoredGraspLog, Withdrawal
 from service.http.schemas.common import MOMENT_EXAMPLE, Body, Next, Text
 from service.http.schemas.jobs import JOB_EXAMPLE, JobOut
 
+FINDING_EXAMPLE: JsonDict = {
+    "name": "no rest",
+    "evidence": "68 elements touch in the first frame",
+    "remedy": "begin the recording before the touch: what was before is not known",
+}
 DETECTION_EXAMPLE: JsonDict = {
     "method": "filter",
     "noise": 1.1e-6,
@@ -19,6 +25,7 @@ DETECTION_EXAMPLE: JsonDict = {
     "events": {"onset": 181, "end": 40, "touch": 203, "release": 0},
     "samples": 1932,
     "seconds": 0.06,
+    "findings": [FINDING_EXAMPLE],
 }
 GRASP_LOG_EXAMPLE: JsonDict = {
     "id": "7c9e6679742540de944be07fc1f90ae7",
@@ -69,6 +76,16 @@ class EventCounts(BaseModel):
     release: int
 
 
+class FindingOut(BaseModel):
+    """Something that makes the friction found in a log doubtful."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [FINDING_EXAMPLE]})
+
+    name: Annotated[str, Field(description="As in docs/checks.md")]
+    evidence: Annotated[str, Field(description="What was seen")]
+    remedy: Annotated[str, Field(description="What to do about it")]
+
+
 class DetectionOut(BaseModel):
     """What the detector found in a log."""
 
@@ -82,6 +99,9 @@ class DetectionOut(BaseModel):
     events: EventCounts
     samples: Annotated[int, Field(description="Number of friction samples")]
     seconds: Annotated[float, Field(description="What the detection took")]
+    findings: Annotated[
+        list[FindingOut] | None, Field(description="Against the log; null where an older version did not look for any")
+    ]
 
 
 class GraspLogOut(BaseModel):
@@ -140,6 +160,7 @@ def _detection_out(log: StoredGraspLog) -> DetectionOut | None:
         events=EventCounts(onset=found.onsets, end=found.ends, touch=found.touches, release=found.releases),
         samples=log.samples.count,
         seconds=found.seconds,
+        findings=None if found.findings is None else [FindingOut(**asdict(each)) for each in found.findings],
     )
 
 

@@ -1,5 +1,6 @@
 import hashlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ def test_what_was_found_is_what_the_numerics_find(client: httpx.Client, fitted: 
     assert found["noise"] == history.noise
     assert found["stick_ratio_min"] == np.nanmin(history.stick_ratio)
     assert found["contact_frames"] == int(history.contact.any(axis=(1, 2)).sum())
+    assert found["findings"] == []
     assert found["events"] == {kind: len(getattr(history.events, kind)) for kind in found["events"]}
     stored = client.get(f"/v1/grasp-logs/{fitted['id']}/samples").json()
     for name, values in stored.items():
@@ -41,6 +43,18 @@ def test_what_was_found_is_what_the_numerics_find(client: httpx.Client, fitted: 
     for kind, listed in events.items():
         np.testing.assert_array_equal(listed["element"], getattr(history.events, kind).element)
         np.testing.assert_array_equal(listed["time"], getattr(history.events, kind).time)
+
+
+def test_what_makes_a_log_doubtful_is_kept_with_it(
+    client: httpx.Client, ramp: GraspLog, upload: Upload, wait: Wait
+) -> None:
+    doubtful = encode(replace(ramp, time=1e3 * ramp.time))
+    accepted = upload(client, doubtful)
+    wait(client, accepted.json()["job"]["id"])
+    (finding,) = client.get(accepted.headers["location"]).json()["detection"]["findings"]
+    assert finding["name"] == "slow frames"
+    assert "ms" in finding["remedy"]
+    assert "s apart" in finding["evidence"]
 
 
 def test_the_stick_ratio_is_null_without_contact(client: httpx.Client, fitted: dict[str, Any], ramp: GraspLog) -> None:
