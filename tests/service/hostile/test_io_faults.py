@@ -108,12 +108,13 @@ def test_a_job_stores_its_results_once_and_whole(
     database: Database,
     blobs: BlobStore,
     content: bytes,
+    tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     caller = reach("open")
     caller.request("POST", "/v1/materials", json={"name": "paper"})
     monkeypatch.setattr(worker, "_stores", lambda _: (database, blobs))
-    place: Any = None
+    place = worker.Place(database.url, tmp_path)
 
     def claim() -> Claim:
         with database.write() as session:
