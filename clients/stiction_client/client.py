@@ -118,8 +118,11 @@ class FrictionClient:
         """Let a log count in no fit any more; it is kept, with the reason."""
         return self._run(flows.withdraw(log if isinstance(log, str) else log.id, reason))
 
-    def model(self, name: str, method: str = "ols") -> FrictionModel:
-        """The current model of a material, to be kept and evaluated here; raises ``NoModel`` where there is none."""
+    def model(self, name: str, method: str = "auto") -> FrictionModel:
+        """The current model of a material, to be kept and evaluated here: of one method, or the recommended one.
+
+        Raises ``NoModel`` where there is none.
+        """
         return self._run(flows.model(name, method, self._kept, self._stale_after))
 
     def friction(
@@ -147,7 +150,7 @@ class FrictionClient:
         """
         return self._run(flows.recognise(grasp, materials, method))
 
-    def fit(self, name: str, method: str = "ols", seed: int = 0) -> Job:
+    def fit(self, name: str, method: str = "auto", seed: int = 0) -> Job:
         """Fit a material over all its grasp logs; follow with ``wait``."""
         return self._run(flows.fit(name, method, seed))
 
@@ -278,7 +281,7 @@ class AsyncFrictionClient:
         """As ``FrictionClient.withdraw``."""
         return await self._run(flows.withdraw(log if isinstance(log, str) else log.id, reason))
 
-    async def model(self, name: str, method: str = "ols") -> FrictionModel:
+    async def model(self, name: str, method: str = "auto") -> FrictionModel:
         """As ``FrictionClient.model``."""
         return await self._run(flows.model(name, method, self._kept, self._stale_after))
 
@@ -300,7 +303,7 @@ class AsyncFrictionClient:
         """As ``FrictionClient.recognise``."""
         return await self._run(flows.recognise(grasp, materials, method))
 
-    async def fit(self, name: str, method: str = "ols", seed: int = 0) -> Job:
+    async def fit(self, name: str, method: str = "auto", seed: int = 0) -> Job:
         """As ``FrictionClient.fit``."""
         return await self._run(flows.fit(name, method, seed))
 

@@ -191,8 +191,9 @@ class Kept:
 
 
 def model(name: str, method: str, kept: dict[str, Kept], stale_after: float) -> Flow[FrictionModel]:
-    """A material's current model of one method, as ``kept`` where it is younger than ``stale_after`` s.
+    """A material's current model of one method, or the recommended one ("auto").
 
+    It is as ``kept`` where that is younger than ``stale_after`` s.
     An older one is asked for again; where nobody answers, the last is good enough, with a warning of its age.
     """
     known = kept.get(name)
@@ -205,6 +206,7 @@ def model(name: str, method: str, kept: dict[str, Kept], stale_after: float) -> 
                 raise
             warnings.warn(f"{error}; going on with the model of {name!r} from {known.age:.0f} s ago", StaleModel, 5)
     models = known.material.models
+    method = known.material.recommended or method if method == "auto" else method
     if method not in models:
         fitted = ", ".join(sorted(models)) or "none"
         raise NoModel(f"material {name!r} has no fitted model of method {method!r}; fitted: {fitted}")

@@ -12,19 +12,28 @@ ENDED = frozenset({"done", "failed", "refused", "cancelled"})
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """A material and its current models, one a method."""
+    """A material and its current models, one a method; ``recommended``: which of them answers who names no method."""
 
     name: str
     description: str
     created_at: str
     grasp_logs: int
     models: Mapping[str, FrictionModel] = field(default_factory=dict)
+    recommended: str | None = None
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "Material":
         """The material in the service's answer."""
         models = {method: FrictionModel.from_json(model) for method, model in record["models"].items()}
-        return cls(record["name"], record["description"], record["created_at"], int(record["grasp_logs"]), models)
+        best = record.get("recommended", {"method": "ols"})  # an older service recommends none
+        return cls(
+            name=record["name"],
+            description=record["description"],
+            created_at=record["created_at"],
+            grasp_logs=int(record["grasp_logs"]),
+            models=models,
+            recommended=None if best is None else str(best["method"]),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +150,8 @@ class FrictionAnswer:
     """Friction of a material at one velocity (m/s) and normal force of an element (N).
 
     ``friction_coefficient`` is the mean, or the quantile asked for ``of`` one "element", or of the mean over the
-    ``elements`` of a "contact"; ``warning`` says what was extrapolated.
+    ``elements`` of a "contact"; ``warning`` says what was extrapolated; ``chosen_because``, why this model answers,
+    where no method was named.
     """
 
     material: str
@@ -156,6 +166,7 @@ class FrictionAnswer:
     warning: str | None
     of: str = "element"
     elements: int = 1
+    chosen_because: str | None = None
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "FrictionAnswer":

@@ -97,7 +97,7 @@ def check(
 
 def fit(
     logs: Logs,
-    method: Annotated[str, typer.Option("--method", help=METHOD_HELP)] = "ols",
+    method: Annotated[str, typer.Option("--method", help=METHOD_HELP)] = "auto",
     detector: Annotated[str | None, typer.Option(help=DETECTOR_HELP)] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the sampler.")] = 0,
     mapping: Mapping = None,

@@ -18,7 +18,9 @@ Url = Annotated[str, typer.Option("--url", envvar="STICTION_URL", help="Address 
 Key = Annotated[str | None, typer.Option("--key", envvar="STICTION_KEY", help="Access key, where the service asks.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
 MaterialName = Annotated[str, typer.Argument(help="Name of a material.")]
-Method = Annotated[str, typer.Option("--method", help="Which current model: ols or bayes.")]
+Method = Annotated[
+    str, typer.Option("--method", help="Whose current model, as of `stiction fit`; auto: the recommended one.")
+]
 Velocity = Annotated[float, typer.Option("--velocity", help="Tangential velocity of the slip, m/s.")]
 
 CODE_OF_STATUS = {
@@ -75,7 +77,7 @@ def lookup(
     elements: Annotated[
         int | None, typer.Option(min=1, help="The quantile of a contact of so many elements, not of one element.")
     ] = None,
-    method: Method = "ols",
+    method: Method = "auto",
     url: Url = DEFAULT_URL,
     key: Key = None,
     json: Json = False,
@@ -117,7 +119,7 @@ def plan(
     elements: Annotated[
         float | None, typer.Option(min=1.0, help="Elements of one contact, where its area does not tell them.")
     ] = None,
-    method: Method = "ols",
+    method: Method = "auto",
     url: Url = DEFAULT_URL,
     key: Key = None,
     json: Json = False,
@@ -139,10 +141,11 @@ def plan(
         of=of,
         elements=elements,
     )
+    told = {"method": model.method, "version": model.version, **asdict(answer)}
     if json:
-        print_json(asdict(answer))
+        print_json(told)
     else:
-        print_table(f"Grip for {load:g} N on {material}", ("", ""), list(asdict(answer).items()))
+        print_table(f"Grip for {load:g} N on {material}", ("", ""), list(told.items()))
 
 
 def _mapping(path: Path | None) -> Any:

@@ -43,5 +43,6 @@ def look_up(known: KnownModel, question: Question) -> FrictionOut:
         friction_coefficient=asked,
         mean=mean,
         within_domain=outside is None,
+        chosen_because=known.because,
         warning="; ".join(filter(None, (outside, nothing, outdated))) or None,
     )

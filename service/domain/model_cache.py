@@ -10,10 +10,13 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
+from sqlalchemy.orm import Session
+
 from db.database import Database
 from db.errors import NotFound, StorageUnavailable
 from db.records import Job, StoredModel
 from db.repositories import friction_models, materials
+from service.domain.recommended import AUTO, recommended
 from service.domain.stored_results import to_friction_model
 from service.http.problems import NO_MODEL, Problem
 
@@ -32,7 +35,8 @@ which costs a look at the database."""
 class KnownModel:
     """A material's current model as it was at a moment, with the tag that stands for what it answers.
 
-    ``read_at`` and ``until`` are s of the clock that nobody sets.
+    ``read_at`` and ``until`` are s of the clock that nobody sets; ``because``: why this model,
+    where no method was named.
     """
 
     stored: StoredModel
@@ -40,6 +44,7 @@ class KnownModel:
     tag: str
     read_at: float
     until: float
+    because: str | None = None
 
 
 class _Reading(NamedTuple):
@@ -110,16 +115,12 @@ class ModelCache:
         read_at = time.monotonic()
         until = read_at + self._seconds
         with database.read() as session:
-            stored = friction_models.current(session, material, method)
-            if stored is None:
-                materials.find_id(session, material)
-                detail = f"material {material!r} has no model fitted by {method!r} yet"
-                raise Problem(NO_MODEL, detail, name="method", value=method, allowed="a method that was fitted")
+            stored, because = _current(session, material, method)
         known = self._known.get((material, method))
         if known is not None and known.tag == _tag(stored):
             known = replace(known, read_at=read_at, until=until)
         else:
-            known = KnownModel(stored, to_friction_model(stored.model), _tag(stored), read_at, until)
+            known = KnownModel(stored, to_friction_model(stored.model), _tag(stored), read_at, until, because)
         if len(self._known) >= MOST:
             self._known.clear()
         newer = self._known.get((material, method))
@@ -163,6 +164,21 @@ class ModelCache:
         self._changes.update({each: None for each in changes if each not in self._changes})
         while len(self._changes) > MOST_CHANGES:
             self._changes.popitem(last=False)
+
+
+def _current(session: Session, material: str, method: str) -> tuple[StoredModel, str | None]:
+    """The current model by a method, or the recommended one with the reason; raises as ``ModelCache.read``."""
+    if method != AUTO:
+        stored = friction_models.current(session, material, method)
+        if stored is not None:
+            return stored, None
+    material_id = materials.find_id(session, material)
+    if method == AUTO:
+        found = recommended(friction_models.all_current(session, [material_id]).get(material_id, ()))
+        if found is not None:
+            return found
+    detail = f"material {material!r} has no model fitted by {method!r} yet"
+    raise Problem(NO_MODEL, detail, name="method", value=method, allowed="a method that was fitted")
 
 
 def _tag(stored: StoredModel) -> str:

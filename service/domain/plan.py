@@ -65,7 +65,9 @@ def grasp_force(context: Context, wish: NewGraspForce) -> GraspForceOut:
         "largest_load": _finite(answer.largest_load),
         "warning": "; ".join(filter(None, (answer.warning, OUTDATED if known.stored.outdated else None))) or None,
     }
-    return GraspForceOut(material=model.material, method=model.method, version=model.version, **told)
+    return GraspForceOut(
+        material=model.material, method=model.method, version=model.version, chosen_because=known.because, **told
+    )
 
 
 def recognise(context: Context, wish: NewRecognition) -> RecognitionOut:

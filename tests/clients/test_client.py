@@ -88,6 +88,19 @@ def test_no_degrees_of_freedom_means_a_normal_distribution(
     assert ask(service(answers.material), "model", "paper").degrees_of_freedom == np.inf
 
 
+@pytest.mark.parametrize(
+    ("recommended", "method"), [({"method": "bayes", "because": "bayes: best"}, "bayes"), ("missing", "ols")]
+)
+def test_who_names_no_method_gets_the_recommended_model_or_least_squares_of_an_older_service(
+    ask: Ask, service: Service, answers: SimpleNamespace, recommended: Any, method: str
+) -> None:
+    answers.material["models"]["bayes"] = answers.model | {"method": "bayes"}
+    if recommended != "missing":
+        answers.material["recommended"] = recommended
+    assert ask(service(answers.material), "model", "paper").method == method
+    assert ask(service(answers.material), "model", "paper", "ols").method == "ols"
+
+
 def test_a_material_without_the_model_says_which_it_has(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
     with pytest.raises(NoModel, match="'paper' has no fitted model of method 'bayes'; fitted: ols"):
         ask(service(answers.material), "model", "paper", method="bayes")

@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic.config import JsonDict
 
 from db.records import Material
+from service.domain.recommended import Recommended, recommended
 from service.http.schemas.common import MOMENT_EXAMPLE, Body, Name, Next, Reference, Text
 from service.http.schemas.jobs import JOB_EXAMPLE, JobOut
 from service.http.schemas.models import MODEL_EXAMPLE, FrictionModelOut
@@ -19,6 +20,10 @@ MATERIAL_EXAMPLE: JsonDict = {
     "grasp_logs": 12,
     "withdrawn_grasp_logs": 0,
     "models": {"ols": MODEL_EXAMPLE},
+    "recommended": {
+        "method": "ols",
+        "because": "ols: the material has no hierarchical model yet; ask for a fit by auto",
+    },
 }
 
 
@@ -48,6 +53,18 @@ class NewMerge(Body):
     source: Annotated[Reference, Field(max_length=100, description="The material whose logs and names move here")]
 
 
+class RecommendedOut(BaseModel):
+    """The recommended one of a material's models."""
+
+    method: str
+    because: str
+
+    @classmethod
+    def of(cls, found: Recommended | None) -> "RecommendedOut | None":
+        """The recommendation as an answer, if there is one."""
+        return None if found is None else cls(method=found.stored.model.method, because=found.because)
+
+
 class MaterialOut(BaseModel):
     """A material with its current models."""
 
@@ -60,6 +77,9 @@ class MaterialOut(BaseModel):
     grasp_logs: Annotated[int, Field(description="How many logs of it are stored")]
     withdrawn_grasp_logs: Annotated[int, Field(description="How many of them count in no fit")]
     models: Annotated[dict[str, FrictionModelOut], Field(description="The current model of each method")]
+    recommended: Annotated[
+        RecommendedOut | None, Field(description="Which of them answers who names no method; null: none may be")
+    ] = None
 
     @classmethod
     def of(cls, material: Material) -> "MaterialOut":
@@ -72,6 +92,7 @@ class MaterialOut(BaseModel):
             grasp_logs=material.grasp_logs,
             withdrawn_grasp_logs=material.withdrawn_grasp_logs,
             models={stored.model.method: FrictionModelOut.of(stored) for stored in material.models},
+            recommended=RecommendedOut.of(recommended(material.models)),
         )
 
 

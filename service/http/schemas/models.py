@@ -13,6 +13,9 @@ from service.http.schemas.common import MOMENT_EXAMPLE, Body, Force, Next, Veloc
 ModelMethod = Literal["ols", "robust", "conjugate", "hierarchical", "bayes"]
 FitMethod = Literal["ols", "robust", "conjugate", "hierarchical", "bayes", "auto"]
 Averaged = Literal["element", "contact"]
+ChosenBecause = Annotated[str | None, Field(description="Why this model answers; null where a method was named")]
+
+CHOSEN_EXAMPLE = "hierarchical: friction may scatter between grasps, between places and within them"
 
 MODEL_EXAMPLE: JsonDict = {
     "material": "paper",
@@ -41,7 +44,7 @@ class NewFit(Body):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"method": "bayes", "seed": 0}]})
 
-    method: Annotated[FitMethod, Field(description="`auto` takes the one that the data call for")] = "ols"
+    method: Annotated[FitMethod, Field(description="`auto` takes the one that the data call for")] = "auto"
     seed: Annotated[int, Field(ge=0, lt=2**32, description="Of the sampler: the same seed gives the same fit.")] = 0
 
 
@@ -152,7 +155,7 @@ class LookUpQuery(BaseModel):
             examples=[0.05],
         ),
     ] = None
-    method: Annotated[ModelMethod, Field(description="Whose current model answers")] = "ols"
+    method: Annotated[FitMethod, Field(description="Whose current model answers; `auto`: the recommended one")] = "auto"
     of: Annotated[
         Averaged | None,
         Field(description="Whose friction the quantile is of; the contact's where `elements` is given, else one's"),
@@ -182,8 +185,9 @@ class FrictionOut(BaseModel):
             "examples": [
                 {
                     "material": "paper",
-                    "method": "ols",
+                    "method": "hierarchical",
                     "version": 3,
+                    "chosen_because": CHOSEN_EXAMPLE,
                     "tangential_velocity": 0.0,
                     "normal_force": 0.05,
                     "quantile": 0.05,
@@ -201,6 +205,7 @@ class FrictionOut(BaseModel):
     material: str
     method: str
     version: int
+    chosen_because: ChosenBecause = None
     tangential_velocity: Annotated[float, Field(description="m/s")]
     normal_force: Annotated[float, Field(description="N on an element")]
     quantile: float | None

@@ -5,7 +5,7 @@ from typing import Annotated, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from service.http.schemas.common import Area, Body, Force, Reference, Velocity
-from service.http.schemas.models import Averaged, ModelMethod
+from service.http.schemas.models import CHOSEN_EXAMPLE, Averaged, ChosenBecause, FitMethod, ModelMethod
 from service.http.schemas.results import SAMPLES_EXAMPLE
 
 
@@ -17,7 +17,7 @@ class NewGraspForce(Body):
     )
 
     material: Reference
-    method: Annotated[ModelMethod, Field(description="Whose current model answers")] = "ols"
+    method: Annotated[FitMethod, Field(description="Whose current model answers; `auto`: the recommended one")] = "auto"
     tangential_load: Annotated[float, Field(ge=0.0, le=1e6, description="Of all fingers together, N")]
     torque: Annotated[float, Field(ge=0.0, le=1e6, description="Of all fingers together, N·m")] = 0.0
     contact_area: Annotated[float, Field(ge=1e-12, le=1.0, description="Of one finger, m²")]
@@ -55,8 +55,9 @@ class GraspForceOut(BaseModel):
             "examples": [
                 {
                     "material": "paper",
-                    "method": "ols",
+                    "method": "hierarchical",
                     "version": 3,
+                    "chosen_because": CHOSEN_EXAMPLE,
                     "normal_force": 4.9,
                     "feasible_interval": [4.9, 31.2],
                     "margin": 26.3,
@@ -66,8 +67,8 @@ class GraspForceOut(BaseModel):
                     "slip_probability": 0.001,
                     "within_domain": True,
                     "warning": None,
-                    "of": "element",
-                    "elements": 1.0,
+                    "of": "contact",
+                    "elements": 60.0,
                 }
             ]
         }
@@ -76,6 +77,7 @@ class GraspForceOut(BaseModel):
     material: str
     method: str
     version: int
+    chosen_because: ChosenBecause = None
     normal_force: Annotated[float, Field(description="The smallest that holds, N")]
     feasible_interval: Annotated[
         list[float | None], Field(min_length=2, max_length=2, description="N; second null: no upper bound")

@@ -83,6 +83,7 @@ def test_what_goes_over_the_wire_has_an_example() -> None:
         "CostOut",
         "ScaleOut",
         "ScalesOut",
+        "RecommendedOut",
         "WithdrawalOut",
         "EventCounts",
         "EventsOfOneKind",

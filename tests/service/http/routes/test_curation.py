@@ -22,6 +22,7 @@ def test_a_material_is_found_by_its_old_name(client: httpx.Client, material: str
         "grasp_logs": 0,
         "withdrawn_grasp_logs": 0,
         "models": {},
+        "recommended": None,
     }
     assert client.get(path).json() == changed.json()
     assert client.patch(path, json={}).json() == changed.json()

@@ -20,6 +20,7 @@ def test_a_new_material_is_there_from_then_on(client: httpx.Client) -> None:
         "grasp_logs": 0,
         "withdrawn_grasp_logs": 0,
         "models": {},
+        "recommended": None,
     }
     assert made.json() in client.get("/v1/materials?search=card&limit=1000").json()["items"]
 

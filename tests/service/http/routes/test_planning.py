@@ -29,10 +29,14 @@ def test_the_grasp_force_is_the_planners_own(
     assert answer.status_code == 200, answer.text
     told = answer.json()
     with FrictionClient(str(client.base_url)) as planner:
-        expected = required_normal_force(planner.model("fitted"), 0.5, contacts=grasp(1e-4, **fingers), **more)
+        model = planner.model("fitted")
+        expected = required_normal_force(model, 0.5, contacts=grasp(1e-4, **fingers), **more)
     assert told["normal_force"] == expected.normal_force
     assert told["feasible_interval"][0] == expected.normal_force
-    assert (told["material"], told["method"], told["version"]) == ("fitted", "ols", 1)
+    assert (told["material"], told["method"], told["version"]) == ("fitted", model.method, model.version)
+    assert told["chosen_because"].startswith(f"{model.method}: ")
+    named = client.post("/v1/grasp-force", json=LOAD | more | fingers | {"method": "ols"}).json()
+    assert (named["method"], named["chosen_because"]) == ("ols", None)
     assert (told["of"], told["elements"]) == (expected.of, expected.elements)
     assert told["friction_coefficient"] == pytest.approx(expected.friction_coefficient)
 
@@ -51,7 +55,7 @@ def test_a_load_that_no_force_holds_is_refused_with_the_most_that_is_held(client
     [
         ("grasp-force", LOAD | {"material": "felt"}, 404, "unknown-material"),
         ("grasp-force", LOAD | {"method": "conjugate"}, 409, "no-model"),
-        ("grasp-force", LOAD | {"method": "auto"}, 422, "invalid-request"),
+        ("grasp-force", LOAD | {"method": "guess"}, 422, "invalid-request"),
         ("grasp-force", LOAD | {"contact_area": 0.0}, 422, "invalid-request"),
         ("grasp-force", LOAD | {"contact_area": 1e30}, 422, "invalid-request"),
         ("grasp-force", LOAD | {"of": "grasp"}, 422, "invalid-request"),
