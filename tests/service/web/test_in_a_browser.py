@@ -1,0 +1,124 @@
+import shutil
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from db.database import Database
+from db.repositories import access_keys
+from service.http import access
+from service.settings import Settings
+from tests.service.web import chromium
+from tests.service.web.chromium import Tab
+
+pytestmark = pytest.mark.skipif(chromium.PROGRAM is None, reason="chromium is not installed: apt-get install chromium")
+ON_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+
+DROP = """(() => {
+  const held = new DataTransfer();
+  held.items.add(new File(["no log at all"], "grasp.npz"));
+  document.getElementById("upload").dispatchEvent(new DragEvent("drop", {dataTransfer: held, cancelable: true}));
+  document.querySelector("#upload button[type=submit]").click();
+})()"""
+
+
+@pytest.fixture(scope="module")
+def tab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
+    with chromium.running(tmp_path_factory.mktemp("browser")) as tab:
+        yield tab
+
+
+@pytest.fixture
+def page(tab: Tab, client: httpx.Client) -> Iterator[Tab]:
+    """A page that makes no error and asks nobody but the service."""
+    tab.errors.clear()
+    tab.requests.clear()
+    yield tab
+    assert tab.errors == []
+    assert [url for url in tab.requests if not url.startswith((str(client.base_url), "about:", "blob:"))] == []
+
+
+def fits(tab: Tab) -> bool:
+    """Whether nothing reaches beyond the right edge."""
+    return bool(tab.run("document.documentElement.scrollWidth <= window.innerWidth"))
+
+
+@ON_SQLITE
+@pytest.mark.parametrize("width", [1400, 390])
+def test_from_an_upload_to_a_grip_force(
+    page: Tab, client: httpx.Client, content: bytes, tmp_path: Path, width: int
+) -> None:
+    base = str(client.base_url).rstrip("/")
+    file = tmp_path / "grasp.npz"
+    file.write_bytes(content)
+    page.resize(width)
+    page.go(f"{base}/upload")
+    page.run(f"material.value = 'browsed {width}'; document.querySelector('[name=create]').checked = true")
+    page.choose("#file", file)
+    page.run("document.querySelector('#upload button[type=submit]').click()")
+    page.until("location.pathname.startsWith('/logs/')")
+    page.until("document.querySelector('.player[data-ready]') !== null")  # the page has renewed itself meanwhile
+    assert fits(page)
+
+    page.run("document.querySelector('.map').focus()")
+    page.press("Home")
+    assert page.run("document.querySelector('.now').textContent").startswith("frame 1 of 82 · ")
+    page.press("ArrowRight")
+    assert page.run("document.querySelector('.now').textContent").startswith("frame 2 of 82 · ")
+    page.press(" ")
+    page.until("!document.querySelector('.now').textContent.startsWith('frame 2 of')")  # it plays
+    page.press("End")
+    assert "stick ratio" in page.run("document.querySelector('.now').textContent")
+    assert page.run("document.querySelector('.play').textContent") == "Play"
+
+    page.run("document.querySelector('main a[href^=\"/materials/\"]').click()")
+    page.until("document.querySelectorAll('svg polyline').length === 2")
+    assert fits(page)
+    page.run("document.querySelector('main a[href^=\"/plan\"]').click()")
+    page.until("location.pathname === '/plan' && document.readyState === 'complete'")
+    page.run("tangential_load.value = '1.5'; contact_area.value = '6e-5'; document.querySelector('main form').submit()")
+    assert page.until("document.querySelector('.answer')?.textContent").endswith("N of each finger")
+    for path in ("/", "/jobs", "/problems", "/login"):
+        page.go(f"{base}{path}")
+        assert fits(page), path
+
+
+@ON_SQLITE
+def test_a_bad_file_that_is_dropped_is_refused_above_the_form(tab: Tab, client: httpx.Client) -> None:
+    tab.go(f"{str(client.base_url).rstrip('/')}/upload")
+    tab.run("sensor.value = 'kept'")
+    tab.run(DROP)
+    told = tab.until("document.querySelector('#result .problem')?.innerText")
+    assert "The format is not supported" in told
+    assert tab.run("[location.pathname, sensor.value].join()") == "/upload,kept"
+
+
+@ON_SQLITE
+@pytest.mark.parametrize("typed", ["<img src=x onerror=document.title='run'>", "\u202eשלום", "🧤" * 50])
+def test_what_somebody_typed_runs_nothing(page: Tab, client: httpx.Client, typed: str, material: str) -> None:
+    client.patch(f"/v1/materials/{material}", json={"description": typed}).raise_for_status()
+    page.go(f"{str(client.base_url).rstrip('/')}/materials/{material.replace(' ', '%20')}")
+    assert typed in page.run("document.querySelector('main').textContent")
+    assert page.run("document.title").startswith(material)
+
+
+def test_a_key_logs_in_and_out(tab: Tab, serving: Any, tmp_path: Path, sqlite_template: Path) -> None:
+    settings = Settings(data_folder=tmp_path, access="keys", workers=0)
+    shutil.copyfile(sqlite_template, tmp_path / sqlite_template.name)
+    key_id, text = access.new_key()
+    with closing(Database(settings.resolved_database_url)) as database, database.write() as session:
+        access_keys.add(session, key_id, "robot", "upload", access.digest(text))
+    with serving(settings) as client:
+        base = str(client.base_url).rstrip("/")
+        tab.call("Page.navigate", url=f"{base}/jobs")
+        tab.until("location.pathname === '/login' && document.readyState === 'complete'")
+        tab.run(f"key.value = '{text}'; document.querySelector('main form').submit()")
+        tab.until("location.pathname === '/jobs' && document.readyState === 'complete'")
+        assert tab.run("document.cookie") == ""  # no script reads it
+        tab.run("document.querySelector('.session button').click()")
+        tab.until("location.pathname === '/login' && document.readyState === 'complete'")
+        tab.call("Page.navigate", url=f"{base}/jobs")
+        tab.until("location.pathname === '/login' && location.search.includes('jobs')")
