@@ -4,6 +4,7 @@ from importlib import import_module
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
+from stiction_client import problems
 from stiction_client.errors import (
     ConnectionFailed,
     InvalidArgument,
@@ -169,6 +170,7 @@ __all__ = [
     "mujoco_pair",
     "n_fingers",
     "physx_material",
+    "problems",
     "required_normal_force",
     "sdf_surface",
     "urdf_gazebo",

@@ -18,7 +18,7 @@ from uuid import uuid4
 import httpx
 import numpy as np
 
-from stiction_client import container
+from stiction_client import container, problems
 from stiction_client.container import GraspLogLike
 from stiction_client.errors import (
     ConnectionFailed,
@@ -60,7 +60,6 @@ SAMPLE_ARRAYS = (
 PAGE = 1000
 """Entries asked for at once: as many as the service gives."""
 
-MATERIAL_EXISTS = "/problems/material-exists"
 
 NOT_MODIFIED = 304
 
@@ -149,10 +148,8 @@ def ensure_material(name: str, description: str) -> Flow[Material]:
     """Create a material unless it is there, whoever else does so at the same time."""
     try:
         return (yield from create_material(name, description))
-    except ProblemError as problem:
-        if problem.type != MATERIAL_EXISTS:
-            raise
-    return (yield from material(name))
+    except problems.MaterialExists:
+        return (yield from material(name))
 
 
 def material(name: str) -> Flow[Material]:
@@ -399,7 +396,7 @@ def _refuse(response: httpx.Response) -> NoReturn:
     except (JSONDecodeError, UnicodeDecodeError, KeyError, TypeError, AttributeError) as error:
         raise UnexpectedAnswer(f"{_summary(response)}, which is no problem+json") from error
     named = {name: None if problem.get(name) is None else str(problem[name]) for name in ("name", "value", "allowed")}
-    raise ProblemError(kind, response.status_code, detail, **named)
+    raise problems.BY_TYPE.get(kind, ProblemError)(kind, response.status_code, detail, **named)
 
 
 def _record(read: Callable[[Any], T], record: Any) -> T:

@@ -1,0 +1,43 @@
+import pickle
+
+import httpx
+import pytest
+
+import stiction_client
+from service.http.problems import PROBLEM_TYPES
+from stiction_client import FrictionClient, ProblemError, problems
+
+
+def client_of(kind: str, status: int) -> FrictionClient:
+    """A client of a service that refuses whatever is asked."""
+
+    def answer(_: httpx.Request) -> httpx.Response:
+        body = {"type": kind, "title": "t", "detail": "d", "name": "n", "value": "v", "allowed": "a"}
+        return httpx.Response(status, json=body, headers={"Retry-After": "1000"})
+
+    return FrictionClient("http://service", transport=httpx.MockTransport(answer))
+
+
+def test_each_problem_of_the_service_has_its_exception_and_no_other_is_there() -> None:
+    assert set(problems.BY_TYPE) == {entry.uri for entry in PROBLEM_TYPES.values()}
+
+
+@pytest.mark.parametrize("entry", PROBLEM_TYPES.values(), ids=lambda entry: entry.name)
+def test_a_problem_is_raised_as_its_exception(entry: object) -> None:
+    kind, status = entry.uri, entry.status  # type: ignore[attr-defined]
+    with client_of(kind, status) as client, pytest.raises(ProblemError) as caught:
+        client.material("paper")
+    assert type(caught.value) is problems.BY_TYPE[kind]
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert (type(again), again.args) == (type(caught.value), (kind, status, "d", "n", "v", "a"))
+    assert str(caught.value) == f"d ({status}, {kind})"
+
+
+def test_a_problem_of_a_later_version_is_a_problem() -> None:
+    with client_of("/problems/of-tomorrow", 418) as client, pytest.raises(ProblemError) as caught:
+        client.material("paper")
+    assert type(caught.value) is ProblemError
+
+
+def test_a_service_without_a_model_is_met_like_a_material_without_one() -> None:
+    assert issubclass(problems.NoModel, stiction_client.NoModel)
