@@ -24,8 +24,8 @@ GRAVITY = 9.81
 COMPONENTS: tuple[Component, ...] = ("xx", "yy", "xy")
 """Of displacement along the surface by traction along it."""
 
-MOST_STIFF = 1.0
-"""Largest h (h + 2τ) K/m at which a step of length h is stable with some margin (2 without damping)."""
+MOST_STIFF = 2.0
+"""Largest h (h + 2τ) K/m: half of that at which steps of length h become unstable."""
 
 
 @dataclass(frozen=True, slots=True)
