@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
-from stiction_client.controller.friction import KnownFriction, LearnedFriction
+from stiction_client.controller.friction import KnownFriction, LearnedFriction, utilisation
 from stiction_client.controller.load import Load
 from stiction_client.controller.records import Command, Mode, Observation, check
 from stiction_client.controller.settings import ControlSettings
@@ -64,11 +64,27 @@ def _sense(state: ControllerState, observation: Observation, elapsed: float) -> 
     """What the frame tells of load and friction."""
     load = state.load.step(observation, elapsed, state.settings)
     felt = state.felt.step(observation, load.size, state.settings)
-    friction = math.nan if observation.slip_samples is None else observation.slip_samples.contact_friction()
-    learned = state.learned if math.isnan(friction) else state.learned.with_frame(friction)
+    friction = _sampled(observation, felt, load.size, state.settings)
+    learned = state.learned if math.isnan(friction) else state.learned.with_frame(friction, state.settings)
     against = _contradicts(state, felt, observation.normal, load.size, friction)
     contradictions = state.contradictions if against is None else state.contradictions + 1 if against else 0
     return replace(state, time=observation.time, load=load, felt=felt, learned=learned, contradictions=contradictions)
+
+
+def _sampled(observation: Observation, felt: Felt, size: float, settings: ControlSettings) -> float:
+    """The contact's friction by the elements that slip; NaN without any, or where the stick ratio says otherwise.
+
+    What sticks bears less than its friction: taken for slip, it would make the contact slip more than it does.
+    """
+    if (
+        observation.slip_samples is None
+        or not felt.stick_ratio < settings.told_stick_ratio
+        or observation.normal == 0.0
+    ):
+        return math.nan
+    friction = observation.slip_samples.contact_friction()
+    least = settings.agreement_share * size / (observation.normal * utilisation(felt.stick_ratio))
+    return friction if friction >= least else math.nan
 
 
 def _contradicts(state: ControllerState, felt: Felt, normal: float, size: float, friction: float) -> bool | None:
@@ -101,8 +117,8 @@ def _decide(state: ControllerState, observation: Observation) -> ControllerState
     known = state.learned.known(settings)
     if known is not None:
         return _enter(replace(state, known=known), "hold")
-    settled = observation.stick_ratio >= 0.0 and state.time - state.load.steady >= settings.settle_time
-    return _enter(state, "learn" if settled else "feel")
+    settled = _loaded(state) and state.time - state.load.steady >= settings.settle_time
+    return _enter(state, "learn" if settled and observation.stick_ratio >= 0.0 else "feel")
 
 
 def _enter(state: ControllerState, mode: Mode) -> ControllerState:
@@ -111,9 +127,12 @@ def _enter(state: ControllerState, mode: Mode) -> ControllerState:
 
 def _blind(state: ControllerState) -> bool:
     """Whether neither a model nor the stick ratio tells how hard to hold a load."""
-    settings = state.settings
-    loaded = state.load.size > settings.blind_friction * settings.least_force
-    return state.known is None and loaded and state.time - state.felt.told > settings.dropout_time
+    return state.known is None and _loaded(state) and state.time - state.felt.told > state.settings.dropout_time
+
+
+def _loaded(state: ControllerState) -> bool:
+    """Whether the load needs more than the least force, were friction low."""
+    return state.load.size > state.settings.unknown_friction * state.settings.least_force
 
 
 def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
@@ -128,12 +147,11 @@ def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
         asked = state.known.required(observation.tangential * growth, observation.torque * growth, settings.most_force)
         return [*demands, _Demand(asked, "friction model" if growth == 1.0 else "friction model, growing load")]
     load = state.load.size * growth
-    if _blind(state):
-        demands.append(_Demand(load / settings.blind_friction, "no stick ratio"))
     target = settings.learn_stick_ratio if state.mode == "learn" else settings.feel_stick_ratio
     demands.append(_Demand(state.felt.required(load, target), "stick ratio"))
     if state.mode != "learn":
-        demands.append(_Demand(state.normal_force, "friction unknown"))
+        why = "no stick ratio" if _blind(state) else "friction unknown"
+        demands += [_Demand(load / settings.unknown_friction, why), _Demand(state.normal_force, why)]
     return demands
 
 

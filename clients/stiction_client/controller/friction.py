@@ -51,29 +51,28 @@ class KnownFriction:
 
 @dataclass(frozen=True, slots=True)
 class LearnedFriction:
-    """Mean and sum of squared deviations of the contact's friction over ``frames`` in which some of it slipped."""
+    """The contact's friction by the elements that slipped: ``values`` of the latest frames that told it."""
 
-    frames: int = 0
-    mean: float = 0.0
-    squares: float = 0.0
+    values: tuple[float, ...] = ()
 
-    def with_frame(self, friction: float) -> "LearnedFriction":
-        """The same after one more frame (Welford 1962)."""
-        frames = self.frames + 1
-        off = friction - self.mean
-        mean = self.mean + off / frames
-        return LearnedFriction(frames, mean, self.squares + off * (friction - mean))
+    def with_frame(self, friction: float, settings: ControlSettings) -> "LearnedFriction":
+        """The same after one more frame; of the older ones ``learn_frames`` are kept."""
+        return LearnedFriction((*self.values, friction)[-settings.learn_frames :])
 
     def known(self, settings: ControlSettings) -> KnownFriction | None:
-        """A model of it once there are ``learn_frames``.
+        """A model of it, once ``learn_frames`` agree to within ``learn_spread``.
 
         Frames of one grasp share their errors, so that their spread is not divided by their number.
         """
-        if self.frames < settings.learn_frames:
+        count = len(self.values)
+        if count < settings.learn_frames:
             return None
-        spread = math.hypot(math.sqrt(self.squares / (self.frames - 1)), settings.learned_error * self.mean)
-        low = self.mean - NORMAL_DEVIATIONS * spread
-        return KnownFriction.learned(low, self.mean, settings.contact) if low > 0.0 else None
+        mean = sum(self.values) / count
+        spread = math.sqrt(sum((value - mean) ** 2 for value in self.values) / (count - 1))
+        if spread > settings.learn_spread * mean:
+            return None
+        low = mean - NORMAL_DEVIATIONS * math.hypot(spread, settings.learned_error * mean)
+        return KnownFriction.learned(low, mean, settings.contact) if low > 0.0 else None
 
 
 def utilisation(stick_ratio: float) -> float:

@@ -33,8 +33,8 @@ class ControlSettings:
         float, Gain(1e-3, 100.0, "1/s", "half of the force in 1.4 s: a load that comes back within a task finds a grip")
     ] = 0.5
     relax_rate: Annotated[
-        float, Gain(1e-3, 10.0, "1/s", "1 % a frame at 30 frames/s: a detector late by three frames costs 3 %")
-    ] = 0.3
+        float, Gain(1e-3, 10.0, "1/s", "1 % a frame at 60 frames/s: a detector late by five frames costs 5 %")
+    ] = 0.5
     lead_time: Annotated[
         float, Gain(0.0, 1.0, "s", "lag of a gripper, 30 ms, and two frames of sensing at 30 frames/s")
     ] = 0.1
@@ -49,6 +49,9 @@ class ControlSettings:
     told_stick_ratio: Annotated[
         float, Gain(0.05, 1.0, "-", "a thinner ring is of one element, and tells nothing of friction")
     ] = 0.9
+    agreement_share: Annotated[
+        float, Gain(0.0, 1.0, "-", "stick taken for slip has half of it; 0.1 of the stick ratio makes 0.8")
+    ] = 0.7
     reflex_stick_ratio: Annotated[
         float, Gain(0.0, 0.5, "-", "0.97 of what it can hold; detectors err by 0.1 in the stick ratio")
     ] = 0.1
@@ -61,6 +64,9 @@ class ControlSettings:
     learn_frames: Annotated[
         int, Gain(2, 1000, "frames", "spread among fewer frames is not known to half of itself")
     ] = 8
+    learn_spread: Annotated[
+        float, Gain(0.0, 0.3, "-", "relative; frames in which little slips scatter by more, and agree by chance")
+    ] = 0.06
     learned_error: Annotated[
         float, Gain(0.0, 1.0, "-", "relative bias of friction from detected slip, one standard deviation")
     ] = 0.03
@@ -71,7 +77,7 @@ class ControlSettings:
         float, Gain(0.0, 1.0, "-", "beyond the model's quantile: samples of one frame err by that much")
     ] = 0.05
     dropout_time: Annotated[float, Gain(1e-3, 10.0, "s", "three frames at 30 frames/s")] = 0.1
-    blind_friction: Annotated[
+    unknown_friction: Annotated[
         float, Gain(0.01, 10.0, "-", "of what robots lift, little is more slippery: the usual fixed value")
     ] = 0.2
 
