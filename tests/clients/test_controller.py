@@ -16,6 +16,8 @@ from stiction_client import (
     GraspController,
     InvalidArgument,
     Observation,
+    Scale,
+    Scales,
     SlipSamples,
     required_normal_force,
 )
@@ -160,6 +162,23 @@ def test_torque_is_borne_as_the_planner_has_it(slope: float, make_model: Make) -
         state, command = GraspController.step(state, Observation(frame * FRAME, 5.0, 1.2, 1e-3, 0.4))
     asked = required_normal_force(model, 1.2, contacts=SETTINGS.contact, torque=1e-3)
     assert command.normal_force == pytest.approx(asked.normal_force, rel=1e-9)
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_a_contact_s_scatter_averages_over_its_elements(flat: bool, make_model: Make) -> None:
+    scales = Scales(Scale(0.02, 20.0), Scale(0.03, 50.0), Scale(0.05, 500.0))
+    model = dataclasses.replace(model_of(make_model, 0.45), scales=scales)
+    contact = Contact.flat(6e-5) if flat else SETTINGS.contact
+    state = GraspController.init(dataclasses.replace(SETTINGS, contact=contact), model)
+    for frame in range(1, 200):
+        state, command = GraspController.step(state, Observation(frame * FRAME, 4.0, 1.2, 0.0, 0.4))
+    of_contact, of_element = (
+        required_normal_force(model, 1.2, contacts=contact, of=kind).normal_force for kind in ("contact", "element")
+    )
+    if flat:
+        assert command.normal_force == pytest.approx(of_contact, rel=1e-9)
+    else:  # counted under the least force, there are fewer of them
+        assert of_contact < command.normal_force < 0.5 * (of_contact + of_element)
 
 
 def test_a_step_changes_nothing_that_it_was_given() -> None:

@@ -23,9 +23,15 @@ class KnownFriction:
 
     @classmethod
     def of_model(cls, model: FrictionModel, settings: ControlSettings) -> "KnownFriction":
-        """What the planner's answers are computed from (``required_normal_force``)."""
-        quantile = FrictionQuantile.of(model, 0.0, settings.slip_probability)
-        return cls(settings.contact, quantile, float(settings.contact.element_force(1.0, model.element_area)))
+        """What the planner's answers are computed from (``required_normal_force``).
+
+        Where the model tells its scales, of the contact: scatter within it averages over as many elements as touch
+        under ``least_force``, the fewest that there will be, so that one quantile serves all loads.
+        """
+        contact, area = settings.contact, model.element_area
+        touching = 1.0 if model.scales is None else max(float(contact.elements(settings.least_force, area)), 1.0)
+        quantile = FrictionQuantile.of(model, 0.0, settings.slip_probability, touching)
+        return cls(contact, quantile, float(contact.element_force(1.0, area)))
 
     @classmethod
     def learned(cls, low: float, mean: float, contact: Contact) -> "KnownFriction":
