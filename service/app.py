@@ -67,6 +67,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         version="1",
         lifespan=lifespan,
         redirect_slashes=False,
+        docs_url=None,  # the framework's own pages load their scripts from elsewhere
+        redoc_url=None,
         telemetry={
             "tracing": provider is not None,
             "tracer_provider": provider,

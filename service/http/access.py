@@ -27,7 +27,7 @@ SCOPES: tuple[Scope, ...] = get_args(Scope)
 """What keys are for; each scope implies those before it."""
 
 CHALLENGE = 'Bearer realm="stiction"'
-_PUBLIC_PAGES = ("/docs", "/docs/oauth2-redirect", "/redoc", "/login", "/logout", "/problems")
+_PUBLIC_PAGES = ("/docs", "/redoc", "/login", "/logout", "/problems")
 PUBLIC_PATHS = frozenset({"/healthz", "/readyz", "/openapi.json", *_PUBLIC_PAGES})
 PUBLIC_FOLDERS = ("/assets/", "/problems/")
 """What anybody may see: whether the service lives, how to log in, and what is the same everywhere."""

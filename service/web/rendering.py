@@ -17,6 +17,9 @@ POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; form-action 'self'; "
     "base-uri 'none'; frame-ancestors 'none'"
 )
+SWAGGER_UI_POLICY = POLICY.replace("img-src 'self'", "img-src 'self' data:")
+"""Swagger UI's style has its pictures inside."""
+
 HEADERS = {"Content-Security-Policy": POLICY, "Referrer-Policy": "same-origin"}
 """Of every page. Without a referrer a browser would not even tell where a form comes from (``Origin: null``)."""
 

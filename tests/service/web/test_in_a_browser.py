@@ -87,6 +87,15 @@ def test_from_an_upload_to_a_grip_force(
 
 
 @ON_SQLITE
+def test_the_api_is_described_without_a_network(page: Tab, client: httpx.Client) -> None:
+    base = str(client.base_url).rstrip("/")
+    page.go(f"{base}/docs")
+    page.until("document.querySelectorAll('.opblock').length > 20")
+    page.call("Page.navigate", url=f"{base}/redoc")
+    page.until("location.pathname === '/docs'")
+
+
+@ON_SQLITE
 def test_a_bad_file_that_is_dropped_is_refused_above_the_form(tab: Tab, client: httpx.Client) -> None:
     tab.go(f"{str(client.base_url).rstrip('/')}/upload")
     tab.run("sensor.value = 'kept'")

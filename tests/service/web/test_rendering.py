@@ -9,7 +9,7 @@ pytestmark = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
 
 
 def test_every_page_may_load_only_what_is_ours(browser: Any) -> None:
-    for path in ("/", "/login", "/nothing"):
+    for path in ("/", "/login", "/nothing", "/problems", "/docs"):
         answer = browser.get(path)
         policy = answer.headers["content-security-policy"]
         assert "unsafe" not in policy
