@@ -13,7 +13,7 @@ from db.repositories import runners
 from service.context import Context
 from service.domain.model_cache import ModelCache
 from service.formats.reading import Readers
-from service.http import access, gate, openapi, problems
+from service.http import access, errors, gate, openapi
 from service.http.envelope import Envelope
 from service.http.gate import Admission, Gate
 from service.http.head_requests import HeadRequests
@@ -94,7 +94,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(Metering, answered=answered)
     app.add_middleware(Lookups, admission=admission, answered=answered)
     app.add_middleware(StartRefusal)
-    problems.install(app)
+    errors.install(app)
     return app
 
 

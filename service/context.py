@@ -1,9 +1,10 @@
-"""What a request has to work with."""
+"""What the use cases have to work with."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Annotated
 
-from fastapi import Depends, Request
+from sqlalchemy.orm import Session
 
 from db.blobs import BlobStore
 from db.database import Database
@@ -32,10 +33,9 @@ class Context:
     watch: StoreWatch | None = None
     bodies: Bodies = field(default_factory=Bodies)
 
-
-async def _context(request: Request) -> Context:
-    context: Context = request.app.state.context
-    return context
-
-
-Given = Annotated[Context, Depends(_context)]
+    @contextmanager
+    def queueing(self) -> Iterator[Session]:
+        """A transaction in which jobs are queued; who does them is woken after it."""
+        with self.database.write() as session:
+            yield session
+        self.jobs.wake()

@@ -143,6 +143,105 @@ def test_only_the_application_knows_the_pages_and_these_ask_no_tables() -> None:
             assert not {name for name in modules if name.startswith("service.web")}, path
 
 
+SERVES = ("service.http", "service.web", "service.app")
+"""What speaks HTTP."""
+
+WITHOUT_HTTP = ("context", "domain", "formats", "jobs", "observability", "processes", "report", "settings", "stream")
+"""What does not, in ``service``, nor imports what does; ``cli`` and ``demo`` start it."""
+
+SOCKETS = {"service.stream.connection", "service.observability.metrics"}
+"""Modules that serve a socket or measure who does: they know the framework's types, and no more."""
+
+
+def speaks_http(modules: Mapping[str, Path], name: str) -> set[str]:
+    """What a module knows of HTTP: modules of the service, by way of others too, and web frameworks by itself."""
+    known, found, todo = set(modules), set[str](), [name]
+    while todo:
+        new = imported_here(modules[todo.pop()], known) - found
+        found |= new
+        todo += new
+    frameworks = third_party(modules[name]) & {"fastapi", "starlette", "uvicorn"}
+    return {each for each in found if each.startswith(SERVES)} | (set() if name in SOCKETS else frameworks)
+
+
+def test_use_cases_jobs_and_formats_know_no_http() -> None:
+    modules = modules_of(ROOT, "service")
+    inside = [name for name in modules if name.split(".")[1:2] and name.split(".")[1] in WITHOUT_HTTP]
+    assert {name.split(".")[1] for name in inside} == set(WITHOUT_HTTP)
+    assert {name: found for name in inside if (found := speaks_http(modules, name))} == {}
+
+
+def test_use_cases_take_plain_arguments() -> None:
+    for path in sorted((ROOT / "service" / "domain").glob("*.py")):
+        assert not third_party(path) & {"fastapi", "starlette", "pydantic"}, path
+
+
+@pytest.mark.parametrize(
+    "text", ["from service.helper import x", "def lazily():\n    import service.http.routes", "import fastapi"]
+)
+def test_a_use_case_that_speaks_http_is_found(tmp_path: Path, text: str) -> None:
+    files = {"domain/fit": text, "helper": "from service.http.problems import Problem"}
+    for name in ("__init__", "domain/__init__", "domain/fit", "helper", "http/__init__", "http/problems"):
+        path = tmp_path / "service" / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(files.get(name, ""))
+    modules = modules_of(tmp_path, "service") | {"service.http.routes": tmp_path / "service/http/__init__.py"}
+    assert speaks_http(modules, "service.domain.fit")
+    assert not speaks_http(modules, "service.domain")
+
+
+def calls(modules: Mapping[str, Path]) -> dict[str, set[str]]:
+    """What each function or class of some modules names of the others': by its own name or by its module's."""
+    graph: dict[str, set[str]] = {}
+    for module, path in modules.items():
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        kinds = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+        parts = {node.name: node for node in tree.body if isinstance(node, kinds)}
+        names = {name: f"{module}.{name}" for name in parts} | {
+            alias.asname or alias.name: f"{node.module}.{alias.name}"
+            for node in tree.body
+            if isinstance(node, ast.ImportFrom)
+            for alias in node.names
+        }
+        names |= {alias.name: alias.name for node in tree.body if isinstance(node, ast.Import) for alias in node.names}
+        for name, part in parts.items():
+            inside = list(ast.walk(part))
+            found = {names[node.id] for node in inside if isinstance(node, ast.Name) and node.id in names}
+            found |= {
+                f"{names[node.value.id]}.{node.attr}"
+                for node in inside
+                if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in names
+            }
+            graph[f"{module}.{name}"] = found
+    return graph
+
+
+def hops(graph: Mapping[str, Collection[str]], start: str, end: str) -> int:
+    """Fewest calls from one function to another; raises ``AssertionError`` where there is no way."""
+    count, reached, found = 0, {start}, {start}
+    while end not in found and reached:
+        reached = {other for name in reached for other in graph.get(name, ())} - found
+        found |= reached
+        count += 1
+    assert end in found, f"no way from {start} to {end}"
+    return count
+
+
+@pytest.mark.parametrize(
+    ("route", "end"),
+    [
+        ("grasp_logs.create_grasp_log", "db.repositories.grasp_logs.add"),
+        ("materials.create_fit", "db.repositories.materials.find_id"),
+        ("materials.read_friction", "service.domain.look_up.look_up"),
+        ("planning.recognise_material", "estimators.recognise"),
+        ("stream.live_stream", "service.stream.live.step"),
+    ],
+)
+def test_from_a_route_to_repository_or_numerics_there_are_three_calls_at_most(route: str, end: str) -> None:
+    graph = calls(modules_of(ROOT, "service"))
+    assert hops(graph, f"service.http.routes.{route}", end) <= 3
+
+
 def test_nothing_but_the_service_knows_a_web_framework() -> None:
     for package in ("slipcore", "estimators", "db", "migrations"):
         for path in (ROOT / package).rglob("*.py"):

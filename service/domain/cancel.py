@@ -4,19 +4,18 @@ from db.records import Job
 from db.repositories import audit, jobs
 from service.context import Context
 from service.domain.asker import ANYBODY, Asker
-from service.http.problems import JOB_ENDED, Problem
+from service.domain.errors import JobEnded
 
 REASON = "cancelled by request"
 
 
 def cancel(context: Context, job_id: str, asker: Asker = ANYBODY) -> Job:
-    """End a job before its time, or find it cancelled; raises ``NotFound``, and ``Problem`` if it ended otherwise."""
+    """End a job before its time, or find it cancelled; raises ``NotFound``, and ``JobEnded`` if it ended otherwise."""
     with context.database.write() as session:
         was_running = jobs.get(session, job_id).finished_at is None
         job = jobs.cancel(session, job_id, REASON)
         if was_running and job.status == "cancelled":
             audit.add(session, asker.actor, "job.cancelled", job_id, {"material": job.material})
     if job.status != "cancelled":
-        detail = f"job {job_id} is {job.status}: it cannot be cancelled any more"
-        raise Problem(JOB_ENDED, detail, name="status", value=job.status, allowed="queued or running")
+        raise JobEnded(job_id, job.status)
     return job

@@ -8,9 +8,8 @@ from db.records import Job, Material, StoredGraspLog
 from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, owners
 from service.context import Context
 from service.domain.asker import ANYBODY, Asker
+from service.domain.errors import InsufficientScope, InvalidValue
 from service.domain.ownership import check_may_change
-from service.http.access import insufficient_scope
-from service.http.problems import INVALID_REQUEST, Problem
 from service.jobs.queueing import queue
 
 REFITTED = "ols"
@@ -32,7 +31,8 @@ def change(
 ) -> Material:
     """Rename a material, its old name becoming an alias, or change its description.
 
-    Raises ``NotFound``, ``AlreadyExists`` for a name that another material has, ``Problem`` for who may not.
+    Raises ``NotFound``, ``AlreadyExists`` for a name that another material has, ``NotOwner`` or ``InsufficientScope``
+    for who may not.
     """
     with context.database.write() as session:
         material_id = _changeable(session, material, asker)
@@ -71,7 +71,7 @@ def merge(context: Context, material: str, source: str, asker: Asker = ANYBODY) 
     with context.database.write() as session:
         target_id, source_id = (_changeable(session, name, asker) for name in (material, source))
         if target_id == source_id:
-            raise Problem.wrong_value(INVALID_REQUEST, "source", source, "another material than the one in the path")
+            raise InvalidValue("source", source, "another material than the one in the path")
         methods = friction_models.current_methods(session, [target_id, source_id])
         materials.merge(session, target_id, source_id)
         audit.add(session, asker.actor, "material.merged", material, {"source": source})
@@ -121,7 +121,7 @@ def _material_to_change(session: Session, log_id: str, asker: Asker) -> int | No
     if material_id is not None:
         check_may_change(session, material_id, asker)
     elif not asker.is_admin:
-        raise insufficient_scope("upload", "admin")
+        raise InsufficientScope("upload", "admin")
     return material_id
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from db.records import StoredGraspLog
 from service import formats
 from service.context import Context
-from service.http.problems import FILE_DELETED, UNSUPPORTED_FORMAT, Problem
+from service.domain.errors import FileDeleted, UnsupportedFormat
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,10 +22,10 @@ class LogFile:
 async def export(context: Context, log: StoredGraspLog, name: str, owner: str = "") -> LogFile:
     """The log as a file of format ``name``, made in the share of ``owner``.
 
-    Raises ``Problem`` where there is none, or no library of that format, and ``Crowded``.
+    Raises ``FileDeleted`` where there is none, ``UnsupportedFormat`` without a library of that format, and ``Crowded``.
     """
     if not log.has_file:
-        raise Problem(FILE_DELETED, f"the file of grasp log {log.id} was deleted, as old uploads are here")
+        raise FileDeleted(f"the file of grasp log {log.id} was deleted, as old uploads are here")
     source = await asyncio.to_thread(context.blobs.path, log.sha256)
     with ExitStack() as spools:
         if name == "npz" and await asyncio.to_thread(formats.identify, source) == "npz":
@@ -34,5 +34,5 @@ async def export(context: Context, log: StoredGraspLog, name: str, owner: str = 
         try:
             await context.readers.write(source, spool.path, name, owner)
         except formats.UnsupportedFormat as error:
-            raise Problem.wrong_value(UNSUPPORTED_FORMAT, error.name, error.value, error.allowed) from error
+            raise UnsupportedFormat(error.name, error.value, error.allowed) from error
         return LogFile(spool.path, spools.pop_all())

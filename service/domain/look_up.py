@@ -1,9 +1,12 @@
 """Answer a planner: the friction coefficient of a material where it is to be held."""
 
 from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 from service.domain.model_cache import KnownModel
-from service.http.schemas.models import Averaged, FrictionOut
+
+Averaged = Literal["element", "contact"]
+"""Whose friction is asked for: the scatter of a contact's elements averages out."""
 
 OUTDATED = "the model is outdated: the material's logs are others since, and it was not fitted again by this method"
 
@@ -22,16 +25,41 @@ class Question:
     elements: int = 1
 
 
-def look_up(known: KnownModel, question: Question) -> FrictionOut:
+class Friction(NamedTuple):
+    """Friction coefficient of a material at a tangential velocity m/s and a normal force of an element N.
+
+    ``friction_coefficient``: the quantile that was asked for, or the mean; ``within_domain``: the samples reach there.
+    """
+
+    material: str
+    method: str
+    version: int
+    tangential_velocity: float
+    normal_force: float
+    quantile: float | None
+    of: Averaged
+    elements: int
+    friction_coefficient: float
+    mean: float
+    within_domain: bool
+    chosen_because: str | None
+    warning: str | None
+
+
+def look_up(known: KnownModel, question: Question) -> Friction:
     """The answer of a material's current model."""
     v, f_n = question.tangential_velocity, question.normal_force
     stored, model = known.stored, known.model
     mean = float(model.predict(v, f_n))
-    asked = float(model.predict(v, f_n, question.quantile, question.of, question.elements))
+    asked = (
+        mean
+        if question.quantile is None
+        else float(model.predict(v, f_n, question.quantile, question.of, question.elements))
+    )
     outside = model.extrapolation(v, f_n)
     outdated = OUTDATED if stored.outdated else None
     nothing = "the answer is not above 0: nothing is known of the friction there" if asked <= 0.0 else None
-    return FrictionOut(
+    return Friction(
         material=stored.material,
         method=stored.model.method,
         version=stored.version,

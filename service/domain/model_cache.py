@@ -16,9 +16,9 @@ from db.database import Database
 from db.errors import NotFound, StorageUnavailable
 from db.records import Job, StoredModel
 from db.repositories import friction_models, materials
+from service.domain.errors import NoModel
 from service.domain.recommended import AUTO, recommended
 from service.domain.stored_results import to_friction_model
-from service.http.problems import NO_MODEL, Problem
 
 if TYPE_CHECKING:
     from estimators import FrictionModel
@@ -111,7 +111,7 @@ class ModelCache:
         return (material, method) in self._known
 
     def read(self, database: Database, material: str, method: str) -> KnownModel:
-        """The model in the database; raises ``NotFound``, and ``Problem`` where the material has none."""
+        """The model in the database; raises ``NotFound``, and ``NoModel`` where the material has none."""
         read_at = time.monotonic()
         until = read_at + self._seconds
         with database.read() as session:
@@ -150,7 +150,7 @@ class ModelCache:
         changed_at = time.monotonic()
         for (name, method), known in list(self._known.items()):
             if known.stored.material == job.material and self._seconds > 0.0:
-                with suppress(NotFound, Problem, StorageUnavailable):  # who looks it up will be told
+                with suppress(NotFound, NoModel, StorageUnavailable):  # who looks it up will be told
                     self.read(database, name, method)
         if len(self._material_changed_at) >= MOST:
             self._material_changed_at, self._changed_at = {}, changed_at
@@ -177,8 +177,7 @@ def _current(session: Session, material: str, method: str) -> tuple[StoredModel,
         found = recommended(friction_models.all_current(session, [material_id]).get(material_id, ()))
         if found is not None:
             return found
-    detail = f"material {material!r} has no model fitted by {method!r} yet"
-    raise Problem(NO_MODEL, detail, name="method", value=method, allowed="a method that was fitted")
+    raise NoModel(f"material {material!r} has no model fitted by {method!r} yet", method)
 
 
 def _tag(stored: StoredModel) -> str:

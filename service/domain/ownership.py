@@ -6,20 +6,22 @@ from db.errors import NotFound
 from db.repositories import access_keys, audit, materials, owners
 from service.context import Context
 from service.domain.asker import Asker
-from service.http.access import insufficient_scope
-from service.http.problems import INVALID_REQUEST, NOT_OWNER, UNKNOWN_OWNER, Problem
+from service.domain.errors import InsufficientScope, InvalidValue, NotOwner, UnknownOwner
 
 
 def check_may_add(session: Session, material_id: int, asker: Asker) -> None:
-    """Whether somebody may upload into a material and have it fitted; raises ``Problem``."""
+    """Whether somebody may upload into a material and have it fitted; raises ``NotOwner``."""
     _check(asker, owners.of_material(session, material_id))
 
 
 def check_may_change(session: Session, material_id: int, asker: Asker) -> None:
-    """Whether somebody may rename, merge or withdraw; without owners that is for admins. Raises ``Problem``."""
+    """Whether somebody may rename, merge or withdraw; without owners that is for admins.
+
+    Raises ``NotOwner`` and ``InsufficientScope``.
+    """
     found = owners.of_material(session, material_id)
     if not found and not asker.is_admin:
-        raise insufficient_scope("upload", "admin")
+        raise InsufficientScope("upload", "admin")
     _check(asker, found)
 
 
@@ -30,7 +32,10 @@ def list_owners(context: Context, material: str) -> list[str]:
 
 
 def add_owner(context: Context, material: str, owner: str, asker: Asker) -> list[str]:
-    """Let a key or a group own a material, too; raises ``NotFound``, and ``Problem`` for a key that is not stored."""
+    """Let a key or a group own a material, too.
+
+    Raises as ``check_may_change``, ``NotFound``, and ``InvalidValue`` for a key that is not stored.
+    """
     with context.database.write() as session:
         material_id = materials.find_id(session, material)
         check_may_change(session, material_id, asker)
@@ -41,19 +46,21 @@ def add_owner(context: Context, material: str, owner: str, asker: Asker) -> list
 
 
 def remove_owner(context: Context, material: str, owner: str, asker: Asker) -> None:
-    """Take a material from an owner; without any it is everybody's again. Raises ``NotFound`` and ``Problem``."""
+    """Take a material from an owner; without any it is everybody's again.
+
+    Raises as ``check_may_change``, ``NotFound``, and ``UnknownOwner`` for who does not own it.
+    """
     with context.database.write() as session:
         material_id = materials.find_id(session, material)
         check_may_change(session, material_id, asker)
         if not owners.remove(session, material_id, owner):
-            raise Problem.wrong_value(UNKNOWN_OWNER, "owner", owner, f"an owner of {material}")
+            raise UnknownOwner("owner", owner, f"an owner of {material}")
         audit.add(session, asker.actor, "owner.removed", material, {"owner": owner})
 
 
 def _check(asker: Asker, found: list[str]) -> None:
     if found and not asker.is_admin and not {*asker.owners} & {*found}:
-        detail = "the material has owners, and this key is none of them; one of them, or an admin, can add it"
-        raise Problem(NOT_OWNER, detail, more={"owners": found})
+        raise NotOwner(found)
 
 
 def _check_owner(session: Session, owner: str) -> None:
@@ -62,4 +69,4 @@ def _check_owner(session: Session, owner: str) -> None:
         try:
             access_keys.get(session, key_id)
         except NotFound as error:
-            raise Problem.wrong_value(INVALID_REQUEST, "owner", owner, "the id of a stored key") from error
+            raise InvalidValue("owner", owner, "the id of a stored key") from error

@@ -1,11 +1,8 @@
 """Answer a planner's other questions: which material this is, and how hard to grip."""
 
-import math
 from collections.abc import Sequence
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
 
 import estimators
 import stiction_client
@@ -13,20 +10,10 @@ from db.records import StoredModel
 from db.repositories import friction_models, grasp_logs, materials
 from estimators.errors import EstimatorError
 from service.context import Context
-from service.domain.look_up import OUTDATED
-from service.domain.stored_results import decode_samples, to_friction_model
-from service.http.problems import INVALID_REQUEST, INVALID_SAMPLES, NO_FEASIBLE_FORCE, NO_MODEL, NOT_READY, Problem
-from service.http.schemas.models import FrictionModelOut
-from service.http.schemas.planning import (
-    CandidateOut,
-    GraspForceOut,
-    NewGraspForce,
-    NewRecognition,
-    RecognitionOut,
-    SamplesIn,
-)
+from service.domain.errors import InvalidSamples, InvalidValue, NoFeasibleForce, NoModel, ResultsNotReady
+from service.domain.look_up import OUTDATED, Averaged
+from service.domain.stored_results import decode_samples, finite_or_none, to_client_model, to_friction_model
 from slipcore import FrictionSamples
-from stiction_client.errors import InvalidArgument, NoFeasibleForce
 
 if TYPE_CHECKING:
     from estimators import Moments
@@ -35,56 +22,121 @@ MOST_CANDIDATES = 100
 """Materials compared in one answer, which keeps one thread of the server busy for 0.15 ms each."""
 
 
-def grasp_force(context: Context, wish: NewGraspForce) -> GraspForceOut:
-    """The smallest normal force that holds; raises ``Problem`` where none does, and ``NotFound``."""
-    known = context.models.fresh(wish.material, wish.method)
-    known = known or context.models.read(context.database, wish.material, wish.method)
-    model = stiction_client.FrictionModel.from_json(FrictionModelOut.of(known.stored).model_dump(mode="json"))
+@dataclass(frozen=True, slots=True)
+class GraspTask:
+    """A grasp that must hold ``tangential_load`` N and ``torque`` N·m of all fingers together; lengths in m.
+
+    ``contact_area`` m² of one finger; ``round_at``: normal force N under which a round fingertip has that area;
+    ``object_radius``: of a round object about whose axis the torque is; ``normal_force_limit`` N: what it may bear.
+    ``of`` and ``elements``: whose scatter of friction counts, as ``required_normal_force`` takes them.
+    """
+
+    material: str
+    method: str
+    tangential_load: float
+    torque: float
+    contact_area: float
+    round_at: float | None
+    fingers: int
+    object_radius: float | None
+    safety_factor: float
+    slip_probability: float
+    tangential_velocity: float
+    normal_force_limit: float | None
+    of: Averaged | None
+    elements: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class GraspForce:
+    """The normal force N that holds, and what else is known of it; bounds of None are infinite."""
+
+    material: str
+    method: str
+    version: int
+    chosen_because: str | None
+    normal_force: float
+    feasible_interval: tuple[float, float | None]
+    margin: float | None
+    largest_load: float | None
+    element_force: float
+    friction_coefficient: float
+    slip_probability: float
+    within_domain: bool
+    warning: str | None
+    of: Averaged
+    elements: float
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A material that it may be, with the version of the model that was compared."""
+
+    material: str
+    version: int
+    probability: float
+
+
+@dataclass(frozen=True, slots=True)
+class Recognition:
+    """How probable each material is, the likeliest first; ``unknown``: that it is none of them."""
+
+    candidates: tuple[Candidate, ...]
+    unknown: float
+
+
+def grasp_force(context: Context, task: GraspTask) -> GraspForce:
+    """The smallest normal force that holds; raises ``NoFeasibleForce``, ``InvalidValue``, ``NoModel``, ``NotFound``."""
+    known = context.models.fresh(task.material, task.method)
+    known = known or context.models.read(context.database, task.material, task.method)
+    model = to_client_model(known.stored)
     try:
-        answer = stiction_client.required_normal_force(
+        found = stiction_client.required_normal_force(
             model,
-            wish.tangential_load,
-            wish.slip_probability,
-            contacts=stiction_client.grasp(wish.contact_area, wish.round_at, wish.fingers, wish.object_radius),
-            torque=wish.torque,
-            safety_factor=wish.safety_factor,
-            tangential_velocity=wish.tangential_velocity,
-            normal_force_limit=wish.normal_force_limit,
-            of=wish.of,
-            elements=wish.elements,
+            task.tangential_load,
+            task.slip_probability,
+            contacts=stiction_client.grasp(task.contact_area, task.round_at, task.fingers, task.object_radius),
+            torque=task.torque,
+            safety_factor=task.safety_factor,
+            tangential_velocity=task.tangential_velocity,
+            normal_force_limit=task.normal_force_limit,
+            of=task.of,
+            elements=task.elements,
         )
-    except NoFeasibleForce as refusal:
-        more = {"largest_load": refusal.largest_load, "normal_force": refusal.normal_force, "cause": refusal.cause}
-        raise Problem(NO_FEASIBLE_FORCE, str(refusal), more=more) from refusal
-    except InvalidArgument as error:
-        raise Problem.wrong_value(INVALID_REQUEST, error.name, error.value, error.allowed) from error
-    low, high = answer.feasible_interval
-    told = asdict(answer) | {
-        "feasible_interval": [low, _finite(high)],
-        "margin": _finite(answer.margin),
-        "largest_load": _finite(answer.largest_load),
-        "warning": "; ".join(filter(None, (answer.warning, OUTDATED if known.stored.outdated else None))) or None,
+    except stiction_client.NoFeasibleForce as refusal:
+        facts = {"largest_load": refusal.largest_load, "normal_force": refusal.normal_force, "cause": refusal.cause}
+        raise NoFeasibleForce(str(refusal), facts=facts) from refusal
+    except stiction_client.InvalidArgument as error:
+        raise InvalidValue(error.name, error.value, error.allowed) from error
+    low, high = found.feasible_interval
+    told = asdict(found) | {
+        "feasible_interval": (low, finite_or_none(high)),
+        "margin": finite_or_none(found.margin),
+        "largest_load": finite_or_none(found.largest_load),
+        "warning": "; ".join(filter(None, (found.warning, OUTDATED if known.stored.outdated else None))) or None,
     }
-    return GraspForceOut(
-        material=model.material, method=model.method, version=model.version, chosen_because=known.because, **told
-    )
+    return GraspForce(model.material, model.method, model.version, known.because, **told)
 
 
-def recognise(context: Context, wish: NewRecognition) -> RecognitionOut:
-    """The probability of each material that has a model; raises ``Problem`` for samples that tell nothing."""
-    candidates = _candidates(context, wish.materials, wish.method)
-    models = {str(number): to_friction_model(stored.model) for number, stored in enumerate(candidates)}
+def recognise(
+    context: Context, grasp: str | FrictionSamples, names: Sequence[str] | None, method: str, unknown: float
+) -> Recognition:
+    """How probable it is that a grasp was of each material that has a model: of those named, or of all.
+
+    ``grasp`` is the id of a stored log, or samples; ``unknown`` the probability beforehand that it is none of them.
+    Raises ``InvalidSamples`` for those that tell nothing, ``ResultsNotReady``, ``NoModel``, ``InvalidValue``,
+    ``NotFound``.
+    """
+    stored = _candidates(context, names, method)
+    models = {str(number): to_friction_model(each.model) for number, each in enumerate(stored)}
     try:
-        told = estimators.recognise(_samples(context, wish), models, unknown=wish.unknown)
+        told = estimators.recognise(_evidence(context, grasp), models, unknown=unknown)
     except EstimatorError as error:
-        raise Problem(INVALID_SAMPLES, str(error)) from error
-    unknown = told.pop("unknown")
-    listed = [
-        CandidateOut(material=stored.material, version=stored.version, probability=probability)
-        for stored, probability in zip(candidates, told.values(), strict=True)
-    ]
-    listed.sort(key=lambda candidate: -candidate.probability)
-    return RecognitionOut(method=wish.method, candidates=listed, unknown=unknown)
+        raise InvalidSamples(str(error)) from error
+    left = told.pop("unknown")
+    pairs = zip(stored, told.values(), strict=True)
+    candidates = [Candidate(each.material, each.version, probability) for each, probability in pairs]
+    return Recognition(tuple(sorted(candidates, key=lambda each: -each.probability)), left)
 
 
 def _candidates(context: Context, names: Sequence[str] | None, method: str) -> list[StoredModel]:
@@ -97,34 +149,22 @@ def _candidates(context: Context, names: Sequence[str] | None, method: str) -> l
             found = [model for models in of_them for model in models if model.model.method == method]
     if len(found) > MOST_CANDIDATES:
         allowed = f"at most {MOST_CANDIDATES} with a model: name those that it may be"
-        raise Problem.wrong_value(INVALID_REQUEST, "materials", f"more than {MOST_CANDIDATES}", allowed)
+        raise InvalidValue("materials", f"more than {MOST_CANDIDATES}", allowed)
     if not found:
-        detail = f"no material in question has a model fitted by {method!r}"
-        raise Problem(NO_MODEL, detail, name="method", value=method, allowed="a method that was fitted")
+        raise NoModel(f"no material in question has a model fitted by {method!r}", method)
     return found
 
 
-def _samples(context: Context, wish: NewRecognition) -> "FrictionSamples | Moments":
+def _evidence(context: Context, grasp: str | FrictionSamples) -> "FrictionSamples | Moments":
     """What is known of the grasp; the moments of a stored one say all that is asked, whatever its length."""
-    if wish.samples is not None:
-        return _given(wish.samples)
+    if isinstance(grasp, FrictionSamples):
+        return grasp
     with context.database.read() as session:
-        log = grasp_logs.get(session, wish.grasp_log or "")
+        log = grasp_logs.get(session, grasp)
     if log.samples is None:
-        raise Problem(NOT_READY, f"job {log.job.id} is {log.job.status}; its results are not there")
+        raise ResultsNotReady(log.job.id, log.job.status)
     if log.samples.none_because is not None:
-        raise Problem(INVALID_SAMPLES, log.samples.none_because)
+        raise InvalidSamples(log.samples.none_because)
     if log.samples.moments is not None:
         return estimators.Moments.from_bytes(log.samples.moments)
     return decode_samples(context.blobs.path(log.samples.samples_blob))
-
-
-def _given(samples: SamplesIn) -> FrictionSamples:
-    arrays: dict[str, Any] = {
-        name: np.array(value, float) for name, value in samples if name not in {"element", "element_area"}
-    }
-    return FrictionSamples(**arrays, element=np.array(samples.element), element_area=samples.element_area)
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 from db.records import NewGraspLog
 from db.repositories import access_keys, grasp_logs, usage
 from db.tables import now
-from service.http.problems import QUOTA_EXCEEDED, STORAGE_QUOTA_EXCEEDED, Problem
+from service.domain.errors import QuotaExceeded, StorageQuotaExceeded
 from service.settings import Settings
 
 DAY = timedelta(days=1)
@@ -27,7 +27,7 @@ def lock(session: Session, settings: Settings, key_id: str | None) -> None:
 
 
 def check_log(session: Session, settings: Settings, key_id: str | None, log: NewGraspLog) -> None:
-    """Raises ``Problem`` where a key may send no more logs and this one is not stored yet."""
+    """Raises as ``check_upload`` where a key may send no more logs and this one is not stored yet."""
     if key_id is None or not _any_is_set(settings):
         return
     if not grasp_logs.is_stored(session, log.sha256, log.material_id, log.detector):
@@ -35,7 +35,7 @@ def check_log(session: Session, settings: Settings, key_id: str | None, log: New
 
 
 def check_upload(session: Session, settings: Settings, key_id: str | None) -> None:
-    """Raises ``Problem`` where a key has all that it may have, and so may send no more logs."""
+    """Raises ``QuotaExceeded`` or ``StorageQuotaExceeded`` where a key may send no more logs."""
     if key_id is None:
         return
     check_job(session, settings, key_id)
@@ -43,11 +43,11 @@ def check_upload(session: Session, settings: Settings, key_id: str | None) -> No
         raise _exceeded("logs of the last 24 hours", most, "STICTION_KEY_LOGS_A_DAY", LOGS_RETRY_SECONDS)
     if (most := settings.key_stored_bytes) is not None and (there := usage.stored_bytes(session, key_id)) >= most:
         allowed = f"less than {most} (STICTION_KEY_STORED_BYTES), before another log"
-        raise Problem.wrong_value(STORAGE_QUOTA_EXCEEDED, "bytes stored by this key", there, allowed)
+        raise StorageQuotaExceeded("bytes stored by this key", there, allowed)
 
 
 def check_job(session: Session, settings: Settings, key_id: str | None) -> None:
-    """Raises ``Problem`` where as many jobs of a key wait as may."""
+    """Raises ``QuotaExceeded`` where as many jobs of a key wait as may."""
     most = settings.key_queued_jobs
     if key_id is not None and most is not None and usage.queued_jobs(session, key_id) >= most:
         raise _exceeded("queued jobs", most, "STICTION_KEY_QUEUED_JOBS", JOBS_RETRY_SECONDS)
@@ -58,6 +58,5 @@ def _any_is_set(settings: Settings) -> bool:
     return any(most is not None for most in quotas)
 
 
-def _exceeded(what: str, most: int, setting: str, seconds: int) -> Problem:
-    detail = f"{what} of this key are {most}; allowed: {most} ({setting})"
-    return Problem(QUOTA_EXCEEDED, detail, headers={"Retry-After": str(seconds)})
+def _exceeded(what: str, most: int, setting: str, seconds: int) -> QuotaExceeded:
+    return QuotaExceeded(f"{what} of this key are {most}; allowed: {most} ({setting})", seconds)

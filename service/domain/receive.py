@@ -7,10 +7,8 @@ import zlib
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
-from starlette.requests import ClientDisconnect
-
 from db.blobs import Spool
-from service.http.problems import INVALID_REQUEST, UNSUPPORTED_FORMAT, UPLOAD_INTERRUPTED, UPLOAD_TOO_LARGE, Problem
+from service.domain.errors import InvalidValue, TooLarge, UnsupportedFormat, UploadInterrupted
 
 if sys.version_info >= (3, 14):
     from compression import zstd
@@ -42,25 +40,25 @@ _UNPACKERS: dict[str, Callable[[Path], gzip.GzipFile | zstd.ZstdFile]] = {"gzip"
 
 
 def check_size(size: int, limit: int) -> None:
-    """Raises ``Problem`` for a body over the limit."""
+    """Raises ``TooLarge`` for a body over the limit."""
     if size > limit:
-        raise Problem.wrong_value(UPLOAD_TOO_LARGE, "body", f"{size} bytes or more", f"at most {limit} bytes")
+        raise TooLarge("body", f"{size} bytes or more", f"at most {limit} bytes")
 
 
 def check_expansion(packed: int, unpacked: int, most: int) -> None:
-    """Raises ``Problem`` for a body that unpacks, by its encoding or as an archive, to too many times its bytes."""
+    """Raises ``TooLarge`` for a body that unpacks, by its encoding or as an archive, to too many times its bytes."""
     if unpacked > max(EXPANSION_FROM, most * packed):
         value = f"{packed} bytes that unpack to {unpacked} or more"
-        raise Problem.wrong_value(UPLOAD_TOO_LARGE, "body", value, f"at most {most} times as many")
+        raise TooLarge("body", value, f"at most {most} times as many")
 
 
 def check_encoding(encoding: str) -> str:
-    """The content encoding, empty where there is none; raises ``Problem`` for one that isn't known."""
+    """The content encoding, empty where there is none; raises ``UnsupportedFormat`` for one that isn't known."""
     name = encoding.strip().lower()
     if name in ("", "identity"):
         return ""
     if name not in _UNPACKERS:
-        raise Problem.wrong_value(UNSUPPORTED_FORMAT, "content encoding", encoding, f"{', '.join(_UNPACKERS)} or none")
+        raise UnsupportedFormat("content encoding", encoding, f"{', '.join(_UNPACKERS)} or none")
     return name
 
 
@@ -71,7 +69,10 @@ class Bodies:
         self._count = 0
 
     async def receive(self, spool: Spool, chunks: AsyncIterator[bytes], limit: int) -> None:
-        """Write a body to ``spool`` as it comes; raises ``Problem`` for one over the limit, or that breaks off."""
+        """Write a body to ``spool`` as it comes.
+
+        Raises ``TooLarge`` for one over the limit, ``UploadInterrupted`` where ``chunks`` raises ``ConnectionError``.
+        """
         self._count += 1
         try:
             await _receive(spool, chunks, limit, self._chunk_bytes)
@@ -94,8 +95,8 @@ async def _receive(spool: Spool, chunks: AsyncIterator[bytes], limit: int, chunk
                 if writing is not None:
                     await writing
                 writing, waiting = asyncio.create_task(asyncio.to_thread(spool.write, waiting)), bytearray()
-    except ClientDisconnect as error:
-        raise Problem(UPLOAD_INTERRUPTED, f"the connection ended after {size} bytes") from error
+    except ConnectionError as error:
+        raise UploadInterrupted(f"the connection ended after {size} bytes") from error
     finally:
         if writing is not None:
             await writing
@@ -103,7 +104,7 @@ async def _receive(spool: Spool, chunks: AsyncIterator[bytes], limit: int, chunk
 
 
 def unpack(packed: Spool, spool: Spool, encoding: str, limit: int, expansion: int) -> None:
-    """Undo a content encoding, a chunk at a time; raises ``Problem`` for a bomb or a damaged stream."""
+    """Undo a content encoding, a chunk at a time; raises ``TooLarge`` or, of a damaged stream, ``InvalidValue``."""
     packed.flush()
     try:
         with _UNPACKERS[encoding](packed.path) as stream:
@@ -113,4 +114,4 @@ def unpack(packed: Spool, spool: Spool, encoding: str, limit: int, expansion: in
                 check_expansion(packed.size, spool.size, expansion)
     except (EOFError, gzip.BadGzipFile, zlib.error, zstd.ZstdError) as error:
         value = f"not a complete {encoding} stream ({str(error)[:80]})"
-        raise Problem.wrong_value(INVALID_REQUEST, "body", value, f"{encoding}, as content-encoding says") from error
+        raise InvalidValue("body", value, f"{encoding}, as content-encoding says") from error

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 import estimators
 import slipcore
-from db.records import Detection, Finding, NewModel, SampleSummary, Scale, Scales
+import stiction_client
+from db.records import Detection, Finding, NewModel, SampleSummary, Scale, Scales, StoredModel
 from service.formats.npy import HEADER_LOCK
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.samples import FrictionSamples
@@ -154,6 +155,35 @@ def to_friction_model(stored: NewModel) -> "FrictionModel":
         diagnostics={name: _or_nan(value) for name, value in stored.diagnostics.items()},
         scales=None if stored.scales is None else _scales(stored.scales),
     )
+
+
+def to_client_model(stored: StoredModel) -> "stiction_client.FrictionModel":
+    """A stored model as planners have it, who get it as the service's answer."""
+    model = to_friction_model(stored.model)
+    return stiction_client.FrictionModel(
+        material=stored.material,
+        method=model.method,
+        version=stored.version,
+        coefficients=model.coefficients,
+        covariance=model.covariance,
+        scale=model.scale,
+        n=model.n,
+        degrees_of_freedom=model.degrees_of_freedom,
+        scatter_degrees_of_freedom=model.scatter_degrees_of_freedom,
+        domain=stiction_client.Domain(model.domain.tangential_velocity, model.domain.normal_force),
+        identifiable=model.identifiable,
+        element_area=model.element_area,
+        cost=stiction_client.Cost(model.cost.seconds, model.cost.monte_carlo_error),
+        current=stored.current,
+        diagnostics=stored.model.diagnostics,
+        created_at=stored.created_at.isoformat(),
+        scales=None if model.scales is None else _client_scales(model.scales),
+    )
+
+
+def _client_scales(scales: "estimators.Scales") -> "stiction_client.Scales":
+    each = (scales.between_grasps, scales.between_places, scales.within)
+    return stiction_client.Scales(*(stiction_client.Scale(scale.value, scale.degrees_of_freedom) for scale in each))
 
 
 def _stored_scales(scales: "estimators.Scales") -> Scales:

@@ -40,7 +40,7 @@ WORKING_FACTOR = 6
 single precision, and 1.6 of an NPZ in double precision as the client writes it."""
 
 Result = TypeVar("Result")
-Settings = Mapping[str, float | str | None]
+FormatSettings = Mapping[str, float | str | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +98,9 @@ class Readers:
         async with self.room.turn(owner, needed):
             return await to_its_end(asyncio.to_thread(read_plain, source, name))
 
-    async def convert(self, source: Path, target: Path, name: str, settings: Settings, owner: str = "") -> Description:
+    async def convert(
+        self, source: Path, target: Path, name: str, settings: FormatSettings, owner: str = ""
+    ) -> Description:
         """Read a log of format ``name`` and write it to ``target`` as a container; raises ``InvalidInput``."""
         do = partial(convert, source, target, name, dict(settings))
         return await self._do(do, name, self._seconds_for(source), owner)
@@ -219,7 +221,7 @@ def _outcome(do: Callable[[], Result]) -> tuple[Result | None, Exception | None]
         return None, error
 
 
-def convert(source: Path, target: Path, name: str, settings: Settings) -> Description:
+def convert(source: Path, target: Path, name: str, settings: FormatSettings) -> Description:
     """In the reader's process: a log of format ``name`` as a container at ``target``."""
     log = formats.read(source, formats.FORMATS[name].content_type, **settings)
     with disk_errors_named():

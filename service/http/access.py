@@ -21,7 +21,7 @@ from starlette.requests import HTTPConnection
 
 from db.records import AccessKey, Scope
 from service.domain.asker import Asker
-from service.http.problems import INSUFFICIENT_SCOPE, Problem
+from service.domain.errors import InsufficientScope
 
 SCOPES: tuple[Scope, ...] = get_args(Scope)
 """What keys are for; each scope implies those before it."""
@@ -102,10 +102,9 @@ def is_loopback(host: str) -> bool:
     return (getattr(address, "ipv4_mapped", None) or address).is_loopback
 
 
-def insufficient_scope(scope: str, needed: str) -> Problem:
-    """That a key may do less than what is asked for."""
-    headers = {"WWW-Authenticate": f'{CHALLENGE}, error="insufficient_scope", scope="{needed}"'}
-    return Problem(INSUFFICIENT_SCOPE, f"the key has scope {scope}; this needs {needed}", headers=headers)
+def challenge_of_scope(needed: str) -> str:
+    """What a client is told whose key may do less than it asks for (RFC 6750)."""
+    return f'{CHALLENGE}, error="insufficient_scope", scope="{needed}"'
 
 
 class Needs(SecurityBase):
@@ -115,11 +114,11 @@ class Needs(SecurityBase):
     model = HTTPBearer(description="A key of `stiction keys create`; its scope is read, upload or admin.")
 
     async def __call__(self, connection: HTTPConnection, needed: SecurityScopes) -> None:
-        """Raise ``Problem`` unless the request has every scope of the route."""
+        """Raise ``InsufficientScope`` unless the request has every scope of the route."""
         access: Access = connection.state.access
         for scope in needed.scopes:
             if not access.allows(scope):
-                raise insufficient_scope(access.scope, scope)
+                raise InsufficientScope(access.scope, scope)
 
 
 _needs = Needs()

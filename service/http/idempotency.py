@@ -12,8 +12,8 @@ from sqlalchemy.orm import Session
 
 from db.errors import AlreadyExists
 from db.repositories import idempotency_keys
-from service.context import Given
 from service.http.access import Access
+from service.http.dependencies import Given
 from service.http.problems import IDEMPOTENCY_KEY_REUSED, Problem
 
 LONGEST_KEY = 200
@@ -42,55 +42,56 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True)
-class Once:
+class IdempotencyKey:
     """A request's key, whose it is, how long it counts, and what is asked under it, as a digest."""
 
     owner: str
-    key: str
+    text: str
     lifetime: timedelta
     fingerprint: str
 
-    def about(self, body_digest: str) -> "Once":
+    def about(self, body_digest: str) -> "IdempotencyKey":
         """The same with a body that was not there yet."""
         return replace(self, fingerprint=_digest(self.fingerprint.encode(), body_digest.encode()))
 
 
-def answer_once(session: Session, once: Once | None, make: Callable[[], Answer]) -> Answer:
+def answer_once(session: Session, key: IdempotencyKey | None, make: Callable[[], Answer]) -> Answer:
     """The answer that ``make`` gives in this transaction, or the one that it gave under the same key.
 
     Raises ``Problem`` for a key under which something else was asked.
     """
-    if once is None:
+    if key is None:
         return make()
     try:
-        earlier = idempotency_keys.claim(session, once.owner, once.key, once.fingerprint, once.lifetime)
+        earlier = idempotency_keys.claim(session, key.owner, key.text, key.fingerprint, key.lifetime)
     except AlreadyExists as error:
         allowed = "another key, or the very request that was sent under it"
-        raise Problem.wrong_value(IDEMPOTENCY_KEY_REUSED, "Idempotency-Key", once.key, allowed) from error
+        raise Problem.wrong_value(IDEMPOTENCY_KEY_REUSED, "Idempotency-Key", key.text, allowed) from error
     if earlier is not None:
         return Answer(**earlier)
     answer = make()
-    idempotency_keys.keep(session, once.owner, once.key, asdict(answer))
+    idempotency_keys.keep(session, key.owner, key.text, asdict(answer))
     return answer
 
 
-async def _once_without_body(context: Given, request: Request, key: KeyHeader = None) -> Once | None:
-    if key is None:
+async def _key_without_body(context: Given, request: Request, text: KeyHeader = None) -> IdempotencyKey | None:
+    if text is None:
         return None
     access: Access = request.state.access
     asked = (request.method, request.url.path, request.url.query)
     lifetime = timedelta(hours=context.settings.idempotency_hours)
-    return Once(access.key_id or "", key, lifetime, _digest(*(part.encode() for part in asked)))
+    return IdempotencyKey(access.key_id or "", text, lifetime, _digest(*(part.encode() for part in asked)))
 
 
-async def _once(request: Request, once: Annotated[Once | None, Depends(_once_without_body)]) -> Once | None:
-    return None if once is None else once.about(_digest(await request.body()))
-
-
-OnceWithoutBody = Annotated[Once | None, Depends(_once_without_body)]
+KeyWithoutBody = Annotated[IdempotencyKey | None, Depends(_key_without_body)]
 """What a route takes that reads its body by itself."""
 
-OnceGiven = Annotated[Once | None, Depends(_once)]
+
+async def _key_with_body(request: Request, key: KeyWithoutBody) -> IdempotencyKey | None:
+    return None if key is None else key.about(_digest(await request.body()))
+
+
+KeyWithBody = Annotated[IdempotencyKey | None, Depends(_key_with_body)]
 """What a route takes whose body is read already."""
 
 

@@ -13,14 +13,14 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from db.errors import NotFound, StorageUnavailable
 from service.context import Context
+from service.domain.errors import NoModel
 from service.domain.look_up import Question, look_up
 from service.domain.model_cache import KnownModel
 from service.http import envelope
 from service.http.conditional import is_one_of, unchanged, whole
 from service.http.envelope import MOST_HEADER_BYTES
 from service.http.gate import Admission
-from service.http.problems import Problem
-from service.http.schemas.models import LookUpQuery
+from service.http.schemas.models import FrictionOut, LookUpQuery
 from service.observability import traces
 from service.observability.answered import Answered
 
@@ -101,7 +101,7 @@ class Lookups:
             return None
         try:
             return await models.get(context.database, material, method)
-        except (NotFound, Problem, StorageUnavailable):
+        except (NotFound, NoModel, StorageUnavailable):
             return None
 
     def _kept_or_made(self, known: KnownModel, question: Question | None, scope: Scope) -> Answer:
@@ -112,7 +112,7 @@ class Lookups:
             if question is None:
                 response = unchanged(known.tag)
             else:
-                response = whole(known.tag, look_up(known, question).model_dump_json())
+                response = whole(known.tag, FrictionOut.json_of(look_up(known, question)))
             if len(self._kept) >= MOST_ANSWERS:
                 self._kept.clear()
             answer = self._kept[key] = Answer.of(response, scope)

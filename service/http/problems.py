@@ -1,30 +1,19 @@
 """Errors as RFC 9457 problem details: one stable type a kind of problem (docs/problems.md)."""
 
-import asyncio
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
-from http import HTTPStatus
 from typing import Any
 
-from fastapi import FastAPI, Request
-from fastapi.exceptions import RequestValidationError
+from fastapi import Request
 from fastapi.responses import JSONResponse
-from starlette.exceptions import HTTPException
-from starlette.routing import Match, Router
 
-from db.errors import AlreadyExists, BlobDamaged, NotFound, StorageUnavailable
-from service.domain.damage import record_damage
-from service.processes.turns import Crowded
+from db.errors import StorageUnavailable
+from service.domain.errors import shown
 
 logger = logging.getLogger(__name__)
 
 MEDIA_TYPE = "application/problem+json"
-CROWD_SECONDS = "5"
-"""s, as text, after which a file may find room to be read; most take less."""
-
-LONGEST_VALUE = 200
-"""Characters of an offending value that an answer repeats."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,15 +73,6 @@ STORAGE_UNAVAILABLE = ProblemType("storage-unavailable", "Database or blob folde
 
 PROBLEM_TYPES = {entry.name: entry for entry in list(globals().values()) if isinstance(entry, ProblemType)}
 
-_UNKNOWN = {
-    "material": UNKNOWN_MATERIAL,
-    "alias": UNKNOWN_ALIAS,
-    "grasp log": UNKNOWN_GRASP_LOG,
-    "job": UNKNOWN_JOB,
-    "blob": FILE_MISSING,
-}
-_BY_STATUS = {404: UNKNOWN_ROUTE, 405: METHOD_NOT_ALLOWED, 408: REQUEST_TIMEOUT, 413: UPLOAD_TOO_LARGE}
-
 
 class Problem(Exception):
     """An answer other than the one that was asked for.
@@ -119,20 +99,8 @@ class Problem(Exception):
     @classmethod
     def wrong_value(cls, kind: ProblemType, name: str, value: object, allowed: str) -> "Problem":
         """One named thing has a value that is not allowed."""
-        shown = str(value)[:LONGEST_VALUE].encode(errors="backslashreplace").decode()  # a lone surrogate is not UTF-8
-        return cls(kind, f"{name} is {shown}; allowed: {allowed}", name=name, value=shown, allowed=allowed)
-
-
-def install(app: FastAPI) -> None:
-    """Let every error of the application be answered as problem details."""
-    app.add_exception_handler(Problem, _on_problem)
-    app.add_exception_handler(NotFound, _on_not_found)
-    app.add_exception_handler(AlreadyExists, _on_already_exists)
-    app.add_exception_handler(BlobDamaged, _on_blob_damaged)
-    app.add_exception_handler(StorageUnavailable, _on_storage_unavailable)
-    app.add_exception_handler(Crowded, _on_crowded)
-    app.add_exception_handler(RequestValidationError, _on_invalid_request)
-    app.add_exception_handler(HTTPException, _on_http_exception)
+        text = shown(value)
+        return cls(kind, f"{name} is {text}; allowed: {allowed}", name=name, value=text, allowed=allowed)
 
 
 def storage_unavailable(error: StorageUnavailable) -> Problem:
@@ -164,81 +132,3 @@ def unexpected(request: Request, error: Exception) -> JSONResponse:
     """The answer to an error that nothing else answers; the log tells what it was, the client does not get to know."""
     logger.error("request failed", exc_info=error)
     return answer(request, Problem(INTERNAL_ERROR, "an unexpected error; the server's log has it"))
-
-
-async def _on_problem(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, Problem)
-    return answer(request, error)
-
-
-async def _on_not_found(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, NotFound)
-    kind = _UNKNOWN.get(error.kind, INTERNAL_ERROR)
-    if kind in {INTERNAL_ERROR, FILE_MISSING}:
-        logger.error("%s is referred to but missing", error.kind, exc_info=error)
-    allowed = f"the name of a stored {error.kind}" if kind is not FILE_MISSING else "its copy from a backup, put back"
-    return answer(request, Problem.wrong_value(kind, error.kind, error.name, allowed))
-
-
-async def _on_already_exists(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, AlreadyExists)
-    allowed = f"a name that no {error.kind} has yet"
-    return answer(request, Problem.wrong_value(MATERIAL_EXISTS, "name", error.name, allowed))
-
-
-async def _on_blob_damaged(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, BlobDamaged)
-    found_by = f"{request.method} {request.url.path}"
-    await asyncio.to_thread(record_damage, request.app.state.context.database, error, found_by)
-    return answer(request, Problem(FILE_DAMAGED, f"{error}; allowed: a copy from a backup, or the same upload again"))
-
-
-async def _on_storage_unavailable(request: Request, error: Exception) -> JSONResponse:
-    logger.error("storage unavailable", exc_info=error)
-    assert isinstance(error, StorageUnavailable)
-    return answer(request, storage_unavailable(error))
-
-
-async def _on_crowded(request: Request, error: Exception) -> JSONResponse:
-    return answer(request, Problem(TOO_MANY_UPLOADS, str(error), headers={"Retry-After": CROWD_SECONDS}))
-
-
-async def _on_invalid_request(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, RequestValidationError)
-    wrong = [_wrong_value(entry) for entry in error.errors()]
-    listed = [{"name": each.name, "value": each.value, "allowed": each.allowed} for each in wrong]
-    wrong[0].more["errors"] = listed
-    return answer(request, wrong[0])
-
-
-def _wrong_value(entry: dict[str, Any]) -> Problem:
-    if entry["type"] == "json_invalid":
-        return Problem.wrong_value(INVALID_REQUEST, "body", f"not JSON ({entry['ctx']['error']})", "a JSON object")
-    name = ".".join(str(part) for part in entry["loc"][1:]) or str(entry["loc"][0])
-    if entry["type"] == "missing":
-        return Problem.wrong_value(INVALID_REQUEST, name, "missing", "a value")
-    allowed = entry["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
-    return Problem.wrong_value(INVALID_REQUEST, name, entry["input"], allowed)
-
-
-async def _on_http_exception(request: Request, error: Exception) -> JSONResponse:
-    assert isinstance(error, HTTPException)
-    kind = _BY_STATUS.get(error.status_code) or ProblemType(
-        BAD_REQUEST.name, HTTPStatus(error.status_code).phrase, error.status_code
-    )
-    headers = dict(error.headers or {})
-    if kind is METHOD_NOT_ALLOWED:
-        headers["Allow"] = ", ".join(_allowed_methods(request))
-    return answer(request, Problem(kind, f"{request.method} {request.url.path}: {error.detail}", headers=headers))
-
-
-def _allowed_methods(request: Request) -> list[str]:
-    """Methods that some route takes for this path: the framework names only those of the first route."""
-    router: Router = request.app.router
-    scopes = {method: {**request.scope, "method": method} for method in ("DELETE", "GET", "PATCH", "POST", "PUT")}
-    taken = {
-        method
-        for method, scope in scopes.items()
-        if any(route.matches(scope)[0] is Match.FULL for route in router.routes)
-    }
-    return sorted(taken | {"HEAD"} if "GET" in taken else taken)

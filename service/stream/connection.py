@@ -9,10 +9,11 @@ import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from db.errors import NotFound, StorageUnavailable
+from db.records import StoredGraspLog
 from service.context import Context
 from service.domain.asker import Asker
-from service.domain.upload import Wish, check_target, store_made
-from service.http.problems import Problem
+from service.domain.errors import DomainError
+from service.domain.upload import UploadRequest, check_target, store_made
 from service.stream import live
 from service.stream.messages import (
     DECODE_BINARY,
@@ -47,17 +48,19 @@ MOST_WAITING_IN, MOST_WAITING_OUT = 8, 64
 dropped, for it does not read."""
 
 
-async def serve(socket: WebSocket, context: Context, asker: Asker) -> None:
-    """One connection from its first message to its end."""
-    connection = _Connection(socket, context, asker)
+async def serve(
+    socket: WebSocket, context: Context, asker: Asker, describe: Callable[[StoredGraspLog], dict[str, Any]]
+) -> None:
+    """One connection from its first message to its end; ``describe`` says of a stored log what its client is told."""
+    connection = _Connection(socket, context, asker, describe)
     try:
         await connection.run()
     except End as end:
         await _close(socket, end.code, end.reason)
     except InvalidInput as error:
         await _close(socket, REFUSED, f"{error.name} is {error.value}; allowed: {error.allowed}")
-    except (Problem, NotFound) as problem:
-        await _close(socket, REFUSED, str(problem))
+    except (DomainError, NotFound) as error:
+        await _close(socket, REFUSED, str(error))
     except StorageUnavailable as error:
         logger.warning("a stream waits: %s", error)
         await _close(socket, STORAGE_AWAY, str(error))
@@ -80,8 +83,10 @@ def _decoded(decode: Callable[[bytes], Incoming], content: bytes) -> Incoming:
 
 
 class _Connection:
-    def __init__(self, socket: WebSocket, context: Context, asker: Asker) -> None:
-        self._socket, self._context, self._asker = socket, context, asker
+    def __init__(
+        self, socket: WebSocket, context: Context, asker: Asker, describe: Callable[[StoredGraspLog], dict[str, Any]]
+    ) -> None:
+        self._socket, self._context, self._asker, self._describe = socket, context, asker, describe
         self._streams = context.streams
         self._incoming: asyncio.Queue[Sent] = asyncio.Queue(MOST_WAITING_IN)
         self._outgoing: asyncio.Queue[dict[str, Any]] = asyncio.Queue(MOST_WAITING_OUT)
@@ -104,7 +109,7 @@ class _Connection:
     async def _begin(self, first: Incoming) -> tuple[Session, list[dict[str, Any]]]:
         """The session, and the answers that its client has missed."""
         if isinstance(first, Open):
-            await check_target(self._context, self._wish(first))
+            await check_target(self._context, self._upload(first))
             return await self._streams.open(first, self._asker.key_id, self._asker.address or ""), []
         if isinstance(first, Resume):
             session = self._streams.find(first.session, self._asker.key_id)
@@ -189,11 +194,11 @@ class _Connection:
             raise End(REFUSED, "store needs keep, said when the session was opened")
         with self._context.blobs.spool() as spool:
             found = await self._streams.call(live.write, session.id, spool.path, opening.sensor)
-            answer = await store_made(self._context, spool, found, self._wish(opening))
-        return {"type": "finished", "grasp_log": answer.body}
+            stored = await store_made(self._context, spool, found, self._upload(opening))
+        return {"type": "finished", "grasp_log": self._describe(stored.log)}
 
-    def _wish(self, opening: Open) -> Wish:
-        return Wish(opening.material, None, opening.detector, None, None, asker=self._asker)
+    def _upload(self, opening: Open) -> UploadRequest:
+        return UploadRequest(opening.material, None, opening.detector, asker=self._asker)
 
     async def _receive(self) -> Sent:
         event = await self._socket.receive()

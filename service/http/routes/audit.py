@@ -6,8 +6,8 @@ from fastapi import APIRouter, Query, Request, Response
 
 from db.records import AuditFilter
 from db.repositories import audit
-from service.context import Given
 from service.http.access import ADMIN
+from service.http.dependencies import Given
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import INVALID_REQUEST, STORAGE_UNAVAILABLE
 from service.http.routes.common import problems

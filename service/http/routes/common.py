@@ -1,11 +1,12 @@
 """What the routes share: how their errors are described, and what a JSON body may be."""
 
-from collections.abc import Callable, Coroutine
+from collections.abc import AsyncIterator, Callable, Coroutine
 from typing import Any
 
 from fastapi import Request, Response
 from fastapi.routing import APIRoute
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 from starlette.types import Message, Receive
 
 from service.http.problems import UNSUPPORTED_FORMAT, Problem, ProblemType
@@ -26,6 +27,15 @@ def description_of(*kinds: ProblemType) -> dict[int, str]:
     for kind in sorted(kinds, key=lambda kind: kind.status):
         by_status.setdefault(kind.status, []).append(f"{kind.title} (`{kind.uri}`)")
     return {status: "; ".join(texts) for status, texts in by_status.items()}
+
+
+async def chunks(request: Request) -> AsyncIterator[bytes]:
+    """The body as it comes; raises ``ConnectionError`` where the client goes before its end."""
+    try:
+        async for chunk in request.stream():
+            yield chunk
+    except ClientDisconnect as error:
+        raise ConnectionError("the client has closed its connection") from error
 
 
 async def gone(request: Request) -> None:

@@ -4,9 +4,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path, Response
 
-from service.context import Given
 from service.domain import curate
 from service.http.access import UPLOAD, Asking
+from service.http.dependencies import Given
 from service.http.problems import (
     INVALID_REQUEST,
     MATERIAL_EXISTS,
@@ -37,9 +37,9 @@ _BODY = (UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILA
     summary="Rename or describe a material",
     responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, MATERIAL_EXISTS, *_BODY),
 )
-def change_material(context: Given, name: str, wish: MaterialChange, asker: Asking) -> MaterialOut:
+def change_material(context: Given, name: str, change: MaterialChange, asker: Asking) -> MaterialOut:
     """The old name becomes an alias, so that whoever knows it still finds the material."""
-    return MaterialOut.of(curate.change(context, name, wish.name, wish.description, asker))
+    return MaterialOut.of(curate.change(context, name, change.name, change.description, asker))
 
 
 @router.put(
@@ -75,12 +75,12 @@ def remove_alias(context: Given, name: str, alias: Alias, asker: Asking) -> Resp
     summary="Merge another material into this one",
     responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, *_BODY),
 )
-def merge_materials(context: Given, name: str, wish: NewMerge, asker: Asking) -> MergedOut:
+def merge_materials(context: Given, name: str, merge: NewMerge, asker: Asking) -> MergedOut:
     """Its logs and names move here, for good, and the fits are made again over all logs.
 
     A log that both have, by content and detector, counts once.
     """
-    material, jobs = curate.merge(context, name, wish.source, asker)
+    material, jobs = curate.merge(context, name, merge.source, asker)
     return MergedOut(material=MaterialOut.of(material), jobs=[JobOut.of(job) for job in jobs])
 
 
@@ -94,14 +94,14 @@ def merge_materials(context: Given, name: str, wish: NewMerge, asker: Asking) ->
 def withdraw_grasp_log(
     context: Given,
     id: str,  # noqa: A002  (the path's own name)
-    wish: NewWithdrawal,
+    withdrawal: NewWithdrawal,
     asker: Asking,
 ) -> WithdrawnOut:
     """It is kept, but counts in no fit from then on; its material's models are fitted again without it.
 
     Until then those models are marked as outdated; where no samples are left, the material has none.
     """
-    log, jobs = curate.withdraw(context, id, wish.reason, asker)
+    log, jobs = curate.withdraw(context, id, withdrawal.reason, asker)
     return WithdrawnOut(grasp_log=GraspLogOut.of(log), jobs=[JobOut.of(job) for job in jobs])
 
 

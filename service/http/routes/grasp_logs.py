@@ -11,14 +11,17 @@ from starlette.background import BackgroundTask
 from db.records import JobStatus, LogFilter, StoredGraspLog
 from db.repositories import grasp_logs, materials
 from service import formats
-from service.context import Context, Given
+from service.context import Context
+from service.domain.asker import Asker
+from service.domain.errors import ResultsNotReady
 from service.domain.export import export
 from service.domain.stored_results import EVENT_KINDS, SAMPLE_ARRAYS, decode_history, decode_samples
-from service.domain.upload import Wish, upload
+from service.domain.upload import ReceivedLog, StoredUpload, UploadRequest, accept, received, storing
 from service.formats import writing
 from service.formats.tracked_markers import FRAME_RATE, SCALE
 from service.http.access import READ, UPLOAD, Asking
-from service.http.idempotency import OnceWithoutBody
+from service.http.dependencies import Given
+from service.http.idempotency import Answer, IdempotencyKey, KeyWithoutBody, answer_once
 from service.http.long_json import long_json
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import (
@@ -40,7 +43,7 @@ from service.http.problems import (
     UPLOAD_TOO_LARGE,
     Problem,
 )
-from service.http.routes.common import gone, problems
+from service.http.routes.common import chunks, gone, problems
 from service.http.schemas.grasp_logs import GraspLogOut, GraspLogsOut
 from service.http.schemas.results import EventsOfOneKind, EventsOut, SamplesOut, StickRatioOut
 from slipcore.defaults import DEFAULT_METHOD, METHOD_NAMES
@@ -96,7 +99,7 @@ _RESULTS = problems(UNKNOWN_GRASP_LOG, NOT_READY, INVALID_REQUEST, FILE_DAMAGED,
 async def create_grasp_log(
     context: Given,
     request: Request,
-    once: OnceWithoutBody,
+    key: KeyWithoutBody,
     asker: Asking,
     material: Annotated[
         str | None, Query(description="What was held; without it slip is only detected", examples=["paper"])
@@ -125,7 +128,7 @@ async def create_grasp_log(
     The body is streamed to disk, up to the largest size that is set; `Content-Encoding` may be gzip or zstd.
     """
     length = request.headers.get("content-length", "")
-    wish = Wish(
+    asked = UploadRequest(
         material,
         sensor,
         detector,
@@ -133,10 +136,21 @@ async def create_grasp_log(
         int(length) if length.isdecimal() else None,
         ",".join(request.headers.getlist("content-encoding")),
         {"scale": scale, "frame_rate": frame_rate, "mapping": mapping},
-        once,
         asker,
     )
-    return (await upload(context, request.stream(), wish, partial(gone, request))).response()
+    async with received(context, chunks(request), asked, partial(gone, request)) as log:
+        answer = await asyncio.to_thread(_store, context, log, key and key.about(log.body_sha256), asker)
+    return answer.response()
+
+
+def _store(context: Context, log: ReceivedLog, key: IdempotencyKey | None, asker: Asker) -> Answer:
+    with storing(context, log) as session:
+        return answer_once(session, key, lambda: _answer(accept(session, context.settings, log.log, asker)))
+
+
+def _answer(stored: StoredUpload) -> Answer:
+    body = GraspLogOut.of(stored.log).model_dump(mode="json")
+    return Answer(202 if stored.is_new else 200, f"/v1/grasp-logs/{stored.log.id}", body)
 
 
 @router.get(
@@ -263,5 +277,5 @@ def _find(context: Context, log_id: str) -> StoredGraspLog:
 
 def _ready(found: Found | None, log: StoredGraspLog) -> Found:
     if found is None:
-        raise Problem(NOT_READY, f"job {log.job.id} is {log.job.status}; its results are not there")
+        raise ResultsNotReady(log.job.id, log.job.status)
     return found

@@ -3,7 +3,7 @@
 from fastapi import APIRouter
 
 from db.errors import StorageUnavailable
-from service.context import Given
+from service.http.dependencies import Given
 from service.http.problems import STORAGE_UNAVAILABLE, WORKERS_NOT_READY, Problem, storage_unavailable
 from service.http.routes.common import problems
 from service.http.schemas.health import HealthOut, ReadyOut

@@ -6,10 +6,10 @@ from fastapi import APIRouter, Query, Request, Response
 
 from db.records import JobStatus
 from db.repositories import jobs
-from service.context import Given
 from service.domain.await_job import MOST_SECONDS, await_job
 from service.domain.cancel import cancel
 from service.http.access import ADMIN, READ, Asking
+from service.http.dependencies import Given
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import INVALID_REQUEST, JOB_ENDED, STORAGE_UNAVAILABLE, UNKNOWN_JOB
 from service.http.routes.common import problems

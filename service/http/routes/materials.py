@@ -6,13 +6,13 @@ from urllib.parse import quote
 from fastapi import APIRouter, Query, Request, Response
 
 from db.repositories import friction_models, materials
-from service.context import Given
 from service.domain import curate
 from service.domain.fit import request_fit
 from service.domain.look_up import Question, look_up
 from service.http.access import READ, UPLOAD, Asking
 from service.http.conditional import NOT_MODIFIED, conditional, tagged
-from service.http.idempotency import Answer, OnceGiven, answer_once
+from service.http.dependencies import Given
+from service.http.idempotency import Answer, KeyWithBody, answer_once
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import (
     IDEMPOTENCY_KEY_REUSED,
@@ -51,7 +51,7 @@ _BODY = (UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, IDEMPOTENCY_KEY_
     response_model=MaterialOut,
     responses=problems(MATERIAL_EXISTS, *_BODY),
 )
-def create_material(context: Given, new: NewMaterial, once: OnceGiven, asker: Asking) -> Response:
+def create_material(context: Given, new: NewMaterial, key: KeyWithBody, asker: Asking) -> Response:
     """Logs can be uploaded for it from then on. It belongs to the key that is sent, and to its group."""
     with context.database.write() as session:
 
@@ -59,7 +59,7 @@ def create_material(context: Given, new: NewMaterial, once: OnceGiven, asker: As
             made = MaterialOut.of(curate.create(session, new.name, new.description, asker))
             return Answer(201, f"/v1/materials/{quote(new.name)}", made.model_dump(mode="json"))
 
-        return answer_once(session, once, create).response()
+        return answer_once(session, key, create).response()
 
 
 @router.get(
@@ -121,7 +121,7 @@ async def read_friction(
     """
     known = await context.models.get(context.database, name, asked.method)
     question = Question(asked.v, asked.fn, asked.quantile, *asked.averaged())
-    return conditional(request, known.tag, lambda: look_up(known, question).model_dump_json())
+    return conditional(request, known.tag, lambda: FrictionOut.json_of(look_up(known, question)))
 
 
 @router.post(
@@ -132,9 +132,15 @@ async def read_friction(
     response_model=JobOut,
     responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, QUOTA_EXCEEDED, *_BODY),
 )
-def create_fit(context: Given, name: str, wish: NewFit, once: OnceGiven, asker: Asking) -> Response:
+def create_fit(context: Given, name: str, new: NewFit, key: KeyWithBody, asker: Asking) -> Response:
     """Over the samples of all its logs. Answers at once; the job at `Location` tells how it went."""
-    return request_fit(context, name, wish.method, wish.seed, once, asker).response()
+    with context.queueing() as session:
+
+        def create() -> Answer:
+            job = request_fit(session, context.settings, name, new.method, new.seed, asker)
+            return Answer(202, f"/v1/jobs/{job.id}", JobOut.of(job).model_dump(mode="json"))
+
+        return answer_once(session, key, create).response()
 
 
 @router.get(

@@ -5,8 +5,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 
-from service.context import Given
 from service.http.access import READ
+from service.http.dependencies import Given
 from service.http.problems import STORAGE_UNAVAILABLE
 from service.http.routes.common import problems
 from service.observability.metrics import Metrics

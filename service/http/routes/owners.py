@@ -4,9 +4,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Path, Response
 
-from service.context import Given
 from service.domain import ownership
 from service.http.access import READ, UPLOAD, Asking
+from service.http.dependencies import Given
 from service.http.problems import (
     INVALID_REQUEST,
     NOT_OWNER,

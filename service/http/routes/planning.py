@@ -1,10 +1,14 @@
 """What a planner asks beyond a look-up: which material this is, how hard to grip. Questions, though sent by POST."""
 
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
 from fastapi import APIRouter
 
-from service.context import Given
 from service.domain import plan
 from service.http.access import READ
+from service.http.dependencies import Given
 from service.http.problems import (
     INVALID_REQUEST,
     INVALID_SAMPLES,
@@ -18,7 +22,8 @@ from service.http.problems import (
     UPLOAD_TOO_LARGE,
 )
 from service.http.routes.common import LongJsonRoute, problems
-from service.http.schemas.planning import GraspForceOut, NewGraspForce, NewRecognition, RecognitionOut
+from service.http.schemas.planning import GraspForceOut, NewGraspForce, NewRecognition, RecognitionOut, SamplesIn
+from slipcore.samples import FrictionSamples
 
 router = APIRouter(prefix="/v1", tags=["planning"], route_class=LongJsonRoute)
 
@@ -31,12 +36,12 @@ _ALWAYS = (UNKNOWN_MATERIAL, NO_MODEL, UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INV
     summary="Ask how hard to grip",
     responses=problems(NO_FEASIBLE_FORCE, *_ALWAYS),
 )
-def find_grasp_force(context: Given, wish: NewGraspForce) -> GraspForceOut:
+def find_grasp_force(context: Given, asked: NewGraspForce) -> GraspForceOut:
     """The smallest normal force at which a contact that bears the load slips no more often than accepted.
 
     The model's uncertainty is in it. A planner that asks often gets the model once and evaluates it by itself.
     """
-    return plan.grasp_force(context, wish)
+    return GraspForceOut.model_validate(asdict(plan.grasp_force(context, asked.task())))
 
 
 @router.post(
@@ -45,9 +50,18 @@ def find_grasp_force(context: Given, wish: NewGraspForce) -> GraspForceOut:
     summary="Ask which material this is",
     responses=problems(UNKNOWN_GRASP_LOG, NOT_READY, INVALID_SAMPLES, *_ALWAYS),
 )
-def recognise_material(context: Given, wish: NewRecognition) -> RecognitionOut:
+def recognise_material(context: Given, asked: NewRecognition) -> RecognitionOut:
     """From the friction samples of one grasp: a stored log's, or those that are sent.
 
     "unknown" is the probability that it is none of the materials compared.
     """
-    return plan.recognise(context, wish)
+    grasp = asked.grasp_log or "" if asked.samples is None else _samples(asked.samples)
+    found = plan.recognise(context, grasp, asked.materials, asked.method, asked.unknown)
+    return RecognitionOut.model_validate({"method": asked.method, **asdict(found)})
+
+
+def _samples(given: SamplesIn) -> FrictionSamples:
+    arrays: dict[str, Any] = {
+        name: np.array(value, float) for name, value in given if name not in {"element", "element_area"}
+    }
+    return FrictionSamples(**arrays, element=np.array(given.element), element_area=given.element_area)

@@ -8,11 +8,11 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.config import JsonDict
 
 from db.records import StoredModel
+from service.domain.look_up import Averaged, Friction
 from service.http.schemas.common import MOMENT_EXAMPLE, Body, Force, Next, Velocity
 
 ModelMethod = Literal["ols", "robust", "conjugate", "hierarchical", "bayes"]
 FitMethod = Literal["ols", "robust", "conjugate", "hierarchical", "bayes", "auto"]
-Averaged = Literal["element", "contact"]
 ChosenBecause = Annotated[str | None, Field(description="Why this model answers; null where a method was named")]
 
 CHOSEN_EXAMPLE = "hierarchical: friction may scatter between grasps, between places and within them"
@@ -215,3 +215,8 @@ class FrictionOut(BaseModel):
     mean: float
     within_domain: Annotated[bool, Field(description="Whether the model's samples reach there")]
     warning: str | None
+
+    @classmethod
+    def json_of(cls, friction: Friction) -> str:
+        """What was looked up as an answer's body."""
+        return cls(**friction._asdict()).model_dump_json()

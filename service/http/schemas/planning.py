@@ -4,8 +4,10 @@ from typing import Annotated, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from service.domain.look_up import Averaged
+from service.domain.plan import GraspTask
 from service.http.schemas.common import Area, Body, Force, Reference, Velocity
-from service.http.schemas.models import CHOSEN_EXAMPLE, Averaged, ChosenBecause, FitMethod, ModelMethod
+from service.http.schemas.models import CHOSEN_EXAMPLE, ChosenBecause, FitMethod, ModelMethod
 from service.http.schemas.results import SAMPLES_EXAMPLE
 
 
@@ -45,6 +47,10 @@ class NewGraspForce(Body):
     elements: Annotated[
         float | None, Field(ge=1.0, le=1e12, description="Of a contact; without, as many as its area has")
     ] = None
+
+    def task(self) -> GraspTask:
+        """The same as the planner takes it."""
+        return GraspTask(**self.model_dump())
 
 
 class GraspForceOut(BaseModel):

@@ -6,8 +6,8 @@ from fastapi import APIRouter, Query, Request, Response
 
 from db.records import JobStatus
 from db.repositories import jobs
-from service.context import Given
 from service.http.access import READ
+from service.http.dependencies import Given
 from service.http.paging import CursorText, Page
 from service.web.forms import EMPTY_IS_NONE
 from service.web.rendering import render

@@ -7,8 +7,8 @@ from fastapi import APIRouter, Request, Response
 from fastapi.params import Form
 from fastapi.responses import RedirectResponse
 
-from service.context import Given
 from service.http import origin, sessions
+from service.http.dependencies import Given
 from service.http.gate import Admission
 from service.web.rendering import on_problem, render
 

@@ -10,10 +10,11 @@ from starlette.background import BackgroundTask
 
 from db.records import StoredGraspLog
 from db.repositories import grasp_logs
-from service.context import Context, Given
+from service.context import Context
+from service.domain.errors import ResultsNotReady
 from service.http.access import READ, Asking
 from service.http.conditional import KEEP_AND_ASK, is_one_of, unchanged
-from service.http.problems import NOT_READY, Problem
+from service.http.dependencies import Given
 from service.web.frames import write_frames
 from service.web.rendering import render
 
@@ -30,10 +31,10 @@ def show_log(context: Given, request: Request, id: str) -> Response:  # noqa: A0
 
 @router.get("/logs/{id}/frames", dependencies=[READ])
 async def read_frames(context: Given, request: Request, asker: Asking, id: str) -> Response:  # noqa: A002
-    """What the player shows (``service.web.frames``), made in a reader's process; raises ``Problem``."""
+    """What the player shows (``service.web.frames``), made in a reader's process; raises ``ResultsNotReady``."""
     log = await asyncio.to_thread(_find, context, id)
     if log.detection is None:
-        raise Problem(NOT_READY, f"job {log.job.id} is {log.job.status}; its results are not there")
+        raise ResultsNotReady(log.job.id, log.job.status)
     tag = f'"{log.detection.history_blob[:32]}{"" if log.has_file else "-"}"'
     if is_one_of(tag, request.headers.get("if-none-match", "")):
         return unchanged(tag)

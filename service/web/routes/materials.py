@@ -10,9 +10,9 @@ from fastapi.responses import RedirectResponse
 from db.paging import Window
 from db.records import LogFilter
 from db.repositories import friction_models, grasp_logs, materials
-from service.context import Given
 from service.domain import curate
 from service.http.access import READ, UPLOAD, Asking
+from service.http.dependencies import Given
 from service.http.paging import CursorText, Page
 from service.http.schemas.common import Force, Velocity
 from service.http.schemas.materials import NewMaterial

@@ -4,9 +4,9 @@ from typing import Any
 
 from fastapi import APIRouter, Request, Response
 
-from service.context import Given
 from service.domain import plan
 from service.http.access import READ
+from service.http.dependencies import Given
 from service.http.schemas.planning import NewGraspForce
 from service.web.forms import checked
 from service.web.materials import names
@@ -23,5 +23,5 @@ def show_plan(context: Given, request: Request) -> Response:
     fields = {name: text for name, text in request.query_params.items() if name in FIELDS}
     given: dict[str, Any] = {"fields": fields, "names": names(context), "answer": None}
     on_problem(request, "plan.html", **given)
-    answer = plan.grasp_force(context, checked(NewGraspForce, fields)) if fields.get("tangential_load") else None
+    answer = plan.grasp_force(context, checked(NewGraspForce, fields).task()) if fields.get("tangential_load") else None
     return render(request, "plan.html", **given | {"answer": answer}, problem=None)

@@ -11,13 +11,14 @@ from starlette.datastructures import FormData, UploadFile
 
 from db.errors import AlreadyExists
 from service import formats
-from service.context import Context, Given
+from service.context import Context
 from service.domain import curate
 from service.domain.asker import Asker
 from service.domain.receive import CHUNK_BYTES
-from service.domain.upload import Wish, upload
+from service.domain.upload import UploadRequest, upload
 from service.formats.tracked_markers import FRAME_RATE, SCALE
 from service.http.access import READ, UPLOAD, Asking
+from service.http.dependencies import Given
 from service.http.problems import INVALID_REQUEST, Problem
 from service.http.routes.common import limited
 from service.http.schemas.materials import NewMaterial
@@ -66,8 +67,8 @@ async def receive_upload(context: Given, request: Request, asker: Asking) -> Res
         file, wanted = _file(form), checked(NewUpload, fields)
         if wanted.create and wanted.material is not None:
             await run_in_threadpool(_make_known, context, wanted.material, asker)
-        answer = await upload(context, _chunks(file), _wish(wanted, file, asker))
-    return RedirectResponse(f"/logs/{answer.body['id']}", 303)
+        stored = await upload(context, _chunks(file), _asked(wanted, file, asker))
+    return RedirectResponse(f"/logs/{stored.log.id}", 303)
 
 
 def _form(context: Context, fields: dict[str, str]) -> dict[str, Any]:
@@ -92,10 +93,10 @@ def _make_known(context: Context, material: str, asker: Asker) -> None:
         return
 
 
-def _wish(wanted: NewUpload, file: UploadFile, asker: Asker) -> Wish:
+def _asked(wanted: NewUpload, file: UploadFile, asker: Asker) -> UploadRequest:
     settings = {"scale": wanted.scale, "frame_rate": wanted.frame_rate, "mapping": wanted.mapping}
     said = (wanted.material, wanted.sensor, wanted.detector, wanted.format)
-    return Wish(*said, file.size, settings=settings, asker=asker)
+    return UploadRequest(*said, file.size, settings=settings, asker=asker)
 
 
 async def _chunks(file: UploadFile) -> AsyncIterator[bytes]:

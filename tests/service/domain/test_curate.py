@@ -13,9 +13,8 @@ from db.records import Claim, Job, NewGraspLog
 from db.repositories import grasp_logs, jobs, materials, runners
 from service.context import Context
 from service.domain import curate
-from service.domain.look_up import Question, look_up
-from service.http.problems import Problem
-from service.http.schemas.models import FrictionOut
+from service.domain.errors import DomainError, InvalidValue, NoModel
+from service.domain.look_up import Friction, Question, look_up
 from service.jobs import pipeline
 from service.settings import Settings
 
@@ -67,7 +66,7 @@ class Shop:
             jobs.add(session, "ingest", method, material_id=material_id, grasp_log_id=log_id)
         return log_id
 
-    def friction(self, material: str, method: str = "ols") -> FrictionOut:
+    def friction(self, material: str, method: str = "ols") -> Friction:
         return look_up(self.context.models.read(self.database, material, method), ANYWHERE)
 
     def model(self, material: str, method: str = "ols") -> tuple[int, int, bool]:
@@ -163,7 +162,7 @@ def test_a_log_that_is_withdrawn_before_its_samples_are_stored_outdates_no_model
 def test_a_material_without_its_only_log_has_no_model(shop: Shop) -> None:
     log = shop.ingest("paper", 0)
     assert curate.withdraw(shop.context, log, "wrong material")[1] == []
-    with pytest.raises(Problem, match="has no model fitted by 'ols'"):
+    with pytest.raises(NoModel, match="has no model fitted by 'ols'"):
         shop.friction("paper")
     curate.restore(shop.context, log)
     shop.work()
@@ -200,7 +199,7 @@ def test_a_merged_material_is_fitted_over_all_its_logs(shop: Shop) -> None:
     assert [job.status for job in shop.work()] == ["done", "done"]
     assert shop.model("papre") == shop.model("paper") == (2, 2 * each, False)
     assert shop.friction("papre", "conjugate").material == "paper"
-    with pytest.raises(Problem, match="source is papre; allowed: another material"):
+    with pytest.raises(InvalidValue, match="source is papre; allowed: another material"):
         curate.merge(shop.context, "paper", "papre")
 
 
@@ -213,7 +212,7 @@ def test_two_merges_against_each_other_leave_one_material(shop: Shop) -> None:
         with closing(Database(shop.database.url)) as own:
             try:
                 ends.append(curate.merge(Context(Settings(), own, shop.blobs, shop.context.jobs), target, source))
-            except (Problem, NotFound) as refused:
+            except (DomainError, NotFound) as refused:
                 ends.append(refused)
 
     threads = [Thread(target=merge, args=names) for names in (("a", "b"), ("b", "a"))]

@@ -9,7 +9,7 @@ from backports import zstd
 
 from db.blobs import BlobStore, Spool
 from service.domain import receive
-from service.http.problems import Problem
+from service.domain.errors import InvalidValue, TooLarge
 
 PACKERS: dict[str, Callable[[bytes], bytes]] = {"gzip": gzip.compress, "zstd": zstd.compress}
 
@@ -36,7 +36,7 @@ def test_a_body_is_unpacked_up_to_its_limit(spools: BlobStore, encoding: str) ->
                 spool.flush()
                 assert spool.path.read_bytes() == content
             else:
-                with pytest.raises(Problem, match="at most 3145727 bytes"):
+                with pytest.raises(TooLarge, match="at most 3145727 bytes"):
                     receive.unpack(packed, spool, encoding, limit, 1)
 
 
@@ -44,7 +44,7 @@ def test_a_body_is_unpacked_up_to_its_limit(spools: BlobStore, encoding: str) ->
 def test_a_body_that_unpacks_to_too_many_times_its_size_is_refused(spools: BlobStore, encoding: str) -> None:
     with spools.spool() as packed, spools.spool() as spool:
         filled(packed, PACKERS[encoding](bytes(40 * 2**20)))
-        with pytest.raises(Problem, match="at most 100 times as many"):
+        with pytest.raises(TooLarge, match="at most 100 times as many"):
             receive.unpack(packed, spool, encoding, 2**30, 100)
         assert spool.size <= receive.EXPANSION_FROM + receive.CHUNK_BYTES
 
@@ -60,7 +60,7 @@ def test_a_damaged_stream_is_refused(spools: BlobStore, encoding: str, kept: int
                 receive.unpack(packed, spool, encoding, 2**20, 100)  # an empty file is an empty body
                 assert spool.size == 0
             else:
-                with pytest.raises(Problem, match=f"not a complete {encoding} stream"):
+                with pytest.raises(InvalidValue, match=f"not a complete {encoding} stream"):
                     receive.unpack(packed, spool, encoding, 2**20, 100)
 
 

@@ -1,5 +1,6 @@
 import math
 from dataclasses import fields, replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,10 @@ import pytest
 
 import estimators
 import slipcore
+import stiction_client
+from db.records import StoredModel
 from service.domain import stored_results
+from service.http.schemas.models import FrictionModelOut
 from slipcore import FrictionSamples, GraspLog, SlipHistory
 
 
@@ -110,3 +114,14 @@ def test_samples_stored_without_their_noise_are_still_read(samples: FrictionSamp
     found = stored_results.decode_samples(path)
     assert (found.element_area, found.normal_force_noise) == (samples.element_area, 0.0)
     np.testing.assert_array_equal(found.normal_force, samples.normal_force)
+
+
+@pytest.mark.parametrize("method", ["ols", "hierarchical"])
+def test_a_planner_has_the_model_that_the_service_answers_with(samples: FrictionSamples, method: str) -> None:
+    fitted = estimators.fit([replace(samples, time=samples.time + 9.0 * part) for part in range(3)], method=method)
+    model = stored_results.to_new_model(fitted)
+    stored = StoredModel(1, "paper", 3, True, False, datetime(2026, 11, 21, 8, 41, tzinfo=UTC), model)
+    told = stiction_client.FrictionModel.from_json(FrictionModelOut.of(stored).model_dump(mode="json")).to_json()
+    made = stored_results.to_client_model(stored).to_json()
+    assert datetime.fromisoformat(made.pop("created_at")) == datetime.fromisoformat(told.pop("created_at"))
+    assert made == told

@@ -13,9 +13,9 @@ from db.database import Database
 from db.repositories import access_keys, usage
 from service.domain import upload
 from service.domain.asker import Asker
+from service.domain.errors import DomainError
 from service.formats.reading import Description
 from service.http import access
-from service.http.problems import Problem
 
 HEADERS = {"content-type": "application/vnd.stiction.grasp-log+npz"}
 ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -146,6 +146,6 @@ def test_a_log_that_a_stream_stores_keeps_to_the_quotas(
     found = Description("npz", "finger", 2, 1.0, (1, 1))
     with context.blobs.spool() as spool:
         spool.path.write_bytes(b"frames")
-        wish = upload.Wish(None, None, "filter", None, None, asker=Asker(key_id=key_id))
-        with pytest.raises(Problem, match=setting.upper()):
-            asyncio.run(upload.store_made(context, spool, found, wish))
+        request = upload.UploadRequest(None, None, "filter", asker=Asker(key_id=key_id))
+        with pytest.raises(DomainError, match=setting.upper()):
+            asyncio.run(upload.store_made(context, spool, found, request))

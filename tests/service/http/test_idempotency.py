@@ -15,7 +15,7 @@ from db.database import Database
 from db.records import NewGraspLog
 from db.repositories import grasp_logs, jobs, materials
 from db.tables import GraspLogRow, IdempotencyKeyRow, JobRow, MaterialRow
-from service.http.idempotency import Answer, Once, answer_once
+from service.http.idempotency import Answer, IdempotencyKey, answer_once
 
 Reach = Callable[..., Any]
 NPZ = {"Content-Type": "application/vnd.stiction.grasp-log+npz"}
@@ -100,12 +100,12 @@ def test_identical_uploads_at_once_under_one_key_get_one_answer(
     assert count(database, GraspLogRow) == 1
 
 
-def store(url: str, together: Any, once: Once | None, answers: Any) -> None:
+def store(url: str, together: Any, key: IdempotencyKey | None, answers: Any) -> None:
     """One process of several that store the same log at once."""
     with closing(Database(url)) as database:
         together.wait()
         with database.write() as session:
-            answers.put(answer_once(session, once, lambda: add(session)))
+            answers.put(answer_once(session, key, lambda: add(session)))
 
 
 def add(session: Any) -> Answer:
@@ -121,8 +121,8 @@ def test_processes_that_ask_the_same_at_once_do_it_once(database: Database, blob
         materials.create(session, "paper", "")
     context = multiprocessing.get_context("fork")
     together, answers = context.Barrier(3), context.Queue()
-    once = Once("", "k", timedelta(hours=1), "0" * 64)
-    processes = [context.Process(target=store, args=(database.url, together, once, answers)) for _ in range(3)]
+    key = IdempotencyKey("", "k", timedelta(hours=1), "0" * 64)
+    processes = [context.Process(target=store, args=(database.url, together, key, answers)) for _ in range(3)]
     for process in processes:
         process.start()
     given = [answers.get(timeout=60) for _ in processes]

@@ -7,7 +7,7 @@ import pytest
 from fastapi import FastAPI
 
 from db.errors import NotFound, StorageUnavailable
-from service.http import problems
+from service.http import errors, problems
 from service.http.envelope import Envelope
 from service.http.problems import PROBLEM_TYPES, Problem
 
@@ -46,7 +46,7 @@ def test_what_the_framework_refuses_is_a_problem_too(
 async def answer_to(error: Exception) -> httpx.Response:
     app = FastAPI()
     app.add_middleware(Envelope)
-    problems.install(app)
+    errors.install(app)
 
     @app.get("/")
     def fail() -> None:

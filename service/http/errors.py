@@ -1,0 +1,196 @@
+"""Which problem each error is answered by: those of the use cases, of the stores and of the framework."""
+
+import asyncio
+import logging
+from collections.abc import Mapping
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from starlette.exceptions import HTTPException
+from starlette.routing import Match, Router
+
+from db.errors import AlreadyExists, BlobDamaged, NotFound, StorageUnavailable
+from service.domain import errors
+from service.domain.damage import record_damage
+from service.domain.errors import DomainError, InsufficientScope
+from service.http.access import challenge_of_scope
+from service.http.problems import (
+    BAD_REQUEST,
+    FILE_DAMAGED,
+    FILE_DELETED,
+    FILE_MISSING,
+    INSUFFICIENT_SCOPE,
+    INTERNAL_ERROR,
+    INVALID_GRASP_LOG,
+    INVALID_REQUEST,
+    INVALID_SAMPLES,
+    JOB_ENDED,
+    MATERIAL_EXISTS,
+    METHOD_NOT_ALLOWED,
+    NO_FEASIBLE_FORCE,
+    NO_MODEL,
+    NOT_OWNER,
+    NOT_READY,
+    QUOTA_EXCEEDED,
+    REQUEST_TIMEOUT,
+    STORAGE_QUOTA_EXCEEDED,
+    TOO_MANY_UPLOADS,
+    UNKNOWN_ALIAS,
+    UNKNOWN_GRASP_LOG,
+    UNKNOWN_JOB,
+    UNKNOWN_MATERIAL,
+    UNKNOWN_OWNER,
+    UNKNOWN_ROUTE,
+    UNSUPPORTED_FORMAT,
+    UPLOAD_INTERRUPTED,
+    UPLOAD_TOO_LARGE,
+    Problem,
+    ProblemType,
+    answer,
+    storage_unavailable,
+)
+from service.processes.turns import Crowded
+
+logger = logging.getLogger(__name__)
+
+CROWD_SECONDS = "5"
+"""s, as text, after which a file may find room to be read; most take less."""
+
+OF_USE_CASES: Mapping[type[DomainError], ProblemType] = {
+    errors.InvalidValue: INVALID_REQUEST,
+    errors.UnsupportedFormat: UNSUPPORTED_FORMAT,
+    errors.InvalidGraspLog: INVALID_GRASP_LOG,
+    errors.TooLarge: UPLOAD_TOO_LARGE,
+    errors.UnknownOwner: UNKNOWN_OWNER,
+    errors.StorageQuotaExceeded: STORAGE_QUOTA_EXCEEDED,
+    errors.QuotaExceeded: QUOTA_EXCEEDED,
+    errors.InsufficientScope: INSUFFICIENT_SCOPE,
+    errors.NotOwner: NOT_OWNER,
+    errors.UploadInterrupted: UPLOAD_INTERRUPTED,
+    errors.FileDeleted: FILE_DELETED,
+    errors.NoModel: NO_MODEL,
+    errors.NoFeasibleForce: NO_FEASIBLE_FORCE,
+    errors.InvalidSamples: INVALID_SAMPLES,
+    errors.ResultsNotReady: NOT_READY,
+    errors.JobEnded: JOB_ENDED,
+}
+"""The problem type of every error of a use case."""
+
+_UNKNOWN = {
+    "material": UNKNOWN_MATERIAL,
+    "alias": UNKNOWN_ALIAS,
+    "grasp log": UNKNOWN_GRASP_LOG,
+    "job": UNKNOWN_JOB,
+    "blob": FILE_MISSING,
+}
+_BY_STATUS = {404: UNKNOWN_ROUTE, 405: METHOD_NOT_ALLOWED, 408: REQUEST_TIMEOUT, 413: UPLOAD_TOO_LARGE}
+
+
+def install(app: FastAPI) -> None:
+    """Let every error of the application be answered as problem details."""
+    app.add_exception_handler(Problem, _on_problem)
+    app.add_exception_handler(DomainError, _on_domain_error)
+    app.add_exception_handler(NotFound, _on_not_found)
+    app.add_exception_handler(AlreadyExists, _on_already_exists)
+    app.add_exception_handler(BlobDamaged, _on_blob_damaged)
+    app.add_exception_handler(StorageUnavailable, _on_storage_unavailable)
+    app.add_exception_handler(Crowded, _on_crowded)
+    app.add_exception_handler(RequestValidationError, _on_invalid_request)
+    app.add_exception_handler(HTTPException, _on_http_exception)
+
+
+def problem_of(error: DomainError) -> Problem:
+    """The error of a use case as it is answered."""
+    headers = {}
+    if error.retry_seconds is not None:
+        headers["Retry-After"] = str(error.retry_seconds)
+    if isinstance(error, InsufficientScope):
+        headers["WWW-Authenticate"] = challenge_of_scope(error.needed)
+    about = {"name": error.name, "value": error.value, "allowed": error.allowed}
+    return Problem(OF_USE_CASES[type(error)], str(error), **about, headers=headers, more=error.facts)
+
+
+async def _on_problem(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, Problem)
+    return answer(request, error)
+
+
+async def _on_domain_error(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, DomainError)
+    return answer(request, problem_of(error))
+
+
+async def _on_not_found(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, NotFound)
+    kind = _UNKNOWN.get(error.kind, INTERNAL_ERROR)
+    if kind in {INTERNAL_ERROR, FILE_MISSING}:
+        logger.error("%s is referred to but missing", error.kind, exc_info=error)
+    allowed = f"the name of a stored {error.kind}" if kind is not FILE_MISSING else "its copy from a backup, put back"
+    return answer(request, Problem.wrong_value(kind, error.kind, error.name, allowed))
+
+
+async def _on_already_exists(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, AlreadyExists)
+    allowed = f"a name that no {error.kind} has yet"
+    return answer(request, Problem.wrong_value(MATERIAL_EXISTS, "name", error.name, allowed))
+
+
+async def _on_blob_damaged(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, BlobDamaged)
+    found_by = f"{request.method} {request.url.path}"
+    await asyncio.to_thread(record_damage, request.app.state.context.database, error, found_by)
+    return answer(request, Problem(FILE_DAMAGED, f"{error}; allowed: a copy from a backup, or the same upload again"))
+
+
+async def _on_storage_unavailable(request: Request, error: Exception) -> JSONResponse:
+    logger.error("storage unavailable", exc_info=error)
+    assert isinstance(error, StorageUnavailable)
+    return answer(request, storage_unavailable(error))
+
+
+async def _on_crowded(request: Request, error: Exception) -> JSONResponse:
+    return answer(request, Problem(TOO_MANY_UPLOADS, str(error), headers={"Retry-After": CROWD_SECONDS}))
+
+
+async def _on_invalid_request(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, RequestValidationError)
+    wrong = [_wrong_value(entry) for entry in error.errors()]
+    listed = [{"name": each.name, "value": each.value, "allowed": each.allowed} for each in wrong]
+    wrong[0].more["errors"] = listed
+    return answer(request, wrong[0])
+
+
+def _wrong_value(entry: dict[str, Any]) -> Problem:
+    if entry["type"] == "json_invalid":
+        return Problem.wrong_value(INVALID_REQUEST, "body", f"not JSON ({entry['ctx']['error']})", "a JSON object")
+    name = ".".join(str(part) for part in entry["loc"][1:]) or str(entry["loc"][0])
+    if entry["type"] == "missing":
+        return Problem.wrong_value(INVALID_REQUEST, name, "missing", "a value")
+    allowed = entry["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
+    return Problem.wrong_value(INVALID_REQUEST, name, entry["input"], allowed)
+
+
+async def _on_http_exception(request: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, HTTPException)
+    kind = _BY_STATUS.get(error.status_code) or ProblemType(
+        BAD_REQUEST.name, HTTPStatus(error.status_code).phrase, error.status_code
+    )
+    headers = dict(error.headers or {})
+    if kind is METHOD_NOT_ALLOWED:
+        headers["Allow"] = ", ".join(_allowed_methods(request))
+    return answer(request, Problem(kind, f"{request.method} {request.url.path}: {error.detail}", headers=headers))
+
+
+def _allowed_methods(request: Request) -> list[str]:
+    """Methods that some route takes for this path: the framework names only those of the first route."""
+    router: Router = request.app.router
+    scopes = {method: {**request.scope, "method": method} for method in ("DELETE", "GET", "PATCH", "POST", "PUT")}
+    taken = {
+        method
+        for method, scope in scopes.items()
+        if any(route.matches(scope)[0] is Match.FULL for route in router.routes)
+    }
+    return sorted(taken | {"HEAD"} if "GET" in taken else taken)

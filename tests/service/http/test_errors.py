@@ -1,0 +1,60 @@
+from collections.abc import Iterator
+
+import pytest
+
+from service.domain.errors import (
+    DomainError,
+    InsufficientScope,
+    InvalidValue,
+    JobEnded,
+    NoFeasibleForce,
+    NotOwner,
+    QuotaExceeded,
+)
+from service.http.errors import OF_USE_CASES, problem_of
+
+
+def below(kind: type[DomainError]) -> Iterator[type[DomainError]]:
+    for each in kind.__subclasses__():
+        yield each
+        yield from below(each)
+
+
+def test_each_error_of_a_use_case_has_its_problem_type() -> None:
+    assert set(OF_USE_CASES) == set(below(DomainError))
+
+
+def test_a_wrong_value_is_named_in_its_problem() -> None:
+    problem = problem_of(InvalidValue("source", "a\ud800", "another material"))
+    assert problem.detail == "source is a\\ud800; allowed: another material"
+    assert (problem.name, problem.value, problem.allowed) == ("source", "a\\ud800", "another material")
+
+
+def test_a_value_is_repeated_only_in_part() -> None:
+    assert problem_of(InvalidValue("source", "a" * 1000, "less")).value == "a" * 200
+
+
+@pytest.mark.parametrize(
+    ("error", "header"),
+    [
+        (QuotaExceeded("queued jobs of this key are 9", 10), ("Retry-After", "10")),
+        (
+            InsufficientScope("read", "upload"),
+            ("WWW-Authenticate", 'Bearer realm="stiction", error="insufficient_scope", scope="upload"'),
+        ),
+    ],
+)
+def test_what_a_client_can_do_stands_in_a_header(error: DomainError, header: tuple[str, str]) -> None:
+    assert list(problem_of(error).headers.items()) == [header]
+
+
+@pytest.mark.parametrize(
+    ("error", "members"),
+    [
+        (NotOwner(["key:3f9c2a7b51de"]), {"owners": ["key:3f9c2a7b51de"]}),
+        (NoFeasibleForce("none", facts={"largest_load": 3.8}), {"largest_load": 3.8}),
+        (JobEnded("00", "done"), {}),
+    ],
+)
+def test_further_facts_are_members_of_the_problem(error: DomainError, members: dict[str, object]) -> None:
+    assert problem_of(error).more == members
