@@ -270,12 +270,13 @@ class SampleSummaryRow(Base):
 class FrictionModelRow(Base):
     """One version of a material's friction model; at most one a material and method is current.
 
-    It is ``outdated`` once the material's logs are others than those that it was fitted to.
+    A job stores one a method. It is ``outdated`` once the material's logs are others than those that it was fitted to.
     """
 
     __tablename__ = "friction_models"
     __table_args__ = (
         UniqueConstraint("material_id", "method", "version"),
+        UniqueConstraint("job_id", "method"),
         Index(
             "uq_friction_models_current",
             "material_id",
@@ -289,7 +290,7 @@ class FrictionModelRow(Base):
 
     id: Mapped[int] = mapped_column(primary_key=True)
     material_id: Mapped[int] = mapped_column(ForeignKey("materials.id"))
-    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id"), unique=True)
+    job_id: Mapped[str] = mapped_column(ForeignKey("jobs.id"))
     method: Mapped[str] = mapped_column(String(30))
     version: Mapped[int]
     current: Mapped[bool]

@@ -1,6 +1,6 @@
 """Queries on friction models: versions only grow, and one a material and method is current."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import Any
 
@@ -70,11 +70,12 @@ def current_methods(session: Session, material_ids: Sequence[int]) -> list[str]:
     return sorted(session.scalars(select(FrictionModelRow.method).where(of_them).distinct()))
 
 
-def mark_outdated(session: Session, material_id: int, besides: str = "") -> None:
-    """Say of a material's current models, but that by the method ``besides``, that its logs are others since."""
+def mark_outdated(session: Session, material_id: int, besides: Collection[str] = ()) -> None:
+    """Say of a material's current models, but those by the methods ``besides``, that its logs are others since."""
     lock(session, material_id)
-    of_it = (FrictionModelRow.material_id == material_id, FrictionModelRow.current, FrictionModelRow.method != besides)
-    session.execute(update(FrictionModelRow).where(*of_it).values(outdated=True))
+    of_it = (FrictionModelRow.material_id == material_id, FrictionModelRow.current)
+    others = FrictionModelRow.method.not_in(besides)
+    session.execute(update(FrictionModelRow).where(*of_it, others).values(outdated=True))
 
 
 def outdated_methods(session: Session, material_id: int) -> list[str]:

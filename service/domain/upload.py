@@ -21,7 +21,7 @@ from service.domain.ownership import check_may_add
 from service.domain.receive import UNPACKING_BYTES, check_encoding, check_expansion, check_size, unpack
 from service.formats.archive import unpacked_bytes
 from service.formats.reading import Description, FormatSettings, to_its_end
-from service.jobs.queueing import queue
+from service.jobs.queueing import INGEST_METHODS, queue
 from service.settings import Settings
 from slipcore.defaults import METHOD_NAMES
 from slipcore.errors import InvalidInput
@@ -163,7 +163,7 @@ def accept(session: Session, settings: Settings, log: NewGraspLog, asker: Asker)
         queue(
             session,
             "ingest",
-            "ols",
+            INGEST_METHODS[0],
             material_id=log.material_id,
             grasp_log_id=log_id,
             requested_by=asker.key_id,

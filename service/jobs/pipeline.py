@@ -30,7 +30,7 @@ from service.domain.stored_results import (
     summarise_samples,
     to_new_model,
 )
-from service.jobs.queueing import queue_cheap_refits
+from service.jobs.queueing import INGEST_METHODS, queue_cheap_refits
 from service.observability import logs, traces
 from slipcore import FrictionSamples, GraspLog, SlipcoreError, SlipHistory
 
@@ -38,6 +38,14 @@ logger = logging.getLogger(__name__)
 
 FITS_BESIDE_OTHERS = 3
 """Fits of a material whose logs change meanwhile, before the next one makes the other writers wait."""
+
+
+FITTED_AT_INGEST = ("hierarchical", "ols")
+"""What the methods of an ingest store their models as."""
+
+SAMPLED_AT_INGEST = 30
+"""Logs of a material up to which an ingest's fit by `auto` looks at their samples, for outliers, 3 ms a log. With more
+logs it takes their moments as they are, 0.2 ms a log, until a fit is asked for."""
 
 
 class Refused(Exception):
@@ -127,12 +135,12 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
     with run.database.write() as session:
         jobs.start_stage(session, run.claim, "samples", run.seconds)  # nobody else has stored them meanwhile
         detections.add(session, log_id, detection, summary)
-        _mark_outdated(run, session, log_id, summary)
+        _mark_outdated(session, log_id, summary)
     return summary
 
 
-def _mark_outdated(run: Run, session: Session, log_id: str, samples: SampleSummary) -> None:
-    """Say that the material's models by other methods than this job's lack these samples.
+def _mark_outdated(session: Session, log_id: str, samples: SampleSummary) -> None:
+    """Say that the material's models by other methods than an upload's job fits by lack these samples.
 
     They do not where the log was withdrawn meanwhile; who withdraws it now waits for the rows that refer to it.
     """
@@ -140,7 +148,7 @@ def _mark_outdated(run: Run, session: Session, log_id: str, samples: SampleSumma
         return
     material_id = grasp_logs.material_id(session, log_id)
     if material_id is not None:
-        friction_models.mark_outdated(session, material_id, besides=run.job.method)
+        friction_models.mark_outdated(session, material_id, besides=FITTED_AT_INGEST)
 
 
 def fit_material(run: Run, material: str) -> None:
@@ -151,17 +159,17 @@ def fit_material(run: Run, material: str) -> None:
             with run.database.read() as session:
                 material_id = materials.find_id(session, material)
                 parts = detections.samples_of_material(session, material_id)
-            model = _fit(run, parts)
+            models = _fit(run, parts)
         with run.database.write() as session:
             friction_models.lock(session, material_id)
             if detections.samples_of_material(session, material_id) == parts:
-                _store_model(run, session, material_id, model)
+                _store_models(run, session, material_id, models)
                 return
     with run.database.write() as session:  # logs come in faster than they are fitted: the other fits wait for this one
         friction_models.lock(session, material_id)
         with run.timed("friction_model"):
-            model = _fit(run, detections.samples_of_material(session, material_id))
-        _store_model(run, session, material_id, model)
+            models = _fit(run, detections.samples_of_material(session, material_id))
+        _store_models(run, session, material_id, models)
 
 
 def _collect(log: GraspLog, history: SlipHistory) -> tuple[FrictionSamples, str | None]:
@@ -184,12 +192,19 @@ def _no_samples(log: GraspLog) -> FrictionSamples:
     return FrictionSamples(none, none, none, none, none, none.astype(int), none, log.element_area)
 
 
-def _fit(run: Run, parts: Sequence[SamplesOfLog]) -> FrictionModel:
-    """From the moments where the method needs no more, else from the samples."""
+def _fit(run: Run, parts: Sequence[SamplesOfLog]) -> list[FrictionModel]:
+    """The models of the job's methods."""
     if not parts:
         raise Refused("no grasp log of this material has friction samples yet")
-    method, seed = run.job.method, run.job.seed
-    if estimators.needs_samples(method, len(parts)):
+    if run.job.kind == "ingest":
+        return [_fit_by(run, parts, method, SAMPLED_AT_INGEST) for method in INGEST_METHODS]
+    return [_fit_by(run, parts, run.job.method, len(parts))]
+
+
+def _fit_by(run: Run, parts: Sequence[SamplesOfLog], method: str, most_sampled: int) -> FrictionModel:
+    """From the moments where the method needs no more, or of more than ``most_sampled`` logs; else from the samples."""
+    seed = run.job.seed
+    if len(parts) <= most_sampled and estimators.needs_samples(method, len(parts)):
         return estimators.fit(
             [decode_samples(run.blobs.path(part.samples_blob)) for part in parts], method=method, seed=seed
         )
@@ -215,11 +230,13 @@ def _note_missing_moments(run: Run, material: str) -> None:
                 detections.set_moments(session, part.grasp_log_id, content)
 
 
-def _store_model(run: Run, session: Session, material_id: int, model: FrictionModel) -> None:
-    """Store the model and close the job, in one transaction with what the model was fitted to."""
+def _store_models(run: Run, session: Session, material_id: int, models: Sequence[FrictionModel]) -> None:
+    """Store the models and close the job, in one transaction with what they were fitted to; it names the first."""
     with run.timed("material"):
-        jobs.start_stage(session, run.claim, "material", run.seconds)  # before the model, which a job may have but once
-        version = friction_models.add(session, material_id, run.job.id, to_new_model(model))
+        jobs.start_stage(
+            session, run.claim, "material", run.seconds
+        )  # before the models, of which a job may have one a method
+        versions = [friction_models.add(session, material_id, run.job.id, to_new_model(model)) for model in models]
         if run.job.kind == "ingest":
             queue_cheap_refits(session, material_id, run.job.requested_by)
-    jobs.finish(session, run.claim, "done", model_version=version, seconds=run.seconds)
+    jobs.finish(session, run.claim, "done", model_version=versions[0], seconds=run.seconds)

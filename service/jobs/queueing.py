@@ -10,6 +10,10 @@ from service.observability import logs, traces
 
 logger = logging.getLogger(__name__)
 
+INGEST_METHODS = ("auto", "ols")
+"""By which an upload's job fits: the recommended method, whose model the job names, and the one that answered before
+there was a recommendation, which clients of then still ask for."""
+
 CHEAP_METHODS = frozenset({"ols", "conjugate", "hierarchical"})
 """Methods whose fit is a merge of moments, milliseconds for any logs: by these a material is always fitted again."""
 

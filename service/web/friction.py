@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from db.records import Material, StoredModel
+from service.domain.recommended import recommended
 from service.domain.stored_results import to_friction_model
-from service.http.schemas.models import LookUpQuery
 from service.web.charts import Chart, Curve, draw
 
-USUAL_METHOD = LookUpQuery.model_fields["method"].default
 LEVELS = (0.05, 0.95)
 """Quantiles between which 90 % of new observations are expected."""
 
@@ -40,11 +39,11 @@ class Friction:
 
 
 def usual_model(models: Sequence[StoredModel], method: str | None = None) -> StoredModel | None:
-    """The model of a method; without one, that which look-ups use, or else the first there is."""
-    by_method = {stored.model.method: stored for stored in models}
+    """The model of a method; without one, the recommended model, or else the first there is."""
     if method is not None:
-        return by_method.get(method)
-    return by_method.get(USUAL_METHOD) or next(iter(models), None)
+        return {stored.model.method: stored for stored in models}.get(method)
+    best = recommended(models)
+    return next(iter(models), None) if best is None else best.stored
 
 
 def middle_force(stored: StoredModel) -> float:

@@ -55,13 +55,14 @@ def tables(database: Database) -> set[str]:
     return set(inspect(database.engine).get_table_names()) - {"alembic_version"}
 
 
-def shape(database: Database) -> dict[str, tuple[set[str], set[str | None]]]:
-    """The tables, each with the names of its columns and indexes."""
+def shape(database: Database) -> dict[str, tuple[set[str | None], ...]]:
+    """The tables, each with the names of its columns, indexes and unique constraints."""
     found = inspect(database.engine)
     return {
         name: (
             {column["name"] for column in found.get_columns(name)},
             {index["name"] for index in found.get_indexes(name)},
+            {rule["name"] for rule in found.get_unique_constraints(name)},
         )
         for name in tables(database)
     }
@@ -191,6 +192,26 @@ def test_models_of_before_scales_are_read_with_those_that_their_diagnostics_tell
     assert hierarchical.model == structured
     assert ols.model == new_model()
     assert ols.model.scales is None
+
+
+def test_models_of_one_job_get_jobs_of_their_own_on_the_way_back(
+    database: Database,
+    new_log: Callable[..., NewGraspLog],
+    detection: Detection,
+    samples: SampleSummary,
+    new_model: Callable[..., NewModel],
+) -> None:
+    fill(database, new_log(material_id=1), detection, samples, new_model())
+    with database.write() as session:
+        ingest = jobs.list_all(session, Window("created_at"))[0]
+        friction_models.add(session, 1, ingest.id, new_model("hierarchical"))
+        models = friction_models.versions(session, 1)
+    migrate.downgrade(database, "0017")
+    migrate.upgrade(database)
+    with database.read() as session:
+        assert friction_models.versions(session, 1) == models
+        found = session.execute(text("SELECT j.kind, m.method FROM friction_models m JOIN jobs j ON j.id = m.job_id"))
+        assert set(found.all()) == {("ingest", "ols"), ("fit", "hierarchical")}
 
 
 def test_a_database_of_a_newer_version_is_refused_by_name(database: Database) -> None:

@@ -47,13 +47,19 @@ class Shop:
                 done.append(jobs.get(session, claim.job_id))
         return done
 
-    def ingest(self, material: str, number: int, method: str = "ols") -> str:
-        """A log of the material, with its model fitted."""
-        log_id = self.store(material, number, method)
+    def ingest(self, material: str, number: int) -> str:
+        """A log of the material, with its models fitted."""
+        log_id = self.store(material, number)
         assert {(job.status, job.reason) for job in self.work()} == {("done", None)}
         return log_id
 
-    def store(self, material: str, number: int, method: str = "ols") -> str:
+    def fit(self, material: str, method: str) -> None:
+        """A model of the material by one method more."""
+        with self.database.write() as session:
+            jobs.add(session, "fit", method, material_id=materials.find_id(session, material))
+        assert [job.status for job in self.work()] == ["done"]
+
+    def store(self, material: str, number: int) -> str:
         """A log of the material whose ingest waits."""
         content = self.contents[number]
         with self.database.write() as session:
@@ -63,7 +69,7 @@ class Shop:
                 material_id = materials.create(session, material, "").id
             log = NewGraspLog(self.blobs.put(content), len(content), "npz", "filter", material_id, "s", 82, 2.7, (8, 8))
             log_id = grasp_logs.add(session, log)
-            jobs.add(session, "ingest", method, material_id=material_id, grasp_log_id=log_id)
+            jobs.add(session, "ingest", "auto", material_id=material_id, grasp_log_id=log_id)
         return log_id
 
     def friction(self, material: str, method: str = "ols") -> Friction:
@@ -107,15 +113,18 @@ def test_models_are_outdated_as_soon_as_a_merge_brings_other_logs(shop: Shop) ->
 
 
 def test_a_withdrawn_log_leaves_every_fit_and_comes_back(shop: Shop) -> None:
-    good, bad = shop.ingest("paper", 0), shop.ingest("paper", 1, method="conjugate")
+    good, bad = shop.ingest("paper", 0), shop.ingest("paper", 1)
+    shop.fit("paper", "conjugate")
     both = shop.model("paper", "conjugate")[1]
     log, queued = curate.withdraw(shop.context, bad, "wet")
     assert log.withdrawal is not None
     assert log.withdrawal.because == "wet"
-    assert [(job.kind, job.method) for job in queued] == [("fit", "conjugate"), ("fit", "ols")]
+    assert [(job.kind, job.method) for job in queued] == [
+        ("fit", each) for each in ("conjugate", "hierarchical", "ols")
+    ]
     assert shop.model("paper", "conjugate") == (1, both, True)
     assert "outdated" in str(shop.friction("paper").warning)
-    assert [job.status for job in shop.work()] == ["done", "done"]
+    assert [job.status for job in shop.work()] == ["done"] * 3
     assert shop.model("paper", "conjugate") == (2, both // 2, False)
     assert shop.model("paper", "ols") == (3, both // 2, False)
     assert "outdated" not in str(shop.friction("paper").warning)
@@ -126,7 +135,7 @@ def test_a_withdrawn_log_leaves_every_fit_and_comes_back(shop: Shop) -> None:
     assert queued == []
     back, queued = curate.restore(shop.context, bad)
     assert back.withdrawal is None
-    assert len(queued) == len(shop.work()) == 2
+    assert len(queued) == len(shop.work()) == 3
     assert shop.model("paper", "ols") == (4, both, False)
     assert curate.restore(shop.context, good)[1] == []
 
@@ -156,7 +165,7 @@ def test_a_log_that_is_withdrawn_before_its_samples_are_stored_outdates_no_model
         monkeypatch.setattr(pipeline.slipcore, "detect_slip", withdraw_and_detect)
     shop.work()
     assert shop.model("paper", "robust") == before
-    assert [job.method for job in curate.restore(shop.context, log_id)[1]] == ["ols", "robust"]
+    assert [job.method for job in curate.restore(shop.context, log_id)[1]] == ["hierarchical", "ols", "robust"]
 
 
 def test_a_material_without_its_only_log_has_no_model(shop: Shop) -> None:
@@ -191,12 +200,13 @@ def test_a_fit_under_way_does_not_bring_a_withdrawn_log_back(shop: Shop, monkeyp
 
 def test_a_merged_material_is_fitted_over_all_its_logs(shop: Shop) -> None:
     shop.ingest("paper", 0)
-    shop.ingest("papre", 1, method="conjugate")
+    shop.ingest("papre", 1)
+    shop.fit("papre", "conjugate")
     each = shop.model("paper")[1]
     merged, queued = curate.merge(shop.context, "paper", "papre")
     assert (merged.name, merged.aliases, merged.grasp_logs) == ("paper", ("papre",), 2)
-    assert [job.method for job in queued] == ["conjugate", "ols"]
-    assert [job.status for job in shop.work()] == ["done", "done"]
+    assert [job.method for job in queued] == ["conjugate", "hierarchical", "ols"]
+    assert [job.status for job in shop.work()] == ["done"] * 3
     assert shop.model("papre") == shop.model("paper") == (2, 2 * each, False)
     assert shop.friction("papre", "conjugate").material == "paper"
     with pytest.raises(InvalidValue, match="source is papre; allowed: another material"):

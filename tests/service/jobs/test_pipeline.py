@@ -16,6 +16,7 @@ from db.records import Claim, Detection, Job, Material, NewGraspLog, StoredGrasp
 from db.repositories import detections, friction_models, grasp_logs, jobs, materials, runners
 from db.tables import JobRow, SampleSummaryRow
 from estimators import Moments
+from service.domain.recommended import recommended
 from service.domain.stored_results import SAMPLE_ARRAYS, encode_samples, summarise_samples
 from service.jobs import pipeline
 from slipcore import FrictionSamples, GraspLog
@@ -95,10 +96,41 @@ def test_a_log_goes_through_all_stages(shop: Shop, content: bytes, calls: list[s
     job = shop.run(job_id)
     assert (job.status, job.model_version) == ("done", 1)
     assert list(job.seconds) == ["frames", "slip_state", "samples", "friction_model", "material"]
-    assert calls == ["detect_slip", "collect_samples", "fit"]
+    assert calls == ["detect_slip", "collect_samples", "fit", "fit"]
     found = shop.log(log_id)
     assert found.samples is not None
-    assert [stored.model.n for stored in shop.material().models] == [found.samples.count]
+    assert {stored.model.method: stored.model.n for stored in shop.material().models} == {
+        "hierarchical": found.samples.count,
+        "ols": found.samples.count,
+    }
+
+
+def test_an_ingest_keeps_the_models_current_that_planners_ask_for(shop: Shop, content: bytes) -> None:
+    shop.run(shop.ingest(content)[1])
+    shop.run(shop.fit("conjugate"))
+    shop.run(shop.ingest(content + b"\0")[1])
+    told = {stored.model.method: (stored.version, stored.outdated) for stored in shop.material().models}
+    assert told == {"hierarchical": (2, False), "ols": (2, False), "conjugate": (1, True)}
+    best = recommended(shop.material().models)
+    assert best is not None
+    assert (best.stored.model.method, best.stored.model.scales is None) == ("hierarchical", False)
+
+
+def test_an_ingest_of_many_logs_looks_at_moments_alone(
+    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pipeline, "SAMPLED_AT_INGEST", 1)
+    seen: list[type] = []
+    fit = estimators.fit
+
+    def noted(parts: Any, **options: Any) -> estimators.FrictionModel:
+        seen.extend(map(type, parts))
+        return fit(parts, **options)
+
+    monkeypatch.setattr(estimators, "fit", noted)
+    for suffix in (b"", b"\0"):
+        shop.run(shop.ingest(content + suffix)[1])
+    assert seen == [FrictionSamples] * 2 + [Moments] * 4
 
 
 def test_a_job_that_is_done_is_not_done_again(shop: Shop, content: bytes, calls: list[str]) -> None:
@@ -132,15 +164,15 @@ def test_a_worker_whose_job_went_to_another_stores_nothing_more(
     with pytest.raises(ClaimLost):
         pipeline.run_job(shop.database, shop.blobs, claim)
     assert shop.log(log_id).job.status == "done"
-    assert [stored.version for stored in shop.material().models] == [1]
+    assert {stored.version for stored in shop.material().models} == {1}
 
 
 @pytest.mark.parametrize(
     ("dies_in", "left_to_do"),
     [
-        ("detections.add", ["detect_slip", "collect_samples", "fit"]),
-        ("friction_models.add", ["fit"]),
-        ("jobs.finish", ["fit"]),
+        ("detections.add", ["detect_slip", "collect_samples", "fit", "fit"]),
+        ("friction_models.add", ["fit", "fit"]),
+        ("jobs.finish", ["fit", "fit"]),
     ],
 )
 def test_a_job_that_was_interrupted_goes_on_where_it_was(
@@ -183,10 +215,10 @@ def test_a_model_leaves_no_samples_out_that_came_in_while_it_was_fitted(
 
     monkeypatch.setattr(estimators, "fit", slow_fit)
     assert shop.run(first).model_version == 2
-    assert grasps == [1, 2]
+    assert grasps == [1, 1, 2, 2]  # by each of the two methods
     samples = shop.log(log_id).samples
     assert samples is not None
-    assert [(stored.version, stored.model.n) for stored in shop.material().models] == [(2, 2 * samples.count)]
+    assert {(stored.version, stored.model.n) for stored in shop.material().models} == {(2, 2 * samples.count)}
 
 
 @pytest.mark.parametrize(

@@ -102,7 +102,10 @@ def test_a_material_without_a_model_says_so(client: httpx.Client, material: str)
 def test_the_friction_of_a_fitted_material_is_its_truth(client: httpx.Client) -> None:
     mean = client.get("/v1/materials/fitted/friction", params={"fn": 0.4}).json()
     assert mean["friction_coefficient"] == mean["mean"] == pytest.approx(0.4, abs=0.004)
-    assert (mean["material"], mean["method"], mean["version"]) == ("fitted", "ols", 1)
+    assert (mean["material"], mean["method"], mean["version"]) == ("fitted", "hierarchical", 1)
+    assert mean["chosen_because"].startswith("hierarchical: ")
+    ols = client.get("/v1/materials/fitted/friction", params={"fn": 0.4, "method": "ols"}).json()
+    assert (ols["method"], ols["chosen_because"]) == ("ols", None)
     assert (mean["tangential_velocity"], mean["normal_force"], mean["quantile"]) == (0.0, 0.4, None)
     assert (mean["within_domain"], mean["warning"]) == (True, None)
 
@@ -169,7 +172,7 @@ def test_a_fit_on_request_is_a_new_current_version(client: httpx.Client, fitted:
     done = wait(client, job["id"])
     assert (done["status"], done["model_version"]) == ("done", len(before) + 1)
     models = client.get("/v1/materials/fitted/fits").json()["items"]
-    assert [model["method"] for model in models if model["current"]] == ["bayes", "ols"]
+    assert [model["method"] for model in models if model["current"]] == ["bayes", "ols", "hierarchical"]
     bayes = client.get("/v1/materials/fitted").json()["models"]["bayes"]
     assert bayes == models[0]
     assert bayes["coefficients"][0] == pytest.approx(0.4, abs=0.004)
