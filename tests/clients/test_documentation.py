@@ -55,6 +55,25 @@ with FrictionClient("{service_url}") as client:
     assert f"{names['grip'].normal_force}" in capsys.readouterr().out
 
 
+def test_the_worked_example_of_a_planner_runs(service_url: str, capsys: pytest.CaptureFixture[str]) -> None:
+    names = run(code_blocks("docs/planner.md"), service_url)
+    weight = 0.2 * 9.81
+    assert 1.2 * weight / 2.0 / 0.47 < names["grip"].normal_force < 1.2 * weight / 2.0 / 0.3
+    assert names["offset"][names["best"]] == pytest.approx(0.0, abs=1e-12)
+    assert names["command"].mode == "hold"
+    assert names["state"].slipped[0] < 1e-4
+    assert 0.1 * 9.81 / 0.45 < names["state"].normal_force[0] < 1.4 * 0.1 * 9.81 / 0.45
+    printed = capsys.readouterr().out
+    page = (ROOT / "docs/planner.md").read_text(encoding="utf-8")
+    for shown in re.findall(r"```text\n(.*?)```", page, re.DOTALL):
+        assert without_numbers(shown) in without_numbers(printed)
+
+
+def without_numbers(text: str) -> str:
+    """The text with each number as #: last digits may differ from machine to machine."""
+    return re.sub(r"\d[\d.]*", "#", text)
+
+
 def test_the_code_of_the_control_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(code_blocks("docs/control.md"))["command"].mode == "feel"
     assert capsys.readouterr().out.count("press with") == 3
