@@ -1,6 +1,5 @@
 import time
 from collections.abc import Callable
-from datetime import UTC, datetime, timedelta
 from http.cookies import SimpleCookie
 from typing import Any
 
@@ -132,16 +131,6 @@ def test_a_session_ends_with_its_key(
     soon = time.monotonic() + gate.KEPT_SECONDS + 0.1
     monkeypatch.setattr(gate.time, "monotonic", lambda: soon)
     assert caller.get("/", headers=headers).status_code == 303
-
-
-def test_a_session_that_is_over_is_forgotten(database: Database, make: Callable[..., str]) -> None:
-    key_id = str(access.key_id(make()))
-    now = datetime.now(UTC)
-    with database.write() as session:
-        browser_sessions.add(session, "a" * 64, key_id, now - timedelta(seconds=1))
-        assert browser_sessions.find_key(session, "a" * 64) is None
-        browser_sessions.add(session, "b" * 64, key_id, now + timedelta(hours=1))
-        assert browser_sessions.find_key(session, "b" * 64) is not None
 
 
 def test_a_key_in_the_header_counts_before_the_cookie(caller: Any, make: Callable[..., str], cookie: str) -> None:
