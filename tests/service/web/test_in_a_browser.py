@@ -127,6 +127,10 @@ def test_a_key_logs_in_and_out(tab: Tab, serving: Any, tmp_path: Path, sqlite_te
         tab.run(f"key.value = '{text}'; document.querySelector('main form').submit()")
         tab.until("location.pathname === '/jobs' && document.readyState === 'complete'")
         assert tab.run("document.cookie") == ""  # no script reads it
+        tab.resize(390)
+        tab.go(f"{base}/")
+        assert "Nothing is stored here yet" in tab.run("document.body.innerText")
+        assert fits(tab)
         tab.run("document.querySelector('.session button').click()")
         tab.until("location.pathname === '/login' && document.readyState === 'complete'")
         tab.call("Page.navigate", url=f"{base}/jobs")

@@ -13,7 +13,7 @@ def test_an_empty_database_greets_with_two_next_steps(browser: Any, elements: Ca
     page = elements(browser.get("/").text)
     assert [tag for tag, _ in page.found].count("li") == 2
     assert "stiction simulate" in page.text
-    assert ("form", {"method": "post", "action": "/materials", "class": "fields narrow"}) in page.found
+    assert ("a", {"class": "button", "href": "/upload"}) in page.found
 
 
 @pytest.mark.usefixtures("store")
