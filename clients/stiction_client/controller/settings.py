@@ -38,7 +38,7 @@ class ControlSettings:
     lead_time: Annotated[
         float, Gain(0.0, 1.0, "s", "lag of a gripper, 30 ms, and two frames of sensing at 30 frames/s")
     ] = 0.1
-    rate_time: Annotated[float, Gain(0.0, 1.0, "s", "two frames at 60 frames/s, and as long as the gripper lags")] = 0.03
+    rate_time: Annotated[float, Gain(0.0, 1.0, "s", "two frames at 60 frames/s; the gripper's lag")] = 0.03
     rate_floor: Annotated[float, Gain(0.0, 1e3, "N/s", "0.02 N of noise at 60 frames/s, filtered so")] = 0.8
     feel_stick_ratio: Annotated[float, Gain(0.05, 0.95, "-", "0.6 of what the contact can hold (Cattaneo-Mindlin)")] = (
         0.55
