@@ -32,7 +32,8 @@ def test_a_grip_is_planned_with_a_service(
     service_url: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("STICTION_URL", service_url)
-    assert 1.5 / 0.4 < number(r"press with ([\d.]+) N", printed("use_a_service", capsys)) < 1.5 / 0.3
+    pressed = number(r"press with ([\d.]+) N", printed("use_a_service", capsys))
+    assert 1.5 / 0.4 < pressed < 1.5 / 0.2  # one grasp does not tell how others differ
 
 
 def test_a_scene_is_simulated_to_an_accuracy(capsys: pytest.CaptureFixture[str]) -> None:
