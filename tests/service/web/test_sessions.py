@@ -110,7 +110,7 @@ def test_a_session_of_a_key_that_may_only_read_changes_nothing(caller: Any, make
     cookie = log_in(caller, make("read")).headers["set-cookie"].partition(";")[0]
     answer = caller.request("POST", "/materials", data={"name": "paper"}, headers={**OWN, "cookie": cookie})
     assert answer.status_code == 403
-    assert "may only read" in caller.get("/", headers={"cookie": cookie}).text
+    assert "may only read" in caller.get("/upload", headers={"cookie": cookie}).text
 
 
 def test_logging_out_ends_the_session_at_once(caller: Any, cookie: str) -> None:
