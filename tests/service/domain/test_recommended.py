@@ -8,9 +8,9 @@ import pytest
 from db.database import Database
 from db.records import NewModel, StoredModel
 from db.repositories import friction_models, jobs, materials
+from service.domain.errors import NoModel
 from service.domain.model_cache import ModelCache
 from service.domain.recommended import recommended
-from service.http.problems import Problem
 
 
 def stored(model: NewModel, method: str, **diagnostics: str) -> StoredModel:
@@ -60,7 +60,7 @@ def test_a_model_in_memory_gives_way_to_one_that_is_recommended_more(database: D
 
     with database.write() as session:
         material = materials.create(session, "paper", "").id
-    with pytest.raises(Problem, match="no model fitted by 'auto'"):
+    with pytest.raises(NoModel, match="no model fitted by 'auto'"):
         cache.read(database, "paper", "auto")
     for method in ("ols", "hierarchical"):
         store(method)
