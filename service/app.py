@@ -20,11 +20,11 @@ from service.http.head_requests import HeadRequests
 from service.http.lookups import Lookups
 from service.http.routes import audit, curation, grasp_logs, health, jobs, materials, metrics, owners, planning, stream
 from service.http.start_refusal import StartRefusal
-from service.jobs.lanes import lane_for_short_jobs, lanes
+from service.jobs.executors import executor_for_short_jobs, executors
 from service.jobs.retention import Retention
 from service.jobs.runner import JobRunner
 from service.jobs.scrub import Scrub
-from service.jobs.worker import Place
+from service.jobs.worker import StoreConfig
 from service.observability import traces
 from service.observability.answered import Answered
 from service.observability.metrics import Metering, Metrics
@@ -111,18 +111,18 @@ async def running(
     with closing(Database(settings.resolved_database_url)) as database:
         blobs = open_blobs(settings.data_folder, settings.blob_url, settings.blob_cache_bytes)
         with shared(settings.data_folder, partial(_enter, settings, database, blobs, check)):
-            place = Place(
+            config = StoreConfig(
                 database.url,
                 settings.data_folder,
                 settings.blob_url,
                 settings.blob_cache_bytes,
                 settings.job_memory_bytes,
             )
-            chosen = place, settings.workers, settings.dask_address, settings.job_cpu_seconds
+            chosen = config, settings.workers, settings.dask_address, settings.job_cpu_seconds
             runner = JobRunner(
                 database,
-                lanes(*chosen),
-                lane_for_short_jobs(*chosen),
+                executors(*chosen),
+                executor_for_short_jobs(*chosen),
                 attempts=settings.job_attempts,
                 lease_seconds=settings.lease_seconds,
                 poll_seconds=settings.poll_seconds,

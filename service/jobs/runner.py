@@ -21,7 +21,7 @@ from db.database import Database
 from db.errors import ClaimLost, SchemaMismatch, StorageUnavailable, StoreMismatch
 from db.records import Claim
 from db.repositories import jobs, runners, stores
-from service.jobs.lane import Lane, LimitReached, WorkerDied
+from service.jobs.executor import JobExecutor, LimitReached, WorkerDied
 from service.observability import logs
 
 logger = logging.getLogger(__name__)
@@ -62,34 +62,35 @@ class Watch:
 
 
 class JobRunner:
-    """Lanes of one worker process each, so that the death of a process is the death of one known job.
+    """Executors of one worker process each, so that the death of a process is the death of one known job.
 
-    ``short_lane`` does short jobs while long ones hold all the others; it has a worker only when that is needed.
+    ``short_executor`` does short jobs while long ones hold all the others; it has a worker only when that is needed.
     """
 
     def __init__(
         self,
         database: Database,
-        lanes: list[Lane],
-        short_lane: Lane | None = None,
+        executors: list[JobExecutor],
+        short_executor: JobExecutor | None = None,
         *,
         attempts: int,
         lease_seconds: float,
         poll_seconds: float,
         shutdown_seconds: float,
     ) -> None:
-        self._database, self._lanes, self._short_lane, self._attempts = database, lanes, short_lane, attempts
+        self._database, self._attempts = database, attempts
+        self._executors, self._short_executor = executors, short_executor
         self._beat_seconds, self._poll_seconds = lease_seconds / LOOKS, poll_seconds
         self._shutdown_seconds = shutdown_seconds
         self._watch = Watch(LOOKS)
         self._id = ""
-        self._at: dict[str, Claim] = {}  # jobs in the lanes
-        self._strays: set[str] = set()  # jobs that were ours in the database at the last beat, but in no lane
-        self._warming = len(lanes)
+        self._at: dict[str, Claim] = {}  # jobs in the executors
+        self._orphans: set[str] = set()  # jobs that were ours in the database at the last beat, but in no executor
+        self._warming = len(executors)
         self._hiring: set[asyncio.Task[None]] = set()
         self._outdated: SchemaMismatch | None = None
         self._stopping = self._leads = False
-        self._woken = {lane: asyncio.Event() for lane in self._all_lanes}
+        self._woken = {executor: asyncio.Event() for executor in self._all_executors}
         self._endings: WeakValueDictionary[str, asyncio.Event] = WeakValueDictionary()  # of jobs that somebody awaits
 
     @property
@@ -97,9 +98,9 @@ class JobRunner:
         """Why no jobs are taken yet, or no longer."""
         if self._outdated is not None:
             return str(self._outdated)
-        missing = next(filter(None, (lane.missing for lane in self._lanes)), None)
+        missing = next(filter(None, (executor.missing for executor in self._executors)), None)
         if self._warming:
-            return f"{self._warming} of {len(self._lanes)} workers warm up" + (f": {missing}" if missing else "")
+            return f"{self._warming} of {len(self._executors)} workers warm up" + (f": {missing}" if missing else "")
         return missing
 
     @property
@@ -110,19 +111,19 @@ class JobRunner:
     async def start(self) -> None:
         """Begin to work."""
         self._loop = asyncio.get_running_loop()
-        if self._lanes:
+        if self._executors:
             self._id = await asyncio.to_thread(self._register)
         self._beating = asyncio.create_task(self._beat())
-        self._working = [asyncio.create_task(self._work(lane)) for lane in self._lanes]
-        if self._short_lane is not None:
-            self._working.append(asyncio.create_task(self._work_beside_long_jobs(self._short_lane)))
+        self._working = [asyncio.create_task(self._work(executor)) for executor in self._executors]
+        if self._short_executor is not None:
+            self._working.append(asyncio.create_task(self._work_beside_long_jobs(self._short_executor)))
 
     def wake(self) -> None:
         """Look for a job soon, since one has just been stored; may be called from any thread."""
-        self._loop.call_soon_threadsafe(self._loop.call_later, WAKE_SECONDS, self._wake_lanes)
+        self._loop.call_soon_threadsafe(self._loop.call_later, WAKE_SECONDS, self._wake_executors)
 
     def ending(self, job_id: str) -> asyncio.Event:
-        """Set once a lane of this runner has done with the job; jobs of other runners end unheard."""
+        """Set once an executor of this runner has done with the job; jobs of other runners end unheard."""
         return self._endings.setdefault(job_id, asyncio.Event())
 
     async def until_outdated(self) -> None:
@@ -134,65 +135,65 @@ class JobRunner:
     async def stop(self) -> None:
         """Let running jobs end within the time allowed, then end their workers; others can take the jobs up."""
         self._stopping = True
-        self._wake_lanes()
+        self._wake_executors()
         for task in self._hiring:  # no job waits for a worker that is not there yet
             task.cancel()
         if self._working:
             _, late = await asyncio.wait(self._working, timeout=self._shutdown_seconds)
-            for lane in self._all_lanes:
-                lane.kill()
+            for executor in self._all_executors:
+                executor.kill()
             for task in late:
                 task.cancel()
         self._beating.cancel()
         await asyncio.gather(self._beating, *self._working, return_exceptions=True)
-        if self._lanes:
+        if self._executors:
             await self._try(lambda: self._remove(self._id))
 
-    async def _work(self, lane: Lane) -> None:
+    async def _work(self, executor: JobExecutor) -> None:
         try:
-            await self._hire(lane)
+            await self._start_executor(executor)
             self._warming -= 1
             while self._goes_on:
-                if not await self._do_next(lane):
-                    await self._wait(lane)
+                if not await self._do_next(executor):
+                    await self._wait(executor)
         finally:
-            await lane.close()
+            await executor.close()
 
-    async def _work_beside_long_jobs(self, lane: Lane) -> None:
-        """Hire when a short job waits for long ones, and let the worker go after a time without any such job."""
+    async def _work_beside_long_jobs(self, executor: JobExecutor) -> None:
+        """Start a worker when a short job waits for long ones, and let it go after a time without such a job."""
         try:
             while self._goes_on:
                 if not (self._is_held_up and await self._try(self._short_job_waits)):
-                    await self._wait(lane)
+                    await self._wait(executor)
                     continue
-                await self._hire(lane)
-                await self._do_short_jobs(lane)
-                await lane.close()
+                await self._start_executor(executor)
+                await self._do_short_jobs(executor)
+                await executor.close()
         finally:
-            await lane.close()
+            await executor.close()
 
-    async def _do_short_jobs(self, lane: Lane) -> None:
+    async def _do_short_jobs(self, executor: JobExecutor) -> None:
         busy_at = self._loop.time()
         while self._goes_on and self._loop.time() - busy_at < IDLE_SECONDS:
-            if self._is_held_up and await self._do_next(lane, only_short=True):
+            if self._is_held_up and await self._do_next(executor, only_short=True):
                 busy_at = self._loop.time()
             else:
-                await self._wait(lane)
+                await self._wait(executor)
 
-    async def _do_next(self, lane: Lane, *, only_short: bool = False) -> bool:
+    async def _do_next(self, executor: JobExecutor, *, only_short: bool = False) -> bool:
         """Do the job whose turn it is; False where there is none."""
         claim = await self._try(lambda: self._claim(only_short=only_short))
         if claim is None:
             return False
         if claim.is_long:  # what waits behind it may be short
-            self._wake_lanes()
+            self._wake_executors()
         with logs.about(job=claim.job_id):
-            await self._do(lane, claim)
+            await self._do(executor, claim)
         return True
 
     @property
-    def _all_lanes(self) -> list[Lane]:
-        return self._lanes if self._short_lane is None else [*self._lanes, self._short_lane]
+    def _all_executors(self) -> list[JobExecutor]:
+        return self._executors if self._short_executor is None else [*self._executors, self._short_executor]
 
     @property
     def _goes_on(self) -> bool:
@@ -200,27 +201,27 @@ class JobRunner:
 
     @property
     def _is_held_up(self) -> bool:
-        """Whether long jobs hold all lanes but the one for short jobs."""
-        return sum(claim.is_long for claim in list(self._at.values())) >= len(self._lanes)
+        """Whether long jobs hold all executors but the one for short jobs."""
+        return sum(claim.is_long for claim in list(self._at.values())) >= len(self._executors)
 
     def _short_job_waits(self) -> bool:
         with self._database.read() as session:
             return jobs.any_queued(session, only_short=True)
 
-    def _wake_lanes(self) -> None:
+    def _wake_executors(self) -> None:
         for woken in self._woken.values():
             woken.set()
 
-    async def _hire(self, lane: Lane) -> None:
-        hiring = asyncio.create_task(lane.hire())
-        self._hiring.add(hiring)
-        hiring.add_done_callback(self._hiring.discard)
-        await hiring
+    async def _start_executor(self, executor: JobExecutor) -> None:
+        starting = asyncio.create_task(executor.start())
+        self._hiring.add(starting)
+        starting.add_done_callback(self._hiring.discard)
+        await starting
 
-    async def _wait(self, lane: Lane) -> None:
+    async def _wait(self, executor: JobExecutor) -> None:
         with suppress(TimeoutError):
-            await asyncio.wait_for(self._woken[lane].wait(), self._poll_seconds)
-        self._woken[lane].clear()  # only now: whatever is stored during a look is looked for once more
+            await asyncio.wait_for(self._woken[executor].wait(), self._poll_seconds)
+        self._woken[executor].clear()  # only now: whatever is stored during a look is looked for once more
 
     async def _try(self, step: Callable[[], Result]) -> Result | None:
         """A step that needs the database, in a thread; None where it cannot be had now."""
@@ -232,7 +233,7 @@ class JobRunner:
         except SchemaMismatch as error:
             logger.error("no more jobs are taken: %s", error)
             self._outdated = error
-        except Exception:  # the lanes and the heartbeat outlive whatever one step throws
+        except Exception:  # the executors and the heartbeat outlive whatever one step throws
             logger.exception("a step of runner %s failed", self._id)
             await asyncio.sleep(RETRY_SECONDS)
         return None
@@ -249,10 +250,10 @@ class JobRunner:
             self._at[claim.job_id] = claim
         return claim
 
-    async def _do(self, lane: Lane, claim: Claim) -> None:
+    async def _do(self, executor: JobExecutor, claim: Claim) -> None:
         is_lost = False
         try:
-            await lane.run(claim)
+            await executor.run(claim)
         except LimitReached as limit:
             is_lost, want = not self._stopping, str(limit)
             await self._try(lambda: self._refuse(claim, want))
@@ -263,16 +264,16 @@ class JobRunner:
         except (StorageUnavailable, StoreMismatch) as error:
             logger.warning("job %s waits: %s", claim.job_id, error)
             await asyncio.sleep(RETRY_SECONDS)
-        except Exception as error:  # a lane outlives whatever one job throws at it
+        except Exception as error:  # an executor outlives whatever one job throws at it
             logger.exception("job %s failed outside its stages", claim.job_id)
             reason = f"{type(error).__name__}: {error}"
             await self._try(lambda: self._fail(claim, reason))
         finally:
-            self._at.pop(claim.job_id, None)  # where it is still ours in the database, it is a stray
+            self._at.pop(claim.job_id, None)  # where it is still ours in the database, it is an orphan
             if (ending := self._endings.pop(claim.job_id, None)) is not None:
                 ending.set()
-        if is_lost and not self._stopping:  # only now: meanwhile another lane may take the job up
-            await self._hire(lane)
+        if is_lost and not self._stopping:  # only now: meanwhile another executor may take the job up
+            await self._start_executor(executor)
 
     def _fail(self, claim: Claim, reason: str) -> None:
         try:
@@ -303,8 +304,8 @@ class JobRunner:
     async def _beat(self) -> None:
         while True:
             await asyncio.sleep(self._beat_seconds)
-            if await self._try(self._beat_once if self._lanes else self._check_schema):
-                self._wake_lanes()
+            if await self._try(self._beat_once if self._executors else self._check_schema):
+                self._wake_executors()
 
     def _check_schema(self) -> None:
         with self._database.read() as session:
@@ -316,7 +317,7 @@ class JobRunner:
             alive = runners.beat(session, self._id)
             living = runners.list_all(session)
             beats = {runner.id: runner.beats for runner in living if runner.id != self._id}
-            freed = self._free_strays(session)
+            freed = self._free_orphans(session)
         self._leads = alive and living[0].id == self._id
         if not alive and not self._stopping:
             logger.error("runner %s was taken for dead; it goes on under a new name", self._id)
@@ -326,11 +327,11 @@ class JobRunner:
             self._remove(runner)
         return freed or bool(dead)
 
-    def _free_strays(self, session: Session) -> bool:
-        """Put jobs that the database says are ours, but that no lane does, back: a commit's answer can be lost."""
-        strays = jobs.claimed(session, self._id) - self._at.keys()
-        stay = strays & self._strays
-        self._strays = strays
+    def _free_orphans(self, session: Session) -> bool:
+        """Put jobs that the database says are ours, but that no executor does, back: a commit's answer can be lost."""
+        orphans = jobs.claimed(session, self._id) - self._at.keys()
+        stay = orphans & self._orphans
+        self._orphans = orphans
         for job_id in stay:
             logger.warning("job %s is queued again: nobody is at it", job_id)
             jobs.release(session, Claim(job_id, self._id))

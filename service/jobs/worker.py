@@ -17,11 +17,11 @@ from service.processes import limits
 
 logger = logging.getLogger(__name__)
 
-_OPEN: dict["Place", tuple[Database, BlobStore]] = {}
+_OPEN: dict["StoreConfig", tuple[Database, BlobStore]] = {}
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class StoreConfig:
     """Where a worker finds its work: database, folder of the blobs and, where they are in one, the object store.
 
     ``job_memory_bytes``: how much memory a job may take beside what the process had before the first.
@@ -49,18 +49,18 @@ def warm_up() -> None:
         logger.exception("the %s is not warmed up; its first job will be slow", pipeline.__name__)
 
 
-def run_job(place: Place, claim: Claim) -> None:
+def run_job(config: StoreConfig, claim: Claim) -> None:
     """Do a job and leave its end in the database; raises ``StorageUnavailable``, for then nobody can write there."""
     with logs.about(job=claim.job_id):
-        _run(place, claim)
+        _run(config, claim)
 
 
-def _run(place: Place, claim: Claim) -> None:
+def _run(config: StoreConfig, claim: Claim) -> None:
     from service.jobs import pipeline  # imports the numerics, which the server process does without
 
-    database, blobs = _stores(place)
+    database, blobs = _stores(config)
     try:
-        with limits.memory(place.job_memory_bytes):
+        with limits.memory(config.job_memory_bytes):
             pipeline.run_job(database, blobs, claim)
     except StorageUnavailable:
         raise
@@ -71,7 +71,7 @@ def _run(place: Place, claim: Claim) -> None:
         with database.write() as session, suppress(ClaimLost):
             jobs.finish(session, claim, "failed", reason=str(damage))
     except MemoryError:
-        _refuse(database, claim, f"more than {place.job_memory_bytes} bytes of memory (STICTION_JOB_MEMORY_BYTES)")
+        _refuse(database, claim, f"more than {config.job_memory_bytes} bytes of memory (STICTION_JOB_MEMORY_BYTES)")
     except Exception as error:
         logger.exception("job failed")
         with database.write() as session, suppress(ClaimLost):
@@ -90,15 +90,15 @@ def close_stores() -> None:
         _OPEN.popitem()[1][0].close()
 
 
-def _stores(place: Place) -> tuple[Database, BlobStore]:
-    """The stores of a place, opened once and kept; raises ``StoreMismatch``."""
-    if place not in _OPEN:
-        database = Database(place.database_url)
-        blobs = open_blobs(place.data_folder, place.blob_url, place.blob_cache_bytes)
+def _stores(config: StoreConfig) -> tuple[Database, BlobStore]:
+    """The stores of a configuration, opened once and kept; raises ``StoreMismatch``."""
+    if config not in _OPEN:
+        database = Database(config.database_url)
+        blobs = open_blobs(config.data_folder, config.blob_url, config.blob_cache_bytes)
         try:
             identity.verify(database, blobs)
         except BaseException:
             database.close()
             raise
-        _OPEN[place] = database, blobs
-    return _OPEN[place]
+        _OPEN[config] = database, blobs
+    return _OPEN[config]

@@ -43,7 +43,7 @@ def start(chosen: logs.Logs | None, prepare: Callable[[], None] | None = None) -
         prepare()
 
 
-def give_way() -> None:
+def lower_priority() -> None:
     """Prepare a process whose work can wait while somebody waits for an answer."""
     os.nice(NICENESS)
 

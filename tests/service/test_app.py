@@ -23,7 +23,7 @@ from db.errors import SchemaMismatch
 from db.repositories import jobs
 from db.tables import FrictionModelRow, JobRow
 from service.app import create_app, running
-from service.jobs.process_lane import ProcessLane
+from service.jobs.process_executor import ProcessExecutor
 from service.settings import Settings
 from slipcore.contact.tiers.ramp import tangential_ramp
 from stiction_client.container import encode
@@ -58,10 +58,10 @@ def test_a_server_is_ready_once_its_workers_are_warm(
 ) -> None:
     warm = threading.Event()
 
-    async def hire(_: ProcessLane) -> None:
+    async def start(_: ProcessExecutor) -> None:
         await asyncio.to_thread(warm.wait)
 
-    monkeypatch.setattr(ProcessLane, "hire", hire)
+    monkeypatch.setattr(ProcessExecutor, "start", start)
     with serving(Settings(data_folder=tmp_path)) as client:
         cold = client.get("/readyz")
         assert (cold.status_code, cold.json()["type"]) == (503, "/problems/workers-not-ready")

@@ -22,7 +22,7 @@ from db.blobs import BlobStore
 from db.database import Database
 from db.records import Claim
 from service.domain import upload
-from service.jobs import lanes, worker
+from service.jobs import executors, worker
 from service.settings import Settings
 from slipcore import GraspLog
 from stiction_client import container
@@ -111,22 +111,22 @@ def small_and_many(ramp: GraspLog, frames: int) -> bytes:
     return container.encode(GraspLog(time_, ramp.position[:2, :2], displacement, ramp.element_area, force=force))
 
 
-class ThreadLane:
-    """A lane whose long jobs do not end before the test, and whose short ones are done in a thread."""
+class ThreadExecutor:
+    """A executor whose long jobs do not end before the test, and whose short ones are done in a thread."""
 
     test_ended = threading.Event()
     missing = None
 
-    def __init__(self, place: worker.Place, _cpu_seconds: float) -> None:
-        self._place = place
+    def __init__(self, config: worker.StoreConfig, _cpu_seconds: float) -> None:
+        self._config = config
 
-    async def hire(self) -> None:
+    async def start(self) -> None:
         pass
 
     async def run(self, claim: Claim) -> None:
         if claim.is_long:
             await asyncio.to_thread(self.test_ended.wait)
-        await asyncio.to_thread(worker.run_job, self._place, claim)
+        await asyncio.to_thread(worker.run_job, self._config, claim)
 
     def kill(self) -> None:
         self.test_ended.set()
@@ -144,9 +144,9 @@ def test_an_honest_upload_and_its_job_are_done_beside_an_attacker(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(lanes, "ProcessLane", ThreadLane)
+    monkeypatch.setattr(executors, "ProcessExecutor", ThreadExecutor)
     monkeypatch.setattr(worker, "_stores", lambda _: (database, BlobStore(tmp_path)))
-    monkeypatch.setattr(ThreadLane, "test_ended", threading.Event())
+    monkeypatch.setattr(ThreadExecutor, "test_ended", threading.Event())
     monkeypatch.setattr(upload, "LONG_FRAMES", 1000)
     honest, long = numbered(content), numbered(small_and_many(ramp, 2000))
     own, attackers = make("upload"), make("upload")
@@ -157,7 +157,7 @@ def test_an_honest_upload_and_its_job_are_done_beside_an_attacker(
         quiet = typical(client, honest)
         with flood(str(client.base_url), attackers, long, 2):
             beside = typical(client, honest)
-        ThreadLane.test_ended.set()
+        ThreadExecutor.test_ended.set()
     tolerated = 1.0  # s: server, worker, attackers and caller share one interpreter here
     assert beside.answer < TIMES * quiet.answer + tolerated, (quiet, beside)
     assert beside.job < TIMES * quiet.job + tolerated, (quiet, beside)

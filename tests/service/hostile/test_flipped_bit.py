@@ -15,7 +15,7 @@ from db.repositories import jobs
 from db.tables import AuditEntryRow
 from service.jobs import scrub, worker
 from service.jobs.scrub import Scrub
-from service.jobs.worker import Place
+from service.jobs.worker import StoreConfig
 
 NPZ = {"content-type": "application/vnd.stiction.grasp-log+npz"}
 DAMAGED = (500, "/problems/file-damaged")
@@ -66,7 +66,7 @@ def test_a_job_on_a_damaged_file_fails_by_name(
     caller: Any, log: dict[str, Any], database: Database, blobs: BlobStore, claim: Callable[[], Claim], tmp_path: Path
 ) -> None:
     flip(blobs.path(log["sha256"]))
-    worker.run_job(Place(database.url, tmp_path), claim())
+    worker.run_job(StoreConfig(database.url, tmp_path), claim())
     job = caller.get(f"/v1/jobs/{log['job']['id']}").json()
     assert (job["status"], job["stage"]) == ("failed", "frames")
     assert f"blob {log['sha256']} has other bytes than it had" in job["reason"]
@@ -76,15 +76,15 @@ def test_a_job_on_a_damaged_file_fails_by_name(
 def test_results_and_fits_of_damaged_files_are_refused(
     caller: Any, log: dict[str, Any], database: Database, blobs: BlobStore, claim: Callable[[], Claim], tmp_path: Path
 ) -> None:
-    place = Place(database.url, tmp_path)
-    worker.run_job(place, claim())
+    config = StoreConfig(database.url, tmp_path)
+    worker.run_job(config, claim())
     for sha256 in set(blobs.hashes()) - {log["sha256"]}:
         flip(blobs.path(sha256))
     for result in ("stick-ratio", "events", "samples"):
         answer = caller.get(f"/v1/grasp-logs/{log['id']}/{result}")
         assert (answer.status_code, answer.json()["type"]) == DAMAGED
     fit = caller.request("POST", "/v1/materials/paper/fits", json={"method": "robust"}).json()
-    worker.run_job(place, claim())
+    worker.run_job(config, claim())
     with database.read() as session:
         job = jobs.get(session, fit["id"])
     assert job.status == "failed"

@@ -114,7 +114,7 @@ def test_a_job_stores_its_results_once_and_whole(
     caller = reach("open")
     caller.request("POST", "/v1/materials", json={"name": "paper"})
     monkeypatch.setattr(worker, "_stores", lambda _: (database, blobs))
-    place = worker.Place(database.url, tmp_path)
+    config = worker.StoreConfig(database.url, tmp_path)
 
     def claim() -> Claim:
         with database.write() as session:
@@ -130,7 +130,7 @@ def test_a_job_stores_its_results_once_and_whole(
         claimed = claim()
         layer.arm(at, fault)
         with suppress(StorageUnavailable):
-            worker.run_job(place, claimed)
+            worker.run_job(config, claimed)
         layer.at = -1
         check_sound(database, blobs)
         with database.write() as session:
@@ -138,7 +138,7 @@ def test_a_job_stores_its_results_once_and_whole(
             if job.status == "running":
                 jobs.release(session, claimed)
         if job.status == "running":
-            worker.run_job(place, claim())
+            worker.run_job(config, claim())
         after = caller.get(f"/v1/jobs/{log['job']['id']}").json()
         assert (after["status"], after["reason"]) == ("done", None), layer.fired
         with database.read() as session:

@@ -16,8 +16,8 @@ from db.blobs import BlobStore
 from db.database import Database
 from db.records import NewGraspLog
 from db.repositories import grasp_logs, jobs, runners
-from service.jobs import pipeline, process_lane, worker
-from service.jobs.lane import LimitReached
+from service.jobs import pipeline, process_executor, worker
+from service.jobs.executor import LimitReached
 from service.processes import limits
 from service.settings import Settings
 from slipcore import GraspLog
@@ -66,7 +66,7 @@ def test_a_job_that_wants_too_much_memory_is_refused_and_its_process_goes_on(
 
     monkeypatch.setattr(worker, "_stores", lambda _: (database, store))
     monkeypatch.setattr(pipeline, "run_job", allocate)
-    worker.run_job(worker.Place(database.url, tmp_path, job_memory_bytes=2**28), claim)
+    worker.run_job(worker.StoreConfig(database.url, tmp_path, job_memory_bytes=2**28), claim)
     with database.read() as session:
         job = jobs.get(session, claim.job_id)
     reason = "stage frames wants more than 268435456 bytes of memory (STICTION_JOB_MEMORY_BYTES)"
@@ -86,20 +86,20 @@ def test_a_worker_that_takes_too_long_is_ended_and_another_one_begins_anew(
     async def run() -> None:
         monkeypatch.setattr(worker, "warm_up", partial(spend, 0.0))
         monkeypatch.setattr(worker, "run_job", spend_on_job)
-        lane = process_lane.ProcessLane(worker.Place("sqlite:///x", tmp_path), 0.3)
-        await lane.hire()
+        executor = process_executor.ProcessExecutor(worker.StoreConfig("sqlite:///x", tmp_path), 0.3)
+        await executor.start()
         try:
             with pytest.raises(LimitReached, match=r"more than 0\.3 s of CPU"):
-                await lane.run(jobs.Claim("job", "runner"))
-            await lane.hire()  # another process, whose time counts from its job's begin
-            lane._cpu_seconds = 60.0
-            await lane.run(jobs.Claim("short", "runner"))
+                await executor.run(jobs.Claim("job", "runner"))
+            await executor.start()  # another process, whose time counts from its job's begin
+            executor._cpu_seconds = 60.0
+            await executor.run(jobs.Claim("short", "runner"))
         finally:
-            await lane.close()
+            await executor.close()
 
     asyncio.run(run())
     assert limits.cpu_seconds(2**22 + 1) is None
 
 
-def spend_on_job(_: worker.Place, claim: jobs.Claim) -> None:
+def spend_on_job(_: worker.StoreConfig, claim: jobs.Claim) -> None:
     spend(0.0 if claim.job_id == "short" else 60.0)

@@ -87,9 +87,9 @@ def test_a_second_server_on_the_database_wants_its_folder(right: Settings, tmp_p
 
 def test_a_worker_process_in_another_folder_takes_no_job(right: Settings, tmp_path: Path) -> None:
     """Such as one of a Dask cluster, on a machine where that folder is another."""
-    place = worker.Place(right.resolved_database_url, tmp_path / "other")
+    config = worker.StoreConfig(right.resolved_database_url, tmp_path / "other")
     with pytest.raises(StoreMismatch, match="of no store yet"):
-        worker.run_job(place, Claim("0" * 32, "1" * 32))
+        worker.run_job(config, Claim("0" * 32, "1" * 32))
 
 
 def test_a_store_of_before_is_taken_over_without_a_hand(right: Settings, serving: Serving, content: bytes) -> None:

@@ -13,7 +13,7 @@ from db.errors import ClaimLost, StorageUnavailable
 from db.records import Claim, Job
 from db.repositories import jobs, materials, runners
 from db.tables import JobRow
-from service.jobs.lane import WorkerDied
+from service.jobs.executor import WorkerDied
 from service.jobs.runner import LOOKS, JobRunner, Watch
 
 Do = Callable[[Claim], None]
@@ -21,16 +21,16 @@ ATTEMPTS = 3
 LEASE_SECONDS = 0.1
 
 
-class ThreadLane:
-    """A lane whose worker is a thread that does what it is told to."""
+class ThreadExecutor:
+    """An executor whose worker is a thread that does what it is told to."""
 
     def __init__(self, do: Do) -> None:
         self._do = do
-        self.hired = self.closed = 0
+        self.started = self.closed = 0
         self.missing = None
 
-    async def hire(self) -> None:
-        self.hired += 1
+    async def start(self) -> None:
+        self.started += 1
 
     async def run(self, claim: Claim) -> None:
         await asyncio.to_thread(self._do, claim)
@@ -63,7 +63,8 @@ def working(database: Database, monkeypatch: pytest.MonkeyPatch) -> Callable[...
                 "shutdown_seconds": 5.0,
             }
             all_of_them = [
-                JobRunner(database, [ThreadLane(do) for _ in range(workers)], **given | options) for _ in range(runners)
+                JobRunner(database, [ThreadExecutor(do) for _ in range(workers)], **given | options)
+                for _ in range(runners)
             ]
             for runner in all_of_them:
                 await runner.start()
@@ -231,7 +232,7 @@ def test_jobs_of_a_runner_that_is_silent_are_done_by_another_one(
 
     working(do, until_finished(database, queued))
     assert sorted(done) == sorted(queued)
-    assert set(done[-2:]) == {lost.job_id for lost in dead}  # each in a lane, at once
+    assert set(done[-2:]) == {lost.job_id for lost in dead}  # each in an executor, at once
     assert {get(database, job_id).deaths for job_id in queued} == {0}
 
 
@@ -282,7 +283,7 @@ def test_a_job_that_does_not_end_in_time_is_left_to_others_by_a_stopping_runner(
     assert {get(database, job_id).deaths for job_id in queued} == {0}
 
 
-def test_a_lane_outlives_what_a_job_throws_at_it(
+def test_an_executor_outlives_what_a_job_throws_at_it(
     database: Database, queued: list[str], working: Callable[..., None]
 ) -> None:
     def do(claim: Claim) -> None:
@@ -325,30 +326,30 @@ def test_a_job_that_lost_its_worker_does_not_wait_for_the_next_one(
     database: Database, queued: list[str], working: Callable[..., None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A Dask scheduler may be away for long."""
-    lost: list[ThreadLane] = []
+    lost: list[ThreadExecutor] = []
 
-    async def hire(lane: ThreadLane) -> None:
-        while lane in lost:
+    async def start(executor: ThreadExecutor) -> None:
+        while executor in lost:
             await asyncio.sleep(0.01)
 
-    async def run(lane: ThreadLane, claim: Claim) -> None:
+    async def run(executor: ThreadExecutor, claim: Claim) -> None:
         if not lost:
-            lost.append(lane)
+            lost.append(executor)
             raise WorkerDied
         await asyncio.to_thread(finish, database, claim)
 
-    monkeypatch.setattr(ThreadLane, "hire", hire)
-    monkeypatch.setattr(ThreadLane, "run", run)
+    monkeypatch.setattr(ThreadExecutor, "start", start)
+    monkeypatch.setattr(ThreadExecutor, "run", run)
     working(finish, until_finished(database, queued), lease_seconds=10.0)
     assert sorted(get(database, job_id).deaths for job_id in queued) == [0, 0, 0, 1]
 
 
-class HeldLanes:
-    """Long jobs that hold their lane until they may end, and short ones that end at once; one lane more for these."""
+class HeldExecutors:
+    """Long jobs that hold their executor until they may end; short ones, which end at once, have one more."""
 
     def __init__(self, database: Database) -> None:
         self.database, self.begun, self.may_end = database, set[str](), Event()
-        self.short_lane = ThreadLane(self.do)
+        self.short_executor = ThreadExecutor(self.do)
         with database.write() as session:
             self.material_id = materials.create(session, "paper", "").id
 
@@ -367,12 +368,12 @@ class HeldLanes:
 
 
 @pytest.fixture
-def held(database: Database) -> HeldLanes:
-    return HeldLanes(database)
+def held(database: Database) -> HeldExecutors:
+    return HeldExecutors(database)
 
 
-def test_short_jobs_do_not_wait_for_long_ones_that_hold_all_lanes(
-    held: HeldLanes, working: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+def test_short_jobs_do_not_wait_for_long_ones_that_hold_all_executors(
+    held: HeldExecutors, working: Callable[..., None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("service.jobs.runner.IDLE_SECONDS", 0.1)
     long = [held.add(is_long=True) for _ in range(3)]
@@ -381,18 +382,20 @@ def test_short_jobs_do_not_wait_for_long_ones_that_hold_all_lanes(
         wait_until(lambda: len(held.begun) == 2)
         for _ in range(2):  # a worker that was idle ends, and there is another one when it is needed again
             short = [held.add(is_long=False) for _ in range(3)]
-            closed = held.short_lane.closed
+            closed = held.short_executor.closed
             held.until_done(*short)
-            wait_until(lambda closed=closed: held.short_lane.closed > closed)  # type: ignore[misc]
+            wait_until(lambda closed=closed: held.short_executor.closed > closed)  # type: ignore[misc]
         assert held.begun & set(long) == set(long[:2])
         held.may_end.set()
         held.until_done(*long)
 
-    working(held.do, meanwhile, short_lane=held.short_lane)
-    assert held.short_lane.hired == 2
+    working(held.do, meanwhile, short_executor=held.short_executor)
+    assert held.short_executor.started == 2
 
 
-def test_no_worker_is_hired_for_short_jobs_that_have_a_lane(held: HeldLanes, working: Callable[..., None]) -> None:
+def test_no_worker_is_started_for_short_jobs_with_an_executor(
+    held: HeldExecutors, working: Callable[..., None]
+) -> None:
     long = held.add(is_long=True)
 
     def meanwhile(_: JobRunner) -> None:
@@ -400,12 +403,12 @@ def test_no_worker_is_hired_for_short_jobs_that_have_a_lane(held: HeldLanes, wor
         held.may_end.set()
         held.until_done(long, held.add(is_long=True))
 
-    working(held.do, meanwhile, short_lane=held.short_lane)
-    assert held.short_lane.hired == 0
+    working(held.do, meanwhile, short_executor=held.short_executor)
+    assert held.short_executor.started == 0
 
 
-def test_short_jobs_that_were_there_first_are_begun_when_a_long_one_takes_the_lane(
-    held: HeldLanes, working: Callable[..., None]
+def test_short_jobs_that_were_there_first_are_begun_when_a_long_one_takes_the_executor(
+    held: HeldExecutors, working: Callable[..., None]
 ) -> None:
     long, short = held.add(is_long=True), held.add(is_long=False)
 
@@ -414,5 +417,5 @@ def test_short_jobs_that_were_there_first_are_begun_when_a_long_one_takes_the_la
         held.may_end.set()
         held.until_done(long)
 
-    working(held.do, meanwhile, workers=1, short_lane=held.short_lane, poll_seconds=60.0, lease_seconds=600.0)
-    assert held.short_lane.hired == 1
+    working(held.do, meanwhile, workers=1, short_executor=held.short_executor, poll_seconds=60.0, lease_seconds=600.0)
+    assert held.short_executor.started == 1

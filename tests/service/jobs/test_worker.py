@@ -9,7 +9,7 @@ from db.errors import StorageUnavailable
 from db.records import Claim
 from db.repositories import jobs, materials
 from service.jobs import pipeline, worker
-from service.jobs.worker import Place
+from service.jobs.worker import StoreConfig
 
 
 @pytest.fixture
@@ -21,8 +21,8 @@ def mine(database: Database, claim: Callable[[], Claim]) -> Claim:
 
 
 def run(database: Database, tmp_path: Path, claim: Claim) -> None:
-    place = Place(database.url, tmp_path)
-    worker.run_job(place, claim)
+    config = StoreConfig(database.url, tmp_path)
+    worker.run_job(config, claim)
 
 
 def test_a_defect_ends_the_job_with_its_name(

@@ -1,4 +1,4 @@
-"""A lane on the workers of a Dask cluster: the same jobs, on other machines.
+"""An executor on the workers of a Dask cluster: the same jobs, on other machines.
 
 The client lives in the event loop of the server. One of its own thread would be asked from here, and where it waits for
 a scheduler that is gone, so would the server.
@@ -14,8 +14,8 @@ from distributed import Client, KilledWorker
 
 from db.records import Claim
 from service.jobs import worker
-from service.jobs.lane import RETRY_SECONDS, WorkerDied
-from service.jobs.worker import Place
+from service.jobs.executor import RETRY_SECONDS, WorkerDied
+from service.jobs.worker import StoreConfig
 
 logger = logging.getLogger(__name__)
 
@@ -23,19 +23,19 @@ CONNECT_SECONDS = 5.0
 """s that the scheduler may take to answer, and to say goodbye."""
 
 
-class DaskLane:
+class DaskExecutor:
     """One job at a time on whichever worker the scheduler chooses. The workers see the same database and folder.
 
     A job whose worker dies is done by another one as long as the scheduler puts up with it. A worker that lost touch
     and goes on stores the same, or nothing once the job has ended.
     """
 
-    def __init__(self, place: Place, address: str) -> None:
-        self._place, self._address = place, address
+    def __init__(self, config: StoreConfig, address: str) -> None:
+        self._config, self._address = config, address
         self._client: Any = None
         self.missing: str | None = None
 
-    async def hire(self) -> None:
+    async def start(self) -> None:
         """Wait for the scheduler, and for one of its workers to be warm."""
         while True:
             try:
@@ -52,7 +52,7 @@ class DaskLane:
 
     async def run(self, claim: Claim) -> None:
         """Do one job; raises ``WorkerDied`` where worker after worker died under it, or the scheduler did."""
-        await self._do(worker.run_job, self._place, claim)
+        await self._do(worker.run_job, self._config, claim)
 
     def kill(self) -> None:
         """Nothing: a worker of the cluster has other work, and without its claim the job stores nothing."""

@@ -1,4 +1,4 @@
-"""A lane: where one job at a time is done, and how that may end."""
+"""An executor: where one job at a time is done, and how that may end."""
 
 from typing import Protocol
 
@@ -16,7 +16,7 @@ class LimitReached(WorkerDied):
     """The worker process was ended, for its job took more than it may; the message says what."""
 
 
-class Lane(Protocol):
+class JobExecutor(Protocol):
     """One job at a time.
 
     ``missing``: what it waits for before it can do jobs, where that is not just a process's start.
@@ -24,7 +24,7 @@ class Lane(Protocol):
 
     missing: str | None
 
-    async def hire(self) -> None:
+    async def start(self) -> None:
         """Make sure that there is a worker and that it is warm."""
 
     async def run(self, claim: Claim) -> None:

@@ -19,8 +19,8 @@ from db.database import Database
 from db.errors import DriverMissing
 from db.repositories import jobs
 from service.jobs import campaign
-from service.jobs.lanes import lanes
-from service.jobs.worker import Place
+from service.jobs.executors import executors
+from service.jobs.worker import StoreConfig
 from service.settings import Settings
 from slipcore.contact import Scene
 from slipcore.errors import InvalidInput
@@ -147,7 +147,7 @@ def test_a_campaign_names_a_scheduler_that_is_not_there(cluster: Cluster, monkey
 def test_a_scheduler_that_is_not_there_is_named_and_holds_no_stop_up(
     cluster: Cluster, settings: Settings, serving: Serving, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("service.jobs.dask_lane.CONNECT_SECONDS", 0.5)
+    monkeypatch.setattr("service.jobs.dask_executor.CONNECT_SECONDS", 0.5)
     with ExitStack() as running:
         client = running.enter_context(serving(settings.model_copy(update={"shutdown_seconds": 60.0})))
         wait_until(lambda: f"{cluster.address} does not answer" in client.get("/readyz").json()["detail"])
@@ -158,8 +158,8 @@ def test_a_scheduler_that_is_not_there_is_named_and_holds_no_stop_up(
 
 def test_without_its_library_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
-    monkeypatch.delitem(sys.modules, "service.jobs.dask_lane", raising=False)
+    monkeypatch.delitem(sys.modules, "service.jobs.dask_executor", raising=False)
     with pytest.raises(DriverMissing, match=r"Dask cluster is tcp://a:1, .* \(stiction\[dask\] brings one\)"):
-        lanes(Place("sqlite:///x", tmp_path), 1, "tcp://a:1", 300.0)
+        executors(StoreConfig("sqlite:///x", tmp_path), 1, "tcp://a:1", 300.0)
     with pytest.raises(DriverMissing, match=r"Dask cluster is tcp://a:1, "), campaign.workers(1, "tcp://a:1"):
         pass

@@ -6,21 +6,21 @@ from pathlib import Path
 import pytest
 
 from service.jobs import worker
-from service.jobs.process_lane import ProcessLane
-from service.jobs.worker import Place
+from service.jobs.process_executor import ProcessExecutor
+from service.jobs.worker import StoreConfig
 
 
 def test_a_worker_that_still_warms_up_holds_no_stop_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(worker, "warm_up", partial(time.sleep, 600.0))
 
     async def stop() -> float:
-        lane = ProcessLane(Place("sqlite:///x", tmp_path), 300.0)
-        hiring = asyncio.create_task(lane.hire())
+        executor = ProcessExecutor(StoreConfig("sqlite:///x", tmp_path), 300.0)
+        starting = asyncio.create_task(executor.start())
         await asyncio.sleep(2.0)  # by now the process sleeps, or starts still
         began = time.monotonic()
-        hiring.cancel()
-        await asyncio.wait([hiring])
-        await lane.close()
+        starting.cancel()
+        await asyncio.wait([starting])
+        await executor.close()
         return time.monotonic() - began
 
     assert asyncio.run(stop()) < 60.0  # not 600 s

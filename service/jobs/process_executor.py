@@ -1,4 +1,4 @@
-"""A lane of this machine: a worker process, behind the executor interface of ``concurrent.futures``."""
+"""An executor of this machine: a worker process, behind the executor interface of ``concurrent.futures``."""
 
 import asyncio
 import logging
@@ -7,8 +7,8 @@ from concurrent.futures.process import BrokenProcessPool
 
 from db.records import Claim
 from service.jobs import worker
-from service.jobs.lane import RETRY_SECONDS, LimitReached, WorkerDied
-from service.jobs.worker import Place
+from service.jobs.executor import RETRY_SECONDS, LimitReached, WorkerDied
+from service.jobs.worker import StoreConfig
 from service.processes import limits, spawned
 
 logger = logging.getLogger(__name__)
@@ -17,23 +17,23 @@ WATCH_SECONDS = 0.2
 """s between two looks at what a job has taken."""
 
 
-class ProcessLane:
+class ProcessExecutor:
     """A worker process of its own on this machine; a job may take so many ``cpu_seconds`` of it."""
 
-    def __init__(self, place: Place, cpu_seconds: float) -> None:
-        self._place, self._cpu_seconds = place, cpu_seconds
-        self._executor: Executor | None = None
+    def __init__(self, config: StoreConfig, cpu_seconds: float) -> None:
+        self._config, self._cpu_seconds = config, cpu_seconds
+        self._pool: Executor | None = None
         self.missing: str | None = None
 
-    async def hire(self) -> None:
-        """Start a worker process and warm it up, in place of the one before; only then it gives way, for jobs wait."""
+    async def start(self) -> None:
+        """Start a worker process and warm it up, in place of the one before; its priority is lowered after that."""
         run = asyncio.get_running_loop().run_in_executor
         while True:
             await self.close()
-            self._executor = spawned.process()
+            self._pool = spawned.process()
             try:
-                await run(self._executor, worker.warm_up)
-                await run(self._executor, spawned.give_way)
+                await run(self._pool, worker.warm_up)
+                await run(self._pool, spawned.lower_priority)
             except asyncio.CancelledError:  # nobody waits for what it compiles
                 self.kill()
                 raise
@@ -48,7 +48,7 @@ class ProcessLane:
         watching = asyncio.create_task(self._end_at_limit())
         died: BrokenProcessPool | None = None
         try:
-            await asyncio.get_running_loop().run_in_executor(self._executor, worker.run_job, self._place, claim)
+            await asyncio.get_running_loop().run_in_executor(self._pool, worker.run_job, self._config, claim)
         except BrokenProcessPool as error:
             died = error
         finally:
@@ -61,7 +61,7 @@ class ProcessLane:
 
     async def _end_at_limit(self) -> None:
         """End the worker process once it has taken the CPU time that a job may."""
-        worker_id = spawned.process_id(self._executor)
+        worker_id = spawned.process_id(self._pool)
         begin = limits.cpu_seconds(worker_id) if worker_id is not None else None
         while True:
             await asyncio.sleep(WATCH_SECONDS)
@@ -72,10 +72,10 @@ class ProcessLane:
 
     def kill(self) -> None:
         """End the worker process at once."""
-        spawned.kill(self._executor)
+        spawned.kill(self._pool)
 
     async def close(self) -> None:
         """Let the worker process go once it has nothing to do."""
-        if self._executor is not None:
-            executor, self._executor = self._executor, None
-            await asyncio.to_thread(executor.shutdown, cancel_futures=True)
+        if self._pool is not None:
+            pool, self._pool = self._pool, None
+            await asyncio.to_thread(pool.shutdown, cancel_futures=True)
