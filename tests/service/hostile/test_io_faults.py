@@ -142,9 +142,18 @@ def test_a_job_stores_its_results_once_and_whole(
         after = caller.get(f"/v1/jobs/{log['job']['id']}").json()
         assert (after["status"], after["reason"]) == ("done", None), layer.fired
         with database.read() as session:
-            models = session.scalar(select(func.count()).where(FrictionModelRow.job_id == claimed.job_id))
-            current = session.scalar(select(func.count()).where(FrictionModelRow.current))
-        assert (models, current) == (1, 1), layer.fired
+            stored = session.execute(
+                select(FrictionModelRow.method, func.count())
+                .where(FrictionModelRow.job_id == claimed.job_id)
+                .group_by(FrictionModelRow.method)
+            ).all()
+            current = session.execute(
+                select(FrictionModelRow.method, func.count())
+                .where(FrictionModelRow.current)
+                .group_by(FrictionModelRow.method)
+            ).all()
+        assert stored, layer.fired
+        assert set(stored) == set(current) == {(method, 1) for method, _ in stored}, layer.fired
 
 
 def rows(database: Database) -> dict[str, list[Any]]:
