@@ -116,18 +116,26 @@ def rescaled(design: FloatArray, response: FloatArray, start: Plane) -> Plane:
     that trusts it takes the nearer outliers for good samples. A tighter loss finds the scale of the rest, by itself no
     smaller than what half of the samples could have been inflated by.
     """
+    least = _least_scale(response)
     loss, plane = Loss(*(partial(rule, c=NEAR) for rule in (_tukey_weight, _tukey_slope))), start
     consistent = normal_square(loss)
     for _ in range(ITERATIONS):
-        u = (response - design @ plane.coefficients) / max(plane.scale, np.finfo(float).tiny)
+        known = max(plane.scale, least)
+        u = (response - design @ plane.coefficients) / known
         weight = loss.weight(u)
         half = np.sqrt(weight)
-        scale = plane.scale * float(np.sqrt(np.average(u**2, weights=weight) / consistent))
+        scale = known * float(np.sqrt(np.average(u**2, weights=weight) / consistent))
         moved = Plane(_least_squares(design * half[:, None], response * half), max(scale, start.scale / INFLATED))
         if abs(moved.scale - plane.scale) <= 1e-3 * plane.scale:
             return moved
         plane = moved
     return plane
+
+
+def _least_scale(response: FloatArray) -> float:
+    """Below it a scale is rounding: most samples may lie on the plane to the last digit, or all have one friction."""
+    size = np.abs(response[response != 0.0])
+    return max(1e-12 * float(np.median(size)), np.finfo(float).tiny) if size.size else np.finfo(float).tiny
 
 
 def _concentrate(design: FloatArray, response: FloatArray, coefficients: FloatArray) -> Plane:
@@ -153,7 +161,7 @@ def _m_step(
 ) -> tuple[Plane, FloatArray, bool]:
     """Iteratively reweighted least squares from the start, its scale kept; the weights [n], and whether it settled."""
     coefficients = start.coefficients
-    scale = max(start.scale, 1e-12 * float(np.median(np.abs(residual / root))), np.finfo(float).tiny)
+    scale = max(start.scale, _least_scale(residual / root))
     for _ in range(ITERATIONS):
         weight = loss.weight((residual - design @ coefficients) / root / scale)
         half = np.sqrt(weight)

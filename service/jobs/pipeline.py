@@ -197,8 +197,22 @@ def _fit(run: Run, parts: Sequence[SamplesOfLog]) -> list[FrictionModel]:
     if not parts:
         raise Refused("no grasp log of this material has friction samples yet")
     if run.job.kind == "ingest":
-        return [_fit_by(run, parts, method, SAMPLED_AT_INGEST) for method in INGEST_METHODS]
+        return _all_that_fit(run, parts)
     return [_fit_by(run, parts, run.job.method, len(parts))]
+
+
+def _all_that_fit(run: Run, parts: Sequence[SamplesOfLog]) -> list[FrictionModel]:
+    """The models of an ingest; what one method cannot fit another may. Raises what was wrong where none can."""
+    models, refusals = list[FrictionModel](), list[EstimatorError]()
+    for method in INGEST_METHODS:
+        try:
+            models.append(_fit_by(run, parts, method, SAMPLED_AT_INGEST))
+        except EstimatorError as refusal:
+            logger.info("no %s fit: %s", method, refusal)
+            refusals.append(refusal)
+    if not models:
+        raise refusals[0]
+    return models
 
 
 def _fit_by(run: Run, parts: Sequence[SamplesOfLog], method: str, most_sampled: int) -> FrictionModel:

@@ -44,6 +44,10 @@ def hard(samples: Make, case: str) -> FrictionSamples | list[FrictionSamples]:
         "coefficients of 1e8": lambda: samples(100, coefficients=1e8 * truth, scale=2e6),
         "coefficients of 1e-8": lambda: samples(100, coefficients=1e-8 * truth, scale=2e-10),
         "no residual": lambda: samples(100, scale=0.0),
+        "most to the last digit alike": lambda: replace(
+            samples(24, normal_force=np.repeat([0.02, 0.05], 12)),
+            friction_coefficient=0.4 - 1e-5 * (np.arange(24) % 5 == 0) * np.arange(24),
+        ),
         "no friction": lambda: samples(100, coefficients=np.zeros(3), scale=0.0),
         "negative friction": lambda: samples(100, coefficients=-truth),
         "one gross outlier": lambda: with_outlier(samples(100), 1e12),
@@ -72,6 +76,7 @@ CASES = [
     "coefficients of 1e8",
     "coefficients of 1e-8",
     "no residual",
+    "most to the last digit alike",
     "no friction",
     "negative friction",
     "one gross outlier",

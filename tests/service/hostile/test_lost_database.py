@@ -162,7 +162,7 @@ def test_a_full_disk_of_the_database_is_told(
     def on_a_full_disk(session: Session) -> None:
         connection = session.connection()
         connection.exec_driver_sql(f"PRAGMA max_page_count = {pages}")
-        connection.exec_driver_sql("CREATE TABLE needs_a_page (number INTEGER)")
+        connection.exec_driver_sql("CREATE TABLE needs_pages AS SELECT zeroblob(10000000)")  # more than are free
         begin(session)
 
     monkeypatch.setattr(stores, "touch", on_a_full_disk)

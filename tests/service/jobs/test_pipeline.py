@@ -1,7 +1,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from types import ModuleType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from db.errors import ClaimLost
 from db.records import Claim, Detection, Job, Material, NewGraspLog, StoredGraspLog
 from db.repositories import detections, friction_models, grasp_logs, jobs, materials, runners
 from db.tables import JobRow, SampleSummaryRow
-from estimators import Moments
+from estimators import InvalidSamples, Moments
 from service.domain.recommended import recommended
 from service.domain.stored_results import SAMPLE_ARRAYS, encode_samples, summarise_samples
 from service.jobs import pipeline
@@ -325,3 +325,17 @@ def test_a_repeated_fit_is_a_version_of_its_own(shop: Shop, content: bytes) -> N
         first, second = friction_models.versions(session, shop.material_id, "ols")[::-1]
     np.testing.assert_array_equal(first.model.coefficients, second.model.coefficients)
     assert (first.current, second.current) == (False, True)
+
+
+def test_what_one_method_cannot_fit_another_may(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fit_by(_run: Any, _parts: Any, method: str, _most_sampled: int) -> str:
+        if method in unfit:
+            raise InvalidSamples(method, "such that it fits none", "others")
+        return method
+
+    monkeypatch.setattr(pipeline, "_fit_by", fit_by)
+    unfit = {"auto"}
+    assert pipeline._all_that_fit(cast(Any, None), []) == ["ols"]
+    unfit = {"auto", "ols"}
+    with pytest.raises(InvalidSamples, match="auto"):
+        pipeline._all_that_fit(cast(Any, None), [])
