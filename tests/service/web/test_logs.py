@@ -1,11 +1,14 @@
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
 
+from slipcore import GraspLog
+from stiction_client.container import encode
 from tests.service.web.conftest import HTML
 
 ON_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -35,6 +38,18 @@ def test_a_log_that_went_all_the_way_has_a_player_with_frames(
     again = client.get(player["data-frames"], headers={"if-none-match": answer.headers["etag"]})
     assert again.status_code == 304
     assert "done" in page.text
+
+
+@ON_SQLITE
+def test_what_makes_a_log_doubtful_stands_on_its_page(
+    client: httpx.Client, ramp: GraspLog, upload: Any, wait: Any, fitted: Any, page_of: Callable[[str], Any]
+) -> None:
+    accepted = upload(client, encode(replace(ramp, time=1e3 * ramp.time))).json()
+    wait(client, accepted["job"]["id"])
+    told = page_of(f"/logs/{accepted['id']}").text
+    assert "slow frames" in told
+    assert "not ms" in told
+    assert "doubtful" not in page_of(f"/logs/{fitted['id']}").text
 
 
 @ON_SQLITE
