@@ -10,9 +10,10 @@ from fastapi.responses import RedirectResponse
 from service.http import origin, sessions
 from service.http.dependencies import Given
 from service.http.gate import Admission
+from service.web.forms import FormRoute
 from service.web.rendering import on_problem, render
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(include_in_schema=False, route_class=FormRoute)
 
 SEE_OTHER = 303
 

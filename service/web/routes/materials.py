@@ -17,11 +17,11 @@ from service.http.paging import CursorText, Page
 from service.http.schemas.common import Force, Velocity
 from service.http.schemas.materials import NewMaterial
 from service.http.schemas.models import ModelMethod
-from service.web.forms import EMPTY_IS_NONE, checked
+from service.web.forms import EMPTY_IS_NONE, FormRoute, checked
 from service.web.friction import coefficients, friction_at, listed, sections, usual_model
 from service.web.rendering import render
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(include_in_schema=False, route_class=FormRoute)
 
 ON_A_PAGE = 50
 LOGS_ON_A_PAGE = 25

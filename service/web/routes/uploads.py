@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
+from db.blobs import disk_errors_named
 from db.errors import AlreadyExists
 from service import formats
 from service.context import Context
@@ -61,13 +62,17 @@ async def receive_upload(context: Given, request: Request, asker: Asking) -> Res
     """Store the file with its job, and lead to the log; raises as the API's route does."""
     on_problem(request, "upload.html", **await run_in_threadpool(_form, context, {}))
     most = context.settings.max_upload_bytes + BESIDE_THE_FILE
-    async with Request(request.scope, limited(request.receive, most)).form(max_files=1, max_fields=len(FIELDS)) as form:
+    with disk_errors_named():  # the form's file is written to the system's temporary folder first
+        form = await Request(request.scope, limited(request.receive, most)).form(max_files=1, max_fields=len(FIELDS))
+    try:
         fields = {name: text.strip() for name in FIELDS if isinstance(text := form.get(name), str)}
         on_problem(request, "upload.html", **await run_in_threadpool(_form, context, fields))
         file, wanted = _file(form), checked(NewUpload, fields)
         if wanted.create and wanted.material is not None:
             await run_in_threadpool(_make_known, context, wanted.material, asker)
         stored = await upload(context, _chunks(file), _asked(wanted, file, asker))
+    finally:
+        await form.close()
     return RedirectResponse(f"/logs/{stored.log.id}", 303)
 
 

@@ -1,3 +1,4 @@
+import errno
 import json
 import re
 from collections.abc import Callable
@@ -6,6 +7,7 @@ from typing import Any
 
 import httpx
 import pytest
+from starlette.datastructures import UploadFile
 
 from service.http.problem_meanings import MEANINGS
 from service.http.problems import PROBLEM_TYPES
@@ -136,3 +138,25 @@ def test_the_pages_of_problems_say_what_the_documentation_says() -> None:
 def test_a_problem_names_an_address_that_is_there(browser: Any) -> None:
     told = json.loads(browser.get("/v1/materials/nobody").text)
     assert browser.get(told["type"]).status_code == 200
+
+
+@pytest.mark.parametrize("path", ["/login", "/materials"])
+@pytest.mark.parametrize("parts", [1, 40], ids=["one file", "many files"])
+def test_a_form_without_a_file_is_not_read_beyond_its_bound(browser: Any, path: str, parts: int) -> None:
+    """Whoever sends it: it is parsed before anybody is asked for a key."""
+    sent = 2_000_000 // parts
+    files = [("file", (f"{part}.bin", b"x" * sent)) for part in range(parts)]
+    answer = browser.request("POST", path, files=files, headers={"Sec-Fetch-Site": "same-origin"})
+    assert answer.status_code == 413
+
+
+def test_a_form_whose_file_cannot_be_written_is_no_error_of_the_service(
+    browser: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def write(_: UploadFile, __: bytes) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(UploadFile, "write", write)
+    files = {"file": ("log.npz", b"x" * 100)}
+    answer = browser.request("POST", "/upload", files=files, headers={"Sec-Fetch-Site": "same-origin"})
+    assert answer.status_code == 503
