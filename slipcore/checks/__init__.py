@@ -44,7 +44,8 @@ def check_log(
     limits = choose_options(CheckOptions, options)
     forces = None if log.force is None else element_forces(log.force, normals_of(log))
     pressing = np.zeros(log.displacement.shape[:3]) if forces is None else np.maximum(forces.pressing, 0.0)
-    subject = Subject(log, history, forces, pressing, samples or _samples(log, history), limits)
+    samples = _samples(log, history) if samples is None else samples
+    subject = Subject(log, history, forces, pressing, samples, limits)
     return [finding for check in CHECKS for finding in check(subject)]
 
 

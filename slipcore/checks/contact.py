@@ -12,12 +12,12 @@ def load_free_tangential_force(seen: Subject) -> Iterator[Finding]:
     """Crosstalk, or wrong normals: elements feel what the whole contact does not."""
     if seen.forces is None or not seen.held.any():
         return
-    load = _load_ratio(seen)
-    free = seen.held & (load < seen.limits.no_load)
+    held = seen.held
+    free = _load_ratio(seen) < seen.limits.no_load
     if not free.any():
         return
-    sideways = (seen.forces.tangential * seen.forces.compressive).sum(axis=(1, 2))
-    ratio = float(np.median(sideways[free] / seen.total[free]))
+    sideways = (seen.forces.tangential * seen.forces.compressive)[held].sum(axis=(1, 2))
+    ratio = float(np.median((sideways / seen.total[held])[free]))
     if ratio > seen.limits.sideways_share:
         evidence = f"elements feel {ratio:.2f} of the normal force sideways while the whole contact feels none"
         remedy = "calibrate normals and crosstalk by a pure press; single elements' f_t/f_n are not friction here"
@@ -25,17 +25,20 @@ def load_free_tangential_force(seen: Subject) -> Iterator[Finding]:
 
 
 def _load_ratio(seen: Subject) -> FloatArray:
-    """|ΣF_t|/F_n and |M_z|/Σ(r f_n) together, [t]: 0 without load, about μ where all slips."""
+    """|ΣF_t|/F_n and |M_z|/Σ(r f_n) together, of the frames that are held: 0 without load, about μ where all slips.
+
+    Of a contact of one element, which carries no moment by tangential forces, the force alone.
+    """
     assert seen.log.force is not None
-    weight = seen.pressing / np.maximum(seen.total, np.finfo(float).tiny)[:, None, None]
-    centre = np.einsum("tnm,nmi->ti", weight, seen.log.position[..., :2])
+    held, pressing, total = seen.held, seen.pressing[seen.held], seen.total[seen.held]
+    centre = np.einsum("tnm,nmi->ti", pressing / total[:, None, None], seen.log.position[..., :2])
     arm = seen.log.position[None, ..., :2] - centre[:, None, None]
-    along = seen.log.force[..., :2]
+    along = seen.log.force[held][..., :2]
     moment = (arm[..., 0] * along[..., 1] - arm[..., 1] * along[..., 0]).sum(axis=(1, 2))
-    limit = (np.hypot(arm[..., 0], arm[..., 1]) * seen.pressing).sum(axis=(1, 2))
+    limit = (np.hypot(arm[..., 0], arm[..., 1]) * pressing).sum(axis=(1, 2))
+    turning = np.divide(moment, limit, out=np.zeros_like(moment), where=(pressing > 0.0).sum(axis=(1, 2)) > 1)
     force = np.hypot(*along.sum(axis=(1, 2)).T)
-    tiny = np.finfo(float).tiny
-    return np.asarray(np.hypot(force / np.maximum(seen.total, tiny), moment / np.maximum(limit, tiny)))
+    return np.asarray(np.hypot(force / total, turning))
 
 
 def moving_contact(seen: Subject) -> Iterator[Finding]:

@@ -11,7 +11,7 @@ LEAST_OF_A_PLACE, LEAST_PLACES = 5, 4
 
 
 def friction_by_force(seen: Subject) -> Iterator[Finding]:
-    """Friction that depends on the element's force more than any law does."""
+    """Friction that depends on the element's force more than it would by a law within one contact."""
     samples = seen.samples
     if samples is None or len(samples) < seen.limits.least_samples:
         return
@@ -40,7 +40,7 @@ def friction_by_place(seen: Subject) -> Iterator[Finding]:
         return
     noise = within[enough] / (count[enough] - 1) / count[enough]
     between = float(np.sqrt(max(np.var(mean[enough], ddof=1) - noise.mean(), 0.0)))
-    share = between / float(np.mean(friction))
-    if share > seen.limits.place_scatter:
-        evidence = f"friction differs by {share:.0%} from element to element, and stays so"
+    middle = float(np.mean(friction))
+    if between > seen.limits.place_scatter * middle > 0.0:
+        evidence = f"friction differs by {between / middle:.0%} from element to element, and stays so"
         yield Finding("friction differs by place", evidence, "calibrate the sensor's elements, or clean its surface")

@@ -6,6 +6,9 @@ import numpy as np
 
 from slipcore.checks.subject import Finding, Subject
 
+SYMMETRIC = 4
+"""Elements that may share the largest reading where nothing but symmetry makes them alike."""
+
 
 def time_unit(seen: Subject) -> Iterator[Finding]:
     """Frames too far apart for slip."""
@@ -60,10 +63,11 @@ def saturation(seen: Subject) -> Iterator[Finding]:
     for name, field in (("displacement", seen.log.displacement), ("force", seen.log.force)):
         if field is None or not field.any():
             continue
-        size = np.abs(field).max(axis=-1)[seen.history.contact]
-        share = float(np.mean(size == size.max(initial=0.0))) if size.size else 0.0
-        if share > seen.limits.saturated_share:
-            evidence = f"{share:.1%} of the readings in contact have the largest {name}, to the last digit"
+        size, contact = np.abs(field).max(axis=-1), seen.history.contact
+        at_most = ((size == size.max(where=contact, initial=0.0)) & contact).any(axis=0)
+        ended, touched = int(np.count_nonzero(at_most)), int(np.count_nonzero(contact.any(axis=0)))
+        if ended > max(SYMMETRIC, seen.limits.saturated_share * touched):
+            evidence = f"{ended} of the {touched} elements that touch reach the largest {name}, to the last digit"
             yield Finding("saturation", evidence, "press less, or choose a wider range of the sensor")
 
 

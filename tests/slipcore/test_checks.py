@@ -139,6 +139,29 @@ def test_of_real_recordings_it_is_said_why_their_friction_is_wrong(recording: Gr
     assert found & {"sideways force without load", "contact travels"}
 
 
+def test_a_hold_of_few_rounded_readings_is_no_saturation(long_ramp: GraspLog) -> None:
+    middle = np.s_[:, 9:11, 9:11]
+    assert long_ramp.force is not None
+    small = replace(
+        long_ramp,
+        position=long_ramp.position[middle[1:]],
+        displacement=np.round(0.1 * long_ramp.displacement[middle], 6),
+        force=np.round(long_ramp.force[middle], 2),
+        normal=None if long_ramp.normal is None else long_ramp.normal[middle],
+    )
+    assert "saturation" not in names(small)
+
+
+def test_a_log_without_any_tangential_force_is_looked_through(long_ramp: GraspLog) -> None:
+    assert names(with_force(long_ramp, np.asarray(long_ramp.force) * [0.0, 0.0, 1.0])) <= {"force too large"}
+
+
+def test_frames_that_pull_among_others_that_press_are_looked_through(long_ramp: GraspLog) -> None:
+    force = np.asarray(long_ramp.force).copy()
+    force[:10] = [0.1, 0.0, 1e-3]
+    assert "force pulls" not in names(with_force(long_ramp, force))
+
+
 def test_a_limit_can_be_moved_and_a_wrong_one_is_refused(long_ramp: GraspLog) -> None:
     assert "slow frames" in names(long_ramp, longest_interval=0.01)
     with pytest.raises(InvalidInput, match="place_scatter"):
