@@ -90,6 +90,10 @@ class FrictionClient:
         """A grasp log by its id, with what was detected."""
         return self._run(flows.grasp_log(id))
 
+    def grasp_logs(self, material: str | None = None, limit: int = 100) -> list[GraspLogReceipt]:
+        """The newest logs, newest first: of one ``material``, or all."""
+        return self._run(flows.grasp_logs(material, limit))
+
     def create_material(self, name: str, description: str = "") -> Material:
         """Create a material; ``ProblemError`` of type "/problems/material-exists" where it is there."""
         return self._run(flows.create_material(name, description))
@@ -252,6 +256,10 @@ class AsyncFrictionClient:
     async def grasp_log(self, id: str) -> GraspLogReceipt:  # noqa: A002 - the API's own name
         """As ``FrictionClient.grasp_log``."""
         return await self._run(flows.grasp_log(id))
+
+    async def grasp_logs(self, material: str | None = None, limit: int = 100) -> list[GraspLogReceipt]:
+        """As ``FrictionClient.grasp_logs``."""
+        return await self._run(flows.grasp_logs(material, limit))
 
     async def create_material(self, name: str, description: str = "") -> Material:
         """As ``FrictionClient.create_material``."""

@@ -138,6 +138,12 @@ def grasp_log(log_id: str) -> Flow[GraspLogReceipt]:
     return _record(GraspLogReceipt.from_json, (yield from _get(f"/v1/grasp-logs/{_part(log_id)}")))
 
 
+def grasp_logs(material: str | None, limit: int) -> Flow[list[GraspLogReceipt]]:
+    """Ask for the newest logs."""
+    answer = yield from _get("/v1/grasp-logs", _given(material=material, limit=limit))
+    return _record(lambda record: [GraspLogReceipt.from_json(item) for item in record["items"]], answer)
+
+
 def create_material(name: str, description: str) -> Flow[Material]:
     """Create a material."""
     body = {"name": name, "description": description}

@@ -2,10 +2,12 @@
 
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Annotated
 
 import typer
 
-from service.cli import audit, blobs, database, jobs, keys, local, owners, remote, running, simulation
+from service.cli import audit, blobs, database, jobs, keys, local, logs, materials, owners, remote, running, simulation
 from service.cli.exit_codes import exit_code, message
 
 app = typer.Typer(
@@ -15,8 +17,24 @@ app = typer.Typer(
     "5 no force holds the load. More: docs/cli.md.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    add_completion=False,
 )
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"stiction {version('stiction')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _about(
+    show_version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and leave.")
+    ] = False,
+) -> None:
+    """Without a docstring of its own: the help is the application's."""
+
+
 for command in (
     running.demo,
     running.serve,
@@ -33,6 +51,8 @@ for command in (
     audit.audit,
 ):
     app.command()(command)
+app.add_typer(materials.app, name="materials")
+app.add_typer(logs.app, name="logs")
 app.add_typer(jobs.app, name="jobs")
 app.add_typer(owners.app, name="owners")
 app.add_typer(database.app, name="db")

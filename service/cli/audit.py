@@ -2,12 +2,12 @@
 
 from dataclasses import asdict
 from json import dumps
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from service.cli.output import print_json, print_table
-from service.cli.remote import DEFAULT_URL, Json, Key, Url
+from service.cli.output import print_json, print_table, when
+from service.cli.remote import DEFAULT_URL, Json, Key, Url, connected
 
 COLUMNS = ("at", "actor", "address", "action", "subject", "details")
 
@@ -22,12 +22,19 @@ def audit(
     json: Json = False,
 ) -> None:
     """Show who changed what in a service, when, and from where: the newest first."""
-    from stiction_client import FrictionClient
-
-    with FrictionClient(url, key=key) as client:
+    with connected(url, key) as client:
         found = [asdict(entry) for entry in client.audit(actor, action, subject, limit)]
     if json:
         print_json({"entries": found})
     else:
-        shown = [entry | {"details": dumps(entry["details"], ensure_ascii=False)} for entry in found]
-        print_table("Audit trail", COLUMNS, [[entry[name] or "" for name in COLUMNS] for entry in shown])
+        for entry in found:
+            entry |= {"at": when(entry["at"]), "details": _details(entry["details"])}
+        print_table("Audit trail", COLUMNS, [[entry[name] for name in COLUMNS] for entry in found])
+
+
+def _details(told: dict[str, Any]) -> str:
+    """What an entry says beside its names: without what is empty, and a hash by its beginning."""
+    shown = {
+        name: value[:12] if name == "sha256" else value for name, value in told.items() if value not in (None, "", [])
+    }
+    return ", ".join(f"{name}: {value if isinstance(value, str) else dumps(value)}" for name, value in shown.items())

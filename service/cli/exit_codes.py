@@ -12,7 +12,8 @@ def message(error: Exception) -> str:
 
     from service.settings import complaints
 
-    return complaints(error) if isinstance(error, ValidationError) else str(error)
+    said = complaints(error) if isinstance(error, ValidationError) else str(error)
+    return "\n".join([said, *getattr(error, "__notes__", ())])
 
 
 def exit_code(error: Exception) -> int | None:

@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from service.cli.output import print_json, print_table
-from service.cli.remote import DEFAULT_URL, Json, Key, Url
+from service.cli.output import print_json, print_table, when
+from service.cli.remote import DEFAULT_URL, Json, Key, Url, connected
 
 app = typer.Typer(help="Look at the jobs of a service, and cancel them.", no_args_is_help=True)
 COLUMNS = ("id", "kind", "status", "stage", "material", "reason", "created_at")
@@ -23,14 +23,14 @@ def list_jobs(
     json: Json = False,
 ) -> None:
     """List the newest jobs, with the reason of those that ended badly."""
-    from stiction_client import FrictionClient
-
-    with FrictionClient(url, key=key) as client:
+    with connected(url, key) as client:
         found = [asdict(job) for job in client.jobs(status, limit)]
     if json:
         print_json({"jobs": found})
     else:
-        print_table("Jobs", COLUMNS, [["" if job[name] is None else job[name] for name in COLUMNS] for job in found])
+        for job in found:
+            job["created_at"] = when(job["created_at"])
+        print_table("Jobs", COLUMNS, [[job[name] for name in COLUMNS] for job in found])
 
 
 @app.command()
@@ -40,8 +40,6 @@ def cancel(
     key: Key = None,
 ) -> None:
     """Cancel jobs: they store nothing more."""
-    from stiction_client import FrictionClient
-
-    with FrictionClient(url, key=key) as client:
+    with connected(url, key) as client:
         for job in jobs:
             typer.echo(f"{client.cancel(job).id} is cancelled")

@@ -70,7 +70,7 @@ def list_keys(database_url: Url = None, json: Json = False) -> None:
         print_json({"keys": shown})
     else:
         columns = ("id", "name", "scope", "group", "created_at", "expires_at", "revoked_at")
-        print_table("Access keys", columns, [[key[column] or "" for column in columns] for key in shown])
+        print_table("Access keys", columns, [[key[column] for column in columns] for key in shown])
 
 
 @app.command()

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.output import print_json, print_table
+from service.cli.output import print_json, print_lines, print_table
+from service.formatting import interval, number
 
 if TYPE_CHECKING:
     from estimators import FrictionModel
@@ -64,11 +65,7 @@ def detect(
     if json:
         print_json(summary | {"time": history.time, "stick_ratio": history.stick_ratio})
     else:
-        print_table(
-            f"{log.name}: local slip by {history.method}",
-            ("", ""),
-            [(name.replace("_", " "), value) for name, value in summary.items()],
-        )
+        print_lines(f"{log.name}: local slip by {history.method}", _detection_lines(summary))
 
 
 def check(
@@ -173,12 +170,12 @@ def print_model(model: "FrictionModel", title: str) -> None:
     """Print a fitted model as a table: estimate, interval, and whether the data tell the coefficient at all."""
     names = ("β₀ [-]", "β₁ [s/m]", "β₂ [1/N]")
     rows: list[tuple[str, str, str, str]] = [
-        (name, f"{value:.5g}", f"{low:.5g} … {high:.5g}", "yes" if known else "no")
-        for name, value, (low, high), known in zip(
+        (name, number(value), interval(bounds), "yes" if known else "no")
+        for name, value, bounds, known in zip(
             names, model.coefficients, model.interval(0.95), model.identifiable, strict=True
         )
     ]
-    rows.append(("σ [-]", f"{model.scale:.5g}", "", ""))
+    rows.append(("σ [-]", number(model.scale), "", ""))
     print_table(title, ("", "estimate", "95 % interval", "identifiable"), rows)
 
 
@@ -202,3 +199,17 @@ def _detection_summary(log: "GraspLog", history: "SlipHistory", seconds: float) 
         "seconds": round(seconds, 6),
         **({} if log.is_scaled else {"unknown": "the scale: no noise, velocity or friction can be told in SI units"}),
     }
+
+
+def _detection_lines(summary: dict[str, Any]) -> list[tuple[str, str | None]]:
+    seen = {name: number(value) for name, value in summary.items() if isinstance(value, float)}
+    begin, end, noise = summary["slip_onsets"], summary["slip_ends"], summary["marker_noise"]
+    return [
+        ("frames", f"{summary['frames']} in {seen['duration']} s"),
+        ("in contact", f"{summary['frames_in_contact']} frames; {summary['frames_in_macro_slip']} slip as a whole"),
+        ("stick ratio", seen.get("smallest_stick_ratio") and f"{seen['smallest_stick_ratio']} at its smallest"),
+        ("elements", f"{summary['touches']} touch, {begin} begin to slip, {end} stick again"),
+        ("marker noise", None if noise is None else f"{number(1e6 * noise)} µm"),
+        ("computed in", f"{seen['seconds']} s"),
+        ("unknown", summary.get("unknown")),
+    ]

@@ -1,13 +1,16 @@
-"""What commands print: a table for people, JSON for programs."""
+"""What commands print: lines and tables for people, JSON for programs."""
 
 import json
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import datetime
 from typing import Any
 
 import numpy as np
 import typer
+
+from service.formatting import moment
 
 LINE_WIDTH = 160
 """Columns of a table in a file or a pipe, which have no width of their own."""
@@ -18,19 +21,32 @@ def print_json(record: Mapping[str, Any]) -> None:
     typer.echo(json.dumps(plain(record), ensure_ascii=False, indent=2))
 
 
+def print_lines(title: str, lines: Iterable[tuple[str, str | None]]) -> None:
+    """Print what is known of one thing, a line for each name and what is said of it; those of None are left out."""
+    told = [(name, text) for name, text in lines if text is not None]
+    width = max(len(name) for name, _ in told)
+    typer.echo("\n".join([title, *(f"  {name:<{width}}  {text}" for name, text in told)]))
+
+
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
-    """Print a table that is readable in a terminal, a log file and a pipe."""
+    """Print a table that is readable in a terminal, a log file and a pipe; a cell of None is empty."""
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
 
-    table = Table(title=escape(title), title_justify="left", box=SIMPLE_HEAD)
+    typer.echo(title)
+    table = Table(box=SIMPLE_HEAD, show_edge=False)
     for column in columns:
         table.add_column(escape(column), overflow="fold")
     for row in rows:
-        table.add_row(*(escape(str(cell)) for cell in row))  # units stand in brackets, as markup does
+        table.add_row(*("" if cell is None else escape(str(cell)) for cell in row))  # units are in brackets, as markup
     Console(width=None if sys.stdout.isatty() else LINE_WIDTH).print(table)
+
+
+def when(text: str) -> str:
+    """A moment of the service (ISO 8601), to the second."""
+    return moment(datetime.fromisoformat(text))
 
 
 def plain(value: Any) -> Any:

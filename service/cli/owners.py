@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from service.cli.remote import DEFAULT_URL, Key, MaterialName, Url
+from service.cli.remote import DEFAULT_URL, Key, MaterialName, Url, connected
 
 app = typer.Typer(help="Show and change whose a material is.", no_args_is_help=True)
 Owner = Annotated[str, typer.Argument(help="A key such as key:3f9c2a7b51de, or a group of keys such as group:lab.")]
@@ -13,9 +13,7 @@ Owner = Annotated[str, typer.Argument(help="A key such as key:3f9c2a7b51de, or a
 @app.command("list")
 def list_owners(material: MaterialName, url: Url = DEFAULT_URL, key: Key = None) -> None:
     """Print the owners of a material, one a line; none: whoever has the scope may add to it."""
-    from stiction_client import FrictionClient
-
-    with FrictionClient(url, key=key) as client:
+    with connected(url, key) as client:
         for owner in client.owners(material):
             typer.echo(owner)
 
@@ -23,17 +21,13 @@ def list_owners(material: MaterialName, url: Url = DEFAULT_URL, key: Key = None)
 @app.command()
 def add(material: MaterialName, owner: Owner, url: Url = DEFAULT_URL, key: Key = None) -> None:
     """Let a key or a group own a material, too."""
-    from stiction_client import FrictionClient
-
-    with FrictionClient(url, key=key) as client:
+    with connected(url, key) as client:
         typer.echo(f"{material} belongs to {', '.join(client.add_owner(material, owner))}")
 
 
 @app.command()
 def remove(material: MaterialName, owner: Owner, url: Url = DEFAULT_URL, key: Key = None) -> None:
     """Take a material from an owner."""
-    from stiction_client import FrictionClient
-
-    with FrictionClient(url, key=key) as client:
+    with connected(url, key) as client:
         client.remove_owner(material, owner)
     typer.echo(f"{material} does not belong to {owner} any more")

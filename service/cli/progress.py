@@ -16,7 +16,10 @@ Thing = TypeVar("Thing")
 
 
 def counted(things: Iterable[Thing], total: int, name: str) -> Iterator[Thing]:
-    """The same things, with how many of them there are said on standard error."""
+    """The same things, with how many of them there are said on standard error, where there are several."""
+    if total == 1:
+        yield from things
+        return
     typer.echo(f"0 of {total} {name}", err=True, nl=False)
     for count, thing in enumerate(things, 1):
         typer.echo(f"\r{count} of {total} {name}", err=True, nl=False)

@@ -1,7 +1,11 @@
 """Commands that ask a running service: upload, lookup, plan."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
+from difflib import get_close_matches
 from json import loads
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,10 +13,12 @@ import typer
 
 from service.cli.exit_codes import FAILURE, INPUT_REFUSED, SERVICE_REFUSED
 from service.cli.local import FrameRate, Mapping, Scale, mapping_text
-from service.cli.output import print_json, print_table
+from service.cli.output import print_json, print_lines, print_table
+from service.cli.progress import counted
+from service.formatting import at_least, number
 
 if TYPE_CHECKING:
-    from stiction_client import FrictionClient, FrictionModel
+    from stiction_client import FrictionAnswer, FrictionClient, FrictionModel, RequiredForce
 
 Url = Annotated[str, typer.Option("--url", envvar="STICTION_URL", help="Address of the service.")]
 Key = Annotated[str | None, typer.Option("--key", envvar="STICTION_KEY", help="Access key, where the service asks.")]
@@ -34,6 +40,24 @@ CODE_OF_STATUS = {
 DEFAULT_URL = "http://127.0.0.1:8000"
 
 
+@contextmanager
+def connected(url: str, key: str | None) -> Iterator["FrictionClient"]:
+    """A client of the service, whose errors say what to do where the service can't: a likely name, how to start one."""
+    from stiction_client import ConnectionFailed, FrictionClient, problems
+
+    with FrictionClient(url, key=key) as client:
+        try:
+            yield client
+        except problems.UnknownMaterial as problem:
+            near = get_close_matches(problem.value or "", [material.name for material in client.materials()])
+            if near:
+                problem.add_note(f"did you mean {' or '.join(near)}?")
+            raise
+        except ConnectionFailed as failure:
+            failure.add_note(f"is a service running at {url}? `stiction serve` starts one; --url names another")
+            raise
+
+
 def upload(
     logs: Annotated[list[Path], typer.Argument(help="Grasp logs in any format of docs/formats.md.")],
     material: Annotated[
@@ -49,23 +73,20 @@ def upload(
     json: Json = False,
 ) -> None:
     """Upload grasp logs and wait until their slip is detected and the material's model is fitted."""
-    from stiction_client import FrictionClient
 
     if create and material is None:
         raise typer.BadParameter("--create needs --material")
     told = _mapping(mapping)
-    with FrictionClient(url, key=key) as client:
+    with connected(url, key) as client:
         if create and material is not None:
             client.ensure_material(material)
         said = {"material": material, "scale": scale, "frame_rate": frame_rate, "mapping": told}
-        results = [_upload(client, path, wait, **said) for path in logs]
+        results = list(counted((_upload(client, path, wait, **said) for path in logs), len(logs), "logs"))
     if json:
         print_json({"uploads": results})
     else:
         columns = ("file", "grasp_log", "status", "reason", "model_version")
-        print_table(
-            "Uploads", columns, [["" if (cell := r.get(c)) is None else cell for c in columns] for r in results]
-        )
+        print_table("Uploads", columns, [[result.get(column) for column in columns] for result in results])
     raise typer.Exit(max(CODE_OF_STATUS.get(result["status"], 0) for result in results))
 
 
@@ -83,15 +104,14 @@ def lookup(
     json: Json = False,
 ) -> None:
     """Look a material's friction coefficient up."""
-    from stiction_client import FrictionClient
 
-    with FrictionClient(url, key=key) as client:
+    with connected(url, key) as client:
         force = normal_force if normal_force is not None else _middle_force(client.model(material, method=method))
-        answer = asdict(client.friction(material, velocity, force, quantile, method, elements=elements))
+        answer = client.friction(material, velocity, force, quantile, method, elements=elements)
     if json:
-        print_json(answer)
+        print_json(asdict(answer))
     else:
-        print_table(f"Friction of {material}", ("", ""), list(answer.items()))
+        print_lines(f"Friction of {material}", _friction_lines(answer))
 
 
 def plan(
@@ -125,9 +145,9 @@ def plan(
     json: Json = False,
 ) -> None:
     """Say how hard to grip so that slip stays improbable, with the model's uncertainty in the answer."""
-    from stiction_client import FrictionClient, grasp, required_normal_force
+    from stiction_client import grasp, required_normal_force
 
-    with FrictionClient(url, key=key) as client:
+    with connected(url, key) as client:
         model = client.model(material, method=method)
     answer = required_normal_force(
         model,
@@ -141,11 +161,10 @@ def plan(
         of=of,
         elements=elements,
     )
-    told = {"method": model.method, "version": model.version, **asdict(answer)}
     if json:
-        print_json(told)
+        print_json({"method": model.method, "version": model.version, **asdict(answer)})
     else:
-        print_table(f"Grip for {load:g} N on {material}", ("", ""), list(told.items()))
+        print_lines(f"Grip for {load:g} N on {material}", _grip_lines(answer, model))
 
 
 def _mapping(path: Path | None) -> Any:
@@ -175,3 +194,31 @@ def _upload(client: "FrictionClient", path: Path, wait: bool, **said: Any) -> di
 def _middle_force(model: "FrictionModel") -> float:
     low, high = model.domain.normal_force
     return 0.5 * (low + high)
+
+
+def _friction_lines(answer: "FrictionAnswer") -> list[tuple[str, str | None]]:
+    whose = f"of a contact of {answer.elements} elements" if answer.of == "contact" else "of one element"
+    said = number(answer.friction_coefficient)
+    if answer.quantile is not None:
+        said += f", the {answer.quantile:g} quantile {whose}; the mean is {number(answer.mean)}"
+    return [
+        ("μ", said),
+        ("at", f"{number(answer.tangential_velocity)} m/s and {number(answer.normal_force)} N an element"),
+        ("model", f"{answer.method}, version {answer.version}"),
+        ("because", answer.chosen_because),
+        ("warning", answer.warning),
+    ]
+
+
+def _grip_lines(grip: "RequiredForce", model: "FrictionModel") -> list[tuple[str, str | None]]:
+    whose = f"a contact of {grip.elements:.0f} elements" if grip.of == "contact" else "one element"
+    most = grip.feasible_interval[1]
+    return [
+        ("press with", f"{at_least(grip.normal_force)} N, each finger"),
+        ("at most", f"{number(most)} N" if isfinite(most) else None),
+        ("slips with", f"a probability of {grip.slip_probability:g} at most"),
+        ("largest load", f"{number(grip.largest_load)} N" if isfinite(grip.largest_load) else None),
+        ("μ", f"{number(grip.friction_coefficient)}, so low in {whose} at {number(grip.element_force)} N an element"),
+        ("model", f"{model.method}, version {model.version}"),
+        ("warning", grip.warning),
+    ]

@@ -10,8 +10,9 @@ import typer
 
 from service.cli.exit_codes import INPUT_REFUSED
 from service.cli.local import Picture
-from service.cli.output import print_json, print_table
+from service.cli.output import print_json, print_lines, print_table
 from service.cli.progress import counted, patience
+from service.formatting import number
 
 if TYPE_CHECKING:
     from service.jobs.campaign import Outcome
@@ -115,7 +116,21 @@ def _print(log: "GraspLog", name: str, json: bool) -> None:
         assert log.truth is not None  # a simulated log has truth
         print_json(summary | {"time": log.time, "stick_ratio": log.truth.stick_ratio})
     else:
-        print_table(name, ("", ""), list(summary.items()))
+        print_lines(name, _lines(log, summary))
+
+
+def _lines(log: "GraspLog", summary: dict[str, Any]) -> list[tuple[str, str | None]]:
+    """What was simulated, then how: the metadata, which the tiers write for people."""
+    how = {name: text for name, text in log.metadata.items() if name not in ("scene", "seconds")}
+    zeroth, first, second = summary["friction"]
+    return [
+        ("frames", f"{summary['frames']} of {summary['points']} points in {number(summary['duration_s'])} s"),
+        ("normal force", f"{number(summary['largest normal force_N'])} N at its largest"),
+        ("stick ratio", f"{number(summary['smallest stick ratio'])} at its smallest"),
+        ("friction", f"β₀ {number(zeroth)}, β₁ {number(first)} s/m, β₂ {number(second)} 1/N"),
+        *how.items(),
+        ("computed in", f"{number(float(log.metadata['seconds']))} s" if "seconds" in log.metadata else None),
+    ]
 
 
 def _summary(log: "GraspLog") -> dict[str, Any]:

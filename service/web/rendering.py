@@ -8,9 +8,9 @@ from fastapi import Request
 from fastapi.responses import HTMLResponse
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from service import formatting
 from service.http.access import EVERYTHING, Access
 from service.http.sessions import sent_token
-from service.web import formatting
 from service.web.assets import path_of
 
 POLICY = (

@@ -437,6 +437,12 @@ def test_materials_are_renamed_and_merged_and_logs_withdrawn(
     assert json.loads(server.requests[0].content) == {"reason": "mislabelled"}
 
 
+def test_the_newest_logs_of_a_material_are_asked_for(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
+    server = service({"items": [answers.grasp_log], "next": "more"})
+    assert [log.id for log in ask(server, "grasp_logs", "paper", 1)] == [answers.grasp_log["id"]]
+    assert dict(server.requests[0].url.params) == {"material": "paper", "limit": "1"}
+
+
 @pytest.mark.parametrize("name", ["", ".", "..", "..."])
 def test_a_name_that_leads_to_another_route_is_refused_here(ask: Ask, service: Service, name: str) -> None:
     server = service({})

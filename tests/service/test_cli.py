@@ -2,9 +2,11 @@
 
 import itertools
 import json
+import re
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -208,6 +210,7 @@ def test_a_service_that_is_not_there_has_its_own_exit_code(run: Run) -> None:
     code, _, err = run("lookup", "paper", "--url", "http://127.0.0.1:9")
     assert code == SERVICE_REFUSED
     assert "ConnectError" in err
+    assert "is a service running at http://127.0.0.1:9?" in err
 
 
 def test_upload_lookup_and_plan_go_through_a_real_service(run: Run, ramps: list[Path], url: str) -> None:
@@ -282,10 +285,65 @@ def test_an_argument_that_cannot_be_is_refused_before_anything_is_asked(run: Run
     assert "allowed" in err
 
 
-def test_an_unknown_material_is_named(run: Run, url: str) -> None:
+def test_an_unknown_material_is_named_with_the_nearest_that_is_known(run: Run, url: str) -> None:
     code, _, err = run("lookup", "unobtainium", "--url", url)
     assert code == SERVICE_REFUSED
     assert "unobtainium" in err
+    assert "did you mean" not in err
+    with FrictionClient(url) as client:
+        client.ensure_material("cardboard")
+    assert "did you mean cardboard?" in run("lookup", "cardbord", "--url", url)[2]
+
+
+def test_what_is_printed_for_people_has_units_and_no_empty_values(run: Run, ramps: list[Path], url: str) -> None:
+    run("upload", *ramps, "--material", "wood", "--create", "--url", url)
+    printed = [
+        run("detect", ramps[0])[1],
+        run("fit", *ramps)[1],
+        run("simulate", "lifting_15N")[1],
+        run("lookup", "wood", "--url", url)[1],
+        run("lookup", "wood", "--quantile", 0.05, "--elements", 30, "--url", url)[1],
+        run("plan", "wood", "--load", 1.0, "--contact-area", 6e-5, "--url", url)[1],
+        run("materials", "list", "--url", url)[1],
+        run("materials", "show", "wood", "--url", url)[1],
+        run("logs", "list", "--url", url)[1],
+        run("audit", "--url", url)[1],
+    ]
+    for text in printed:
+        assert not re.search(r"\bNone\b|\bnan\b|\binf\b|\d{4}-\d\d-\d\dT", text), text
+    detected, fitted, simulated, expected, quantile, grip = printed[:6]
+    assert re.search(r"frames +\d+ in [\d.]+ s\n", detected)
+    assert "β₁ [s/m]" in fitted
+    assert re.search(r"normal force +15\.0 N", simulated)
+    assert re.search(r"at +0 m/s and [\d.]+ N an element", expected)
+    assert "the 0.05 quantile of a contact of 30 elements; the mean is" in quantile
+    assert re.search(r"press with +[\d.]+ N, each finger", grip)
+
+
+def test_materials_and_logs_are_looked_at_and_looked_after(run: Run, ramps: list[Path], url: str) -> None:
+    told = ("--url", url)
+    sent = json.loads(run("upload", *ramps[:2], "--material", "felt", "--create", *told, "--json")[1])["uploads"]
+    kept = json.loads(run("logs", "list", "--material", "felt", *told, "--json")[1])["grasp_logs"]
+    assert {log["id"] for log in kept} == {log["grasp_log"] for log in sent}
+    assert len(json.loads(run("logs", "list", "--limit", 1, *told, "--json")[1])["grasp_logs"]) == 1
+    assert re.search(r"material +felt\n", run("logs", "show", sent[0]["grasp_log"], *told)[1])
+    code, out, _ = run("materials", "fit", "felt", "--method", "robust", *told)
+    assert (code, "by robust" in out) == (0, True)
+    assert "robust" in run("materials", "show", "felt", *told)[1]
+    assert run("materials", "rename", "felt", "grey felt", *told)[1] == "felt is grey felt now\n"
+    listed = json.loads(run("materials", "list", *told, "--json")[1])["materials"]
+    assert "grey felt" in {material["name"] for material in listed}
+    run("upload", ramps[2], "--material", "velour", "--create", *told)
+    assert run("materials", "merge", "grey felt", "velour", *told)[1] == "velour is part of grey felt now\n"
+    assert json.loads(run("materials", "show", "velour", *told, "--json")[1])["name"] == "grey felt"
+    assert run("logs", "withdraw", sent[0]["grasp_log"], "--reason", "mislabelled", *told)[0] == 0
+    withdrawn = json.loads(run("logs", "list", "--material", "felt", *told, "--json")[1])["grasp_logs"]
+    assert len(withdrawn) == 3
+
+
+def test_the_version_is_told(run: Run) -> None:
+    code, out, _ = run("--version")
+    assert (code, out) == (0, f"stiction {version('stiction')}\n")
 
 
 def test_db_upgrade_makes_a_database_that_check_approves_of(

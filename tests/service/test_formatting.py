@@ -2,7 +2,7 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from service.web import formatting
+from service import formatting
 from service.web.assets import all_assets
 
 
