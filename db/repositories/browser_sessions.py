@@ -17,6 +17,14 @@ def add(session: Session, sha256: str, key_id: str, expires_at: datetime) -> Non
     session.flush()
 
 
+def keep_newest(session: Session, key_id: str, most: int) -> None:
+    """End all sessions of a key but those that were begun last."""
+    newest_first = (BrowserSessionRow.created_at.desc(), BrowserSessionRow.sha256)
+    of_key = select(BrowserSessionRow.sha256).where(BrowserSessionRow.key_id == key_id)
+    oldest = list(session.scalars(of_key.order_by(*newest_first).offset(most)))
+    session.execute(delete(BrowserSessionRow).where(BrowserSessionRow.sha256.in_(oldest)))
+
+
 def find_key(session: Session, sha256: str) -> AccessKey | None:
     """The access key, valid or not, of a session that has not expired; None where there is no such session."""
     is_it = (BrowserSessionRow.sha256 == sha256, BrowserSessionRow.expires_at > now())

@@ -18,6 +18,9 @@ COOKIE = "stiction_session"
 LIFETIME = timedelta(hours=12)
 """A working day; a key that is revoked or expires ends its sessions before."""
 
+MOST_OF_A_KEY = 100
+"""Sessions: a person has one in each browser, a key of a whole laboratory some tens; who logs in by a script, more."""
+
 
 def sent_token(connection: HTTPConnection) -> str | None:
     """The token that a browser sent; a key in the request's header counts before it."""
@@ -34,10 +37,11 @@ def find_key(database: Database, token: str) -> AccessKey | None:
 
 
 def begin(database: Database, key: AccessKey, connection: HTTPConnection, response: Response) -> None:
-    """Store a new session of the key, and give its cookie to the browser."""
+    """Store a new session of the key, whose oldest ends where it has too many; give its cookie to the browser."""
     token = secrets.token_urlsafe(32)
     with database.write() as session:
         browser_sessions.add(session, digest(token), key.id, datetime.now(UTC) + LIFETIME)
+        browser_sessions.keep_newest(session, key.id, MOST_OF_A_KEY)
     is_tls = connection.scope["scheme"] in {"https", "wss"}
     seconds = int(LIFETIME.total_seconds())
     response.set_cookie(COOKIE, token, max_age=seconds, httponly=True, samesite="strict", secure=is_tls)

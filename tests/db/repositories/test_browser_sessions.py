@@ -36,3 +36,15 @@ def test_a_session_that_is_over_is_not_found_and_goes_with_the_next_login(keyed:
         browser_sessions.add(session, SECOND, KEY, now() + timedelta(hours=1))
         assert browser_sessions.find_key(session, SECOND) is not None
         assert session.scalar(select(func.count()).select_from(BrowserSessionRow)) == 1
+
+
+def test_only_the_sessions_of_a_key_that_were_begun_last_are_kept(keyed: Database) -> None:
+    other = "1" * 12
+    with keyed.write() as session:
+        access_keys.add(session, other, "robot", "read", "1" * 64)
+        browser_sessions.add(session, "f" * 64, other, now() + timedelta(hours=1))
+        for letter in "cab":
+            browser_sessions.add(session, letter * 64, KEY, now() + timedelta(hours=1))
+        browser_sessions.keep_newest(session, KEY, 2)
+        kept = [letter for letter in "abcf" if browser_sessions.find_key(session, letter * 64) is not None]
+    assert kept == ["a", "b", "f"]

@@ -62,6 +62,15 @@ def test_the_cookie_is_no_key_and_is_kept_from_scripts_and_other_sites(
         assert browser_sessions.find_key(session, access.digest(found.value)) is not None
 
 
+def test_a_key_has_a_bounded_number_of_sessions_and_loses_the_oldest(
+    caller: Any, make: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sessions, "MOST_OF_A_KEY", 2)
+    key = make()
+    cookies = [log_in(caller, key).headers["set-cookie"].partition(";")[0] for _ in range(3)]
+    assert [caller.get("/", headers={"cookie": each}).status_code for each in cookies] == [303, 200, 200]
+
+
 def test_over_tls_the_cookie_goes_over_tls_only(caller: Any, make: Callable[..., str]) -> None:
     caller.server = "10.0.0.5"
     answer = caller.request(
