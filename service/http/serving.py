@@ -10,6 +10,7 @@ import uvicorn
 from service.app import create_app
 from service.http.connections import BoundedConnection, H11Connection
 from service.http.envelope import MOST_HEADER_BYTES
+from service.http.websockets import WebSocketConnection
 from service.settings import Settings
 
 MOST_MESSAGE_BYTES = 2**20
@@ -31,6 +32,7 @@ def configuration(settings: Settings, **options: Any) -> uvicorn.Config:
         timeout_graceful_shutdown=max(1, math.ceil(settings.shutdown_seconds)),  # without it, clients hold the end up
         log_config=None,  # ours, service.observability: its logs, and in its metrics the record of each request
         access_log=False,
+        ws=WebSocketConnection,
         ws_max_size=MOST_MESSAGE_BYTES,
         ws_per_message_deflate=False,  # noise does not pack, and packing takes its time
         **options,

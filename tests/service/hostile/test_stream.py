@@ -8,6 +8,7 @@ from contextlib import nullcontext, suppress
 from types import SimpleNamespace
 from typing import Any
 
+import httpx
 import msgspec
 import numpy as np
 import pytest
@@ -261,3 +262,14 @@ def test_messages_wait_as_they_were_sent_and_not_as_lists() -> None:
         assert asyncio.run(fill()) < 2 * connection.MOST_WAITING_IN * len(content)
     finally:
         tracemalloc.stop()
+
+
+def test_a_stream_that_is_refused_is_no_error_of_the_service(
+    client: httpx.Client, caplog: pytest.LogCaptureFixture
+) -> None:
+    offer = {"connection": "Upgrade", "upgrade": "websocket", "sec-websocket-version": "13"}
+    headers = {**offer, "sec-websocket-key": "dGhlIHNhbXBsZSBub25jZQ==", "authorization": "Bearer unknown"}
+    answer = client.get("/v1/stream", headers=headers)
+    assert (answer.status_code, answer.headers["content-type"]) == (401, "application/problem+json")
+    client.get("/healthz").raise_for_status()  # by then all is logged
+    assert [record.getMessage() for record in caplog.records if record.levelname == "ERROR"] == []
