@@ -9,8 +9,9 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
+from tempfile import TemporaryFile
 from types import TracebackType
-from typing import Self
+from typing import IO, Self
 
 from db.defaults import CACHE_GRACE, COPY_BYTES
 from db.errors import BlobDamaged, NotFound, StorageUnavailable
@@ -120,6 +121,11 @@ class BlobStore:
         """A new file to write to; use it in a ``with`` statement."""
         with disk_errors_named():
             return Spool(self._spool / uuid.uuid4().hex, self._take_in)
+
+    def unnamed_file(self) -> IO[bytes]:
+        """A new file beside those of ``spool``, without a name: it is gone once it is closed or its process ends."""
+        with disk_errors_named():
+            return TemporaryFile(dir=self._spool)
 
     def clear_spool(self) -> None:
         """Remove what was under way when its process ended; only for one who works in the folder alone."""

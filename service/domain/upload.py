@@ -9,12 +9,12 @@ from typing import Any, TypeVar
 from sqlalchemy.orm import Session
 
 from db.blobs import Spool, disk_errors_named
-from db.errors import AlreadyExists, StorageUnavailable
+from db.errors import AlreadyExists, NotFound, StorageUnavailable
 from db.records import NewGraspLog, StoredGraspLog
 from db.repositories import audit, grasp_logs, jobs, materials, stores, uploads
 from service import formats
 from service.context import Context
-from service.domain import quotas
+from service.domain import curate, quotas
 from service.domain.asker import ANYBODY, Asker
 from service.domain.errors import InvalidGraspLog, InvalidValue, UnsupportedFormat, UploadInterrupted
 from service.domain.ownership import check_may_add
@@ -41,7 +41,8 @@ Result = TypeVar("Result")
 @dataclass(frozen=True, slots=True)
 class UploadRequest:
     """What the uploader says of a log: its material, sensor and detector, type, length and encoding of its bytes, and
-    the settings that its format needs (``formats.read``); ``asker`` is who sends it.
+    the settings that its format needs (``formats.read``); ``asker`` is who sends it. Where ``creates_material`` is set,
+    a material that is not known is made known with the log, or not at all.
     """
 
     material: str | None
@@ -52,15 +53,20 @@ class UploadRequest:
     content_encoding: str = ""
     settings: FormatSettings = field(default_factory=dict)
     asker: Asker = ANYBODY
+    creates_material: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class ReceivedLog:
-    """A log on disk that is not stored yet; ``body_sha256``: of the bytes as they were sent."""
+    """A log on disk that is not stored yet; ``body_sha256``: of the bytes as they were sent.
+
+    ``new_material``: the name of a material that is to be made known with it, of which ``log`` has no key.
+    """
 
     spool: Spool
     log: NewGraspLog
     body_sha256: str
+    new_material: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +107,8 @@ async def received(
             async with context.readers.room.turn(request.asker.share, UNPACKING_BYTES):
                 await to_its_end(asyncio.to_thread(unpack, body, spool, encoding, limit, expansion))
         kept, description = await _unless_gone(_read(context, spools, spool, request, body.size), gone())
-        yield ReceivedLog(kept, _new_log(kept, description, request, material_id), body.sha256)
+        new_material = request.material if material_id is None else None
+        yield ReceivedLog(kept, _new_log(kept, description, request, material_id), body.sha256, new_material)
 
 
 async def upload(context: Context, chunks: AsyncIterator[bytes], request: UploadRequest) -> StoredUpload:
@@ -126,7 +133,7 @@ async def store_made(context: Context, spool: Spool, found: Description, request
 
 def _store(context: Context, received: ReceivedLog, asker: Asker) -> StoredUpload:
     with storing(context, received) as session:
-        return accept(session, context.settings, received.log, asker)
+        return accept(session, context.settings, received, asker)
 
 
 @contextmanager
@@ -146,17 +153,14 @@ def storing(context: Context, received: ReceivedLog) -> Iterator[Session]:
         yield session
 
 
-def accept(session: Session, settings: Settings, log: NewGraspLog, asker: Asker) -> StoredUpload:
+def accept(session: Session, settings: Settings, received: ReceivedLog, asker: Asker) -> StoredUpload:
     """Store a new log with its job; a known one whose job failed, which is our fault, or was cancelled gets another.
 
     Quotas are looked at once more: others of the same key may have been stored since this one's body began. Raises
     ``NotOwner``, ``QuotaExceeded`` and ``StorageQuotaExceeded``.
     """
     quotas.lock(session, settings, asker.key_id)
-    if log.material_id is not None:  # it may have been merged into another while the log came in
-        material_id = materials.still(session, log.material_id)
-        check_may_add(session, material_id, asker)
-        log = replace(log, material_id=material_id)
+    log = replace(received.log, material_id=_material(session, received, asker))
     quotas.check_log(session, settings, asker.key_id, log)
     try:
         log_id, is_new = grasp_logs.add(session, log), True
@@ -182,6 +186,21 @@ def accept(session: Session, settings: Settings, log: NewGraspLog, asker: Asker)
     return StoredUpload(stored, is_new)
 
 
+def _material(session: Session, received: ReceivedLog, asker: Asker) -> int | None:
+    """The key of the log's material: one to be made known, or one that was merged into another meanwhile."""
+    material_id = received.log.material_id
+    if received.new_material is not None:
+        try:
+            return curate.create(session, received.new_material, "", asker).id
+        except AlreadyExists:  # somebody else made it known while the log came in
+            material_id = materials.find_id(session, received.new_material)
+    if material_id is None:
+        return None
+    material_id = materials.still(session, material_id)
+    check_may_add(session, material_id, asker)
+    return material_id
+
+
 async def _unless_gone(work: Coroutine[Any, Any, Result], gone: Coroutine[Any, Any, None]) -> Result:
     """The result of ``work``; raises ``UploadInterrupted`` where the client has gone before it is there."""
     tasks = asyncio.create_task(work), asyncio.create_task(gone)
@@ -197,7 +216,7 @@ async def _unless_gone(work: Coroutine[Any, Any, Result], gone: Coroutine[Any, A
 
 
 def _check(context: Context, request: UploadRequest) -> int | None:
-    """What can be told before the bytes are there; returns the material's key."""
+    """What can be told before the bytes are there; returns the material's key, None where there is none yet."""
     if request.detector not in METHOD_NAMES:
         raise InvalidValue("detector", request.detector, ", ".join(METHOD_NAMES))
     try:
@@ -207,7 +226,12 @@ def _check(context: Context, request: UploadRequest) -> int | None:
     with context.database.read() as session:
         if request.material is None:
             return None
-        material_id = materials.find_id(session, request.material)
+        try:
+            material_id = materials.find_id(session, request.material)
+        except NotFound:
+            if request.creates_material:
+                return None
+            raise
         check_may_add(session, material_id, request.asker)
     return material_id
 

@@ -1,12 +1,15 @@
 """What forms send: text for everything, and nothing for what was left empty."""
 
 from collections.abc import Callable, Coroutine, Mapping
-from typing import Any, TypeVar
+from typing import IO, Any, TypeVar
 
 from fastapi import Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, BeforeValidator, ValidationError
+from starlette.datastructures import FormData
+from starlette.exceptions import HTTPException
+from starlette.formparsers import MultiPartException, MultiPartParser
 
 from service.http.routes.common import limited
 
@@ -30,6 +33,35 @@ class FormRoute(APIRoute):
             return await handle(Request(request.scope, limited(request.receive, MOST_FORM_BYTES)))
 
         return handle_form
+
+
+class _FileParser(MultiPartParser):
+    """Reads a form whose files are kept in those that ``make_file`` gives; by itself in the system's folder."""
+
+    def __init__(self, request: Request, make_file: Callable[[], IO[bytes]], **most: int) -> None:
+        super().__init__(request.headers, request.stream(), **most)
+        self._make_file = make_file
+
+    def on_headers_finished(self) -> None:
+        """Begin a part."""
+        super().on_headers_finished()
+        if (upload := self._current_part.file) is not None:
+            upload.file.close()
+            upload.file = self._make_file()  # type: ignore[assignment]  # the same methods
+            self._files_to_close_on_error.append(upload.file)  # type: ignore[arg-type]
+
+
+async def read_form(request: Request, make_file: Callable[[], IO[bytes]], **most: int) -> FormData:
+    """A form with a file, to be closed; no fields of what is none. Raises ``HTTPException`` for a broken one.
+
+    ``most``: ``max_files`` and ``max_fields``.
+    """
+    if not request.headers.get("content-type", "").startswith("multipart/form-data"):
+        return FormData()
+    try:
+        return await _FileParser(request, make_file, **most).parse()
+    except MultiPartException as error:
+        raise HTTPException(400, error.message) from error
 
 
 def checked(shape: type[Shape], fields: Mapping[str, str]) -> Shape:

@@ -145,7 +145,7 @@ async def create_grasp_log(
 
 def _store(context: Context, log: ReceivedLog, key: IdempotencyKey | None, asker: Asker) -> Answer:
     with storing(context, log) as session:
-        return answer_once(session, key, lambda: _answer(accept(session, context.settings, log.log, asker)))
+        return answer_once(session, key, lambda: _answer(accept(session, context.settings, log, asker)))
 
 
 def _answer(stored: StoredUpload) -> Answer:

@@ -10,10 +10,8 @@ from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
 from db.blobs import disk_errors_named
-from db.errors import AlreadyExists
 from service import formats
 from service.context import Context
-from service.domain import curate
 from service.domain.asker import Asker
 from service.domain.receive import CHUNK_BYTES
 from service.domain.upload import UploadRequest, upload
@@ -23,7 +21,7 @@ from service.http.dependencies import Given
 from service.http.problems import INVALID_REQUEST, Problem
 from service.http.routes.common import limited
 from service.http.schemas.materials import NewMaterial
-from service.web.forms import checked
+from service.web.forms import checked, read_form
 from service.web.materials import names
 from service.web.rendering import on_problem, render
 from slipcore.defaults import DEFAULT_METHOD, METHOD_NAMES
@@ -62,14 +60,13 @@ async def receive_upload(context: Given, request: Request, asker: Asking) -> Res
     """Store the file with its job, and lead to the log; raises as the API's route does."""
     on_problem(request, "upload.html", **await run_in_threadpool(_form, context, {}))
     most = context.settings.max_upload_bytes + BESIDE_THE_FILE
-    with disk_errors_named():  # the form's file is written to the system's temporary folder first
-        form = await Request(request.scope, limited(request.receive, most)).form(max_files=1, max_fields=len(FIELDS))
+    bounded = Request(request.scope, limited(request.receive, most))
+    with disk_errors_named():
+        form = await read_form(bounded, context.blobs.unnamed_file, max_files=1, max_fields=len(FIELDS))
     try:
         fields = {name: text.strip() for name in FIELDS if isinstance(text := form.get(name), str)}
         on_problem(request, "upload.html", **await run_in_threadpool(_form, context, fields))
         file, wanted = _file(form), checked(NewUpload, fields)
-        if wanted.create and wanted.material is not None:
-            await run_in_threadpool(_make_known, context, wanted.material, asker)
         stored = await upload(context, _chunks(file), _asked(wanted, file, asker))
     finally:
         await form.close()
@@ -88,20 +85,14 @@ def _file(form: FormData) -> UploadFile:
     return file
 
 
-def _make_known(context: Context, material: str, asker: Asker) -> None:
-    """Make a material known, unless it is."""
-    new = checked(NewMaterial, {"name": material})
-    try:
-        with context.database.write() as session:
-            curate.create(session, new.name, "", asker)
-    except AlreadyExists:
-        return
-
-
 def _asked(wanted: NewUpload, file: UploadFile, asker: Asker) -> UploadRequest:
+    """The upload; raises ``RequestValidationError`` for a new material with a name that none may have."""
     settings = {"scale": wanted.scale, "frame_rate": wanted.frame_rate, "mapping": wanted.mapping}
     said = (wanted.material, wanted.sensor, wanted.detector, wanted.format)
-    return UploadRequest(*said, file.size, settings=settings, asker=asker)
+    creates = wanted.create and wanted.material is not None
+    if creates:
+        checked(NewMaterial, {"name": wanted.material or ""})
+    return UploadRequest(*said, file.size, settings=settings, asker=asker, creates_material=creates)
 
 
 async def _chunks(file: UploadFile) -> AsyncIterator[bytes]:

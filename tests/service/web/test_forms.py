@@ -1,19 +1,23 @@
 import errno
 import json
 import re
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 from starlette.datastructures import UploadFile
 
+from service.domain import upload
 from service.http.problem_meanings import MEANINGS
 from service.http.problems import PROBLEM_TYPES
 from tests.service.web.conftest import HOSTILE, HTML
 
 ON_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+SAME_ORIGIN = {"Sec-Fetch-Site": "same-origin"}
 DOCS = Path(__file__).parents[3] / "docs"
 
 
@@ -52,6 +56,45 @@ def test_a_refused_upload_is_told_above_its_form(
     assert '<form id="upload"' in answer.text
     kept = {name: text for name, text in data.items() if name in {"scale"}}
     assert all(f'value="{text}"' in answer.text for text in kept.values())
+
+
+@ON_SQLITE
+@pytest.mark.parametrize(
+    ("more", "file"), [({}, b"no log at all"), ({"detector": "magic"}, b"x"), ({"sensor": "\x07"}, None)]
+)
+def test_a_refused_upload_makes_no_material_known(
+    client: httpx.Client, content: bytes, more: dict[str, str], file: bytes | None
+) -> None:
+    data = {"material": "not to be", "create": "true", **more}
+    sent = {"file": ("grasp.npz", content if file is None else file)}
+    assert client.post("/upload", data=data, files=sent, headers=HTML).status_code in {415, 422}
+    assert client.get("/v1/materials/not to be").status_code == 404
+
+
+@ON_SQLITE
+def test_an_upload_over_its_quota_makes_no_material_known(
+    reach: Any, make: Callable[..., str], members: dict[str, Any], repack: Callable[..., bytes]
+) -> None:
+    caller = reach("keys", key=make("upload"), key_logs_a_day=1)
+    statuses = []
+    for name in ("first", "second"):
+        file = repack(members | {"sensor": np.str_(name)})
+        form = {"data": {"material": name, "create": "true"}, "files": {"file": ("log.npz", file)}}
+        statuses.append((caller.request("POST", "/upload", **form), caller.get(f"/v1/materials/{name}")))
+    assert [(sent.status_code, found.status_code) for sent, found in statuses] == [(303, 200), (429, 404)]
+
+
+@ON_SQLITE
+def test_a_material_that_another_made_known_meanwhile_takes_the_log(
+    browser: Any, content: bytes, add: Callable[..., int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(upload, "_check", lambda *_: None)  # as it was before the other came
+    add("made meanwhile")
+    sent = {"data": {"material": "made meanwhile", "create": "true"}, "files": {"file": ("log.npz", content)}}
+    answer = browser.request("POST", "/upload", **sent, headers=SAME_ORIGIN)
+    assert answer.status_code == 303, answer.text
+    (log,) = browser.get("/v1/grasp-logs?material=made meanwhile").json()["items"]
+    assert answer.headers["location"] == f"/logs/{log['id']}"
 
 
 @ON_SQLITE
@@ -146,8 +189,24 @@ def test_a_form_without_a_file_is_not_read_beyond_its_bound(browser: Any, path: 
     """Whoever sends it: it is parsed before anybody is asked for a key."""
     sent = 2_000_000 // parts
     files = [("file", (f"{part}.bin", b"x" * sent)) for part in range(parts)]
-    answer = browser.request("POST", path, files=files, headers={"Sec-Fetch-Site": "same-origin"})
+    answer = browser.request("POST", path, files=files, headers=SAME_ORIGIN)
     assert answer.status_code == 413
+
+
+@ON_SQLITE
+def test_the_file_of_a_form_is_written_beside_the_blobs_only(
+    browser: Any, content: bytes, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Where there is room for it, and nobody else may read."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
+    answer = browser.request("POST", "/upload", files={"file": ("log.npz", content * 8)}, headers=SAME_ORIGIN)
+    assert answer.status_code == 303, answer.text
+
+
+@pytest.mark.parametrize("body", [b"no parts", b"--x\r\nContent-Disposition: form-data\r\n\r\n1\r\n--x--"])
+def test_a_broken_form_is_refused(browser: Any, body: bytes) -> None:
+    headers = {**SAME_ORIGIN, "content-type": "multipart/form-data; boundary=x"}
+    assert browser.request("POST", "/upload", content=body, headers=headers).status_code == 400
 
 
 def test_a_form_whose_file_cannot_be_written_is_no_error_of_the_service(
@@ -158,5 +217,5 @@ def test_a_form_whose_file_cannot_be_written_is_no_error_of_the_service(
 
     monkeypatch.setattr(UploadFile, "write", write)
     files = {"file": ("log.npz", b"x" * 100)}
-    answer = browser.request("POST", "/upload", files=files, headers={"Sec-Fetch-Site": "same-origin"})
+    answer = browser.request("POST", "/upload", files=files, headers=SAME_ORIGIN)
     assert answer.status_code == 503
