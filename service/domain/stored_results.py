@@ -47,9 +47,9 @@ def encode_history(history: SlipHistory) -> bytes:
     return _pack([history.time, history.stick_ratio, *parts, *maps])
 
 
-def decode_history(path: Path) -> StoredHistory:
-    """The history in a blob."""
-    time, stick_ratio, *parts = _unpack(path)
+def decode_history(path: Path, *, with_maps: bool = True) -> StoredHistory:
+    """The history in a blob; ``with_maps`` of contact and slip, which take 16 times their bytes in the blob."""
+    time, stick_ratio, *parts = _unpack(path, None if with_maps else 2 + 2 * len(EVENT_KINDS))
     lists, maps = parts[: 2 * len(EVENT_KINDS)], parts[2 * len(EVENT_KINDS) :]
     events = SlipEvents(*(EventList(*pair) for pair in zip(lists[0::2], lists[1::2], strict=True)))
     if not maps:
@@ -225,9 +225,10 @@ def _pack(arrays: Sequence[NDArray[Any]]) -> bytes:
     return buffer.getvalue()
 
 
-def _unpack(path: Path) -> list[NDArray[Any]]:
-    arrays = []
+def _unpack(path: Path, most: int | None = None) -> list[NDArray[Any]]:
+    """All arrays of a blob, or the first ones."""
+    arrays: list[NDArray[Any]] = []
     with path.open("rb") as stream, HEADER_LOCK:
-        while stream.peek(1):
+        while stream.peek(1) and len(arrays) != most:
             arrays.append(np.load(stream, allow_pickle=False))
     return arrays

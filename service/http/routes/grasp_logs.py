@@ -6,7 +6,6 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import FileResponse
-from starlette.background import BackgroundTask
 
 from db.records import JobStatus, LogFilter, StoredGraspLog
 from db.repositories import grasp_logs, materials
@@ -15,12 +14,13 @@ from service.context import Context
 from service.domain.asker import Asker
 from service.domain.errors import ResultsNotReady
 from service.domain.export import export
-from service.domain.stored_results import EVENT_KINDS, SAMPLE_ARRAYS, decode_history, decode_samples
+from service.domain.stored_results import EVENT_KINDS, SAMPLE_ARRAYS, StoredHistory, decode_history, decode_samples
 from service.domain.upload import ReceivedLog, StoredUpload, UploadRequest, accept, received, storing
 from service.formats import writing
 from service.formats.tracked_markers import FRAME_RATE, SCALE
 from service.http.access import READ, UPLOAD, Asking
 from service.http.dependencies import Given
+from service.http.download import Download
 from service.http.idempotency import Answer, IdempotencyKey, KeyWithoutBody, answer_once
 from service.http.long_json import long_json
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
@@ -45,7 +45,7 @@ from service.http.problems import (
 )
 from service.http.routes.common import chunks, gone, problems
 from service.http.schemas.grasp_logs import GraspLogOut, GraspLogsOut
-from service.http.schemas.results import EventsOfOneKind, EventsOut, SamplesOut, StickRatioOut
+from service.http.schemas.results import EventsOut, SamplesOut, StickRatioOut
 from slipcore.defaults import DEFAULT_METHOD, METHOD_NAMES
 
 router = APIRouter(prefix="/v1/grasp-logs", tags=["grasp logs"])
@@ -200,23 +200,22 @@ def read_grasp_log(context: Given, id: str) -> GraspLogOut:  # noqa: A002  (the 
 )
 def read_stick_ratio(context: Given, id: str) -> Response:  # noqa: A002
     """One value a frame."""
-    log = _find(context, id)
-    history = decode_history(context.blobs.path(_ready(log.detection, log).history_blob))
+    history = _history(context, id)
     return long_json({"time": history.time, "stick_ratio": history.stick_ratio})
 
 
-@router.get("/{id}/events", dependencies=[READ], summary="Look at slip and contact events", responses=_RESULTS)
-def read_events(context: Given, id: str) -> EventsOut:  # noqa: A002
+@router.get(
+    "/{id}/events",
+    dependencies=[READ],
+    summary="Look at slip and contact events",
+    response_model=EventsOut,
+    responses=_RESULTS,
+)
+def read_events(context: Given, id: str) -> Response:  # noqa: A002
     """Of each element."""
-    log = _find(context, id)
-    events = decode_history(context.blobs.path(_ready(log.detection, log).history_blob)).events
+    events = _history(context, id).events
     of_kind = {kind: getattr(events, kind) for kind in EVENT_KINDS}
-    return EventsOut(
-        **{
-            kind: EventsOfOneKind(element=found.element.tolist(), time=found.time.tolist())
-            for kind, found in of_kind.items()
-        }
-    )
+    return long_json({kind: {"element": found.element, "time": found.time} for kind, found in of_kind.items()})
 
 
 @router.get(
@@ -231,7 +230,7 @@ def read_samples(context: Given, id: str) -> Response:  # noqa: A002
     log = _find(context, id)
     samples = decode_samples(context.blobs.path(_ready(log.samples, log).samples_blob))
     arrays = {name: getattr(samples, name) for name in SAMPLE_ARRAYS}
-    return long_json(arrays, element_area=samples.element_area)
+    return long_json({**arrays, "element_area": samples.element_area})
 
 
 @router.get(
@@ -257,22 +256,28 @@ async def read_file(
     format: Annotated[  # noqa: A002
         str, Query(description="Of the file", json_schema_extra={"enum": list(writing.SUFFIXES)})
     ] = "npz",
-) -> FileResponse:
+) -> Download:
     """As it was uploaded, or as NPZ, Parquet or MCAP made of it: each is read back bit for bit."""
     if format not in writing.SUFFIXES:
         raise Problem.wrong_value(INVALID_REQUEST, "format", format, ", ".join(writing.SUFFIXES))
     file = await export(context, await asyncio.to_thread(_find, context, id), format, asker.share)
-    return FileResponse(
+    return Download(
         file.path,
+        file.close.close,
         media_type=formats.FORMATS[format].content_type,
         filename=f"{id}{writing.SUFFIXES[format]}",
-        background=BackgroundTask(file.close.close),
     )
 
 
 def _find(context: Context, log_id: str) -> StoredGraspLog:
     with context.database.read() as session:
         return grasp_logs.get(session, log_id)
+
+
+def _history(context: Context, log_id: str) -> StoredHistory:
+    """What was found over time, without the maps of all elements and frames."""
+    log = _find(context, log_id)
+    return decode_history(context.blobs.path(_ready(log.detection, log).history_blob), with_maps=False)
 
 
 def _ready(found: Found | None, log: StoredGraspLog) -> Found:

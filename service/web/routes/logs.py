@@ -5,8 +5,6 @@ from contextlib import ExitStack
 from functools import partial
 
 from fastapi import APIRouter, Request, Response
-from fastapi.responses import FileResponse
-from starlette.background import BackgroundTask
 
 from db.records import StoredGraspLog
 from db.repositories import grasp_logs
@@ -15,6 +13,7 @@ from service.domain.errors import ResultsNotReady
 from service.http.access import READ, Asking
 from service.http.conditional import KEEP_AND_ASK, is_one_of, unchanged
 from service.http.dependencies import Given
+from service.http.download import Download
 from service.web.frames import write_frames
 from service.web.rendering import render
 
@@ -43,9 +42,9 @@ async def read_frames(context: Given, request: Request, asker: Asking, id: str) 
     with ExitStack() as spools:
         spool = spools.enter_context(context.blobs.spool())
         await context.readers.derive(partial(write_frames, history, upload, spool.path), log.format, asker.share)
-        closing = BackgroundTask(spools.pop_all().close)
+        close = spools.pop_all().close
     headers = {"ETag": tag, "Cache-Control": KEEP_AND_ASK}
-    return FileResponse(spool.path, headers=headers, media_type="application/octet-stream", background=closing)
+    return Download(spool.path, close, headers=headers, media_type="application/octet-stream")
 
 
 def _find(context: Context, log_id: str) -> StoredGraspLog:

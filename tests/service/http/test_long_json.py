@@ -9,15 +9,17 @@ import pytest
 from service.http.long_json import PIECE, long_json
 
 
-async def sent(arrays: dict[str, Any], **numbers: float) -> list[bytes]:
-    return [bytes(piece) async for piece in long_json(arrays, **numbers).body_iterator]  # type: ignore[arg-type]
+async def sent(members: dict[str, Any]) -> list[bytes]:
+    return [bytes(piece) async for piece in long_json(members).body_iterator]  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("count", [0, 1, PIECE, PIECE + 1])
 def test_an_answer_is_the_json_of_its_arrays(count: int) -> None:
     times, elements = np.linspace(0.0, 1.0, count), np.arange(count)
-    answer = json.loads(b"".join(asyncio.run(sent({"time": times, "element": elements}, element_area=1e-6))))
-    assert answer == {"time": times.tolist(), "element": elements.tolist(), "element_area": 1e-6}
+    members = {"onset": {"time": times, "element": elements}, "time": times, "element_area": 1e-6}
+    answer = json.loads(b"".join(asyncio.run(sent(members))))
+    of_kind = {"time": times.tolist(), "element": elements.tolist()}
+    assert answer == {"onset": of_kind, "time": times.tolist(), "element_area": 1e-6}
 
 
 def test_what_is_not_finite_becomes_null() -> None:

@@ -41,6 +41,27 @@ def test_a_log_that_went_all_the_way_has_a_player_with_frames(
 
 
 @ON_SQLITE
+@pytest.mark.parametrize(
+    "path", ["/logs/{id}/frames", "/v1/grasp-logs/{id}/file", "/v1/grasp-logs/{id}/file?format=parquet"]
+)
+@pytest.mark.parametrize(("asked", "status"), [("bytes=999999999-", 416), ("lines=1-2", 400)])
+def test_a_range_that_a_file_does_not_have_is_a_problem_and_leaves_no_file(
+    client: httpx.Client, fitted: Any, path: str, asked: str, status: int
+) -> None:
+    answer = client.get(path.format(id=fitted["id"]), headers={"range": asked})
+    assert (answer.status_code, answer.headers["content-type"]) == (status, "application/problem+json")
+    assert answer.json()["status"] == status
+    assert (status == 416) == answer.headers.get("content-range", "").startswith("bytes */")
+    assert not list((Path(client.headers["x-data-folder"]) / "spool").iterdir())
+
+
+@ON_SQLITE
+def test_a_range_of_a_file_is_sent(client: httpx.Client, fitted: Any, content: bytes) -> None:
+    answer = client.get(f"/v1/grasp-logs/{fitted['id']}/file", headers={"range": "bytes=2-5"})
+    assert (answer.status_code, answer.content) == (206, content[2:6])
+
+
+@ON_SQLITE
 def test_what_makes_a_log_doubtful_stands_on_its_page(
     client: httpx.Client, ramp: GraspLog, upload: Any, wait: Any, fitted: Any, page_of: Callable[[str], Any]
 ) -> None:

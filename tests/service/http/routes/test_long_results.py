@@ -3,13 +3,19 @@
 import asyncio
 import json
 import tracemalloc
+from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+import slipcore
+from service.domain.stored_results import encode_history
 from service.http.routes import grasp_logs
+from slipcore import GraspLog
+from slipcore.slip_state import EventList, SlipEvents
 
 FRAMES = 200_000
 
@@ -19,7 +25,7 @@ def test_a_long_stick_ratio_is_sent_piece_by_piece(monkeypatch: pytest.MonkeyPat
     history = SimpleNamespace(time=np.arange(FRAMES) * 0.01, stick_ratio=np.linspace(0.0, 1.0, FRAMES))
     history.stick_ratio[1] = np.nan
     monkeypatch.setattr(grasp_logs, "_find", lambda *_: SimpleNamespace(detection=SimpleNamespace(history_blob="")))
-    monkeypatch.setattr(grasp_logs, "decode_history", lambda _: history)
+    monkeypatch.setattr(grasp_logs, "decode_history", lambda *_, **__: history)
     context: Any = SimpleNamespace(blobs=SimpleNamespace(path=lambda _: None))
 
     async def peak_and_start() -> tuple[int, bytes]:
@@ -35,8 +41,34 @@ def test_a_long_stick_ratio_is_sent_piece_by_piece(monkeypatch: pytest.MonkeyPat
         peak, first = asyncio.run(peak_and_start())
     finally:
         tracemalloc.stop()
-    assert first == b'{"time":['
+    assert first == b'{"time":'
     assert peak < 3e6
+
+
+def test_events_are_sent_piece_by_piece_and_without_the_maps_beside_them(
+    monkeypatch: pytest.MonkeyPatch, ramp: GraspLog, tmp_path: Path
+) -> None:
+    """Contact and slip of each frame and element would take 2.6 MB, the events as Python's objects 3 MB."""
+    count = 20_000
+    of_one_kind = EventList(np.arange(count) % 64, np.arange(count) * 0.01)
+    events, maps = SlipEvents(*(of_one_kind,) * 4), np.zeros((count, 8, 8), dtype=bool)
+    history = replace(slipcore.detect_slip(ramp), events=events, contact=maps, slip=maps)
+    path = tmp_path / "history"
+    path.write_bytes(encode_history(history))
+    monkeypatch.setattr(grasp_logs, "_find", lambda *_: SimpleNamespace(detection=SimpleNamespace(history_blob="")))
+    context: Any = SimpleNamespace(blobs=SimpleNamespace(path=lambda _: path))
+
+    async def length() -> int:
+        answer: Any = grasp_logs.read_events(context, "0" * 32)
+        return sum([len(piece) async for piece in answer.body_iterator])
+
+    tracemalloc.start()
+    try:
+        sent, peak = asyncio.run(length()), tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert sent > 600_000
+    assert peak < 4 * 2 * count * 8 + 1.5e6  # the stored events themselves, and a piece of text
 
 
 def test_a_frame_without_contact_has_no_stick_ratio() -> None:

@@ -1,0 +1,43 @@
+"""Files as answers, whole or in the ranges that are asked for."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from fastapi.responses import FileResponse
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.types import Message, Receive, Scope, Send
+
+
+class Download(FileResponse):
+    """A file and its parts; ``close`` is called at the end, however that comes.
+
+    A header Range that cannot be met (416) or read (400) raises ``HTTPException``: by itself it is plain text.
+    """
+
+    def __init__(self, path: Path, close: Callable[[], None], **options: Any) -> None:
+        super().__init__(path, **options)
+        self._close = close
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send the file."""
+
+        async def send_unless_refused(message: Message) -> None:
+            if message["type"] == "http.response.start" and message["status"] in REFUSALS:
+                headers = {name.decode(): value.decode() for name, value in message["headers"]}
+                kept = {name: value for name, value in headers.items() if name == "content-range"}
+                raise HTTPException(message["status"], REFUSALS[message["status"]], kept)
+            await send(message)
+
+        try:
+            await super().__call__(scope, receive, send_unless_refused)
+        finally:
+            await run_in_threadpool(self._close)
+
+
+REFUSALS = {
+    400: "the header Range is not understood; allowed: such as bytes=0-1023",
+    416: "the header Range begins behind the end of the file; allowed: within its length",
+}
+"""Why a Range is refused, by the answer's status."""
