@@ -10,15 +10,14 @@ from slipcore.defaults import (
     LOOKAHEAD,
     CheckOptions,
     FilterOptions,
-    Option,
     SampleOptions,
     StrainRateLiteralOptions,
     StrainRateOptions,
-    describe_options,
 )
 from slipcore.element_forces import ElementForces, contact_factor, element_forces, stick_ratio
 from slipcore.errors import InvalidInput, NoForces, SlipcoreError, UnknownScale
 from slipcore.frames import Frame, FrictionLaw, GraspLog, GroundTruth
+from slipcore.options import Option, describe_options
 from slipcore.samples import FrictionSamples, collect_samples
 from slipcore.slip_state import EventList, SlipEvents, SlipHistory, SlipState
 from slipcore.warm_up import warm_up

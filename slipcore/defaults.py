@@ -3,10 +3,11 @@
 import math
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import Annotated, NamedTuple, TypeVar, get_type_hints
+from dataclasses import dataclass
+from typing import Annotated, TypeVar
 
 from slipcore.errors import InvalidInput
+from slipcore.options import Option, Options, describe_options
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,20 +58,6 @@ class NoiseDefaults:
 
 
 NOISE = NoiseDefaults()
-
-
-class Option(NamedTuple):
-    """What an option means: valid range (both ends allowed), unit, and where its default comes from."""
-
-    low: float
-    high: float
-    unit: str
-    source: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Options:
-    """Named options, each annotated with what it means."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -384,12 +371,6 @@ FORMER_OPTIONS = frozenset({"onset_time", "end_time", "motion_margin"})
 """Of method ``filter`` until slip began and ended by motion and load alone; ignored with a warning for one version."""
 
 Kind = TypeVar("Kind", bound=Options)
-
-
-def describe_options(kind: type[Options]) -> dict[str, Option]:
-    """Unit, valid range and source of every option of a method or of sampling, by name."""
-    hints = get_type_hints(kind, include_extras=True)
-    return {entry.name: hints[entry.name].__metadata__[0] for entry in fields(kind)}
 
 
 def choose_options(kind: type[Kind], given: Mapping[str, float]) -> Kind:

@@ -3,7 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from slipcore.contact.elasticity.influence import HalfSpace, Opposite
+from slipcore.contact.defaults import SCENE
+from slipcore.contact.elasticity.influence import HalfSpace, MirroredBody
 from slipcore.contact.plan.plan import Plan
 from slipcore.errors import InvalidInput
 
@@ -13,7 +14,7 @@ class ElasticObject:
     """Object of ``young_modulus`` Pa (inf is rigid) and ``poisson_ratio``, with the compliance of a half-space."""
 
     young_modulus: float
-    poisson_ratio: float = 0.3
+    poisson_ratio: float = SCENE.object_poisson_ratio
 
     why: ClassVar[str] = "a soft object makes the contact larger and the finger's share of the motion smaller"
     cost: ClassVar[str] = "two applications a step, to tell the finger's displacement from the object's"
@@ -29,5 +30,5 @@ class ElasticObject:
 
     def extend(self, plan: Plan) -> Plan:
         """Add the object's compliance."""
-        body = Opposite(HalfSpace.from_young(self.young_modulus, self.poisson_ratio))
+        body = MirroredBody(HalfSpace.from_young(self.young_modulus, self.poisson_ratio))
         return replace(plan, problem=replace(plan.problem, obstacle=(*plan.problem.obstacle, body)))

@@ -6,12 +6,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from slipcore.contact.defaults import SCENE
 from slipcore.contact.plan.plan import Plan
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray
-
-WAVES = 256
-"""Random waves whose sum is the field: its values are then normal to the eye of any test that a scene meets."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,9 +40,9 @@ class RandomFriction:
     def extend(self, plan: Plan) -> Plan:
         """Add the field, and its scatter to the scene's friction law."""
         rng = np.random.default_rng([plan.seed, zlib.crc32(repr(self).encode())])
-        wave = rng.normal(scale=1.0 / self.correlation_length, size=(WAVES, 2))
-        phase = rng.uniform(0.0, 2.0 * np.pi, size=WAVES)
-        amplitude = self.scale * np.sqrt(2.0 / WAVES)
+        wave = rng.normal(scale=1.0 / self.correlation_length, size=(SCENE.random_waves, 2))
+        phase = rng.uniform(0.0, 2.0 * np.pi, size=SCENE.random_waves)
+        amplitude = self.scale * np.sqrt(2.0 / SCENE.random_waves)
 
         def field(x: FloatArray, y: FloatArray) -> FloatArray:
             total = np.zeros_like(x)

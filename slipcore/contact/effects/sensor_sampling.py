@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+from slipcore.contact.defaults import RAMP
 from slipcore.contact.plan.plan import Plan, Sampling
 from slipcore.errors import InvalidInput
 
@@ -14,9 +15,9 @@ class SensorSampling:
     Displacement is that of the point; force is that on the square of ``pitch`` around it.
     """
 
-    points: tuple[int, int] = (20, 20)
-    pitch: float = 0.75e-3
-    frame_rate: float = 30.0
+    points: tuple[int, int] = (RAMP.points, RAMP.points)
+    pitch: float = RAMP.pitch
+    frame_rate: float = RAMP.frame_rate
 
     why: ClassVar[str] = "a sensor sees points and frames, not fields: an element mixes stick and slip"
     cost: ClassVar[str] = "nothing: points are cell centres, elements are sums of cells"

@@ -15,26 +15,11 @@ import scipy.fft
 from numpy.polynomial import Chebyshev
 from scipy import special
 
+from slipcore.contact.defaults import LAYER
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import Component
 from slipcore.contact.reference.bonded_layer import BondedLayer, LayerModes, half_space_modes
 from slipcore.frames import FloatArray
-
-BOTTOM = 22.0
-"""From this kh on the base takes less than (kh)² exp(−2kh) = 4e-17 from any wave."""
-FAR = 64.0
-"""Thicknesses beyond which a layer does not give way at all: the base takes the half-space's whole response."""
-PANEL_POINTS = 24
-PANEL_PHASE = 12.0
-"""Largest change of kr and of kh over one panel of Gauss points: 24 of them are then exact to rounding."""
-DEGREE = 96
-"""Of the polynomials: the functions are analytic for |Im asinh(r/2h)| < π/2, which leaves 1e-13 up to r = 1000 h."""
-NEGLIGIBLE = 1e-14
-"""Coefficients of the polynomials that are left out, as a share of the largest."""
-CELL_TOLERANCE = 1e-12
-"""Of Gauss quadrature over a cell, as a share of the function."""
-CHUNK = 32
-"""Kernels are made for multiples of so many cells a side and cut to size, so that growing boxes find them made."""
 
 
 class RadialFunctions(NamedTuple):
@@ -68,7 +53,7 @@ class LayerBase:
     def influence(self, component: Component, grid: Grid) -> FloatArray | None:
         """Displacement (m) by 1 Pa on one cell at the offsets of the first quadrant [ny, nx]."""
         ny, nx = grid.shape
-        whole = (-(-ny // CHUNK) * CHUNK, -(-nx // CHUNK) * CHUNK)
+        whole = (-(-ny // LAYER.chunk) * LAYER.chunk, -(-nx // LAYER.chunk) * LAYER.chunk)
         return _influence(self, component, Grid(whole, grid.pitch))[:ny, :nx]
 
     def at(self, component: Component, functions: RadialFunctions, x: FloatArray, y: FloatArray) -> FloatArray:
@@ -113,9 +98,9 @@ def radial_functions(layer: BondedLayer, reach: float) -> RadialFunctions:
 
     A wave's longitudinal L and transverse T give (L + T)/2 with J₀ and (L − T)/2 with J₂; its coupling goes with J₁.
     """
-    k, weight = _wave_numbers(min(reach, FAR), layer.thickness)
+    k, weight = _wave_numbers(min(reach, LAYER.far), layer.thickness)
     radius = _radii(reach, layer.thickness)
-    near = radius <= FAR * layer.thickness
+    near = radius <= LAYER.far * layer.thickness
     phase = np.multiply.outer(radius[near], k)
     zero, one = special.j0(phase), special.j1(phase)
     base, free = _taken_by_the_base(layer, k), half_space_modes(1.0, layer.surface)
@@ -139,7 +124,7 @@ def radial_functions(layer: BondedLayer, reach: float) -> RadialFunctions:
 
 def _radii(reach: float, thickness: float) -> FloatArray:
     """Chebyshev points of asinh(r/2h), as distances m."""
-    points = np.polynomial.chebyshev.chebpts1(DEGREE + 1)
+    points = np.polynomial.chebyshev.chebpts1(LAYER.degree + 1)
     return np.asarray(2.0 * thickness * np.sinh(0.5 * (points + 1.0) * np.arcsinh(0.5 * reach)))
 
 
@@ -148,15 +133,15 @@ def _polynomial(value: FloatArray, reach: float) -> Chebyshev:
     coefficients = scipy.fft.dct(value[::-1], type=2) / len(value)
     coefficients[0] *= 0.5
     size = np.abs(coefficients)
-    kept = int(np.flatnonzero(size > NEGLIGIBLE * size.max())[-1]) + 1 if size.any() else 1
+    kept = int(np.flatnonzero(size > LAYER.negligible * size.max())[-1]) + 1 if size.any() else 1
     return Chebyshev(coefficients[:kept], domain=[0.0, float(np.arcsinh(0.5 * reach))])
 
 
 def _wave_numbers(reach: float, thickness: float) -> tuple[FloatArray, FloatArray]:
     """Nodes (1/m) and weights of Gauss quadrature over all waves that reach the base."""
-    panels = int(np.ceil(BOTTOM * max(reach, 2.0) / PANEL_PHASE))
-    node, weight = np.polynomial.legendre.leggauss(PANEL_POINTS)
-    width = BOTTOM / panels
+    panels = int(np.ceil(LAYER.deepest_wave * max(reach, 2.0) / LAYER.panel_phase))
+    node, weight = np.polynomial.legendre.leggauss(LAYER.panel_points)
+    width = LAYER.deepest_wave / panels
     y = width * (np.arange(panels)[:, None] + 0.5 * (node + 1.0)[None, :])
     return y.ravel() / thickness, np.tile(0.5 * width * weight, panels) / thickness
 
@@ -170,5 +155,5 @@ def _taken_by_the_base(layer: BondedLayer, k: FloatArray) -> LayerModes:
 def _points(pitch: float) -> int:
     """Even number of Gauss points over a cell of ``pitch`` thicknesses: poles lie two thicknesses away."""
     ellipse = 4.0 / pitch + float(np.hypot(1.0, 4.0 / pitch))
-    needed = -np.log(CELL_TOLERANCE) / (2.0 * np.log(ellipse))
+    needed = -np.log(LAYER.cell_tolerance) / (2.0 * np.log(ellipse))
     return 2 * int(np.ceil(0.5 * needed))

@@ -53,7 +53,7 @@ def _doubled_last(field: FloatArray) -> FloatArray:
 
 
 @compiled(fastmath=VECTOR)
-def _inner(a, b):  # type: ignore[no-untyped-def]
+def _inner(a: FloatArray, b: FloatArray) -> float:
     total = 0.0
     for i in range(a.size):
         total += a[i] * b[i]

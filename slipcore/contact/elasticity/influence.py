@@ -12,14 +12,10 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from slipcore.contact.defaults import INFLUENCE
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray
-
-NEAR = 24.0
-"""Cells (of the longer side) within which corner sums are used: they lose at most NEAR² = 576 roundings there."""
-GAUSS_POINTS = 4
-"""Points a direction beyond NEAR: the error (1 / 2 NEAR)^(2·4) is below 1e-13."""
 
 Component = Literal["nn", "xx", "xy", "yy", "zx", "zy"]
 """``nn``: normal displacement by pressure; ``xx``, ``xy``, ``yy``: tangential by traction; ``zx``, ``zy``: normal by
@@ -88,7 +84,7 @@ class Scaled:
 
 
 @dataclass(frozen=True, slots=True)
-class Opposite:
+class MirroredBody:
     """A body on the other side of the contact: what pulls the finger to the right pulls it to the left."""
 
     body: ElasticBody
@@ -156,7 +152,7 @@ def cell_integral(name: str, grid: Grid) -> FloatArray:
     integrand, antiderivative = INTEGRANDS[name]
     hx, hy = grid.pitch
     y, x = np.meshgrid(np.arange(grid.shape[0]) * hy, np.arange(grid.shape[1]) * hx, indexing="ij")
-    reach = NEAR * max(hx, hy)
+    reach = INFLUENCE.near * max(hx, hy)
     near = np.s_[: int(reach / hy) + 1, : int(reach / hx) + 1]
     corners = _by_corners(antiderivative, x[near], y[near], hx, hy)
     if corners.shape == x.shape:
@@ -167,7 +163,7 @@ def cell_integral(name: str, grid: Grid) -> FloatArray:
 
 
 def _by_quadrature(integrand: Function, x: FloatArray, y: FloatArray, hx: float, hy: float) -> FloatArray:
-    node, weight = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    node, weight = np.polynomial.legendre.leggauss(INFLUENCE.gauss_points)
     total = np.zeros_like(x)
     for v, wv in zip(node / 2, weight / 2, strict=True):
         for u, wu in zip(node / 2, weight / 2, strict=True):

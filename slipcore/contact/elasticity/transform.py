@@ -79,7 +79,7 @@ def multiply_pair(spectrum: ComplexArray, xx: FloatArray, yy: FloatArray, xy: Fl
 
 
 @compiled
-def _multiply(along_x, along_y, xx, yy, xy):  # type: ignore[no-untyped-def]
+def _multiply(along_x: ComplexArray, along_y: ComplexArray, xx: FloatArray, yy: FloatArray, xy: FloatArray) -> None:
     for i in range(xx.size):
         first, second = along_x[i], along_y[i]
         along_x[i] = xx[i] * first + xy[i] * second

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from slipcore.contact.defaults import RAMP, SCENE
 from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.plan.plan import Effect, Plan, ramp
 from slipcore.contact.solver.problem import HeightField, Problem
@@ -19,9 +20,9 @@ class Finger:
     The gel is a half-space to the solver unless the scene has a bonded layer; its thickness tells whether it should.
     """
 
-    radius: float = 15e-3
-    young_modulus: float = 1e6
-    poisson_ratio: float = 0.49
+    radius: float = RAMP.sphere_radius
+    young_modulus: float = RAMP.young_modulus
+    poisson_ratio: float = RAMP.poisson_ratio
     thickness: float = float("inf")
 
     def __post_init__(self) -> None:
@@ -43,8 +44,8 @@ class Finger:
 class Press:
     """Normal ``force`` N, reached within ``duration`` s from the begin, then held."""
 
-    force: float = 10.0
-    duration: float = 1.0
+    force: float = RAMP.normal_force
+    duration: float = SCENE.press_duration
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.force < np.inf:
@@ -62,9 +63,9 @@ class SceneDescription:
     name: str
     effects: tuple[Effect, ...] = ()
     finger: Finger = field(default_factory=Finger)
-    friction: float = 0.4
+    friction: float = RAMP.friction
     press: Press = field(default_factory=Press)
-    duration: float = 2.0
+    duration: float = SCENE.duration
     description: str = ""
 
     def __post_init__(self) -> None:

@@ -7,15 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipcore.compilation import compiled
+from slipcore.contact.defaults import WORLD
 from slipcore.frames import BoolArray, FloatArray
 
 Places = NDArray[np.int64]
 
-CUT = 1.0 - 1e-9
-"""Share of its limit from which a force was cut to it: by rounding it may end below."""
 
-AT_LIMIT = 0.98
-"""Share of its limit from which a bristle counts as slipping: an object that comes to rest goes back by a little."""
+_CUT, _AT_LIMIT = 1.0 - WORLD.cut, WORLD.at_limit
 
 
 class Pad(NamedTuple):
@@ -30,6 +28,16 @@ class Pad(NamedTuple):
     influence: FloatArray
     same: int
     pressing: float
+
+
+class Bristles(NamedTuple):
+    """State of the bristles of f fingers: ``force`` [f, k, 2] N on each, ``offset`` [f, k, 2] m by which it has slipped
+    (NaN: apart), and whether it ``slips`` [f, k].
+    """
+
+    force: FloatArray
+    offset: FloatArray
+    slips: BoolArray
 
 
 class Steps(NamedTuple):
@@ -55,16 +63,13 @@ def advance(
     load: FloatArray,
     normal: FloatArray,
     motion: FloatArray,
-    force: FloatArray,
-    offset: FloatArray,
-    slips: BoolArray,
+    bristles: Bristles,
 ) -> None:
     """Go on in place, with the load [2, 3] (N, N, N·m) changing evenly from its first row to its second.
 
-    Of each finger: ``friction`` [f, k] (coefficient), ``command`` and ``normal`` [f] N, ``force`` [f, k, 2] N on each
-    bristle, ``offset`` [f, k, 2] m by which it has slipped (NaN:
-    apart), ``slips`` [f, k]; of the object: ``motion`` [2, 3] (pose;
-    velocity). The second finger faces the first: y and yaw are turned round in its frame.
+    Of each finger: ``friction`` [f, k] (coefficient), ``command`` and ``normal`` force [f] N, and its ``bristles``; of
+    the object: ``motion`` [2, 3] (pose; velocity). The second finger faces the first: y and yaw are turned round in its
+    frame.
     """
     fingers = normal.shape[0]
     for step in range(steps.number):
@@ -76,8 +81,8 @@ def advance(
             normal[f] += (command[f] - normal[f]) * -math.expm1(-steps.length / steps.lag)
             limit = friction[f] * pressures(pad, normal[f])
             pose = target * np.array([1.0, side, side])
-            relax(pad, limit, pose, force[f], offset[f], slips[f], steps.sweeps)
-            resultant += on_object(pad, force[f], side)
+            relax(pad, limit, pose, bristles.force[f], bristles.offset[f], bristles.slips[f], steps.sweeps)
+            resultant += on_object(pad, bristles.force[f], side)
         share = (step + 1.0) / steps.number
         driving = load[0] + share * (load[1] - load[0]) - resultant
         motion[1, :2] += steps.length / steps.mass * driving[:2]
@@ -134,8 +139,8 @@ def relax(
     slips[:] = False
     for i, k in enumerate(touching):
         factor = math.hypot(force[k, 0], force[k, 1]) / limit[k]
-        slips[k] = factor >= AT_LIMIT
-        if factor >= CUT:
+        slips[k] = factor >= _AT_LIMIT
+        if factor >= _CUT:
             offset[k] = wanted[i] - moved[i]
 
 

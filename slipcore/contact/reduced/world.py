@@ -7,25 +7,23 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from slipcore.contact.defaults import WORLD
 from slipcore.contact.effects.sensor_sampling import SensorSampling
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import Component, HalfSpace
 from slipcore.contact.plan.description import Finger
-from slipcore.contact.reduced.kernel import Pad, Steps, advance, displaced, pressures
+from slipcore.contact.reduced.kernel import Bristles, Pad, Steps, advance, displaced, pressures
 from slipcore.contact.reference.checks import check_range
 from slipcore.contact.reference.elastic_pair import half_space
 from slipcore.contact.reference.hertz import HertzContact
 from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray, Frame
 
-GRAVITY = 9.81
+GRAVITY = WORLD.gravity
 """m/s², standard."""
 
 COMPONENTS: tuple[Component, ...] = ("xx", "yy", "xy")
 """Of displacement along the surface by traction along it."""
-
-MOST_STIFF = 2.0
-"""Largest h (h + 2τ) K/m: half of that at which steps of length h become unstable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,11 +64,11 @@ class World:
     friction: FloatArray
     finger: Finger = field(default_factory=Finger)
     sampling: SensorSampling = field(default_factory=SensorSampling)
-    gyration: float = 0.03
-    gripper_lag: float = 0.03
-    gel_time: float = 3e-3
-    time_step: float = 1e-3
-    sweeps: int = 3
+    gyration: float = WORLD.gyration
+    gripper_lag: float = WORLD.gripper_lag
+    gel_time: float = WORLD.gel_time
+    time_step: float = WORLD.time_step
+    sweeps: int = WORLD.sweeps
     marker_noise: float = 0.0
     force_noise: float = 0.0
 
@@ -172,7 +170,8 @@ def step(world: World, state: WorldState, command: ArrayLike, load: Load, durati
         count, length, world.sweeps, world.gripper_lag, world.gel_time, load.mass, load.mass * world.gyration**2
     )
     friction = world.friction.reshape(fingers, size)
-    advance(state.pad, steps, friction, commands, np.stack([state.load, after]), normal, motion, force, offset, slip)
+    bristles = Bristles(force, offset, slip)
+    advance(state.pad, steps, friction, commands, np.stack([state.load, after]), normal, motion, bristles)
     return WorldState(
         state.pad,
         state.time + duration,
@@ -233,6 +232,6 @@ def _check_stiffness(world: World, normal_force: float, mass: float, length: flo
     shear = world.finger.young_modulus / (2.0 * (1.0 + world.finger.poisson_ratio))
     radius = world.contact(normal_force).contact_radius
     stiffness = len(world.friction) * 8.0 * shear * radius / (2.0 - world.finger.poisson_ratio)
-    least = stiffness * length * (length + 2.0 * world.gel_time) / MOST_STIFF
+    least = stiffness * length * (length + 2.0 * world.gel_time) / WORLD.most_stiff
     if mass < least:
         raise InvalidInput("mass", f"{mass:g} kg", f"at least {least:.3g} kg with steps of {length:g} s")

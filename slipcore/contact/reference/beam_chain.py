@@ -14,18 +14,13 @@ import scipy.fft
 from scipy import optimize
 
 from slipcore.compilation import compiled
+from slipcore.contact.defaults import REFERENCE
 from slipcore.contact.errors import InfeasibleLoad, NotConverged
 from slipcore.contact.reference.checks import check_range
 from slipcore.contact.reference.elastic_pair import half_space
 from slipcore.contact.solver.limit_surface import limit_load
 from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray
-
-TOLERANCE = 1e-10
-"""Largest violation of a beam's equilibrium, as a share of the largest Coulomb limit."""
-MAX_SWEEPS = 20_000
-LOAD_TOLERANCE = 1e-9
-"""Largest imbalance of a given load, as a share of the summed limits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +126,11 @@ def unloaded(lattice: BeamLattice) -> BeamState:
 
 
 def drag(
-    lattice: BeamLattice, state: BeamState, pose: FloatArray, limit: FloatArray, tolerance: float = TOLERANCE
+    lattice: BeamLattice,
+    state: BeamState,
+    pose: FloatArray,
+    limit: FloatArray,
+    tolerance: float = REFERENCE.beam_tolerance,
 ) -> BeamState:
     """State after the object has moved to ``pose`` [3] (m, m, rad), with Coulomb limits μf_n ``limit`` [n, m] in N.
 
@@ -146,9 +145,8 @@ def drag(
         return unloaded(lattice)._replace(pose=np.array(pose, float))
     spread = 4.0 * lattice.coupling / (lattice.bending + 4.0 * lattice.coupling)
     relaxation = 2.0 / (1.0 + np.sqrt(1.0 - spread**2))
-    residual, sweeps = _relax(
-        displacement, goal, limit, lattice.bending, lattice.coupling, relaxation, tolerance * largest, MAX_SWEEPS
-    )
+    stiffness, bounds = (lattice.bending, lattice.coupling), (tolerance * largest, REFERENCE.beam_sweeps)
+    residual, sweeps = _relax(displacement, goal, limit, *stiffness, relaxation, *bounds)
     if residual > tolerance * largest:
         raise NotConverged("beam lattice", residual / largest, tolerance, sweeps)
     slip = np.where(limit[..., None] > 0.0, displacement - goal, 0.0)
@@ -170,14 +168,21 @@ def push(lattice: BeamLattice, state: BeamState, load: FloatArray, limit: FloatA
     units = np.array([1.0, 1.0, length])
     travel = capacity / (lattice.bending * np.count_nonzero(limit)) / units
 
+    inner = REFERENCE.inner_share * REFERENCE.beam_tolerance
+
     def imbalance(steps: FloatArray) -> FloatArray:
-        moved = drag(lattice, state, state.pose + steps * travel, limit, 1e-3 * TOLERANCE)
+        moved = drag(lattice, state, state.pose + steps * travel, limit, inner)
         return (lattice.resultants(moved.force) - load) / (units * capacity)
 
-    root = optimize.root(imbalance, np.zeros(3), method="hybr", options={"xtol": 1e-10, "eps": 1e-7, "factor": 0.1})
+    root = optimize.root(
+        imbalance,
+        np.zeros(3),
+        method="hybr",
+        options={"xtol": REFERENCE.pose_tolerance, "eps": REFERENCE.pose_step, "factor": REFERENCE.first_pose},
+    )
     worst = float(np.abs(root.fun).max())
-    if worst > LOAD_TOLERANCE:
-        raise NotConverged("load on the beams", worst, LOAD_TOLERANCE, int(root.nfev))
+    if worst > REFERENCE.load_tolerance:
+        raise NotConverged("load on the beams", worst, REFERENCE.load_tolerance, int(root.nfev))
     return drag(lattice, state, state.pose + root.x * travel, limit)
 
 
@@ -189,7 +194,8 @@ def follow(lattice: BeamLattice, poses: FloatArray, limits: FloatArray) -> BeamH
         states.append(state)
     force, slip = np.stack([s.force for s in states]), np.stack([s.slip for s in states])
     contact = np.asarray(limits) > 0.0
-    floor = 10.0 * TOLERANCE * float(np.max(limits)) / lattice.bending  # of a beam at the limit but not moving
+    tolerance = REFERENCE.beam_noise * REFERENCE.beam_tolerance  # of a beam at the limit but not moving
+    floor = tolerance * float(np.max(limits)) / lattice.bending
     return BeamHistory(
         displacement=np.stack([s.displacement for s in states]),
         force=force,
@@ -197,7 +203,7 @@ def follow(lattice: BeamLattice, poses: FloatArray, limits: FloatArray) -> BeamH
         pose=np.stack([s.pose for s in states]),
         contact=contact,
         slip_kinematic=np.hypot(slip[..., 0], slip[..., 1]) > floor,
-        slip_contact_factor=contact & (np.hypot(force[..., 0], force[..., 1]) >= (1.0 - 1e-6) * limits),
+        slip_contact_factor=contact & (np.hypot(force[..., 0], force[..., 1]) >= (1.0 - REFERENCE.at_limit) * limits),
     )
 
 
@@ -211,7 +217,16 @@ def _checked_limit(lattice: BeamLattice, limit: FloatArray) -> FloatArray:
 
 
 @compiled
-def _relax(u, goal, limit, bending, coupling, relaxation, tolerance, max_sweeps):  # type: ignore[no-untyped-def]
+def _relax(
+    u: FloatArray,
+    goal: FloatArray,
+    limit: FloatArray,
+    bending: float,
+    coupling: float,
+    relaxation: float,
+    tolerance: float,
+    max_sweeps: int,
+) -> tuple[float, int]:
     """Sweep over the beams until no force is off by more than ``tolerance``; ``u`` is overwritten."""
     n, m = limit.shape
     worst = np.inf

@@ -16,15 +16,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from slipcore.contact.defaults import REFERENCE
 from slipcore.contact.reference.checks import check_range
 from slipcore.contact.reference.elastic_pair import Compliance, half_space
-from slipcore.contact.reference.ellipsoidal import SERIES_BELOW
 from slipcore.frames import FloatArray
 
 ComplexArray = NDArray[np.complex128]
-
-BOTTOMLESS = 400.0
-"""From this kh on exp(−2kh) is 0 in double precision, and the layer is a half-space to the last bit."""
 
 
 class LayerModes(NamedTuple):
@@ -61,7 +58,7 @@ class BondedLayer:
         """Compliances at ``wave_number`` k ≥ 0 in 1/m: from k = 0, where the layer is a spring, to any k."""
         y = np.asarray(wave_number, float) * self.thickness
         nu, scale = self.poisson_ratio, self.thickness * self.surface.shear
-        k_nu, reach = 3.0 - 4.0 * nu, np.minimum(y, BOTTOMLESS)
+        k_nu, reach = 3.0 - 4.0 * nu, np.minimum(y, REFERENCE.bottomless)
         decay, rise = np.exp(-2.0 * reach), np.expm1(-2.0 * reach) ** 2  # 2(cosh 2y − 1) of the text, times decay
         bend = k_nu * _sinh_excess(y, reach)
         denominator = k_nu * rise + (4.0 * reach**2 + 16.0 * (1.0 - nu) ** 2) * decay
@@ -112,8 +109,8 @@ def _over(numerator: FloatArray, y: FloatArray) -> FloatArray:
 def _sinh_excess(y: FloatArray, reach: FloatArray) -> FloatArray:
     """Value of 2e^{−2y} (sinh 2y − 2y)/y without the cancellation of small y and the overflow of large y."""
     series = np.ones_like(y)
-    small = 2.0 * np.minimum(y, SERIES_BELOW)
+    small = 2.0 * np.minimum(y, REFERENCE.series_below)
     for k in range(10, 1, -1):  # 1 + z²/(4·5)·(1 + z²/(6·7)·(…)): the rest is below 1e-20 for z up to 1
         series = 1.0 + small**2 / (2 * k * (2 * k + 1)) * series
     direct = _over(-np.expm1(-4.0 * reach) - 4.0 * reach * np.exp(-2.0 * reach), y)
-    return np.where(small < SERIES_BELOW, small**2 / 3.0 * 2.0 * series * np.exp(-small), direct)
+    return np.where(small < REFERENCE.series_below, small**2 / 3.0 * 2.0 * series * np.exp(-small), direct)

@@ -13,10 +13,8 @@ Source: Johnson, Contact Mechanics (1985), §3.4 and 3.7; the paper, (A6)–(A11
 import numpy as np
 from scipy import special
 
+from slipcore.contact.defaults import REFERENCE
 from slipcore.frames import FloatArray
-
-SERIES_BELOW = 1.0
-"""Below this argument x − sin x is summed: the direct difference would lose 1/x² of its digits."""
 
 
 def sin_minus_x_cos(x: FloatArray) -> FloatArray:
@@ -30,7 +28,7 @@ def x_minus_sin(x: FloatArray) -> FloatArray:
     series = np.ones_like(x)
     for k in range(10, 1, -1):  # 1 − x²/(4·5)·(1 − x²/(6·7)·(…)): the rest is below 1e-20 at x = 1
         series = 1.0 - x * x / (2 * k * (2 * k + 1)) * series
-    result: FloatArray = np.where(x < SERIES_BELOW, x**3 / 6.0 * series, x - np.sin(x))
+    result: FloatArray = np.where(x < REFERENCE.series_below, x**3 / 6.0 * series, x - np.sin(x))
     return result
 
 

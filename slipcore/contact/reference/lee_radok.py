@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import optimize
 
+from slipcore.contact.defaults import REFERENCE
 from slipcore.contact.reference.checks import check_range
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray
 
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(48)
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(REFERENCE.line_nodes)
 NODES, WEIGHTS = (0.5 * (NODES + 1.0)) ** 2, 0.5 * (NODES + 1.0) * WEIGHTS
 """Gauss–Legendre on [0, 1], graded towards 0, where a point's pressure starts with the root of time."""
 

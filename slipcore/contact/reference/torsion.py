@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import optimize, special
 
+from slipcore.contact.defaults import REFERENCE
 from slipcore.contact.reference.checks import check_range
 from slipcore.contact.reference.ellipsoidal import polar_angle, x_minus_sin
 from slipcore.contact.reference.hertz import HertzContact
 from slipcore.frames import FloatArray
 
-_V, _W = np.polynomial.legendre.leggauss(96)
+_V, _W = np.polynomial.legendre.leggauss(REFERENCE.torsion_nodes)
 NODES, WEIGHTS = (0.5 * (_V + 1.0)) ** 3, 1.5 * (0.5 * (_V + 1.0)) ** 2 * _W
 """Gauss–Legendre on [0, 1], graded towards 0, where E(1 − s²) has a weak logarithm: 1e-13 in all that follows."""
 

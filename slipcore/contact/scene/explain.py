@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from slipcore.contact.defaults import EXPLAIN
 from slipcore.contact.effects.finite_layer import FiniteLayer
 from slipcore.contact.plan.description import SceneDescription
 from slipcore.contact.plan.plan import Effect, Plan, Sampling
@@ -15,24 +16,7 @@ from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach, ru
 from slipcore.errors import SlipcoreError
 from slipcore.frames import GraspLog
 
-COARSE = Fidelity(cells=10, substeps=1, tolerance=1e-3)
-FRAMES = 12
-"""Of the coarse runs; they show which effects count, not how much to the last per cent."""
-REPEATS = 2
-"""Runs of which the faster one's time counts: the other may have shared its core."""
-NEGLIGIBLE = 1e-3
-"""Change of stick ratio, displacement and force below which an effect may be left out: the coarse runs' tolerance."""
-LAYER_RATIO = 0.08
-"""Contact radius over thickness from which a base stiffens a gel of ν = 0.5 by 10 %: force 1 + 1.133χ + 1.497χ² + …
-(Garcia & Garcia, Biophys. J. 114 (2018) 2923; the test of the bonded layer holds the kernels to it)."""
-COUPLING_RATIO = 0.1
-"""Dundurs' β over μ from which pressing alone makes slip that counts (Spence, J. Elasticity 5 (1975) 297: the stick
-radius under pressing depends on β/μ only)."""
-MOMENT_SHARE = 0.05
-"""Of friction's moment μF_N a that an off-centre contact takes from a force through the sensor's origin."""
-FEWEST_POINTS = 4
-"""Sensor points along a contact radius; with fewer, the elements at the edge alone hold 1 − (3/4)² = 0.44 of the
-contact's area, and the slip front passes through as many again."""
+COARSE_RUNS = Fidelity(EXPLAIN.cells, tolerance=EXPLAIN.tolerance)
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,17 +101,17 @@ def explain(scene: SceneDescription, seed: int = 0) -> Explanation:
 
 def _few_frames(plan: Plan) -> Sampling:
     """The plan's sampling at few frames; points over the contact where it has none."""
-    rate = FRAMES / plan.duration
+    rate = EXPLAIN.frames / plan.duration
     if plan.sampling is not None:
         return replace(plan.sampling, frame_rate=rate)
-    return Sampling((COARSE.cells, COARSE.cells), 2.0 * contact_reach(plan) / COARSE.cells, rate)
+    return Sampling((COARSE_RUNS.cells, COARSE_RUNS.cells), 2.0 * contact_reach(plan) / COARSE_RUNS.cells, rate)
 
 
 def _measure(scene: SceneDescription, sampling: Sampling, seed: int) -> Measured:
     plan, seconds = replace(scene.plan(seed), sampling=sampling), np.inf
-    for _ in range(REPEATS):
+    for _ in range(EXPLAIN.repeats):
         began = time.perf_counter()
-        log = run(plan, COARSE)
+        log = run(plan, COARSE_RUNS)
         seconds = min(seconds, time.perf_counter() - began)
     return Measured(scene, plan, log, observe(plan, log), seconds, int(log.metadata["applications"]))
 
@@ -176,12 +160,12 @@ def _changed(report: EffectReport) -> str:
 def _base(whole: Measured) -> Proposal | None:
     """A base under a gel that is not thick against the contact."""
     thickness, radius = whole.scene.finger.thickness, contact_reach(whole.plan)
-    if _has_layer(whole) or radius < LAYER_RATIO * thickness:
+    if _has_layer(whole) or radius < EXPLAIN.layer_ratio * thickness:
         return None
     chi = radius / thickness
     reason = (
         f"the contact reaches {1e3 * radius:.2g} mm and the gel is {1e3 * thickness:.2g} mm thick (ratio {chi:.2g}); "
-        f"from {LAYER_RATIO} on its base stiffens it by 10 % and more"
+        f"from {EXPLAIN.layer_ratio} on its base stiffens it by 10 % and more"
     )
     return Proposal("add", "FiniteLayer", reason, "Garcia & Garcia, Biophys. J. 114 (2018) 2923")
 
@@ -192,15 +176,15 @@ def _coupling(whole: Measured) -> Proposal | None:
     if problem.coupled or problem.spread:
         return None
     if _has_layer(whole):
-        reason = "pressing shears a bonded layer at any ν: up to 0.29 μp₀ on 5 mm of gel at ν = 0.49"
+        reason = f"pressing shears a bonded layer at any ν: up to {EXPLAIN.layer_shear} μp₀ on 5 mm of gel at ν = 0.49"
         return Proposal("add", "NormalTangentialCoupling", reason, "boundary elements with and without it")
     ratio = whole.plan.poisson_ratio
     dundurs = (1.0 - 2.0 * ratio) / (2.0 * (1.0 - ratio))
-    if friction == 0.0 or dundurs < COUPLING_RATIO * friction:
+    if friction == 0.0 or dundurs < EXPLAIN.coupling_ratio * friction:
         return None
     reason = f"Dundurs' β = {dundurs:.2g} at ν = {ratio:g} against a rigid object, {dundurs / friction:.2g} of μ"
     return Proposal(
-        "add", "NormalTangentialCoupling", reason, f"Spence, J. Elasticity 5 (1975) 297: β/μ ≥ {COUPLING_RATIO}"
+        "add", "NormalTangentialCoupling", reason, f"Spence, J. Elasticity 5 (1975) 297: β/μ ≥ {EXPLAIN.coupling_ratio}"
     )
 
 
@@ -218,13 +202,13 @@ def _off_centre(whole: Measured) -> Proposal | None:
     pulled = force[..., :2].sum(axis=(1, 2))
     moment = np.abs(centre[0] * pulled[:, 1] - centre[1] * pulled[:, 0]).max()
     share = moment / (whole.scene.friction * normal[k] * contact_reach(whole.plan))
-    if share < MOMENT_SHARE:
+    if share < EXPLAIN.moment_share:
         return None
     reason = (
         f"the pressure's centre lies {1e3 * np.hypot(*centre):.2g} mm off the sensor's, through which forces go: a "
         f"moment of {share:.2g} μF_N a about the contact that an object held at its own centre does not make"
     )
-    return Proposal("add", "Torsion", reason, f"share of the limit moment above {MOMENT_SHARE}")
+    return Proposal("add", "Torsion", reason, f"share of the limit moment above {EXPLAIN.moment_share}")
 
 
 def _velocity(whole: Measured) -> Proposal | None:
@@ -246,10 +230,10 @@ def _resolution(whole: Measured) -> Proposal | None:
     if sampling is None:
         return None
     points = contact_reach(whole.plan) / sampling.pitch
-    if points >= FEWEST_POINTS:
+    if points >= EXPLAIN.fewest_points:
         return None
     reason = f"{points:.1f} sensor points along a contact radius: most elements would mix stick and slip"
-    return Proposal("add", "SensorSampling", reason, f"fewer than {FEWEST_POINTS}, by area of edge and front")
+    return Proposal("add", "SensorSampling", reason, f"fewer than {EXPLAIN.fewest_points}, by area of edge and front")
 
 
 PROPOSALS: tuple[Callable[[Measured], Proposal | None], ...] = (_base, _coupling, _off_centre, _velocity, _resolution)
@@ -257,10 +241,11 @@ PROPOSALS: tuple[Callable[[Measured], Proposal | None], ...] = (_base, _coupling
 
 def _superfluous(report: EffectReport) -> Proposal | None:
     """An effect whose absence would not be noticed."""
-    if report.change is None or report.change.largest >= NEGLIGIBLE:
+    if report.change is None or report.change.largest >= EXPLAIN.negligible:
         return None
     reason = f"without it nothing changes by more than {100 * report.change.largest:.2g} %"
-    return Proposal("leave out", report.name, reason, f"measured on a coarse run, threshold {100 * NEGLIGIBLE:g} %")
+    source = f"measured on a coarse run, threshold {100 * EXPLAIN.negligible:g} %"
+    return Proposal("leave out", report.name, reason, source)
 
 
 def _has_layer(whole: Measured) -> bool:

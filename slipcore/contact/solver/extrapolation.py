@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.compilation import compiled
+from slipcore.contact.defaults import STEP
 from slipcore.frames import FloatArray
 
 
@@ -24,15 +25,15 @@ class Stress(NamedTuple):
 def continuation(before: FloatArray, drive: FloatArray) -> float:
     """How far the last step's change of stress goes on in this one: along the same drive, never backward."""
     size = float((before**2).sum())
-    return min(max(float((before * drive).sum()) / size, 0.0), 2.0) if size > 0.0 else 0.0
+    return min(max(float((before * drive).sum()) / size, 0.0), STEP.longest_extrapolation) if size > 0.0 else 0.0
 
 
-def foreseen(now: Stress, before: Stress, share: float) -> Stress:
+def extrapolated(now: Stress, before: Stress, share: float) -> Stress:
     """Stresses after ``share`` of the change from ``before`` to ``now`` once more."""
     pressure = np.maximum(now.pressure + share * (now.pressure - before.pressure), 0.0)
     limit = np.maximum(now.limit + share * (now.limit - before.limit), 0.0)
     traction = np.empty_like(now.traction)
-    _go_on(
+    _extrapolate_traction(
         now.traction.reshape(2, -1),
         before.traction.reshape(2, -1),
         now.limit.ravel(),
@@ -45,7 +46,16 @@ def foreseen(now: Stress, before: Stress, share: float) -> Stress:
 
 
 @compiled
-def _go_on(traction, earlier, limit, earlier_limit, coming_limit, share, coming):  # type: ignore[no-untyped-def]
+def _extrapolate_traction(
+    traction: FloatArray,
+    earlier: FloatArray,
+    limit: FloatArray,
+    earlier_limit: FloatArray,
+    next_limit: FloatArray,
+    share: float,
+    following: FloatArray,
+) -> None:
+    """Fill ``following`` [2, n] from tractions [2, n] and limits [n], as the module's text has it."""
     for i in range(limit.size):
         qx, qy, ex, ey = traction[0, i], traction[1, i], earlier[0, i], earlier[1, i]
         cx, cy = qx + share * (qx - ex), qy + share * (qy - ey)
@@ -55,6 +65,6 @@ def _go_on(traction, earlier, limit, earlier_limit, coming_limit, share, coming)
             left = 1.0 - min(size / limit[i], 1.0)
             left_before = 1.0 - min((ex * nx + ey * ny) / earlier_limit[i], 1.0)
             square = left * left + share * (left * left - left_before * left_before)
-            along = coming_limit[i] * (1.0 - np.sqrt(max(square, 0.0))) - (cx * nx + cy * ny)
+            along = next_limit[i] * (1.0 - np.sqrt(max(square, 0.0))) - (cx * nx + cy * ny)
             cx, cy = cx + along * nx, cy + along * ny
-        coming[0, i], coming[1, i] = cx, cy
+        following[0, i], following[1, i] = cx, cy

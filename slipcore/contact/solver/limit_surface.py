@@ -9,12 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.compilation import compiled
+from slipcore.contact.defaults import LIMIT_SURFACE
 from slipcore.contact.elasticity.fields import rigid_displacement
 from slipcore.frames import BoolArray, FloatArray
 
-DESCENTS = 500
-STILL = 1e-12
-"""Share of the fastest motion below which a cell counts as its centre, or its weight would overflow."""
+_STILL = LIMIT_SURFACE.still
 
 
 class LimitLoad(NamedTuple):
@@ -34,15 +33,15 @@ def limit_load(radius: FloatArray, arm: FloatArray, load: FloatArray, given: Boo
     if not load.any():
         return LimitLoad(np.inf, np.zeros(3))
     factor, motion = np.inf, load / (load @ load)
-    for _ in range(DESCENTS):
+    for _ in range(LIMIT_SURFACE.descents):
         taken, matrix = _friction(radius, arm, motion)
-        if taken >= factor * (1.0 - 1e-15):
+        if taken >= factor * (1.0 - LIMIT_SURFACE.settled):
             break
         factor, matrix = taken, matrix * np.outer(given, given)
-        answer = np.linalg.pinv(matrix, rcond=1e-14, hermitian=True) @ load
-        if np.abs(matrix @ answer - load).max() > 1e-6 * np.abs(load).max():
+        solution = np.linalg.pinv(matrix, rcond=LIMIT_SURFACE.rank, hermitian=True) @ load
+        if np.abs(matrix @ solution - load).max() > LIMIT_SURFACE.free_motion * np.abs(load).max():
             return LimitLoad(0.0, motion)  # some motion meets no friction, such as rotation about a single cell
-        motion = answer / (load @ answer)
+        motion = solution / (load @ solution)
     return LimitLoad(factor, motion)
 
 
@@ -56,10 +55,10 @@ def sliding_traction(radius: FloatArray, arm: FloatArray, motion: FloatArray) ->
 
 
 @compiled
-def _friction(radius, arm, motion):  # type: ignore[no-untyped-def]
+def _friction(radius: FloatArray, arm: FloatArray, motion: FloatArray) -> tuple[float, FloatArray]:
     """What friction takes up in a sliding motion, σ, and the matrix A for which motion·A·motion = σ."""
     taken, matrix = 0.0, np.zeros((3, 3))
-    still = STILL * np.abs(motion).max()
+    still = _STILL * np.abs(motion).max()
     for i in range(radius.size):
         x, y = arm[0, i], arm[1, i]
         speed = np.hypot(motion[0] - y * motion[2], motion[1] + x * motion[2])

@@ -12,24 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.compilation import compiled
+from slipcore.contact.defaults import NORMAL, TINY
 from slipcore.contact.elasticity.fields import doubled, inner
 from slipcore.contact.elasticity.grid import Box, Grid, bounding_box
 from slipcore.contact.elasticity.operator import ElasticOperator, Operators
 from slipcore.contact.errors import NotConverged
 from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray
-
-CG_REDUCTION = 0.3
-"""How far each active set is relaxed; measured best of 0.01 to 0.3, because most sets are not the last."""
-CG_ITERATIONS = 20
-COARSE_TOLERANCE = 1e-3
-"""On all grids but the finest: their discretisation error is larger."""
-COARSEST = 24
-"""Cells a side below which no coarser grid pays."""
-MEMORY = 5
-"""Active sets over whose energies a new one may climb."""
-MARGIN = 3
-"""Cells around the contact that its box leaves it to grow."""
 
 
 class NormalContact(NamedTuple):
@@ -53,9 +42,9 @@ def solve_normal(
     height: FloatArray,
     force: float | None = None,
     approach: float | None = None,
-    tolerance: float = 1e-8,
+    tolerance: float = NORMAL.tolerance,
     start: FloatArray | None = None,
-    max_iterations: int = 100,
+    max_iterations: int = NORMAL.active_sets,
 ) -> NormalContact:
     """Pressure under a given ``force`` (N) or at a given ``approach`` (m).
 
@@ -92,16 +81,16 @@ def _from_coarse(
     operators: Operators, grid: Grid, height: FloatArray, force: float | None, approach: float | None, most: int
 ) -> FloatArray:
     """A first pressure, from a grid of half as many cells a side."""
-    if min(grid.shape) < 2 * COARSEST or grid.shape[0] % 2 or grid.shape[1] % 2:
+    if min(grid.shape) < 2 * NORMAL.coarsest or grid.shape[0] % 2 or grid.shape[1] % 2:
         touching = np.isfinite(height)
         level = force / (touching.sum() * grid.cell_area) if force is not None else 0.0
         return np.where(touching, level, 0.0)
     half = Grid((grid.shape[0] // 2, grid.shape[1] // 2), (2.0 * grid.pitch[0], 2.0 * grid.pitch[1]), grid.centre)
     lower = _halved(height)
     start = _from_coarse(operators, half, lower, force, approach, most)
-    coarse = _on_own_box(operators, half, lower, force, approach, COARSE_TOLERANCE, start, most).pressure
+    coarse = _on_own_box(operators, half, lower, force, approach, NORMAL.coarse_tolerance, start, most).pressure
     fine = np.where(np.isfinite(height), doubled(coarse, grid.shape), 0.0)
-    fine[fine < 0.03 * fine.max()] = 0.0  # interpolation has spread the edge
+    fine[fine < NORMAL.spread_edge * fine.max()] = 0.0  # interpolation has spread the edge
     return fine
 
 
@@ -149,7 +138,7 @@ def _with_margin(box: Box, shape: tuple[int, int]) -> Box:
     """The box with room around it, of even size where there is room for that."""
 
     def span(part: slice, size: int) -> slice:
-        first, last = max(part.start - MARGIN, 0), min(part.stop + MARGIN, size)
+        first, last = max(part.start - NORMAL.margin, 0), min(part.stop + NORMAL.margin, size)
         return slice(first, last + ((last - first) % 2 and last < size))
 
     return span(box[0], shape[0]), span(box[1], shape[1])
@@ -177,23 +166,23 @@ class _Relaxation:
     def solve(self, pressure: FloatArray, tolerance: float, max_iterations: int) -> _Relaxed:
         pressure = self._feasible(pressure)
         displacement = self.operator.normal(pressure)
-        energies = deque([self._energy(pressure, displacement)], MEMORY)
+        energies = deque([self._energy(pressure, displacement)], NORMAL.memory)
         residual = np.inf
         for iteration in range(max_iterations):
             gap, approach = self._gap(displacement, pressure)
             loaded = pressure > 0.0
             worst = max(float(np.abs(gap[loaded]).max(initial=0.0)), -float(gap.min()))
-            residual = worst / max(approach - self.lowest, 1e-300)
+            residual = worst / max(approach - self.lowest, TINY)
             if residual <= tolerance and approach > self.lowest:
                 return _Relaxed(pressure, displacement, approach, residual, iteration)
             change, response = self._relax(loaded | (gap < 0.0), gap)
             trial = self._feasible(pressure + change)
             if (pressure + change < 0.0).any():
                 response = self.operator.normal(trial - pressure)
-            answer = displacement + response
-            if self._energy(trial, answer) > max(energies) + 1e-12 * abs(max(energies)):
-                trial, answer = self._descend(pressure, displacement, gap, approach)
-            pressure, displacement = trial, answer
+            moved = displacement + response
+            if self._energy(trial, moved) > max(energies) + NORMAL.energy_rounding * abs(max(energies)):
+                trial, moved = self._descend(pressure, displacement, gap, approach)
+            pressure, displacement = trial, moved
             energies.append(self._energy(pressure, displacement))
         raise NotConverged("normal contact", residual, tolerance, max_iterations)
 
@@ -226,15 +215,15 @@ class _Relaxation:
         improved = self._balanced(inverse(residual), active)
         direction = -improved
         size = first = inner(residual, improved)
-        for _ in range(CG_ITERATIONS):
+        for _ in range(NORMAL.iterations):
             if size <= 0.0:
                 break
-            answer = self.operator.normal(direction)
-            _advance(change, response, residual, direction, answer, size / inner(direction, answer))
+            image = self.operator.normal(direction)
+            _advance(change, response, residual, direction, image, size / inner(direction, image))
             self._balanced(residual, active)
             improved = self._balanced(inverse(residual), active)
             before, size = size, inner(residual, improved)
-            if size <= CG_REDUCTION**2 * first:
+            if size <= NORMAL.reduction**2 * first:
                 break
             direction *= size / before
             direction -= improved
@@ -260,7 +249,8 @@ class _Relaxation:
 
 
 @compiled
-def _restrict(field, active, balanced):  # type: ignore[no-untyped-def]
+def _restrict(field: FloatArray, active: BoolArray, balanced: bool) -> None:
+    """Zero a field [ny, nx] outside the active cells and, if ``balanced``, make it sum to zero on them; in place."""
     total, count = 0.0, 0
     for i in range(field.shape[0]):
         for j in range(field.shape[1]):
@@ -278,9 +268,17 @@ def _restrict(field, active, balanced):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _advance(change, response, residual, direction, answer, step):  # type: ignore[no-untyped-def]
+def _advance(
+    change: FloatArray,
+    response: FloatArray,
+    residual: FloatArray,
+    direction: FloatArray,
+    image: FloatArray,
+    step: float,
+) -> None:
+    """One conjugate-gradient step in place; ``image``: the operator on ``direction``."""
     for i in range(change.shape[0]):
         for j in range(change.shape[1]):
             change[i, j] += step * direction[i, j]
-            response[i, j] += step * answer[i, j]
-            residual[i, j] += step * answer[i, j]
+            response[i, j] += step * image[i, j]
+            residual[i, j] += step * image[i, j]

@@ -11,23 +11,19 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.compilation import compiled
+from slipcore.contact.defaults import PROJECTION, TINY
 from slipcore.contact.elasticity.fields import VECTOR
 from slipcore.frames import BoolArray, FloatArray
 
-TIGHT = 2e-14
-"""Imbalance, as a share of the sum of the radii, that rounding allows to reach."""
-
-BLOCK = 256
-"""Cells summed at a time: a plain sum of many equal tractions rounds always the same way, and misses ``TIGHT``."""
-
-FLAT = 1e7
-"""Dual, as a multiple of the largest wish and radius, beyond which φ is flat to rounding: the load is at its limit."""
-
-SMALLEST = 1e-300
-"""Added to squares that are divided by."""
-
-LONGEST = 1e6
-"""Steps a search may grow to: φ is then as good as linear along it."""
+# What compiled loops hold fixed; what each means stands in the table.
+_BLOCK, _FLAT, _LONGEST, _TINY = PROJECTION.block, PROJECTION.flat, PROJECTION.longest, TINY
+_SEARCH_STEPS, _SLOPE, _GROWTH, _BRACKET = (
+    PROJECTION.search_steps,
+    PROJECTION.slope,
+    PROJECTION.growth,
+    PROJECTION.bracket,
+)
+_RIDGE, _CERTIFICATE = PROJECTION.ridge, PROJECTION.certificate
 
 
 class Projection(NamedTuple):
@@ -40,88 +36,127 @@ class Projection(NamedTuple):
     feasible: bool
 
 
+class Constraints(NamedTuple):
+    """What is projected on what: the ``point`` w [2, n], disks of ``radius`` [n] at ``arm`` [2, n], and the resultants
+    ``target`` [3] that are ``given`` [3].
+    """
+
+    point: FloatArray
+    radius: FloatArray
+    arm: FloatArray
+    target: FloatArray
+    given: BoolArray
+
+
+class Evaluation(NamedTuple):
+    """φ at a dual, to be filled: ``traction`` [2, n], ``gradient`` [3] (the imbalance) and ``hessian`` [3, 3]."""
+
+    traction: FloatArray
+    gradient: FloatArray
+    hessian: FloatArray
+
+
 def project(
-    wish: FloatArray,
+    point: FloatArray,
     radius: FloatArray,
     arm: FloatArray,
     target: FloatArray,
     given: BoolArray,
     start: FloatArray | None = None,
-    max_iterations: int = 60,
+    max_iterations: int = PROJECTION.newton_steps,
 ) -> Projection:
-    """Project ``wish`` [2, n] on the disks of ``radius`` [n] and on the resultants ``target`` [3] that are ``given``
+    """Project ``point`` [2, n] on the disks of ``radius`` [n] and on the resultants ``target`` [3] that are ``given``
     [3].
 
     ``arm`` [2, n]: x and y of the cells; ``start``: a guess of the dual, from a projection nearby. ``feasible`` is
     False where no tractions within the disks have that resultant.
     """
     first = np.zeros(3) if start is None else np.where(given, start, 0.0)
-    traction = np.empty_like(wish)
-    motion, imbalance, iterations, feasible = _dual_newton(
-        wish, radius, arm, target, given, first, traction, TIGHT * radius.sum(), max_iterations
-    )
+    traction = np.empty_like(point)
+    constraints, bounds = (point, radius, arm, target, given), (PROJECTION.tight * radius.sum(), max_iterations)
+    motion, imbalance, iterations, feasible = _dual_newton(constraints, first, traction, bounds)
     return Projection(traction, motion, imbalance, iterations, feasible)
 
 
 @compiled
-def _dual_newton(wish, radius, arm, target, given, motion, traction, tight, max_iterations):  # type: ignore[no-untyped-def]
-    gradient, hessian = np.empty(3), np.empty((3, 3))
-    trial_gradient, trial_hessian = np.empty(3), np.empty((3, 3))
-    feasible, reach = True, radius.max() + np.abs(wish).max()
-    _evaluate(wish, radius, arm, target, given, motion, traction, gradient, hessian)
+def _dual_newton(
+    given_constraints: tuple[FloatArray, FloatArray, FloatArray, FloatArray, BoolArray],
+    motion: FloatArray,
+    traction: FloatArray,
+    bounds: tuple[float, int],
+) -> tuple[FloatArray, FloatArray, int, bool]:
+    """Newton's steps on φ from a dual ``motion``; fills the ``traction``.
+
+    ``bounds``: imbalance that is none, and most steps. The constraints come as a plain tuple, which enters compiled
+    code four times as fast as a named one.
+    """
+    constraints, (tight, max_iterations) = Constraints(*given_constraints), bounds
+    here = Evaluation(traction, np.empty(3), np.empty((3, 3)))
+    trial = Evaluation(traction, np.empty(3), np.empty((3, 3)))
+    feasible, reach = True, constraints.radius.max() + np.abs(constraints.point).max()
+    _evaluate(constraints, motion, here)
     iteration = 0
     for iteration in range(max_iterations):  # noqa: B007
-        if np.abs(gradient).max() <= tight:
+        if np.abs(here.gradient).max() <= tight:
             break
-        if np.abs(motion).max() > FLAT * reach or _is_certificate(radius, arm, target, motion):
+        if np.abs(motion).max() > _FLAT * reach or _is_certificate(constraints, motion):
             feasible = False
             break
-        step = -_solve(hessian, gradient, given)
+        step = -_solve(here.hessian, here.gradient, constraints.given)
         # Where all disks are left on one side φ is straight and Newton's step has no length of its own.
-        step *= min(1.0, 2.0 * (reach + np.abs(motion).max()) / max(np.abs(step).max(), 1e-300))
-        motion = _search(
-            wish, radius, arm, target, given, motion, step, gradient, tight, traction, trial_gradient, trial_hessian
-        )
-        gradient[:], hessian[:] = trial_gradient, trial_hessian
-    return motion, gradient, iteration, feasible
+        step *= min(1.0, 2.0 * (reach + np.abs(motion).max()) / max(np.abs(step).max(), _TINY))
+        motion = _search(constraints, motion, step, here.gradient, tight, trial)
+        here.gradient[:], here.hessian[:] = trial.gradient, trial.hessian
+    return motion, here.gradient, iteration, feasible
 
 
 @compiled
-def _search(wish, radius, arm, target, given, motion, step, gradient, tight, traction, trial_gradient, trial_hessian):  # type: ignore[no-untyped-def]
-    """Move along ``step`` to where the slope of φ has at most half its first size, by bracketing and false position."""
-    first = gradient @ step
+def _search(
+    constraints: Constraints,
+    motion: FloatArray,
+    step: FloatArray,
+    gradient: FloatArray,
+    tight: float,
+    found: Evaluation,
+) -> FloatArray:
+    """Move along ``step`` to where the slope of φ has at most half its first size, by bracketing and false position;
+    φ there goes to ``found``.
+    """
+    first = float(gradient @ step)
     low, low_slope, high, high_slope, length = 0.0, first, np.inf, np.inf, 1.0
     trial = motion + step
-    for _ in range(60):
+    for _ in range(_SEARCH_STEPS):
         trial = motion + length * step
-        _evaluate(wish, radius, arm, target, given, trial, traction, trial_gradient, trial_hessian)
-        slope = trial_gradient @ step
-        if abs(slope) <= 0.5 * abs(first) or np.abs(trial_gradient).max() <= tight:
+        _evaluate(constraints, trial, found)
+        slope = float(found.gradient @ step)
+        if abs(slope) <= _SLOPE * abs(first) or np.abs(found.gradient).max() <= tight:
             break
         if slope < 0.0:
             low, low_slope = length, slope
         else:
             high, high_slope = length, slope
-        if high == np.inf and length >= LONGEST:
+        if high == np.inf and length >= _LONGEST:
             break
         if high == np.inf:
-            length *= 4.0
+            length *= _GROWTH
         else:
             share = low_slope / (low_slope - high_slope)
-            length = low + min(max(share, 0.1), 0.9) * (high - low)
+            length = low + min(max(share, _BRACKET), 1.0 - _BRACKET) * (high - low)
     return trial
 
 
 @compiled
-def _evaluate(wish, radius, arm, target, given, motion, traction, gradient, hessian):  # type: ignore[no-untyped-def]
+def _evaluate(constraints: Constraints, motion: FloatArray, found: Evaluation) -> None:
     """Tractions for a dual ``motion``, the gradient of φ (the imbalance) and its Hessian."""
+    point, radius, arm, target, given = constraints
+    traction, gradient, hessian = found
     gx, gy, gm = -target[0], -target[1], -target[2]
     hxx = hxy = hyy = hxm = hym = hmm = 0.0
-    for first in range(0, radius.size, BLOCK):
-        part = slice(first, min(first + BLOCK, radius.size))
+    for first in range(0, radius.size, _BLOCK):
+        part = slice(first, min(first + _BLOCK, radius.size))
         (bx, by, bm), (bxx, bxy, byy, bxm, bym, bmm) = _evaluate_block(
-            wish[0, part],
-            wish[1, part],
+            point[0, part],
+            point[1, part],
             radius[part],
             arm[0, part],
             arm[1, part],
@@ -138,14 +173,23 @@ def _evaluate(wish, radius, arm, target, given, motion, traction, gradient, hess
 
 
 @compiled(fastmath=VECTOR)
-def _evaluate_block(wish_x, wish_y, radius, arm_x, arm_y, motion, traction_x, traction_y):  # type: ignore[no-untyped-def]
+def _evaluate_block(
+    point_x: FloatArray,
+    point_y: FloatArray,
+    radius: FloatArray,
+    arm_x: FloatArray,
+    arm_y: FloatArray,
+    motion: FloatArray,
+    traction_x: FloatArray,
+    traction_y: FloatArray,
+) -> tuple[tuple[float, float, float], tuple[float, float, float, float, float, float]]:
     """Tractions of a few cells, their resultants and derivatives; without branches, so that it runs in vectors."""
     mx, my, yaw = motion[0], motion[1], motion[2]
     bx = by = bm = hxx = hxy = hyy = hxm = hym = hmm = 0.0
     for i in range(radius.size):
         x, y = arm_x[i], arm_y[i]
-        qx, qy = wish_x[i] + mx - y * yaw, wish_y[i] + my + x * yaw
-        square = qx * qx + qy * qy + SMALLEST
+        qx, qy = point_x[i] + mx - y * yaw, point_y[i] + my + x * yaw
+        square = qx * qx + qy * qy + _TINY
         share = min(1.0, radius[i] / np.sqrt(square))
         free = 1.0 if share == 1.0 else 0.0
         turning = (1.0 - free) * share / square  # at its limit a traction turns, but does not grow
@@ -166,7 +210,7 @@ def _evaluate_block(wish_x, wish_y, radius, arm_x, arm_y, motion, traction_x, tr
 
 
 @compiled
-def _solve(hessian, gradient, given):  # type: ignore[no-untyped-def]
+def _solve(hessian: FloatArray, gradient: FloatArray, given: BoolArray) -> FloatArray:
     """Newton's step in the directions whose load is given (Cholesky), with a ridge where φ is flat."""
     lower, step = np.zeros((3, 3)), np.zeros(3)
     for i in range(3):
@@ -174,7 +218,7 @@ def _solve(hessian, gradient, given):  # type: ignore[no-untyped-def]
             lower[i, j] = (hessian[i, j] * given[i] * given[j] - (lower[i, :j] * lower[j, :j]).sum()) / lower[j, j]
         diagonal = hessian[i, i] if given[i] else 1.0
         pivot = diagonal - (lower[i, :i] ** 2).sum()
-        lower[i, i] = np.sqrt(max(pivot, 1e-13 * diagonal, 1e-300))
+        lower[i, i] = np.sqrt(max(pivot, _RIDGE * diagonal, _TINY))
     for i in range(3):
         step[i] = (gradient[i] * given[i] - (lower[i, :i] * step[:i]).sum()) / lower[i, i]
     for i in range(2, -1, -1):
@@ -183,9 +227,10 @@ def _solve(hessian, gradient, given):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _is_certificate(radius, arm, target, motion):  # type: ignore[no-untyped-def]
+def _is_certificate(constraints: Constraints, motion: FloatArray) -> bool:
     """Whether the load does more work on this motion than friction everywhere could take up."""
-    work, taken = target @ motion, 0.0
+    radius, arm = constraints.radius, constraints.arm
+    work, taken = constraints.target @ motion, 0.0
     for i in range(radius.size):
         taken += radius[i] * np.hypot(motion[0] - arm[1, i] * motion[2], motion[1] + arm[0, i] * motion[2])
-    return work > taken * (1.0 + 1e-12)
+    return bool(work > taken * (1.0 + _CERTIFICATE))

@@ -9,24 +9,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from slipcore.contact.defaults import STEP, TINY
 from slipcore.contact.elasticity.fields import rigid_displacement
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import Scaled
 from slipcore.contact.elasticity.operator import Count, Operators
 from slipcore.contact.solver.creep import creep_compliance, creep_recalled, creep_step
-from slipcore.contact.solver.extrapolation import Stress, continuation, foreseen
+from slipcore.contact.solver.extrapolation import Stress, continuation, extrapolated
 from slipcore.contact.solver.normal import NormalContact
 from slipcore.contact.solver.problem import Problem, StepLoad
 from slipcore.contact.solver.resolution import unresolved
 from slipcore.contact.solver.step_equations import StepEquations, StepSolution
 from slipcore.frames import BoolArray, FloatArray
-
-AT_LIMIT = 1e-3
-"""A cell whose traction is within this share of its limit is at it (contact factor, paper eq. 36)."""
-MOVED = 1e-3
-"""A cell that slips more than this share of the object's motion in the step moves against it."""
-LEAST_SHARE = 1e-3
-"""Tolerances follow a step's increment down to this share of the contact's capacity, where rounding comes near."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,7 +91,13 @@ class QuasiStatic:
     ``normal_tolerance`` on the gap is relative to the indentation.
     """
 
-    def __init__(self, problem: Problem, grid: Grid, tolerance: float = 1e-5, normal_tolerance: float = 1e-7) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        grid: Grid,
+        tolerance: float = STEP.tolerance,
+        normal_tolerance: float = STEP.normal_tolerance,
+    ) -> None:
         self.problem, self.grid = problem, grid
         self.tolerance, self.normal_tolerance = tolerance, normal_tolerance
         self.height, self.friction = problem.height(grid), problem.static_friction(grid)
@@ -137,7 +137,7 @@ class QuasiStatic:
             self.normal_tolerance,
             state.normal if self._pressed_alike(state, load) else None,
         )
-        solution = equations.solve(foreseen(state.stress, state.before, continuation(state.drive, drive)))
+        solution = equations.solve(extrapolated(state.stress, state.before, continuation(state.drive, drive)))
         after = self._advance(equations, state, load, drive, solution, recalled)
         result = self._result(equations, state, after, solution)
         seconds = time.perf_counter() - began
@@ -162,10 +162,10 @@ class QuasiStatic:
         """How much of the contact's capacity the step can change: what its tolerance is measured by."""
         before, now = state.load.normal_force, load.normal_force
         if before is None or now is None or now == 0.0 or not all(load.given):
-            return max(LEAST_SHARE, 0.01)
+            return max(STEP.least_share, STEP.unknown_share)
         capacity = float(self.friction.max()) * now
         shear = float(np.hypot(drive[0], drive[1])) + abs(drive[2]) / _lever(state.stress.pressure, self.grid)
-        return float(np.clip(max(abs(now - before) / now, shear / max(capacity, 1e-300)), LEAST_SHARE, 1.0))
+        return float(np.clip(max(abs(now - before) / now, shear / max(capacity, TINY)), STEP.least_share, 1.0))
 
     def _advance(
         self,
@@ -226,7 +226,7 @@ class QuasiStatic:
         slip, at_limit, moved = np.zeros_like(after.stress.traction), np.zeros_like(contact), np.zeros_like(contact)
         touching = contact[box]
         slip[:, *box] = np.where(touching, tangential.slip, 0.0)
-        at_limit[box] = touching & (np.hypot(*tangential.traction) >= (1.0 - AT_LIMIT) * solution.limit)
+        at_limit[box] = touching & (np.hypot(*tangential.traction) >= (1.0 - STEP.at_limit) * solution.limit)
         moved[box] = np.hypot(*slip[:, *box]) > self._noticeable(equations, solution, after.pose - state.pose)
         creep = sum(after.creep, start=np.zeros_like(after.elastic))
         return StepResult(
@@ -255,7 +255,7 @@ class QuasiStatic:
         carried = float(np.hypot(*rigid_displacement(np.stack(part.points()), motion)).max())
         kernel = equations.operators.on(part).kernel("xx")
         compliance = 0.0 if kernel is None else float(kernel[0, 0])
-        return max(MOVED * carried, 10.0 * equations.tolerance * float(solution.limit.max()) * compliance)
+        return max(STEP.moved * carried, STEP.noise * equations.tolerance * float(solution.limit.max()) * compliance)
 
 
 def _drive(before: StepLoad, load: StepLoad) -> FloatArray:

@@ -5,13 +5,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from slipcore.contact.defaults import STEP
 from slipcore.frames import BoolArray
-
-CONTACT_CELLS = 6.0
-"""Radius of the contact in cells, below which the pressures of a sphere are off by 2 to 6 % of their norm."""
-SLIP_CELLS = 1.0
-"""Width of the slip zone in cells, below which the tractions of a sphere are off by 6 % of their norm or more: by 14 %
-at F_T = 0.05 μF_N on 64 × 64 cells."""
 
 
 def unresolved(contact: BoolArray, at_limit: BoolArray, sheared: bool) -> tuple[str, ...]:
@@ -27,11 +22,11 @@ def unresolved(contact: BoolArray, at_limit: BoolArray, sheared: bool) -> tuple[
     if contact[[0, -1]].any() or contact[:, [0, -1]].any():
         found.append("the contact reaches the edge of the grid, beyond which there is none")
     radius = float(np.sqrt(touching / np.pi))
-    if radius < CONTACT_CELLS:
-        found.append(f"the contact's radius spans {radius:.1f} cells, {CONTACT_CELLS:g} or more are needed")
+    if radius < STEP.contact_cells:
+        found.append(f"the contact's radius spans {radius:.1f} cells, {STEP.contact_cells:g} or more are needed")
     width = slipping / _rim(contact)
-    if sheared and width < SLIP_CELLS:
-        found.append(f"the slip zone spans {width:.1f} cells, {SLIP_CELLS:g} or more are needed")
+    if sheared and width < STEP.slip_cells:
+        found.append(f"the slip zone spans {width:.1f} cells, {STEP.slip_cells:g} or more are needed")
     return tuple(found)
 
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from slipcore.contact.defaults import STEP, TINY
 from slipcore.contact.elasticity.fields import inner
 from slipcore.contact.elasticity.grid import Box, Grid, bounding_box
 from slipcore.contact.elasticity.operator import Operators
@@ -16,17 +17,6 @@ from slipcore.contact.solver.tangential import TangentialContact, solve_tangenti
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray
 
-BOX_MULTIPLE = 4
-"""Boxes grow by so many cells, so that a growing contact meets few new operators."""
-OUTER_ITERATIONS = 60
-"""Of coupling and of velocity-dependent friction."""
-PRESSURE_BY_LIFT = 5.0
-"""Change of a sphere's pressure, as a share of its largest, by a lift as a share of the indentation: π²/2."""
-COUPLING_START = 1e-2
-"""What the first guess of the lift is taken to be off by, in the same measure."""
-INEXACT = 0.3
-"""Of the last change of the lift: how far contact is solved under one that will change again."""
-
 
 class Mixing:
     """Anderson's acceleration of a fixed point, of depth one (J. ACM 12 (1965) 547)."""
@@ -34,17 +24,17 @@ class Mixing:
     def __init__(self) -> None:
         self._last: tuple[FloatArray, FloatArray] | None = None
 
-    def next(self, point: FloatArray, answer: FloatArray) -> FloatArray:
+    def next(self, point: FloatArray, mapped: FloatArray) -> FloatArray:
         """The next point, given the last and what the map made of it."""
-        change, share = answer - point, 0.0
+        change, share = mapped - point, 0.0
         if self._last is not None:
             bend = change - self._last[0]
             size = inner(bend, bend)
             share = float(np.clip(inner(change, bend) / size, -1.0, 1.0)) if size > 0.0 else 0.0
-            following = answer - share * (answer - self._last[1])
+            following = mapped - share * (mapped - self._last[1])
         else:
-            following = answer
-        self._last = (change, answer)
+            following = mapped
+        self._last = (change, mapped)
         return following
 
 
@@ -87,20 +77,20 @@ class StepEquations:
         pressure, traction, _ = guess
         if not self.problem.coupled:
             return self._once(pressure, traction, self.height, self.tolerance)
-        lift, change, iterations, mixing = self._lift(traction), COUPLING_START, 0, Mixing()
-        for _ in range(OUTER_ITERATIONS):
-            goal = max(self.tolerance, INEXACT * change)
+        lift, change, iterations, mixing = self._lift(traction), STEP.coupling_start, 0, Mixing()
+        for _ in range(STEP.outer_iterations):
+            goal = max(self.tolerance, STEP.inexact * change)
             solution = self._once(pressure, traction, self.height + lift, goal)
             pressure, traction = solution.normal.pressure, self._whole(solution)
             iterations += solution.iterations
             if not pressure.any():
                 return solution
-            answer = self._lift(traction)
-            change = PRESSURE_BY_LIFT * float(np.abs(answer - lift).max() / solution.normal.displacement.max())
-            if max(10.0 * change, goal) <= self.tolerance:
+            mapped = self._lift(traction)
+            change = STEP.pressure_by_lift * float(np.abs(mapped - lift).max() / solution.normal.displacement.max())
+            if max(STEP.coupling_margin * change, goal) <= self.tolerance:
                 return solution._replace(iterations=iterations)
-            lift = mixing.next(lift, answer)
-        raise NotConverged("normal-tangential coupling", change, self.tolerance, OUTER_ITERATIONS)
+            lift = mixing.next(lift, mapped)
+        raise NotConverged("normal-tangential coupling", change, self.tolerance, STEP.outer_iterations)
 
     def _lift(self, traction: FloatArray) -> FloatArray:
         return self.operators.on(self.grid).normal_by_traction(traction)
@@ -122,7 +112,7 @@ class StepEquations:
             pressure,
         )
         touching = normal.pressure > 0.0
-        box = bounding_box(touching if touching.any() else ~touching, BOX_MULTIPLE)
+        box = bounding_box(touching if touching.any() else ~touching, STEP.box_multiple)
         offset = self.offset
         if self.problem.coupled or self.problem.spread:
             offset = offset + self.operators.on(self.grid).tangential_by_pressure(normal.pressure)
@@ -140,17 +130,17 @@ class StepEquations:
             tangential = self._tangential(box, limit, offset, start, tolerance)
             return StepSolution(normal, tangential, limit, box, tangential.iterations)
         iterations, speed, mixing = 0, self.speed[box], Mixing()
-        for _ in range(OUTER_ITERATIONS):
+        for _ in range(STEP.outer_iterations):
             limit = self._limit(coefficient, speed, pressure)
             tangential = self._tangential(box, limit, offset, start, tolerance)
             iterations += tangential.iterations
-            answer = np.hypot(*tangential.slip) / self.load.duration
-            off = np.abs(self._limit(coefficient, answer, pressure) - limit)
-            change = float(off.max()) / max(float(limit.max()), 1e-300)
+            mapped = np.hypot(*tangential.slip) / self.load.duration
+            off = np.abs(self._limit(coefficient, mapped, pressure) - limit)
+            change = float(off.max()) / max(float(limit.max()), TINY)
             if change <= tolerance:
                 return StepSolution(normal, tangential, limit, box, iterations)
-            start, speed = tangential.traction, np.maximum(mixing.next(speed, answer), 0.0)
-        raise NotConverged("velocity-dependent friction", change, tolerance, OUTER_ITERATIONS)
+            start, speed = tangential.traction, np.maximum(mixing.next(speed, mapped), 0.0)
+        raise NotConverged("velocity-dependent friction", change, tolerance, STEP.outer_iterations)
 
     def _limit(self, coefficient: FloatArray, speed: FloatArray, pressure: FloatArray) -> FloatArray:
         """μp at a slip speed."""

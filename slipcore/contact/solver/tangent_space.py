@@ -5,13 +5,16 @@ costs as much as its arithmetic.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slipcore.compilation import compiled
+from slipcore.contact.defaults import TANGENTIAL
 from slipcore.contact.elasticity.fields import VECTOR
 from slipcore.contact.elasticity.operator import ElasticOperator
 from slipcore.frames import BoolArray, FloatArray
 
 OUTSIDE, STICK, SLIP = 0, 1, 2
+_CIRCLE_ROUNDING, _RANK = TANGENTIAL.circle_rounding, TANGENTIAL.rank
 
 
 class TangentSpace:
@@ -77,9 +80,9 @@ class TangentSpace:
         for _ in range(max_iterations):
             if size <= 0.0:
                 break
-            answer = operator.tangential(direction)
-            self._advance(move, residual, direction, answer, size)
-            improved = inverse(answer)
+            image = operator.tangential(direction)
+            self._advance(move, residual, direction, image, size)
+            improved = inverse(image)
             before, size = size, self._improve(residual, improved)
             if size <= reduction**2 * first:
                 break
@@ -87,19 +90,15 @@ class TangentSpace:
         return move
 
     def _advance(
-        self, move: FloatArray, residual: FloatArray, direction: FloatArray, answer: FloatArray, size: float
+        self, move: FloatArray, residual: FloatArray, direction: FloatArray, image: FloatArray, size: float
     ) -> None:
-        """One step along ``direction``; the new residual, scaled for the preconditioner, in place of ``answer``."""
+        """One step along ``direction``; the new residual, scaled for the preconditioner, in place of ``image``."""
         _advance(
-            _flat(self.projector),
-            _flat(self.arm),
-            self.inverse_gram,
-            self.curvature.ravel(),
-            self.scale.ravel(),
+            (_flat(self.projector), _flat(self.arm), self.inverse_gram, self.curvature.ravel(), self.scale.ravel()),
             _flat(move),
             _flat(residual),
             _flat(direction),
-            _flat(answer),
+            _flat(image),
             size,
         )
 
@@ -122,7 +121,17 @@ def _flat(field: FloatArray) -> FloatArray:
 
 
 @compiled
-def _classify(traction, slip, limit, stiffness, state, projector, onto_circle, curvature):  # type: ignore[no-untyped-def]
+def _classify(
+    traction: FloatArray,
+    slip: FloatArray,
+    limit: FloatArray,
+    stiffness: float,
+    state: NDArray[np.int8],
+    projector: FloatArray,
+    onto_circle: FloatArray,
+    curvature: FloatArray,
+) -> None:
+    """Fill the last four, as ``TangentSpace`` describes them, for flat fields of n cells."""
     for i in range(limit.size):
         radius = limit[i]
         if radius <= 0.0:
@@ -136,7 +145,7 @@ def _classify(traction, slip, limit, stiffness, state, projector, onto_circle, c
             projector[0, i], projector[1, i], projector[2, i] = 1.0, 0.0, 1.0
             continue
         size = np.sqrt(qx * qx + qy * qy)
-        on_circle = size > radius * (1.0 - 1e-12)
+        on_circle = size > radius * (1.0 - _CIRCLE_ROUNDING)
         nx, ny = (qx / size, qy / size) if on_circle else (wx, wy)
         if not on_circle:
             size = np.sqrt(wx * wx + wy * wy)
@@ -148,7 +157,7 @@ def _classify(traction, slip, limit, stiffness, state, projector, onto_circle, c
 
 
 @compiled(fastmath=VECTOR)
-def _gram(projector, arm):  # type: ignore[no-untyped-def]
+def _gram(projector: FloatArray, arm: FloatArray) -> FloatArray:
     """Products of the three rigid motions, restricted to the space."""
     xx = xy = yy = xm = ym = mm = 0.0
     for i in range(arm.shape[1]):
@@ -165,18 +174,18 @@ def _gram(projector, arm):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _inverse(gram):  # type: ignore[no-untyped-def]
+def _inverse(gram: FloatArray) -> FloatArray:
     """Pseudo-inverse: where all cells slide along one line some rigid motion is not in the space."""
     values, vectors = np.linalg.eigh(gram)
     inverse = np.zeros((3, 3))
     for k in range(3):
-        if values[k] > 1e-12 * values[2]:
+        if values[k] > _RANK * values[2]:
             inverse += np.outer(vectors[:, k], vectors[:, k]) / values[k]
     return inverse
 
 
 @compiled(fastmath=VECTOR)
-def _restrict(projector, arm, move):  # type: ignore[no-untyped-def]
+def _restrict(projector: FloatArray, arm: FloatArray, move: FloatArray) -> tuple[float, float, float]:
     """Restrict a move to the space in place and return its resultants."""
     sx = sy = sm = 0.0
     for i in range(move.shape[1]):
@@ -191,7 +200,7 @@ def _restrict(projector, arm, move):  # type: ignore[no-untyped-def]
 
 
 @compiled(fastmath=VECTOR)
-def _subtract_rigid(projector, arm, motion, move):  # type: ignore[no-untyped-def]
+def _subtract_rigid(projector: FloatArray, arm: FloatArray, motion: FloatArray, move: FloatArray) -> None:
     """Subtract from a move, in place, the part of a rigid motion [3] that lies in the space."""
     mx, my, yaw = motion[0], motion[1], motion[2]
     for i in range(move.shape[1]):
@@ -201,40 +210,58 @@ def _subtract_rigid(projector, arm, motion, move):  # type: ignore[no-untyped-de
 
 
 @compiled
-def _balance(projector, arm, inverse_gram, move):  # type: ignore[no-untyped-def]
+def _balance(projector: FloatArray, arm: FloatArray, inverse_gram: FloatArray, move: FloatArray) -> None:
+    """Restrict a move to the space and take off its resultants, in place."""
     sx, sy, sm = _restrict(projector, arm, move)
     motion = inverse_gram[:, 0] * sx + inverse_gram[:, 1] * sy + inverse_gram[:, 2] * sm
     _subtract_rigid(projector, arm, motion, move)
 
 
 @compiled
-def _advance(projector, arm, inverse_gram, curvature, scale, move, residual, direction, answer, size):  # type: ignore[no-untyped-def]
-    step = size / _stiffen(projector, curvature, direction, answer)
+def _advance(
+    space: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
+    move: FloatArray,
+    residual: FloatArray,
+    direction: FloatArray,
+    image: FloatArray,
+    size: float,
+) -> None:
+    """One conjugate-gradient step in place; ``space``: projector, arm, inverse Gram matrix, curvature and scale."""
+    projector, arm, inverse_gram, curvature, scale = space
+    step = size / _stiffen(projector, curvature, direction, image)
     for k in range(2):
         for i in range(move.shape[1]):
             move[k, i] += step * direction[k, i]
-            residual[k, i] += step * answer[k, i]
+            residual[k, i] += step * image[k, i]
     _balance(projector, arm, inverse_gram, residual)
     for k in range(2):
         for i in range(move.shape[1]):
-            answer[k, i] = scale[i] * residual[k, i]
+            image[k, i] = scale[i] * residual[k, i]
 
 
 @compiled(fastmath=VECTOR)
-def _stiffen(projector, curvature, direction, answer):  # type: ignore[no-untyped-def]
-    """Restrict C·direction to the space and add the curvature, in place; return direction·answer."""
+def _stiffen(projector: FloatArray, curvature: FloatArray, direction: FloatArray, image: FloatArray) -> float:
+    """Restrict C·direction to the space and add the curvature, in place; return direction·image."""
     product = 0.0
     for i in range(direction.shape[1]):
-        ax, ay, dx, dy = answer[0, i], answer[1, i], direction[0, i], direction[1, i]
+        ax, ay, dx, dy = image[0, i], image[1, i], direction[0, i], direction[1, i]
         px = projector[0, i] * ax + projector[1, i] * ay + curvature[i] * dx
         py = projector[1, i] * ax + projector[2, i] * ay + curvature[i] * dy
-        answer[0, i], answer[1, i] = px, py
+        image[0, i], image[1, i] = px, py
         product += dx * px + dy * py
     return product
 
 
 @compiled(fastmath=VECTOR)
-def _improve(projector, arm, inverse_gram, scale, residual, improved):  # type: ignore[no-untyped-def]
+def _improve(
+    projector: FloatArray,
+    arm: FloatArray,
+    inverse_gram: FloatArray,
+    scale: FloatArray,
+    residual: FloatArray,
+    improved: FloatArray,
+) -> float:
+    """Scale and balance a preconditioned residual in place; its product with the residual."""
     for k in range(2):
         for i in range(improved.shape[1]):
             improved[k, i] *= scale[i]
@@ -247,7 +274,8 @@ def _improve(projector, arm, inverse_gram, scale, residual, improved):  # type: 
 
 
 @compiled
-def _turn(direction, improved, share):  # type: ignore[no-untyped-def]
+def _turn(direction: FloatArray, improved: FloatArray, share: float) -> None:
+    """The next conjugate direction, in place."""
     for k in range(2):
         for i in range(direction.shape[1]):
             direction[k, i] = share * direction[k, i] - improved[k, i]

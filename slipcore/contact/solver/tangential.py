@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from slipcore.contact.defaults import TANGENTIAL, TINY
 from slipcore.contact.elasticity.fields import doubled, halved, inner, resultants, rigid_displacement
 from slipcore.contact.elasticity.operator import ElasticOperator
 from slipcore.contact.errors import InfeasibleLoad, NotConverged
@@ -24,20 +25,6 @@ from slipcore.contact.solver.projection import project
 from slipcore.contact.solver.tangent_space import TangentSpace
 from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray
-
-CG_REDUCTION = 0.05
-"""How far each Newton system is solved, in the preconditioned residual; measured best between 0.03 and 0.1."""
-CG_ITERATIONS = 25
-ROUNDING = 1e-13
-"""Of the work of slip at the limits, below which a slope is noise."""
-FAR = 0.2
-"""Residual of a start from which a coarser grid is asked first: Newton's steps move fronts by a few cells only."""
-COARSEST = 24
-COARSE_TOLERANCE = 1e-3
-LIMIT_MARGIN = 1e-12
-"""Loads this close to the limit surface (relative) are on it: all slides."""
-BALANCE = 1e-10
-"""Of the summed limits: a load that tractions miss by more is not carried, however small the residual."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,8 +69,8 @@ def solve_tangential(
     offset: FloatArray,
     control: Control,
     start: FloatArray,
-    tolerance: float = 1e-8,
-    max_iterations: int = 60,
+    tolerance: float = TANGENTIAL.tolerance,
+    max_iterations: int = TANGENTIAL.newton_steps,
 ) -> TangentialContact:
     """Tractions and motion of one step.
 
@@ -135,7 +122,7 @@ class _Problem:
             gradient = displacement + self.offset
             nearest, _ = self.project(traction - self.stiffness * gradient, keep=True)
             before, residual = residual, float(np.abs(traction - nearest).max()) / self.largest
-            if iteration == 0 and residual > FAR and min(self.limit.shape) >= 2 * COARSEST:
+            if iteration == 0 and residual > TANGENTIAL.far_start and min(self.limit.shape) >= 2 * TANGENTIAL.coarsest:
                 traction, _ = self.project(self._from_coarse(traction))
                 displacement = self.operator.tangential(traction)
                 continue
@@ -143,7 +130,7 @@ class _Problem:
                 result = self._result(traction, displacement, residual, iteration)
                 return self._at_the_limit(result) if result.sliding and self.given.all() else result
             slip = gradient - rigid_displacement(self.arm, self.dual / self.stiffness)
-            trial = nearest if residual > 0.9 * before and iteration % 2 else self._newton(traction, slip)
+            trial = nearest if residual > TANGENTIAL.slow * before and iteration % 2 else self._newton(traction, slip)
             traction, displacement = self._search(traction, displacement, slip, trial)
         raise NotConverged("tangential contact", residual, tolerance, max_iterations)
 
@@ -154,16 +141,16 @@ class _Problem:
         limit, start = halved(self.limit, "constant"), halved(traction, "constant")
         try:
             coarse = solve_tangential(
-                operator, (x, y), limit, halved(self.original), self.control, start, COARSE_TOLERANCE
+                operator, (x, y), limit, halved(self.original), self.control, start, TANGENTIAL.coarse_tolerance
             )
         except (InfeasibleLoad, NotConverged):  # the coarse contact is another one; this is only a guess
             return traction
         return doubled(coarse.traction, self.limit.shape)
 
-    def project(self, wish: FloatArray, keep: bool = False) -> tuple[FloatArray, bool]:
-        """Nearest feasible traction; ``keep`` its dual, which is the rigid motion when the wish is a gradient step."""
+    def project(self, point: FloatArray, keep: bool = False) -> tuple[FloatArray, bool]:
+        """Nearest feasible traction; ``keep`` its dual, which is the rigid motion when the point is a gradient step."""
         flat = project(
-            wish.reshape(2, -1),
+            point.reshape(2, -1),
             self.limit.ravel(),
             self.arm.reshape(2, -1),
             self.target,
@@ -172,16 +159,16 @@ class _Problem:
         )
         if keep:
             self.dual = flat.motion
-        return flat.traction.reshape(wish.shape), flat.feasible
+        return flat.traction.reshape(point.shape), flat.feasible
 
     def _newton(self, traction: FloatArray, slip: FloatArray) -> FloatArray:
         space = TangentSpace(traction, slip, self.limit, self.stiffness, self.arm, self.given)
         lacking = self.target - resultants(traction + space.onto_circle, self.arm)
         move = space.onto_circle + space.balancing(lacking)
-        answer = slip.copy()
-        if np.abs(move).max() > 1e-14 * self.largest:
-            answer += self.operator.tangential(move)
-        move += space.conjugate_gradients(self.operator, answer, move, CG_REDUCTION, CG_ITERATIONS)
+        image = slip.copy()
+        if np.abs(move).max() > TANGENTIAL.move_rounding * self.largest:
+            image += self.operator.tangential(move)
+        move += space.conjugate_gradients(self.operator, image, move, TANGENTIAL.reduction, TANGENTIAL.iterations)
         return self.project(traction + move)[0]
 
     def _search(
@@ -195,7 +182,7 @@ class _Problem:
         way = trial - traction
         response = self.operator.tangential(way)
         slope, curvature = inner(slip, way), inner(way, response)
-        rounding = ROUNDING * inner(np.hypot(slip[0], slip[1]), self.limit)
+        rounding = TANGENTIAL.slope_rounding * inner(np.hypot(slip[0], slip[1]), self.limit)
         best = -slope / curvature if curvature > 0.0 and abs(slope) > rounding else 1.0
         share = 1.0 if best >= 0.5 else max(best, 0.0)
         if share == 1.0:
@@ -209,9 +196,9 @@ class _Problem:
         slip = displacement + self.offset - rigid_displacement(self.arm, np.where(self.given, scaled, 0.0))
         lacking = (self.target - resultants(traction, self.arm)) * self.given
         imbalance = float(np.abs(lacking).max()) / self.capacity
-        if imbalance > BALANCE:
-            raise NotConverged("balance of the tangential load", imbalance, BALANCE, iterations)
-        wish = np.hypot(*(traction - self.stiffness * slip))
+        if imbalance > TANGENTIAL.balance:
+            raise NotConverged("balance of the tangential load", imbalance, TANGENTIAL.balance, iterations)
+        point = np.hypot(*(traction - self.stiffness * slip))
         return TangentialContact(
             traction,
             displacement,
@@ -220,7 +207,7 @@ class _Problem:
             residual,
             imbalance,
             iterations,
-            bool((wish > self.limit)[self.limit > 0.0].all()),
+            bool((point > self.limit)[self.limit > 0.0].all()),
         )
 
     def _at_the_limit(self, balanced: TangentialContact | None = None) -> TangentialContact:
@@ -230,14 +217,14 @@ class _Problem:
         """
         radius, arm = self.limit.ravel(), self.arm.reshape(2, -1)
         factor, direction = limit_load(radius, arm, self.target, self.given)
-        if factor < 1.0 - LIMIT_MARGIN:
+        if factor < 1.0 - TANGENTIAL.limit_margin:
             raise InfeasibleLoad(self.control.load, factor)
-        if balanced is not None and factor > 1.0 + LIMIT_MARGIN:
+        if balanced is not None and factor > 1.0 + TANGENTIAL.limit_margin:
             return balanced
         traction = sliding_traction(radius, arm, direction).reshape(self.offset.shape)
         displacement = self.operator.tangential(traction)
         along = rigid_displacement(self.arm, direction)
-        lag = ((displacement + self.offset) * along).sum(axis=0) / (along**2).sum(axis=0).clip(min=1e-300)
+        lag = ((displacement + self.offset) * along).sum(axis=0) / (along**2).sum(axis=0).clip(min=TINY)
         self.dual = direction * float(lag[self.limit > 0.0].max()) * self.stiffness
         return self._result(traction, displacement, 0.0, 0)._replace(sliding=True)
 

@@ -6,28 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from slipcore.contact.defaults import ACCURACY, PROBE
 from slipcore.contact.errors import NotConverged
 from slipcore.contact.plan.plan import Plan, Sampling
-from slipcore.contact.tiers.boundary_elements import ROOM, Fidelity, contact_reach, run
-from slipcore.contact.tiers.sampling import UNSAMPLED_FRAMES, lattice
+from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach, run
+from slipcore.contact.tiers.sampling import lattice
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray, GraspLog
-
-SAFETY = 1.25
-"""Estimates are multiplied by this, because errors fall with the cell size on average only. On the scenes that it was
-chosen with, estimates without it were 1.3 to 6 times the true errors."""
-STEP_SHARE = 0.3
-"""Of the asked accuracy that load steps may use up; the rest is the grid's."""
-SOLVER_SHARE = 1e-2
-"""Of the asked accuracy that the solver's tolerance is."""
-COARSEST_CELLS = 12
-FINEST_CELLS = 700
-MOST_SUBSTEPS = 64
-FIRST_GROWTH, LARGEST_GROWTH = 1.6, 2.5
-"""Of cells from one grid to the next: less would show too little, more would trust one estimate too far."""
-COST_ORDER = 2.4
-"""Seconds grow with this power of the cells across, a little more than their number."""
-UNSAMPLED_POINTS = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,11 +84,11 @@ def simulate_to(plan: Plan, accuracy: float | None = None, seconds: float | None
 
 def _refinements(plan: Plan, target: float) -> Iterator[Refined]:
     """Ever finer logs, each with an error estimated from its difference from the one before."""
-    reach = ROOM * contact_reach(plan)
-    tolerance = min(1e-3, SOLVER_SHARE * target) if target > 0.0 else 1e-4
-    fidelity, step_error, coarse = _steps(plan, Fidelity(COARSEST_CELLS, 1, tolerance), target)
-    cells, error = _across(plan, reach, COARSEST_CELLS), np.inf
-    while error == np.inf or cells < FINEST_CELLS:
+    reach = PROBE.room * contact_reach(plan)
+    tolerance = min(ACCURACY.loosest, ACCURACY.solver_share * target) if target > 0.0 else ACCURACY.timed_tolerance
+    fidelity, step_error, coarse = _steps(plan, Fidelity(ACCURACY.coarsest_cells, 1, tolerance), target)
+    cells, error = _across(plan, reach, ACCURACY.coarsest_cells), np.inf
+    while error == np.inf or cells < ACCURACY.finest_cells:
         fidelity = replace(fidelity, cells=_next_cells(cells, error, target))
         began = time.perf_counter()
         fine = run(plan, fidelity)
@@ -123,16 +108,16 @@ def _steps(plan: Plan, fidelity: Fidelity, target: float) -> tuple[Fidelity, Dif
         halved = replace(fidelity, substeps=2 * fidelity.substeps)
         finer = run(plan, halved)
         left = difference(log, finer)
-        if 2.0 * left.largest <= STEP_SHARE * target or target == 0.0:
+        if 2.0 * left.largest <= ACCURACY.step_share * target or target == 0.0:
             return fidelity, left.times(2.0), log
-        if left.largest <= STEP_SHARE * target or halved.substeps >= MOST_SUBSTEPS:
+        if left.largest <= ACCURACY.step_share * target or halved.substeps >= ACCURACY.most_substeps:
             return halved, left, finer
         fidelity, log = halved, finer
 
 
 def _extrapolated(change: Difference, ratio: float, step_error: Difference) -> Difference:
     """Error of the finer of two grids whose cells are ``ratio`` apart, at first order, with that of the steps."""
-    grid = change.times(SAFETY / (ratio - 1.0))
+    grid = change.times(ACCURACY.safety / (ratio - 1.0))
     return Difference(
         grid.stick_ratio + step_error.stick_ratio,
         grid.displacement + step_error.displacement,
@@ -142,14 +127,15 @@ def _extrapolated(change: Difference, ratio: float, step_error: Difference) -> D
 
 def _next_cells(cells: int, error: float, target: float) -> int:
     """Cells across at which an error that falls with their size should meet the target; never too far at once."""
-    growth = FIRST_GROWTH if not np.isfinite(error) else 1.15 * error / target if target > 0.0 else LARGEST_GROWTH
-    return int(np.ceil(cells * min(max(growth, FIRST_GROWTH), LARGEST_GROWTH)))
+    least, most = ACCURACY.first_growth, ACCURACY.largest_growth
+    growth = least if not np.isfinite(error) else ACCURACY.overshoot * error / target if target > 0.0 else most
+    return int(np.ceil(cells * min(max(growth, least), most)))
 
 
 def _next_seconds(last: Refined, target: float) -> float:
     """Seconds that the next grid would take."""
     growth = _next_cells(last.fidelity.cells, last.error.largest, target) / last.fidelity.cells
-    return last.seconds * float(growth**COST_ORDER)
+    return last.seconds * float(growth**ACCURACY.cost_order)
 
 
 def _across(plan: Plan, reach: float, cells: int) -> int:
@@ -161,6 +147,6 @@ def _sampled(plan: Plan) -> Plan:
     """The plan with points that do not change with the grid; without a sensor they cover the contact."""
     if plan.sampling is not None:
         return plan
-    pitch = 2.0 * ROOM * contact_reach(plan) / UNSAMPLED_POINTS
-    rate = UNSAMPLED_FRAMES / plan.duration
-    return replace(plan, sampling=Sampling((UNSAMPLED_POINTS, UNSAMPLED_POINTS), pitch, rate))
+    pitch = 2.0 * PROBE.room * contact_reach(plan) / ACCURACY.points
+    rate = ACCURACY.frames / plan.duration
+    return replace(plan, sampling=Sampling((ACCURACY.points, ACCURACY.points), pitch, rate))

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from slipcore.contact.defaults import CHEAP_TIERS, PROBE
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import Component, ElasticBody
 from slipcore.contact.elasticity.operator import Operators
@@ -17,16 +18,12 @@ from slipcore.contact.plan.description import SceneDescription
 from slipcore.contact.plan.plan import Plan
 from slipcore.contact.solver.normal import solve_normal
 from slipcore.contact.tiers import boundary_elements
-from slipcore.contact.tiers.boundary_elements import ROOM, Fidelity, contact_reach
+from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach
 from slipcore.contact.tiers.sampling import lattice
 from slipcore.frames import FloatArray, GraspLog
 
 NAME = "beams"
-ACCURACY = 0.5
-"""Largest error of stick ratio, displacement and force; 0.40 measured over the library's scenes."""
-ONE_CELL_AN_ELEMENT = Fidelity(cells=4)
-ROOM_TO_DECAY = 8
-"""Lattices are this much wider than the grid when their compliance is computed, so that their ends do not count."""
+ONE_CELL_AN_ELEMENT = Fidelity(cells=CHEAP_TIERS.beam_cells)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +46,8 @@ class Beams:
         if component in {"xy", "zx", "zy"}:
             return None
         ny, nx = grid.shape
-        waves_y, waves_x = (2.0 - 2.0 * np.cos(2.0 * np.pi * np.fft.fftfreq(ROOM_TO_DECAY * n)) for n in (ny, nx))
+        lengths = (CHEAP_TIERS.beam_room * n for n in (ny, nx))
+        waves_y, waves_x = (2.0 - 2.0 * np.cos(2.0 * np.pi * np.fft.fftfreq(length)) for length in lengths)
         stiffness = self.bending + self.tie / grid.cell_area * (waves_y[:, None] + waves_x[None, :])
         return np.ascontiguousarray(np.fft.ifft2(1.0 / stiffness).real[:ny, :nx])
 
@@ -58,7 +56,7 @@ def accuracy(scene: SceneDescription, plan: Plan) -> float | None:  # noqa: ARG0
     """Largest error to expect; None for a scene with something that beams do not have."""
     problem = plan.problem
     lacking = (problem.obstacle, problem.creep, problem.coupled, problem.spread)
-    return None if any(lacking) or plan.sampling is None else ACCURACY
+    return None if any(lacking) or plan.sampling is None else CHEAP_TIERS.beam_error
 
 
 def run(scene: SceneDescription, plan: Plan) -> GraspLog:  # noqa: ARG001 - as every tier is called
@@ -73,10 +71,11 @@ def fitted(plan: Plan) -> Beams:
     """Beams that carry, where the bodies would be under a traction like the pressure, as nearly that traction as they
     can (least squares over the contact at the largest normal force).
     """
-    grid = lattice(plan.sampling, ROOM * contact_reach(plan), ONE_CELL_AN_ELEMENT.cells).grid
+    grid = lattice(plan.sampling, PROBE.room * contact_reach(plan), ONE_CELL_AN_ELEMENT.cells).grid
     operators = Operators(plan.problem.finger)
     force = max(plan.value("normal_force", float(t)) for t in np.append(plan.corners(), plan.duration))
-    pressure = solve_normal(operators, grid, plan.problem.height(grid), force=force, tolerance=1e-3).pressure
+    height, tolerance = plan.problem.height(grid), CHEAP_TIERS.beam_tolerance
+    pressure = solve_normal(operators, grid, height, force=force, tolerance=tolerance).pressure
     along_x = operators.on(grid).tangential(np.stack((pressure, np.zeros_like(pressure))))[0]
     along_y = operators.on(grid).tangential(np.stack((np.zeros_like(pressure), pressure)))[1]
     moved, touching = 0.5 * (along_x + along_y), pressure > 0.0

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from slipcore.contact.defaults import FIDELITY, PROBE
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import Scaled
 from slipcore.contact.elasticity.operator import Operators
@@ -25,19 +26,14 @@ from slipcore.contact.tiers.sampling import (
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray, GraspLog
 
-PROBE_CELLS = 48
-PROBE_TOLERANCE = 1e-3
-ROOM = 1.06
-"""Of the contact's reach, for what the coarse probe misses at its edge."""
-
 
 @dataclass(frozen=True, slots=True)
 class Fidelity:
     """``cells`` across the largest contact, load steps a frame (``substeps``), ``tolerance`` of the solver."""
 
-    cells: int = 32
-    substeps: int = 1
-    tolerance: float = 1e-4
+    cells: int = FIDELITY.cells
+    substeps: int = FIDELITY.substeps
+    tolerance: float = FIDELITY.tolerance
 
     def __post_init__(self) -> None:
         if self.cells < 4 or self.substeps < 1 or not 0.0 < self.tolerance < 1.0:
@@ -51,8 +47,8 @@ def run(plan: Plan, fidelity: Fidelity | None = None) -> GraspLog:
     """
     fidelity = Fidelity() if fidelity is None else fidelity
     began = time.perf_counter()
-    where = lattice(plan.sampling, ROOM * contact_reach(plan), fidelity.cells)
-    solver = QuasiStatic(plan.problem, where.grid, fidelity.tolerance, 1e-2 * fidelity.tolerance)
+    where = lattice(plan.sampling, PROBE.room * contact_reach(plan), fidelity.cells)
+    solver = QuasiStatic(plan.problem, where.grid, fidelity.tolerance, FIDELITY.normal_share * fidelity.tolerance)
     times = frame_times(plan)
     frames, warnings = _frames(plan, solver, where, times, fidelity.substeps)
     metadata = {
@@ -94,24 +90,24 @@ def contact_reach(plan: Plan) -> float:
     force = max(plan.value("normal_force", float(t)) for t in knots)
     softening = 1.0 + sum(branch.strength for branch in problem.creep)
     operators = Operators((*(Scaled(body, softening) for body in problem.finger), *problem.obstacle))
-    reach = 4e-3
+    reach = PROBE.first_reach
     if force <= 0.0:
         return reach
-    for _ in range(20):
-        grid = Grid.square(PROBE_CELLS, 2.0 * reach)
+    for _ in range(PROBE.tries):
+        grid = Grid.square(PROBE.cells, 2.0 * reach)
         try:
             height = problem.height(grid)
-            pressure = solve_normal(operators, grid, height, force=force, tolerance=PROBE_TOLERANCE).pressure
+            pressure = solve_normal(operators, grid, height, force=force, tolerance=PROBE.tolerance).pressure
         except InvalidInput:  # no surface within reach yet
             reach *= 2.0
             continue
         x, y = grid.points()
         touching = pressure > 0.0
         extent = float(np.maximum(np.abs(x), np.abs(y))[touching].max()) + 0.5 * grid.pitch[0]
-        if extent > 0.95 * reach:
+        if extent > PROBE.fills * reach:
             reach *= 2.0
-        elif extent < 0.3 * reach:
-            reach = 1.5 * extent
+        elif extent < PROBE.least * reach:
+            reach = PROBE.shrink * extent
         else:
             return extent
     raise InvalidInput("contact", f"reaches beyond {reach:.3g} m", "surfaces that part within some metres")

@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from slipcore.contact.defaults import CHEAP_TIERS
 from slipcore.contact.effects.elastic_object import ElasticObject
 from slipcore.contact.effects.surface_shape import SphereSurface
 from slipcore.contact.elasticity.grid import Grid
@@ -22,14 +23,6 @@ from slipcore.contact.tiers.sampling import FrameRecord, Lattice, frame_times, g
 from slipcore.frames import FloatArray, GraspLog
 
 NAME = "closed form"
-SAMPLES = 8
-"""Samples a side of each element over which its force is summed."""
-ROUNDING = 1e-12
-"""Of the sliding force."""
-SAMPLING_ERROR = 3e-3
-"""What forces by ``SAMPLES`` and a stick ratio without the threshold of 1e-3 leave at ν = 0; 1.4e-3 measured."""
-POISSON_ERROR = 0.05
-"""By ν, of what the rule leaves out: 0.035 measured on loading, changing normal force and reversal near sliding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +79,7 @@ def _line_of_force(plan: Plan) -> tuple[float, float] | None:
         return (1.0, 0.0)
     x, y = pulls[longest] / size[longest]
     across = np.abs(pulls[:, 1] * x - pulls[:, 0] * y).max()
-    return (float(x), float(y)) if across <= 1e-12 * size[longest] else None
+    return (float(x), float(y)) if across <= CHEAP_TIERS.rounding * size[longest] else None
 
 
 def accuracy(scene: SceneDescription, plan: Plan) -> float | None:
@@ -94,7 +87,7 @@ def accuracy(scene: SceneDescription, plan: Plan) -> float | None:
     case = sphere_on_plane(scene, plan)
     if case is None:
         return None
-    return SAMPLING_ERROR + POISSON_ERROR * case.both.poisson / case.both.shear
+    return CHEAP_TIERS.sampling_error + CHEAP_TIERS.poisson_error * case.both.poisson / case.both.shear
 
 
 def run(scene: SceneDescription, plan: Plan) -> GraspLog:
@@ -136,7 +129,7 @@ def _loads(plan: Plan, case: SphereOnPlane, instant: float) -> tuple[float, floa
 
 def _holds(state: MindlinDeresiewicz, normal: float, pull: float) -> bool:
     """Whether the loads are the last ones; a rounding would count as a reversal."""
-    unchanged = abs(pull - state.tangential_force) <= ROUNDING * state.friction * normal
+    unchanged = abs(pull - state.tangential_force) <= CHEAP_TIERS.rounding * state.friction * normal
     return unchanged and normal == state.contact.normal_force
 
 
@@ -182,8 +175,8 @@ def _sticking_radius(state: MindlinDeresiewicz) -> float:
 
 
 def _element_forces(state: MindlinDeresiewicz, case: SphereOnPlane, where: Lattice) -> FloatArray:
-    """Force [n, m, 3] N on each element: means over ``SAMPLES``² of its points."""
-    offset = (np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5
+    """Force [n, m, 3] N on each element: means over ``element_samples``² of its points."""
+    offset = (np.arange(CHEAP_TIERS.element_samples) + 0.5) / CHEAP_TIERS.element_samples - 0.5
     dx, dy = np.meshgrid(offset * where.pitch, offset * where.pitch)
     position = where.position()
     r = np.hypot(position[..., 0, None] + dx.ravel(), position[..., 1, None] + dy.ravel())

@@ -4,30 +4,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slipcore.contact.defaults import RAMP
+from slipcore.contact.defaults import CHEAP_TIERS, SCHEDULE, RampDefaults
 from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
 from slipcore.contact.reference.checks import check_range
 from slipcore.contact.reference.elastic_pair import half_space
 from slipcore.contact.reference.hertz import HertzContact
+from slipcore.defaults import choose_options
 from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray, FrictionLaw, GraspLog, GroundTruth
-
-STICK_TOLERANCE = 1e-9
-"""A point is at the Coulomb limit where |f_t| ≥ (1 − this) μ f_n."""
 
 
 @dataclass(frozen=True, slots=True)
 class RampSchedule:
     """Seconds of each phase, in their order; a phase of 0 s is left out (but the log needs two frames)."""
 
-    rest: float = 0.5
+    rest: float = SCHEDULE.rest
     """Without contact: a detector sees its noise, then the touch."""
-    press: float = 1.0
+    press: float = SCHEDULE.press
     """F_N rises in proportion to time. On an uncoupled half-space this moves points along the normal only."""
-    settle: float = 0.5
-    shear: float = 3.0
+    settle: float = SCHEDULE.settle
+    shear: float = SCHEDULE.shear
     """F_T rises in proportion to time at constant F_N."""
-    hold: float = 0.5
+    hold: float = SCHEDULE.hold
     """Constant load: points stay at the Coulomb limit but no longer move."""
 
 
@@ -46,45 +44,36 @@ class _Fields:
 
 def tangential_ramp(
     *,
-    friction: float = RAMP.friction,
-    normal_force: float = RAMP.normal_force,
-    tangential_force: float = RAMP.tangential_force,
-    sphere_radius: float = RAMP.sphere_radius,
-    young_modulus: float = RAMP.young_modulus,
-    poisson_ratio: float = RAMP.poisson_ratio,
-    points: int = RAMP.points,
-    pitch: float = RAMP.pitch,
-    frame_rate: float = RAMP.frame_rate,
     schedule: RampSchedule | None = None,
     marker_noise: float = 0.0,
     force_noise: float = 0.0,
     seed: int | np.random.Generator = 0,
+    **options: float,
 ) -> GraspLog:
     """Log with truth of a rigid sphere pressed on a flat elastic sensor with F_N (N) and sheared along +x.
 
-    ``tangential_force`` is the final F_T as a fraction of the sliding force μF_N, 0 to 1 (at 1 the contact has just
-    begun to slide). ``marker_noise`` m and ``force_noise`` N are standard deviations per component; the truth and the
-    object's pose stay exact. Points lie on a centred square lattice of ``points``² at ``pitch`` m; the force of an
-    element is the traction at its point times pitch². SI; other arguments and defaults: ``contact.defaults.Ramp``.
-    Coulomb friction with constant μ, sensor a half-space without normal–tangential coupling. Raises ``InvalidInput``.
+    ``options`` are those of ``contact.defaults.RampDefaults``. ``marker_noise`` m and ``force_noise`` N are standard
+    deviations per component; the truth and the object's pose stay exact. Points lie on a centred square lattice; the
+    force of an element is the traction at its point times pitch². Coulomb friction with constant μ, sensor a half-space
+    without normal–tangential coupling. Raises ``InvalidInput``.
     """
-    check_range("friction", friction, above=0.0)
-    check_range("normal_force", normal_force, above=0.0, unit="N")
-    check_range("tangential_force", tangential_force, at_least=0.0, at_most=1.0, unit="of the sliding force")
+    ramp = choose_options(RampDefaults, options)
+    check_range("friction", ramp.friction, above=0.0)
+    check_range("normal_force", ramp.normal_force, above=0.0, unit="N")
     check_range("marker_noise", marker_noise, at_least=0.0, unit="m")
     check_range("force_noise", force_noise, at_least=0.0, unit="N")
-    compliance = half_space(young_modulus, poisson_ratio)
-    time, normal, tangential = _loads(schedule or RampSchedule(), frame_rate)
-    position = _lattice(points, pitch)
+    compliance = half_space(ramp.young_modulus, ramp.poisson_ratio)
+    time, normal, tangential = _loads(schedule or RampSchedule(), ramp.frame_rate)
+    position = _lattice(ramp.points, ramp.pitch)
 
     def frame(k: int) -> _Fields:
-        hertz = HertzContact(sphere_radius, float(normal[k]) * normal_force, compliance)
-        sliding_force = friction * hertz.normal_force
-        sheared = CattaneoMindlin(hertz, friction, float(tangential[k]) * tangential_force * sliding_force)
-        return _fields(sheared, position, pitch**2)
+        hertz = HertzContact(ramp.sphere_radius, float(normal[k]) * ramp.normal_force, compliance)
+        sliding_force = ramp.friction * hertz.normal_force
+        sheared = CattaneoMindlin(hertz, ramp.friction, float(tangential[k]) * ramp.tangential_force * sliding_force)
+        return _fields(sheared, position, ramp.pitch**2)
 
     noise = (marker_noise, force_noise, np.random.default_rng(seed))
-    return _log(time, position, pitch, [frame(k) for k in range(len(time))], friction, noise)
+    return _log(time, position, ramp.pitch, [frame(k) for k in range(len(time))], ramp.friction, noise)
 
 
 def _log(
@@ -119,7 +108,8 @@ def _loads(schedule: RampSchedule, frame_rate: float) -> tuple[FloatArray, Float
     for name, seconds in zip(RampSchedule.__slots__, phases, strict=True):
         check_range(f"schedule.{name}", seconds, at_least=0.0, unit="s")
     knots = np.cumsum([0.0, *phases])
-    last = np.floor(knots[-1] * frame_rate * (1.0 + 1e-12))  # a whole number of frames stays one in spite of rounding
+    # A whole number of frames stays one in spite of rounding.
+    last = np.floor(knots[-1] * frame_rate * (1.0 + CHEAP_TIERS.rounding))
     time = np.arange(last + 1.0) / frame_rate
     normal = _rise(time, knots[1], schedule.press)
     return time, normal, _rise(time, knots[3], schedule.shear)
@@ -155,7 +145,7 @@ def _fields(sheared: CattaneoMindlin, position: FloatArray, element_area: float)
         force=traction * element_area,
         pose=np.array([sheared.rigid_displacement, 0.0, 0.0]),
         contact=contact,
-        at_limit=contact & (traction[..., 0] >= (1.0 - STICK_TOLERANCE) * sheared.friction * pressure),
+        at_limit=contact & (traction[..., 0] >= (1.0 - CHEAP_TIERS.limit_rounding) * sheared.friction * pressure),
         slip=np.where(contact[..., np.newaxis], sheared.slip(x, y), 0.0),
         stick_ratio=sheared.stick_ratio if hertz.normal_force > 0.0 else np.nan,
     )

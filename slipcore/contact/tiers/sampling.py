@@ -5,13 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from slipcore.contact.defaults import ACCURACY, CHEAP_TIERS
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.plan.plan import Plan, Sampling
 from slipcore.contact.solver.quasi_static import StepResult
 from slipcore.frames import BoolArray, FloatArray, GraspLog, GroundTruth
-
-UNSAMPLED_FRAMES = 60
-"""Frames of a scene without a sensor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +71,9 @@ def lattice(sampling: Sampling | None, reach: float, cells_across: int) -> Latti
 
 def frame_times(plan: Plan) -> FloatArray:
     """Times of the frames, from zero to the end of the scene."""
-    rate = UNSAMPLED_FRAMES / plan.duration if plan.sampling is None else plan.sampling.frame_rate
-    last = np.floor(plan.duration * rate * (1.0 + 1e-12))  # a whole number of frames stays one in spite of rounding
+    rate = ACCURACY.frames / plan.duration if plan.sampling is None else plan.sampling.frame_rate
+    # A whole number of frames stays one in spite of rounding.
+    last = np.floor(plan.duration * rate * (1.0 + CHEAP_TIERS.rounding))
     return np.asarray(np.arange(last + 1.0) / rate)
 
 

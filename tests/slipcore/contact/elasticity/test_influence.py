@@ -4,8 +4,9 @@ import mpmath
 import numpy as np
 import pytest
 
+from slipcore.contact.defaults import INFLUENCE
 from slipcore.contact.elasticity.grid import Grid
-from slipcore.contact.elasticity.influence import INTEGRANDS, NEAR, HalfSpace, Opposite, Scaled, cell_integral
+from slipcore.contact.elasticity.influence import INTEGRANDS, HalfSpace, MirroredBody, Scaled, cell_integral
 from slipcore.errors import InvalidInput
 
 ANTIDERIVATIVES = {
@@ -32,7 +33,7 @@ def exact(name: str, i: int, j: int, hx: float, hy: float) -> float:
 def test_cell_integrals_hold_near_and_far_and_for_any_aspect(name: str, pitch: tuple[float, float]) -> None:
     grid = Grid((600, 600), pitch)
     got = cell_integral(name, grid)
-    edge = int(NEAR)
+    edge = int(INFLUENCE.near)
     for i, j in (
         (0, 0),
         (0, 1),
@@ -45,7 +46,7 @@ def test_cell_integrals_hold_near_and_far_and_for_any_aspect(name: str, pitch: t
         (0, 599),
         (599, 599),
     ):
-        # corner sums within NEAR lose up to NEAR²·aspect² roundings; nothing is lost beyond
+        # corner sums within INFLUENCE.near lose up to INFLUENCE.near²·aspect² roundings; nothing is lost beyond
         np.testing.assert_allclose(
             got[i, j], exact(name, i, j, *pitch), rtol=3e-11, atol=1e-13 * got.max(), err_msg=f"{i}, {j}"
         )
@@ -75,8 +76,8 @@ def test_what_is_zero_is_absent() -> None:
 def test_scaled_and_opposite_bodies() -> None:
     grid, body = Grid((3, 3), (1.0, 1.0)), HalfSpace(1.0, 0.3)
     np.testing.assert_array_equal(Scaled(body, 2.0).influence("nn", grid), 2.0 * body.influence("nn", grid))
-    np.testing.assert_array_equal(Opposite(body).influence("zx", grid), -body.influence("zx", grid))
-    np.testing.assert_array_equal(Opposite(body).influence("xx", grid), body.influence("xx", grid))
+    np.testing.assert_array_equal(MirroredBody(body).influence("zx", grid), -body.influence("zx", grid))
+    np.testing.assert_array_equal(MirroredBody(body).influence("xx", grid), body.influence("xx", grid))
 
 
 @pytest.mark.parametrize(

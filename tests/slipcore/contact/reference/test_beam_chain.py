@@ -1,8 +1,10 @@
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from slipcore.contact.defaults import REFERENCE
 from slipcore.contact.errors import InfeasibleLoad, NotConverged
 from slipcore.contact.reference import beam_chain
 from slipcore.contact.reference.beam_chain import BeamLattice, drag, follow, layer_beams, push, unloaded
@@ -90,7 +92,7 @@ def test_every_state_satisfies_equilibrium_limit_and_complementarity() -> None:
     opposite = np.linalg.norm(state.slip, axis=-1)[slipping] * size[slipping]
     np.testing.assert_allclose(dissipated, opposite, rtol=1e-5)
     np.testing.assert_allclose(state.force[limit == 0.0], 0.0, atol=1e-9 * limit.max())
-    assert state.residual <= beam_chain.TOLERANCE
+    assert state.residual <= REFERENCE.beam_tolerance
 
 
 def test_over_relaxation_keeps_strongly_coupled_beams_cheap() -> None:
@@ -185,7 +187,7 @@ def test_a_long_wave_sees_the_layer_that_the_beams_stand_for() -> None:
 
 
 def test_unconverged_beams_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(beam_chain, "MAX_SWEEPS", 2)
+    monkeypatch.setattr(beam_chain, "REFERENCE", replace(REFERENCE, beam_sweeps=2))
     with pytest.raises(NotConverged, match="beam lattice"):
         drag(PATCH, unloaded(PATCH), np.array([1e-3, 0.0, 0.0]), pressed(PATCH, 2.0, 2.8e-3))
 

@@ -9,7 +9,7 @@ import pytest
 
 from slipcore.contact.effects import FiniteLayer
 from slipcore.contact.elasticity.grid import Grid
-from slipcore.contact.elasticity.influence import HalfSpace, Opposite
+from slipcore.contact.elasticity.influence import HalfSpace, MirroredBody
 from slipcore.contact.elasticity.operator import Operators
 from slipcore.contact.errors import InfeasibleLoad
 from slipcore.contact.plan.plan import Plan
@@ -304,7 +304,7 @@ def test_a_stiff_object_meets_the_rigid_one() -> None:
     path = [at(FORCE), at(FORCE, 0.7 * SLIDING)]
     rigid = follow(problem(), path)[-1]
     for stiffer in (1e3, 1e9):
-        elastic = follow(problem(obstacle=(Opposite(body(young=stiffer * YOUNG)),)), path)[-1]
+        elastic = follow(problem(obstacle=(MirroredBody(body(young=stiffer * YOUNG)),)), path)[-1]
         assert elastic.pose[0] == pytest.approx(rigid.pose[0], rel=2.0 / stiffer + 1e-7)
 
 

@@ -15,64 +15,65 @@ def disks(cells: int = 24, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.nd
     """Radii of a Hertz-like contact, arms and random wishes; ``cells`` squared of them."""
     x, y = np.meshgrid(np.linspace(-1.0, 1.0, cells), np.linspace(-1.0, 1.0, cells))
     radius = np.sqrt(np.maximum(1.0 - (x**2 + y**2) / 0.9, 0.0)).ravel()
-    wish = np.random.default_rng(seed).normal(size=(2, cells**2))
-    return radius, np.stack((x.ravel(), y.ravel())), wish
+    point = np.random.default_rng(seed).normal(size=(2, cells**2))
+    return radius, np.stack((x.ravel(), y.ravel())), point
 
 
-def on_disks(wish: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    size = np.hypot(*wish)
-    return wish * np.minimum(1.0, radius / np.where(size > 0.0, size, 1.0))
+def on_disks(point: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    size = np.hypot(*point)
+    return point * np.minimum(1.0, radius / np.where(size > 0.0, size, 1.0))
 
 
-def dual(motion: np.ndarray, wish: np.ndarray, radius: np.ndarray, arm: np.ndarray, target: np.ndarray) -> float:
+def dual(motion: np.ndarray, point: np.ndarray, radius: np.ndarray, arm: np.ndarray, target: np.ndarray) -> float:
     """The dual function, in plain numpy."""
-    size = np.hypot(*(wish + rigid_displacement(arm, motion)))
+    size = np.hypot(*(point + rigid_displacement(arm, motion)))
     value = np.where(size <= radius, 0.5 * size**2, radius * size - 0.5 * radius**2)
     return float(value.sum() - target @ motion)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.9])
 def test_projection_meets_its_optimality_conditions(share: float) -> None:
-    radius, arm, wish = disks()
+    radius, arm, point = disks()
     target = np.array([share, -0.1, 0.2]) * 0.7 * radius.sum()
-    got = project(wish, radius, arm, target, GIVEN)
+    got = project(point, radius, arm, target, GIVEN)
     assert got.feasible
     np.testing.assert_allclose(resultants(got.traction, arm), target, rtol=0.0, atol=1e-12 * radius.sum())
-    expected = on_disks(wish + rigid_displacement(arm, got.motion), radius)
+    expected = on_disks(point + rigid_displacement(arm, got.motion), radius)
     np.testing.assert_allclose(got.traction, expected, rtol=0.0, atol=1e-14)
 
 
 def test_projection_minimises_the_dual_that_numpy_minimises() -> None:
-    radius, arm, wish = disks(10)
+    radius, arm, point = disks(10)
     target = np.array([0.5, 0.1, 0.1]) * radius.sum()
-    got = project(wish, radius, arm, target, GIVEN)
-    reference = minimize(dual, np.zeros(3), args=(wish, radius, arm, target), method="BFGS", tol=1e-9)
+    got = project(point, radius, arm, target, GIVEN)
+    reference = minimize(dual, np.zeros(3), args=(point, radius, arm, target), method="BFGS", tol=1e-9)
     np.testing.assert_allclose(got.motion, reference.x, rtol=1e-5, atol=1e-6)  # BFGS with numerical gradients
 
 
 def test_compiled_projection_is_the_interpreted_one() -> None:
     from slipcore.contact.solver import projection
 
-    radius, arm, wish = disks(8)
-    target, traction = np.array([0.6, 0.0, 0.1]) * radius.sum(), np.empty_like(wish)
+    radius, arm, point = disks(8)
+    target, traction = np.array([0.6, 0.0, 0.1]) * radius.sum(), np.empty_like(point)
     gradient, hessian = np.empty(3), np.empty((3, 3))
     motion = np.array([0.4, -0.2, 0.7])
-    projection._evaluate(wish, radius, arm, target, GIVEN, motion, traction, gradient, hessian)
-    expected = on_disks(wish + rigid_displacement(arm, motion), radius)
+    constraints = projection.Constraints(point, radius, arm, target, GIVEN)
+    projection._evaluate(constraints, motion, projection.Evaluation(traction, gradient, hessian))
+    expected = on_disks(point + rigid_displacement(arm, motion), radius)
     np.testing.assert_allclose(traction, expected, rtol=0.0, atol=1e-15)
     np.testing.assert_allclose(gradient, resultants(expected, arm) - target, rtol=0.0, atol=1e-13)
     step = 1e-6
     for k, e in enumerate(np.eye(3) * step):
-        ahead = resultants(on_disks(wish + rigid_displacement(arm, motion + e), radius), arm)
-        behind = resultants(on_disks(wish + rigid_displacement(arm, motion - e), radius), arm)
+        ahead = resultants(on_disks(point + rigid_displacement(arm, motion + e), radius), arm)
+        behind = resultants(on_disks(point + rigid_displacement(arm, motion - e), radius), arm)
         np.testing.assert_allclose(hessian[k], (ahead - behind) / (2 * step), rtol=1e-6, atol=1e-6)
 
 
 @pytest.mark.parametrize("short", [1e-3, 1e-6, 1e-9, 1e-12])
 def test_projection_holds_close_to_full_sliding(short: float) -> None:
-    radius, arm, wish = disks()
+    radius, arm, point = disks()
     target = np.array([(1.0 - short) * radius.sum(), 0.0, 0.0])
-    got = project(0.1 * wish, radius, arm, target, GIVEN)
+    got = project(0.1 * point, radius, arm, target, GIVEN)
     assert got.feasible
     assert got.iterations <= 45
     assert np.abs(got.imbalance).max() <= 1e-13 * radius.sum()
@@ -80,17 +81,17 @@ def test_projection_holds_close_to_full_sliding(short: float) -> None:
 
 @pytest.mark.parametrize("load", [(1.001, 0.0, 0.0), (0.8, 0.0, 0.4), (0.0, 0.0, 2.0), (-3.0, 4.0, 0.0)])
 def test_loads_outside_the_limit_surface_are_recognised(load: tuple[float, float, float]) -> None:
-    radius, arm, wish = disks()
+    radius, arm, point = disks()
     target = np.array(load) * radius.sum()
-    assert not project(0.1 * wish, radius, arm, target, GIVEN).feasible
+    assert not project(0.1 * point, radius, arm, target, GIVEN).feasible
     assert limit_load(radius, arm, target, GIVEN).factor < 1.0
 
 
 def test_a_held_motion_leaves_its_load_free() -> None:
-    radius, arm, wish = disks()
+    radius, arm, point = disks()
     given = np.array([True, False, False])
     target = np.array([0.4 * radius.sum(), 0.0, 0.0])
-    got = project(wish, radius, arm, target, given)
+    got = project(point, radius, arm, target, given)
     assert got.motion[1] == got.motion[2] == 0.0
     assert got.traction[0].sum() == pytest.approx(target[0], abs=1e-12 * radius.sum())
     assert abs(got.traction[1].sum()) > 1e-3
@@ -107,14 +108,14 @@ def test_limit_surface_in_pure_force_and_pure_moment() -> None:
 
 
 def test_the_factor_brings_a_load_exactly_to_the_surface() -> None:
-    radius, arm, wish = disks()
+    radius, arm, point = disks()
     load = np.array([0.5, 0.3, 0.4]) * radius.sum()
     factor, motion = limit_load(radius, arm, load, GIVEN)
     np.testing.assert_allclose(
         resultants(sliding_traction(radius, arm, motion), arm), factor * load, rtol=0.0, atol=1e-6 * radius.sum()
     )
-    assert project(wish, radius, arm, (1.0 - 1e-6) * factor * load, GIVEN).feasible
-    assert not project(wish, radius, arm, (1.0 + 1e-6) * factor * load, GIVEN).feasible
+    assert project(point, radius, arm, (1.0 - 1e-6) * factor * load, GIVEN).feasible
+    assert not project(point, radius, arm, (1.0 + 1e-6) * factor * load, GIVEN).feasible
 
 
 def test_no_load_has_no_limit() -> None:

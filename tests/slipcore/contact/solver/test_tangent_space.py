@@ -32,9 +32,9 @@ def flat(field: np.ndarray) -> np.ndarray:
 def test_cells_stick_inside_their_disk_and_slide_on_it() -> None:
     traction, slip, limit, arm, _ = case()
     space = TangentSpace(traction, slip, limit, 0.5, arm, GIVEN)
-    wish = np.hypot(*(traction - 0.5 * slip))
+    point = np.hypot(*(traction - 0.5 * slip))
     np.testing.assert_array_equal(space.state == OUTSIDE, limit <= 0.0)
-    np.testing.assert_array_equal(space.state == SLIP, (wish > limit) & (limit > 0.0))
+    np.testing.assert_array_equal(space.state == SLIP, (point > limit) & (limit > 0.0))
     assert (space.state == STICK).any()
     sliding = space.state == SLIP
     np.testing.assert_allclose(np.hypot(*(traction + space.onto_circle))[sliding], limit[sliding], rtol=1e-14)

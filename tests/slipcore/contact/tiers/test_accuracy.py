@@ -1,8 +1,11 @@
 """Accuracy on request: estimates that hold, budgets that are kept."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from slipcore.contact.defaults import ACCURACY
 from slipcore.contact.effects import LoadPath, SensorSampling, TangentialLoad, Torsion
 from slipcore.contact.errors import NotConverged
 from slipcore.contact.plan.plan import Plan
@@ -50,7 +53,7 @@ class Clock:
 
     def run(self, plan: Plan, fidelity: Fidelity) -> GraspLog:
         log = run(plan, fidelity)
-        self.now += (fidelity.cells / 100.0) ** accuracy.COST_ORDER * fidelity.substeps
+        self.now += (fidelity.cells / 100.0) ** ACCURACY.cost_order * fidelity.substeps
         return log
 
 
@@ -97,6 +100,6 @@ def test_a_fidelity_beside_an_accuracy_is_refused() -> None:
 
 
 def test_an_accuracy_out_of_reach_is_an_error_not_an_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("slipcore.contact.tiers.accuracy.FINEST_CELLS", 20)
+    monkeypatch.setattr(accuracy, "ACCURACY", replace(ACCURACY, finest_cells=20))
     with pytest.raises(NotConverged, match="accuracy"):
         simulate_to(SCENES["shear"].plan(), accuracy=0.005)
