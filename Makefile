@@ -12,7 +12,7 @@ RESOLUTION := --universal --python-version 3.11 --generate-hashes --no-emit-inde
     --no-emit-package stiction --no-emit-package stiction-client
 export UV_PYTHON_DOWNLOADS := never
 
-.PHONY: demo test test-long coverage lint types unit setup recordings docs constraints upgrade sbom notices clean
+.PHONY: demo test test-long coverage mutants lint types unit setup recordings docs constraints upgrade sbom notices clean
 
 demo: setup recordings  ## run the whole path on real input and write pictures and a report to $(OUTPUT)
 	$(BIN)/stiction demo --output $(OUTPUT) --recordings $(RECORDINGS)
@@ -37,6 +37,9 @@ coverage: setup recordings  ## the tests again, with the lines that none of them
 
 test-long: setup recordings  ## calibration, fuzz and kill campaigns; results stand in docs/long-tests.md
 	$(BIN)/pytest -m long -n 2 --dist worksteal --durations=0
+
+mutants: setup recordings  ## change the code in 300 small ways and see whether tests fail: docs/mutants.md; hours
+	$(BIN)/python -m benchmarks.mutants
 
 docs: setup  ## the pages and the Python reference as a site, in site/; a link that leads nowhere stops it
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict

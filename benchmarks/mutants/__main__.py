@@ -1,0 +1,97 @@
+"""Mutation testing: `python -m benchmarks.mutants [--count N] [--seed N] [--work FOLDER] [--cover] [--again]`.
+
+Draws mutants of the code, tries each with the tests that run its line, and writes mutants.md and images/mutants.json to
+`--output`. All happens in a copy below `--work`, whose verdicts stay: a run that was stopped goes on, `--again` tries
+survivors once more. The first run, or `--cover`, runs all tests once to know what they cover; `--cover tests/a.py` adds
+those of new tests. `--only slipcore/frames.py:12` tries every mutant of a file or of one of its lines, and only prints.
+"""
+
+import argparse
+import json
+import tomllib
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import asdict
+from pathlib import Path
+
+from benchmarks.mutants import sample, verdicts
+from benchmarks.mutants.edits import Edit, edits
+from benchmarks.mutants.page import page, score
+from benchmarks.mutants.scratch_copy import ROOT, ScratchCopy
+from benchmarks.mutants.verdicts import Court, Verdict
+
+EXPLAINED = Path(__file__).with_name("explained.toml")
+
+
+def main() -> None:
+    """Draw, try, and tell."""
+    options = _options()
+    copy = ScratchCopy(options.work)
+    copy.refresh()
+    if options.cover is not None or not copy.data.exists():
+        copy.cover(options.cover or [])
+    if options.only:
+        _try_place(copy, options.only)
+    else:
+        _try_sample(copy, options)
+
+
+def _try_sample(copy: ScratchCopy, options: argparse.Namespace) -> None:
+    drawn = sample.draw(copy.root, options.count, options.seed)
+    path = options.work / f"verdicts-{options.seed}.jsonl"
+    found = verdicts.known(path)
+    waiting = [edit for edit in drawn if edit.key not in found or (options.again and not found[edit.key].is_killed)]
+    with _court(copy) as try_mutant:
+        for number, edit in enumerate(waiting, 1):
+            verdict = found[edit.key] = try_mutant(edit)
+            verdicts.append(path, verdict)
+            print(f"{number}/{len(waiting)} {_line(edit, verdict)}", flush=True)
+    _write(copy, drawn, found, options.output)
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=320, help="how many mutants are drawn, at least")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--work", type=Path, default=ROOT / ".cache" / "mutants", help="the copy and all verdicts")
+    parser.add_argument("--cover", nargs="*", metavar="TESTS", help="run the tests with coverage first")
+    parser.add_argument("--again", action="store_true", help="try survivors once more")
+    parser.add_argument("--only", metavar="PLACE", help="a file, or file:line")
+    parser.add_argument(
+        "--output", type=Path, default=ROOT / "docs", help="where mutants.md and images/mutants.json go"
+    )
+    return parser.parse_args()
+
+
+@contextmanager
+def _court(copy: ScratchCopy) -> Iterator[Callable[[Edit], Verdict]]:
+    paths = [path for package in sample.PACKAGES for path in sample.sources(copy.root, package)]
+    with closing(Court(copy, paths)) as court:
+        yield court.try_mutant
+
+
+def _try_place(copy: ScratchCopy, place: str) -> None:
+    path, _, line = place.partition(":")
+    with _court(copy) as try_mutant:
+        for edit in edits(copy.root, path):
+            if not line or edit.start[0] == int(line):
+                print(_line(edit, try_mutant(edit)), flush=True)
+
+
+def _line(edit: Edit, verdict: Verdict) -> str:
+    place = f"{edit.path}:{edit.start[0]} {edit.old!r} → {edit.new!r}"
+    found = f"killed by {verdict.by}" if verdict.is_killed else "SURVIVED"
+    return f"{place} {found} ({verdict.seconds} s, {verdict.tests} tests)"
+
+
+def _write(copy: ScratchCopy, drawn: list[Edit], found: dict[str, Verdict], output: Path) -> None:
+    reasons = tomllib.loads(EXPLAINED.read_text()) if EXPLAINED.exists() else {}
+    lines = sample.lines_of(copy.root)
+    print(score(drawn, found, reasons, lines))
+    (output / "mutants.md").write_text(page(drawn, found, reasons, lines))
+    records = [asdict(found[edit.key]) for edit in sorted(drawn, key=lambda edit: edit.key)]
+    (output / "images" / "mutants.json").write_text(json.dumps(records, indent=1, ensure_ascii=False) + "\n")
+
+
+if __name__ == "__main__":
+    main()

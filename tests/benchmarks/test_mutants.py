@@ -1,0 +1,234 @@
+"""Mutation testing itself: a tool that finds too little makes any tests look good."""
+
+import json
+import sqlite3
+import subprocess
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from coverage.numbits import nums_to_numbits
+
+from benchmarks.mutants import sample, verdicts
+from benchmarks.mutants.edits import Edit, edits
+from benchmarks.mutants.page import page, score
+from benchmarks.mutants.reach import Reach
+from benchmarks.mutants.scratch_copy import ScratchCopy
+from benchmarks.mutants.verdicts import Court, Verdict
+
+PROGRAM = '''\
+"""A program."""
+
+from typing import TYPE_CHECKING, cast
+
+LIMIT = 3
+if TYPE_CHECKING:
+    UNUSED = 7
+
+
+def is_large(x: "int | None") -> bool:
+    return x is not None and x > LIMIT
+
+
+def total(xs: list[int], start=0):
+    """Adds up."""
+    while xs:
+        xs, start = xs[1:], start + xs[0]
+    return cast("dict[int, int]", start)
+
+
+def large_total(xs):
+    return is_large(total(xs))
+'''
+
+TESTS = """\
+from slipcore import program
+
+
+def test_is_large():
+    assert program.is_large(5)
+    assert not program.is_large(2)
+
+
+def test_total():
+    assert program.total([1, 2]) == 3
+
+
+def test_flaky():
+    import pathlib
+    mark = pathlib.Path("mark")
+    mark.touch()
+    assert program.is_large(4) and False
+"""
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> ScratchCopy:
+    """Of a small repository, as covered: ``test_total`` runs a loop, the others ``is_large``."""
+    checkout = tmp_path / "checkout"
+    for name, text in {
+        "slipcore/__init__.py": "",
+        "slipcore/program.py": PROGRAM,
+        "tests/slipcore/test_program.py": TESTS,
+        "pytest.ini": "[pytest]\naddopts = -p no:schemathesis -p no:anyio -p no:hypothesispytest -p no:cov",
+        ".gitignore": "ignored.py",
+        "ignored.py": "",
+    }.items():
+        (checkout / name).parent.mkdir(parents=True, exist_ok=True)
+        (checkout / name).write_text(text)
+    for package in ("estimators", "db", "service", "clients"):
+        (checkout / package).mkdir()
+        (checkout / package / "__init__.py").touch()
+    subprocess.run(["git", "init", "--quiet"], cwd=checkout, check=True)
+    copy = ScratchCopy(tmp_path / "work", checkout)
+    copy.root.mkdir(parents=True)
+    copy.refresh()
+    copy.keep()
+    _cover(copy.data, {"test_is_large": [11], "test_flaky": [11], "test_total": [16, 17, 18]})
+    copy.durations.write_text(json.dumps({"tests/slipcore/test_program.py::test_total": 0.1}))
+    return copy
+
+
+def _cover(data: Path, lines: dict[str, list[int]]) -> None:
+    with closing(sqlite3.connect(data)) as database, database:
+        database.execute("CREATE TABLE file (id, path)")
+        database.execute("CREATE TABLE context (id, context)")
+        database.execute("CREATE TABLE line_bits (file_id, context_id, numbits)")
+        database.execute("INSERT INTO file VALUES (1, '/elsewhere/slipcore/program.py')")
+        database.execute("INSERT INTO context VALUES (0, '')")
+        database.execute("INSERT INTO line_bits VALUES (1, 0, ?)", [nums_to_numbits(range(1, 22))])
+        for number, (test, own) in enumerate(lines.items(), 1):
+            database.execute(
+                "INSERT INTO context VALUES (?, ?)", [number, f"tests/slipcore/test_program.py::{test}|run"]
+            )
+            database.execute("INSERT INTO line_bits VALUES (1, ?, ?)", [number, nums_to_numbits(own)])
+
+
+@pytest.fixture
+def court(copy: ScratchCopy) -> Iterator[Court]:
+    with closing(Court(copy, ["slipcore/program.py"], libraries="", compiling=5.0)) as court:
+        yield court
+
+
+def change(copy: ScratchCopy, old: str, new: str) -> Edit:
+    return next(e for e in edits(copy.root, "slipcore/program.py") if (e.old, e.new) == (old, new))
+
+
+def test_what_decides_is_changed_and_nothing_else(copy: ScratchCopy) -> None:
+    found = {(edit.start[0], edit.old, edit.new) for edit in edits(copy.root, "slipcore/program.py")}
+    assert found == {
+        (5, "3", "4"),
+        (11, "x is not None and x > LIMIT", "None"),
+        (11, "is not", "is"),
+        (11, "and", "or"),
+        (11, ">", ">="),
+        (11, ">", "<="),
+        (14, "0", "1"),
+        (17, "1", "2"),
+        (17, "+", "-"),
+        (17, "0", "1"),
+        (18, 'cast("dict[int, int]", start)', "None"),
+        (22, "is_large(total(xs))", "None"),
+    }
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("def f(a):\n    return a[-1]\n", "def f(a):\n    return a[1]\n"),
+        ("def f(a):\n    if not a:\n        a.b()\n", "def f(a):\n    if a:\n        a.b()\n"),
+        ("def f(a):\n    if a:\n        a.b()\n", "def f(a):\n    if not (a):\n        a.b()\n"),
+        ("def f(a):\n    a.b()\n", "def f(a):\n    pass\n"),
+        ("x = 'ä' * (2) # +\n", "x = 'ä' / (2) # +\n"),
+        ("x = (a  # a + b\n     + b)\n", "x = (a  # a + b\n     - b)\n"),
+        ("x = 0.0\n", "x = 1.0\n"),
+        ("x = 2.0\n", "x = 3.0\n"),
+        ("x = True\n", "x = False\n"),
+        ("x += y\n", "x -= y\n"),
+        ("for x in y:\n    break\n", "for x in y:\n    continue\n"),
+        ("x = a not  in b\n", "x = a in b\n"),
+    ],
+)
+def test_a_change_is_of_its_place_alone(tmp_path: Path, before: str, after: str) -> None:
+    (tmp_path / "a.py").write_text(before)
+    assert after.encode() in [edit.apply(before.encode()) for edit in edits(tmp_path, "a.py")]
+
+
+def test_an_edit_is_known_again_where_lines_before_it_changed(tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text("x = 1 + 1\n")
+    before = [edit.key for edit in edits(tmp_path, "a.py")]
+    (tmp_path / "a.py").write_text("import b\nx = 1 + 1\n")
+    assert [edit.key for edit in edits(tmp_path, "a.py")] == before
+    assert len(set(before)) == 3
+
+
+def test_packages_have_their_share_and_a_seed_draws_the_same(copy: ScratchCopy) -> None:
+    assert sample.shares({"a": 30, "b": 10}, 5) == {"a": 4, "b": 2}
+    drawn = sample.draw(copy.root, 4, seed=1)
+    assert len(drawn) == 4
+    assert drawn == sample.draw(copy.root, 4, seed=1)
+    assert drawn != sample.draw(copy.root, 4, seed=2)
+    more = sample.draw(copy.root, 8, seed=1)
+    assert set(drawn) < set(more)
+
+
+def test_tests_reach_a_line_directly_or_through_what_uses_it(copy: ScratchCopy) -> None:
+    reach = Reach(copy.data, copy.covered, copy.root, ["slipcore/program.py"])
+    large = {f"tests/slipcore/test_program.py::{name}" for name in ("test_is_large", "test_flaky")}
+    total = {"tests/slipcore/test_program.py::test_total"}
+    assert reach.of(change(copy, "and", "or")) == large
+    assert reach.of(change(copy, "3", "4")) == large  # a constant: by the line that reads it
+    assert reach.of(change(copy, "+", "-")) == total
+    default = next(e for e in edits(copy.root, "slipcore/program.py") if e.start[0] == 14)
+    assert reach.of(default) == total
+    assert reach.of(change(copy, "is_large(total(xs))", "None")) == set()
+
+
+def test_lines_that_moved_since_are_found(copy: ScratchCopy) -> None:
+    path = copy.root / "slipcore/program.py"
+    path.write_text(path.read_text().replace("LIMIT = 3\n", "# The largest of small ones.\nLIMIT = 3\n"))
+    reach = Reach(copy.data, copy.covered, copy.root, ["slipcore/program.py"])
+    assert len(reach.of(change(copy, "and", "or"))) == 2
+
+
+def test_a_mutant_is_killed_survives_or_never_ends(copy: ScratchCopy, court: Court) -> None:
+    killed = court.try_mutant(change(copy, "and", "or"))
+    assert killed.is_killed
+    assert killed.by == "tests/slipcore/test_program.py::test_is_large"
+    assert not court.try_mutant(change(copy, ">", ">=")).is_killed
+    endless = replace(change(copy, "1", "2"), new="0")
+    assert court.try_mutant(endless).by == "time limit"
+    assert not court.try_mutant(change(copy, "is_large(total(xs))", "None")).is_killed
+    assert (copy.root / "slipcore/program.py").read_text() == PROGRAM
+
+
+def test_a_run_that_was_stopped_goes_on(tmp_path: Path) -> None:
+    path = tmp_path / "verdicts.jsonl"
+    first, second = (Verdict("a", 1, by, 2, 0, 0.5) for by in ("", "tests/test_a.py::test_b"))
+    assert verdicts.known(path) == {}
+    verdicts.append(path, first)
+    verdicts.append(path, second)
+    assert verdicts.known(path) == {"a": second}
+    assert json.loads(path.read_text().splitlines()[0])["by"] == ""
+
+
+def test_the_copy_has_what_the_checkout_has(copy: ScratchCopy, tmp_path: Path) -> None:
+    assert not (copy.root / "ignored.py").exists()
+    (tmp_path / "checkout/slipcore/program.py").unlink()
+    (tmp_path / "checkout/slipcore/other.py").write_text("x = 1\n")
+    copy.refresh()
+    assert {path.name for path in (copy.root / "slipcore").glob("*.py")} == {"__init__.py", "other.py"}
+
+
+def test_the_page_tells_score_and_survivors(copy: ScratchCopy) -> None:
+    killed, explained, missed = (change(copy, *words) for words in (("and", "or"), (">", ">="), ("+", "-")))
+    drawn = [killed, explained, missed]
+    found = {edit.key: Verdict(edit.key, 1, "a test" if edit is killed else "", 1, 0, 0.1) for edit in drawn}
+    reasons = {explained.key: "the limit itself is never met"}
+    assert "| slipcore | 20 | 3 | 1 | 1 | 1 | 50.0% |" in score(drawn, found, reasons, {"slipcore": 20})
+    text = page(drawn, found, reasons, {"slipcore": 20})
+    assert "`>` → `>=`: the limit itself is never met" in text
+    assert text.index("Other survivors") < text.index("`+` → `-`")
+    assert "Other survivors" not in page([killed], found, reasons, {"slipcore": 20})
