@@ -1,0 +1,56 @@
+"""What benchmarks put on pages."""
+
+import json
+from argparse import Namespace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from PIL import Image
+
+from benchmarks.pages import picture_folder, renew, save, table, write
+
+PAGE = "# Title\n\n<!-- table one -->\nold\n<!-- end -->\n\nText.\n\n<!-- table two -->\n<!-- end -->\n"
+
+
+def test_numbers_have_three_digits_and_what_is_not_known_a_dash() -> None:
+    assert table(("a", "b"), [(1.23456, "text"), (12345.6, 7), (np.nan, np.float64(0.00012345))]) == (
+        "| a | b |\n| --- | --- |\n| 1.23 | text |\n| 12346 | 7 |\n| – | 0.000123 |"
+    )
+
+
+def test_only_the_named_table_of_a_page_is_renewed(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(PAGE)
+    renew(page, {"one": r"| new \1 |"})
+    assert page.read_text() == PAGE.replace("old", r"| new \1 |")
+
+
+@pytest.mark.parametrize(("text", "places"), [("# Title", 0), (PAGE + PAGE, 2)])
+def test_a_page_without_one_place_for_a_table_is_refused(tmp_path: Path, text: str, places: int) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(text)
+    with pytest.raises(SystemExit, match=f"{places} places for the table one"):
+        renew(page, {"one": "| new |"})
+    assert page.read_text() == text
+
+
+def test_results_go_to_their_folder_and_pictures_beside_the_page(tmp_path: Path) -> None:
+    page = tmp_path / "docs" / "page.md"
+    arguments = Namespace(output=tmp_path / "results", page=page)
+    assert picture_folder(arguments) == tmp_path / "docs" / "images"
+    page.write_text(PAGE)
+    write({"a": 1.5}, {"two": "| x |"}, arguments, "numbers.json")
+    assert json.loads((tmp_path / "results" / "numbers.json").read_text()) == {"a": 1.5}
+    assert "<!-- table two -->\n| x |\n<!-- end -->" in page.read_text()
+    assert picture_folder(Namespace(output=tmp_path / "other", page=None)) == tmp_path / "other"
+
+
+def test_a_picture_has_few_colours(tmp_path: Path) -> None:
+    figure = Figure(figsize=(2.0, 1.0))
+    figure.subplots().imshow(np.random.default_rng(0).random((40, 40)))
+    save(figure, tmp_path / "picture.png")
+    with Image.open(tmp_path / "picture.png") as image:
+        assert image.mode == "P"
+        assert image.width > 100
