@@ -72,31 +72,32 @@ class Edit:
 
 
 def edits(root: Path, path: str) -> list[Edit]:
-    """Every edit of a file, in the order of its lines; each leaves a program that compiles."""
+    """Every edit of a file, in the order of its lines."""
     source = (root / path).read_bytes()
     lines = source.splitlines(keepends=True)
     found: list[Edit] = []
     counts: dict[str, int] = {}
     for scope, node in _walk(ast.parse(source), ""):
         for start, end, new in _changes(node, lines):
-            old = b"".join(lines)[_offset(lines, start) : _offset(lines, end)].decode()
+            old = source[_offset(lines, start) : _offset(lines, end)].decode()
             edit = Edit(path, start, end, new, scope, lines[start[0] - 1].decode().strip(), old)
             nth = counts[edit.key] = counts.get(edit.key, -1) + 1
             found.append(Edit(path, start, end, new, scope, edit.statement, old, nth))
-    return sorted((edit for edit in found if _compiles(edit, source)), key=lambda edit: edit.start)
+    return sorted(found, key=lambda edit: edit.start)
+
+
+def compiles(root: Path, edit: Edit) -> bool:
+    """Whether an edit leaves a program: ``break`` outside of a loop, say, does not."""
+    try:
+        compile(edit.apply((root / edit.path).read_bytes()), edit.path, "exec", dont_inherit=True)
+    except SyntaxError:
+        return False
+    return True
 
 
 def code_lines(path: Path) -> int:
     """Lines that are neither empty nor only a comment."""
     return sum(bool(line.strip()) and not line.lstrip().startswith("#") for line in path.read_text().splitlines())
-
-
-def _compiles(edit: Edit, source: bytes) -> bool:
-    try:
-        compile(edit.apply(source), edit.path, "exec", dont_inherit=True)
-    except SyntaxError:
-        return False
-    return True
 
 
 def _walk(node: ast.AST, scope: str) -> Iterator[tuple[str, ast.AST]]:
@@ -118,8 +119,8 @@ def _is_for_types(node: ast.AST) -> bool:
             return True
         case ast.FunctionDef(decorator_list=[ast.Name(id="overload"), *_]):
             return True
-        case ast.Call(func=ast.Name(id="TypeVar" | "cast" | "NewType")):
-            return True
+        case ast.Call(func=ast.Name(id="TypeVar" | "cast" | "NewType" | "dataclass")):
+            return True  # flags of a dataclass are what mypy looks at
     return False
 
 

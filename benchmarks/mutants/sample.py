@@ -1,9 +1,10 @@
 """Which mutants are tried: drawn from every package in proportion to its lines of code."""
 
 import hashlib
+from itertools import islice
 from pathlib import Path
 
-from benchmarks.mutants.edits import Edit, code_lines, edits
+from benchmarks.mutants.edits import Edit, code_lines, compiles, edits
 
 PACKAGES = ("slipcore", "estimators", "db", "service", "clients/stiction_client")
 
@@ -32,5 +33,5 @@ def draw(root: Path, count: int, seed: int) -> list[Edit]:
     drawn: list[Edit] = []
     for package, share in shares(lines_of(root), count).items():
         every = [edit for path in sources(root, package) for edit in edits(root, path)]
-        drawn += sorted(every, key=rank)[:share]
+        drawn += islice((edit for edit in sorted(every, key=rank) if compiles(root, edit)), share)
     return sorted(drawn, key=rank)

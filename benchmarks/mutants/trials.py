@@ -20,17 +20,15 @@ import pytest
 
 
 class Chosen:
-    """Keeps the wished tests, in the order of their files, and remembers the first that fails."""
+    """Keeps the wished tests, and remembers the first that fails."""
 
     def __init__(self, tests: list[str]) -> None:
-        files = list(dict.fromkeys(test.partition("::")[0] for test in tests))
-        self._tests, self._files = set(tests), {file: i for i, file in enumerate(files)}
+        self._tests = set(tests)
         self.ran, self.failed = 0, ""
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         """Leave the others out."""
         items[:] = [item for item in items if item.nodeid in self._tests]
-        items.sort(key=lambda item: self._files[item.nodeid.partition("::")[0]])
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Count, and keep the first failure."""
@@ -69,21 +67,22 @@ def _trial(tests: list[str], seconds: float) -> dict[str, Any]:
 
 
 def _run(tests: list[str], answer: Path, folder: Path) -> None:
-    """The trial itself, in its own group of processes."""
+    """The trial itself, in its own group of processes: file by file, so that no more are imported than are needed."""
     os.setsid()
     with (folder / "output.txt").open("wb") as output:
         os.dup2(output.fileno(), 1)
         os.dup2(output.fileno(), 2)
     chosen = Chosen(tests)
-    files = dict.fromkeys(test.partition("::")[0] for test in tests)
-    status = 1
-    with contextlib.suppress(BaseException):
-        base = f"--basetemp={folder / 'tests'}"
-        status = int(
-            pytest.main(["-x", "-q", "-p", "no:xdist", "-p", "no:cacheprovider", base, *files], plugins=[chosen])
-        )
-    failed = chosen.failed or ("" if status in {0, 5} else "pytest")
-    answer.write_text(json.dumps({"ran": chosen.ran, "failed": failed}))
+    options = ["-x", "-q", "-p", "no:xdist", "-p", "no:cacheprovider", f"--basetemp={folder / 'tests'}"]
+    options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of plugins that are loaded already
+    for file in dict.fromkeys(test.partition("::")[0] for test in tests):
+        status: int | None = None
+        with contextlib.suppress(BaseException):
+            status = int(pytest.main([*options, file], plugins=[chosen]))
+        if status not in {0, 5} or chosen.failed:
+            chosen.failed = chosen.failed or file
+            break
+    answer.write_text(json.dumps({"ran": chosen.ran, "failed": chosen.failed}))
     os._exit(0)
 
 
