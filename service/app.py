@@ -11,9 +11,10 @@ from db.blobs import BlobStore, open_blobs
 from db.database import Database
 from db.repositories import runners
 from service.context import Context
+from service.domain import keys
 from service.domain.model_cache import ModelCache
 from service.formats.reading import Readers
-from service.http import access, errors, gate, openapi
+from service.http import access, errors, openapi
 from service.http.envelope import Envelope
 from service.http.gate import Admission, Gate
 from service.http.head_requests import HeadRequests
@@ -52,7 +53,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         try:
-            async with running(chosen, check=gate.check_start) as context:
+            async with running(chosen, check=keys.check_start) as context:
                 app.state.context = context
                 yield
         except Exception as error:

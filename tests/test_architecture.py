@@ -171,6 +171,32 @@ def test_use_cases_jobs_and_formats_know_no_http() -> None:
     assert {name: found for name in inside if (found := speaks_http(modules, name))} == {}
 
 
+STARTERS = {"service.cli.running"}
+"""Commands that start the server; all others work on files or tables, or ask a service."""
+
+
+def server_imports(modules: Mapping[str, Path]) -> dict[str, set[str]]:
+    """The commands that import what speaks HTTP without starting it, each with what it imports."""
+    commands = {name: path for name, path in modules.items() if name.startswith(("service.cli", "service.demo"))}
+    found = {name: imported_here(path, modules) for name, path in commands.items() if name not in STARTERS}
+    return {name: serving for name, all_ in found.items() if (serving := {s for s in all_ if s.startswith(SERVES)})}
+
+
+def test_commands_import_nothing_of_the_server() -> None:
+    modules = modules_of(ROOT, "service")
+    assert set(modules) >= STARTERS
+    assert server_imports(modules) == {}
+
+
+@pytest.mark.parametrize("text", ["from service.http import access", "def lazily():\n    import service.app"])
+def test_a_command_that_imports_the_server_is_found(tmp_path: Path, text: str) -> None:
+    modules = {}
+    for name in ("service.app", "service.http.access", "service.cli.keys", "service.cli.running"):
+        modules[name] = tmp_path / f"{name}.py"
+        modules[name].write_text(text if name.startswith("service.cli") else "")
+    assert set(server_imports(modules)) == {"service.cli.keys"}
+
+
 def test_use_cases_take_plain_arguments() -> None:
     for path in sorted((ROOT / "service" / "domain").glob("*.py")):
         assert not third_party(path) & {"fastapi", "starlette", "pydantic"}, path

@@ -22,7 +22,7 @@ def exit_code(error: Exception) -> int | None:
 
     from db.errors import DatabaseError
     from estimators.errors import EstimatorError
-    from service.http.gate import NoKeys
+    from service.domain.keys import NoKeys
     from slipcore.errors import SlipcoreError
     from stiction_client.errors import InvalidArgument, NoFeasibleForce, StictionError
 

@@ -1,15 +1,8 @@
-"""Access keys: how one is made and known again, what it may do, and what a route needs."""
+"""What a request may do, and what a route needs."""
 
-import hashlib
-import hmac
-import ipaddress
-import re
-import secrets
 from collections.abc import Iterator
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from functools import lru_cache
-from typing import Annotated, get_args
+from typing import Annotated
 
 from fastapi import Depends, FastAPI, Security
 from fastapi.dependencies.models import Dependant
@@ -19,12 +12,10 @@ from fastapi.security import SecurityScopes
 from fastapi.security.base import SecurityBase
 from starlette.requests import HTTPConnection
 
-from db.records import AccessKey, Scope
+from db.records import Scope
 from service.domain.asker import Asker
 from service.domain.errors import InsufficientScope
-
-SCOPES: tuple[Scope, ...] = get_args(Scope)
-"""What keys are for; each scope implies those before it."""
+from service.domain.keys import SCOPES
 
 CHALLENGE = 'Bearer realm="stiction"'
 _PUBLIC_PAGES = ("/docs", "/redoc", "/login", "/logout", "/problems")
@@ -34,8 +25,6 @@ PUBLIC_FOLDERS = ("/assets/", "/problems/")
 
 LONGEST_ADDRESS = 100
 """Characters of a network address that the audit trail keeps: one of IPv6 with its zone has some 60."""
-
-_KEY = re.compile(r"stiction_([0-9a-f]{12})_[0-9a-f]{64}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,53 +42,10 @@ class Access:
 
 EVERYTHING = Access(None, "admin")
 
-NO_KEY = AccessKey("", "", "read", "0" * 64, datetime.min.replace(tzinfo=UTC), None)
-"""Stands for a key that is not stored: no text is it, and to find that out takes as long as with one that is."""
-
-
-def new_key() -> tuple[str, str]:
-    """A new key's public id and its text, which is to be shown once."""
-    key_id = secrets.token_hex(6)
-    return key_id, f"stiction_{key_id}_{secrets.token_hex(32)}"
-
-
-def key_id(text: str) -> str | None:
-    """The public part of a key; None for what is no key."""
-    found = _KEY.fullmatch(text)
-    return found[1] if found else None
-
-
-def digest(text: str) -> str:
-    """What is stored of a key.
-
-    256 random bits cannot be guessed, however fast the hash, so a slow one as for passwords would only cost time.
-    """
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def is_key(text: str, stored: AccessKey) -> bool:
-    """Whether ``text`` is this key, neither revoked nor expired; takes as long wherever they differ."""
-    return hmac.compare_digest(digest(text), stored.sha256) and is_valid(stored)
-
-
-def is_valid(stored: AccessKey) -> bool:
-    """Whether a key is neither revoked nor expired."""
-    return stored.revoked_at is None and (stored.expires_at is None or datetime.now(UTC) < stored.expires_at)
-
 
 def is_public(path: str) -> bool:
     """Whether anybody may ask for this path."""
     return path in PUBLIC_PATHS or path.startswith(PUBLIC_FOLDERS)
-
-
-@lru_cache(maxsize=1024)
-def is_loopback(host: str) -> bool:
-    """Whether an address, or a name, is this machine's own and reached from nowhere else."""
-    try:
-        address = ipaddress.ip_address(host)
-    except ValueError:
-        return host == "localhost"
-    return (getattr(address, "ipv4_mapped", None) or address).is_loopback
 
 
 def challenge_of_scope(needed: str) -> str:

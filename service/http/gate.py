@@ -15,8 +15,10 @@ from db.errors import NotFound, StorageUnavailable
 from db.records import AccessKey
 from db.repositories import access_keys
 from service.context import Context
-from service.http import access, origin, problems, sessions
-from service.http.access import CHALLENGE, EVERYTHING, NO_KEY, Access, is_loopback, is_public
+from service.domain import keys
+from service.domain.keys import NO_KEY, is_loopback
+from service.http import origin, problems, sessions
+from service.http.access import CHALLENGE, EVERYTHING, Access, is_public
 from service.http.problems import INVALID_KEY, KEY_REQUIRED, MISDIRECTED_REQUEST, TOO_MANY_REQUESTS, Problem
 from service.http.rate_limit import RateLimit
 from service.settings import Settings
@@ -26,20 +28,6 @@ KEPT_SECONDS = 2.0
 
 MOST_KEPT = 10_000
 """Keys; more than a fleet has."""
-
-
-class NoKeys(RuntimeError):
-    """The service would ask everybody for a key, and there is none."""
-
-
-def check_start(settings: Settings, database: Database) -> None:
-    """Refuse to listen where others can reach the service, unless there are keys; raises ``NoKeys``."""
-    if settings.access == "open" or (settings.access == "auto" and is_loopback(settings.host)):
-        return
-    with database.read() as session:
-        if not access_keys.any_valid(session):
-            what = f"host is {settings.host}, access is {settings.access}, and there are no keys"
-            raise NoKeys(f"{what}; allowed: make one with `stiction keys create`, or set STICTION_ACCESS=open")
 
 
 class KeyRing:
@@ -55,14 +43,14 @@ class KeyRing:
 
     async def find(self, database: Database, text: str) -> AccessKey | None:
         """The key with this text, if it is a valid one."""
-        key_id = access.key_id(text)
+        key_id = keys.key_id(text)
         if key_id is None:
             return None
         known = self.find_kept(text)
         if known is not None:
             return known
         known = await run_in_threadpool(_read, database, key_id)
-        if not access.is_key(text, known):
+        if not keys.is_key(text, known):
             return None
         _keep(self._kept, key_id, known)
         return known
@@ -74,7 +62,7 @@ class KeyRing:
             known = await run_in_threadpool(sessions.find_key, database, token)
             if known is not None:
                 _keep(self._sessions, token, known)
-        return known if known is not None and access.is_valid(known) else None
+        return known if known is not None and keys.is_valid(known) else None
 
     def forget_session(self, token: str) -> None:
         """Believe a token no longer: somebody has logged out."""
@@ -82,8 +70,8 @@ class KeyRing:
 
     def find_kept(self, text: str) -> AccessKey | None:
         """The same without a question to the database: None, too, where one would be needed."""
-        known, until = self._kept.get(access.key_id(text) or "", (NO_KEY, 0.0))
-        return known if access.is_key(text, known) and time.monotonic() <= until else None
+        known, until = self._kept.get(keys.key_id(text) or "", (NO_KEY, 0.0))
+        return known if keys.is_key(text, known) and time.monotonic() <= until else None
 
 
 class Gate:

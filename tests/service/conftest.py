@@ -22,8 +22,8 @@ from db.records import NewModel
 from db.repositories import access_keys, friction_models, jobs, materials
 from service.app import create_app
 from service.context import Context
+from service.domain import keys
 from service.domain.model_cache import ModelCache
-from service.http import access
 from service.http.serving import configuration
 from service.jobs import worker
 from service.observability import logs
@@ -134,9 +134,9 @@ def make(database: Database) -> Callable[..., str]:
     """Store an access key and return its text."""
 
     def make_key(scope: str = "read", **more: Any) -> str:
-        key_id, text = access.new_key()
+        key_id, text = keys.new_key()
         with database.write() as session:
-            access_keys.add(session, key_id, "robot", scope, access.digest(text), **more)
+            access_keys.add(session, key_id, "robot", scope, keys.digest(text), **more)
         return text
 
     return make_key

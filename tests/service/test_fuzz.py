@@ -15,7 +15,7 @@ import pytest
 
 from db.database import Database
 from db.repositories import access_keys
-from service.http import access
+from service.domain import keys
 from service.settings import Settings
 
 CHECKS = (
@@ -34,9 +34,9 @@ def fuzz(tmp_path: Path) -> Fuzz:
     """Send generated requests to a server, some with names that lead somewhere, and get the report."""
 
     def run(client: httpx.Client, settings: Settings, *options: str, known: dict[str, list[str]]) -> dict[str, Any]:
-        key_id, key = access.new_key()
+        key_id, key = keys.new_key()
         with closing(Database(settings.resolved_database_url)) as database, database.write() as session:
-            access_keys.add(session, key_id, "fuzz", "admin", access.digest(key))
+            access_keys.add(session, key_id, "fuzz", "admin", keys.digest(key))
         configuration, report = tmp_path / "schemathesis.toml", tmp_path / "report.json"
         configuration.write_text(dictionaries(known))
         command = [sys.executable, "-m", "schemathesis.cli", "--config-file", configuration, "run"]

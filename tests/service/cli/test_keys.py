@@ -7,7 +7,7 @@ from sqlalchemy import URL
 from db.database import Database
 from db.repositories import access_keys
 from service import cli
-from service.http.access import is_key
+from service.domain.keys import is_key
 
 Capture = pytest.CaptureFixture[str]
 

@@ -18,8 +18,9 @@ from db.repositories import access_keys, audit
 from db.tables import now
 from service import cli
 from service.cli.durations import moment_to_come
-from service.http import access, gate
-from service.http.gate import NoKeys, check_start
+from service.domain import keys
+from service.domain.keys import NoKeys, check_start
+from service.http import gate
 from service.settings import Settings
 
 Reach = Callable[..., Any]
@@ -72,7 +73,7 @@ def test_a_refusal_takes_the_same_steps_whether_the_id_is_stored_or_not(
     assert taken(text) == ["compared", "asked", "compared"]
     assert taken(text) == ["compared"]
     wrong = text[:-1] + ("0" if text[-1] != "0" else "1")
-    assert taken(wrong) == taken(access.new_key()[1]) == taken(wrong) == ["compared", "asked", "compared"]
+    assert taken(wrong) == taken(keys.new_key()[1]) == taken(wrong) == ["compared", "asked", "compared"]
     event.remove(database.engine, "before_cursor_execute", note_query)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from db.database import Database
 from db.repositories import materials
-from service.http import access
+from service.domain import keys
 
 NPZ = {"content-type": "application/vnd.stiction.grasp-log+npz"}
 FORBIDDEN, OK = httpx.codes.FORBIDDEN, httpx.codes.OK
@@ -28,7 +28,7 @@ class Lab:
 
 
 def key_of(caller: Any) -> str:
-    return str(access.key_id(caller.headers["Authorization"].removeprefix("Bearer ")))
+    return str(keys.key_id(caller.headers["Authorization"].removeprefix("Bearer ")))
 
 
 @pytest.fixture

@@ -11,11 +11,10 @@ import pytest
 from db.blobs import BlobStore
 from db.database import Database
 from db.repositories import access_keys, usage
-from service.domain import upload
+from service.domain import keys, upload
 from service.domain.asker import Asker
 from service.domain.errors import DomainError
 from service.formats.reading import Description
-from service.http import access
 
 HEADERS = {"content-type": "application/vnd.stiction.grasp-log+npz"}
 ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -23,9 +22,9 @@ ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
 
 @pytest.fixture
 def key(database: Database) -> str:
-    key_id, text = access.new_key()
+    key_id, text = keys.new_key()
     with database.write() as session:
-        access_keys.add(session, key_id, "robot", "upload", access.digest(text))
+        access_keys.add(session, key_id, "robot", "upload", keys.digest(text))
     return text
 
 
@@ -142,7 +141,7 @@ def test_a_log_that_a_stream_stores_keeps_to_the_quotas(
 ) -> None:
     client = reach(key=key, **{setting: 1})
     assert send(client, content).status_code == 202
-    context, key_id = client.app.state.context, access.key_id(key)
+    context, key_id = client.app.state.context, keys.key_id(key)
     found = Description("npz", "finger", 2, 1.0, (1, 1))
     with context.blobs.spool() as spool:
         spool.path.write_bytes(b"frames")

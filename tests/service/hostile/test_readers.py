@@ -11,8 +11,8 @@ import pytest
 
 from db.database import Database
 from db.repositories import access_keys
+from service.domain import keys
 from service.formats import reading
-from service.http import access
 from service.processes import turns
 from service.settings import Settings
 
@@ -32,9 +32,9 @@ def new_key(served: Settings, client: httpx.Client) -> Iterator[Callable[[], dic
     database = Database(served.resolved_database_url)
 
     def make() -> dict[str, str]:
-        key_id, text = access.new_key()
+        key_id, text = keys.new_key()
         with database.write() as session:
-            access_keys.add(session, key_id, "robot", "upload", access.digest(text))
+            access_keys.add(session, key_id, "robot", "upload", keys.digest(text))
         return {"authorization": f"Bearer {text}"}
 
     yield make

@@ -6,26 +6,27 @@ from fastapi.staticfiles import StaticFiles
 
 from db.records import AccessKey, Scope
 from service.app import create_app
+from service.domain import keys
 from service.http import access
 from service.http.access import READ, Access
 from service.settings import Settings
 
 
-@pytest.mark.parametrize("scope", access.SCOPES)
+@pytest.mark.parametrize("scope", keys.SCOPES)
 def test_a_scope_implies_those_before_it_and_no_other(scope: Scope) -> None:
-    allowed = [needed for needed in access.SCOPES if Access("k", scope).allows(needed)]
-    assert allowed == list(access.SCOPES[: access.SCOPES.index(scope) + 1])
+    allowed = [needed for needed in keys.SCOPES if Access("k", scope).allows(needed)]
+    assert allowed == list(keys.SCOPES[: keys.SCOPES.index(scope) + 1])
 
 
 def test_a_key_is_long_random_and_known_again_by_its_digest() -> None:
-    key_id, text = access.new_key()
-    assert access.new_key()[1] != text
-    assert access.key_id(text) == key_id
+    key_id, text = keys.new_key()
+    assert keys.new_key()[1] != text
+    assert keys.key_id(text) == key_id
     assert len(bytes.fromhex(text.rpartition("_")[2])) == 32
-    stored = AccessKey(key_id, "robot", "read", access.digest(text), datetime.now(UTC), None)
-    assert access.is_key(text, stored)
+    stored = AccessKey(key_id, "robot", "read", keys.digest(text), datetime.now(UTC), None)
+    assert keys.is_key(text, stored)
     for last in "01":
-        assert access.is_key(text[:-1] + last, stored) == (text[-1] == last)
+        assert keys.is_key(text[:-1] + last, stored) == (text[-1] == last)
     assert stored.sha256 not in repr(stored)
 
 
@@ -33,7 +34,7 @@ def test_a_key_is_long_random_and_known_again_by_its_digest() -> None:
     "text", ["", "stiction_", "stiction_0123456789ab_" + "0" * 63, "stiction_" + "é" * 77, "0" * 9999]
 )
 def test_what_is_no_key_has_no_id(text: str) -> None:
-    assert access.key_id(text) is None
+    assert keys.key_id(text) is None
 
 
 @pytest.mark.parametrize(
@@ -54,7 +55,7 @@ def test_what_is_no_key_has_no_id(text: str) -> None:
     ],
 )
 def test_loopback_is_told_from_what_others_reach(host: str, expected: bool) -> None:
-    assert access.is_loopback(host) is expected
+    assert keys.is_loopback(host) is expected
 
 
 def test_a_route_that_says_no_scope_stops_the_application() -> None:

@@ -11,9 +11,9 @@ from sqlalchemy import event
 from db.database import Database
 from db.repositories import access_keys
 from service.app import create_app
+from service.domain import keys
+from service.domain.keys import SCOPES, NoKeys, check_start
 from service.http import access, gate
-from service.http.access import SCOPES
-from service.http.gate import NoKeys, check_start
 from service.settings import Settings
 from stiction_client import AsyncFrictionClient, Material, ProblemError
 
@@ -39,8 +39,8 @@ def knock(client: Any, route: str) -> httpx.Response:
 
 @ONLY_SQLITE
 def test_no_route_answers_without_its_scope(reach: Reach, make: Make) -> None:
-    keys = {scope: make(scope) for scope in SCOPES}
-    clients = {scope: reach(key=key) for scope, key in keys.items()}
+    texts = {scope: make(scope) for scope in SCOPES}
+    clients = {scope: reach(key=key) for scope, key in texts.items()}
     nobody = reach()
     assert ROUTES
     for route, needed in HTTP_ROUTES.items():
@@ -78,7 +78,7 @@ def test_a_key_lets_in_and_a_revoked_or_changed_one_does_not(
         assert answer.headers["www-authenticate"] == 'Bearer realm="stiction", error="invalid_token"'
         assert wrong not in answer.text or wrong == "x"
     with database.write() as session:
-        access_keys.revoke(session, access.key_id(text) or "")
+        access_keys.revoke(session, keys.key_id(text) or "")
     assert client.get("/v1/materials").status_code == 401
 
 
@@ -212,7 +212,7 @@ def test_a_service_that_others_reach_does_not_start_without_keys(
     if needed:
         with pytest.raises(NoKeys, match=f"host is {settings.host}.* `stiction keys create`"):
             check_start(settings, database)
-        key_id = access.key_id(make()) or ""
+        key_id = keys.key_id(make()) or ""
         check_start(settings, database)
         with database.write() as session:
             access_keys.revoke(session, key_id)

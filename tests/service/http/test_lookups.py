@@ -7,8 +7,9 @@ import pytest
 from db.database import Database
 from db.records import NewModel
 from db.repositories import access_keys, friction_models, jobs, materials
+from service.domain import keys
 from service.domain.model_cache import ModelCache
-from service.http import access, lookups
+from service.http import lookups
 from service.http.lookups import Lookups
 from service.http.routes import materials as route
 
@@ -200,9 +201,9 @@ def test_the_shortest_way_is_as_narrow_as_the_gate(reach: Callable[..., Any], cl
 def test_the_shortest_way_knows_a_key_that_was_used_a_moment_ago(
     reach: Callable[..., Any], client: Any, database: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    key_id, key = access.new_key()
+    key_id, key = keys.new_key()
     with database.write() as session:
-        access_keys.add(session, key_id, "planner", "read", access.digest(key))
+        access_keys.add(session, key_id, "planner", "read", keys.digest(key))
     planner = reach("keys", key=key, lookup_seconds=60.0, rate_limit=3.0)
     planner.app.state.context = client.app.state.context
     client.get(f"{PATH}fn=0.05")

@@ -13,7 +13,7 @@ from sqlalchemy import text
 
 from db.database import Database
 from db.repositories import access_keys
-from service.http import access
+from service.domain import keys
 from service.http.serving import configuration
 from service.observability import logs
 from service.observability.logs import JsonLines, Logs, TextLines
@@ -145,7 +145,7 @@ def test_server_and_worker_log_one_story_without_secrets(
     tmp_path: Path, database: Database, serving: Any, log: Log, content: bytes, upload: Any, wait: Any
 ) -> None:
     with database.write() as session:
-        access_keys.add(session, access.key_id(KEY) or "", "robot", "admin", access.digest(KEY))
+        access_keys.add(session, keys.key_id(KEY) or "", "robot", "admin", keys.digest(KEY))
     with serving(Settings(data_folder=tmp_path, database_url=database.url, access="keys")) as client:
         client.headers.update({"Authorization": f"Bearer {KEY}", "X-Request-ID": "request-1"})
         client.headers["Idempotency-Key"] = "hush-1"

@@ -22,7 +22,7 @@ from websockets.sync.client import ClientConnection, connect
 from db import migrate
 from db.database import Database
 from db.repositories import access_keys
-from service.http import access
+from service.domain import keys
 from service.http.serving import configuration
 from service.settings import Settings
 from service.stream import connection as stream
@@ -214,21 +214,21 @@ def test_a_stream_needs_a_key_that_may_upload(ramp: GraspLog, tmp_path: Path) ->
     url, log = f"sqlite:///{tmp_path / 'stiction.sqlite3'}", ramp
     with closing(Database(url)) as database:
         migrate.upgrade(database)
-        keys = {}
+        texts = {}
         for scope in ("read", "upload"):
-            key_id, keys[scope] = access.new_key()
+            key_id, texts[scope] = keys.new_key()
             with database.write() as session:
-                access_keys.add(session, key_id, scope, scope, access.digest(keys[scope]))
+                access_keys.add(session, key_id, scope, scope, keys.digest(texts[scope]))
     served = Served(tmp_path, access="keys")
     try:
-        for key in (None, "nonsense", keys["read"]):
+        for key in (None, "nonsense", texts["read"]):
             with pytest.raises(ConnectionFailed, match=r"HTTP 40[13]"):
                 SlipStream(served.url, log.position, log.element_area, key=key)
-        with served.connect({"Authorization": f"Bearer {keys['upload']}"}) as socket:
+        with served.connect({"Authorization": f"Bearer {texts['upload']}"}) as socket:
             socket.send('{"type": "finish"}')
             with pytest.raises(ConnectionClosed, match="must be of type open or resume"):  # it was let in
                 socket.recv(30.0)
-        with SlipStream(served.url, log.position, log.element_area, keep=True, key=keys["upload"]) as live:
+        with SlipStream(served.url, log.position, log.element_area, keep=True, key=texts["upload"]) as live:
             for k in range(2):
                 live.send(log.time[k], *parts(log, k))
             stored = live.finish(store=True)

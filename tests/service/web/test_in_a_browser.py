@@ -9,7 +9,7 @@ import pytest
 
 from db.database import Database
 from db.repositories import access_keys
-from service.http import access
+from service.domain import keys
 from service.settings import Settings
 from tests.service.web import chromium
 from tests.service.web.chromium import Tab
@@ -117,9 +117,9 @@ def test_what_somebody_typed_runs_nothing(page: Tab, client: httpx.Client, typed
 def test_a_key_logs_in_and_out(tab: Tab, serving: Any, tmp_path: Path, sqlite_template: Path) -> None:
     settings = Settings(data_folder=tmp_path, access="keys", workers=0)
     shutil.copyfile(sqlite_template, tmp_path / sqlite_template.name)
-    key_id, text = access.new_key()
+    key_id, text = keys.new_key()
     with closing(Database(settings.resolved_database_url)) as database, database.write() as session:
-        access_keys.add(session, key_id, "robot", "upload", access.digest(text))
+        access_keys.add(session, key_id, "robot", "upload", keys.digest(text))
     with serving(settings) as client:
         base = str(client.base_url).rstrip("/")
         tab.call("Page.navigate", url=f"{base}/jobs")

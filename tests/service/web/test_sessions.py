@@ -7,7 +7,8 @@ import pytest
 
 from db.database import Database
 from db.repositories import access_keys, browser_sessions
-from service.http import access, gate, sessions
+from service.domain import keys
+from service.http import gate, sessions
 from tests.service.web.conftest import HTML
 
 pytestmark = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -59,7 +60,7 @@ def test_the_cookie_is_no_key_and_is_kept_from_scripts_and_other_sites(
     assert key not in found.value
     with database.read() as session:
         assert browser_sessions.find_key(session, found.value) is None
-        assert browser_sessions.find_key(session, access.digest(found.value)) is not None
+        assert browser_sessions.find_key(session, keys.digest(found.value)) is not None
 
 
 def test_a_key_has_a_bounded_number_of_sessions_and_loses_the_oldest(
@@ -136,7 +137,7 @@ def test_a_session_ends_with_its_key(
     headers = {"cookie": log_in(caller, key).headers["set-cookie"].partition(";")[0]}
     assert caller.get("/", headers=headers).status_code == 200
     with database.write() as session:
-        access_keys.revoke(session, str(access.key_id(key)))
+        access_keys.revoke(session, str(keys.key_id(key)))
     soon = time.monotonic() + gate.KEPT_SECONDS + 0.1
     monkeypatch.setattr(gate.time, "monotonic", lambda: soon)
     assert caller.get("/", headers=headers).status_code == 303

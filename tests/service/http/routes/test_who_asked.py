@@ -6,7 +6,7 @@ import pytest
 from db.database import Database
 from db.records import Detection, SampleSummary
 from db.repositories import access_keys, detections, grasp_logs
-from service.http import access
+from service.domain import keys
 
 NPZ = "application/vnd.stiction.grasp-log+npz"
 DETECTION = Detection("filter", 1e-6, 0.1, 60, 3, 4, 3, 4, 4, 0.05, "1" * 64)
@@ -20,9 +20,9 @@ def asker(reach: Callable[..., Any], database: Database) -> Callable[[], Asker]:
     """The id of a new key, and who asks with it."""
 
     def new() -> Asker:
-        key_id, text = access.new_key()
+        key_id, text = keys.new_key()
         with database.write() as session:
-            access_keys.add(session, key_id, "robot", "admin", access.digest(text))
+            access_keys.add(session, key_id, "robot", "admin", keys.digest(text))
         return key_id, reach(key=text)
 
     return new
