@@ -1,14 +1,11 @@
-"""Runs migrations on the connection that ``db.migrate`` hands over, all of them in one transaction."""
+"""Runs migrations on the connection that its caller hands over, all of them in one transaction."""
 
 from alembic import context
 from sqlalchemy import text
 
-from db.tables import Base
-
 connection = context.config.attributes["connection"]
 context.configure(
     connection=connection,
-    target_metadata=Base.metadata,
     render_as_batch=True,  # SQLite alters a table by copying it
     compare_type=True,
     transactional_ddl=True,  # also on SQLite, where it holds as long as BEGIN is not left to the driver

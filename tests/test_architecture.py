@@ -18,7 +18,7 @@ ALLOWED = {
     "slipcore": {"slipcore", "numpy", "scipy", "numba"},
     "estimators": {"estimators", "slipcore", "numpy", "scipy", "numba", "statsmodels", "emcee", "pandas"},
     "db": {"db", "migrations", "sqlalchemy", "alembic", "obstore"},
-    "migrations": {"migrations", "db", "sqlalchemy", "alembic"},
+    "migrations": {"migrations", "sqlalchemy", "alembic"},
     CLIENT: {"stiction_client", "httpx", "numpy", "scipy"},
 }
 
