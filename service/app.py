@@ -10,11 +10,11 @@ from db import identity, migrate
 from db.blobs import BlobStore, open_blobs
 from db.database import Database
 from db.repositories import runners
-from service.context import Context
 from service.domain import keys
 from service.domain.model_cache import ModelCache
 from service.formats.reading import Readers
 from service.http import access, errors, openapi
+from service.http.context import ServerContext
 from service.http.envelope import Envelope
 from service.http.gate import Admission, Gate
 from service.http.head_requests import HeadRequests
@@ -34,8 +34,8 @@ from service.processes import data_folder, private_files
 from service.processes.folder_lock import shared
 from service.settings import Settings
 from service.stream.sessions import Streams
-from service.web import pages
 from service.web.problem_pages import ProblemPages
+from service.web.routes import pages
 
 UNTRACED = access.PUBLIC_PATHS | {"/metrics"}
 """Paths of which a monitor asks all the time."""
@@ -102,7 +102,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 @asynccontextmanager
 async def running(
     settings: Settings, check: Callable[[Settings, Database], None] | None = None
-) -> AsyncIterator[Context]:
+) -> AsyncIterator[ServerContext]:
     """Open the stores, which must belong together, and take up unfinished jobs; at the end, stop in opposite order.
 
     ``check`` may raise what stops the start.
@@ -146,7 +146,9 @@ async def running(
                 thread.start()
             try:
                 models = ModelCache(settings.lookup_seconds)
-                yield Context(settings, database, blobs, runner, readers, streams, models, scrub, watch)
+                yield ServerContext(
+                    settings, database, blobs, runner, readers, models, streams=streams, scrub=scrub, watch=watch
+                )
             finally:
                 for thread in (retention, scrub, watch):
                     await thread.stop()

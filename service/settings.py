@@ -9,9 +9,10 @@ from pydantic import Field, ValidationError, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 from sqlalchemy import URL
 
-from service.observability import logs
-
 MIB = 2**20
+
+LogFormat = Literal["text", "json"]
+LogLevel = Literal["debug", "info", "warning", "error"]
 
 PREFIX = "STICTION_"
 OF_CLIENTS = frozenset({"URL", "KEY"})
@@ -57,10 +58,10 @@ class Settings(BaseSettings):
         default=True,
         description="Bring the database to this version's schema at start; otherwise an old one stops the start.",
     )
-    log_format: logs.Format = Field(
+    log_format: LogFormat = Field(
         default="text", description="Form of the log: lines to be read (text), or one JSON object a line (json)."
     )
-    log_level: logs.Level = Field(default="info", description="Least level of what is logged.")
+    log_level: LogLevel = Field(default="info", description="Least level of what is logged.")
     host: str = Field(default="127.0.0.1", description="Address to listen on.")
     port: Annotated[int, Field(ge=0, le=65535)] = Field(
         default=8000, description="Port to listen on; 0 takes a free one."

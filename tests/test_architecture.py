@@ -143,10 +143,10 @@ def test_only_the_application_knows_the_pages_and_these_ask_no_tables() -> None:
             assert not {name for name in modules if name.startswith("service.web")}, path
 
 
-SERVES = ("service.http", "service.web", "service.app")
+SERVES = ("service.http", "service.web", "service.app", "service.serving")
 """What speaks HTTP."""
 
-WITHOUT_HTTP = ("context", "domain", "formats", "jobs", "observability", "processes", "report", "settings", "stream")
+WITHOUT_HTTP = ("domain", "formats", "jobs", "observability", "processes", "report", "settings", "stream")
 """What does not, in ``service``, nor imports what does; ``cli`` and ``demo`` start it."""
 
 SOCKETS = {"service.stream.connection", "service.observability.metrics"}
@@ -256,16 +256,18 @@ def hops(graph: Mapping[str, Collection[str]], start: str, end: str) -> int:
 @pytest.mark.parametrize(
     ("route", "end"),
     [
-        ("grasp_logs.create_grasp_log", "db.repositories.grasp_logs.add"),
-        ("materials.create_fit", "db.repositories.materials.find_id"),
-        ("materials.read_friction", "service.domain.look_up.look_up"),
-        ("planning.recognise_material", "estimators.recognise"),
-        ("stream.live_stream", "service.stream.live.step"),
+        ("http.routes.grasp_logs.create_grasp_log", "db.repositories.grasp_logs.add"),
+        ("web.routes.uploads.receive_upload", "db.repositories.grasp_logs.add"),
+        ("http.routes.materials.create_fit", "db.repositories.materials.find_id"),
+        ("http.routes.materials.read_friction", "service.domain.look_up.look_up"),
+        ("http.routes.planning.recognise_material", "estimators.recognise"),
+        ("http.routes.stream.live_stream", "service.stream.live.step"),
+        ("http.routes.stream.live_stream", "db.repositories.grasp_logs.add"),
     ],
 )
 def test_from_a_route_to_repository_or_numerics_there_are_three_calls_at_most(route: str, end: str) -> None:
     graph = calls(modules_of(ROOT, "service"))
-    assert hops(graph, f"service.http.routes.{route}", end) <= 3
+    assert hops(graph, f"service.{route}", end) <= 3
 
 
 def test_nothing_but_the_service_knows_a_web_framework() -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from service.cli.exit_codes import FAILURE, exit_code
+from service.cli.output import print_table
 
 if TYPE_CHECKING:
     from service.settings import Settings
@@ -29,7 +30,7 @@ def serve(
     """Run the web service until it is told to stop (every setting: docs/settings.md)."""
     import uvicorn
 
-    from service.http.serving import configuration
+    from service.serving import configuration
 
     settings = _settings(host=host, port=port, data_folder=data_folder, database_url=database_url)
     _prepare(settings)
@@ -85,7 +86,7 @@ def demo(
     """Run the whole path on real input: recordings in, friction of each material, a planner's answer, a report."""
     from service.demo.run import run_demo
 
-    run_demo(output, recordings, seed)
+    run_demo(output, recordings, seed, print_table)
 
 
 def _prepare(settings: "Settings") -> None:

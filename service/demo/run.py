@@ -1,13 +1,12 @@
 """Run the demo: inputs → server → uploads → fits → planner's question → tables, pictures, report."""
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from service.cli.output import print_table
 from service.demo import tables
 from service.demo.drawing import draw_grasps, draw_materials, see
 from service.demo.inputs import DemoLog, recorded_logs, simulated_logs
@@ -33,8 +32,12 @@ CONTACT_AREA = 6e-5
 """m²; a fingertip of 15 mm radius and 1 MPa pressed with about 10 N."""
 
 
-def run_demo(output: Path, recordings: Path | None, seed: int) -> None:
-    """Run the main job; prints its tables and leaves ``report.html`` with its pictures in ``output``."""
+Show = Callable[[str, Sequence[str], Sequence[Sequence[object]]], None]
+"""Prints a table: its caption, columns and rows."""
+
+
+def run_demo(output: Path, recordings: Path | None, seed: int, show: Show) -> None:
+    """Run the main job; shows its tables and leaves ``report.html`` with its pictures in ``output``."""
     console = Console()
     output.mkdir(parents=True, exist_ok=True)
     shutil.rmtree(output / "service", ignore_errors=True)  # the demo's own folder: each run starts a fresh database
@@ -46,7 +49,7 @@ def run_demo(output: Path, recordings: Path | None, seed: int) -> None:
         sections = _sections(uploads, answers, output, seed, progress)
     for section in sections:
         for table in section.tables:
-            print_table(table.caption, table.columns, table.rows)
+            show(table.caption, table.columns, table.rows)
     page = write_report("Stiction: from tactile recordings to a planner's answer", _lead(logs), sections, output)
     console.print(f"Report and pictures: {page}")
 

@@ -6,7 +6,7 @@ from contextlib import suppress
 
 from db.records import Job
 from db.repositories import jobs
-from service.context import Context
+from service.domain.context import Context
 
 MOST_SECONDS = 10.0
 """s that an answer may be kept back: a proxy lets a silent connection live longer, a stopping server waits for it."""

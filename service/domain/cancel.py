@@ -2,8 +2,8 @@
 
 from db.records import Job
 from db.repositories import audit, jobs
-from service.context import Context
 from service.domain.asker import ANYBODY, Asker
+from service.domain.context import Context
 from service.domain.errors import JobEnded
 
 REASON = "cancelled by request"

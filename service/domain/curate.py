@@ -6,11 +6,11 @@ from sqlalchemy.orm import Session
 
 from db.records import Job, Material, StoredGraspLog
 from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, owners
-from service.context import Context
 from service.domain.asker import ANYBODY, Asker
+from service.domain.context import Context
 from service.domain.errors import InsufficientScope, InvalidValue
 from service.domain.ownership import check_may_change
-from service.jobs.queueing import queue
+from service.domain.queueing import queue
 
 REFITTED = "ols"
 """The method by which a material is fitted even if it has no model yet, as after an upload."""

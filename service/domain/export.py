@@ -7,7 +7,7 @@ from pathlib import Path
 
 from db.records import StoredGraspLog
 from service import formats
-from service.context import Context
+from service.domain.context import Context
 from service.domain.errors import FileDeleted, UnsupportedFormat
 
 

@@ -7,7 +7,7 @@ from db.repositories import audit, jobs, materials
 from service.domain import quotas
 from service.domain.asker import ANYBODY, Asker
 from service.domain.ownership import check_may_add
-from service.jobs.queueing import queue
+from service.domain.queueing import queue
 from service.settings import Settings
 
 

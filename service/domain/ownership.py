@@ -4,8 +4,8 @@ from sqlalchemy.orm import Session
 
 from db.errors import NotFound
 from db.repositories import access_keys, audit, materials, owners
-from service.context import Context
 from service.domain.asker import Asker
+from service.domain.context import Context
 from service.domain.errors import InsufficientScope, InvalidValue, NotOwner, UnknownOwner
 
 

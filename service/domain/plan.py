@@ -9,7 +9,7 @@ import stiction_client
 from db.records import StoredModel
 from db.repositories import friction_models, grasp_logs, materials
 from estimators.errors import EstimatorError
-from service.context import Context
+from service.domain.context import Context
 from service.domain.errors import InvalidSamples, InvalidValue, NoFeasibleForce, NoModel, ResultsNotReady
 from service.domain.look_up import OUTDATED, Averaged
 from service.domain.stored_results import decode_samples, finite_or_none, to_client_model, to_friction_model

@@ -13,16 +13,15 @@ from db.errors import AlreadyExists, NotFound, StorageUnavailable
 from db.records import NewGraspLog, StoredGraspLog
 from db.repositories import audit, grasp_logs, jobs, materials, stores, uploads
 from service import formats
-from service.context import Context
 from service.domain import curate, quotas
 from service.domain.asker import ANYBODY, Asker
+from service.domain.context import Context
 from service.domain.errors import InvalidGraspLog, InvalidValue, UnsupportedFormat, UploadInterrupted
 from service.domain.ownership import check_may_add
+from service.domain.queueing import INGEST_METHODS, queue
 from service.domain.receive import UNPACKING_BYTES, check_encoding, check_expansion, check_size, unpack
 from service.formats.archive import unpacked_bytes
 from service.formats.reading import Description, FormatSettings, to_its_end
-from service.jobs.queueing import INGEST_METHODS, queue
-from service.settings import Settings
 from slipcore.defaults import METHOD_NAMES
 from slipcore.errors import InvalidInput
 
@@ -66,6 +65,7 @@ class ReceivedLog:
     spool: Spool
     log: NewGraspLog
     body_sha256: str
+    asker: Asker
     new_material: str | None = None
 
 
@@ -108,13 +108,14 @@ async def received(
                 await to_its_end(asyncio.to_thread(unpack, body, spool, encoding, limit, expansion))
         kept, description = await _unless_gone(_read(context, spools, spool, request, body.size), gone())
         new_material = request.material if material_id is None else None
-        yield ReceivedLog(kept, _new_log(kept, description, request, material_id), body.sha256, new_material)
+        log = _new_log(kept, description, request, material_id)
+        yield ReceivedLog(kept, log, body.sha256, request.asker, new_material)
 
 
 async def upload(context: Context, chunks: AsyncIterator[bytes], request: UploadRequest) -> StoredUpload:
     """Store a log that comes in ``chunks``, and queue its ingest; raises as ``received`` and ``accept``."""
     async with received(context, chunks, request) as log:
-        return await asyncio.to_thread(_store, context, log, request.asker)
+        return await asyncio.to_thread(store, context, log, lambda session: accept(session, context, log))
 
 
 async def check_target(context: Context, request: UploadRequest) -> None:
@@ -123,22 +124,16 @@ async def check_target(context: Context, request: UploadRequest) -> None:
     await asyncio.to_thread(_check_quotas, context, request.asker)
 
 
-async def store_made(context: Context, spool: Spool, found: Description, request: UploadRequest) -> StoredUpload:
-    """Store a log that the service itself has written to ``spool.path``, and queue its ingest; raises as ``store``."""
-    material_id = await asyncio.to_thread(_check, context, request)
-    await asyncio.to_thread(spool.adopt)
-    made = ReceivedLog(spool, _new_log(spool, found, request, material_id), spool.sha256)
-    return await asyncio.to_thread(_store, context, made, request.asker)
+def store_made(context: Context, spool: Spool, found: Description, request: UploadRequest) -> StoredUpload:
+    """Store a log that the service itself has written to ``spool.path``, and queue its ingest; raises as ``upload``."""
+    material_id = _check(context, request)
+    spool.adopt()
+    made = ReceivedLog(spool, _new_log(spool, found, request, material_id), spool.sha256, request.asker)
+    return store(context, made, lambda session: accept(session, context, made))
 
 
-def _store(context: Context, received: ReceivedLog, asker: Asker) -> StoredUpload:
-    with storing(context, received) as session:
-        return accept(session, context.settings, received, asker)
-
-
-@contextmanager
-def storing(context: Context, received: ReceivedLog) -> Iterator[Session]:
-    """The transaction for ``accept``: first the blob, durably, then the rows that refer to it.
+def store(context: Context, received: ReceivedLog, make_rows: Callable[[Session], Result]) -> Result:
+    """Store a log in one transaction: first the blob, durably, then the rows that refer to it, by ``accept``.
 
     Neither where a quota forbids them: raises ``QuotaExceeded`` and ``StorageQuotaExceeded``.
     """
@@ -150,17 +145,18 @@ def storing(context: Context, received: ReceivedLog) -> Iterator[Session]:
         uploads.lock(session, [received.log.sha256])
         if uploads.bring_back(session, received.log.sha256) and not context.blobs.has(received.log.sha256):
             raise StorageUnavailable("the file was old and about to be deleted when it came in again")
-        yield session
+        return make_rows(session)
 
 
-def accept(session: Session, settings: Settings, received: ReceivedLog, asker: Asker) -> StoredUpload:
+def accept(session: Session, context: Context, received: ReceivedLog) -> StoredUpload:
     """Store a new log with its job; a known one whose job failed, which is our fault, or was cancelled gets another.
 
     Quotas are looked at once more: others of the same key may have been stored since this one's body began. Raises
     ``NotOwner``, ``QuotaExceeded`` and ``StorageQuotaExceeded``.
     """
+    settings, asker = context.settings, received.asker
     quotas.lock(session, settings, asker.key_id)
-    log = replace(received.log, material_id=_material(session, received, asker))
+    log = replace(received.log, material_id=_material(session, received))
     quotas.check_log(session, settings, asker.key_id, log)
     try:
         log_id, is_new = grasp_logs.add(session, log), True
@@ -186,9 +182,9 @@ def accept(session: Session, settings: Settings, received: ReceivedLog, asker: A
     return StoredUpload(stored, is_new)
 
 
-def _material(session: Session, received: ReceivedLog, asker: Asker) -> int | None:
+def _material(session: Session, received: ReceivedLog) -> int | None:
     """The key of the log's material: one to be made known, or one that was merged into another meanwhile."""
-    material_id = received.log.material_id
+    material_id, asker = received.log.material_id, received.asker
     if received.new_material is not None:
         try:
             return curate.create(session, received.new_material, "", asker).id

@@ -4,13 +4,13 @@ from typing import Annotated
 
 from fastapi import Depends, Request
 
-from service.context import Context
+from service.http.context import ServerContext
 
 
-async def _context(request: Request) -> Context:
-    context: Context = request.app.state.context
+async def _context(request: Request) -> ServerContext:
+    context: ServerContext = request.app.state.context
     return context
 
 
-Given = Annotated[Context, Depends(_context)]
+Given = Annotated[ServerContext, Depends(_context)]
 """The open stores and the running jobs."""

@@ -14,8 +14,8 @@ from db.database import Database
 from db.errors import NotFound, StorageUnavailable
 from db.records import AccessKey
 from db.repositories import access_keys
-from service.context import Context
 from service.domain import keys
+from service.domain.context import Context
 from service.domain.keys import NO_KEY, is_loopback
 from service.http import origin, problems, sessions
 from service.http.access import CHALLENGE, EVERYTHING, Access, is_public

@@ -12,7 +12,7 @@ from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from db.errors import NotFound, StorageUnavailable
-from service.context import Context
+from service.domain.context import Context
 from service.domain.errors import NoModel
 from service.domain.look_up import Question, look_up
 from service.domain.model_cache import KnownModel

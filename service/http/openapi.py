@@ -5,6 +5,7 @@ from typing import Any
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 
+from service.http.descriptions import description_of
 from service.http.problems import (
     BAD_REQUEST,
     HEADERS_TOO_LARGE,
@@ -19,7 +20,6 @@ from service.http.problems import (
     TOO_MANY_REQUESTS,
     ProblemType,
 )
-from service.http.routes.common import description_of
 
 AT_THE_DOOR = (BAD_REQUEST, HEADERS_TOO_LARGE, STOPPING, TOO_MANY_CONNECTIONS)
 """Problems of every route, before it is known what is asked."""

@@ -22,6 +22,7 @@ from db.records import Claim, Job, SamplesOfLog, SampleSummary
 from db.repositories import detections, friction_models, grasp_logs, jobs, materials
 from estimators import EstimatorError, FrictionModel, Moments
 from service import formats
+from service.domain.queueing import INGEST_METHODS, queue_cheap_refits
 from service.domain.stored_results import (
     decode_samples,
     encode_history,
@@ -30,7 +31,6 @@ from service.domain.stored_results import (
     summarise_samples,
     to_new_model,
 )
-from service.jobs.queueing import INGEST_METHODS, queue_cheap_refits
 from service.observability import logs, traces
 from slipcore import FrictionSamples, GraspLog, SlipcoreError, SlipHistory
 

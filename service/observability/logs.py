@@ -9,12 +9,12 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-Format = Literal["text", "json"]
-Level = Literal["debug", "info", "warning", "error"]
+if TYPE_CHECKING:
+    from service.settings import LogFormat, LogLevel
 
 ABOUT: ContextVar[Mapping[str, object]] = ContextVar("about", default=MappingProxyType({}))
 """What is going on here, a request or a job: fields of every record that is written meanwhile."""
@@ -27,8 +27,8 @@ _SECRET = re.compile(r"(stiction_[0-9a-f]{12}_)[0-9a-f]{64}|(://[^\s:/@]*:)\S*(?
 class Logs:
     """How a process writes its log: each record as ``format``, those of ``level`` or above."""
 
-    format: Format = "text"
-    level: Level = "info"
+    format: "LogFormat" = "text"
+    level: "LogLevel" = "info"
 
 
 _chosen: Logs | None = None

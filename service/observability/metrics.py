@@ -3,6 +3,7 @@
 import threading
 import time
 from datetime import datetime, timedelta
+from typing import Protocol
 
 from prometheus_client import CollectorRegistry, Gauge, Histogram, generate_latest
 from sqlalchemy.orm import Session
@@ -12,7 +13,6 @@ from db.database import Database
 from db.records import Job
 from db.repositories import audit, grasp_logs, jobs
 from db.tables import now
-from service.jobs.scrub import Scrub
 from service.observability.answered import Answered
 
 REQUEST_BUCKETS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0)
@@ -20,6 +20,13 @@ STAGE_BUCKETS = (0.001, 0.005, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 6
 
 OVERLAP = timedelta(seconds=60)
 """How long before another one a job may have ended and be seen after it: transactions end in their own order."""
+
+
+class Compared(Protocol):
+    """What was compared of the stored files: bytes, and how often all of them."""
+
+    bytes: int
+    passes: int
 
 
 class Metrics:
@@ -67,7 +74,7 @@ class Metrics:
         self._horizon = now()
         self._counted: dict[str, datetime] = {}
 
-    def expose(self, database: Database, scrub: Scrub | None = None) -> bytes:
+    def expose(self, database: Database, scrub: Compared | None = None) -> bytes:
         """Everything, as of now."""
         with self._lock:
             with database.read() as session:

@@ -8,12 +8,13 @@ from typing import Any
 import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from db.blobs import Spool
 from db.errors import NotFound, StorageUnavailable
-from db.records import StoredGraspLog
-from service.context import Context
 from service.domain.asker import Asker
+from service.domain.context import Context
 from service.domain.errors import DomainError
-from service.domain.upload import UploadRequest, check_target, store_made
+from service.domain.upload import UploadRequest, check_target
+from service.formats.reading import Description
 from service.stream import live
 from service.stream.messages import (
     DECODE_BINARY,
@@ -35,10 +36,14 @@ from service.stream.sessions import (
     STORAGE_AWAY,
     End,
     Session,
+    Streams,
 )
 from slipcore.errors import InvalidInput
 
 logger = logging.getLogger(__name__)
+
+Store = Callable[[Spool, Description, UploadRequest], dict[str, Any]]
+"""Stores the log in a file that a detector wrote; returns what its client is told of it."""
 
 Sent = tuple[Callable[[bytes], Incoming], bytes]
 """A message as it came, and its decoder: in lists, 1 MiB of it may take 50 times as much."""
@@ -48,11 +53,9 @@ MOST_WAITING_IN, MOST_WAITING_OUT = 8, 64
 dropped, for it does not read."""
 
 
-async def serve(
-    socket: WebSocket, context: Context, asker: Asker, describe: Callable[[StoredGraspLog], dict[str, Any]]
-) -> None:
-    """One connection from its first message to its end; ``describe`` says of a stored log what its client is told."""
-    connection = _Connection(socket, context, asker, describe)
+async def serve(socket: WebSocket, context: Context, streams: Streams, asker: Asker, store: Store) -> None:
+    """One connection from its first message to its end; ``store`` keeps a log that it recorded."""
+    connection = _Connection(socket, context, streams, asker, store)
     try:
         await connection.run()
     except End as end:
@@ -83,11 +86,9 @@ def _decoded(decode: Callable[[bytes], Incoming], content: bytes) -> Incoming:
 
 
 class _Connection:
-    def __init__(
-        self, socket: WebSocket, context: Context, asker: Asker, describe: Callable[[StoredGraspLog], dict[str, Any]]
-    ) -> None:
-        self._socket, self._context, self._asker, self._describe = socket, context, asker, describe
-        self._streams = context.streams
+    def __init__(self, socket: WebSocket, context: Context, streams: Streams, asker: Asker, store: Store) -> None:
+        self._socket, self._context, self._asker, self._store = socket, context, asker, store
+        self._streams = streams
         self._incoming: asyncio.Queue[Sent] = asyncio.Queue(MOST_WAITING_IN)
         self._outgoing: asyncio.Queue[dict[str, Any]] = asyncio.Queue(MOST_WAITING_OUT)
         self._encode: Callable[[Any], bytes] = msgspec.msgpack.encode
@@ -194,8 +195,8 @@ class _Connection:
             raise End(REFUSED, "store needs keep, said when the session was opened")
         with self._context.blobs.spool() as spool:
             found = await self._streams.call(live.write, session.id, spool.path, opening.sensor)
-            stored = await store_made(self._context, spool, found, self._upload(opening))
-        return {"type": "finished", "grasp_log": self._describe(stored.log)}
+            stored = await asyncio.to_thread(self._store, spool, found, self._upload(opening))
+        return {"type": "finished", "grasp_log": stored}
 
     def _upload(self, opening: Open) -> UploadRequest:
         return UploadRequest(opening.material, None, opening.detector, asker=self._asker)

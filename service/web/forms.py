@@ -11,7 +11,7 @@ from starlette.datastructures import FormData
 from starlette.exceptions import HTTPException
 from starlette.formparsers import MultiPartException, MultiPartParser
 
-from service.http.routes.common import limited
+from service.http.bodies import limited
 
 MOST_FORM_BYTES = 2**18
 """Of a form without a file; the longest description takes half of that."""

@@ -2,7 +2,7 @@
 
 from db.paging import Window
 from db.repositories import materials
-from service.context import Context
+from service.domain.context import Context
 
 FIRST_NAMES = Window("name", limit=200)
 """So many are offered; any other may be typed."""

@@ -21,12 +21,12 @@ from db.database import Database
 from db.records import NewModel
 from db.repositories import access_keys, friction_models, jobs, materials
 from service.app import create_app
-from service.context import Context
 from service.domain import keys
 from service.domain.model_cache import ModelCache
-from service.http.serving import configuration
+from service.http.context import ServerContext
 from service.jobs import worker
 from service.observability import logs
+from service.serving import configuration
 from service.settings import Settings
 from slipcore import GraspLog
 from slipcore.contact.tiers.ramp import RampSchedule, tangential_ramp
@@ -123,7 +123,7 @@ def reach(database: Database, blobs: BlobStore) -> Callable[..., Caller]:
         chosen = Settings.model_validate({"access": access, "lookup_seconds": 0.0, **settings})
         app = create_app(chosen)
         jobs: Any = SimpleNamespace(wake=lambda: None, ending=lambda _: asyncio.Event())
-        app.state.context = Context(chosen, database, blobs, jobs, models=ModelCache(chosen.lookup_seconds))
+        app.state.context = ServerContext(chosen, database, blobs, jobs, models=ModelCache(chosen.lookup_seconds))
         return Caller(app, server, address, {"Authorization": f"Bearer {key}"} if key else {})
 
     return client

@@ -8,9 +8,9 @@ from db.records import AuditFilter
 from db.repositories import audit
 from service.http.access import ADMIN
 from service.http.dependencies import Given
+from service.http.descriptions import problems
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import INVALID_REQUEST, STORAGE_UNAVAILABLE
-from service.http.routes.common import problems
 from service.http.schemas.audit import AuditEntryOut, AuditOut
 
 router = APIRouter(prefix="/v1/audit", tags=["audit"])

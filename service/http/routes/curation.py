@@ -6,7 +6,9 @@ from fastapi import APIRouter, Path, Response
 
 from service.domain import curate
 from service.http.access import UPLOAD, Asking
+from service.http.bodies import JsonRoute
 from service.http.dependencies import Given
+from service.http.descriptions import problems
 from service.http.problems import (
     INVALID_REQUEST,
     MATERIAL_EXISTS,
@@ -18,7 +20,6 @@ from service.http.problems import (
     UNSUPPORTED_FORMAT,
     UPLOAD_TOO_LARGE,
 )
-from service.http.routes.common import JsonRoute, problems
 from service.http.schemas.common import NAME_PATTERN
 from service.http.schemas.grasp_logs import GraspLogOut, NewWithdrawal, WithdrawnOut
 from service.http.schemas.jobs import JobOut

@@ -10,16 +10,17 @@ from fastapi.responses import FileResponse
 from db.records import JobStatus, LogFilter, StoredGraspLog
 from db.repositories import grasp_logs, materials
 from service import formats
-from service.context import Context
-from service.domain.asker import Asker
+from service.domain.context import Context
 from service.domain.errors import ResultsNotReady
 from service.domain.export import export
 from service.domain.stored_results import EVENT_KINDS, SAMPLE_ARRAYS, StoredHistory, decode_history, decode_samples
-from service.domain.upload import ReceivedLog, StoredUpload, UploadRequest, accept, received, storing
+from service.domain.upload import ReceivedLog, StoredUpload, UploadRequest, accept, received, store
 from service.formats import writing
 from service.formats.tracked_markers import FRAME_RATE, SCALE
 from service.http.access import READ, UPLOAD, Asking
+from service.http.bodies import chunks, gone
 from service.http.dependencies import Given
+from service.http.descriptions import problems
 from service.http.download import Download
 from service.http.idempotency import Answer, IdempotencyKey, KeyWithoutBody, answer_once
 from service.http.long_json import long_json
@@ -43,7 +44,6 @@ from service.http.problems import (
     UPLOAD_TOO_LARGE,
     Problem,
 )
-from service.http.routes.common import chunks, gone, problems
 from service.http.schemas.grasp_logs import GraspLogOut, GraspLogsOut
 from service.http.schemas.results import EventsOut, SamplesOut, StickRatioOut
 from slipcore.defaults import DEFAULT_METHOD, METHOD_NAMES
@@ -139,13 +139,14 @@ async def create_grasp_log(
         asker,
     )
     async with received(context, chunks(request), asked, partial(gone, request)) as log:
-        answer = await asyncio.to_thread(_store, context, log, key and key.about(log.body_sha256), asker)
+        answer = await asyncio.to_thread(_store, context, log, key and key.about(log.body_sha256))
     return answer.response()
 
 
-def _store(context: Context, log: ReceivedLog, key: IdempotencyKey | None, asker: Asker) -> Answer:
-    with storing(context, log) as session:
-        return answer_once(session, key, lambda: _answer(accept(session, context.settings, log, asker)))
+def _store(context: Context, log: ReceivedLog, key: IdempotencyKey | None) -> Answer:
+    return store(
+        context, log, lambda session: answer_once(session, key, lambda: _answer(accept(session, context, log)))
+    )
 
 
 def _answer(stored: StoredUpload) -> Answer:

@@ -4,8 +4,8 @@ from fastapi import APIRouter
 
 from db.errors import StorageUnavailable
 from service.http.dependencies import Given
+from service.http.descriptions import problems
 from service.http.problems import STORAGE_UNAVAILABLE, WORKERS_NOT_READY, Problem, storage_unavailable
-from service.http.routes.common import problems
 from service.http.schemas.health import HealthOut, ReadyOut
 
 router = APIRouter(tags=["health"])

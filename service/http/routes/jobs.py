@@ -10,9 +10,9 @@ from service.domain.await_job import MOST_SECONDS, await_job
 from service.domain.cancel import cancel
 from service.http.access import ADMIN, READ, Asking
 from service.http.dependencies import Given
+from service.http.descriptions import problems
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import INVALID_REQUEST, JOB_ENDED, STORAGE_UNAVAILABLE, UNKNOWN_JOB
-from service.http.routes.common import problems
 from service.http.schemas.jobs import JobOut, JobsOut
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])

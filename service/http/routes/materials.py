@@ -10,8 +10,10 @@ from service.domain import curate
 from service.domain.fit import request_fit
 from service.domain.look_up import Question, look_up
 from service.http.access import READ, UPLOAD, Asking
+from service.http.bodies import JsonRoute
 from service.http.conditional import NOT_MODIFIED, conditional, tagged
 from service.http.dependencies import Given
+from service.http.descriptions import problems
 from service.http.idempotency import Answer, KeyWithBody, answer_once
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import (
@@ -26,7 +28,6 @@ from service.http.problems import (
     UNSUPPORTED_FORMAT,
     UPLOAD_TOO_LARGE,
 )
-from service.http.routes.common import JsonRoute, problems
 from service.http.schemas.jobs import JobOut
 from service.http.schemas.materials import MaterialOut, MaterialsOut, NewMaterial
 from service.http.schemas.models import (

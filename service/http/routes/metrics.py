@@ -7,8 +7,8 @@ from prometheus_client import CONTENT_TYPE_LATEST
 
 from service.http.access import READ
 from service.http.dependencies import Given
+from service.http.descriptions import problems
 from service.http.problems import STORAGE_UNAVAILABLE
-from service.http.routes.common import problems
 from service.observability.metrics import Metrics
 
 router = APIRouter(tags=["health"])

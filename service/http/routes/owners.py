@@ -7,6 +7,7 @@ from fastapi import APIRouter, Path, Response
 from service.domain import ownership
 from service.http.access import READ, UPLOAD, Asking
 from service.http.dependencies import Given
+from service.http.descriptions import problems
 from service.http.problems import (
     INVALID_REQUEST,
     NOT_OWNER,
@@ -14,7 +15,6 @@ from service.http.problems import (
     UNKNOWN_MATERIAL,
     UNKNOWN_OWNER,
 )
-from service.http.routes.common import problems
 from service.http.schemas.owners import OwnersOut
 
 router = APIRouter(prefix="/v1/materials/{name}/owners", tags=["materials"])

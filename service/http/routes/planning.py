@@ -8,7 +8,9 @@ from fastapi import APIRouter
 
 from service.domain import plan
 from service.http.access import READ
+from service.http.bodies import LongJsonRoute
 from service.http.dependencies import Given
+from service.http.descriptions import problems
 from service.http.problems import (
     INVALID_REQUEST,
     INVALID_SAMPLES,
@@ -21,7 +23,6 @@ from service.http.problems import (
     UNSUPPORTED_FORMAT,
     UPLOAD_TOO_LARGE,
 )
-from service.http.routes.common import LongJsonRoute, problems
 from service.http.schemas.planning import GraspForceOut, NewGraspForce, NewRecognition, RecognitionOut, SamplesIn
 from slipcore.samples import FrictionSamples
 

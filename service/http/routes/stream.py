@@ -4,9 +4,11 @@ from typing import Any
 
 from fastapi import APIRouter, WebSocket
 
-from db.records import StoredGraspLog
-from service.context import Context
+from db.blobs import Spool
+from service.domain.upload import UploadRequest, store_made
+from service.formats.reading import Description
 from service.http.access import UPLOAD, asker
+from service.http.context import ServerContext
 from service.http.schemas.grasp_logs import GraspLogOut
 from service.stream import connection
 
@@ -16,10 +18,10 @@ router = APIRouter()
 @router.websocket("/v1/stream", dependencies=[UPLOAD])
 async def live_stream(socket: WebSocket) -> None:
     """Frames in, slip states out (docs/stream.md)."""
-    context: Context = socket.app.state.context
+    context: ServerContext = socket.app.state.context
     await socket.accept()
-    await connection.serve(socket, context, await asker(socket), _as_json)
 
+    def store(spool: Spool, found: Description, request: UploadRequest) -> dict[str, Any]:
+        return GraspLogOut.of(store_made(context, spool, found, request).log).model_dump(mode="json")
 
-def _as_json(log: StoredGraspLog) -> dict[str, Any]:
-    return GraspLogOut.of(log).model_dump(mode="json")
+    await connection.serve(socket, context, context.streams, await asker(socket), store)

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Request, Response
 
 from db.records import StoredGraspLog
 from db.repositories import grasp_logs
-from service.context import Context
+from service.domain.context import Context
 from service.domain.errors import ResultsNotReady
 from service.http.access import READ, Asking
 from service.http.conditional import KEEP_AND_ASK, is_one_of, unchanged

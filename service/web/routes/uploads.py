@@ -11,15 +11,15 @@ from starlette.datastructures import FormData, UploadFile
 
 from db.blobs import disk_errors_named
 from service import formats
-from service.context import Context
 from service.domain.asker import Asker
+from service.domain.context import Context
 from service.domain.receive import CHUNK_BYTES
 from service.domain.upload import UploadRequest, upload
 from service.formats.tracked_markers import FRAME_RATE, SCALE
 from service.http.access import READ, UPLOAD, Asking
+from service.http.bodies import limited
 from service.http.dependencies import Given
 from service.http.problems import INVALID_REQUEST, Problem
-from service.http.routes.common import limited
 from service.http.schemas.materials import NewMaterial
 from service.web.forms import checked, read_form
 from service.web.materials import names

@@ -11,8 +11,8 @@ from db.database import Database
 from db.errors import NotFound
 from db.records import Claim, Job, NewGraspLog
 from db.repositories import grasp_logs, jobs, materials, runners
-from service.context import Context
 from service.domain import curate
+from service.domain.context import Context
 from service.domain.errors import DomainError, InvalidValue, NoModel
 from service.domain.look_up import Friction, Question, look_up
 from service.jobs import pipeline

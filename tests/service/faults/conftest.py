@@ -141,7 +141,7 @@ class Fleet:
         self.servers: dict[Server, BaseProcess] = {}
         self.workers: list[BaseProcess] = []
         self._context = multiprocessing.get_context("forkserver")
-        self._context.set_forkserver_preload(["service.cli", "service.cli.running", "service.http.serving"])
+        self._context.set_forkserver_preload(["service.cli", "service.cli.running", "service.serving"])
         self.environment = {
             "STICTION_DATA_FOLDER": str(folder),
             "STICTION_DATABASE_URL": database_url,

@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, ExitStack, closing, suppress
 import httpx
 import pytest
 
-from service.http import serving as http_serving
+from service import serving as server
 from service.http.connections import BoundedConnection, H11Connection
 from service.http.envelope import MOST_HEADER_BYTES
 from service.http.httptools_connections import HttpToolsConnection
@@ -29,7 +29,7 @@ def address(
     folder = tmp_path_factory.mktemp("served")
     settings = Settings(data_folder=folder, workers=0, max_connections_per_address=MOST_OF_ONE, max_connections=100)
     with pytest.MonkeyPatch.context() as patch, ExitStack() as stack:
-        patch.setattr(http_serving, "parsed_connection", lambda: protocol)
+        patch.setattr(server, "parsed_connection", lambda: protocol)
         client = stack.enter_context(serving(settings))
         yield client.base_url.host, int(client.base_url.port or 0)
 

@@ -13,7 +13,7 @@ import httpx
 import pytest
 
 from service.http.origin import FORWARDING
-from service.http.serving import configuration
+from service.serving import configuration
 from service.settings import Settings
 
 Reach = Callable[..., Any]

@@ -14,9 +14,9 @@ from sqlalchemy import text
 from db.database import Database
 from db.repositories import access_keys
 from service.domain import keys
-from service.http.serving import configuration
 from service.observability import logs
 from service.observability.logs import JsonLines, Logs, TextLines
+from service.serving import configuration
 from service.settings import Settings
 
 KEY = "stiction_0123456789ab_" + "c0ffee00" * 8

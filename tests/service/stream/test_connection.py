@@ -23,7 +23,7 @@ from db import migrate
 from db.database import Database
 from db.repositories import access_keys
 from service.domain import keys
-from service.http.serving import configuration
+from service.serving import configuration
 from service.settings import Settings
 from service.stream import connection as stream
 from slipcore import GraspLog, detect_slip

@@ -1,4 +1,4 @@
-"""What the routes share: how their errors are described, and what a JSON body may be."""
+"""Bodies of requests: read as they come, and of bounded size."""
 
 from collections.abc import AsyncIterator, Callable, Coroutine
 from typing import Any
@@ -9,24 +9,10 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.types import Message, Receive
 
-from service.http.problems import UNSUPPORTED_FORMAT, Problem, ProblemType
-from service.http.schemas.problems import ProblemOut
+from service.http.problems import UNSUPPORTED_FORMAT, Problem
 
 MAX_JSON_BYTES = 64 * 1024
 """Bytes of a JSON body; the longest description is 10,000 characters."""
-
-
-def problems(*kinds: ProblemType) -> dict[int | str, dict[str, Any]]:
-    """Description of the problems that a route may answer with, by status, as the framework takes it."""
-    return {status: {"description": text, "model": ProblemOut} for status, text in description_of(*kinds).items()}
-
-
-def description_of(*kinds: ProblemType) -> dict[int, str]:
-    """What is said of problems, by status."""
-    by_status: dict[int, list[str]] = {}
-    for kind in sorted(kinds, key=lambda kind: kind.status):
-        by_status.setdefault(kind.status, []).append(f"{kind.title} (`{kind.uri}`)")
-    return {status: "; ".join(texts) for status, texts in by_status.items()}
 
 
 async def chunks(request: Request) -> AsyncIterator[bytes]:

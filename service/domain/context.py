@@ -1,8 +1,10 @@
 """What the use cases have to work with."""
 
+import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from sqlalchemy.orm import Session
 
@@ -11,11 +13,24 @@ from db.database import Database
 from service.domain.model_cache import ModelCache
 from service.domain.receive import Bodies
 from service.formats.reading import Readers
-from service.jobs.runner import JobRunner
-from service.jobs.scrub import Scrub
-from service.observability.store_watch import StoreWatch
 from service.settings import Settings
-from service.stream.sessions import Streams
+
+
+class Jobs(Protocol):
+    """Who does the jobs that are queued."""
+
+    @property
+    def missing(self) -> str | None:
+        """What it waits for before it can do any, None if nothing."""
+
+    def wake(self) -> None:
+        """Look for a job soon, since one has just been stored; may be called from any thread."""
+
+    def ending(self, job_id: str) -> asyncio.Event:
+        """Set once this job is done here; jobs that are done elsewhere end unheard."""
+
+    async def until_outdated(self) -> None:
+        """Raise ``SchemaMismatch`` once the schema is not this version's any more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,12 +40,9 @@ class Context:
     settings: Settings
     database: Database
     blobs: BlobStore
-    jobs: JobRunner
+    jobs: Jobs
     readers: Readers = field(default_factory=Readers)
-    streams: Streams = field(default_factory=Streams)
     models: ModelCache = field(default_factory=ModelCache)
-    scrub: Scrub | None = None
-    watch: StoreWatch | None = None
     bodies: Bodies = field(default_factory=Bodies)
 
     @contextmanager
