@@ -198,11 +198,15 @@ class SampleSummary:
 
 @dataclass(frozen=True, slots=True)
 class SamplesOfLog:
-    """Where the samples of one log are: in the blob of hash ``samples_blob``, and their ``moments`` where known."""
+    """Where the samples of one log are: in the blob of hash ``samples_blob``, and their ``moments`` where known.
+
+    ``findings``: names of what was found against the log.
+    """
 
     grasp_log_id: str
     samples_blob: str
     moments: bytes | None
+    findings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

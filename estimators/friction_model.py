@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 from estimators.errors import InvalidSamples
+from stiction_client.support import Kind, Support, extrapolation, support, widening
 
 FloatArray = NDArray[np.float64]
 
@@ -106,8 +107,9 @@ class FrictionModel:
 
         The quantile includes the scatter and the uncertainty of the coefficients, whose distances from the mean add
         as root of squares (Graybill & Wang 1980): exact where all have the same degrees of freedom, and not too narrow
-        in the tails where some have less. Shapes broadcast. Raises ``InvalidSamples`` for a quantile outside (0, 1) and
-        for a contact of no elements.
+        in the tails where some have less. Outside the data the ``widening`` adds in the same way (``support.BEND``). No
+        quantile is below 0. Shapes broadcast. Raises ``InvalidSamples`` for a quantile outside (0, 1) and for a contact
+        of no elements.
         """
         count = _averaged(of, elements)
         v, f_n = np.broadcast_arrays(np.asarray(tangential_velocity, float), np.asarray(normal_force, float))
@@ -118,8 +120,9 @@ class FrictionModel:
         _check_probability("quantile", quantile)
         error = np.sqrt(np.maximum(np.einsum("...i,ij,...j->...", x, self.covariance, x), 0.0))
         uncertain = special.stdtrit(self.degrees_of_freedom, quantile) * error
-        distance = np.hypot(self._scattered(quantile, mean, count), uncertain)
-        return np.asarray(mean + np.sign(quantile - 0.5) * distance)
+        outside = special.ndtri(quantile) * widening(self, v, f_n)
+        distance = np.hypot(np.hypot(self._scattered(quantile, mean, count), uncertain), outside)
+        return np.asarray(np.maximum(mean + np.sign(quantile - 0.5) * distance, 0.0))
 
     def _scattered(self, quantile: float, mean: FloatArray, count: int) -> FloatArray | float:
         """How far scatter alone takes the mean over so many elements of a new grasp from the ``mean`` [...]."""
@@ -136,16 +139,24 @@ class FrictionModel:
 
         Slower than the data is not outside: slip is never observed at rest, and a grasp that holds is the limit v → 0.
         """
-        asked = (
-            ("tangential velocity", tangential_velocity, (0.0, self.domain.tangential_velocity[1]), "m/s"),
-            ("normal force", normal_force, self.domain.normal_force, "N an element"),
-        )
-        remarks = [
-            f"{name} extrapolated to {value:.4g} {unit}, observed {low:.4g} to {high:.4g}"
-            for name, value, (low, high), unit in asked
-            if not low <= value <= high
-        ]
-        return "; ".join(remarks) or None
+        return extrapolation(self.domain, tangential_velocity, normal_force)
+
+    def support_at(self, tangential_velocity: float, normal_force: float, stale: str | None = None) -> Support:
+        """What the answer at v (m/s) and f_n (N an element) rests on, and what to do about it.
+
+        ``stale``: why the model is not its material's any more, if it is not.
+        """
+        return support(self, tangential_velocity, normal_force, stale)
+
+    @property
+    def support(self) -> Kind:
+        """What answers rest on at rest and in the middle of the normal forces observed (``support_at``)."""
+        return self.support_at(0.0, 0.5 * sum(self.domain.normal_force)).kind
+
+    @property
+    def advice(self) -> str:
+        """What to do about it."""
+        return self.support_at(0.0, 0.5 * sum(self.domain.normal_force)).advice
 
 
 def _check_probability(name: str, value: float) -> None:

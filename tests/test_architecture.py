@@ -16,7 +16,17 @@ CLIENT = "clients/stiction_client"
 
 ALLOWED = {
     "slipcore": {"slipcore", "numpy", "scipy", "numba"},
-    "estimators": {"estimators", "slipcore", "numpy", "scipy", "numba", "statsmodels", "emcee", "pandas"},
+    "estimators": {
+        "estimators",
+        "slipcore",
+        "stiction_client",
+        "numpy",
+        "scipy",
+        "numba",
+        "statsmodels",
+        "emcee",
+        "pandas",
+    },
     "db": {"db", "migrations", "sqlalchemy", "alembic", "obstore"},
     "migrations": {"migrations", "sqlalchemy", "alembic"},
     CLIENT: {"stiction_client", "httpx", "numpy", "scipy"},
@@ -89,6 +99,12 @@ def test_estimators_know_of_slipcore_only_its_samples_and_its_compiler() -> None
     for path in sorted((ROOT / "estimators").rglob("*.py")):
         modules = {name for name in imported_modules(path) if name.split(".")[0] == "slipcore"}
         assert all(name.startswith(("slipcore.samples", "slipcore.compilation")) for name in modules), path
+
+
+def test_estimators_know_of_the_client_only_what_says_how_far_a_model_is_to_be_trusted() -> None:
+    for path in sorted((ROOT / "estimators").rglob("*.py")):
+        modules = {name for name in imported_modules(path) if name.split(".")[0] == "stiction_client"}
+        assert all(name.startswith("stiction_client.support") for name in modules), path
 
 
 def test_one_module_decides_how_kernels_are_compiled_and_kept() -> None:

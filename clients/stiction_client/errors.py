@@ -92,7 +92,7 @@ forces beyond those observed would; or the expected friction would, but too litt
 _CAUSES: dict[str, str] = {
     "physics": "even the friction that is expected holds less",
     "limit": "a normal force above the limit would hold it",
-    "range": "only normal forces beyond those observed would hold it: record grasps that press harder",
+    "range": "only normal forces beyond those observed{observed} would hold it: record grasps that press harder",
     "ignorance": "the friction that is expected would hold it, but is too uncertain: record more grasps",
     "": "",
 }
@@ -102,15 +102,23 @@ class NoFeasibleForce(StictionError):
     """No normal force holds the load with the slip probability asked for.
 
     ``largest_load``: N, the most that can be held so (0 where nothing can), at ``normal_force`` N; ``cause``: whether
-    physics, the limit, the range of the data or ignorance is why.
+    physics, the limit, the range of the data or ignorance is why; ``largest_observed``: greatest normal force of an
+    element in the data, N, where it is known.
     """
 
     def __init__(
-        self, tangential_load: float, largest_load: float, normal_force: float, reason: str, cause: Cause | str = ""
+        self,
+        tangential_load: float,
+        largest_load: float,
+        normal_force: float,
+        reason: str,
+        cause: Cause | str = "",
+        largest_observed: float | None = None,
     ) -> None:
         self.tangential_load, self.largest_load = tangential_load, largest_load
         self.normal_force, self.reason, self.cause = normal_force, reason, cause
-        super().__init__(tangential_load, largest_load, normal_force, reason, cause)
+        self.largest_observed = largest_observed
+        super().__init__(tangential_load, largest_load, normal_force, reason, cause, largest_observed)
 
     def __str__(self) -> str:
         most = (
@@ -118,5 +126,6 @@ class NoFeasibleForce(StictionError):
             if self.largest_load > 0.0
             else "no load is held so at any force"
         )
-        because = f"; {_CAUSES[self.cause]}" if self.cause else ""
+        up_to = "" if self.largest_observed is None else f", {self.largest_observed:.4g} N an element,"
+        because = f"; {_CAUSES[self.cause].format(observed=up_to)}" if self.cause else ""
         return f"no normal force holds {self.tangential_load:.6g} N ({self.reason}); {most}{because}"

@@ -115,6 +115,7 @@ class LoadedContact:
                 (value < -0.25 * rounding)
                 & onwards
                 & (direction * step > 0.25 * ROUNDING * x)
+                & (step > -x)  # friction may fall in a straight line to 0 without load: then there is no root
                 & (self.unit * x < ENDLESS)
             )
             if not (moving.any() if isinstance(moving, np.ndarray) else moving):

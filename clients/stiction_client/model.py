@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiction_client.errors import InvalidArgument
+from stiction_client.support import OUTDATED, SUPERSEDED, Kind, Support, extrapolation, support, widening
 
 FloatArray = NDArray[np.float64]
 
@@ -91,7 +92,7 @@ class FrictionModel:
     ε [-]; ``n`` samples of elements of ``element_area`` m²; ``degrees_of_freedom`` of the Student-t distribution that
     the coefficients follow, ``scatter_degrees_of_freedom`` of that which ε/σ follows; ``identifiable`` [3] bool;
     ``scales`` of the scatter where the method tells them apart, when σ is all of it, as one element in a new grasp
-    shows it; None also of a model that an older version stored.
+    shows it; None also of a model that an older version stored; ``outdated``: the material's logs are others since.
     """
 
     material: str
@@ -111,6 +112,7 @@ class FrictionModel:
     diagnostics: Mapping[str, float | str | None] = field(default_factory=dict)
     created_at: str = ""
     scales: Scales | None = None
+    outdated: bool = False
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "FrictionModel":
@@ -134,6 +136,7 @@ class FrictionModel:
             diagnostics=dict(record["diagnostics"]),
             created_at=record["created_at"],
             scales=None if record.get("scales") is None else Scales.from_json(record["scales"]),
+            outdated=bool(record.get("outdated", False)),
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -159,6 +162,7 @@ class FrictionModel:
             "diagnostics": dict(self.diagnostics),
             "created_at": self.created_at,
             "scales": None if self.scales is None else self.scales.to_json(),
+            "outdated": self.outdated,
         }
 
     def save(self, path: Path | str) -> None:
@@ -213,8 +217,9 @@ class FrictionModel:
         as shared.
 
         The quantile includes the scatter and the uncertainty of the coefficients, whose distances from the mean add
-        as root of squares (Graybill & Wang 1980), as in the service. Shapes broadcast. Raises ``InvalidArgument`` for
-        a quantile outside (0, 1) and for a contact of no elements.
+        as root of squares (Graybill & Wang 1980), as in the service. Outside the data the ``widening`` adds in the same
+        way (``support.BEND``). No quantile is below 0. Shapes broadcast. Raises ``InvalidArgument`` for a quantile
+        outside (0, 1) and for a contact of no elements.
         """
         from scipy import special
 
@@ -228,8 +233,9 @@ class FrictionModel:
         error = np.sqrt(np.maximum(np.einsum("...i,ij,...j->...", x, self.covariance, x), 0.0))
         shared, own = self.scatter(quantile, count)
         scatter = np.hypot(shared * mean, own)
-        distance = np.hypot(scatter, special.stdtrit(self.degrees_of_freedom, quantile) * error)
-        return np.asarray(mean + np.sign(quantile - 0.5) * distance)
+        uncertain = special.stdtrit(self.degrees_of_freedom, quantile) * error
+        distance = np.hypot(np.hypot(scatter, uncertain), special.ndtri(quantile) * widening(self, v, f_n))
+        return np.asarray(np.maximum(mean + np.sign(quantile - 0.5) * distance, 0.0))
 
     def scatter(self, quantile: Number, elements: Number = 1.0) -> tuple[Number, Number]:
         """How far scatter takes the mean over so many elements of a new grasp: a part of friction, and what adds [-].
@@ -249,16 +255,26 @@ class FrictionModel:
 
         Slower than the data is not outside: slip is never observed at rest, and a grasp that holds is the limit v → 0.
         """
-        asked = (
-            ("tangential velocity", tangential_velocity, (0.0, self.domain.tangential_velocity[1]), "m/s"),
-            ("normal force", normal_force, self.domain.normal_force, "N an element"),
-        )
-        remarks = [
-            f"{name} extrapolated to {value:.4g} {unit}, observed {low:.4g} to {high:.4g}"
-            for name, value, (low, high), unit in asked
-            if not low <= value <= high
-        ]
-        return "; ".join(remarks) or None
+        return extrapolation(self.domain, tangential_velocity, normal_force)
+
+    def support_at(self, tangential_velocity: float, normal_force: float) -> Support:
+        """What the answer at v (m/s) and f_n (N an element) rests on, and what to do about it."""
+        return support(self, tangential_velocity, normal_force, self.stale)
+
+    @property
+    def stale(self) -> str | None:
+        """Why this is not the material's model any more; None while it is."""
+        return OUTDATED if self.outdated else None if self.current else SUPERSEDED
+
+    @property
+    def support(self) -> Kind:
+        """What answers rest on at rest and in the middle of the normal forces observed (``support_at``)."""
+        return self.support_at(0.0, 0.5 * sum(self.domain.normal_force)).kind
+
+    @property
+    def advice(self) -> str:
+        """What to do about it."""
+        return self.support_at(0.0, 0.5 * sum(self.domain.normal_force)).advice
 
 
 def check_probability(name: str, value: float) -> None:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -14,6 +14,7 @@ from stiction_client.errors import Cause, InvalidArgument, NoFeasibleForce
 from stiction_client.holding import LoadedContact, least, select
 from stiction_client.model import KINDS, FloatArray, FrictionModel, Number
 from stiction_client.quantile import FrictionQuantile
+from stiction_client.support import Kind, kinds
 
 SLIP_PROBABILITY = 1e-3
 """Default bound: one slip in a thousand grasps that bear the full load."""
@@ -43,8 +44,9 @@ class RequiredForce:
     ``largest_load``: the most tangential load on one contact, in the ratio to the torque that was asked for, that any
     force holds so (infinite where unbounded); ``element_force``: mean normal force of one element at the answer;
     ``friction_coefficient``: the conservative quantile there; ``within_domain``: whether velocity and element force lie
-    where the model was observed; ``warning``: which of them does not, or None; ``of``: whether the quantile is that of
-    one "element" or of the mean over the contact's ``elements``.
+    where the model was observed; ``warning``: which of them does not, or what else speaks against the answer, or None;
+    ``of``: whether the quantile is that of one "element" or of the mean over the contact's ``elements``; ``support``
+    and ``advice``: what the answer rests on, and what to do about it (``support.Support``).
     """
 
     normal_force: float
@@ -58,6 +60,8 @@ class RequiredForce:
     warning: str | None
     of: str = "element"
     elements: float = 1.0
+    support: Kind = "supported"
+    advice: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,6 +79,7 @@ class RequiredForces:
     outcome: NDArray[np.str_]
     of: str
     elements: FloatArray
+    support: NDArray[np.str_]
 
 
 @overload
@@ -259,9 +264,11 @@ def _one(question: _Question, tangential_load: Number) -> RequiredForce:
             float(loaded.force(best)),
             _asked(question),
             str(_causes(question)),
+            question.model.domain.normal_force[1],
         )
     element = float(question.element_force(low))
-    warning = question.model.extrapolation(float(question.velocity), element)
+    outside = question.model.extrapolation(float(question.velocity), element)
+    support = question.model.support_at(float(question.velocity), element)
     bounds = float(loaded.force(low)), float(loaded.force(high))
     return RequiredForce(
         normal_force=bounds[0],
@@ -271,10 +278,12 @@ def _one(question: _Question, tangential_load: Number) -> RequiredForce:
         element_force=element,
         friction_coefficient=float(loaded.quantile(loaded.unit * low)[0]),
         slip_probability=float(question.probability),
-        within_domain=warning is None,
-        warning=warning,
+        within_domain=outside is None,
+        warning=support.warning(outside),
         of=question.of,
         elements=float(question.elements),
+        support=support.kind,
+        advice=support.advice,
     )
 
 
@@ -298,6 +307,7 @@ def _many(question: _Question, given: tuple[Number, ...]) -> RequiredForces:
             outcome=outcome,
             of=question.of,
             elements=np.broadcast_to(question.elements, low.shape),
+            support=np.where(holds, kinds(question.model, question.velocity, element, question.model.stale), ""),
         )
 
 
@@ -308,7 +318,8 @@ def _causes(question: _Question) -> Any:
     expected, _, possible = loaded.expected().interval(math.inf)
     most = loaded.root(question.limit)
     observed = question.model.domain.normal_force[1]
-    unobserved = question.element_force(expected) > observed
+    straight = replace(loaded, quantile=replace(loaded.quantile, below=0.0, above=0.0)).interval(math.inf)[2]
+    unobserved = (question.element_force(expected) > observed) | (straight & ~np.asarray(could))
     limited = (could & (beyond > most)) | (possible & (expected > most))
     return np.select([~np.asarray(possible), limited, unobserved], ["physics", "limit", "range"], "ignorance")
 

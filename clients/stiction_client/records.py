@@ -151,7 +151,8 @@ class FrictionAnswer:
 
     ``friction_coefficient`` is the mean, or the quantile asked for ``of`` one "element", or of the mean over the
     ``elements`` of a "contact"; ``warning`` says what was extrapolated; ``chosen_because``, why this model answers,
-    where no method was named.
+    where no method was named; ``support`` and ``advice``, what the answer rests on and what to do about it (None where
+    an older service answers).
     """
 
     material: str
@@ -167,6 +168,8 @@ class FrictionAnswer:
     of: str = "element"
     elements: int = 1
     chosen_because: str | None = None
+    support: str | None = None
+    advice: str | None = None
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "FrictionAnswer":
@@ -176,17 +179,23 @@ class FrictionAnswer:
 
 @dataclass(frozen=True, slots=True)
 class Recognition:
-    """How probable it is that a grasp was of each material, the likeliest first; ``unknown``: of none of them."""
+    """How probable it is that a grasp was of each material, the likeliest first; ``unknown``: of none of them.
+
+    ``advice``: what to do about each material's model, where that is not supported by its data.
+    """
 
     method: str
     probability: dict[str, float]
     unknown: float
+    advice: dict[str, str] = field(default_factory=dict)
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "Recognition":
         """The recognition in the service's answer."""
         probability = {entry["material"]: float(entry["probability"]) for entry in record["candidates"]}
-        return cls(record["method"], probability, float(record["unknown"]))
+        doubtful = (entry for entry in record["candidates"] if entry.get("support", "supported") != "supported")
+        advice = {entry["material"]: f"{entry['support']}: {entry['advice']}" for entry in doubtful}
+        return cls(record["method"], probability, float(record["unknown"]), advice)
 
 
 @dataclass(frozen=True, slots=True)

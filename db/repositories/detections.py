@@ -38,13 +38,25 @@ def samples_of_material(session: Session, material_id: int) -> list[SamplesOfLog
     still: its newest samples count.
     """
     query = (
-        select(GraspLogRow.sha256, GraspLogRow.id, SampleSummaryRow.samples_blob, SampleSummaryRow.moments)
+        select(
+            GraspLogRow.sha256,
+            GraspLogRow.id,
+            SampleSummaryRow.samples_blob,
+            SampleSummaryRow.moments,
+            DetectionRow.findings,
+        )
         .join(SampleSummaryRow)
+        .outerjoin(DetectionRow, DetectionRow.grasp_log_id == GraspLogRow.id)
         .where(*_that_count(material_id))
         .order_by(SampleSummaryRow.created_at, GraspLogRow.id)
     )
     found = session.execute(query)
-    return list({sha256: SamplesOfLog(log_id, blob, moments) for sha256, log_id, blob, moments in found}.values())
+    return list(
+        {
+            sha256: SamplesOfLog(log_id, blob, moments, tuple(finding["name"] for finding in findings or ()))
+            for sha256, log_id, blob, moments, findings in found
+        }.values()
+    )
 
 
 def set_moments(session: Session, log_id: str, moments: bytes) -> None:

@@ -103,17 +103,20 @@ def fit(
     """Fit the stochastic linear friction model to the slip seen in one or more grasp logs."""
     from estimators import fit as fit_model
     from service import formats
+    from service.domain.doubtful_logs import with_doubts
     from slipcore import LOOKAHEAD, check_log, collect_samples, detect_slip
     from slipcore.defaults import DEFAULT_METHOD
 
-    grasps = []
+    grasps, found = [], []
     for path in logs:
         grasp = formats.read(path, mapping=mapping_text(mapping))
         history = detect_slip(grasp, method=detector or DEFAULT_METHOD, lookahead=LOOKAHEAD)
-        for finding in check_log(grasp, history):
+        found.append(check_log(grasp, history))
+        for finding in found[-1]:
             typer.echo(f"{path.name}: {finding.name}: {finding.evidence}", err=True)
         grasps.append(collect_samples(grasp, history))
-    model = fit_model(grasps, method=method, seed=seed)
+    names = [[finding.name for finding in findings] for findings in found]
+    model = with_doubts(fit_model(grasps, method=method, seed=seed), names)
     if json:
         print_json(model_record(model))
     else:
@@ -163,6 +166,8 @@ def model_record(model: "FrictionModel") -> dict[str, Any]:
         "element_area": model.element_area,
         "diagnostics": dict(model.diagnostics),
         "cost": {"seconds": model.cost.seconds, "monte_carlo_error": model.cost.monte_carlo_error},
+        "support": model.support,
+        "advice": model.advice,
     }
 
 
@@ -177,6 +182,7 @@ def print_model(model: "FrictionModel", title: str) -> None:
     ]
     rows.append(("σ [-]", number(model.scale), "", ""))
     print_table(title, ("", "estimate", "95 % interval", "identifiable"), rows)
+    typer.echo(f"{model.support}: {model.advice}")
 
 
 def _detection_summary(log: "GraspLog", history: "SlipHistory", seconds: float) -> dict[str, Any]:

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from service.domain.model_cache import KnownModel
+from stiction_client.support import OUTDATED, Kind
 
 Averaged = Literal["element", "contact"]
 """Whose friction is asked for: the scatter of a contact's elements averages out."""
-
-OUTDATED = "the model is outdated: the material's logs are others since, and it was not fitted again by this method"
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +27,8 @@ class Question:
 class Friction(NamedTuple):
     """Friction coefficient of a material at a tangential velocity m/s and a normal force of an element N.
 
-    ``friction_coefficient``: the quantile that was asked for, or the mean; ``within_domain``: the samples reach there.
+    ``friction_coefficient``: the quantile that was asked for, or the mean, at least 0; ``within_domain``: the samples
+    reach there; ``support`` and ``advice``: what the answer rests on, and what to do about it.
     """
 
     material: str
@@ -44,6 +44,8 @@ class Friction(NamedTuple):
     within_domain: bool
     chosen_because: str | None
     warning: str | None
+    support: Kind
+    advice: str
 
 
 def look_up(known: KnownModel, question: Question) -> Friction:
@@ -57,7 +59,7 @@ def look_up(known: KnownModel, question: Question) -> Friction:
         else float(model.predict(v, f_n, question.quantile, question.of, question.elements))
     )
     outside = model.extrapolation(v, f_n)
-    outdated = OUTDATED if stored.outdated else None
+    support = model.support_at(v, f_n, OUTDATED if stored.outdated else None)
     nothing = "the answer is not above 0: nothing is known of the friction there" if asked <= 0.0 else None
     return Friction(
         material=stored.material,
@@ -68,9 +70,11 @@ def look_up(known: KnownModel, question: Question) -> Friction:
         quantile=question.quantile,
         of=question.of,
         elements=question.elements,
-        friction_coefficient=asked,
+        friction_coefficient=max(asked, 0.0),
         mean=mean,
         within_domain=outside is None,
         chosen_because=known.because,
-        warning="; ".join(filter(None, (outside, nothing, outdated))) or None,
+        warning=support.warning(outside, nothing, known.disagreement),
+        support=support.kind,
+        advice=support.advice,
     )

@@ -17,7 +17,7 @@ from db.errors import NotFound, StorageUnavailable
 from db.records import Job, StoredModel
 from db.repositories import friction_models, materials
 from service.domain.errors import NoModel
-from service.domain.recommended import AUTO, recommended
+from service.domain.recommended import AUTO, disagreeing, recommended
 from service.domain.stored_results import to_friction_model
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class KnownModel:
     """A material's current model as it was at a moment, with the tag that stands for what it answers.
 
     ``read_at`` and ``until`` are s of the clock that nobody sets; ``because``: why this model,
-    where no method was named.
+    where no method was named; ``disagreement`` with the material's models by other methods, where there is any.
     """
 
     stored: StoredModel
@@ -45,6 +45,7 @@ class KnownModel:
     read_at: float
     until: float
     because: str | None = None
+    disagreement: str | None = None
 
 
 class _Reading(NamedTuple):
@@ -115,12 +116,14 @@ class ModelCache:
         read_at = time.monotonic()
         until = read_at + self._seconds
         with database.read() as session:
-            stored, because = _current(session, material, method)
-        known = self._known.get((material, method))
-        if known is not None and known.tag == _tag(stored):
+            stored, because, others = _current(session, material, method)
+        disagreement = disagreeing(stored, others)
+        known, tag = self._known.get((material, method)), _tag(stored, disagreement)
+        if known is not None and known.tag == tag:
             known = replace(known, read_at=read_at, until=until)
         else:
-            known = KnownModel(stored, to_friction_model(stored.model), _tag(stored), read_at, until, because)
+            model = to_friction_model(stored.model)
+            known = KnownModel(stored, model, tag, read_at, until, because, disagreement)
         if len(self._known) >= MOST:
             self._known.clear()
         newer = self._known.get((material, method))
@@ -166,20 +169,23 @@ class ModelCache:
             self._changes.popitem(last=False)
 
 
-def _current(session: Session, material: str, method: str) -> tuple[StoredModel, str | None]:
-    """The current model by a method, or the recommended one with the reason; raises as ``ModelCache.read``."""
-    if method != AUTO:
-        stored = friction_models.current(session, material, method)
-        if stored is not None:
-            return stored, None
+def _current(session: Session, material: str, method: str) -> tuple[StoredModel, str | None, Sequence[StoredModel]]:
+    """The current model by a method, or the recommended one with the reason, and all of the material's current models;
+    raises as ``ModelCache.read``.
+    """
     material_id = materials.find_id(session, material)
-    if method == AUTO:
-        found = recommended(friction_models.all_current(session, [material_id]).get(material_id, ()))
+    models = friction_models.all_current(session, [material_id]).get(material_id, [])
+    if method != AUTO:
+        named = next((stored for stored in models if stored.model.method == method), None)
+        if named is not None:
+            return named, None, models
+    else:
+        found = recommended(models)
         if found is not None:
-            return found
+            return found.stored, found.because, models
     raise NoModel(f"material {material!r} has no model fitted by {method!r} yet", method)
 
 
-def _tag(stored: StoredModel) -> str:
-    identity = (stored.id, stored.material, stored.outdated)
+def _tag(stored: StoredModel, disagreement: str | None) -> str:
+    identity = (stored.id, stored.material, stored.outdated, disagreement)
     return f'"{hashlib.blake2b(repr(identity).encode(), digest_size=12).hexdigest()}"'

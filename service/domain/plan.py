@@ -11,9 +11,10 @@ from db.repositories import friction_models, grasp_logs, materials
 from estimators.errors import EstimatorError
 from service.domain.context import Context
 from service.domain.errors import InvalidSamples, InvalidValue, NoFeasibleForce, NoModel, ResultsNotReady
-from service.domain.look_up import OUTDATED, Averaged
+from service.domain.look_up import Averaged
 from service.domain.stored_results import decode_samples, finite_or_none, to_client_model, to_friction_model
 from slipcore import FrictionSamples
+from stiction_client.support import Kind
 
 if TYPE_CHECKING:
     from estimators import Moments
@@ -66,15 +67,19 @@ class GraspForce:
     warning: str | None
     of: Averaged
     elements: float
+    support: Kind
+    advice: str
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A material that it may be, with the version of the model that was compared."""
+    """A material that it may be, with the version of the model that was compared, and what that rests on."""
 
     material: str
     version: int
     probability: float
+    support: Kind
+    advice: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +109,12 @@ def grasp_force(context: Context, task: GraspTask) -> GraspForce:
             elements=task.elements,
         )
     except stiction_client.NoFeasibleForce as refusal:
-        facts = {"largest_load": refusal.largest_load, "normal_force": refusal.normal_force, "cause": refusal.cause}
+        facts = {
+            "largest_load": refusal.largest_load,
+            "normal_force": refusal.normal_force,
+            "cause": refusal.cause,
+            "largest_observed": refusal.largest_observed,
+        }
         raise NoFeasibleForce(str(refusal), facts=facts) from refusal
     except stiction_client.InvalidArgument as error:
         raise InvalidValue(error.name, error.value, error.allowed) from error
@@ -113,7 +123,7 @@ def grasp_force(context: Context, task: GraspTask) -> GraspForce:
         "feasible_interval": (low, finite_or_none(high)),
         "margin": finite_or_none(found.margin),
         "largest_load": finite_or_none(found.largest_load),
-        "warning": "; ".join(filter(None, (found.warning, OUTDATED if known.stored.outdated else None))) or None,
+        "warning": "; ".join(filter(None, (found.warning, known.disagreement))) or None,
     }
     return GraspForce(model.material, model.method, model.version, known.because, **told)
 
@@ -135,8 +145,13 @@ def recognise(
         raise InvalidSamples(str(error)) from error
     left = told.pop("unknown")
     pairs = zip(stored, told.values(), strict=True)
-    candidates = [Candidate(each.material, each.version, probability) for each, probability in pairs]
+    candidates = [_candidate(each, probability) for each, probability in pairs]
     return Recognition(tuple(sorted(candidates, key=lambda each: -each.probability)), left)
+
+
+def _candidate(stored: StoredModel, probability: float) -> Candidate:
+    model = to_client_model(stored)
+    return Candidate(stored.material, stored.version, probability, model.support, model.advice)
 
 
 def _candidates(context: Context, names: Sequence[str] | None, method: str) -> list[StoredModel]:

@@ -4,6 +4,8 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from db.records import StoredModel
+from service.domain.stored_results import to_friction_model
+from stiction_client.support import disagreement
 
 AUTO = "auto"
 """In place of a method's name: the recommended model."""
@@ -36,3 +38,15 @@ def _because(stored: StoredModel) -> str:
         checked = told.get("check")
         return f"{method}: {reason}" + (f"; {checked}" if checked else "")
     return f"{method}: the material has no {PREFERENCE[0]} model yet; ask for a fit by {AUTO}"
+
+
+def disagreeing(stored: StoredModel, others: Iterable[StoredModel]) -> str | None:
+    """In a sentence, which models of the same logs expect another friction than the ``stored`` one, if any does."""
+    of_the_same = {
+        other.model.method: to_friction_model(other.model)
+        for other in others
+        if other.model.method in PREFERENCE and other.id != stored.id and not other.outdated
+    }
+    if stored.outdated or not of_the_same:
+        return None
+    return disagreement(stored.model.method, to_friction_model(stored.model), of_the_same)

@@ -178,6 +178,7 @@ def to_client_model(stored: StoredModel) -> "stiction_client.FrictionModel":
         diagnostics=stored.model.diagnostics,
         created_at=stored.created_at.isoformat(),
         scales=None if model.scales is None else _client_scales(model.scales),
+        outdated=stored.outdated,
     )
 
 

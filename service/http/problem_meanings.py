@@ -78,7 +78,8 @@ MEANINGS: dict[str, Meaning] = {
     ),
     "no-feasible-force": Meaning(
         "No normal force holds the load; `largest_load` is the most that is held, at `normal_force` N; "
-        "`cause` says whether physics, the limit, the range of the data or ignorance is why (client).",
+        "`cause` says whether physics, the limit, the range of the data (up to `largest_observed` N an element) "
+        "or ignorance is why (client).",
         "Do not lift it so: more contact area, more fingers; or record what the cause asks for.",
     ),
     "job-ended": Meaning(

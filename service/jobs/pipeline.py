@@ -22,6 +22,7 @@ from db.records import Claim, Job, SamplesOfLog, SampleSummary
 from db.repositories import detections, friction_models, grasp_logs, jobs, materials
 from estimators import EstimatorError, FrictionModel, Moments
 from service import formats
+from service.domain.doubtful_logs import with_doubts
 from service.domain.queueing import INGEST_METHODS, queue_cheap_refits
 from service.domain.stored_results import (
     decode_samples,
@@ -217,12 +218,12 @@ def _all_that_fit(run: Run, parts: Sequence[SamplesOfLog]) -> list[FrictionModel
 
 def _fit_by(run: Run, parts: Sequence[SamplesOfLog], method: str, most_sampled: int) -> FrictionModel:
     """From the moments where the method needs no more, or of more than ``most_sampled`` logs; else from the samples."""
-    seed = run.job.seed
+    data: list[Moments] | list[FrictionSamples]
     if len(parts) <= most_sampled and estimators.needs_samples(method, len(parts)):
-        return estimators.fit(
-            [decode_samples(run.blobs.path(part.samples_blob)) for part in parts], method=method, seed=seed
-        )
-    return estimators.fit([_moments(run, part) for part in parts], method=method, seed=seed)
+        data = [decode_samples(run.blobs.path(part.samples_blob)) for part in parts]
+    else:
+        data = [_moments(run, part) for part in parts]
+    return with_doubts(estimators.fit(data, method=method, seed=run.job.seed), [part.findings for part in parts])
 
 
 def _moments(run: Run, part: SamplesOfLog) -> Moments:

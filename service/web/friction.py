@@ -7,9 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from db.records import Material, StoredModel
-from service.domain.recommended import recommended
+from service.domain.recommended import disagreeing, recommended
 from service.domain.stored_results import to_friction_model
 from service.web.charts import Chart, Curve, draw
+from stiction_client.support import OUTDATED, Support
 
 LEVELS = (0.05, 0.95)
 """Quantiles between which 90 % of new observations are expected."""
@@ -29,13 +30,17 @@ COEFFICIENTS = (
 
 @dataclass(frozen=True, slots=True)
 class Friction:
-    """Friction coefficient at a tangential velocity, m/s, and a normal force of an element, N, with its interval."""
+    """Friction coefficient at a tangential velocity, m/s, and a normal force of an element, N, with its interval.
+
+    ``disagreement`` with the material's models by other methods, where there is any.
+    """
 
     tangential_velocity: float
     normal_force: float
     mean: float
     interval: tuple[float, float]
-    warning: str | None
+    support: Support
+    disagreement: str | None = None
 
 
 def usual_model(models: Sequence[StoredModel], method: str | None = None) -> StoredModel | None:
@@ -51,12 +56,21 @@ def middle_force(stored: StoredModel) -> float:
     return 0.5 * sum(stored.model.normal_force)
 
 
-def friction_at(stored: StoredModel, normal_force: float | None, tangential_velocity: float = 0.0) -> Friction:
-    """Friction of a model; without a normal force, in the middle of what its samples have."""
+def friction_at(
+    stored: StoredModel,
+    normal_force: float | None,
+    tangential_velocity: float = 0.0,
+    others: Sequence[StoredModel] = (),
+) -> Friction:
+    """Friction of a model; without a normal force, in the middle of what its samples have.
+
+    ``others``: current models of the same material, with which it may disagree.
+    """
     model = to_friction_model(stored.model)
     v, f_n = tangential_velocity, middle_force(stored) if normal_force is None else normal_force
-    low, high = (max(0.0, float(model.predict(v, f_n, quantile=level))) for level in LEVELS)
-    return Friction(v, f_n, float(model.predict(v, f_n)), (low, high), model.extrapolation(v, f_n))
+    low, high = (float(model.predict(v, f_n, quantile=level)) for level in LEVELS)
+    support = model.support_at(v, f_n, OUTDATED if stored.outdated else None)
+    return Friction(v, f_n, float(model.predict(v, f_n)), (low, high), support, disagreeing(stored, others))
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from slipcore.frames import GraspLog
 from slipcore.samples import FrictionSamples, collect_samples, normals_of
 from slipcore.slip_state import SlipHistory
 
-__all__ = ["Finding", "check_log"]
+__all__ = ["AGAINST_FRICTION", "Finding", "check_log"]
 
 CHECKS: tuple[Check, ...] = (
     recording.time_unit,
@@ -31,6 +31,21 @@ CHECKS: tuple[Check, ...] = (
     friction.friction_by_place,
 )
 """In the order in which findings are told: the recording first, then what was found in it."""
+
+AGAINST_FRICTION = frozenset(
+    {
+        "contact travels",
+        "force pulls",
+        "force too large",
+        "friction differs by place",
+        "friction follows force",
+        "saturation",
+        "sideways force without load",
+    }
+)
+"""Findings by which the ratio of an element's forces, or the force it is told at, is not the material's. The others say
+that less was seen than might have been.
+"""
 
 
 def check_log(

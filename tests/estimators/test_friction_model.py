@@ -10,18 +10,23 @@ from scipy import integrate, special, stats
 
 from estimators import Cost, Domain, FrictionModel, InvalidSamples, Scale, Scales
 
+LEVEL = 1000.0
+"""Of friction: so far above 0 that no quantile gets there."""
 
-def model(scale: float = 1.0, error: float = 0.3, freedom: float = 3.0, n: int = 5003) -> FrictionModel:
+
+def model(
+    scale: float = 1.0, error: float = 0.3, freedom: float = 3.0, n: int = 5003, level: float = 0.4
+) -> FrictionModel:
     """A model whose intercept alone is uncertain."""
     return FrictionModel(
         method="ols",
-        coefficients=np.array([0.4, 2.0, -0.5]),
+        coefficients=np.array([level, 2.0, -0.5]),
         covariance=np.diag([error**2, 0.0, 0.0]),
         scale=scale,
         n=n,
         degrees_of_freedom=freedom,
         scatter_degrees_of_freedom=n - 3.0,
-        domain=Domain((0.0, 0.01), (0.01, 0.1)),
+        domain=Domain((0.0, 0.01), (0.0, 0.1)),
         identifiable=np.ones(3, dtype=bool),
         element_area=1e-6,
         cost=Cost(0.0),
@@ -47,8 +52,8 @@ def test_mean_is_the_plane() -> None:
 
 @pytest.mark.parametrize("quantile", [0.001, 0.05, 0.5, 0.9])
 def test_equal_degrees_of_freedom_give_students_t_exactly(quantile: float) -> None:
-    exact = 0.4 + math.hypot(3.0, 4.0) * stats.t.ppf(quantile, 10)
-    found = model(scale=3.0, error=4.0, freedom=10.0, n=13).predict(0.0, 0.0, quantile)
+    exact = LEVEL + math.hypot(3.0, 4.0) * stats.t.ppf(quantile, 10)
+    found = model(scale=3.0, error=4.0, freedom=10.0, n=13, level=LEVEL).predict(0.0, 0.0, quantile)
     np.testing.assert_allclose(found, exact, rtol=1e-12, atol=1e-12)  # rounding of the quantile function
 
 
@@ -58,14 +63,14 @@ def test_equal_degrees_of_freedom_give_students_t_exactly(quantile: float) -> No
 def test_lower_tail_is_never_too_narrow_nor_wasteful_for_few_clusters(
     freedom: float, error: float, quantile: float
 ) -> None:
-    distance = float(0.4 - model(error=error, freedom=freedom, n=10**7).predict(0.0, 0.0, quantile))
+    distance = float(LEVEL - model(error=error, freedom=freedom, n=10**7, level=LEVEL).predict(0.0, 0.0, quantile))
     assert sum_below(-distance, error, freedom) <= 1.05 * quantile  # too narrow by 5 % of the probability at most
     assert sum_below(-distance / 1.3, error, freedom) >= quantile  # at most 30 % further out than need be
 
 
 def test_scatter_has_its_own_degrees_of_freedom() -> None:
-    given = replace(model(error=0.0), scatter_degrees_of_freedom=5.0)
-    np.testing.assert_allclose(given.predict(0.0, 0.0, 0.05), 0.4 + stats.t.ppf(0.05, 5.0), rtol=1e-12)  # rounding
+    given = replace(model(error=0.0, level=LEVEL), scatter_degrees_of_freedom=5.0)
+    np.testing.assert_allclose(given.predict(0.0, 0.0, 0.05), LEVEL + stats.t.ppf(0.05, 5.0), rtol=1e-12)  # rounding
 
 
 def test_without_scatter_and_error_every_quantile_is_the_mean() -> None:

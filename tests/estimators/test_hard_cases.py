@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from estimators import Domain, Moments
 from estimators.defaults import REFERENCE
 from estimators.linear.least_squares import factorise, solve
 from slipcore.samples import FrictionSamples
+from stiction_client.support import Kind
 
 Make = Callable[..., FrictionSamples]
 
@@ -123,7 +125,9 @@ def test_every_method_gives_a_sound_answer_or_a_named_error(samples: Make, case:
     v, f_n = (float(np.mean(range_)) for range_ in (model.domain.tangential_velocity, model.domain.normal_force))
     low, middle, high = (float(model.predict(v, f_n, quantile)) for quantile in (0.05, None, 0.95))
     assert np.isfinite([low, middle, high, *model.coefficients, *model.covariance.ravel(), model.scale]).all()
-    assert low <= middle <= high
+    assert low <= max(middle, 0.0) <= high
+    assert model.support in get_args(Kind)
+    assert (model.support == "implausible") >= (middle <= 0.0)
     assert (np.diag(model.covariance) >= 0.0).all()
 
 

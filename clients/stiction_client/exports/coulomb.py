@@ -1,9 +1,12 @@
 """Friction as one conservative number, and as a cone."""
 
 import math
+from typing import TypedDict, Unpack
 
 import numpy as np
 
+from stiction_client.arguments import within
+from stiction_client.contacts import AREAS
 from stiction_client.errors import InvalidArgument
 from stiction_client.model import FloatArray, FrictionModel
 
@@ -11,24 +14,50 @@ QUANTILE = 0.05
 """Default: nineteen observations of twenty have more friction."""
 
 
-def conservative_friction(
-    model: FrictionModel, normal_force: float, quantile: float = QUANTILE, *, tangential_velocity: float = 0.0
-) -> float:
-    """Quantile of μ at ``normal_force`` N an element and ``tangential_velocity`` m/s, for those who need one number.
+FINGERTIP = 6e-5
+"""m²; contact of a fingertip under some newtons."""
 
-    Raises ``InvalidArgument`` for a quantile above ½, and where the quantile of μ isn't positive: the model is then
-    too uncertain there to promise any friction.
+
+class Terms(TypedDict, total=False):
+    """On what terms friction is told: the ``contact_area`` m² over whose elements scatter averages out (a fingertip's
+    unless given), and whether to ``allow_unidentified`` friction.
+    """
+
+    contact_area: float
+    allow_unidentified: bool
+
+
+def conservative_friction(
+    model: FrictionModel,
+    normal_force: float,
+    quantile: float = QUANTILE,
+    *,
+    tangential_velocity: float = 0.0,
+    contact_area: float = FINGERTIP,
+    allow_unidentified: bool = False,
+) -> float:
+    """Quantile of a contact's μ at ``normal_force`` N an element and ``tangential_velocity`` m/s, as one number.
+
+    It is that of the mean over the elements of ``contact_area`` m², where the model tells its ``scales``; without them
+    all scatter counts as common to the elements. Raises ``InvalidArgument`` for a quantile above ½, where the quantile
+    of μ isn't positive, and for friction that the data do not tell, or that is implausible: pass
+    ``allow_unidentified`` to have the quantile anyway.
     """
     if not 0.0 < quantile <= 0.5:
         raise InvalidArgument("quantile", quantile, "above 0, at most 0.5: a bound from below")
-    friction = float(model.predict(tangential_velocity, normal_force, quantile))
+    elements = max(float(within("contact_area", contact_area, *AREAS, "m²")) / model.element_area, 1.0)
+    support = model.support_at(tangential_velocity, normal_force)
+    if not allow_unidentified and support.kind in ("not identified", "implausible"):
+        allowed = "supported, or allow_unidentified=True"
+        raise InvalidArgument(f"friction of {model.material!r}", f"{support.kind} ({support.advice})", allowed)
+    friction = float(model.predict(tangential_velocity, normal_force, quantile, of="contact", elements=elements))
     if not 0.0 < friction < math.inf:
         raise InvalidArgument(f"friction coefficient at quantile {quantile:g}", f"{friction:.4g}", "above 0")
     return friction
 
 
 def friction_cone(
-    model: FrictionModel, normal_force: float, quantile: float = QUANTILE, *, edges: int = 8
+    model: FrictionModel, normal_force: float, quantile: float = QUANTILE, *, edges: int = 8, **terms: Unpack[Terms]
 ) -> FloatArray:
     """Edges of a linearised friction cone, [edges, 3]: (f_x, f_y, f_z) with f_z = 1 along the contact normal.
 
@@ -37,11 +66,13 @@ def friction_cone(
     """
     if edges < 3:
         raise InvalidArgument("edges", edges, "at least 3")
-    friction = conservative_friction(model, normal_force, quantile)
+    friction = conservative_friction(model, normal_force, quantile, **terms)
     angle = 2.0 * np.pi * np.arange(edges) / edges
     return np.stack([friction * np.cos(angle), friction * np.sin(angle), np.ones(edges)], axis=-1)
 
 
-def cone_half_angle(model: FrictionModel, normal_force: float, quantile: float = QUANTILE) -> float:
+def cone_half_angle(
+    model: FrictionModel, normal_force: float, quantile: float = QUANTILE, **terms: Unpack[Terms]
+) -> float:
     """Angle between the contact normal and the edge of the friction cone, rad; ``normal_force`` N an element."""
-    return math.atan(conservative_friction(model, normal_force, quantile))
+    return math.atan(conservative_friction(model, normal_force, quantile, **terms))

@@ -1,10 +1,11 @@
 """Friction for Drake (drake.mit.edu, CoulombFriction and "Hydroelastic/point contact"; version 1.51)."""
 
 from dataclasses import dataclass
+from typing import Unpack
 
 from stiction_client.arguments import within
 from stiction_client.errors import InvalidArgument
-from stiction_client.exports.coulomb import QUANTILE, conservative_friction
+from stiction_client.exports.coulomb import QUANTILE, Terms, conservative_friction
 from stiction_client.model import FrictionModel
 
 
@@ -36,6 +37,7 @@ def drake_friction(
     sliding_velocity: float | None = None,
     other_friction: float | None = None,
     discrete: bool = False,
+    **terms: Unpack[Terms],
 ) -> CoulombFriction:
     """Drake's Coulomb friction: static at rest, dynamic at ``sliding_velocity`` m/s (by default the fastest observed).
 
@@ -45,8 +47,8 @@ def drake_friction(
     ``InvalidArgument`` where none can: a pair never has twice the other's friction.
     """
     velocity = model.domain.tangential_velocity[1] if sliding_velocity is None else sliding_velocity
-    static = conservative_friction(model, normal_force, quantile)
-    moving = conservative_friction(model, normal_force, quantile, tangential_velocity=velocity)
+    static = conservative_friction(model, normal_force, quantile, **terms)
+    moving = conservative_friction(model, normal_force, quantile, tangential_velocity=velocity, **terms)
     dynamic = static if discrete else min(static, moving)
     if other_friction is None:
         return CoulombFriction(static, dynamic)

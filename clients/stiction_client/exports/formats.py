@@ -2,10 +2,14 @@
 
 import math
 from dataclasses import dataclass
+from typing import Unpack
 
-from stiction_client.exports.coulomb import QUANTILE, conservative_friction
+from stiction_client.exports.coulomb import QUANTILE, Terms, conservative_friction
 from stiction_client.model import FrictionModel
 from stiction_client.planner import RequiredForce
+
+ONE_DEVIATION = 0.15865525393145707
+"""Quantile of a normal distribution one standard deviation below its mean."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,39 +34,46 @@ class PhysxMaterial:
 
 
 def physx_material(
-    model: FrictionModel, normal_force: float, quantile: float = QUANTILE, *, sliding_velocity: float | None = None
+    model: FrictionModel,
+    normal_force: float,
+    quantile: float = QUANTILE,
+    *,
+    sliding_velocity: float | None = None,
+    **terms: Unpack[Terms],
 ) -> PhysxMaterial:
     """Static friction at rest, dynamic at ``sliding_velocity`` m/s (by default the fastest observed), never above it.
 
     ``normal_force`` N an element.
     """
     velocity = model.domain.tangential_velocity[1] if sliding_velocity is None else sliding_velocity
-    static = conservative_friction(model, normal_force, quantile)
-    moving = conservative_friction(model, normal_force, quantile, tangential_velocity=velocity)
+    static = conservative_friction(model, normal_force, quantile, **terms)
+    moving = conservative_friction(model, normal_force, quantile, tangential_velocity=velocity, **terms)
     return PhysxMaterial(static, min(static, moving))
 
 
-def sdf_surface(model: FrictionModel, normal_force: float, quantile: float = QUANTILE) -> str:
+def sdf_surface(model: FrictionModel, normal_force: float, quantile: float = QUANTILE, **terms: Unpack[Terms]) -> str:
     """The ``<surface>`` of an SDFormat collision, as Gazebo takes it; of two surfaces it takes the smaller friction."""
-    friction = conservative_friction(model, normal_force, quantile)
+    friction = conservative_friction(model, normal_force, quantile, **terms)
     return f"<surface><friction><ode><mu>{friction:.9g}</mu><mu2>{friction:.9g}</mu2></ode></friction></surface>"
 
 
-def urdf_gazebo(model: FrictionModel, link: str, normal_force: float, quantile: float = QUANTILE) -> str:
+def urdf_gazebo(
+    model: FrictionModel, link: str, normal_force: float, quantile: float = QUANTILE, **terms: Unpack[Terms]
+) -> str:
     """Gazebo's extension of a URDF ``link``; URDF itself has no friction of contacts."""
-    friction = conservative_friction(model, normal_force, quantile)
+    friction = conservative_friction(model, normal_force, quantile, **terms)
     return f'<gazebo reference="{link}"><mu1>{friction:.9g}</mu1><mu2>{friction:.9g}</mu2></gazebo>'
 
 
-def dexnet_friction(model: FrictionModel, normal_force: float) -> dict[str, float]:
+def dexnet_friction(model: FrictionModel, normal_force: float, **terms: Unpack[Terms]) -> dict[str, float]:
     """Dex-Net's two parameters: the expected friction, and its *variance*, as which ``sigma_friction_coef`` is used.
 
     Its grasps are scored over random friction, so that the spread is the caution here: that of a new observation, from
     the quantile one standard deviation below the mean.
     """
     expected = float(model.predict(0.0, normal_force))
-    conservative_friction(model, normal_force)  # refuses what promises no friction
-    below = float(model.predict(0.0, normal_force, 0.15865525393145707))
+    conservative_friction(model, normal_force, **terms)  # refuses what promises no friction
+    below = conservative_friction(model, normal_force, ONE_DEVIATION, **terms)
     return {"friction_coef": expected, "sigma_friction_coef": (expected - below) ** 2}
 
 

@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import dataclass
+from typing import Unpack
 
 from stiction_client.arguments import within
 from stiction_client.contacts import HERTZ_TORSION, Contact
 from stiction_client.errors import InvalidArgument
-from stiction_client.exports.coulomb import QUANTILE, conservative_friction
+from stiction_client.exports.coulomb import QUANTILE, Terms, conservative_friction
 from stiction_client.model import FrictionModel
 from stiction_client.quantile import FrictionQuantile
 
@@ -50,6 +51,7 @@ def mujoco_pair(
     *,
     points: int = 1,
     load_faithful: bool = False,
+    allow_unidentified: bool = False,
 ) -> MujocoPair:
     """Friction between two geoms that ``grip_force`` N presses together over ``contact``, at rest.
 
@@ -62,11 +64,14 @@ def mujoco_pair(
     force = float(within("grip_force", grip_force, 1e-9, 1e9, "N"))
     count = int(within("points", points, 1, 1000, "points"))
     element = float(contact.element_force(force, model.element_area))
-    friction = conservative_friction(model, element, quantile)
+    elements = max(float(contact.elements(force, model.element_area)), 1.0)
+    friction = conservative_friction(
+        model, element, quantile, contact_area=elements * model.element_area, allow_unidentified=allow_unidentified
+    )
     arm = float(contact.arm(force))
     if not load_faithful:
         return MujocoPair(*geoms, friction, arm * friction, 0.0)
-    _, slope = FrictionQuantile.of(model, 0.0, quantile)(element)
+    _, slope = FrictionQuantile.of(model, 0.0, quantile, elements)(element)
     sliding = friction + element * float(slope) / contact.power
     if sliding > friction or sliding <= 0.0:
         grows = "grows" if sliding > friction else "falls so fast that pressing harder holds less"
@@ -78,7 +83,12 @@ def mujoco_pair(
 
 
 def mujoco_friction(
-    model: FrictionModel, normal_force: float, quantile: float = QUANTILE, *, contact_radius: float = 0.0
+    model: FrictionModel,
+    normal_force: float,
+    quantile: float = QUANTILE,
+    *,
+    contact_radius: float = 0.0,
+    **terms: Unpack[Terms],
 ) -> tuple[float, float, float]:
     """MuJoCo's friction triple: sliding [-], torsional [m], rolling [m].
 
@@ -87,18 +97,23 @@ def mujoco_friction(
     """
     if not 0.0 <= contact_radius < math.inf:
         raise InvalidArgument("contact_radius", contact_radius, "m, at least 0 and finite")
-    sliding = conservative_friction(model, normal_force, quantile)
+    sliding = conservative_friction(model, normal_force, quantile, **terms)
     return sliding, HERTZ_TORSION * contact_radius * sliding, 0.0
 
 
 def mujoco_geom(
-    model: FrictionModel, normal_force: float, quantile: float = QUANTILE, *, contact_radius: float = 0.0
+    model: FrictionModel,
+    normal_force: float,
+    quantile: float = QUANTILE,
+    *,
+    contact_radius: float = 0.0,
+    **terms: Unpack[Terms],
 ) -> str:
     """Attributes for a MuJoCo ``<geom>`` of the fingertip, as ``mujoco_friction`` has them.
 
     Of two geoms MuJoCo takes the larger friction unless one has priority: without it the object's default of 1
     would undo the conservative value.
     """
-    triple = mujoco_friction(model, normal_force, quantile, contact_radius=contact_radius)
+    triple = mujoco_friction(model, normal_force, quantile, contact_radius=contact_radius, **terms)
     condim = 4 if contact_radius > 0.0 else 3
     return f'friction="{" ".join(f"{value:.9g}" for value in triple)}" condim="{condim}" priority="1"'

@@ -9,11 +9,18 @@ from pydantic.config import JsonDict
 
 from db.records import StoredModel
 from service.domain.look_up import Averaged, Friction
+from service.domain.stored_results import to_client_model
 from service.http.schemas.common import MOMENT_EXAMPLE, Body, Force, Next, Velocity
 
 ModelMethod = Literal["ols", "robust", "conjugate", "hierarchical", "bayes"]
 FitMethod = Literal["ols", "robust", "conjugate", "hierarchical", "bayes", "auto"]
 ChosenBecause = Annotated[str | None, Field(description="Why this model answers; null where a method was named")]
+
+SupportKind = Annotated[
+    Literal["supported", "extrapolated", "not identified", "stale", "implausible"],
+    Field(description="What the answer rests on: the last of these that applies"),
+]
+Advice = Annotated[str, Field(description="What to do about it, in one sentence")]
 
 CHOSEN_EXAMPLE = "hierarchical: friction may scatter between grasps, between places and within them"
 
@@ -36,6 +43,8 @@ MODEL_EXAMPLE: JsonDict = {
     "cost": {"seconds": 0.012, "monte_carlo_error": 0.0},
     "created_at": MOMENT_EXAMPLE,
     "scales": None,
+    "support": "supported",
+    "advice": "the samples tell the expected friction to within ± 2.3%",
 }
 
 
@@ -103,11 +112,13 @@ class FrictionModelOut(BaseModel):
         ScalesOut | None,
         Field(description="Of the scatter; null: the method does not tell them apart, or it was stored without them"),
     ] = None
+    support: SupportKind = "supported"
+    advice: Advice = ""
 
     @classmethod
     def of(cls, stored: StoredModel) -> "FrictionModelOut":
-        """The stored model as an answer."""
-        model = stored.model
+        """The stored model as an answer, with what it rests on at rest and in the middle of its normal forces."""
+        model, told = stored.model, to_client_model(stored)
         return cls(
             material=stored.material,
             method=model.method,
@@ -127,6 +138,8 @@ class FrictionModelOut(BaseModel):
             cost=CostOut(seconds=model.cost_seconds, monte_carlo_error=model.monte_carlo_error),
             created_at=stored.created_at,
             scales=None if model.scales is None else ScalesOut.model_validate(asdict(model.scales)),
+            support=told.support,
+            advice=told.advice,
         )
 
 
@@ -197,6 +210,8 @@ class FrictionOut(BaseModel):
                     "mean": 0.39,
                     "within_domain": True,
                     "warning": None,
+                    "support": "supported",
+                    "advice": "the samples tell the expected friction to within ± 3.1%",
                 }
             ]
         }
@@ -215,6 +230,8 @@ class FrictionOut(BaseModel):
     mean: float
     within_domain: Annotated[bool, Field(description="Whether the model's samples reach there")]
     warning: str | None
+    support: SupportKind
+    advice: Advice
 
     @classmethod
     def json_of(cls, friction: Friction) -> str:

@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from service.domain.look_up import Averaged
 from service.domain.plan import GraspTask
 from service.http.schemas.common import Area, Body, Force, Reference, Velocity
-from service.http.schemas.models import CHOSEN_EXAMPLE, ChosenBecause, FitMethod, ModelMethod
+from service.http.schemas.models import CHOSEN_EXAMPLE, Advice, ChosenBecause, FitMethod, ModelMethod, SupportKind
 from service.http.schemas.results import SAMPLES_EXAMPLE
 
 
@@ -75,6 +75,8 @@ class GraspForceOut(BaseModel):
                     "warning": None,
                     "of": "contact",
                     "elements": 60.0,
+                    "support": "supported",
+                    "advice": "the samples tell the expected friction to within ± 3.1%",
                 }
             ]
         }
@@ -97,6 +99,8 @@ class GraspForceOut(BaseModel):
     warning: str | None
     of: Annotated[Averaged, Field(description="Whose scatter is in the quantile")]
     elements: Annotated[float, Field(description="Over how many elements it averages out")]
+    support: SupportKind
+    advice: Advice
 
 
 class SamplesIn(Body):
@@ -154,6 +158,8 @@ class CandidateOut(BaseModel):
     material: str
     version: Annotated[int, Field(description="Of the model that was compared")]
     probability: float
+    support: SupportKind
+    advice: Advice
 
 
 class RecognitionOut(BaseModel):
@@ -164,7 +170,15 @@ class RecognitionOut(BaseModel):
             "examples": [
                 {
                     "method": "ols",
-                    "candidates": [{"material": "paper", "version": 3, "probability": 0.97}],
+                    "candidates": [
+                        {
+                            "material": "paper",
+                            "version": 3,
+                            "probability": 0.97,
+                            "support": "supported",
+                            "advice": "the samples tell the expected friction to within ± 3.1%",
+                        }
+                    ],
                     "unknown": 0.03,
                 }
             ]

@@ -48,3 +48,6 @@ class ProblemOut(BaseModel):
     errors: list[WrongValue] | None = None
     largest_load: Annotated[float | None, Field(description="Where no force holds: the most that is held, N")] = None
     normal_force: Annotated[float | None, Field(description="Where no force holds: that which holds it, N")] = None
+    largest_observed: Annotated[
+        float | None, Field(description="Where no force holds: greatest normal force of an element in the data, N")
+    ] = None

@@ -82,7 +82,7 @@ def show_material(
         versions = friction_models.versions(session, found.id, method, window=NEWEST_VERSIONS)
         logs, after = page.cut(grasp_logs.list_all(session, page.window(), LogFilter(material_id=found.id)))
     stored = usual_model(found.models, method)
-    shown = None if stored is None else friction_at(stored, fn, v or 0.0)
+    shown = None if stored is None else friction_at(stored, fn, v or 0.0, found.models)
     return render(
         request,
         "material.html",

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import slipcore
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import NotFound
@@ -17,6 +18,7 @@ from service.domain.errors import DomainError, InvalidValue, NoModel
 from service.domain.look_up import Friction, Question, look_up
 from service.jobs import pipeline
 from service.settings import Settings
+from slipcore import Finding
 
 Repack = Callable[..., bytes]
 ANYWHERE = Question(0.0, 0.1, None)
@@ -166,6 +168,22 @@ def test_a_log_that_is_withdrawn_before_its_samples_are_stored_outdates_no_model
     shop.work()
     assert shop.model("paper", "robust") == before
     assert [job.method for job in curate.restore(shop.context, log_id)[1]] == ["hierarchical", "ols", "robust"]
+
+
+def test_a_doubtful_log_makes_friction_implausible_until_it_is_withdrawn(
+    shop: Shop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    doubt = Finding("contact travels", "rolling", "hold it")
+    monkeypatch.setattr(slipcore, "check_log", lambda *_: [doubt])
+    doubtful = shop.ingest("paper", 1)
+    monkeypatch.setattr(slipcore, "check_log", lambda *_: [Finding("no rest", "touch", "begin before it")])
+    shop.ingest("paper", 2)
+    told = shop.friction("paper")
+    assert told.support == "implausible"
+    assert told.advice.startswith("1 of 2 logs is doubtful (contact travels): mend")
+    curate.withdraw(shop.context, doubtful, "rolled")
+    shop.work()
+    assert shop.friction("paper").support != "implausible"
 
 
 def test_a_material_without_its_only_log_has_no_model(shop: Shop) -> None:

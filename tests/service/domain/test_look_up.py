@@ -2,6 +2,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 import estimators
@@ -77,6 +78,31 @@ def test_forces_beyond_the_samples_are_outside_on_both_sides(
 
 def test_an_answer_that_is_no_friction_warns(ask: Callable[..., Any], model: estimators.FrictionModel) -> None:
     answer = ask(replace(model, scale=10.0), Question(0.0, model.domain.normal_force[1], 0.05))
-    assert answer.friction_coefficient < 0.0
+    assert answer.friction_coefficient == 0.0
     assert answer.within_domain
     assert "not above 0" in answer.warning
+
+
+def test_an_answer_says_what_it_rests_on(ask: Callable[..., Any], model: estimators.FrictionModel) -> None:
+    f_n = sum(model.domain.normal_force) / 2.0
+    assert ask(model, Question(1e-5, f_n, 0.05)).support == "supported"
+    assert ask(model, Question(1e-5, 3.0 * f_n, 0.05)).support == "extrapolated"
+    unknown = ask(replace(model, identifiable=np.zeros(3, bool)), Question(1e-5, f_n, 0.05))
+    assert (unknown.support, unknown.within_domain) == ("not identified", True)
+    assert unknown.warning == unknown.advice
+
+
+def test_methods_that_disagree_are_told_of(
+    ask: Callable[..., Any], model: estimators.FrictionModel, database: Database
+) -> None:
+    f_n = sum(model.domain.normal_force) / 2.0
+    higher = replace(model, method="robust", coefficients=model.coefficients + np.array([0.2, 0.0, 0.0]))
+    with database.write() as session:
+        material = materials.find_id(session, "paper")
+        job = jobs.add(session, "fit", "robust", material_id=material)
+        friction_models.add(session, material, job, to_new_model(higher))
+    answer = ask(model, Question(1e-5, f_n, 0.05))
+    assert "methods disagree by more than their intervals allow: robust expects 0.6" in answer.warning
+    with database.write() as session:
+        friction_models.mark_outdated(session, material, besides=("ols",))
+    assert look_up(ModelCache().read(database, "paper", "ols"), Question(1e-5, f_n, 0.05)).warning is None

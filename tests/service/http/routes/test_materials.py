@@ -107,7 +107,9 @@ def test_the_friction_of_a_fitted_material_is_its_truth(client: httpx.Client) ->
     ols = client.get("/v1/materials/fitted/friction", params={"fn": 0.4, "method": "ols"}).json()
     assert (ols["method"], ols["chosen_because"]) == ("ols", None)
     assert (mean["tangential_velocity"], mean["normal_force"], mean["quantile"]) == (0.0, 0.4, None)
-    assert (mean["within_domain"], mean["warning"]) == (True, None)
+    assert (mean["within_domain"], mean["support"]) == (True, "not identified")  # by one grasp
+    assert mean["warning"] == mean["advice"]
+    assert "record more grasps" in mean["advice"]
 
 
 @pytest.mark.usefixtures("fitted")

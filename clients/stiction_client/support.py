@@ -1,0 +1,233 @@
+"""What a model's answer at a working point rests on: the data, an extrapolation, or nothing to rely on."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+
+Kind = Literal["supported", "extrapolated", "not identified", "stale", "implausible"]
+
+UNCERTAIN = 0.1
+"""-, in parts of the expected friction: the half-width of its 95 % interval from which on it is not identified. The
+same tenth makes a coefficient identifiable."""
+
+BEND = 0.1
+"""-: standard deviation, in parts of friction, of what the law bends away from its line where an element's normal force
+leaves the data by as much as the bound that it passes, and where velocity does by a factor of e. Friction that goes as
+f^(-1/3), as an elastic sphere's does (Hertz), departs from its tangent by 0.13 of itself at twice the force; with
+velocity friction goes by its logarithm (Dieterich, 1979)."""
+
+OUTDATED = "the material's logs are others since, and it was not fitted again by this method: ask for a fit"
+SUPERSEDED = "a newer version took its place: fetch the current model"
+
+
+class Domain(Protocol):
+    """Range of the data: tangential velocity, m/s, and normal force of an element, N."""
+
+    @property
+    def tangential_velocity(self) -> tuple[float, float]:
+        """Least and greatest, m/s."""
+
+    @property
+    def normal_force(self) -> tuple[float, float]:
+        """Least and greatest, N."""
+
+
+class Model(Protocol):
+    """What of a fitted friction model is needed here."""
+
+    @property
+    def coefficients(self) -> FloatArray:
+        """β₀ [-], β₁ [s/m], β₂ [1/N]."""
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Of the coefficients, [3, 3]."""
+
+    @property
+    def degrees_of_freedom(self) -> float:
+        """Of the coefficients' Student-t."""
+
+    @property
+    def domain(self) -> Domain:
+        """Where the samples lie."""
+
+    @property
+    def identifiable(self) -> NDArray[np.bool_]:
+        """Whether the data tell each coefficient, [3]."""
+
+    @property
+    def diagnostics(self) -> Mapping[str, Any]:
+        """``doubtful_logs``, where there is one: which findings speak against its logs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Support:
+    """What an answer rests on, and one sentence on what to do about it.
+
+    ``kind``, the first that applies: "implausible" (friction cannot be so, or findings speak against the logs),
+    "stale" (the model is not the material's any more), "not identified" (the data do not tell friction there, or no
+    coefficient at all), "extrapolated" (beyond the data), "supported".
+    """
+
+    kind: Kind
+    advice: str
+
+    def warning(self, *others: str | None) -> str | None:
+        """What speaks against the answer: ``others``, and the advice where the answer cannot be relied on."""
+        own = None if self.kind in ("supported", "extrapolated") else self.advice
+        return "; ".join(filter(None, (*others, own))) or None
+
+
+def support(model: Model, tangential_velocity: float, normal_force: float, stale: str | None = None) -> Support:
+    """What the answer at v (m/s) and f_n (N an element) rests on; ``stale``: why the model is, if it is."""
+    doubt = _implausible(model)
+    if doubt is not None:
+        return Support("implausible", doubt)
+    if stale is not None:
+        return Support("stale", f"the model is outdated: {stale}")
+    kind = kinds(model, tangential_velocity, normal_force)
+    if kind == "not identified":
+        return Support("not identified", _ignorance(model, tangential_velocity, normal_force))
+    if kind == "extrapolated":
+        outside = extrapolation(model.domain, tangential_velocity, normal_force)
+        return Support("extrapolated", f"{outside}: record a grasp there")
+    part = float(uncertainty(model, *within(model.domain, tangential_velocity, normal_force)))
+    return Support("supported", f"the samples tell the expected friction to within ± {part:.1%}")
+
+
+def kinds(
+    model: Model, tangential_velocity: ArrayLike, normal_force: ArrayLike, stale: str | None = None
+) -> NDArray[np.str_]:
+    """The kind of support at each v and f_n, in their common shape; see ``Support``."""
+    v, f_n = np.broadcast_arrays(np.asarray(tangential_velocity, float), np.asarray(normal_force, float))
+    if _implausible(model) is not None:
+        return np.full(v.shape, "implausible")
+    if stale is not None:
+        return np.full(v.shape, "stale")
+    unknown = ~(uncertainty(model, *within(model.domain, v, f_n)) <= UNCERTAIN) | ~model.identifiable.any()
+    (low, high), fastest = model.domain.normal_force, model.domain.tangential_velocity[1]
+    outside = (f_n < low) | (f_n > high) | (v > fastest)
+    return np.select([unknown, outside], ["not identified", "extrapolated"], "supported")
+
+
+def disagreement(method: str, model: Model, others: Mapping[str, Model]) -> str | None:
+    """Which of the ``others``, fitted by other methods to the same data, expect another friction somewhere within it.
+
+    They disagree where the 95 % intervals of the expected friction have no value in common: at a bound of the data or
+    at rest, in the middle of the normal forces. None where none does.
+    """
+    (_, fastest), (low, high) = model.domain.tangential_velocity, model.domain.normal_force
+    v, f_n = np.array([0.0, 0.0, 0.0, fastest, fastest]), np.array([0.5 * (low + high), low, high, low, high])
+    for name, other in others.items():
+        (mean, half), (expected, spread) = _interval(model, v, f_n), _interval(other, v, f_n)
+        gap = np.abs(mean - expected) - (half + spread)
+        at = int(np.argmax(gap))
+        if gap[at] > 0.0:
+            told = f"{name} expects {expected[at]:.3g} ± {spread[at]:.2g}, {method} {mean[at]:.3g} ± {half[at]:.2g}"
+            where = f"at {v[at]:.4g} m/s and {f_n[at]:.4g} N an element"
+            return f"methods disagree by more than their intervals allow: {told} {where}; look at the samples"
+    return None
+
+
+def uncertainty(model: Model, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> FloatArray:
+    """Half-width of the 95 % interval of the friction expected at v and f_n, in parts of it."""
+    mean, half = _interval(model, tangential_velocity, normal_force)
+    return np.asarray(half / np.maximum(mean, np.finfo(float).tiny))
+
+
+def within(domain: Domain, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """The nearest v and f_n in the data; any v below them is near enough, as the limit v → 0."""
+    v = np.minimum(np.asarray(tangential_velocity, float), domain.tangential_velocity[1])
+    return v, np.clip(np.asarray(normal_force, float), *domain.normal_force)
+
+
+def beyond(domain: Domain, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """How far v and f_n lie outside the data, 0 inside and at a bound of 0.
+
+    v by the logarithm of its ratio to the fastest, f_n in parts of the bound that it passes.
+    """
+    v, f_n = np.asarray(tangential_velocity, float), np.asarray(normal_force, float)
+    fastest, (low, high) = domain.tangential_velocity[1], domain.normal_force
+    return (
+        np.log(np.maximum(v * _inverse(fastest), 1.0)),
+        np.maximum(f_n - high, 0.0) * _inverse(high) + np.maximum(low - f_n, 0.0) * _inverse(low),
+    )
+
+
+def widening(model: Model, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> FloatArray:
+    """Standard deviation of what the law bends away from its line at v and f_n outside the data; 0 inside."""
+    return np.asarray(bend(model) * np.hypot(*beyond(model.domain, tangential_velocity, normal_force)))
+
+
+def bend(model: Model) -> float:
+    """The same at a distance of 1 (``BEND``, ``beyond``)."""
+    middle = [1.0, *(0.5 * sum(ends) for ends in (model.domain.tangential_velocity, model.domain.normal_force))]
+    return BEND * abs(float(np.dot(middle, model.coefficients)))
+
+
+def extrapolation(domain: Domain, tangential_velocity: float, normal_force: float) -> str | None:
+    """Which of v (m/s) and f_n (N an element) lies outside the data; None where neither does.
+
+    Slower than the data is not outside: slip is never observed at rest, and a grasp that holds is the limit v → 0.
+    """
+    asked = (
+        ("tangential velocity", tangential_velocity, (0.0, domain.tangential_velocity[1]), "m/s"),
+        ("normal force", normal_force, domain.normal_force, "N an element"),
+    )
+    remarks = [
+        f"{name} extrapolated to {value:.4g} {unit}, observed {low:.4g} to {high:.4g}"
+        for name, value, (low, high), unit in asked
+        if not low <= value <= high
+    ]
+    return "; ".join(remarks) or None
+
+
+def _interval(model: Model, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """The friction expected at v and f_n, and the half-width of its 95 % interval."""
+    from scipy import special  # takes longer to import than all else of this package
+
+    v, f_n = np.broadcast_arrays(np.asarray(tangential_velocity, float), np.asarray(normal_force, float))
+    x = np.stack([np.ones_like(v), v, f_n], axis=-1)
+    variance = np.maximum(np.einsum("...i,ij,...j->...", x, model.covariance, x), 0.0)
+    return x @ model.coefficients, np.asarray(special.stdtrit(model.degrees_of_freedom, 0.975) * np.sqrt(variance))
+
+
+def _inverse(bound: float) -> float:
+    return 1.0 / bound if bound > 0.0 else 0.0
+
+
+def _implausible(model: Model) -> str | None:
+    """Why friction cannot be as the model says, or its logs are in doubt; None where nothing speaks against it."""
+    doubtful = model.diagnostics.get("doubtful_logs")
+    if doubtful:
+        return f"{doubtful}: mend what the finding names, or withdraw the log"
+    for v, f_n, friction in _corners(model):
+        if not 0.0 < friction < math.inf:
+            return (
+                f"friction within the data comes out at {friction:.3g}, at {v:.4g} m/s and {f_n:.4g} N an element: "
+                "look for a log with wrong forces (stiction check), and withdraw it"
+            )
+    return None
+
+
+def _corners(model: Model) -> Iterator[tuple[float, float, float]]:
+    """The bounds of the data, between which friction is linear, with the friction expected there."""
+    for v in model.domain.tangential_velocity:
+        for f_n in model.domain.normal_force:
+            yield v, f_n, float(np.dot([1.0, v, f_n], model.coefficients))
+
+
+def _ignorance(model: Model, tangential_velocity: float, normal_force: float) -> str:
+    part = float(uncertainty(model, *within(model.domain, tangential_velocity, normal_force)))
+    if part > UNCERTAIN or math.isnan(part):
+        return f"the expected friction is known to within ± {part:.0%} only: record more grasps"
+    return (
+        f"no coefficient is known, only friction near the middle of the samples (± {part:.1%}): "
+        "record grasps that press harder and lighter"
+    )

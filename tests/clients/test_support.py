@@ -1,0 +1,155 @@
+import pickle
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import special
+
+from stiction_client import (
+    FrictionModel,
+    InvalidArgument,
+    NoFeasibleForce,
+    Scale,
+    Scales,
+    conservative_friction,
+    drake_friction,
+    friction_cone,
+    mujoco_geom,
+    physx_material,
+    required_normal_force,
+    sdf_surface,
+)
+from stiction_client.support import BEND, Support, kinds, support
+
+Make = Callable[..., FrictionModel]
+
+EXACT = np.diag([1e-8, 1e-8, 1e-8])
+
+
+def test_each_kind_of_support_and_what_to_do(make_model: Make) -> None:
+    """The data reach from 1e-5 to 4e-3 m/s and from 0.002 to 0.3 N."""
+    known = make_model((0.4, 0.0, 0.0), EXACT)
+    cases = {
+        (known, 0.0, 0.1): ("supported", "± 0.1%"),
+        (known, 0.0, 0.6): ("extrapolated", "normal force extrapolated to 0.6 N an element, observed 0.002 to 0.3"),
+        (known, 0.01, 0.1): ("extrapolated", "tangential velocity extrapolated to 0.01 m/s"),
+        (make_model((0.4, 0.0, 0.0), np.diag([1e-3, 0, 0])), 0.0, 0.1): ("not identified", "± 17% only: record more"),
+        (replace(known, identifiable=np.zeros(3, bool)), 0.0, 0.1): ("not identified", "no coefficient is known"),
+        (replace(known, outdated=True), 0.0, 0.1): ("stale", "ask for a fit"),
+        (replace(known, current=False), 0.0, 0.1): ("stale", "fetch the current model"),
+        (make_model((0.4, 0.0, -1.5), EXACT), 0.0, 0.1): ("implausible", "comes out at -0.05, at 1e-05 m/s and 0.3 N"),
+        (replace(known, diagnostics={"doubtful_logs": "1 of 4 logs is doubtful"}), 0.0, 0.1): (
+            "implausible",
+            "1 of 4 logs is doubtful: mend",
+        ),
+    }
+    for (model, v, f_n), (kind, advice) in cases.items():
+        found = model.support_at(v, f_n)
+        assert found.kind == kind
+        assert advice in found.advice
+        assert kinds(model, v, f_n, model.stale) == kind
+
+
+def test_a_model_tells_what_it_rests_on_in_the_middle_of_its_data(make_model: Make) -> None:
+    known, unknown = make_model((0.4, 0.0, 0.0), EXACT), make_model((0.4, 0.0, 0.0), np.diag([1e-3, 0, 0]))
+    assert (known.support, unknown.support) == ("supported", "not identified")
+    assert unknown.advice.startswith("the expected friction is known to within")
+
+
+def test_three_coefficients_that_no_data_tell_are_never_supported(make_model: Make) -> None:
+    model = replace(make_model(), identifiable=np.zeros(3, bool))
+    grip = required_normal_force(model, 1.0, contact_area=6e-5)
+    assert grip.within_domain
+    assert grip.support == "not identified"
+    assert grip.warning == grip.advice
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_support_does_not_depend_on_the_units_of_force(make_model: Make, scale: float) -> None:
+    units = np.array([1.0, 1.0, 1.0 / scale])
+    model = make_model((0.4, 0.0, -0.3), np.diag([1e-5, 1e-2, 1e-3]), normal_force_domain=(0.002, 0.3))
+    same = replace(
+        model,
+        coefficients=model.coefficients * units,
+        covariance=model.covariance * np.outer(units, units),
+        domain=replace(model.domain, normal_force=(0.002 * scale, 0.3 * scale)),
+    )
+    forces = np.array([1e-4, 0.01, 0.2, 0.5, 5.0])
+    np.testing.assert_array_equal(kinds(same, 0.0, forces * scale), kinds(model, 0.0, forces))
+    expected = model.predict(0.0, forces, 0.01)
+    np.testing.assert_allclose(same.predict(0.0, forces * scale, 0.01), expected, rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize("bounds", [(0.1, 0.1), (0.0, 0.1)])
+def test_data_at_one_force_or_without_a_velocity_have_support(make_model: Make, bounds: tuple[float, float]) -> None:
+    model = make_model((0.4, 0.0, 0.0), EXACT, normal_force_domain=bounds)
+    still = replace(model, domain=replace(model.domain, tangential_velocity=(0.0, 0.0)))
+    assert support(still, 0.0, 0.1).kind == "supported"
+    assert support(still, 1e-3, 0.1).kind == "extrapolated"
+    assert np.isfinite(still.predict(1e-3, [0.0, 0.1, 1.0], 0.01)).all()
+
+
+def test_coefficients_that_are_not_finite_are_implausible(make_model: Make) -> None:
+    assert make_model((np.nan, 0.0, 0.0), EXACT).support == "implausible"
+
+
+@pytest.mark.parametrize(
+    ("v", "f_n", "distance"),
+    [(0.0, 0.6, 1.0), (0.0, 0.001, 0.5), (0.004 * np.e, 0.1, 1.0), (0.004 * np.e**2, 0.9, np.hypot(2.0, 2.0))],
+)
+def test_outside_the_data_the_interval_widens_by_a_tenth_of_friction_and_distance(
+    make_model: Make, v: float, f_n: float, distance: float
+) -> None:
+    model = make_model((0.4, 0.0, 0.0), np.zeros((3, 3)), scale=0.0)
+    expected = 0.4 + special.ndtri([0.05, 0.95]) * BEND * 0.4 * distance
+    found = [float(model.predict(v, f_n, quantile)) for quantile in (0.05, 0.95)]
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    assert float(model.predict(0.004, 0.3, 0.05)) == 0.4  # up to the bounds nothing is added
+
+
+def test_no_quantile_is_a_negative_friction(make_model: Make) -> None:
+    far = make_model().predict(0.0, np.geomspace(1e-6, 1e6, 50), 1e-6)
+    assert (far >= 0.0).all()
+    assert far.min() == 0.0
+
+
+def test_a_refusal_names_the_largest_force_observed_where_only_greater_ones_would_hold(make_model: Make) -> None:
+    model = make_model((0.4, 0.0, 0.0), EXACT, normal_force_domain=(0.002, 0.05))
+    with pytest.raises(NoFeasibleForce, match=r"beyond those observed, 0\.05 N an element, would hold") as refusal:
+        required_normal_force(model, 100.0, contact_area=6e-5)
+    assert (refusal.value.cause, refusal.value.largest_observed) == ("range", 0.05)
+    assert str(pickle.loads(pickle.dumps(refusal.value))) == str(refusal.value)
+
+
+def test_many_answers_tell_their_support_one_by_one(make_model: Make) -> None:
+    model = make_model((0.4, 0.0, 0.0), EXACT, normal_force_domain=(0.002, 0.05))
+    found = required_normal_force(model, np.array([0.5, 1.1, 100.0]), contact_area=6e-5)
+    assert found.support.tolist() == ["supported", "extrapolated", ""]
+
+
+@pytest.mark.parametrize(
+    "export", [conservative_friction, drake_friction, friction_cone, mujoco_geom, physx_material, sdf_surface]
+)
+def test_exports_refuse_what_is_not_identified_unless_it_is_allowed(
+    make_model: Make, export: Callable[..., object]
+) -> None:
+    model = make_model((0.4, 0.0, 0.0), np.diag([1e-3, 0, 0]))
+    with pytest.raises(InvalidArgument, match=r"not identified .*; allowed: supported, or allow_unidentified=True"):
+        export(model, 0.1)
+    export(model, 0.1, allow_unidentified=True)
+
+
+def test_exports_tell_the_friction_of_a_contact(make_model: Make) -> None:
+    scales = Scales(Scale(0.05, np.inf), Scale(0.02, np.inf), Scale(0.03, np.inf))
+    model = replace(make_model((0.4, 0.0, 0.0), EXACT), scales=scales)
+    expected = float(model.predict(0.0, 0.1, 0.05, of="contact", elements=60))
+    assert expected > float(model.predict(0.0, 0.1, 0.05))
+    assert conservative_friction(model, 0.1) == pytest.approx(expected, rel=1e-12)  # 60 mm² of elements of 1 mm²
+    assert conservative_friction(model, 0.1, contact_area=1e-9) == float(model.predict(0.0, 0.1, 0.05))
+
+
+def test_what_can_be_relied_on_warns_of_nothing_more() -> None:
+    assert Support("supported", "well known").warning(None) is None
+    assert Support("extrapolated", "record").warning("outside") == "outside"
+    assert Support("stale", "fit").warning("outside", None) == "outside; fit"

@@ -1,0 +1,42 @@
+import numpy as np
+import pytest
+
+from estimators import Cost, Domain, FrictionModel
+from service.domain.doubtful_logs import with_doubts
+
+MODEL = FrictionModel(
+    method="ols",
+    coefficients=np.array([0.4, 0.0, 0.0]),
+    covariance=np.zeros((3, 3)),
+    scale=0.02,
+    n=100,
+    degrees_of_freedom=10.0,
+    scatter_degrees_of_freedom=97.0,
+    domain=Domain((0.0, 0.01), (0.01, 0.1)),
+    identifiable=np.ones(3, bool),
+    element_area=1e-6,
+    cost=Cost(0.0),
+    diagnostics={"rank": 3.0},
+)
+
+
+@pytest.mark.parametrize(
+    ("findings", "told"),
+    [
+        ([["saturation"]], "1 of 1 log is doubtful (saturation)"),
+        ([["saturation", "no rest"], []], "1 of 2 logs is doubtful (saturation)"),
+        (
+            [["saturation"], ["contact travels", "saturation"], []],
+            "2 of 3 logs are doubtful (contact travels, saturation)",
+        ),
+    ],
+)
+def test_findings_against_friction_are_counted_and_named(findings: list[list[str]], told: str) -> None:
+    doubted = with_doubts(MODEL, findings)
+    assert doubted.diagnostics == {"rank": 3.0, "doubtful_logs": told}
+    assert doubted.support == "implausible"
+
+
+def test_findings_that_less_was_seen_speak_not_against_friction() -> None:
+    assert with_doubts(MODEL, [["no rest", "slow frames", "repeated frames", "no displacement"], []]) is MODEL
+    assert MODEL.support == "supported"
