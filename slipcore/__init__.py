@@ -10,6 +10,7 @@ from slipcore.defaults import (
     LOOKAHEAD,
     CheckOptions,
     FilterOptions,
+    PatchOptions,
     SampleOptions,
     StrainRateLiteralOptions,
     StrainRateOptions,
@@ -18,6 +19,8 @@ from slipcore.element_forces import ElementForces, contact_factor, element_force
 from slipcore.errors import InvalidInput, NoForces, SlipcoreError, UnknownScale
 from slipcore.frames import Frame, FrictionLaw, GraspLog, GroundTruth
 from slipcore.options import Option, describe_options
+from slipcore.patch.friction import contact_friction
+from slipcore.patch.record import ContactFriction, Patch
 from slipcore.samples import FrictionSamples, collect_samples
 from slipcore.slip_state import EventList, SlipEvents, SlipHistory, SlipState
 from slipcore.warm_up import warm_up
@@ -45,6 +48,7 @@ __all__ = [
     "LOOKAHEAD",
     "METHODS",
     "CheckOptions",
+    "ContactFriction",
     "DetectorState",
     "ElementForces",
     "EventList",
@@ -59,6 +63,8 @@ __all__ = [
     "InvalidInput",
     "NoForces",
     "Option",
+    "Patch",
+    "PatchOptions",
     "SampleOptions",
     "SlipDetector",
     "SlipEvents",
@@ -72,6 +78,7 @@ __all__ = [
     "collect_history",
     "collect_samples",
     "contact_factor",
+    "contact_friction",
     "describe_options",
     "detect_slip",
     "element_forces",

@@ -321,6 +321,40 @@ class SampleOptions(Options):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PatchOptions(Options):
+    """How contact patches are followed, and when the load on one stands on the limit surface."""
+
+    window: Annotated[float, Option(1e-3, 100.0, "s", "objects pivot and slide within seconds")] = 0.5
+    """Over which rates of motion are taken."""
+    margin: Annotated[int, Option(0, 100, "elements", "sensors smooth forces over one to three")] = 2
+    """How far around a patch forces still count as its own."""
+    kernel_width: Annotated[float, Option(0.0, 0.1, "m", "0: not smoothed")] = 0.0
+    """Standard deviation of the kernel that the sensor smooths forces with."""
+    least_anisotropy: Annotated[float, Option(0.0, 1.0, "-", "half-axes 1.36 to 1; rounder ones turn by noise")] = 0.3
+    """(a² − b²)/(a² + b²) of the half-axes of a patch above which it has a direction."""
+    least_travel: Annotated[float, Option(0.0, 10.0, "elements", "the centre of force errs by a tenth")] = 0.2
+    """Travel of a patch over the markers within the window from which it moves."""
+    least_speed: Annotated[float, Option(0.0, 1.0, "m/s", "creep of a gel at rest")] = 2e-5
+    """Speed over the markers from which an object moves, where its pose is given."""
+    least_force_share: Annotated[float, Option(0.0, 1.0, "-", "forces are least certain at touch and release")] = 0.3
+    """Of a patch's largest normal force, under which its load is not looked at."""
+    flatness: Annotated[float, Option(0.0, 1.0, "-", "μ differs by less with speed and place")] = 0.1
+    """Share of the largest load that a plateau may lie below it, and grow within an element's travel."""
+    plateau_travel: Annotated[float, Option(0.0, 100.0, "elements", "far beyond what partial slip moves")] = 0.5
+    """Least travel over the markers on a plateau."""
+    shortfall: Annotated[float, Option(0.0, 1.0, "-", "μ of one object in two directions")] = 0.2
+    """Share that a plateau may lie below the largest load that the patch bore; below, it rolls."""
+    rolling_resistance: Annotated[float, Option(0.0, 10.0, "-", "soft rollers resist with 0.01 to 0.1")] = 0.1
+    """Tangential over normal force up to which a patch that travels may roll."""
+    sliding_share: Annotated[float, Option(0.0, 1.0, "-", "a rolling body: up to 0.36; a sliding one nearly 1")] = 0.6
+    """Share of a patch's way that it makes on plateaus, if it slides; below, it rolls."""
+    resultant_error: Annotated[float, Option(0.0, 1.0, "-", "Tac3D's resultants and sums differ by 3 to 7 %")] = 0.03
+    """Standard error of a ratio of resultants, as a share of it."""
+    slip_share: Annotated[float, Option(0.0, 1.0, "-", "false slip of noise is less")] = 0.05
+    """Share of a patch's elements that slip, from which its slip is incipient."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CheckOptions(Options):
     """When ``check_log`` finds something doubtful.
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from slipcore.element_forces import stick_ratio
 from slipcore.frames import BoolArray, FloatArray
+from slipcore.patch.record import Patch
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +70,9 @@ class SlipEvents:
 class SlipHistory:
     """A detector's answer for a whole log: the fields of ``SlipState`` with a leading axis [t].
 
-    ``noise``: estimated standard deviation of one marker coordinate, m (NaN where it could not be estimated).
+    ``noise``: estimated standard deviation of one marker coordinate, m (NaN where it could not be estimated);
+    ``patches``: the contact as a whole (docs/patches.md), of a whole log alone; ``macro_slip`` is also where all of
+    them slide or pivot over the markers.
     """
 
     time: FloatArray
@@ -83,6 +86,7 @@ class SlipHistory:
     noise: float
     method: str
     observed: BoolArray | None = None
+    patches: tuple[Patch, ...] = ()
 
 
 def observed_over_time(answers: Sequence[SlipState]) -> BoolArray | None:

@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from slipcore.detection.shared.interface import CompiledMethod
 from slipcore.detection.whole_log import history_of
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
+from slipcore.patch.following import follow_patches
+from slipcore.patch.regimes import slips_as_a_whole
 from slipcore.slip_state import SlipHistory, SlipState, observed_over_time, slip_events
 
 
@@ -24,13 +27,23 @@ def detect_slip(log: GraspLog, method: str = DEFAULT_METHOD, *, lookahead: int =
     """
     state = init(log.position, log.element_area, method, **options)
     if isinstance(find_method(method), CompiledMethod):
-        return history_of(log, state, checked_lookahead(lookahead))
+        return with_patches(log, history_of(log, state, checked_lookahead(lookahead)))
     smoother, answers = FixedLagSmoother(state, lookahead), []
     for frame in log.frames():
         state, now = step(state, frame)
         if (settled := smoother.take(state, now)) is not None:
             answers.append(settled)
-    return collect_history([*answers, *smoother.rest()], state)
+    return with_patches(log, collect_history([*answers, *smoother.rest()], state))
+
+
+def with_patches(log: GraspLog, history: SlipHistory, **options: float) -> SlipHistory:
+    """The history with the log's contact patches, and with their macro slip beside that of elements.
+
+    ``options``: see ``defaults.PatchOptions``; raises ``InvalidInput`` for those that do not exist or are out of range.
+    """
+    patches = follow_patches(log, history.contact, history.slip, **options)
+    macro_slip = history.macro_slip | slips_as_a_whole(patches, len(log))
+    return replace(history, patches=patches, macro_slip=macro_slip)
 
 
 def checked_lookahead(lookahead: int) -> int:

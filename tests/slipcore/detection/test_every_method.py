@@ -10,6 +10,7 @@ import pytest
 from slipcore import METHODS, GraspLog, SlipDetector, SlipHistory, collect_history, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.defaults import ContactOptions
+from slipcore.detection.batch import with_patches
 from slipcore.detection.detector import init, step
 from slipcore.detection.shared.interface import Decision, Method, Observation
 from slipcore.detection.shared.strain import Lattice
@@ -59,11 +60,11 @@ def resumed(log: GraspLog, stored: bytes, start: int, whole: SlipHistory, method
 
 def check_streaming_is_batch(log: GraspLog, method: str, same_history: Same) -> None:
     batch = detect_slip(log, method)
-    same_history(stream(log, method), batch)
+    same_history(with_patches(log, stream(log, method)), batch)
     cut, stored = cut_everywhere(log, method)
-    same_history(cut, batch)
+    same_history(with_patches(log, cut), batch)
     for start in (1, len(log) // 3, len(log) - 1):
-        same_history(resumed(log, stored[start], start, batch, method), batch)
+        same_history(with_patches(log, resumed(log, stored[start], start, batch, method)), batch)
 
 
 @EACH_METHOD

@@ -1,0 +1,52 @@
+"""What is known of a contact patch."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipcore.frames import FloatArray
+
+Regime = Literal["none", "stick", "incipient", "sliding", "pivoting", "rolling"]
+REGIMES: tuple[Regime, ...] = ("none", "stick", "incipient", "sliding", "pivoting", "rolling")
+MACRO_SLIP: tuple[Regime, ...] = ("sliding", "pivoting")
+"""Regimes in which the whole patch slips."""
+
+
+@dataclass(frozen=True, slots=True)
+class ContactFriction:
+    """Friction that the resultants of a contact tell, with its 95 % interval from ``low`` to ``high``.
+
+    ``coefficient``: the median ratio of loads while these stood on the limit surface. Without such a plateau it
+    ``is_bound``: the coefficient is the largest ratio of loads that was held, ``low`` is what friction is at least, and
+    ``high`` is infinite. ``reason``: what it was found from, or why there is no more than a bound.
+    """
+
+    coefficient: float
+    low: float
+    high: float
+    is_bound: bool
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Patch:
+    """A connected contact from its first touch to its last: arrays [t] over the log's frames, NaN where it is absent.
+
+    ``pose`` [t, 3]: where it lies among the markers at rest, x m, y m and yaw rad of its longer axis; ``speed`` m/s:
+    mean speed of the object over the markers; ``regime``: one of ``REGIMES``; ``normal_force`` N,
+    ``tangential_force`` [t, 2] N, ``moment`` N·m about its mean normal; ``load_ratio``: least friction coefficient that
+    bears these; ``element_force`` N: mean normal force of its elements, weighted by force. Without forces all of
+    these are NaN.
+    """
+
+    pose: FloatArray
+    speed: FloatArray
+    regime: NDArray[np.str_]
+    normal_force: FloatArray
+    tangential_force: FloatArray
+    moment: FloatArray
+    load_ratio: FloatArray
+    element_force: FloatArray
+    plateau: NDArray[np.bool_]

@@ -1,0 +1,155 @@
+"""Friction of a whole contact: found where it slides or pivots, bounded where it does not, whatever elements show."""
+
+import numpy as np
+import pytest
+
+from slipcore import GraspLog, InvalidInput, detect_slip
+from slipcore.detection.batch import with_patches
+from slipcore.patch.following import follow_patches
+from slipcore.patch.friction import contact_friction
+from slipcore.patch.record import ContactFriction, Patch
+from tests.slipcore.conftest import RECORDINGS, read_recording
+from tests.slipcore.patch.grasps import PITCH, PIVOT, SLIDE, grasp, ramp_and_go
+
+FRICTION = 0.7
+NOISE = {"marker_noise": 1e-6, "force_noise": 2e-3}
+
+
+def patches_of(log: GraspLog, **options: float) -> tuple[Patch, ...]:
+    return with_patches(log, detect_slip(log), **options).patches
+
+
+def friction_of(log: GraspLog, **options: float) -> ContactFriction:
+    found = contact_friction(log.time, patches_of(log, **options))
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("crosstalk", [0.0, 0.3])
+@pytest.mark.parametrize("smoothing", [0.0, 1.0, 1.5])
+def test_a_sliding_contact_tells_its_friction(smoothing: float, crosstalk: float) -> None:
+    found = friction_of(grasp(SLIDE, FRICTION, smoothing=smoothing, crosstalk=crosstalk, **NOISE))
+    assert found.coefficient == pytest.approx(FRICTION, rel=0.01)
+    assert found.low < FRICTION < found.high
+    assert not found.is_bound
+
+
+@pytest.mark.parametrize("crosstalk", [0.0, 0.3])
+@pytest.mark.parametrize("smoothing", [0.0, 1.0])
+def test_a_pivoting_contact_tells_its_friction_once_the_kernel_is_known(smoothing: float, crosstalk: float) -> None:
+    log = grasp(PIVOT, FRICTION, smoothing=smoothing, crosstalk=crosstalk, **NOISE)
+    found = friction_of(log, kernel_width=smoothing * PITCH)
+    assert found.coefficient == pytest.approx(FRICTION, rel=0.03)
+    assert not found.is_bound
+
+
+def test_an_unknown_kernel_makes_a_pivoting_contact_look_a_little_less_rough() -> None:
+    found = friction_of(grasp(PIVOT, FRICTION, smoothing=1.0))
+    assert 0.9 * FRICTION < found.coefficient < FRICTION
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_contact_that_holds_gives_a_bound_below_its_friction(turns: bool) -> None:
+    still = ramp_and_go(0.0, turns=turns)
+    found = friction_of(grasp(still._replace(share=0.6 * still.share), FRICTION, **NOISE))
+    assert found.is_bound
+    assert found.low == pytest.approx(0.6 * FRICTION, rel=0.1)
+    assert (found.low < FRICTION, found.high) == (True, np.inf)
+
+
+def test_a_contact_that_travels_under_hardly_any_load_rolls() -> None:
+    log = grasp(SLIDE._replace(share=np.full(len(SLIDE.time), 0.05)), FRICTION, **NOISE)
+    (patch,) = patches_of(log)
+    assert (patch.regime[60:80] == "rolling").all()
+    found = contact_friction(log.time, [patch])
+    assert found is not None
+    assert (found.is_bound, found.coefficient < 0.1, "rolls" in found.reason) == (True, True, True)
+
+
+def test_a_contact_that_travels_against_its_force_rolls() -> None:
+    back = SLIDE._replace(x=-SLIDE.x)
+    assert friction_of(grasp(back, FRICTION)).is_bound
+
+
+def test_a_load_that_still_grows_is_no_plateau() -> None:
+    """The body creeps a tenth of a millimetre a second while the load rises."""
+    course = ramp_and_go(0.0, turns=False, ramp=2.5, go=0.1)
+    assert friction_of(grasp(course._replace(x=1e-4 * course.time), FRICTION)).is_bound
+
+
+def test_regimes_follow_each_other() -> None:
+    (patch,) = patches_of(grasp(PIVOT, FRICTION))
+    assert (patch.regime[:30] == "stick").all()
+    assert (patch.regime[-40:] == "pivoting").all()
+    turned = patch.pose[-1, 2] - patch.pose[0, 2]
+    assert np.rad2deg(turned) == pytest.approx(60.0, abs=2.0)
+
+
+def test_a_round_contact_shows_that_it_pivots_by_the_pose_alone() -> None:
+    course = ramp_and_go(np.deg2rad(60.0), turns=True)
+    log = grasp(course, FRICTION, half_axes=(6e-3, 6e-3))
+    assert friction_of(log).is_bound
+    pose = np.stack([np.zeros_like(course.yaw), course.x, course.yaw + 5e-4 / 6e-3 * course.share], axis=-1)
+    seen = GraspLog(log.time, log.position, log.displacement, log.element_area, log.force, log.normal, pose)
+    found = friction_of(seen)
+    assert (found.is_bound, found.coefficient) == (False, pytest.approx(FRICTION, rel=0.01))
+
+
+def test_pivoting_beyond_half_a_turn_is_followed() -> None:
+    (patch,) = patches_of(grasp(ramp_and_go(4.0, turns=True, go=4.0), FRICTION))
+    assert patch.pose[-1, 2] - patch.pose[0, 2] == pytest.approx(4.0, abs=0.05)
+
+
+def test_two_bodies_are_two_patches() -> None:
+    one = grasp(ramp_and_go(0.0, turns=False)._replace(x=np.full(90, -6e-3)), FRICTION, half_axes=(2e-3, 4e-3))
+    two = grasp(ramp_and_go(0.0, turns=False)._replace(x=np.full(90, 5e-3)), 0.4, half_axes=(3e-3, 4e-3))
+    assert one.force is not None
+    assert two.force is not None
+    both = GraspLog(one.time, one.position, one.displacement, one.element_area, one.force + two.force, one.normal)
+    first, second = patches_of(both)
+    assert first.load_ratio[-5] == pytest.approx(FRICTION, rel=0.01)
+    assert second.load_ratio[-5] == pytest.approx(0.4, rel=0.01)
+
+
+def test_without_forces_patches_have_motion_and_no_friction() -> None:
+    log = grasp(SLIDE, FRICTION)
+    bare = GraspLog(log.time, log.position, log.displacement, log.element_area)
+    (patch,) = patches_of(bare)
+    assert np.isnan(patch.load_ratio).all()
+    assert patch.pose[-1, 0] - patch.pose[0, 0] == pytest.approx(3e-3, abs=3e-4)
+    assert contact_friction(log.time, [patch]) is None
+
+
+def test_without_contact_there_is_nothing() -> None:
+    log = grasp(SLIDE, FRICTION)
+    nowhere = np.zeros(log.displacement.shape[:3], bool)
+    assert follow_patches(log, nowhere, nowhere) == ()
+    assert contact_friction(log.time, []) is None
+
+
+def test_an_option_out_of_its_range_is_refused() -> None:
+    log = grasp(SLIDE, FRICTION)
+    with pytest.raises(InvalidInput, match="flatness"):
+        patches_of(log, flatness=2.0)
+
+
+def test_macro_slip_is_seen_though_all_markers_stand_still() -> None:
+    """The elements may say what they will: their patch turns over them."""
+    history = detect_slip(grasp(PIVOT, FRICTION, smoothing=1.0, crosstalk=0.3, **NOISE))
+    assert history.macro_slip[-40:].all()
+    assert not history.macro_slip[:35].any()
+
+
+def test_two_fingers_that_hold_one_rod_agree() -> None:
+    """Both see it pivot; their elements show friction between 0.4 and 1.1 (docs/checks.md)."""
+    first, second = (friction_of(read_recording(RECORDINGS / "example_2" / f"HDL1-GWH002{k}")) for k in (1, 2))
+    for found in (first, second):
+        assert not found.is_bound
+        assert found.high - found.coefficient < 0.07 * found.coefficient
+    assert abs(first.coefficient - second.coefficient) < 0.05 * second.coefficient
+    assert first.low < second.high
+
+
+def test_bodies_that_roll_give_a_bound() -> None:
+    found = friction_of(read_recording(RECORDINGS / "example_1" / "AD2-0065L"))
+    assert (found.is_bound, "rolls" in found.reason) == (True, True)

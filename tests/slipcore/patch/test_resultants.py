@@ -1,0 +1,71 @@
+"""Resultants against closed forms of the limit surface."""
+
+import numpy as np
+import pytest
+
+from slipcore.patch.resultants import Resultants, resultants
+
+RADIUS, FRICTION = 6e-3, 0.45
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def points(count: int = 120) -> np.ndarray:
+    axis = np.linspace(-8e-3, 8e-3, count)
+    return np.stack([*np.meshgrid(axis, axis, indexing="ij"), np.zeros((count, count))], axis=-1)
+
+
+def slipping(motion: tuple[float, float, float], hertz: bool, turned: np.ndarray | None = None) -> Resultants:
+    """All of a disk slips with velocity (x, y) and rotation ``motion`` about its middle, in a turned frame."""
+    place = points()
+    inside = 1.0 - (place[..., 0] ** 2 + place[..., 1] ** 2) / RADIUS**2
+    pressure = np.where(inside > 0.0, np.sqrt(np.maximum(inside, 0.0)) if hertz else 1.0, 0.0)
+    along = np.stack([motion[0] - motion[2] * place[..., 1], motion[1] + motion[2] * place[..., 0]], axis=-1)
+    speed = np.maximum(np.linalg.norm(along, axis=-1), 1e-15)
+    force = np.concatenate([FRICTION * (pressure / speed)[..., None] * along, -pressure[..., None]], axis=-1)
+    turn = np.eye(3) if turned is None else turned
+    normal = np.broadcast_to(UP @ turn.T, force.shape)
+    return resultants((force @ turn.T)[None], normal[None], (place @ turn.T)[None], (pressure > 0.0)[None])
+
+
+@pytest.mark.parametrize(("hertz", "arm"), [(True, 3.0 * np.pi / 16.0), (False, 2.0 / 3.0)])
+def test_a_pivoting_disk_bears_the_moment_of_its_closed_form(hertz: bool, arm: float) -> None:
+    felt = slipping((0.0, 0.0, 1.0), hertz)
+    assert felt.moment[0] == pytest.approx(FRICTION * felt.normal_force[0] * arm * RADIUS, rel=3e-3)
+    assert felt.load_ratio[0] == pytest.approx(FRICTION, rel=1e-3)
+
+
+@pytest.mark.parametrize("turning", [0.0, 0.1, 0.5, 1.0, 3.0])
+@pytest.mark.parametrize("hertz", [True, False])
+def test_sliding_and_pivoting_together_show_the_same_friction(turning: float, hertz: bool) -> None:
+    """An ellipse for the limit surface would err by 6 % between."""
+    felt = slipping((0.6, 0.8, turning / RADIUS), hertz)
+    assert felt.load_ratio[0] == pytest.approx(FRICTION, rel=1e-3)
+
+
+def test_a_tilted_sensor_feels_the_same() -> None:
+    level = slipping((1.0, 0.0, 100.0), hertz=True)
+    c, s = np.cos(0.4), np.sin(0.4)
+    tilted = slipping((1.0, 0.0, 100.0), hertz=True, turned=np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]))
+    for name in ("normal_force", "moment", "load_ratio", "element_force"):
+        assert getattr(tilted, name) == pytest.approx(getattr(level, name), rel=1e-9)
+    assert tilted.tangential_force == pytest.approx(level.tangential_force, rel=1e-9, abs=1e-9 * level.normal_force[0])
+
+
+def test_half_of_the_load_is_borne_by_half_of_the_friction() -> None:
+    place, force = points(), np.zeros((120, 120, 3))
+    force[..., 2], force[..., 0] = -1.0, 0.5 * FRICTION
+    felt = resultants(force[None], np.broadcast_to(UP, force.shape)[None], place[None], np.ones((1, 120, 120), bool))
+    assert felt.load_ratio[0] == pytest.approx(0.5 * FRICTION, rel=1e-3)
+
+
+def test_a_single_element_has_a_ratio_of_forces_and_no_moment() -> None:
+    force = np.array([0.3, 0.4, -1.0]) * np.ones((1, 1, 1, 3))
+    felt = resultants(force, np.broadcast_to(UP, force.shape), np.zeros(force.shape), np.ones((1, 1, 1), bool))
+    assert (felt.load_ratio[0], felt.moment[0]) == (pytest.approx(0.5), 0.0)
+
+
+def test_where_nothing_presses_nothing_is_known() -> None:
+    force = np.array([0.1, 0.0, 0.0]) * np.ones((1, 2, 2, 3))
+    felt = resultants(force, np.broadcast_to(UP, force.shape), np.zeros(force.shape), np.ones((1, 2, 2), bool))
+    assert felt.normal_force[0] == 0.0
+    assert np.isnan(felt.load_ratio[0])
