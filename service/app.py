@@ -14,11 +14,11 @@ from service.domain import keys
 from service.domain.model_cache import ModelCache
 from service.formats.reading import Readers
 from service.http import access, errors, openapi
+from service.http.authentication import Authentication, Authenticator
 from service.http.context import ServerContext
-from service.http.envelope import Envelope
-from service.http.gate import Admission, Gate
 from service.http.head_requests import HeadRequests
 from service.http.lookups import Lookups
+from service.http.request_middleware import RequestMiddleware
 from service.http.routes import audit, curation, grasp_logs, health, jobs, materials, metrics, owners, planning, stream
 from service.http.start_refusal import StartRefusal
 from service.jobs.executors import executor_for_short_jobs, executors
@@ -27,7 +27,7 @@ from service.jobs.runner import JobRunner
 from service.jobs.scrub import Scrub
 from service.jobs.worker import StoreConfig
 from service.observability import traces
-from service.observability.answered import Answered
+from service.observability.access_log import AccessLog
 from service.observability.metrics import Metering, Metrics
 from service.observability.store_watch import StoreWatch
 from service.processes import data_folder, private_files
@@ -60,7 +60,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             app.state.start_error = error
             raise
         finally:
-            answered.tell_others()
+            access_log.flush()
 
     app = openapi.DescribedApp(
         title="Stiction",
@@ -86,14 +86,14 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.include_router(pages.router)
     access.check_routes(app)
     app.state.metrics = Metrics()
-    answered = Answered(app.state.metrics.requests)
-    admission = app.state.admission = Admission(chosen)
-    app.add_middleware(Gate, admission=admission)
+    access_log = AccessLog(app.state.metrics.requests)
+    authenticator = app.state.authenticator = Authenticator(chosen)
+    app.add_middleware(Authentication, authenticator=authenticator)
     app.add_middleware(HeadRequests)
-    app.add_middleware(Envelope)
+    app.add_middleware(RequestMiddleware)
     app.add_middleware(ProblemPages)
-    app.add_middleware(Metering, answered=answered)
-    app.add_middleware(Lookups, admission=admission, answered=answered)
+    app.add_middleware(Metering, access_log=access_log)
+    app.add_middleware(Lookups, authenticator=authenticator, access_log=access_log)
     app.add_middleware(StartRefusal)
     errors.install(app)
     return app

@@ -9,7 +9,7 @@ import uvicorn
 
 from service.app import create_app
 from service.http.connections import BoundedConnection, H11Connection
-from service.http.envelope import MOST_HEADER_BYTES
+from service.http.request_middleware import MOST_HEADER_BYTES
 from service.http.websockets import WebSocketConnection
 from service.settings import Settings
 

@@ -277,7 +277,7 @@ def hops(graph: Mapping[str, Collection[str]], start: str, end: str) -> int:
         ("http.routes.materials.create_fit", "db.repositories.materials.find_id"),
         ("http.routes.materials.read_friction", "service.domain.look_up.look_up"),
         ("http.routes.planning.recognise_material", "estimators.recognise"),
-        ("http.routes.stream.live_stream", "service.stream.live.step"),
+        ("http.routes.stream.live_stream", "service.stream.detectors.step"),
         ("http.routes.stream.live_stream", "db.repositories.grasp_logs.add"),
     ],
 )

@@ -1,4 +1,4 @@
-"""The two clients, one waiting and one awaiting: they carry out what ``flows`` describes."""
+"""The two clients, one waiting and one awaiting: they carry out what ``calls`` describes."""
 
 import asyncio
 import os
@@ -10,10 +10,10 @@ from typing import Any, Self
 
 import httpx
 
-from stiction_client import flows
+from stiction_client import calls
+from stiction_client.calls import Call, Ended, Pause, Reply, Request, T
 from stiction_client.container import GraspLogLike
 from stiction_client.errors import ConnectionFailed
-from stiction_client.flows import Answer, Ended, Flow, Pause, Request, T
 from stiction_client.model import FrictionModel
 from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt, Job, Material, Recognition
 
@@ -51,7 +51,7 @@ class FrictionClient:
         timeout: float = TIMEOUT,
         stale_after: float = 0.0,
     ) -> None:
-        self._kept: dict[str, flows.Kept] = {}
+        self._kept: dict[str, calls.CachedModel] = {}
         self._stale_after = stale_after
         self._http = httpx.Client(**_options(url, key, timeout), transport=transport)
 
@@ -84,50 +84,50 @@ class FrictionClient:
         ``scale`` (m per pixel) and ``frame_rate`` (1/s) are for a table of tracked markers that does not tell them,
         ``mapping`` for a recording whose topics, fields or columns have names of their own.
         """
-        return self._run(flows.upload(log, material, sensor, detector, scale, frame_rate, mapping))
+        return self._run(calls.upload(log, material, sensor, detector, scale, frame_rate, mapping))
 
     def grasp_log(self, id: str) -> GraspLogReceipt:  # noqa: A002 - the API's own name
         """A grasp log by its id, with what was detected."""
-        return self._run(flows.grasp_log(id))
+        return self._run(calls.grasp_log(id))
 
     def grasp_logs(self, material: str | None = None, limit: int = 100) -> list[GraspLogReceipt]:
         """The newest logs, newest first: of one ``material``, or all."""
-        return self._run(flows.grasp_logs(material, limit))
+        return self._run(calls.grasp_logs(material, limit))
 
     def create_material(self, name: str, description: str = "") -> Material:
         """Create a material; ``ProblemError`` of type "/problems/material-exists" where it is there."""
-        return self._run(flows.create_material(name, description))
+        return self._run(calls.create_material(name, description))
 
     def ensure_material(self, name: str, description: str = "") -> Material:
         """The material of this name, created where it isn't there (its description then stays as it was)."""
-        return self._run(flows.ensure_material(name, description))
+        return self._run(calls.ensure_material(name, description))
 
     def material(self, name: str) -> Material:
         """A material with its current models."""
-        return self._run(flows.material(name))
+        return self._run(calls.material(name))
 
     def materials(self) -> list[Material]:
         """All materials."""
-        return self._run(flows.materials())
+        return self._run(calls.materials())
 
     def rename_material(self, name: str, new_name: str) -> Material:
         """Rename a material; the old name stays an alias of it."""
-        return self._run(flows.rename_material(name, new_name))
+        return self._run(calls.rename_material(name, new_name))
 
     def merge_materials(self, name: str, source: str) -> Material:
         """Move the logs and names of ``source`` to the material ``name``, for good; its models are fitted again."""
-        return self._run(flows.merge_materials(name, source))
+        return self._run(calls.merge_materials(name, source))
 
     def withdraw(self, log: GraspLogReceipt | str, reason: str) -> GraspLogReceipt:
         """Let a log count in no fit any more; it is kept, with the reason."""
-        return self._run(flows.withdraw(log if isinstance(log, str) else log.id, reason))
+        return self._run(calls.withdraw(log if isinstance(log, str) else log.id, reason))
 
     def model(self, name: str, method: str = "auto") -> FrictionModel:
         """The current model of a material, to be kept and evaluated here: of one method, or the recommended one.
 
         Raises ``NoModel`` where there is none.
         """
-        return self._run(flows.model(name, method, self._kept, self._stale_after))
+        return self._run(calls.model(name, method, self._kept, self._stale_after))
 
     def friction(
         self,
@@ -145,48 +145,48 @@ class FrictionClient:
         The quantile is ``of`` one "element", or of the mean over the ``elements`` of a "contact" (the default where
         these are given).
         """
-        return self._run(flows.friction(name, v, fn, quantile, method, of, elements))
+        return self._run(calls.friction(name, v, fn, quantile, method, of, elements))
 
     def recognise(self, grasp: Any, materials: Sequence[str] | None = None, method: str = "ols") -> Recognition:
         """Which material a grasp was of: a stored log (its receipt or id), or friction samples as slipcore gives them.
 
         ``materials``: which it may be, at most 100; without, all that have a model of ``method``.
         """
-        return self._run(flows.recognise(grasp, materials, method))
+        return self._run(calls.recognise(grasp, materials, method))
 
     def fit(self, name: str, method: str = "auto", seed: int = 0) -> Job:
         """Fit a material over all its grasp logs; follow with ``wait``."""
-        return self._run(flows.fit(name, method, seed))
+        return self._run(calls.fit(name, method, seed))
 
     def job(self, id: str) -> Job:  # noqa: A002 - the API's own name
         """A job as it stands."""
-        return self._run(flows.job(id))
+        return self._run(calls.job(id))
 
     def jobs(self, status: str | None = None, limit: int = 100) -> list[Job]:
         """The newest jobs, newest first: of one ``status``, such as "failed", or all."""
-        return self._run(flows.jobs(status, limit))
+        return self._run(calls.jobs(status, limit))
 
     def cancel(self, job: Job | GraspLogReceipt | str) -> Job:
         """End a job that nobody wants any more; ``ProblemError`` where it has ended otherwise."""
-        return self._run(flows.cancel(_job_id(job)))
+        return self._run(calls.cancel(_job_id(job)))
 
     def owners(self, name: str) -> list[str]:
         """Whose a material is: ``key:ID`` and ``group:NAME``; without any, the keys' scopes alone decide."""
-        return self._run(flows.owners(name))
+        return self._run(calls.owners(name))
 
     def add_owner(self, name: str, owner: str) -> list[str]:
         """Let ``key:ID`` or ``group:NAME`` own a material, too, and get all its owners."""
-        return self._run(flows.add_owner(name, owner))
+        return self._run(calls.add_owner(name, owner))
 
     def remove_owner(self, name: str, owner: str) -> None:
         """Take a material from an owner."""
-        self._run(flows.remove_owner(name, owner))
+        self._run(calls.remove_owner(name, owner))
 
     def audit(
         self, actor: str | None = None, action: str | None = None, subject: str | None = None, limit: int = 100
     ) -> list[AuditEntry]:
         """The newest entries of the audit trail: who changed what, when, and from where. Needs a key of scope admin."""
-        return self._run(flows.audit(actor, action, subject, limit))
+        return self._run(calls.audit(actor, action, subject, limit))
 
     def wait(self, job: Job | GraspLogReceipt | str, timeout: float = JOB_TIMEOUT) -> Job:
         """Wait until a job has ended and return it, whatever its end; ``JobTimedOut`` after ``timeout`` s.
@@ -194,15 +194,15 @@ class FrictionClient:
         A refusal is an answer (the data do not allow a fit), so it isn't raised: read ``status`` and ``reason``, or
         call ``raise_for_status()`` on the result.
         """
-        return self._run(flows.wait(_job_id(job), timeout))
+        return self._run(calls.wait(_job_id(job), timeout))
 
-    def _run(self, flow: Flow[T]) -> T:
-        answer: Answer = None
-        while not isinstance(step := flows.advance(flow, answer), Ended):
+    def _run(self, call: Call[T]) -> T:
+        answer: Reply = None
+        while not isinstance(step := calls.advance(call, answer), Ended):
             answer = self._carry_out(step)
         return step.result
 
-    def _carry_out(self, step: Request | Pause) -> Answer:
+    def _carry_out(self, step: Request | Pause) -> Reply:
         if isinstance(step, Pause):
             time.sleep(step.seconds)
             return None
@@ -224,7 +224,7 @@ class AsyncFrictionClient:
         timeout: float = TIMEOUT,
         stale_after: float = 0.0,
     ) -> None:
-        self._kept: dict[str, flows.Kept] = {}
+        self._kept: dict[str, calls.CachedModel] = {}
         self._stale_after = stale_after
         self._http = httpx.AsyncClient(**_options(url, key, timeout), transport=transport)
 
@@ -251,47 +251,47 @@ class AsyncFrictionClient:
         mapping: Mapping[str, Any] | None = None,
     ) -> GraspLogReceipt:
         """As ``FrictionClient.upload``."""
-        return await self._run(flows.upload(log, material, sensor, detector, scale, frame_rate, mapping))
+        return await self._run(calls.upload(log, material, sensor, detector, scale, frame_rate, mapping))
 
     async def grasp_log(self, id: str) -> GraspLogReceipt:  # noqa: A002 - the API's own name
         """As ``FrictionClient.grasp_log``."""
-        return await self._run(flows.grasp_log(id))
+        return await self._run(calls.grasp_log(id))
 
     async def grasp_logs(self, material: str | None = None, limit: int = 100) -> list[GraspLogReceipt]:
         """As ``FrictionClient.grasp_logs``."""
-        return await self._run(flows.grasp_logs(material, limit))
+        return await self._run(calls.grasp_logs(material, limit))
 
     async def create_material(self, name: str, description: str = "") -> Material:
         """As ``FrictionClient.create_material``."""
-        return await self._run(flows.create_material(name, description))
+        return await self._run(calls.create_material(name, description))
 
     async def ensure_material(self, name: str, description: str = "") -> Material:
         """As ``FrictionClient.ensure_material``."""
-        return await self._run(flows.ensure_material(name, description))
+        return await self._run(calls.ensure_material(name, description))
 
     async def material(self, name: str) -> Material:
         """As ``FrictionClient.material``."""
-        return await self._run(flows.material(name))
+        return await self._run(calls.material(name))
 
     async def materials(self) -> list[Material]:
         """As ``FrictionClient.materials``."""
-        return await self._run(flows.materials())
+        return await self._run(calls.materials())
 
     async def rename_material(self, name: str, new_name: str) -> Material:
         """As ``FrictionClient.rename_material``."""
-        return await self._run(flows.rename_material(name, new_name))
+        return await self._run(calls.rename_material(name, new_name))
 
     async def merge_materials(self, name: str, source: str) -> Material:
         """As ``FrictionClient.merge_materials``."""
-        return await self._run(flows.merge_materials(name, source))
+        return await self._run(calls.merge_materials(name, source))
 
     async def withdraw(self, log: GraspLogReceipt | str, reason: str) -> GraspLogReceipt:
         """As ``FrictionClient.withdraw``."""
-        return await self._run(flows.withdraw(log if isinstance(log, str) else log.id, reason))
+        return await self._run(calls.withdraw(log if isinstance(log, str) else log.id, reason))
 
     async def model(self, name: str, method: str = "auto") -> FrictionModel:
         """As ``FrictionClient.model``."""
-        return await self._run(flows.model(name, method, self._kept, self._stale_after))
+        return await self._run(calls.model(name, method, self._kept, self._stale_after))
 
     async def friction(
         self,
@@ -305,57 +305,57 @@ class AsyncFrictionClient:
         elements: int | None = None,
     ) -> FrictionAnswer:
         """As ``FrictionClient.friction``."""
-        return await self._run(flows.friction(name, v, fn, quantile, method, of, elements))
+        return await self._run(calls.friction(name, v, fn, quantile, method, of, elements))
 
     async def recognise(self, grasp: Any, materials: Sequence[str] | None = None, method: str = "ols") -> Recognition:
         """As ``FrictionClient.recognise``."""
-        return await self._run(flows.recognise(grasp, materials, method))
+        return await self._run(calls.recognise(grasp, materials, method))
 
     async def fit(self, name: str, method: str = "auto", seed: int = 0) -> Job:
         """As ``FrictionClient.fit``."""
-        return await self._run(flows.fit(name, method, seed))
+        return await self._run(calls.fit(name, method, seed))
 
     async def job(self, id: str) -> Job:  # noqa: A002 - the API's own name
         """As ``FrictionClient.job``."""
-        return await self._run(flows.job(id))
+        return await self._run(calls.job(id))
 
     async def jobs(self, status: str | None = None, limit: int = 100) -> list[Job]:
         """As ``FrictionClient.jobs``."""
-        return await self._run(flows.jobs(status, limit))
+        return await self._run(calls.jobs(status, limit))
 
     async def cancel(self, job: Job | GraspLogReceipt | str) -> Job:
         """As ``FrictionClient.cancel``."""
-        return await self._run(flows.cancel(_job_id(job)))
+        return await self._run(calls.cancel(_job_id(job)))
 
     async def owners(self, name: str) -> list[str]:
         """As ``FrictionClient.owners``."""
-        return await self._run(flows.owners(name))
+        return await self._run(calls.owners(name))
 
     async def add_owner(self, name: str, owner: str) -> list[str]:
         """As ``FrictionClient.add_owner``."""
-        return await self._run(flows.add_owner(name, owner))
+        return await self._run(calls.add_owner(name, owner))
 
     async def remove_owner(self, name: str, owner: str) -> None:
         """As ``FrictionClient.remove_owner``."""
-        await self._run(flows.remove_owner(name, owner))
+        await self._run(calls.remove_owner(name, owner))
 
     async def audit(
         self, actor: str | None = None, action: str | None = None, subject: str | None = None, limit: int = 100
     ) -> list[AuditEntry]:
         """As ``FrictionClient.audit``."""
-        return await self._run(flows.audit(actor, action, subject, limit))
+        return await self._run(calls.audit(actor, action, subject, limit))
 
     async def wait(self, job: Job | GraspLogReceipt | str, timeout: float = JOB_TIMEOUT) -> Job:
         """As ``FrictionClient.wait``."""
-        return await self._run(flows.wait(_job_id(job), timeout))
+        return await self._run(calls.wait(_job_id(job), timeout))
 
-    async def _run(self, flow: Flow[T]) -> T:
-        answer: Answer = None
-        while not isinstance(step := flows.advance(flow, answer), Ended):
+    async def _run(self, call: Call[T]) -> T:
+        answer: Reply = None
+        while not isinstance(step := calls.advance(call, answer), Ended):
             answer = await self._carry_out(step)
         return step.result
 
-    async def _carry_out(self, step: Request | Pause) -> Answer:
+    async def _carry_out(self, step: Request | Pause) -> Reply:
         if isinstance(step, Pause):
             await asyncio.sleep(step.seconds)
             return None

@@ -59,7 +59,7 @@ def create(
 
 @app.command("list")
 def list_keys(database_url: Url = None, json: Json = False) -> None:
-    """List all keys, the revoked and expired ones too; the keys themselves are not to be had again."""
+    """List all keys, the revoked and expired ones too; the keys themselves cannot be shown again."""
     from db.repositories import access_keys
 
     with opened(database_url) as database:

@@ -2,20 +2,20 @@
 
 from db.records import Job
 from db.repositories import audit, jobs
-from service.domain.asker import ANYBODY, Asker
 from service.domain.context import Context
 from service.domain.errors import JobEnded
+from service.domain.principal import ANONYMOUS, Principal
 
 REASON = "cancelled by request"
 
 
-def cancel(context: Context, job_id: str, asker: Asker = ANYBODY) -> Job:
+def cancel(context: Context, job_id: str, principal: Principal = ANONYMOUS) -> Job:
     """End a job before its time, or find it cancelled; raises ``NotFound``, and ``JobEnded`` if it ended otherwise."""
     with context.database.write() as session:
         was_running = jobs.get(session, job_id).finished_at is None
         job = jobs.cancel(session, job_id, REASON)
         if was_running and job.status == "cancelled":
-            audit.add(session, asker.actor, "job.cancelled", job_id, {"material": job.material})
+            audit.add(session, principal.actor, "job.cancelled", job_id, {"material": job.material})
     if job.status != "cancelled":
         raise JobEnded(job_id, job.status)
     return job

@@ -6,28 +6,28 @@ from sqlalchemy.orm import Session
 
 from db.records import Job, Material, StoredGraspLog
 from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, owners
-from service.domain.asker import ANYBODY, Asker
 from service.domain.context import Context
 from service.domain.errors import InsufficientScope, InvalidValue
 from service.domain.ownership import check_may_change
+from service.domain.principal import ANONYMOUS, Principal
 from service.domain.queueing import queue
 
 REFITTED = "ols"
 """The method by which a material is fitted even if it has no model yet, as after an upload."""
 
 
-def create(session: Session, name: str, description: str, asker: Asker) -> Material:
-    """Make a material known, which belongs to the asker's key and its group; raises ``AlreadyExists``."""
+def create(session: Session, name: str, description: str, principal: Principal) -> Material:
+    """Make a material known, which belongs to the principal's key and its group; raises ``AlreadyExists``."""
     made = materials.create(session, name, description)
-    for owner in asker.owners:
+    for owner in principal.owners:
         owners.add(session, made.id, owner)
-    told = {"description": description, "owners": list(asker.owners)}
-    audit.add(session, asker.actor, "material.created", name, told)
+    told = {"description": description, "owners": list(principal.owners)}
+    audit.add(session, principal.actor, "material.created", name, told)
     return made
 
 
 def change(
-    context: Context, material: str, name: str | None, description: str | None, asker: Asker = ANYBODY
+    context: Context, material: str, name: str | None, description: str | None, principal: Principal = ANONYMOUS
 ) -> Material:
     """Rename a material, its old name becoming an alias, or change its description.
 
@@ -35,12 +35,14 @@ def change(
     for who may not.
     """
     with context.database.write() as session:
-        material_id = _changeable(session, material, asker)
+        material_id = _changeable(session, material, principal)
         before = materials.get(session, material)
         name = None if name == before.name else name
         description = None if description == before.description else description
         if (name, description) != (None, None):
-            audit.add(session, asker.actor, "material.changed", material, {"name": name, "description": description})
+            audit.add(
+                session, principal.actor, "material.changed", material, {"name": name, "description": description}
+            )
         if description is not None:
             materials.describe(session, material_id, description)
         if name is not None:
@@ -50,77 +52,79 @@ def change(
     return changed
 
 
-def add_alias(context: Context, material: str, alias: str, asker: Asker = ANYBODY) -> Material:
+def add_alias(context: Context, material: str, alias: str, principal: Principal = ANONYMOUS) -> Material:
     """Let a material be found by one more name; raises as ``change``."""
     with context.database.write() as session:
-        if materials.add_alias(session, _changeable(session, material, asker), alias):
-            audit.add(session, asker.actor, "alias.added", material, {"alias": alias})
+        if materials.add_alias(session, _changeable(session, material, principal), alias):
+            audit.add(session, principal.actor, "alias.added", material, {"alias": alias})
         return materials.get(session, material)
 
 
-def remove_alias(context: Context, material: str, alias: str, asker: Asker = ANYBODY) -> None:
+def remove_alias(context: Context, material: str, alias: str, principal: Principal = ANONYMOUS) -> None:
     """Free an alias; raises as ``change``."""
     with context.database.write() as session:
-        materials.remove_alias(session, _changeable(session, material, asker), alias)
-        audit.add(session, asker.actor, "alias.removed", material, {"alias": alias})
+        materials.remove_alias(session, _changeable(session, material, principal), alias)
+        audit.add(session, principal.actor, "alias.removed", material, {"alias": alias})
     context.models.seen()
 
 
-def merge(context: Context, material: str, source: str, asker: Asker = ANYBODY) -> tuple[Material, list[Job]]:
-    """Put what is known of ``source`` to ``material`` and refit it; both must be the asker's. Raises as ``change``."""
+def merge(context: Context, material: str, source: str, principal: Principal = ANONYMOUS) -> tuple[Material, list[Job]]:
+    """Put what is known of ``source`` to ``material`` and refit it; both are the principal's; raises as ``change``."""
     with context.database.write() as session:
-        target_id, source_id = (_changeable(session, name, asker) for name in (material, source))
+        target_id, source_id = (_changeable(session, name, principal) for name in (material, source))
         if target_id == source_id:
             raise InvalidValue("source", source, "another material than the one in the path")
         methods = friction_models.current_methods(session, [target_id, source_id])
         materials.merge(session, target_id, source_id)
-        audit.add(session, asker.actor, "material.merged", material, {"source": source})
-        queued = _queue_refits(session, target_id, methods, asker.key_id)
+        audit.add(session, principal.actor, "material.merged", material, {"source": source})
+        queued = _queue_refits(session, target_id, methods, principal.key_id)
         merged = materials.get(session, material)
     return merged, _follow_up(context, queued)
 
 
-def withdraw(context: Context, log_id: str, because: str, asker: Asker = ANYBODY) -> tuple[StoredGraspLog, list[Job]]:
+def withdraw(
+    context: Context, log_id: str, because: str, principal: Principal = ANONYMOUS
+) -> tuple[StoredGraspLog, list[Job]]:
     """Take a log out of its material's fits, and fit again without it; raises as ``change``."""
     with context.database.write() as session:
-        material_id = _material_to_change(session, log_id, asker)
-        before = grasp_logs.withdraw(session, log_id, because, asker.key_id)
+        material_id = _material_to_change(session, log_id, principal)
+        before = grasp_logs.withdraw(session, log_id, because, principal.key_id)
         if before is None or before.because != because:
-            audit.add(session, asker.actor, "grasp_log.withdrawn", log_id, {"reason": because})
+            audit.add(session, principal.actor, "grasp_log.withdrawn", log_id, {"reason": because})
         had_part = before is None and detections.has_samples(session, log_id)
-        queued = _refit_without(session, material_id, asker.key_id) if had_part else []
+        queued = _refit_without(session, material_id, principal.key_id) if had_part else []
         log = grasp_logs.get(session, log_id)
     return log, _follow_up(context, queued)
 
 
-def restore(context: Context, log_id: str, asker: Asker = ANYBODY) -> tuple[StoredGraspLog, list[Job]]:
+def restore(context: Context, log_id: str, principal: Principal = ANONYMOUS) -> tuple[StoredGraspLog, list[Job]]:
     """Put a withdrawn log back into its material's fits, and fit again with it; raises as ``change``."""
     with context.database.write() as session:
-        material_id = _material_to_change(session, log_id, asker)
+        material_id = _material_to_change(session, log_id, principal)
         was_withdrawn = grasp_logs.restore(session, log_id)
         if was_withdrawn:
-            audit.add(session, asker.actor, "grasp_log.restored", log_id)
+            audit.add(session, principal.actor, "grasp_log.restored", log_id)
         queued: list[Job] = []
         if was_withdrawn and material_id is not None and detections.has_samples(session, log_id):
             methods = friction_models.current_methods(session, [material_id])
-            queued = _queue_refits(session, material_id, methods, asker.key_id)
+            queued = _queue_refits(session, material_id, methods, principal.key_id)
         log = grasp_logs.get(session, log_id)
     return log, _follow_up(context, queued)
 
 
-def _changeable(session: Session, material: str, asker: Asker) -> int:
-    """The key of a material that the asker may change."""
+def _changeable(session: Session, material: str, principal: Principal) -> int:
+    """The key of a material that the principal may change."""
     material_id = materials.find_id(session, material)
-    check_may_change(session, material_id, asker)
+    check_may_change(session, material_id, principal)
     return material_id
 
 
-def _material_to_change(session: Session, log_id: str, asker: Asker) -> int | None:
+def _material_to_change(session: Session, log_id: str, principal: Principal) -> int | None:
     """The key of a log's material, if it has one; a log without material is for admins to change."""
     material_id = grasp_logs.material_id(session, log_id)
     if material_id is not None:
-        check_may_change(session, material_id, asker)
-    elif not asker.is_admin:
+        check_may_change(session, material_id, principal)
+    elif not principal.is_admin:
         raise InsufficientScope("upload", "admin")
     return material_id
 

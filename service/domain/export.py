@@ -22,7 +22,7 @@ class LogFile:
 async def export(context: Context, log: StoredGraspLog, name: str, owner: str = "") -> LogFile:
     """The log as a file of format ``name``, made in the share of ``owner``.
 
-    Raises ``FileDeleted`` where there is none, ``UnsupportedFormat`` without a library of that format, and ``Crowded``.
+    Raises ``FileDeleted`` where there is none, ``UnsupportedFormat`` without a library of that format, ``QueueFull``.
     """
     if not log.has_file:
         raise FileDeleted(f"the file of grasp log {log.id} was deleted, as old uploads are here")

@@ -5,23 +5,23 @@ from sqlalchemy.orm import Session
 from db.records import Job
 from db.repositories import audit, jobs, materials
 from service.domain import quotas
-from service.domain.asker import ANYBODY, Asker
 from service.domain.ownership import check_may_add
+from service.domain.principal import ANONYMOUS, Principal
 from service.domain.queueing import queue
 from service.settings import Settings
 
 
 def request_fit(
-    session: Session, settings: Settings, material: str, method: str, seed: int, asker: Asker = ANYBODY
+    session: Session, settings: Settings, material: str, method: str, seed: int, principal: Principal = ANONYMOUS
 ) -> Job:
     """Queue a fit over all samples of a material; the workers are to be woken once it is committed.
 
     Raises ``NotFound``, ``NotOwner`` and ``QuotaExceeded``.
     """
     material_id = materials.find_id(session, material)
-    check_may_add(session, material_id, asker)
-    quotas.lock(session, settings, asker.key_id)
-    quotas.check_job(session, settings, asker.key_id)
-    job_id = queue(session, "fit", method, material_id=material_id, seed=seed, requested_by=asker.key_id)
-    audit.add(session, asker.actor, "fit.requested", material, {"job": job_id, "method": method, "seed": seed})
+    check_may_add(session, material_id, principal)
+    quotas.lock(session, settings, principal.key_id)
+    quotas.check_job(session, settings, principal.key_id)
+    job_id = queue(session, "fit", method, material_id=material_id, seed=seed, requested_by=principal.key_id)
+    audit.add(session, principal.actor, "fit.requested", material, {"job": job_id, "method": method, "seed": seed})
     return jobs.get(session, job_id)

@@ -4,25 +4,25 @@ from sqlalchemy.orm import Session
 
 from db.errors import NotFound
 from db.repositories import access_keys, audit, materials, owners
-from service.domain.asker import Asker
 from service.domain.context import Context
 from service.domain.errors import InsufficientScope, InvalidValue, NotOwner, UnknownOwner
+from service.domain.principal import Principal
 
 
-def check_may_add(session: Session, material_id: int, asker: Asker) -> None:
+def check_may_add(session: Session, material_id: int, principal: Principal) -> None:
     """Whether somebody may upload into a material and have it fitted; raises ``NotOwner``."""
-    _check(asker, owners.of_material(session, material_id))
+    _check(principal, owners.of_material(session, material_id))
 
 
-def check_may_change(session: Session, material_id: int, asker: Asker) -> None:
+def check_may_change(session: Session, material_id: int, principal: Principal) -> None:
     """Whether somebody may rename, merge or withdraw; without owners that is for admins.
 
     Raises ``NotOwner`` and ``InsufficientScope``.
     """
     found = owners.of_material(session, material_id)
-    if not found and not asker.is_admin:
+    if not found and not principal.is_admin:
         raise InsufficientScope("upload", "admin")
-    _check(asker, found)
+    _check(principal, found)
 
 
 def list_owners(context: Context, material: str) -> list[str]:
@@ -31,35 +31,35 @@ def list_owners(context: Context, material: str) -> list[str]:
         return owners.of_material(session, materials.find_id(session, material))
 
 
-def add_owner(context: Context, material: str, owner: str, asker: Asker) -> list[str]:
+def add_owner(context: Context, material: str, owner: str, principal: Principal) -> list[str]:
     """Let a key or a group own a material, too.
 
     Raises as ``check_may_change``, ``NotFound``, and ``InvalidValue`` for a key that is not stored.
     """
     with context.database.write() as session:
         material_id = materials.find_id(session, material)
-        check_may_change(session, material_id, asker)
+        check_may_change(session, material_id, principal)
         _check_owner(session, owner)
         if owners.add(session, material_id, owner):
-            audit.add(session, asker.actor, "owner.added", material, {"owner": owner})
+            audit.add(session, principal.actor, "owner.added", material, {"owner": owner})
         return owners.of_material(session, material_id)
 
 
-def remove_owner(context: Context, material: str, owner: str, asker: Asker) -> None:
+def remove_owner(context: Context, material: str, owner: str, principal: Principal) -> None:
     """Take a material from an owner; without any it is everybody's again.
 
     Raises as ``check_may_change``, ``NotFound``, and ``UnknownOwner`` for who does not own it.
     """
     with context.database.write() as session:
         material_id = materials.find_id(session, material)
-        check_may_change(session, material_id, asker)
+        check_may_change(session, material_id, principal)
         if not owners.remove(session, material_id, owner):
             raise UnknownOwner("owner", owner, f"an owner of {material}")
-        audit.add(session, asker.actor, "owner.removed", material, {"owner": owner})
+        audit.add(session, principal.actor, "owner.removed", material, {"owner": owner})
 
 
-def _check(asker: Asker, found: list[str]) -> None:
-    if found and not asker.is_admin and not {*asker.owners} & {*found}:
+def _check(principal: Principal, found: list[str]) -> None:
+    if found and not principal.is_admin and not {*principal.owners} & {*found}:
         raise NotOwner(found)
 
 

@@ -14,10 +14,10 @@ from db.records import NewGraspLog, StoredGraspLog
 from db.repositories import audit, grasp_logs, jobs, materials, stores, uploads
 from service import formats
 from service.domain import curate, quotas
-from service.domain.asker import ANYBODY, Asker
 from service.domain.context import Context
 from service.domain.errors import InvalidGraspLog, InvalidValue, UnsupportedFormat, UploadInterrupted
 from service.domain.ownership import check_may_add
+from service.domain.principal import ANONYMOUS, Principal
 from service.domain.queueing import INGEST_METHODS, queue
 from service.domain.receive import UNPACKING_BYTES, check_encoding, check_expansion, check_size, unpack
 from service.formats.archive import unpacked_bytes
@@ -40,8 +40,8 @@ Result = TypeVar("Result")
 @dataclass(frozen=True, slots=True)
 class UploadRequest:
     """What the uploader says of a log: its material, sensor and detector, type, length and encoding of its bytes, and
-    the settings that its format needs (``formats.read``); ``asker`` is who sends it. Where ``creates_material`` is set,
-    a material that is not known is made known with the log, or not at all.
+    the settings that its format needs (``formats.read``); ``principal`` is who sends it. Where
+    ``creates_material`` is set, a material that is not known is made known with the log, or not at all.
     """
 
     material: str | None
@@ -51,7 +51,7 @@ class UploadRequest:
     content_length: int | None = None
     content_encoding: str = ""
     settings: FormatSettings = field(default_factory=dict)
-    asker: Asker = ANYBODY
+    principal: Principal = ANONYMOUS
     creates_material: bool = False
 
 
@@ -65,7 +65,7 @@ class ReceivedLog:
     spool: Spool
     log: NewGraspLog
     body_sha256: str
-    asker: Asker
+    principal: Principal
     new_material: str | None = None
 
 
@@ -92,7 +92,7 @@ async def received(
     """Take a log in, which is forgotten at the end unless it is stored.
 
     ``gone`` ends when the client has gone: what is still to be read then is not. Raises ``DomainError`` for what cannot
-    be taken, ``Crowded``, ``NotFound`` for an unknown material.
+    be taken, ``QueueFull``, ``NotFound`` for an unknown material.
     """
     limit, expansion = context.settings.max_upload_bytes, context.settings.max_expansion
     check_size(request.content_length or 0, limit)
@@ -104,12 +104,12 @@ async def received(
         await context.bodies.receive(body, chunks, limit)
         if encoding:
             spool = spools.enter_context(context.blobs.spool())
-            async with context.readers.room.turn(request.asker.share, UNPACKING_BYTES):
+            async with context.readers.room.turn(request.principal.share, UNPACKING_BYTES):
                 await to_its_end(asyncio.to_thread(unpack, body, spool, encoding, limit, expansion))
         kept, description = await _unless_gone(_read(context, spools, spool, request, body.size), gone())
         new_material = request.material if material_id is None else None
         log = _new_log(kept, description, request, material_id)
-        yield ReceivedLog(kept, log, body.sha256, request.asker, new_material)
+        yield ReceivedLog(kept, log, body.sha256, request.principal, new_material)
 
 
 async def upload(context: Context, chunks: AsyncIterator[bytes], request: UploadRequest) -> StoredUpload:
@@ -121,14 +121,14 @@ async def upload(context: Context, chunks: AsyncIterator[bytes], request: Upload
 async def check_target(context: Context, request: UploadRequest) -> None:
     """Raises ``DomainError`` or ``NotFound`` for what a new log could not be stored for."""
     await asyncio.to_thread(_check, context, request)
-    await asyncio.to_thread(_check_quotas, context, request.asker)
+    await asyncio.to_thread(_check_quotas, context, request.principal)
 
 
 def store_made(context: Context, spool: Spool, found: Description, request: UploadRequest) -> StoredUpload:
     """Store a log that the service itself has written to ``spool.path``, and queue its ingest; raises as ``upload``."""
     material_id = _check(context, request)
     spool.adopt()
-    made = ReceivedLog(spool, _new_log(spool, found, request, material_id), spool.sha256, request.asker)
+    made = ReceivedLog(spool, _new_log(spool, found, request, material_id), spool.sha256, request.principal)
     return store(context, made, lambda session: accept(session, context, made))
 
 
@@ -154,10 +154,10 @@ def accept(session: Session, context: Context, received: ReceivedLog) -> StoredU
     Quotas are looked at once more: others of the same key may have been stored since this one's body began. Raises
     ``NotOwner``, ``QuotaExceeded`` and ``StorageQuotaExceeded``.
     """
-    settings, asker = context.settings, received.asker
-    quotas.lock(session, settings, asker.key_id)
+    settings, principal = context.settings, received.principal
+    quotas.lock(session, settings, principal.key_id)
     log = replace(received.log, material_id=_material(session, received))
-    quotas.check_log(session, settings, asker.key_id, log)
+    quotas.check_log(session, settings, principal.key_id, log)
     try:
         log_id, is_new = grasp_logs.add(session, log), True
         queue(
@@ -166,7 +166,7 @@ def accept(session: Session, context: Context, received: ReceivedLog) -> StoredU
             INGEST_METHODS[0],
             material_id=log.material_id,
             grasp_log_id=log_id,
-            requested_by=asker.key_id,
+            requested_by=principal.key_id,
             is_long=_is_long(log),
         )
     except AlreadyExists:
@@ -174,26 +174,26 @@ def accept(session: Session, context: Context, received: ReceivedLog) -> StoredU
         job = grasp_logs.get(session, log_id).job
         if job.status not in {"failed", "cancelled"}:
             return StoredUpload(grasp_logs.get(session, log_id), is_new)
-        quotas.check_job(session, settings, asker.key_id)
-        jobs.requeue(session, job.id, requested_by=asker.key_id)
+        quotas.check_job(session, settings, principal.key_id)
+        jobs.requeue(session, job.id, requested_by=principal.key_id)
     stored = grasp_logs.get(session, log_id)
     told = {"material": stored.material, "sha256": stored.sha256, "bytes": stored.bytes, "new": is_new}
-    audit.add(session, asker.actor, "grasp_log.uploaded", log_id, told)
+    audit.add(session, principal.actor, "grasp_log.uploaded", log_id, told)
     return StoredUpload(stored, is_new)
 
 
 def _material(session: Session, received: ReceivedLog) -> int | None:
     """The key of the log's material: one to be made known, or one that was merged into another meanwhile."""
-    material_id, asker = received.log.material_id, received.asker
+    material_id, principal = received.log.material_id, received.principal
     if received.new_material is not None:
         try:
-            return curate.create(session, received.new_material, "", asker).id
+            return curate.create(session, received.new_material, "", principal).id
         except AlreadyExists:  # somebody else made it known while the log came in
             material_id = materials.find_id(session, received.new_material)
     if material_id is None:
         return None
     material_id = materials.still(session, material_id)
-    check_may_add(session, material_id, asker)
+    check_may_add(session, material_id, principal)
     return material_id
 
 
@@ -228,13 +228,13 @@ def _check(context: Context, request: UploadRequest) -> int | None:
             if request.creates_material:
                 return None
             raise
-        check_may_add(session, material_id, request.asker)
+        check_may_add(session, material_id, request.principal)
     return material_id
 
 
-def _check_quotas(context: Context, asker: Asker) -> None:
+def _check_quotas(context: Context, principal: Principal) -> None:
     with context.database.read() as session:
-        quotas.check_upload(session, context.settings, asker.key_id)
+        quotas.check_upload(session, context.settings, principal.key_id)
 
 
 def _check_type(content_type: str | None) -> None:
@@ -277,11 +277,14 @@ async def _read(
     with _refusals_named():
         if formats.FORMATS[name].plain:
             found, _ = await asyncio.gather(  # the disk is slow while the reader computes
-                context.readers.describe(spool.path, name, unpacked, request.asker.share), asyncio.to_thread(spool.sync)
+                context.readers.describe(spool.path, name, unpacked, request.principal.share),
+                asyncio.to_thread(spool.sync),
             )
             return spool, found
         made = spools.enter_context(context.blobs.spool())
-        description = await context.readers.convert(spool.path, made.path, name, request.settings, request.asker.share)
+        description = await context.readers.convert(
+            spool.path, made.path, name, request.settings, request.principal.share
+        )
         await asyncio.to_thread(made.adopt)
         check_expansion(received, made.size, expansion)
     return made, description
@@ -298,7 +301,7 @@ def _new_log(spool: Spool, found: Description, request: UploadRequest, material_
         frames=found.frames,
         duration=found.duration,
         grid=found.grid,
-        uploaded_by=request.asker.key_id,
+        uploaded_by=request.principal.key_id,
     )
 
 

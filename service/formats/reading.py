@@ -20,7 +20,7 @@ from db.errors import StorageUnavailable
 from service import formats
 from service.formats import writing
 from service.processes import spawned
-from service.processes.turns import Turns
+from service.processes.fair_queue import FairQueue
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 from stiction_client import container
@@ -78,15 +78,15 @@ class Readers:
     ``room``: bytes that reading may take of this process at once. A log that would need a quarter of it or more is
     read in a process, whose memory is bounded by itself. At most ``size`` processes are there, each started when it is
     first needed and ended when it is lost or long idle; a file may take ``seconds`` there. One ``owner`` has half of
-    the room and of the processes (``Turns``); ``Crowded`` is raised where too many wait. Who is cancelled, since the
-    client has gone, gives up its place at once.
+    the room and of the processes (``FairQueue``); ``QueueFull`` is raised where too many wait. Who is cancelled, since
+    the client has gone, gives up its place at once.
     """
 
     def __init__(self, seconds: float = 60.0, size: int = 2, room: int = 2**28) -> None:
-        self.room = Turns(room, "read")
+        self.room = FairQueue(room, "read")
         self._most_here = room // 4
         self._seconds = seconds
-        self._turns = Turns(size, "read")
+        self._turns = FairQueue(size, "read")
         self._size, self._busy = size, 0
         self._idle: dict[ProcessPoolExecutor, _Idle] = {}
 

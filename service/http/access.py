@@ -13,9 +13,9 @@ from fastapi.security.base import SecurityBase
 from starlette.requests import HTTPConnection
 
 from db.records import Scope
-from service.domain.asker import Asker
 from service.domain.errors import InsufficientScope
 from service.domain.keys import SCOPES
+from service.domain.principal import Principal
 
 CHALLENGE = 'Bearer realm="stiction"'
 _PUBLIC_PAGES = ("/docs", "/redoc", "/login", "/logout", "/problems")
@@ -53,8 +53,8 @@ def challenge_of_scope(needed: str) -> str:
     return f'{CHALLENGE}, error="insufficient_scope", scope="{needed}"'
 
 
-class Needs(SecurityBase):
-    """The dependency of a route on a scope; the gate before it has found out who asks."""
+class RequiredScope(SecurityBase):
+    """The dependency of a route on a scope; the authentication before it has found out who asks."""
 
     scheme_name = "accessKey"
     model = HTTPBearer(description="A key of `stiction keys create`; its scope is read, upload or admin.")
@@ -67,20 +67,20 @@ class Needs(SecurityBase):
                 raise InsufficientScope(access.scope, scope)
 
 
-_needs = Needs()
-READ, UPLOAD, ADMIN = (Security(_needs, scopes=[scope]) for scope in SCOPES)
+_required_scope = RequiredScope()
+READ, UPLOAD, ADMIN = (Security(_required_scope, scopes=[scope]) for scope in SCOPES)
 """What a route puts into its ``dependencies``."""
 
 
-async def asker(connection: HTTPConnection) -> Asker:
+async def principal(connection: HTTPConnection) -> Principal:
     """Who asks, as the use cases take it."""
     access: Access = connection.state.access
     address = connection.client.host[:LONGEST_ADDRESS] if connection.client else None
     request_id = getattr(connection.state, "request_id", None)
-    return Asker(access.key_id, access.group, access.scope == "admin", address, request_id)
+    return Principal(access.key_id, access.group, access.scope == "admin", address, request_id)
 
 
-Asking = Annotated[Asker, Depends(asker)]
+CurrentPrincipal = Annotated[Principal, Depends(principal)]
 """Who asks for a change, for the routes that make some."""
 
 
@@ -102,7 +102,7 @@ def check_routes(app: FastAPI) -> None:
 
 def _scopes(dependant: Dependant | None) -> Iterator[str]:
     if dependant is not None:
-        if isinstance(dependant.call, Needs):
+        if isinstance(dependant.call, RequiredScope):
             yield from dependant.own_oauth_scopes or ()
         for part in dependant.dependencies:
             yield from _scopes(part)

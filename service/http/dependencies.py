@@ -12,5 +12,5 @@ async def _context(request: Request) -> ServerContext:
     return context
 
 
-Given = Annotated[ServerContext, Depends(_context)]
+CurrentContext = Annotated[ServerContext, Depends(_context)]
 """The open stores and the running jobs."""

@@ -49,14 +49,14 @@ from service.http.problems import (
     UPLOAD_TOO_LARGE,
     Problem,
     ProblemType,
-    answer,
+    problem_response,
     storage_unavailable,
 )
-from service.processes.turns import Crowded
+from service.processes.fair_queue import QueueFull
 
 logger = logging.getLogger(__name__)
 
-CROWD_SECONDS = "5"
+QUEUE_FULL_SECONDS = "5"
 """s, as text, after which a file may find room to be read; most take less."""
 
 OF_USE_CASES: Mapping[type[DomainError], ProblemType] = {
@@ -97,7 +97,7 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(AlreadyExists, _on_already_exists)
     app.add_exception_handler(BlobDamaged, _on_blob_damaged)
     app.add_exception_handler(StorageUnavailable, _on_storage_unavailable)
-    app.add_exception_handler(Crowded, _on_crowded)
+    app.add_exception_handler(QueueFull, _on_queue_full)
     app.add_exception_handler(RequestValidationError, _on_invalid_request)
     app.add_exception_handler(HTTPException, _on_http_exception)
 
@@ -115,12 +115,12 @@ def problem_of(error: DomainError) -> Problem:
 
 async def _on_problem(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, Problem)
-    return answer(request, error)
+    return problem_response(request, error)
 
 
 async def _on_domain_error(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, DomainError)
-    return answer(request, problem_of(error))
+    return problem_response(request, problem_of(error))
 
 
 async def _on_not_found(request: Request, error: Exception) -> JSONResponse:
@@ -129,30 +129,32 @@ async def _on_not_found(request: Request, error: Exception) -> JSONResponse:
     if kind in {INTERNAL_ERROR, FILE_MISSING}:
         logger.error("%s is referred to but missing", error.kind, exc_info=error)
     allowed = f"the name of a stored {error.kind}" if kind is not FILE_MISSING else "its copy from a backup, put back"
-    return answer(request, Problem.wrong_value(kind, error.kind, error.name, allowed))
+    return problem_response(request, Problem.wrong_value(kind, error.kind, error.name, allowed))
 
 
 async def _on_already_exists(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, AlreadyExists)
     allowed = f"a name that no {error.kind} has yet"
-    return answer(request, Problem.wrong_value(MATERIAL_EXISTS, "name", error.name, allowed))
+    return problem_response(request, Problem.wrong_value(MATERIAL_EXISTS, "name", error.name, allowed))
 
 
 async def _on_blob_damaged(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, BlobDamaged)
     found_by = f"{request.method} {request.url.path}"
     await asyncio.to_thread(record_damage, request.app.state.context.database, error, found_by)
-    return answer(request, Problem(FILE_DAMAGED, f"{error}; allowed: a copy from a backup, or the same upload again"))
+    return problem_response(
+        request, Problem(FILE_DAMAGED, f"{error}; allowed: a copy from a backup, or the same upload again")
+    )
 
 
 async def _on_storage_unavailable(request: Request, error: Exception) -> JSONResponse:
     logger.error("storage unavailable", exc_info=error)
     assert isinstance(error, StorageUnavailable)
-    return answer(request, storage_unavailable(error))
+    return problem_response(request, storage_unavailable(error))
 
 
-async def _on_crowded(request: Request, error: Exception) -> JSONResponse:
-    return answer(request, Problem(TOO_MANY_UPLOADS, str(error), headers={"Retry-After": CROWD_SECONDS}))
+async def _on_queue_full(request: Request, error: Exception) -> JSONResponse:
+    return problem_response(request, Problem(TOO_MANY_UPLOADS, str(error), headers={"Retry-After": QUEUE_FULL_SECONDS}))
 
 
 async def _on_invalid_request(request: Request, error: Exception) -> JSONResponse:
@@ -160,7 +162,7 @@ async def _on_invalid_request(request: Request, error: Exception) -> JSONRespons
     wrong = [_wrong_value(entry) for entry in error.errors()]
     listed = [{"name": each.name, "value": each.value, "allowed": each.allowed} for each in wrong]
     wrong[0].more["errors"] = listed
-    return answer(request, wrong[0])
+    return problem_response(request, wrong[0])
 
 
 def _wrong_value(entry: dict[str, Any]) -> Problem:
@@ -181,7 +183,9 @@ async def _on_http_exception(request: Request, error: Exception) -> JSONResponse
     headers = dict(error.headers or {})
     if kind is METHOD_NOT_ALLOWED:
         headers["Allow"] = ", ".join(_allowed_methods(request))
-    return answer(request, Problem(kind, f"{request.method} {request.url.path}: {error.detail}", headers=headers))
+    return problem_response(
+        request, Problem(kind, f"{request.method} {request.url.path}: {error.detail}", headers=headers)
+    )
 
 
 def _allowed_methods(request: Request) -> list[str]:

@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 from db.errors import AlreadyExists
 from db.repositories import idempotency_keys
 from service.http.access import Access
-from service.http.dependencies import Given
+from service.http.dependencies import CurrentContext
 from service.http.problems import IDEMPOTENCY_KEY_REUSED, Problem
 
 LONGEST_KEY = 200
@@ -29,7 +29,7 @@ KeyHeader = Annotated[
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class RepeatableResponse:
     """A status, a place and a JSON body."""
 
     status: int
@@ -37,7 +37,7 @@ class Answer:
     body: dict[str, Any]
 
     def response(self) -> JSONResponse:
-        """The answer over the wire."""
+        """The response of the framework."""
         return JSONResponse(self.body, self.status, {"Location": self.location} if self.location else {})
 
 
@@ -55,8 +55,10 @@ class IdempotencyKey:
         return replace(self, fingerprint=_digest(self.fingerprint.encode(), body_digest.encode()))
 
 
-def answer_once(session: Session, key: IdempotencyKey | None, make: Callable[[], Answer]) -> Answer:
-    """The answer that ``make`` gives in this transaction, or the one that it gave under the same key.
+def respond_once(
+    session: Session, key: IdempotencyKey | None, make: Callable[[], RepeatableResponse]
+) -> RepeatableResponse:
+    """The response that ``make`` gives in this transaction, or the one that it gave under the same key.
 
     Raises ``Problem`` for a key under which something else was asked.
     """
@@ -68,13 +70,13 @@ def answer_once(session: Session, key: IdempotencyKey | None, make: Callable[[],
         allowed = "another key, or the very request that was sent under it"
         raise Problem.wrong_value(IDEMPOTENCY_KEY_REUSED, "Idempotency-Key", key.text, allowed) from error
     if earlier is not None:
-        return Answer(**earlier)
-    answer = make()
-    idempotency_keys.keep(session, key.owner, key.text, asdict(answer))
-    return answer
+        return RepeatableResponse(**earlier)
+    response = make()
+    idempotency_keys.keep(session, key.owner, key.text, asdict(response))
+    return response
 
 
-async def _key_without_body(context: Given, request: Request, text: KeyHeader = None) -> IdempotencyKey | None:
+async def _key_without_body(context: CurrentContext, request: Request, text: KeyHeader = None) -> IdempotencyKey | None:
     if text is None:
         return None
     access: Access = request.state.access

@@ -16,15 +16,21 @@ from service.domain.context import Context
 from service.domain.errors import NoModel
 from service.domain.look_up import Question, look_up
 from service.domain.model_cache import KnownModel
-from service.http import envelope
+from service.http.authentication import Authenticator
 from service.http.conditional import is_one_of, unchanged, whole
-from service.http.envelope import MOST_HEADER_BYTES
-from service.http.gate import Admission
+from service.http.request_middleware import (
+    MOST_HEADER_BYTES,
+    Headers,
+    id_header,
+    request_id_of,
+    size_of_headers,
+    with_common_headers,
+)
 from service.http.schemas.models import FrictionOut, LookUpQuery
 from service.observability import traces
-from service.observability.answered import Answered
+from service.observability.access_log import AccessLog
 
-MOST_ANSWERS = 10_000
+MOST_RESPONSES = 10_000
 """Answers kept of all models together, 3 kB each: planners ask the same again and again. When there are more, all are
 made anew."""
 
@@ -38,17 +44,21 @@ _PATH = re.compile(r"/v1/materials/([A-Za-z0-9][A-Za-z0-9 ._-]{0,99})/friction")
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class CachedResponse:
     """What is sent but for the request's id: status, headers and body."""
 
     status: int
-    headers: envelope.Headers
+    headers: Headers
     body: bytes
 
     @classmethod
-    def of(cls, response: Response, scope: Scope) -> "Answer":
+    def of(cls, response: Response, scope: Scope) -> "CachedResponse":
         """A response with the headers that every one has."""
-        return cls(response.status_code, envelope.completed(response.raw_headers, scope), bytes(response.body))
+        return cls(
+            response.status_code,
+            with_common_headers(response.raw_headers, scope),
+            bytes(response.body),
+        )
 
 
 class Lookups:
@@ -59,10 +69,10 @@ class Lookups:
     ask for it wait for one reading; each through the route, they would keep everybody waiting for ten times as long.
     """
 
-    def __init__(self, app: ASGIApp, admission: Admission, answered: Answered) -> None:
+    def __init__(self, app: ASGIApp, authenticator: Authenticator, access_log: AccessLog) -> None:
         self.app = app
-        self._admission, self._answered = admission, answered
-        self._kept: dict[tuple[str, bytes | None, str], Answer] = {}
+        self._authenticator, self._access_log = authenticator, access_log
+        self._kept: dict[tuple[str, bytes | None, str], CachedResponse] = {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
@@ -71,20 +81,20 @@ class Lookups:
         if answer is None:
             await self.app(scope, receive, send)
             return
-        request_id = envelope.request_id_of(scope)
-        headers = [envelope.id_header(request_id), *answer.headers]
+        request_id = request_id_of(scope)
+        headers = [id_header(request_id), *answer.headers]
         await send({"type": "http.response.start", "status": answer.status, "headers": headers})
         await send({"type": "http.response.body", "body": answer.body})
-        self._answered.note("GET", ROUTE.path, answer.status, time.perf_counter() - begin, request_id)
+        self._access_log.record("GET", ROUTE.path, answer.status, time.perf_counter() - begin, request_id)
 
-    async def _answer(self, scope: Scope) -> Answer | None:
+    async def _answer(self, scope: Scope) -> CachedResponse | None:
         found = _PATH.fullmatch(scope["path"])
         asked = _read(scope["query_string"]) if found and len(scope["query_string"]) <= LONGEST_QUERY else None
-        if found is None or asked is None or envelope.size_of_headers(scope) > MOST_HEADER_BYTES:
+        if found is None or asked is None or size_of_headers(scope) > MOST_HEADER_BYTES:
             return None
         connection, (method, question) = HTTPConnection(scope), asked
         known = await self._model(connection, found[1], method)
-        if known is None or not self._admission.admits_at_once(connection):
+        if known is None or not self._authenticator.allows_at_once(connection):
             return None
         traces.name_request("GET", ROUTE.path)
         listed = connection.headers.get("if-none-match")
@@ -96,7 +106,7 @@ class Lookups:
         context: Context = connection.app.state.context
         models = context.models
         if models.fresh(material, method) is None and (
-            not models.has_known(material, method) or self._admission.known(connection) is None
+            not models.has_known(material, method) or self._authenticator.known(connection) is None
         ):
             return None
         try:
@@ -104,7 +114,7 @@ class Lookups:
         except (NotFound, NoModel, StorageUnavailable):
             return None
 
-    def _kept_or_made(self, known: KnownModel, question: Question | None, scope: Scope) -> Answer:
+    def _kept_or_made(self, known: KnownModel, question: Question | None, scope: Scope) -> CachedResponse:
         """The answer to a question, made where nobody asked it yet so; without one, to who has the answer already."""
         key = known.tag, None if question is None else scope["query_string"], scope["scheme"]
         answer = self._kept.get(key)
@@ -113,9 +123,9 @@ class Lookups:
                 response = unchanged(known.tag)
             else:
                 response = whole(known.tag, FrictionOut.json_of(look_up(known, question)))
-            if len(self._kept) >= MOST_ANSWERS:
+            if len(self._kept) >= MOST_RESPONSES:
                 self._kept.clear()
-            answer = self._kept[key] = Answer.of(response, scope)
+            answer = self._kept[key] = CachedResponse.of(response, scope)
         return answer
 
 

@@ -21,10 +21,10 @@ from service.http.problems import (
     ProblemType,
 )
 
-AT_THE_DOOR = (BAD_REQUEST, HEADERS_TOO_LARGE, STOPPING, TOO_MANY_CONNECTIONS)
+OF_EVERY_ROUTE = (BAD_REQUEST, HEADERS_TOO_LARGE, STOPPING, TOO_MANY_CONNECTIONS)
 """Problems of every route, before it is known what is asked."""
 
-AT_THE_GATE = (KEY_REQUIRED, INVALID_KEY, INSUFFICIENT_SCOPE, MISDIRECTED_REQUEST, TOO_MANY_REQUESTS)
+OF_PROTECTED_ROUTES = (KEY_REQUIRED, INVALID_KEY, INSUFFICIENT_SCOPE, MISDIRECTED_REQUEST, TOO_MANY_REQUESTS)
 """Problems of every route that needs a key."""
 
 
@@ -50,7 +50,7 @@ class DescribedApp(FastAPI):
 def _describe_problems(description: dict[str, Any]) -> None:
     for operations in description["paths"].values():
         for operation in operations.values():
-            kinds = AT_THE_DOOR + (AT_THE_GATE if "security" in operation else ())
+            kinds = OF_EVERY_ROUTE + (OF_PROTECTED_ROUTES if "security" in operation else ())
             kinds += (REQUEST_TIMEOUT,) if "requestBody" in operation else ()
             operation["responses"] = _described(*kinds) | operation["responses"]
             for status, response in operation["responses"].items():

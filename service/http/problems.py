@@ -113,7 +113,7 @@ def stopping() -> Problem:
     return Problem(STOPPING, "not done before the server stopped", headers={"Retry-After": "1"})
 
 
-def answer(request: Request, problem: Problem) -> JSONResponse:
+def problem_response(request: Request, problem: Problem) -> JSONResponse:
     """The problem as a response."""
     content: dict[str, Any] = {
         "type": problem.kind.uri,
@@ -131,4 +131,4 @@ def answer(request: Request, problem: Problem) -> JSONResponse:
 def unexpected(request: Request, error: Exception) -> JSONResponse:
     """The answer to an error that nothing else answers; the log tells what it was, the client does not get to know."""
     logger.error("request failed", exc_info=error)
-    return answer(request, Problem(INTERNAL_ERROR, "an unexpected error; the server's log has it"))
+    return problem_response(request, Problem(INTERNAL_ERROR, "an unexpected error; the server's log has it"))

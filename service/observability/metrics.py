@@ -13,7 +13,7 @@ from db.database import Database
 from db.records import Job
 from db.repositories import audit, grasp_logs, jobs
 from db.tables import now
-from service.observability.answered import Answered
+from service.observability.access_log import AccessLog
 
 REQUEST_BUCKETS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0)
 STAGE_BUCKETS = (0.001, 0.005, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0, 60.0)
@@ -111,8 +111,8 @@ class Metrics:
 class Metering:
     """Times every request for the figures and for the log."""
 
-    def __init__(self, app: ASGIApp, answered: Answered) -> None:
-        self.app, self._answered = app, answered
+    def __init__(self, app: ASGIApp, access_log: AccessLog) -> None:
+        self.app, self._access_log = app, access_log
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
@@ -132,4 +132,4 @@ class Metering:
         finally:
             route = getattr(scope.get("route"), "path", "none")
             request_id = scope.get("state", {}).get("request_id")
-            self._answered.note(scope["method"], route, status, time.perf_counter() - begin, request_id)
+            self._access_log.record(scope["method"], route, status, time.perf_counter() - begin, request_id)

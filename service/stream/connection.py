@@ -10,12 +10,12 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from db.blobs import Spool
 from db.errors import NotFound, StorageUnavailable
-from service.domain.asker import Asker
 from service.domain.context import Context
 from service.domain.errors import DomainError
+from service.domain.principal import Principal
 from service.domain.upload import UploadRequest, check_target
 from service.formats.reading import Description
-from service.stream import live
+from service.stream import detectors
 from service.stream.messages import (
     DECODE_BINARY,
     DECODE_TEXT,
@@ -53,9 +53,9 @@ MOST_WAITING_IN, MOST_WAITING_OUT = 8, 64
 dropped, for it does not read."""
 
 
-async def serve(socket: WebSocket, context: Context, streams: Streams, asker: Asker, store: Store) -> None:
+async def serve(socket: WebSocket, context: Context, streams: Streams, principal: Principal, store: Store) -> None:
     """One connection from its first message to its end; ``store`` keeps a log that it recorded."""
-    connection = _Connection(socket, context, streams, asker, store)
+    connection = _Connection(socket, context, streams, principal, store)
     try:
         await connection.run()
     except End as end:
@@ -86,8 +86,10 @@ def _decoded(decode: Callable[[bytes], Incoming], content: bytes) -> Incoming:
 
 
 class _Connection:
-    def __init__(self, socket: WebSocket, context: Context, streams: Streams, asker: Asker, store: Store) -> None:
-        self._socket, self._context, self._asker, self._store = socket, context, asker, store
+    def __init__(
+        self, socket: WebSocket, context: Context, streams: Streams, principal: Principal, store: Store
+    ) -> None:
+        self._socket, self._context, self._principal, self._store = socket, context, principal, store
         self._streams = streams
         self._incoming: asyncio.Queue[Sent] = asyncio.Queue(MOST_WAITING_IN)
         self._outgoing: asyncio.Queue[dict[str, Any]] = asyncio.Queue(MOST_WAITING_OUT)
@@ -111,9 +113,9 @@ class _Connection:
         """The session, and the answers that its client has missed."""
         if isinstance(first, Open):
             await check_target(self._context, self._upload(first))
-            return await self._streams.open(first, self._asker.key_id, self._asker.address or ""), []
+            return await self._streams.open(first, self._principal.key_id, self._principal.address or ""), []
         if isinstance(first, Resume):
-            session = self._streams.find(first.session, self._asker.key_id)
+            session = self._streams.find(first.session, self._principal.key_id)
             return session, session.recent.after(first.last)
         raise End(NOT_UNDERSTOOD, "the first message must be of type open or resume")
 
@@ -176,7 +178,7 @@ class _Connection:
 
     async def _detect(self, session: Session, frame: FrameIn) -> dict[str, Any]:
         return await self._streams.call(
-            live.step,
+            detectors.step,
             session.id,
             frame.number,
             frame.time,
@@ -194,12 +196,12 @@ class _Connection:
         if not opening.keep:
             raise End(REFUSED, "store needs keep, said when the session was opened")
         with self._context.blobs.spool() as spool:
-            found = await self._streams.call(live.write, session.id, spool.path, opening.sensor)
+            found = await self._streams.call(detectors.write, session.id, spool.path, opening.sensor)
             stored = await asyncio.to_thread(self._store, spool, found, self._upload(opening))
         return {"type": "finished", "grasp_log": stored}
 
     def _upload(self, opening: Open) -> UploadRequest:
-        return UploadRequest(opening.material, None, opening.detector, asker=self._asker)
+        return UploadRequest(opening.material, None, opening.detector, principal=self._principal)
 
     async def _receive(self) -> Sent:
         event = await self._socket.receive()

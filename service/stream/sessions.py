@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from service.processes.side_process import ProcessEnded, SideProcess
-from service.stream import live
+from service.stream import detectors
 from service.stream.messages import Open, packed
 
 MOST_SESSIONS = 200
@@ -91,7 +91,7 @@ class Streams:
         self._sessions[session.id] = session  # before it is there, so that others who open one meanwhile count it
         try:
             await self.call(
-                live.open_session, session.id, position, opening.grid, opening.element_area, opening.detector,
+                detectors.open_session, session.id, position, opening.grid, opening.element_area, opening.detector,
                 opening.keep, self._most_bytes,
             )  # fmt: skip
         except BaseException:
@@ -130,7 +130,7 @@ class Streams:
     async def end(self, session: Session) -> None:
         """Forget a session."""
         if self._sessions.pop(session.id, None) is not None:
-            await self.call(live.drop, session.id)
+            await self.call(detectors.drop, session.id)
 
     def _forget(self, session: Session) -> None:
         """The same at once, with the detector dropped soon after."""
@@ -141,7 +141,7 @@ class Streams:
 
     async def _drop(self, name: str) -> None:
         with suppress(End):  # the process ended, and every session with it
-            await self.call(live.drop, name)
+            await self.call(detectors.drop, name)
 
     async def call(self, do: Callable[..., Result], *arguments: Any) -> Result:
         """Do something in the worker; raises ``End`` where it died, and all detectors with it."""

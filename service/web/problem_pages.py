@@ -11,8 +11,8 @@ from fastapi import Request
 from fastapi.responses import RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.http import envelope
 from service.http.problems import MEDIA_TYPE
+from service.http.request_middleware import with_common_headers
 from service.web.rendering import render
 
 KEPT_HEADERS = frozenset({b"retry-after", b"www-authenticate", b"allow", b"x-request-id"})
@@ -56,7 +56,7 @@ class _Sender:
         if not message.get("more_body", False):
             page = _page(Request(self._scope), self._start["status"], json.loads(self._body))
             kept = [each for each in self._start["headers"] if each[0] in KEPT_HEADERS]
-            page.raw_headers[:] = envelope.completed([*page.raw_headers, *kept], self._scope)
+            page.raw_headers[:] = with_common_headers([*page.raw_headers, *kept], self._scope)
             await page(self._scope, self._receive, self._send)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import uvicorn
 
-import stiction_client.flows
+import stiction_client.calls
 from service.app import create_app
 from service.settings import Settings
 from slipcore import GraspLog
@@ -150,7 +150,7 @@ def ask(request: pytest.FixtureRequest) -> Ask:
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pauses of a microsecond, so that retries and polls take no time."""
     for name in ("RETRY_PAUSE", "FIRST_POLL", "LONGEST_POLL"):
-        monkeypatch.setattr(stiction_client.flows, name, 1e-6)
+        monkeypatch.setattr(stiction_client.calls, name, 1e-6)
 
 
 @pytest.fixture

@@ -25,8 +25,8 @@ from stiction_client import (
     ProblemError,
     StaleModel,
     UnexpectedAnswer,
+    calls,
     container,
-    flows,
 )
 
 Ask = Callable[..., Any]
@@ -211,13 +211,13 @@ def test_waiting_ends_with_its_timeout(ask: Ask, service: Service, answers: Simp
 
 
 def test_polls_get_rarer_up_to_a_bound(answers: SimpleNamespace) -> None:
-    flow = stiction_client.flows.wait("j1", 1e6)
+    call = stiction_client.calls.wait("j1", 1e6)
     running = httpx.Response(200, json=answers.job | {"status": "running"})
-    steps = [stiction_client.flows.advance(flow, None)]
+    steps = [stiction_client.calls.advance(call, None)]
     for _ in range(30):
-        steps.append(stiction_client.flows.advance(flow, running))
-        steps.append(stiction_client.flows.advance(flow, None))
-    pauses = [step.seconds for step in steps if isinstance(step, stiction_client.flows.Pause)]
+        steps.append(stiction_client.calls.advance(call, running))
+        steps.append(stiction_client.calls.advance(call, None))
+    pauses = [step.seconds for step in steps if isinstance(step, stiction_client.calls.Pause)]
     expected = [min(0.05 * 1.5**k, 2.0) for k in range(30)]
     assert pauses == pytest.approx(expected, rel=0, abs=0.02)  # less what the answer took
 
@@ -340,12 +340,12 @@ def test_a_busy_service_is_asked_again(
 @pytest.mark.parametrize(("asked", "waited"), [("0.004", 0.004), ("-1", 0.0), ("Sun, 22 Nov 2026 08:49:37 GMT", 1e-6)])
 @pytest.mark.usefixtures("quick")
 def test_a_busy_service_is_left_alone_as_long_as_it_asks(asked: str, waited: float) -> None:
-    flow = flows.material("paper")
-    assert isinstance(flows.advance(flow, None), flows.Request)
+    call = calls.material("paper")
+    assert isinstance(calls.advance(call, None), calls.Request)
     busy = problem(503)
     busy.headers["Retry-After"] = asked
-    assert flows.advance(flow, busy) == flows.Pause(waited)
-    assert isinstance(flows.advance(flow, None), flows.Request)
+    assert calls.advance(call, busy) == calls.Pause(waited)
+    assert isinstance(calls.advance(call, None), calls.Request)
 
 
 def test_a_service_that_is_busy_for_long_is_not_waited_for(ask: Ask, service: Service) -> None:
@@ -384,7 +384,7 @@ def test_a_model_that_has_not_changed_is_not_sent_again(answers: SimpleNamespace
 
 def test_a_young_model_is_not_even_asked_for(answers: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
     service, now = Tagged(answers.material), [100.0]
-    monkeypatch.setattr(flows.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(calls.time, "monotonic", lambda: now[0])
     with FrictionClient("http://stiction", transport=httpx.MockTransport(service), stale_after=60.0) as client:
         client.model("paper")
         now[0] += 59.0
@@ -400,7 +400,7 @@ def test_away_from_the_service_the_last_model_is_used_with_a_warning(
     answers: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     service, now = Tagged(answers.material), [100.0]
-    monkeypatch.setattr(flows.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(calls.time, "monotonic", lambda: now[0])
     with FrictionClient("http://stiction", transport=httpx.MockTransport(service)) as client:
         first = client.model("paper")
         service.away, now[0] = True, 1000.0
@@ -469,7 +469,7 @@ def test_a_grasp_is_recognised_by_its_log_or_by_its_samples(
 ) -> None:
     told = {"method": "ols", "candidates": [{"material": "paper", "version": 3, "probability": 0.9}], "unknown": 0.1}
     server = service(told)
-    samples = SimpleNamespace(element_area=1e-6, **{name: np.ones(2) for name in stiction_client.flows.SAMPLE_ARRAYS})
+    samples = SimpleNamespace(element_area=1e-6, **{name: np.ones(2) for name in stiction_client.calls.SAMPLE_ARRAYS})
     receipt = GraspLogReceipt.from_json(answers.grasp_log)
     for grasp in ("g1", receipt, samples):
         found = ask(server, "recognise", grasp, materials=["paper"])

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Query, Request, Response
 from db.records import AuditFilter
 from db.repositories import audit
 from service.http.access import ADMIN
-from service.http.dependencies import Given
+from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import INVALID_REQUEST, STORAGE_UNAVAILABLE
@@ -20,7 +20,7 @@ router = APIRouter(prefix="/v1/audit", tags=["audit"])
     "", dependencies=[ADMIN], summary="Look who changed what", responses=problems(INVALID_REQUEST, STORAGE_UNAVAILABLE)
 )
 def list_audit_entries(
-    context: Given,
+    context: CurrentContext,
     request: Request,
     response: Response,
     actor: Annotated[

@@ -5,9 +5,9 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Response
 
 from service.domain import curate
-from service.http.access import UPLOAD, Asking
+from service.http.access import UPLOAD, CurrentPrincipal
 from service.http.bodies import JsonRoute
-from service.http.dependencies import Given
+from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
 from service.http.problems import (
     INVALID_REQUEST,
@@ -38,9 +38,11 @@ _BODY = (UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILA
     summary="Rename or describe a material",
     responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, MATERIAL_EXISTS, *_BODY),
 )
-def change_material(context: Given, name: str, change: MaterialChange, asker: Asking) -> MaterialOut:
+def change_material(
+    context: CurrentContext, name: str, change: MaterialChange, principal: CurrentPrincipal
+) -> MaterialOut:
     """The old name becomes an alias, so that whoever knows it still finds the material."""
-    return MaterialOut.of(curate.change(context, name, change.name, change.description, asker))
+    return MaterialOut.of(curate.change(context, name, change.name, change.description, principal))
 
 
 @router.put(
@@ -50,9 +52,9 @@ def change_material(context: Given, name: str, change: MaterialChange, asker: As
     summary="Give a material one more name",
     responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, MATERIAL_EXISTS, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
-def add_alias(context: Given, name: str, alias: Alias, asker: Asking) -> MaterialOut:
+def add_alias(context: CurrentContext, name: str, alias: Alias, principal: CurrentPrincipal) -> MaterialOut:
     """Every route finds the material by any of its names."""
-    return MaterialOut.of(curate.add_alias(context, name, alias, asker))
+    return MaterialOut.of(curate.add_alias(context, name, alias, principal))
 
 
 @router.delete(
@@ -63,9 +65,9 @@ def add_alias(context: Given, name: str, alias: Alias, asker: Asking) -> Materia
     status_code=204,
     responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, UNKNOWN_ALIAS, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
-def remove_alias(context: Given, name: str, alias: Alias, asker: Asking) -> Response:
+def remove_alias(context: CurrentContext, name: str, alias: Alias, principal: CurrentPrincipal) -> Response:
     """The name is free then; a material's own name is no alias."""
-    curate.remove_alias(context, name, alias, asker)
+    curate.remove_alias(context, name, alias, principal)
     return Response(status_code=204)
 
 
@@ -76,12 +78,12 @@ def remove_alias(context: Given, name: str, alias: Alias, asker: Asking) -> Resp
     summary="Merge another material into this one",
     responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, *_BODY),
 )
-def merge_materials(context: Given, name: str, merge: NewMerge, asker: Asking) -> MergedOut:
+def merge_materials(context: CurrentContext, name: str, merge: NewMerge, principal: CurrentPrincipal) -> MergedOut:
     """Its logs and names move here, for good, and the fits are made again over all logs.
 
     A log that both have, by content and detector, counts once.
     """
-    material, jobs = curate.merge(context, name, merge.source, asker)
+    material, jobs = curate.merge(context, name, merge.source, principal)
     return MergedOut(material=MaterialOut.of(material), jobs=[JobOut.of(job) for job in jobs])
 
 
@@ -93,16 +95,16 @@ def merge_materials(context: Given, name: str, merge: NewMerge, asker: Asking) -
     responses=problems(NOT_OWNER, UNKNOWN_GRASP_LOG, *_BODY),
 )
 def withdraw_grasp_log(
-    context: Given,
+    context: CurrentContext,
     id: str,  # noqa: A002  (the path's own name)
     withdrawal: NewWithdrawal,
-    asker: Asking,
+    principal: CurrentPrincipal,
 ) -> WithdrawnOut:
     """It is kept, but counts in no fit from then on; its material's models are fitted again without it.
 
     Until then those models are marked as outdated; where no samples are left, the material has none.
     """
-    log, jobs = curate.withdraw(context, id, withdrawal.reason, asker)
+    log, jobs = curate.withdraw(context, id, withdrawal.reason, principal)
     return WithdrawnOut(grasp_log=GraspLogOut.of(log), jobs=[JobOut.of(job) for job in jobs])
 
 
@@ -113,7 +115,7 @@ def withdraw_grasp_log(
     summary="Take a withdrawal back",
     responses=problems(NOT_OWNER, UNKNOWN_GRASP_LOG, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
-def restore_grasp_log(context: Given, id: str, asker: Asking) -> WithdrawnOut:  # noqa: A002
+def restore_grasp_log(context: CurrentContext, id: str, principal: CurrentPrincipal) -> WithdrawnOut:  # noqa: A002
     """The log counts again, and its material's models are fitted again with it."""
-    log, jobs = curate.restore(context, id, asker)
+    log, jobs = curate.restore(context, id, principal)
     return WithdrawnOut(grasp_log=GraspLogOut.of(log), jobs=[JobOut.of(job) for job in jobs])

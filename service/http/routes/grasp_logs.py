@@ -17,12 +17,12 @@ from service.domain.stored_results import EVENT_KINDS, SAMPLE_ARRAYS, StoredHist
 from service.domain.upload import ReceivedLog, StoredUpload, UploadRequest, accept, received, store
 from service.formats import writing
 from service.formats.tracked_markers import FRAME_RATE, SCALE
-from service.http.access import READ, UPLOAD, Asking
+from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.bodies import chunks, gone
-from service.http.dependencies import Given
+from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
 from service.http.download import Download
-from service.http.idempotency import Answer, IdempotencyKey, KeyWithoutBody, answer_once
+from service.http.idempotency import IdempotencyKey, KeyWithoutBody, RepeatableResponse, respond_once
 from service.http.long_json import long_json
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import (
@@ -97,10 +97,10 @@ _RESULTS = problems(UNKNOWN_GRASP_LOG, NOT_READY, INVALID_REQUEST, FILE_DAMAGED,
     ),
 )
 async def create_grasp_log(
-    context: Given,
+    context: CurrentContext,
     request: Request,
     key: KeyWithoutBody,
-    asker: Asking,
+    principal: CurrentPrincipal,
     material: Annotated[
         str | None, Query(description="What was held; without it slip is only detected", examples=["paper"])
     ] = None,
@@ -136,22 +136,22 @@ async def create_grasp_log(
         int(length) if length.isdecimal() else None,
         ",".join(request.headers.getlist("content-encoding")),
         {"scale": scale, "frame_rate": frame_rate, "mapping": mapping},
-        asker,
+        principal,
     )
     async with received(context, chunks(request), asked, partial(gone, request)) as log:
         answer = await asyncio.to_thread(_store, context, log, key and key.about(log.body_sha256))
     return answer.response()
 
 
-def _store(context: Context, log: ReceivedLog, key: IdempotencyKey | None) -> Answer:
+def _store(context: Context, log: ReceivedLog, key: IdempotencyKey | None) -> RepeatableResponse:
     return store(
-        context, log, lambda session: answer_once(session, key, lambda: _answer(accept(session, context, log)))
+        context, log, lambda session: respond_once(session, key, lambda: _answer(accept(session, context, log)))
     )
 
 
-def _answer(stored: StoredUpload) -> Answer:
+def _answer(stored: StoredUpload) -> RepeatableResponse:
     body = GraspLogOut.of(stored.log).model_dump(mode="json")
-    return Answer(202 if stored.is_new else 200, f"/v1/grasp-logs/{stored.log.id}", body)
+    return RepeatableResponse(202 if stored.is_new else 200, f"/v1/grasp-logs/{stored.log.id}", body)
 
 
 @router.get(
@@ -161,7 +161,7 @@ def _answer(stored: StoredUpload) -> Answer:
     responses=problems(UNKNOWN_MATERIAL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
 def list_grasp_logs(
-    context: Given,
+    context: CurrentContext,
     request: Request,
     response: Response,
     material: Annotated[str | None, Query(description="Only those of this material")] = None,
@@ -184,7 +184,7 @@ def list_grasp_logs(
 
 
 @router.get("/{id}", dependencies=[READ], summary="Look at a grasp log", responses=_FOUND)
-def read_grasp_log(context: Given, id: str) -> GraspLogOut:  # noqa: A002  (the path's own name)
+def read_grasp_log(context: CurrentContext, id: str) -> GraspLogOut:  # noqa: A002  (the path's own name)
     """With its job and, once there, what was found in it."""
     log = _find(context, id)
     if log.job.finished_at is not None:
@@ -199,7 +199,7 @@ def read_grasp_log(context: Given, id: str) -> GraspLogOut:  # noqa: A002  (the 
     response_model=StickRatioOut,
     responses=_RESULTS,
 )
-def read_stick_ratio(context: Given, id: str) -> Response:  # noqa: A002
+def read_stick_ratio(context: CurrentContext, id: str) -> Response:  # noqa: A002
     """One value a frame."""
     history = _history(context, id)
     return long_json({"time": history.time, "stick_ratio": history.stick_ratio})
@@ -212,7 +212,7 @@ def read_stick_ratio(context: Given, id: str) -> Response:  # noqa: A002
     response_model=EventsOut,
     responses=_RESULTS,
 )
-def read_events(context: Given, id: str) -> Response:  # noqa: A002
+def read_events(context: CurrentContext, id: str) -> Response:  # noqa: A002
     """Of each element."""
     events = _history(context, id).events
     of_kind = {kind: getattr(events, kind) for kind in EVENT_KINDS}
@@ -226,7 +226,7 @@ def read_events(context: Given, id: str) -> Response:  # noqa: A002
     response_model=SamplesOut,
     responses=_RESULTS,
 )
-def read_samples(context: Given, id: str) -> Response:  # noqa: A002
+def read_samples(context: CurrentContext, id: str) -> Response:  # noqa: A002
     """One entry an element and frame; empty where no slip gave one."""
     log = _find(context, id)
     samples = decode_samples(context.blobs.path(_ready(log.samples, log).samples_blob))
@@ -251,8 +251,8 @@ def read_samples(context: Given, id: str) -> Response:  # noqa: A002
     ),
 )
 async def read_file(
-    context: Given,
-    asker: Asking,
+    context: CurrentContext,
+    principal: CurrentPrincipal,
     id: str,  # noqa: A002
     format: Annotated[  # noqa: A002
         str, Query(description="Of the file", json_schema_extra={"enum": list(writing.SUFFIXES)})
@@ -261,7 +261,7 @@ async def read_file(
     """As it was uploaded, or as NPZ, Parquet or MCAP made of it: each is read back bit for bit."""
     if format not in writing.SUFFIXES:
         raise Problem.wrong_value(INVALID_REQUEST, "format", format, ", ".join(writing.SUFFIXES))
-    file = await export(context, await asyncio.to_thread(_find, context, id), format, asker.share)
+    file = await export(context, await asyncio.to_thread(_find, context, id), format, principal.share)
     return Download(
         file.path,
         file.close.close,

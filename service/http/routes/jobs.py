@@ -8,8 +8,8 @@ from db.records import JobStatus
 from db.repositories import jobs
 from service.domain.await_job import MOST_SECONDS, await_job
 from service.domain.cancel import cancel
-from service.http.access import ADMIN, READ, Asking
-from service.http.dependencies import Given
+from service.http.access import ADMIN, READ, CurrentPrincipal
+from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import INVALID_REQUEST, JOB_ENDED, STORAGE_UNAVAILABLE, UNKNOWN_JOB
@@ -20,7 +20,7 @@ router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
 @router.get("", dependencies=[READ], summary="List jobs", responses=problems(INVALID_REQUEST, STORAGE_UNAVAILABLE))
 def list_jobs(
-    context: Given,
+    context: CurrentContext,
     request: Request,
     response: Response,
     status: Annotated[JobStatus | None, Query(description="Only those of it, such as `failed`")] = None,
@@ -46,7 +46,7 @@ def list_jobs(
     responses=problems(UNKNOWN_JOB, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
 async def read_job(
-    context: Given,
+    context: CurrentContext,
     id: str,  # noqa: A002  (the path's own name)
     wait: Annotated[float, Query(ge=0.0, le=MOST_SECONDS, description="s to wait for its end", examples=[10.0])] = 0.0,
 ) -> JobOut:
@@ -64,6 +64,6 @@ async def read_job(
     summary="Cancel a job",
     responses=problems(UNKNOWN_JOB, JOB_ENDED, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
-def cancel_job(context: Given, id: str, asker: Asking) -> JobOut:  # noqa: A002
+def cancel_job(context: CurrentContext, id: str, principal: CurrentPrincipal) -> JobOut:  # noqa: A002
     """It stores nothing more; a worker that is at it turns to the next one after the stage that it is in."""
-    return JobOut.of(cancel(context, id, asker))
+    return JobOut.of(cancel(context, id, principal))

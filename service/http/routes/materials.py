@@ -9,12 +9,12 @@ from db.repositories import friction_models, materials
 from service.domain import curate
 from service.domain.fit import request_fit
 from service.domain.look_up import Question, look_up
-from service.http.access import READ, UPLOAD, Asking
+from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.bodies import JsonRoute
 from service.http.conditional import NOT_MODIFIED, conditional, tagged
-from service.http.dependencies import Given
+from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
-from service.http.idempotency import Answer, KeyWithBody, answer_once
+from service.http.idempotency import KeyWithBody, RepeatableResponse, respond_once
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import (
     IDEMPOTENCY_KEY_REUSED,
@@ -52,15 +52,17 @@ _BODY = (UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, IDEMPOTENCY_KEY_
     response_model=MaterialOut,
     responses=problems(MATERIAL_EXISTS, *_BODY),
 )
-def create_material(context: Given, new: NewMaterial, key: KeyWithBody, asker: Asking) -> Response:
+def create_material(
+    context: CurrentContext, new: NewMaterial, key: KeyWithBody, principal: CurrentPrincipal
+) -> Response:
     """Logs can be uploaded for it from then on. It belongs to the key that is sent, and to its group."""
     with context.database.write() as session:
 
-        def create() -> Answer:
-            made = MaterialOut.of(curate.create(session, new.name, new.description, asker))
-            return Answer(201, f"/v1/materials/{quote(new.name)}", made.model_dump(mode="json"))
+        def create() -> RepeatableResponse:
+            made = MaterialOut.of(curate.create(session, new.name, new.description, principal))
+            return RepeatableResponse(201, f"/v1/materials/{quote(new.name)}", made.model_dump(mode="json"))
 
-        return answer_once(session, key, create).response()
+        return respond_once(session, key, create).response()
 
 
 @router.get(
@@ -70,7 +72,7 @@ def create_material(context: Given, new: NewMaterial, key: KeyWithBody, asker: A
     responses=problems(INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
 def list_materials(
-    context: Given,
+    context: CurrentContext,
     request: Request,
     response: Response,
     search: Annotated[str | None, Query(max_length=100, description="Part of a name or an alias")] = None,
@@ -94,7 +96,7 @@ def list_materials(
     response_model=MaterialOut,
     responses=NOT_MODIFIED | problems(UNKNOWN_MATERIAL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
-def read_material(context: Given, request: Request, name: str) -> Response:
+def read_material(context: CurrentContext, request: Request, name: str) -> Response:
     """With the current model of each method. `ETag` and `If-None-Match` save the answer to who has it."""
     with context.database.read() as session:
         found = materials.get(session, name)
@@ -110,7 +112,7 @@ def read_material(context: Given, request: Request, name: str) -> Response:
     responses=NOT_MODIFIED | problems(UNKNOWN_MATERIAL, NO_MODEL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
 async def read_friction(
-    context: Given,
+    context: CurrentContext,
     request: Request,
     name: str,
     asked: Annotated[LookUpQuery, Query()],
@@ -133,15 +135,17 @@ async def read_friction(
     response_model=JobOut,
     responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, QUOTA_EXCEEDED, *_BODY),
 )
-def create_fit(context: Given, name: str, new: NewFit, key: KeyWithBody, asker: Asking) -> Response:
+def create_fit(
+    context: CurrentContext, name: str, new: NewFit, key: KeyWithBody, principal: CurrentPrincipal
+) -> Response:
     """Over the samples of all its logs. Answers at once; the job at `Location` tells how it went."""
     with context.queueing() as session:
 
-        def create() -> Answer:
-            job = request_fit(session, context.settings, name, new.method, new.seed, asker)
-            return Answer(202, f"/v1/jobs/{job.id}", JobOut.of(job).model_dump(mode="json"))
+        def create() -> RepeatableResponse:
+            job = request_fit(session, context.settings, name, new.method, new.seed, principal)
+            return RepeatableResponse(202, f"/v1/jobs/{job.id}", JobOut.of(job).model_dump(mode="json"))
 
-        return answer_once(session, key, create).response()
+        return respond_once(session, key, create).response()
 
 
 @router.get(
@@ -151,7 +155,7 @@ def create_fit(context: Given, name: str, new: NewFit, key: KeyWithBody, asker: 
     responses=problems(UNKNOWN_MATERIAL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
 def list_fits(
-    context: Given,
+    context: CurrentContext,
     request: Request,
     response: Response,
     name: str,

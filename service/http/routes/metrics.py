@@ -6,7 +6,7 @@ from fastapi import APIRouter, Depends, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST
 
 from service.http.access import READ
-from service.http.dependencies import Given
+from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
 from service.http.problems import STORAGE_UNAVAILABLE
 from service.observability.metrics import Metrics
@@ -30,6 +30,6 @@ async def _metrics(request: Request) -> Metrics:
     response_class=Response,
     responses=problems(STORAGE_UNAVAILABLE) | _TEXT,
 )
-def read_metrics(context: Given, metrics: Annotated[Metrics, Depends(_metrics)]) -> Response:
+def read_metrics(context: CurrentContext, metrics: Annotated[Metrics, Depends(_metrics)]) -> Response:
     """Requests, jobs and their stages, and what is stored (docs/operations.md)."""
     return Response(metrics.expose(context.database, context.scrub), media_type=CONTENT_TYPE_LATEST)

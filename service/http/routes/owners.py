@@ -5,8 +5,8 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Response
 
 from service.domain import ownership
-from service.http.access import READ, UPLOAD, Asking
-from service.http.dependencies import Given
+from service.http.access import READ, UPLOAD, CurrentPrincipal
+from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
 from service.http.problems import (
     INVALID_REQUEST,
@@ -31,7 +31,7 @@ _ALWAYS = (UNKNOWN_MATERIAL, INVALID_REQUEST, STORAGE_UNAVAILABLE)
 
 
 @router.get("", dependencies=[READ], summary="Look at a material's owners", responses=problems(*_ALWAYS))
-def list_owners(context: Given, name: str) -> OwnersOut:
+def list_owners(context: CurrentContext, name: str) -> OwnersOut:
     """Without any, whoever has the scope may add to it, and admins change it."""
     return OwnersOut(owners=ownership.list_owners(context, name))
 
@@ -39,9 +39,9 @@ def list_owners(context: Given, name: str) -> OwnersOut:
 @router.put(
     "/{owner}", dependencies=[UPLOAD], summary="Let another own a material", responses=problems(NOT_OWNER, *_ALWAYS)
 )
-def add_owner(context: Given, name: str, owner: Owner, asker: Asking) -> OwnersOut:
+def add_owner(context: CurrentContext, name: str, owner: Owner, principal: CurrentPrincipal) -> OwnersOut:
     """For its owners, and admins."""
-    return OwnersOut(owners=ownership.add_owner(context, name, owner, asker))
+    return OwnersOut(owners=ownership.add_owner(context, name, owner, principal))
 
 
 @router.delete(
@@ -51,7 +51,7 @@ def add_owner(context: Given, name: str, owner: Owner, asker: Asking) -> OwnersO
     status_code=204,
     responses=problems(NOT_OWNER, UNKNOWN_OWNER, *_ALWAYS),
 )
-def remove_owner(context: Given, name: str, owner: Owner, asker: Asking) -> Response:
+def remove_owner(context: CurrentContext, name: str, owner: Owner, principal: CurrentPrincipal) -> Response:
     """For its owners, and admins. Without any owner the scope alone decides again."""
-    ownership.remove_owner(context, name, owner, asker)
+    ownership.remove_owner(context, name, owner, principal)
     return Response(status_code=204)

@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from service.domain import plan
 from service.http.access import READ
 from service.http.bodies import LongJsonRoute
-from service.http.dependencies import Given
+from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
 from service.http.problems import (
     INVALID_REQUEST,
@@ -37,7 +37,7 @@ _ALWAYS = (UNKNOWN_MATERIAL, NO_MODEL, UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INV
     summary="Ask how hard to grip",
     responses=problems(NO_FEASIBLE_FORCE, *_ALWAYS),
 )
-def find_grasp_force(context: Given, asked: NewGraspForce) -> GraspForceOut:
+def find_grasp_force(context: CurrentContext, asked: NewGraspForce) -> GraspForceOut:
     """The smallest normal force at which a contact that bears the load slips no more often than accepted.
 
     The model's uncertainty is in it. A planner that asks often gets the model once and evaluates it by itself.
@@ -51,7 +51,7 @@ def find_grasp_force(context: Given, asked: NewGraspForce) -> GraspForceOut:
     summary="Ask which material this is",
     responses=problems(UNKNOWN_GRASP_LOG, NOT_READY, INVALID_SAMPLES, *_ALWAYS),
 )
-def recognise_material(context: Given, asked: NewRecognition) -> RecognitionOut:
+def recognise_material(context: CurrentContext, asked: NewRecognition) -> RecognitionOut:
     """From the friction samples of one grasp: a stored log's, or those that are sent.
 
     "unknown" is the probability that it is none of the materials compared.

@@ -7,7 +7,7 @@ from fastapi import APIRouter, WebSocket
 from db.blobs import Spool
 from service.domain.upload import UploadRequest, store_made
 from service.formats.reading import Description
-from service.http.access import UPLOAD, asker
+from service.http.access import UPLOAD, principal
 from service.http.context import ServerContext
 from service.http.schemas.grasp_logs import GraspLogOut
 from service.stream import connection
@@ -24,4 +24,4 @@ async def live_stream(socket: WebSocket) -> None:
     def store(spool: Spool, found: Description, request: UploadRequest) -> dict[str, Any]:
         return GraspLogOut.of(store_made(context, spool, found, request).log).model_dump(mode="json")
 
-    await connection.serve(socket, context, context.streams, await asker(socket), store)
+    await connection.serve(socket, context, context.streams, await principal(socket), store)

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Query, Request, Response
 from db.records import JobStatus
 from db.repositories import jobs
 from service.http.access import READ
-from service.http.dependencies import Given
+from service.http.dependencies import CurrentContext
 from service.http.paging import CursorText, Page
 from service.web.forms import EMPTY_IS_NONE
 from service.web.rendering import render
@@ -21,7 +21,7 @@ STAGES = {"ingest": ("frames", "slip_state", "samples", "friction_model", "mater
 
 @router.get("/jobs", dependencies=[READ])
 def list_jobs(
-    context: Given,
+    context: CurrentContext,
     request: Request,
     status: Annotated[JobStatus | None, EMPTY_IS_NONE, Query()] = None,
     cursor: CursorText = None,

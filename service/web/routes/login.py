@@ -8,8 +8,8 @@ from fastapi.params import Form
 from fastapi.responses import RedirectResponse
 
 from service.http import origin, sessions
-from service.http.dependencies import Given
-from service.http.gate import Admission
+from service.http.authentication import Authenticator
+from service.http.dependencies import CurrentContext
 from service.web.forms import FormRoute
 from service.web.rendering import on_problem, render
 
@@ -26,29 +26,29 @@ async def show_login(request: Request, next: str = "/") -> Response:  # noqa: A0
 
 @router.post("/login")
 async def log_in(
-    context: Given,
+    context: CurrentContext,
     request: Request,
     key: Annotated[str, Form(max_length=1000)] = "",
     next: Annotated[str, Form(max_length=2000)] = "/",  # noqa: A002
 ) -> Response:
     """Begin a session of this key; raises ``Problem`` for what is none, and for a form of another site's page."""
     origin.check_site(request, is_browser=True)
-    admission: Admission = request.app.state.admission
+    authenticator: Authenticator = request.app.state.authenticator
     on_problem(request, "login.html", next=_own_path(next))
-    found = await admission.find_key(request, key.strip())
+    found = await authenticator.find_key(request, key.strip())
     response = RedirectResponse(_own_path(next), SEE_OTHER)
     await asyncio.to_thread(sessions.begin, context.database, found, request, response)
     return response
 
 
 @router.post("/logout")
-async def log_out(context: Given, request: Request) -> Response:
+async def log_out(context: CurrentContext, request: Request) -> Response:
     """End the session, if there is one; raises ``Problem`` for a form of another site's page."""
     origin.check_site(request, is_browser=True)
     response, token = RedirectResponse("/login", SEE_OTHER), sessions.sent_token(request)
     if token is not None:
-        admission: Admission = request.app.state.admission
-        admission.forget_session(token)
+        authenticator: Authenticator = request.app.state.authenticator
+        authenticator.forget_session(token)
         await asyncio.to_thread(sessions.end, context.database, token, response)
     return response
 

@@ -10,9 +10,9 @@ from db.records import StoredGraspLog
 from db.repositories import grasp_logs
 from service.domain.context import Context
 from service.domain.errors import ResultsNotReady
-from service.http.access import READ, Asking
+from service.http.access import READ, CurrentPrincipal
 from service.http.conditional import KEEP_AND_ASK, is_one_of, unchanged
-from service.http.dependencies import Given
+from service.http.dependencies import CurrentContext
 from service.http.download import Download
 from service.web.frames import write_frames
 from service.web.rendering import render
@@ -21,7 +21,7 @@ router = APIRouter(include_in_schema=False)
 
 
 @router.get("/logs/{id}", dependencies=[READ])
-def show_log(context: Given, request: Request, id: str) -> Response:  # noqa: A002  (the path's own name)
+def show_log(context: CurrentContext, request: Request, id: str) -> Response:  # noqa: A002  (the path's own name)
     """State, findings and player of a log; raises ``NotFound``."""
     log = _find(context, id)
     is_kept = log.detection is not None and context.blobs.has(log.detection.history_blob)
@@ -29,7 +29,7 @@ def show_log(context: Given, request: Request, id: str) -> Response:  # noqa: A0
 
 
 @router.get("/logs/{id}/frames", dependencies=[READ])
-async def read_frames(context: Given, request: Request, asker: Asking, id: str) -> Response:  # noqa: A002
+async def read_frames(context: CurrentContext, request: Request, principal: CurrentPrincipal, id: str) -> Response:  # noqa: A002
     """What the player shows (``service.web.frames``), made in a reader's process; raises ``ResultsNotReady``."""
     log = await asyncio.to_thread(_find, context, id)
     if log.detection is None:
@@ -41,7 +41,7 @@ async def read_frames(context: Given, request: Request, asker: Asking, id: str) 
     upload = await asyncio.to_thread(context.blobs.path, log.sha256) if log.has_file else None
     with ExitStack() as spools:
         spool = spools.enter_context(context.blobs.spool())
-        await context.readers.derive(partial(write_frames, history, upload, spool.path), log.format, asker.share)
+        await context.readers.derive(partial(write_frames, history, upload, spool.path), log.format, principal.share)
         close = spools.pop_all().close
     headers = {"ETag": tag, "Cache-Control": KEEP_AND_ASK}
     return Download(spool.path, close, headers=headers, media_type="application/octet-stream")

@@ -11,8 +11,8 @@ from db.paging import Window
 from db.records import LogFilter
 from db.repositories import friction_models, grasp_logs, materials
 from service.domain import curate
-from service.http.access import READ, UPLOAD, Asking
-from service.http.dependencies import Given
+from service.http.access import READ, UPLOAD, CurrentPrincipal
+from service.http.dependencies import CurrentContext
 from service.http.paging import CursorText, Page
 from service.http.schemas.common import Force, Velocity
 from service.http.schemas.materials import NewMaterial
@@ -33,7 +33,7 @@ VelocityOrEmpty = Annotated[Velocity | None, EMPTY_IS_NONE, Query()]
 
 @router.get("/", dependencies=[READ])
 def list_materials(
-    context: Given,
+    context: CurrentContext,
     request: Request,
     search: Annotated[str, Query(max_length=100)] = "",
     sort: Literal["name", "-name", "created_at", "-created_at"] = "name",
@@ -53,21 +53,21 @@ def list_materials(
 
 @router.post("/materials", dependencies=[UPLOAD])
 def create_material(
-    context: Given,
-    asker: Asking,
+    context: CurrentContext,
+    principal: CurrentPrincipal,
     name: Annotated[str, Form(max_length=200)] = "",
     description: Annotated[str, Form(max_length=20_000)] = "",
 ) -> Response:
     """Make a material known; raises as the API's route does."""
     new = checked(NewMaterial, {"name": name.strip(), "description": description.strip()})
     with context.database.write() as session:
-        curate.create(session, new.name, new.description, asker)
+        curate.create(session, new.name, new.description, principal)
     return RedirectResponse(f"/materials/{quote(new.name, safe='')}", 303)
 
 
 @router.get("/materials/{name}", dependencies=[READ])
 def show_material(
-    context: Given,
+    context: CurrentContext,
     request: Request,
     name: str,
     fn: ForceOrEmpty = None,

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request, Response
 
 from service.domain import plan
 from service.http.access import READ
-from service.http.dependencies import Given
+from service.http.dependencies import CurrentContext
 from service.http.schemas.planning import NewGraspForce
 from service.web.forms import checked
 from service.web.materials import names
@@ -18,7 +18,7 @@ FIELDS = frozenset(NewGraspForce.model_fields)
 
 
 @router.get("/plan", dependencies=[READ])
-def show_plan(context: Given, request: Request) -> Response:
+def show_plan(context: CurrentContext, request: Request) -> Response:
     """The form, and what it was last asked; raises as the API's route does."""
     fields = {name: text for name, text in request.query_params.items() if name in FIELDS}
     given: dict[str, Any] = {"fields": fields, "names": names(context), "answer": None}

@@ -11,14 +11,14 @@ from starlette.datastructures import FormData, UploadFile
 
 from db.blobs import disk_errors_named
 from service import formats
-from service.domain.asker import Asker
 from service.domain.context import Context
+from service.domain.principal import Principal
 from service.domain.receive import CHUNK_BYTES
 from service.domain.upload import UploadRequest, upload
 from service.formats.tracked_markers import FRAME_RATE, SCALE
-from service.http.access import READ, UPLOAD, Asking
+from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.bodies import limited
-from service.http.dependencies import Given
+from service.http.dependencies import CurrentContext
 from service.http.problems import INVALID_REQUEST, Problem
 from service.http.schemas.materials import NewMaterial
 from service.web.forms import checked, read_form
@@ -50,13 +50,13 @@ class NewUpload(BaseModel):
 
 
 @router.get("/upload", dependencies=[READ])
-def show_upload(context: Given, request: Request, material: str = "") -> Response:
+def show_upload(context: CurrentContext, request: Request, material: str = "") -> Response:
     """The form."""
     return render(request, "upload.html", **_form(context, {"material": material}), problem=None)
 
 
 @router.post("/upload", dependencies=[UPLOAD])
-async def receive_upload(context: Given, request: Request, asker: Asking) -> Response:
+async def receive_upload(context: CurrentContext, request: Request, principal: CurrentPrincipal) -> Response:
     """Store the file with its job, and lead to the log; raises as the API's route does."""
     on_problem(request, "upload.html", **await run_in_threadpool(_form, context, {}))
     most = context.settings.max_upload_bytes + BESIDE_THE_FILE
@@ -67,7 +67,7 @@ async def receive_upload(context: Given, request: Request, asker: Asking) -> Res
         fields = {name: text.strip() for name in FIELDS if isinstance(text := form.get(name), str)}
         on_problem(request, "upload.html", **await run_in_threadpool(_form, context, fields))
         file, wanted = _file(form), checked(NewUpload, fields)
-        stored = await upload(context, _chunks(file), _asked(wanted, file, asker))
+        stored = await upload(context, _chunks(file), _asked(wanted, file, principal))
     finally:
         await form.close()
     return RedirectResponse(f"/logs/{stored.log.id}", 303)
@@ -85,14 +85,14 @@ def _file(form: FormData) -> UploadFile:
     return file
 
 
-def _asked(wanted: NewUpload, file: UploadFile, asker: Asker) -> UploadRequest:
+def _asked(wanted: NewUpload, file: UploadFile, principal: Principal) -> UploadRequest:
     """The upload; raises ``RequestValidationError`` for a new material with a name that none may have."""
     settings = {"scale": wanted.scale, "frame_rate": wanted.frame_rate, "mapping": wanted.mapping}
     said = (wanted.material, wanted.sensor, wanted.detector, wanted.format)
     creates = wanted.create and wanted.material is not None
     if creates:
         checked(NewMaterial, {"name": wanted.material or ""})
-    return UploadRequest(*said, file.size, settings=settings, asker=asker, creates_material=creates)
+    return UploadRequest(*said, file.size, settings=settings, principal=principal, creates_material=creates)
 
 
 async def _chunks(file: UploadFile) -> AsyncIterator[bytes]:

@@ -11,8 +11,8 @@ import pytest
 
 from service import serving as server
 from service.http.connections import BoundedConnection, H11Connection
-from service.http.envelope import MOST_HEADER_BYTES
 from service.http.httptools_connections import HttpToolsConnection
+from service.http.request_middleware import MOST_HEADER_BYTES
 from service.settings import Settings
 
 MOST_OF_ONE = 20

@@ -20,7 +20,7 @@ from service import cli
 from service.cli.durations import moment_to_come
 from service.domain import keys
 from service.domain.keys import NoKeys, check_start
-from service.http import gate
+from service.http import authentication
 from service.settings import Settings
 
 Reach = Callable[..., Any]
@@ -30,7 +30,7 @@ ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
 
 
 def test_a_key_ends_to_the_moment(reach: Reach, make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gate, "KEPT_SECONDS", 60.0)
+    monkeypatch.setattr(authentication, "KEPT_SECONDS", 60.0)
     client = reach(key=make(expires_at=now() + timedelta(seconds=1.5)))
     assert client.get("/v1/materials").status_code == httpx.codes.OK
     time.sleep(1.6)

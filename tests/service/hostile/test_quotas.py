@@ -12,8 +12,8 @@ from db.blobs import BlobStore
 from db.database import Database
 from db.repositories import access_keys, usage
 from service.domain import keys, upload
-from service.domain.asker import Asker
 from service.domain.errors import DomainError
+from service.domain.principal import Principal
 from service.formats.reading import Description
 
 HEADERS = {"content-type": "application/vnd.stiction.grasp-log+npz"}
@@ -145,6 +145,6 @@ def test_a_log_that_a_stream_stores_keeps_to_the_quotas(
     found = Description("npz", "finger", 2, 1.0, (1, 1))
     with context.blobs.spool() as spool:
         spool.path.write_bytes(b"frames")
-        request = upload.UploadRequest(None, None, "filter", asker=Asker(key_id=key_id))
+        request = upload.UploadRequest(None, None, "filter", principal=Principal(key_id=key_id))
         with pytest.raises(DomainError, match=setting.upper()):
             asyncio.run(upload.store_made(context, spool, found, request))

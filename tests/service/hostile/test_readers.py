@@ -13,7 +13,7 @@ from db.database import Database
 from db.repositories import access_keys
 from service.domain import keys
 from service.formats import reading
-from service.processes import turns
+from service.processes import fair_queue
 from service.settings import Settings
 
 ENDLESS = (Path(__file__).parents[2] / "data/hostile/endless-hdf5").read_bytes()
@@ -88,7 +88,7 @@ def has_answer(connection: socket.socket) -> bool:
 def test_who_has_too_many_waiting_is_told_to_come_again(
     client: httpx.Client, new_key: Callable[[], dict[str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(turns, "MOST_WAITING_OF_ONE", 1)
+    monkeypatch.setattr(fair_queue, "MOST_WAITING_OF_ONE", 1)
     hostile = new_key()
     with attack(client, 2, hostile):
         answer = client.post("/v1/grasp-logs", content=ENDLESS, headers={"content-type": HDF5, **hostile})
@@ -100,7 +100,7 @@ def test_who_has_too_many_waiting_is_told_to_come_again(
 def test_what_does_not_begin_as_its_format_does_reaches_no_reader(
     client: httpx.Client, new_key: Callable[[], dict[str, str]], name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(turns.Turns, "turn", None)
+    monkeypatch.setattr(fair_queue.FairQueue, "turn", None)
     kind = f"application/{'x-' if name == 'mcap' else ''}{name}"
     answer = client.post("/v1/grasp-logs", content=TABLE, headers={"content-type": kind, **new_key()})
     assert (answer.status_code, answer.json()["name"]) == (422, "file")

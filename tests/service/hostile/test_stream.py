@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from starlette.websockets import WebSocketDisconnect
 
-from service.domain.asker import Asker
+from service.domain.principal import Principal
 from service.settings import Settings
-from service.stream import connection, live, sessions
+from service.stream import connection, detectors, sessions
 from service.stream.messages import Open
 from service.stream.sessions import REFUSED, TOO_MANY, UNKNOWN_SESSION, End, Streams
 from slipcore.errors import InvalidInput
@@ -43,7 +43,7 @@ def make(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Streams]]:
 
     monkeypatch.setattr(sessions.SideProcess, "start", start)
     yield Streams
-    live._SESSIONS.clear()
+    detectors._SESSIONS.clear()
 
 
 def opening(keep: bool = False) -> Open:
@@ -96,7 +96,7 @@ def test_an_abandoned_session_is_forgotten_though_nobody_opens_another(
         streams.join(joined)
         assert streams.find(left.id, None) is left
         await asyncio.sleep(0.2)
-        assert set(live._SESSIONS) == {joined.id}  # with all its frames
+        assert set(detectors._SESSIONS) == {joined.id}  # with all its frames
         with pytest.raises(End) as ended:
             streams.find(left.id, None)
         assert ended.value.code == UNKNOWN_SESSION
@@ -105,7 +105,7 @@ def test_an_abandoned_session_is_forgotten_though_nobody_opens_another(
 
 
 def test_all_sessions_together_hold_a_bounded_number_of_bytes(make: Callable[..., Streams]) -> None:
-    reserve = live.WINDOW * 3 * POSITION.nbytes
+    reserve = detectors.WINDOW * 3 * POSITION.nbytes
     most = 2 * reserve + 3 * ZERO.nbytes
 
     async def go() -> None:
@@ -117,11 +117,11 @@ def test_all_sessions_together_hold_a_bounded_number_of_bytes(make: Callable[...
         with suppress(InvalidInput):
             for number in range(100):
                 for session in (first, second):
-                    live.step(session.id, number, 0.1 * number, ZERO.tobytes(), None, None, None)
+                    detectors.step(session.id, number, 0.1 * number, ZERO.tobytes(), None, None, None)
                     taken += 1
         assert taken == 3
         await streams.end(first)
-        live.step(second.id, 50, 50.0, ZERO.tobytes(), None, None, None)
+        detectors.step(second.id, 50, 50.0, ZERO.tobytes(), None, None, None)
 
     run(go)
 
@@ -162,7 +162,7 @@ def converse(streams: Streams, *said: Any, raw: bool = False) -> Socket:
 
     async def go() -> None:
         with suppress(WebSocketDisconnect):
-            await connection.serve(socket, context, Asker(), lambda log: {"id": log.id})
+            await connection.serve(socket, context, Principal(), lambda log: {"id": log.id})
 
     asyncio.run(go())
     return socket  # type: ignore[no-any-return]

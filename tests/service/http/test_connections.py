@@ -15,8 +15,8 @@ from starlette.types import Receive, Scope, Send
 
 from service.http import connections
 from service.http.connections import BoundedConnection, H11Connection
-from service.http.envelope import MOST_HEADER_BYTES
 from service.http.httptools_connections import HttpToolsConnection
+from service.http.request_middleware import MOST_HEADER_BYTES
 
 PATIENCE = 0.2
 MOST, MOST_OF_ONE = 60, 100

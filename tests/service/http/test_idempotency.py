@@ -15,7 +15,7 @@ from db.database import Database
 from db.records import NewGraspLog
 from db.repositories import grasp_logs, jobs, materials
 from db.tables import GraspLogRow, IdempotencyKeyRow, JobRow, MaterialRow
-from service.http.idempotency import Answer, IdempotencyKey, answer_once
+from service.http.idempotency import IdempotencyKey, RepeatableResponse, respond_once
 
 Reach = Callable[..., Any]
 NPZ = {"Content-Type": "application/vnd.stiction.grasp-log+npz"}
@@ -105,14 +105,14 @@ def store(url: str, together: Any, key: IdempotencyKey | None, answers: Any) -> 
     with closing(Database(url)) as database:
         together.wait()
         with database.write() as session:
-            answers.put(answer_once(session, key, lambda: add(session)))
+            answers.put(respond_once(session, key, lambda: add(session)))
 
 
-def add(session: Any) -> Answer:
+def add(session: Any) -> RepeatableResponse:
     log = NewGraspLog("0" * 64, 10, "npz", "filter", materials.find_id(session, "paper"), "sensor", 9, 0.3, (8, 8))
     log_id = grasp_logs.add(session, log)
     job = jobs.add(session, "ingest", "ols", material_id=log.material_id, grasp_log_id=log_id)
-    return Answer(202, f"/v1/grasp-logs/{log_id}", {"job": job})
+    return RepeatableResponse(202, f"/v1/grasp-logs/{log_id}", {"job": job})
 
 
 def test_processes_that_ask_the_same_at_once_do_it_once(database: Database, blobs: BlobStore) -> None:

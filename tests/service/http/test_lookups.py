@@ -164,7 +164,7 @@ def answers_kept(layer: Any) -> dict[Any, Any]:
 
 
 def test_the_answers_kept_are_bounded(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lookups, "MOST_ANSWERS", 3)
+    monkeypatch.setattr(lookups, "MOST_RESPONSES", 3)
     values = [client.get(f"{PATH}fn=0.0{number}").json()["normal_force"] for number in range(10)]
     assert values == [number / 100.0 for number in range(10)]
     kept = answers_kept(client.app.middleware_stack)

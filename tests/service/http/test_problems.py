@@ -8,8 +8,8 @@ from fastapi import FastAPI
 
 from db.errors import NotFound, StorageUnavailable
 from service.http import errors, problems
-from service.http.envelope import Envelope
 from service.http.problems import PROBLEM_TYPES, Problem
+from service.http.request_middleware import RequestMiddleware
 
 DOCUMENTED = dict(
     re.findall(r"^\| `/problems/([\w-]+)` \| (\d+)", (Path(__file__).parents[3] / "docs/problems.md").read_text(), re.M)
@@ -45,7 +45,7 @@ def test_what_the_framework_refuses_is_a_problem_too(
 
 async def answer_to(error: Exception) -> httpx.Response:
     app = FastAPI()
-    app.add_middleware(Envelope)
+    app.add_middleware(RequestMiddleware)
     errors.install(app)
 
     @app.get("/")

@@ -9,7 +9,7 @@ import pytest
 from starlette.middleware.exceptions import ExceptionMiddleware
 from starlette.types import Message, Receive, Scope, Send
 
-from service.http.envelope import BODY_SECONDS, SLOWEST_BODY, Envelope
+from service.http.request_middleware import BODY_SECONDS, SLOWEST_BODY, RequestMiddleware
 
 SECOND_EARNED = b"x" * int(SLOWEST_BODY)
 SCOPE = {"type": "http", "method": "POST", "path": "/", "query_string": b"", "headers": [], "scheme": "http"}
@@ -62,7 +62,7 @@ def sent(loop: JumpingLoop, pauses: list[float], body: bytes) -> list[Message]:
     async def send(message: Message) -> None:
         answers.append(message)
 
-    loop.run_until_complete(Envelope(ExceptionMiddleware(_read))(dict(SCOPE), receive, send))
+    loop.run_until_complete(RequestMiddleware(ExceptionMiddleware(_read))(dict(SCOPE), receive, send))
     return answers
 
 

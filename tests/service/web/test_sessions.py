@@ -8,7 +8,7 @@ import pytest
 from db.database import Database
 from db.repositories import access_keys, browser_sessions
 from service.domain import keys
-from service.http import gate, sessions
+from service.http import authentication, sessions
 from tests.service.web.conftest import HTML
 
 pytestmark = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -138,8 +138,8 @@ def test_a_session_ends_with_its_key(
     assert caller.get("/", headers=headers).status_code == 200
     with database.write() as session:
         access_keys.revoke(session, str(keys.key_id(key)))
-    soon = time.monotonic() + gate.KEPT_SECONDS + 0.1
-    monkeypatch.setattr(gate.time, "monotonic", lambda: soon)
+    soon = time.monotonic() + authentication.KEPT_SECONDS + 0.1
+    monkeypatch.setattr(authentication.time, "monotonic", lambda: soon)
     assert caller.get("/", headers=headers).status_code == 303
 
 

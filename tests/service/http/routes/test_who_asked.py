@@ -12,14 +12,14 @@ NPZ = "application/vnd.stiction.grasp-log+npz"
 DETECTION = Detection("filter", 1e-6, 0.1, 60, 3, 4, 3, 4, 4, 0.05, "1" * 64)
 SAMPLES = SampleSummary(120, None, 1e-6, 0.41, (0.0, 0.01), (0.01, 0.09), "2" * 64)
 
-Asker = tuple[str, Any]
+Principal = tuple[str, Any]
 
 
 @pytest.fixture
-def asker(reach: Callable[..., Any], database: Database) -> Callable[[], Asker]:
+def newcomer(reach: Callable[..., Any], database: Database) -> Callable[[], Principal]:
     """The id of a new key, and who asks with it."""
 
-    def new() -> Asker:
+    def new() -> Principal:
         key_id, text = keys.new_key()
         with database.write() as session:
             access_keys.add(session, key_id, "robot", "admin", keys.digest(text))
@@ -34,8 +34,10 @@ def send(client: Any, content: bytes) -> Any:
     )
 
 
-def test_a_log_tells_who_sent_it_and_its_job_who_asked_for_it(asker: Callable[[], Asker], content: bytes) -> None:
-    (first_id, first), (second_id, second) = asker(), asker()
+def test_a_log_tells_who_sent_it_and_its_job_who_asked_for_it(
+    newcomer: Callable[[], Principal], content: bytes
+) -> None:
+    (first_id, first), (second_id, second) = newcomer(), newcomer()
     first.request("POST", "/v1/materials", json={"name": "paper"})
     sent = send(first, content)
     assert (sent.status_code, sent.json()["uploaded_by"], sent.json()["job"]["requested_by"]) == (
@@ -57,8 +59,8 @@ def test_a_log_without_a_key_is_nobodys(reach: Callable[..., Any], content: byte
     assert (sent["uploaded_by"], sent["job"]["requested_by"]) == (None, None)
 
 
-def test_fits_tell_who_asked_for_them(asker: Callable[[], Asker], database: Database, content: bytes) -> None:
-    (sender_id, sender), (curator_id, curator) = asker(), asker()
+def test_fits_tell_who_asked_for_them(newcomer: Callable[[], Principal], database: Database, content: bytes) -> None:
+    (sender_id, sender), (curator_id, curator) = newcomer(), newcomer()
     for name in ("paper", "papre"):
         sender.request("POST", "/v1/materials", json={"name": name})
     log_id = send(sender, content).json()["id"]

@@ -13,7 +13,7 @@ from db.repositories import access_keys
 from service.app import create_app
 from service.domain import keys
 from service.domain.keys import SCOPES, NoKeys, check_start
-from service.http import access, gate
+from service.http import access, authentication
 from service.settings import Settings
 from stiction_client import AsyncFrictionClient, Material, ProblemError
 
@@ -68,7 +68,7 @@ def test_even_what_is_not_there_is_not_told_without_a_key(reach: Reach, path: st
 def test_a_key_lets_in_and_a_revoked_or_changed_one_does_not(
     reach: Reach, make: Make, database: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(gate, "KEPT_SECONDS", -1.0)
+    monkeypatch.setattr(authentication, "KEPT_SECONDS", -1.0)
     text = make()
     client = reach(key=text)
     assert client.get("/v1/materials").status_code == 200

@@ -1,6 +1,6 @@
 """What each call says to the service and makes of its answers, without any I/O.
 
-A flow is a generator: it yields a ``Request`` or a ``Pause``, is sent the ``Answer``, and returns the result. The
+A call is a generator: it yields a ``Request`` or a ``Pause``, is sent the ``Reply``, and returns the result. The
 clients only carry requests out, one waiting, the other awaiting, so nothing is written twice.
 """
 
@@ -90,22 +90,22 @@ class Pause:
 
 
 T = TypeVar("T")
-Flow = Generator[Request | Pause, httpx.Response | None, T]
-Answer = httpx.Response | ConnectionFailed | None
+Call = Generator[Request | Pause, httpx.Response | None, T]
+Reply = httpx.Response | ConnectionFailed | None
 """What a client got for a step: a response or a broken connection for a request, nothing for a pause."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ended(Generic[T]):
-    """A flow is through."""
+    """A call is through."""
 
     result: T
 
 
-def advance(flow: Flow[T], answer: Answer) -> Request | Pause | Ended[T]:
-    """Tell a flow what came of its last step (None at the start) and get its next one."""
+def advance(call: Call[T], answer: Reply) -> Request | Pause | Ended[T]:
+    """Tell a call what came of its last step (None at the start) and get its next one."""
     try:
-        return flow.throw(answer) if isinstance(answer, ConnectionFailed) else flow.send(answer)
+        return call.throw(answer) if isinstance(answer, ConnectionFailed) else call.send(answer)
     except StopIteration as end:
         return Ended(end.value)
 
@@ -118,7 +118,7 @@ def upload(
     scale: float | None,
     frame_rate: float | None,
     mapping: Mapping[str, Any] | None,
-) -> Flow[GraspLogReceipt]:
+) -> Call[GraspLogReceipt]:
     """Upload a log; the service knows logs by content, so that a repetition is no second log."""
     content, content_type = _body(log)
     params = _given(
@@ -133,24 +133,24 @@ def upload(
     return _record(GraspLogReceipt.from_json, (yield from _ask(request)))
 
 
-def grasp_log(log_id: str) -> Flow[GraspLogReceipt]:
+def grasp_log(log_id: str) -> Call[GraspLogReceipt]:
     """Ask for a log."""
     return _record(GraspLogReceipt.from_json, (yield from _get(f"/v1/grasp-logs/{_part(log_id)}")))
 
 
-def grasp_logs(material: str | None, limit: int) -> Flow[list[GraspLogReceipt]]:
+def grasp_logs(material: str | None, limit: int) -> Call[list[GraspLogReceipt]]:
     """Ask for the newest logs."""
     answer = yield from _get("/v1/grasp-logs", _given(material=material, limit=limit))
     return _record(lambda record: [GraspLogReceipt.from_json(item) for item in record["items"]], answer)
 
 
-def create_material(name: str, description: str) -> Flow[Material]:
+def create_material(name: str, description: str) -> Call[Material]:
     """Create a material."""
     body = {"name": name, "description": description}
     return _record(Material.from_json, (yield from _ask(_post_once("/v1/materials", body))))
 
 
-def ensure_material(name: str, description: str) -> Flow[Material]:
+def ensure_material(name: str, description: str) -> Call[Material]:
     """Create a material unless it is there, whoever else does so at the same time."""
     try:
         return (yield from create_material(name, description))
@@ -158,12 +158,12 @@ def ensure_material(name: str, description: str) -> Flow[Material]:
         return (yield from material(name))
 
 
-def material(name: str) -> Flow[Material]:
+def material(name: str) -> Call[Material]:
     """Ask for a material."""
     return _record(Material.from_json, (yield from _get(f"/v1/materials/{_part(name)}")))
 
 
-def materials() -> Flow[list[Material]]:
+def materials() -> Call[list[Material]]:
     """Ask for all materials, page after page."""
     found: list[Material] = []
     cursor: str | None = None
@@ -180,7 +180,7 @@ def _page_of_materials(record: Mapping[str, Any]) -> tuple[list[Material], str |
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class CachedModel:
     """A material as the service last told it, with the tag of that answer and when it was asked (monotonic, s)."""
 
     material: Material
@@ -193,7 +193,7 @@ class Kept:
         return time.monotonic() - self.asked
 
 
-def model(name: str, method: str, kept: dict[str, Kept], stale_after: float) -> Flow[FrictionModel]:
+def model(name: str, method: str, kept: dict[str, CachedModel], stale_after: float) -> Call[FrictionModel]:
     """A material's current model of one method, or the recommended one ("auto").
 
     It is as ``kept`` where that is younger than ``stale_after`` s.
@@ -216,29 +216,29 @@ def model(name: str, method: str, kept: dict[str, Kept], stale_after: float) -> 
     return models[method]
 
 
-def _ask_again(name: str, known: Kept | None) -> Flow[Kept]:
+def _ask_again(name: str, known: CachedModel | None) -> Call[CachedModel]:
     """Ask for a material; it isn't sent once more if it is as ``known``."""
     request = Request("GET", f"/v1/materials/{_part(name)}", tag=None if known is None else known.tag)
     asked = time.monotonic()
     response = yield from _send(request)
     if known is not None and response.status_code == NOT_MODIFIED:
         return replace(known, asked=asked)
-    return Kept(_record(Material.from_json, _content(response)), response.headers.get("etag", ""), asked)
+    return CachedModel(_record(Material.from_json, _content(response)), response.headers.get("etag", ""), asked)
 
 
-def rename_material(name: str, new_name: str) -> Flow[Material]:
+def rename_material(name: str, new_name: str) -> Call[Material]:
     """Rename a material."""
     request = Request("PATCH", f"/v1/materials/{_part(name)}", json={"name": new_name})
     return _record(Material.from_json, (yield from _ask(request)))
 
 
-def merge_materials(name: str, source: str) -> Flow[Material]:
+def merge_materials(name: str, source: str) -> Call[Material]:
     """Merge another material into one."""
     answer = yield from _ask(Request("POST", f"/v1/materials/{_part(name)}/merges", json={"source": source}))
     return _record(lambda record: Material.from_json(record["material"]), answer)
 
 
-def withdraw(log_id: str, reason: str) -> Flow[GraspLogReceipt]:
+def withdraw(log_id: str, reason: str) -> Call[GraspLogReceipt]:
     """Withdraw a log."""
     request = Request("PUT", f"/v1/grasp-logs/{_part(log_id)}/withdrawal", json={"reason": reason})
     return _record(lambda record: GraspLogReceipt.from_json(record["grasp_log"]), (yield from _ask(request)))
@@ -252,54 +252,54 @@ def friction(
     method: str | None,
     of: str | None,
     elements: int | None,
-) -> Flow[FrictionAnswer]:
+) -> Call[FrictionAnswer]:
     """Look friction up."""
     params = _given(v=tangential_velocity, fn=normal_force, quantile=quantile, method=method, of=of, elements=elements)
     answer = yield from _get(f"/v1/materials/{_part(name)}/friction", params)
     return _record(FrictionAnswer.from_json, answer)
 
 
-def recognise(grasp: Any, materials: Sequence[str] | None, method: str) -> Flow[Recognition]:
+def recognise(grasp: Any, materials: Sequence[str] | None, method: str) -> Call[Recognition]:
     """Ask which material a grasp was of."""
     body = {**_grasp(grasp), "materials": None if materials is None else list(materials), "method": method}
     return _record(Recognition.from_json, (yield from _ask(Request("POST", "/v1/recognise", json=body))))
 
 
-def fit(name: str, method: str, seed: int) -> Flow[Job]:
+def fit(name: str, method: str, seed: int) -> Call[Job]:
     """Ask for a fit."""
     request = _post_once(f"/v1/materials/{_part(name)}/fits", {"method": method, "seed": seed})
     return _record(Job.from_json, (yield from _ask(request)))
 
 
-def job(job_id: str) -> Flow[Job]:
+def job(job_id: str) -> Call[Job]:
     """Ask for a job."""
     return _record(Job.from_json, (yield from _get(f"/v1/jobs/{_part(job_id)}")))
 
 
-def jobs(status: str | None, limit: int) -> Flow[list[Job]]:
+def jobs(status: str | None, limit: int) -> Call[list[Job]]:
     """Ask for the newest jobs."""
     answer = yield from _get("/v1/jobs", _given(status=status, limit=limit))
     return _record(lambda record: [Job.from_json(item) for item in record["items"]], answer)
 
 
-def cancel(job_id: str) -> Flow[Job]:
+def cancel(job_id: str) -> Call[Job]:
     """Cancel a job, which is harmless twice."""
     request = Request("POST", f"/v1/jobs/{_part(job_id)}/cancel")
     return _record(Job.from_json, (yield from _ask(request)))
 
 
-def owners(name: str) -> Flow[list[str]]:
+def owners(name: str) -> Call[list[str]]:
     """Ask whose a material is."""
     return _record(_owners, (yield from _get(f"/v1/materials/{_part(name)}/owners")))
 
 
-def add_owner(name: str, owner: str) -> Flow[list[str]]:
+def add_owner(name: str, owner: str) -> Call[list[str]]:
     """Let a key or a group own a material, too, which is harmless twice."""
     path = f"/v1/materials/{_part(name)}/owners/{_part(owner)}"
     return _record(_owners, (yield from _ask(Request("PUT", path))))
 
 
-def remove_owner(name: str, owner: str) -> Flow[None]:
+def remove_owner(name: str, owner: str) -> Call[None]:
     """Take a material from an owner."""
     yield from _ask(Request("DELETE", f"/v1/materials/{_part(name)}/owners/{_part(owner)}"))
 
@@ -308,7 +308,7 @@ def _owners(record: Mapping[str, Any]) -> list[str]:
     return [str(owner) for owner in record["owners"]]
 
 
-def audit(actor: str | None, action: str | None, subject: str | None, limit: int) -> Flow[list[AuditEntry]]:
+def audit(actor: str | None, action: str | None, subject: str | None, limit: int) -> Call[list[AuditEntry]]:
     """Ask for the newest entries of the audit trail, page after page up to ``limit``."""
     found: list[AuditEntry] = []
     cursor: str | None = None
@@ -327,7 +327,7 @@ def _page_of_entries(record: Mapping[str, Any]) -> tuple[list[AuditEntry], str |
     return [AuditEntry.from_json(item) for item in record["items"]], record.get("next")
 
 
-def wait(job_id: str, timeout: float) -> Flow[Job]:
+def wait(job_id: str, timeout: float) -> Call[Job]:
     """Ask for a job until it has ended; the service keeps its answer back that long, unless it is an older one."""
     deadline = time.monotonic() + timeout
     pause = FIRST_POLL
@@ -345,7 +345,7 @@ def wait(job_id: str, timeout: float) -> Flow[Job]:
         pause = min(pause * POLL_GROWTH, LONGEST_POLL)
 
 
-def _get(path: str, params: Mapping[str, str | float] | None = None) -> Flow[Any]:
+def _get(path: str, params: Mapping[str, str | float] | None = None) -> Call[Any]:
     return (yield from _ask(Request("GET", path, params or {})))
 
 
@@ -353,12 +353,12 @@ def _post_once(path: str, body: Mapping[str, Any]) -> Request:
     return Request("POST", path, json=body, idempotency_key=uuid4().hex)
 
 
-def _ask(request: Request) -> Flow[Any]:
+def _ask(request: Request) -> Call[Any]:
     """Send a request, again where the connection breaks, and return the JSON of a good answer."""
     return _content((yield from _send(request)))
 
 
-def _send(request: Request) -> Flow[httpx.Response]:
+def _send(request: Request) -> Call[httpx.Response]:
     """Send a request, again where the connection breaks or the service is busy, and return what is answered."""
     for attempt in range(ATTEMPTS):
         pause = RETRY_PAUSE * 2**attempt

@@ -7,7 +7,7 @@ import pytest
 from fastapi import APIRouter
 from fastapi.responses import HTMLResponse
 
-from service.http import envelope
+from service.http import request_middleware
 from service.http.access import READ
 from service.observability.logs import ABOUT
 
@@ -81,7 +81,7 @@ def test_a_page_that_says_nothing_of_its_own_may_load_nothing(client: Any) -> No
     router = APIRouter()
     router.get("/v1/page", dependencies=[READ], response_class=HTMLResponse)(lambda: "<p>")
     client.app.include_router(router)
-    assert client.get("/v1/page").headers["content-security-policy"] == envelope.NOTHING
+    assert client.get("/v1/page").headers["content-security-policy"] == request_middleware.NOTHING
 
 
 def test_only_over_tls_is_tls_asked_for(client: Any) -> None:
@@ -96,7 +96,7 @@ def test_a_nul_is_refused_before_any_database_sees_it(client: Any, path: str) ->
 
 
 def test_headers_are_bounded(client: Any) -> None:
-    answer = client.get("/healthz", headers={"X-Large": "x" * envelope.MOST_HEADER_BYTES})
+    answer = client.get("/healthz", headers={"X-Large": "x" * request_middleware.MOST_HEADER_BYTES})
     assert (answer.status_code, answer.json()["type"]) == (431, "/problems/headers-too-large")
 
 
@@ -104,7 +104,7 @@ def test_headers_are_bounded(client: Any) -> None:
 def test_a_body_that_does_not_come_is_given_up(
     client: Any, path: str, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(envelope, "BODY_SECONDS", 0.05)
+    monkeypatch.setattr(request_middleware, "BODY_SECONDS", 0.05)
 
     async def trickle() -> Any:
         yield b"{"

@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 from prometheus_client import CollectorRegistry, Histogram
 
-from service.observability import answered as module
-from service.observability.answered import LOGGED_A_SECOND, Answered
+from service.observability import access_log as module
+from service.observability.access_log import LOGGED_A_SECOND, AccessLog
 
 ROUTE = "/v1/materials/{name}/friction"
 
@@ -22,11 +22,11 @@ def noted(caplog: pytest.LogCaptureFixture) -> list[tuple[str, Any]]:
 
 def note(seconds: Histogram, count: int, method: str = "GET", status: int = 200) -> None:
     async def go() -> None:
-        answered = Answered(seconds)
+        log = AccessLog(seconds)
         for number in range(count):
-            answered.note(method, ROUTE, status, 0.25, f"request-{number}")
-        answered.tell_others()
-        answered.tell_others()
+            log.record(method, ROUTE, status, 0.25, f"request-{number}")
+        log.flush()
+        log.flush()
 
     asyncio.run(go())
 
@@ -62,13 +62,13 @@ def test_a_second_ends_by_itself(
     seconds: Histogram, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "LOGGED_A_SECOND", 1)
-    monkeypatch.setattr(module, "TOLD_SECONDS", 0.01)
+    monkeypatch.setattr(module, "FLUSH_SECONDS", 0.01)
 
     async def go() -> None:
-        answered = Answered(seconds)
+        log = AccessLog(seconds)
         for _ in range(2):
             for _ in range(3):
-                answered.note("GET", ROUTE, 200, 0.25, "id")
+                log.record("GET", ROUTE, 200, 0.25, "id")
             await asyncio.sleep(0.05)
 
     with caplog.at_level(logging.INFO):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from service.stream import live
+from service.stream import detectors
 from slipcore import GraspLog, collect_samples, detect_slip
 
 
@@ -11,21 +11,23 @@ def feed(log: GraspLog, *, wait: bool) -> dict[str, object] | None:
     """All frames, with time for the looks between them or only at their end; the friction that was found."""
     assert log.force is not None
     position = log.position.tobytes()
-    live.open_session("one", position, log.grid, log.element_area, "filter", keep=False, most_bytes=2**30)
-    session = live._SESSIONS["one"]
+    detectors.open_session("one", position, log.grid, log.element_area, "filter", keep=False, most_bytes=2**30)
+    session = detectors._SESSIONS["one"]
     for k, time in enumerate(log.time.tolist()):
-        live.step("one", k, time, log.displacement[k].tobytes(), log.force[k].tobytes(), None, None)
+        detectors.step("one", k, time, log.displacement[k].tobytes(), log.force[k].tobytes(), None, None)
         if wait and session.look is not None:
             session.look.result()
     assert session.look is not None
     session.look.result()
-    live.drop("one")
+    detectors.drop("one")
     return session.friction
 
 
 def test_looks_once_a_second_find_the_samples_of_the_whole_log(ramp: GraspLog) -> None:
     samples = collect_samples(ramp, detect_slip(ramp))
-    looked_until = ramp.time[live.WINDOW - 1 + (len(ramp) - live.WINDOW) // live.STRIDE * live.STRIDE]
+    looked_until = ramp.time[
+        detectors.WINDOW - 1 + (len(ramp) - detectors.WINDOW) // detectors.STRIDE * detectors.STRIDE
+    ]
     expected = np.count_nonzero(samples.time < looked_until)
     friction = feed(ramp, wait=True)
     assert friction is not None
@@ -43,6 +45,6 @@ def test_a_look_that_fails_costs_the_stream_nothing_but_its_friction(
     def fail(*_: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(live, "collect_samples", fail)
+    monkeypatch.setattr(detectors, "collect_samples", fail)
     assert feed(ramp, wait=True) is None
     assert "a look for friction failed" in caplog.text

@@ -1,4 +1,4 @@
-"""The gate before all routes: finds out who asks, and turns away who may not."""
+"""Authentication before all routes: finds out who asks, and refuses who may not."""
 
 import math
 import re
@@ -30,7 +30,7 @@ MOST_KEPT = 10_000
 """Keys; more than a fleet has."""
 
 
-class KeyRing:
+class KeyCache:
     """Keys of the database, each read once every few seconds at most.
 
     Whatever is wrong with a key, an unknown id or another secret, costs one question to the database and two
@@ -74,12 +74,12 @@ class KeyRing:
         return known if keys.is_key(text, known) and time.monotonic() <= until else None
 
 
-class Gate:
+class Authentication:
     """Tells the routes who asks (``request.state.access``); answers by itself who has no key where one is needed."""
 
-    def __init__(self, app: ASGIApp, admission: "Admission") -> None:
+    def __init__(self, app: ASGIApp, authenticator: "Authenticator") -> None:
         self.app = app
-        self._admission = admission
+        self._authenticator = authenticator
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
@@ -88,22 +88,22 @@ class Gate:
             return
         connection = HTTPConnection(scope)
         try:
-            connection.state.access = await self._admission.admit(connection)
+            connection.state.access = await self._authenticator.authenticate(connection)
         except Problem as problem:
-            await problems.answer(Request({**scope, "type": "http"}), problem)(scope, receive, send)
+            await problems.problem_response(Request({**scope, "type": "http"}), problem)(scope, receive, send)
             return
         await self.app(scope, receive, send)
 
 
-class Admission:
+class Authenticator:
     """Finds out who asks, and counts how often."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self._ring = KeyRing()
+        self._keys = KeyCache()
         self._rate = RateLimit(settings.rate_limit)
 
-    async def admit(self, connection: HTTPConnection) -> Access:
+    async def authenticate(self, connection: HTTPConnection) -> Access:
         """Who asks, and not too often; raises ``Problem`` for who may not."""
         try:
             admitted = await self._identify(connection)
@@ -113,7 +113,7 @@ class Admission:
         self._count(_counted_as(admitted, connection))
         return admitted
 
-    def admits_at_once(self, connection: HTTPConnection) -> bool:
+    def allows_at_once(self, connection: HTTPConnection) -> bool:
         """Whether somebody may ask who is known without waiting; for all others ``admit`` has to say."""
         known = self.known(connection)
         who = None if known is None else _counted_as(known, connection)
@@ -129,7 +129,7 @@ class Admission:
             return None
         if text is None:
             return EVERYTHING
-        found = self._ring.find_kept(text)
+        found = self._keys.find_kept(text)
         return None if found is None else Access(found.id, found.scope)
 
     def _count(self, who: str | None) -> None:
@@ -146,7 +146,7 @@ class Admission:
 
     def forget_session(self, token: str) -> None:
         """Believe a token no longer: somebody has logged out."""
-        self._ring.forget_session(token)
+        self._keys.forget_session(token)
 
     async def _identify(self, connection: HTTPConnection) -> Access:
         found = await self._key_of_session(connection)
@@ -164,7 +164,7 @@ class Admission:
             return None
         context: Context = connection.app.state.context
         try:
-            found = await self._ring.find_of_session(context.database, token)
+            found = await self._keys.find_of_session(context.database, token)
         except StorageUnavailable as error:
             raise problems.storage_unavailable(error) from error
         if found is not None:
@@ -174,7 +174,7 @@ class Admission:
     async def _find(self, connection: HTTPConnection, text: str) -> AccessKey:
         context: Context = connection.app.state.context
         try:
-            found = await self._ring.find(context.database, text)
+            found = await self._keys.find(context.database, text)
         except StorageUnavailable as error:
             raise problems.storage_unavailable(error) from error
         if found is None:

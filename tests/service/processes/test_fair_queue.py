@@ -4,15 +4,15 @@ from typing import Any
 
 import pytest
 
-from service.processes import turns
-from service.processes.turns import Crowded, Turns
+from service.processes import fair_queue
+from service.processes.fair_queue import FairQueue, QueueFull
 
 
 class Crew:
     """Starts pieces of work that hold their turn until they are told to end."""
 
     def __init__(self, capacity: int) -> None:
-        self.turns = Turns(capacity, "read")
+        self.turns = FairQueue(capacity, "read")
         self.begun: list[str] = []
         self._ends: dict[str, asyncio.Event] = {}
         self._tasks: dict[str, asyncio.Task[None]] = {}
@@ -121,14 +121,14 @@ def test_a_turn_that_comes_as_its_owner_gives_up_goes_to_the_next() -> None:
 
 @pytest.mark.parametrize("owners", ["aaaa", "abcd"])
 def test_too_many_who_wait_are_refused_at_once(monkeypatch: pytest.MonkeyPatch, owners: str) -> None:
-    monkeypatch.setattr(turns, "MOST_WAITING_OF_ONE", 2)
-    monkeypatch.setattr(turns, "MOST_WAITING", 2 if owners == "abcd" else 100)
+    monkeypatch.setattr(fair_queue, "MOST_WAITING_OF_ONE", 2)
+    monkeypatch.setattr(fair_queue, "MOST_WAITING", 2 if owners == "abcd" else 100)
 
     async def check() -> None:
         crew = Crew(1)
         *let_in, last = (f"{owner}{number}" for number, owner in enumerate(owners))
         await crew.start(*let_in)
-        with pytest.raises(Crowded, match="2 wait to be read already"):
+        with pytest.raises(QueueFull, match="2 wait to be read already"):
             await crew._work(last, 1)
         for name in let_in:
             await crew.end(name)
@@ -138,12 +138,12 @@ def test_too_many_who_wait_are_refused_at_once(monkeypatch: pytest.MonkeyPatch, 
 
 
 def test_nobody_waits_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(turns, "WAIT_SECONDS", 0.01)
+    monkeypatch.setattr(fair_queue, "WAIT_SECONDS", 0.01)
 
     async def check() -> None:
         crew = Crew(1)
         await crew.start("a1")
-        with pytest.raises(Crowded, match=r"not read within 0\.01 s"):
+        with pytest.raises(QueueFull, match=r"not read within 0\.01 s"):
             await crew._work("b1", 1)
         await crew.end("a1")
         await crew.start("c1")

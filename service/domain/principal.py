@@ -6,7 +6,7 @@ from db.records import Actor
 
 
 @dataclass(frozen=True, slots=True)
-class Asker:
+class Principal:
     """An access key and its group, None where no key is asked for; ``is_admin``: what is another's may be changed, too.
 
     ``address`` is the network address, ``request_id`` the request's.
@@ -36,5 +36,5 @@ class Asker:
         return tuple(f"{kind}:{name}" for kind, name in own.items() if name is not None)
 
 
-ANYBODY = Asker()
+ANONYMOUS = Principal()
 """Where no key is asked for, everything is allowed."""

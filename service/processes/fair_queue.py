@@ -13,7 +13,7 @@ WAIT_SECONDS = 30.0
 """s that anybody waits at most; clients and proxies give up after a minute, as a rule."""
 
 
-class Crowded(Exception):
+class QueueFull(Exception):
     """There is no room, and too many wait for it already; the message says of whom, and for what."""
 
 
@@ -22,7 +22,7 @@ class _Waiting(NamedTuple):
     turn: asyncio.Future[None]
 
 
-class Turns:
+class FairQueue:
     """Room of ``capacity`` units, of which one owner has half at most as long as others may come.
 
     Owners who wait are let in one after the other, each owner's work in the order in which it came: however much one
@@ -36,7 +36,7 @@ class Turns:
 
     @asynccontextmanager
     async def turn(self, owner: str, weight: int = 1) -> AsyncIterator[None]:
-        """Room of ``weight`` units (an owner's whole share for more) until the end; raises ``Crowded``."""
+        """Room of ``weight`` units (an owner's whole share for more) until the end; raises ``QueueFull``."""
         weight = min(weight, self._share)
         await self._enter(owner, weight)
         try:
@@ -50,12 +50,12 @@ class Turns:
         self._let_in()
         try:
             if not waiting.turn.done():
-                self._check_crowd(owner)
+                self._check_length(owner)
                 async with asyncio.timeout(WAIT_SECONDS):
                     await waiting.turn
         except TimeoutError as error:
             self._give_up(owner, waiting)
-            raise Crowded(f"not {self._what} within {WAIT_SECONDS:g} s") from error
+            raise QueueFull(f"not {self._what} within {WAIT_SECONDS:g} s") from error
         except BaseException:
             self._give_up(owner, waiting)
             raise
@@ -66,13 +66,13 @@ class Turns:
         self._taken += Counter()  # forgets who has nothing
         self._let_in()
 
-    def _check_crowd(self, owner: str) -> None:
+    def _check_length(self, owner: str) -> None:
         for count, most in (
             (len(self._waiting[owner]), MOST_WAITING_OF_ONE),
             (sum(map(len, self._waiting.values())), MOST_WAITING),
         ):
             if count > most:
-                raise Crowded(f"{most} wait to be {self._what} already")
+                raise QueueFull(f"{most} wait to be {self._what} already")
 
     def _give_up(self, owner: str, waiting: _Waiting) -> None:
         if waiting.turn.done() and not waiting.turn.cancelled():  # let in at the very moment

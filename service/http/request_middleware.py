@@ -32,7 +32,7 @@ Headers = list[tuple[bytes, bytes]]
 _ID = re.compile(rb"[A-Za-z0-9._-]{1,128}")
 
 
-class Envelope:
+class RequestMiddleware:
     """Gives each request an id, bounds its headers and the patience with its body, and completes its answer's headers.
 
     An error that nothing else answers is answered here.
@@ -59,11 +59,11 @@ class Envelope:
             _check(scope)
             await self.app(scope, _Receiver(receive).receive, send)
         except Problem as problem:
-            await problems.answer(Request(scope), problem)(scope, receive, send)
+            await problems.problem_response(Request(scope), problem)(scope, receive, send)
         except asyncio.CancelledError:  # the server waits for its requests no longer
             if send.has_begun:
                 raise
-            await problems.answer(Request(scope), problems.stopping())(scope, receive, send)
+            await problems.problem_response(Request(scope), problems.stopping())(scope, receive, send)
         except Exception as error:
             answer = problems.unexpected(Request(scope), error)
             if send.has_begun:
@@ -81,7 +81,7 @@ class _Sender:
     async def __call__(self, message: Message) -> None:
         if message["type"] == "http.response.start":
             self.has_begun = True
-            said = completed(message["headers"], self._scope)
+            said = with_common_headers(message["headers"], self._scope)
             message = {**message, "headers": [id_header(self._request_id), *said]}
         await self._send(message)
 
@@ -109,7 +109,7 @@ class _Receiver:
         return message
 
 
-def completed(headers: Headers, scope: Scope) -> Headers:
+def with_common_headers(headers: Headers, scope: Scope) -> Headers:
     """The headers of an answer, and those that every one has, unless it says something else itself."""
     said = dict(headers)
     return [*headers, *(header for header in _usual(scope, said) if header[0] not in said)]

@@ -14,7 +14,7 @@ LOGGED_A_SECOND = 100
 """Of requests that change nothing and went well; a record costs a third of what a look-up does. The others of a second
 are told together. Changes and errors have a record each."""
 
-TOLD_SECONDS = 1.0
+FLUSH_SECONDS = 1.0
 """s after which the others are told."""
 
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
@@ -28,7 +28,7 @@ class _Timer(Protocol):
     def observe(self, amount: float) -> None: ...
 
 
-class Answered:
+class AccessLog:
     """Notes requests by their route's path and not by their own.
 
     Names of materials are not to be labels, and what somebody wrote into an address is not to be logged.
@@ -41,17 +41,17 @@ class Answered:
         self._second_ends: asyncio.TimerHandle | None = None
         self._others: dict[Kind, tuple[int, float]] = {}
 
-    def note(self, method: str, route: str, status: int, seconds: float, request_id: str | None) -> None:
+    def record(self, method: str, route: str, status: int, seconds: float, request_id: str | None) -> None:
         """One request, answered in so many s; to be called in the event loop."""
         kind = method if method in METHODS else "other", route, status
         timer = self._timers.get(kind)
         if timer is None:
             timer = self._timers[kind] = self._seconds.labels(kind[0], route, str(status or "none"))
         timer.observe(seconds)
-        if logger.isEnabledFor(logging.INFO) and not self._is_told_later(kind, seconds):
+        if logger.isEnabledFor(logging.INFO) and not self._is_summed_up(kind, seconds):
             logger.info("answered", extra=_fields(kind, seconds, request_id=request_id))
 
-    def tell_others(self) -> None:
+    def flush(self) -> None:
         """Log those that had no record of their own, and begin another second."""
         if self._second_ends is not None:
             self._second_ends.cancel()
@@ -60,12 +60,12 @@ class Answered:
         for kind, (count, seconds) in others.items():
             logger.info("answered many", extra=_fields(kind, seconds, requests=count))
 
-    def _is_told_later(self, kind: Kind, seconds: float) -> bool:
+    def _is_summed_up(self, kind: Kind, seconds: float) -> bool:
         method, _, status = kind
         if method not in {"GET", "HEAD"} or not 200 <= status < 400:
             return False
         if self._second_ends is None:
-            self._second_ends = asyncio.get_running_loop().call_later(TOLD_SECONDS, self.tell_others)
+            self._second_ends = asyncio.get_running_loop().call_later(FLUSH_SECONDS, self.flush)
         self._logged += 1
         if self._logged <= LOGGED_A_SECOND:
             return False
