@@ -68,6 +68,7 @@ def test_a_zipped_recording_equals_its_folder(
 ) -> None:
     members = {f"{prefix}{name}.npy": array for name, array in recording_fields.items()}
     extras = {f"__MACOSX/{prefix}._index.npy": b"finder", f"{prefix}overview.csv": b"a,b"}
+    extras |= {"notes/shape.npy": b"of something else", f"notes/{tac3d.REQUIRED[0]}.txt": b"how it was measured"}
     packed = tac3d.read(zip_of(members | extras, zipfile.ZIP_DEFLATED))
     folder = tac3d.read(folder_of(recording_fields))
     np.testing.assert_array_equal(packed.displacement, folder.displacement)
