@@ -1,13 +1,14 @@
-"""Mutation testing: `python -m benchmarks.mutants [--count N] [--seed N] [--work FOLDER] [--cover] [--again]`.
+"""Does a test fail when the code is changed? `python -m benchmarks.mutants [--page docs/mutants.md] [--count N] ...`.
 
-Draws mutants of the code, tries each with the tests that run its line, and writes mutants.md and images/mutants.json to
-`--output`. All happens in a copy below `--work`, whose verdicts stay: a run that was stopped goes on, `--again` tries
-survivors once more. The first run, or `--cover`, runs all tests once to know what they cover; `--cover tests/a.py` adds
-those of new tests. `--only slipcore/frames.py:12` tries every mutant of a file or of one of its lines, and only prints.
+Draws mutants of the code, tries each with the tests that run its line, and writes mutants.json. All happens in a copy
+below `--work`, whose verdicts stay: a run that was stopped goes on, `--again` tries survivors once more. The first run,
+or `--cover`, runs all tests once to know what they cover; `--cover tests/a.py` adds those of new tests. `--seconds`
+ends a run early. `--only slipcore/frames.py:12` tries every mutant of a file or of one of its lines, and only prints.
 """
 
 import argparse
-import json
+import math
+import time
 import tomllib
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
@@ -16,9 +17,11 @@ from pathlib import Path
 
 from benchmarks.mutants import sample, verdicts
 from benchmarks.mutants.edits import Edit, edits
-from benchmarks.mutants.page import page, score
+from benchmarks.mutants.page import tables
 from benchmarks.mutants.scratch_copy import ROOT, ScratchCopy
 from benchmarks.mutants.verdicts import Court, Verdict
+from benchmarks.pages import options as page_options
+from benchmarks.pages import picture_folder, write
 
 EXPLAINED = Path(__file__).with_name("explained.toml")
 
@@ -41,25 +44,26 @@ def _try_sample(copy: ScratchCopy, options: argparse.Namespace) -> None:
     path = options.work / f"verdicts-{options.seed}.jsonl"
     found = verdicts.known(path)
     waiting = [edit for edit in drawn if edit.key not in found or (options.again and not found[edit.key].is_killed)]
+    end = time.monotonic() + options.seconds
     with _court(copy) as try_mutant:
         for number, edit in enumerate(waiting, 1):
+            if time.monotonic() > end:
+                break
             verdict = found[edit.key] = try_mutant(edit)
             verdicts.append(path, verdict)
             print(f"{number}/{len(waiting)} {_line(edit, verdict)}", flush=True)
-    _write(copy, drawn, found, options.output)
+    _write(copy, drawn, found, options)
 
 
 def _options() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = page_options(__doc__)
     parser.add_argument("--count", type=int, default=320, help="how many mutants are drawn, at least")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seconds", type=float, default=math.inf, help="no mutant is begun after so many")
     parser.add_argument("--work", type=Path, default=ROOT / ".cache" / "mutants", help="the copy and all verdicts")
     parser.add_argument("--cover", nargs="*", metavar="TESTS", help="run the tests with coverage first")
     parser.add_argument("--again", action="store_true", help="try survivors once more")
     parser.add_argument("--only", metavar="PLACE", help="a file, or file:line")
-    parser.add_argument(
-        "--output", type=Path, default=ROOT / "docs", help="where mutants.md and images/mutants.json go"
-    )
     return parser.parse_args()
 
 
@@ -84,13 +88,13 @@ def _line(edit: Edit, verdict: Verdict) -> str:
     return f"{place} {found} ({verdict.seconds} s, {verdict.tests} tests)"
 
 
-def _write(copy: ScratchCopy, drawn: list[Edit], found: dict[str, Verdict], output: Path) -> None:
-    reasons = tomllib.loads(EXPLAINED.read_text()) if EXPLAINED.exists() else {}
-    lines = sample.lines_of(copy.root)
-    print(score(drawn, found, reasons, lines))
-    (output / "mutants.md").write_text(page(drawn, found, reasons, lines))
-    records = [asdict(found[edit.key]) for edit in sorted(drawn, key=lambda edit: edit.key)]
-    (output / "images" / "mutants.json").write_text(json.dumps(records, indent=1, ensure_ascii=False) + "\n")
+def _write(copy: ScratchCopy, drawn: list[Edit], found: dict[str, Verdict], options: argparse.Namespace) -> None:
+    reasons = tomllib.loads(EXPLAINED.read_text())
+    made = tables(drawn, found, reasons, sample.lines_of(copy.root))
+    print(made["score"])
+    picture_folder(options)
+    records = [asdict(found[edit.key]) for edit in drawn if edit.key in found]
+    write(records, made, options, "mutants.json")
 
 
 if __name__ == "__main__":

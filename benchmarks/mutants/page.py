@@ -1,72 +1,49 @@
-"""The page that tells what a run found."""
+"""What a run found, as the tables of docs/mutants.md."""
 
 from collections.abc import Mapping
 
 from benchmarks.mutants.edits import Edit
 from benchmarks.mutants.verdicts import Verdict
+from benchmarks.pages import table
 
-HEAD = """# Mutation testing
+SCORE = ("package", "lines of code", "drawn", "tried", "killed", "survived, explained", "survived", "score")
 
-A test says something if it fails when the code is wrong. `make mutants` changes the code in one small place at a time
-(a comparison, an operator, a sign, a number, a condition, what is returned, a call left out), in a copy of the
-repository, and runs the tests that run that place: a mutant is *killed* if one of them fails, or does not end. Mutants
-are drawn by a seed, from every package in proportion to its lines of code, compiled kernels included, which are then
-compiled anew. A failure counts only if that test passes without the change.
-
-"""
-
-EXPLAINED = """
-## Survivors that no test should kill
-
-What they change is no behaviour, or none that is promised. Each was looked at by hand, with its reason in
-`benchmarks/mutants/explained.toml`, and is left out of the score.
-
-"""
-
-OTHERS = "\n## Other survivors\n\nMissing checks.\n\n"
+Verdicts = Mapping[str, Verdict]
+Reasons = Mapping[str, str]
 
 
-def page(
-    drawn: list[Edit], verdicts: Mapping[str, Verdict], reasons: Mapping[str, str], packages: Mapping[str, int]
-) -> str:
-    """Score by package, then every survivor with its reason or without."""
-    tried = [edit for edit in drawn if edit.key in verdicts]
-    alive = [edit for edit in tried if not verdicts[edit.key].is_killed]
-    explained = [edit for edit in alive if edit.key in reasons]
-    others = [edit for edit in alive if edit.key not in reasons]
-    text = HEAD + score(tried, verdicts, reasons, packages)
-    if explained:
-        text += EXPLAINED + "".join(f"- {_told(edit)}: {reasons[edit.key]}\n" for edit in _sorted(explained))
-    if others:
-        text += OTHERS + "".join(f"- {_told(edit)}\n" for edit in _sorted(others))
-    return text
+def tables(drawn: list[Edit], verdicts: Verdicts, reasons: Reasons, lines: Mapping[str, int]) -> dict[str, str]:
+    """Score by package, survivors that are explained, and those that are not."""
+    alive = [edit for edit in drawn if edit.key in verdicts and not verdicts[edit.key].is_killed]
+    alive.sort(key=lambda edit: (edit.path, edit.start))
+    explained = [[_place(edit), _change(edit), reasons[edit.key]] for edit in alive if edit.key in reasons]
+    others = [[_place(edit), _change(edit)] for edit in alive if edit.key not in reasons]
+    return {
+        "score": score(drawn, verdicts, reasons, lines),
+        "explained": table(("where", "change", "why no test should notice"), explained),
+        "survivors": table(("where", "change"), others),
+    }
 
 
-def score(
-    tried: list[Edit], verdicts: Mapping[str, Verdict], reasons: Mapping[str, str], packages: Mapping[str, int]
-) -> str:
-    """A table: of each package, and of all, how many were killed of those that could be."""
-    lines = [
-        "| package | lines of code | mutants | killed | survived, explained | survived | score |",
-        "|---|--:|--:|--:|--:|--:|--:|",
-    ]
-    for package, size in [*packages.items(), ("all", sum(packages.values()))]:
-        own = [edit for edit in tried if package == "all" or edit.path.startswith(f"{package}/")]
-        killed = sum(verdicts[edit.key].is_killed for edit in own)
-        explained = sum(edit.key in reasons and not verdicts[edit.key].is_killed for edit in own)
-        possible = len(own) - explained
+def score(drawn: list[Edit], verdicts: Verdicts, reasons: Reasons, lines: Mapping[str, int]) -> str:
+    """Of each package, and of all, how many mutants were killed of those that could be."""
+    rows = []
+    for package, size in [*lines.items(), ("all", sum(lines.values()))]:
+        own = [edit for edit in drawn if package == "all" or edit.path.startswith(f"{package}/")]
+        tried = [edit for edit in own if edit.key in verdicts]
+        killed = sum(verdicts[edit.key].is_killed for edit in tried)
+        explained = sum(edit.key in reasons and not verdicts[edit.key].is_killed for edit in tried)
+        possible = len(tried) - explained
         share = f"{killed / possible:.1%}" if possible else "–"
-        lines.append(f"| {package} | {size} | {len(own)} | {killed} | {explained} | {possible - killed} | {share} |")
-    return "\n".join(lines) + "\n"
+        rows.append((package, size, len(own), len(tried), killed, explained, possible - killed, share))
+    return table(SCORE, rows)
 
 
-def _sorted(edits: list[Edit]) -> list[Edit]:
-    return sorted(edits, key=lambda edit: (edit.path, edit.start))
+def _place(edit: Edit) -> str:
+    return f"`{edit.path}`" + (f", `{edit.scope}`" if edit.scope else "")
 
 
-def _told(edit: Edit) -> str:
+def _change(edit: Edit) -> str:
     old, new = (" ".join(text.split())[:60] for text in (edit.old, edit.new))
-    change = f"`{old}` → `{new}`" if new.strip() else f"without `{old.strip()}`"
-    return f"`{edit.path}` {f'`{edit.scope}`' if edit.scope else ''} `{edit.statement[:100]}`: {change}".replace(
-        "  ", " "
-    )
+    change = f"`{old}` → `{new}`" if new else f"without `{old}`"
+    return f"{change} in `{edit.statement[:100]}`".replace("|", "\\|")

@@ -13,7 +13,7 @@ from coverage.numbits import nums_to_numbits
 
 from benchmarks.mutants import sample, verdicts
 from benchmarks.mutants.edits import Edit, edits
-from benchmarks.mutants.page import page, score
+from benchmarks.mutants.page import tables
 from benchmarks.mutants.reach import Reach
 from benchmarks.mutants.scratch_copy import ScratchCopy
 from benchmarks.mutants.verdicts import Court, Verdict
@@ -223,12 +223,13 @@ def test_the_copy_has_what_the_checkout_has(copy: ScratchCopy, tmp_path: Path) -
 
 
 def test_the_page_tells_score_and_survivors(copy: ScratchCopy) -> None:
-    killed, explained, missed = (change(copy, *words) for words in (("and", "or"), (">", ">="), ("+", "-")))
-    drawn = [killed, explained, missed]
-    found = {edit.key: Verdict(edit.key, 1, "a test" if edit is killed else "", 1, 0, 0.1) for edit in drawn}
-    reasons = {explained.key: "the limit itself is never met"}
-    assert "| slipcore | 20 | 3 | 1 | 1 | 1 | 50.0% |" in score(drawn, found, reasons, {"slipcore": 20})
-    text = page(drawn, found, reasons, {"slipcore": 20})
-    assert "`>` → `>=`: the limit itself is never met" in text
-    assert text.index("Other survivors") < text.index("`+` → `-`")
-    assert "Other survivors" not in page([killed], found, reasons, {"slipcore": 20})
+    killed, explained, missed, waiting = (
+        change(copy, *words) for words in (("and", "or"), (">", ">="), ("+", "-"), ("3", "4"))
+    )
+    drawn = [killed, explained, missed, waiting]
+    found = {edit.key: Verdict(edit.key, 1, "a test" if edit is killed else "", 1, 0, 0.1) for edit in drawn[:3]}
+    made = tables(drawn, found, {explained.key: "the limit itself is never met"}, {"slipcore": 20})
+    assert "| slipcore | 20 | 4 | 3 | 1 | 1 | 1 | 50.0% |" in made["score"]
+    assert made["explained"].endswith("x > LIMIT` | the limit itself is never met |")
+    assert "`+` → `-`" in made["survivors"]
+    assert "`>` → `>=`" not in made["survivors"]
