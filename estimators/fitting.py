@@ -5,10 +5,9 @@ from dataclasses import replace
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.linear.fit_data import FitData, GraspData, gather
+from estimators.method_names import METHODS
 from estimators.methods import conjugate, hierarchical, ols, robust
 from estimators.methods.automatic import choose, compared
-
-METHODS = ("ols", "robust", "conjugate", "hierarchical", "bayes", "auto")
 
 
 def needs_samples(method: str, grasps: int) -> bool:

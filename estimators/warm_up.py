@@ -2,8 +2,6 @@
 
 import time
 
-import numpy as np
-
 
 def warm_up() -> float:
     """Compile the likelihoods' sums, or load them from where they are kept; seconds that it took.
@@ -11,6 +9,7 @@ def warm_up() -> float:
     The libraries that only some methods need are loaded on the way.
     """
     began = time.perf_counter()
+    import numpy as np
     import statsmodels.regression.linear_model  # noqa: F401
 
     import estimators.sampling.ensemble  # noqa: F401

@@ -315,6 +315,20 @@ def test_the_server_starts_without_the_numerics() -> None:
     assert answer.stdout == "set() []\n"
 
 
+@pytest.mark.parametrize(("package", "most"), [("service.cli", 200), ("stiction_client", 100)])
+def test_the_help_of_commands_and_the_client_load_little(package: str, most: int) -> None:
+    """0.3 s and 0.07 s of CPU; either loads the rest when it is first needed."""
+    heavy = NUMERICS | {"numpy", "httpx", "sqlalchemy", "fastapi", "pydantic", "rich"}
+    script = (
+        f"import sys; before = set(sys.modules); import {package}; loaded = set(sys.modules) - before;"
+        f"print(len(loaded), sorted({heavy} & loaded))"
+    )
+    answer = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT)
+    count, _, found = answer.stdout.strip().partition(" ")
+    assert found == "[]"
+    assert int(count) <= most
+
+
 @pytest.mark.parametrize("package", ["slipcore", "estimators", "stiction_client"])
 def test_every_public_name_is_there(package: str) -> None:
     module = importlib.import_module(package)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from estimators.method_names import METHODS
 from service.cli.output import print_json, print_lines, print_table
 from service.formatting import interval, number
 
@@ -19,7 +20,7 @@ Log = Annotated[
     typer.Argument(help="A grasp log in any format of docs/formats.md: NPZ, Tac3D, tracked markers, MCAP, ROS bag, …"),
 ]
 DETECTOR_HELP = "Slip detector (docs/detector.md); the best one where none is named."
-METHOD_HELP = "Estimator: ols, robust, conjugate, hierarchical, bayes or auto."
+METHOD_HELP = f"Estimator: {', '.join(METHODS[:-1])} or {METHODS[-1]}."
 Logs = Annotated[list[Path], typer.Argument(help="Grasp logs of one material, each one grasp.")]
 
 

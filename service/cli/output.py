@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
-import numpy as np
 import typer
 
 from service.formatting import moment
@@ -53,7 +52,7 @@ def plain(value: Any) -> Any:
     """A copy of ``value`` that JSON can hold."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
+    if hasattr(value, "tolist"):  # of numpy, which takes longer to import than all else of a command's help
         return plain(value.tolist())
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]

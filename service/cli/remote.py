@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from estimators.method_names import METHODS
 from service.cli.exit_codes import FAILURE, INPUT_REFUSED, SERVICE_REFUSED
 from service.cli.local import FrameRate, Mapping, Scale, mapping_text
 from service.cli.output import print_json, print_lines, print_table
@@ -25,7 +26,7 @@ Key = Annotated[str | None, typer.Option("--key", envvar="STICTION_KEY", help="A
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
 MaterialName = Annotated[str, typer.Argument(help="Name of a material.")]
 Method = Annotated[
-    str, typer.Option("--method", help="Whose current model, as of `stiction fit`; auto: the recommended one.")
+    str, typer.Option("--method", help=f"Whose current model: {', '.join(METHODS[:-1])}, or auto: the recommended one.")
 ]
 Velocity = Annotated[float, typer.Option("--velocity", help="Tangential velocity of the slip, m/s.")]
 

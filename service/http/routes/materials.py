@@ -6,6 +6,7 @@ from urllib.parse import quote
 from fastapi import APIRouter, Query, Request, Response
 
 from db.repositories import friction_models, materials
+from estimators.method_names import ModelMethod
 from service.domain import curate
 from service.domain.fit import request_fit
 from service.domain.look_up import Question, look_up
@@ -30,14 +31,7 @@ from service.http.problems import (
 )
 from service.http.schemas.jobs import JobOut
 from service.http.schemas.materials import MaterialOut, MaterialsOut, NewMaterial
-from service.http.schemas.models import (
-    FrictionModelOut,
-    FrictionModelsOut,
-    FrictionOut,
-    LookUpQuery,
-    ModelMethod,
-    NewFit,
-)
+from service.http.schemas.models import FrictionModelOut, FrictionModelsOut, FrictionOut, LookUpQuery, NewFit
 
 router = APIRouter(prefix="/v1/materials", tags=["materials"], route_class=JsonRoute)
 

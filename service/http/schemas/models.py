@@ -8,12 +8,11 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.config import JsonDict
 
 from db.records import StoredModel
+from estimators.method_names import FitMethod
 from service.domain.look_up import Averaged, Friction
 from service.domain.stored_results import to_client_model
 from service.http.schemas.common import MOMENT_EXAMPLE, Body, Force, Next, Velocity
 
-ModelMethod = Literal["ols", "robust", "conjugate", "hierarchical", "bayes"]
-FitMethod = Literal["ols", "robust", "conjugate", "hierarchical", "bayes", "auto"]
 ChosenBecause = Annotated[str | None, Field(description="Why this model answers; null where a method was named")]
 
 SupportKind = Annotated[

@@ -4,10 +4,11 @@ from typing import Annotated, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from estimators.method_names import FitMethod, ModelMethod
 from service.domain.look_up import Averaged
 from service.domain.plan import GraspTask
 from service.http.schemas.common import Area, Body, Force, Reference, Velocity
-from service.http.schemas.models import CHOSEN_EXAMPLE, Advice, ChosenBecause, FitMethod, ModelMethod, SupportKind
+from service.http.schemas.models import CHOSEN_EXAMPLE, Advice, ChosenBecause, SupportKind
 from service.http.schemas.results import SAMPLES_EXAMPLE
 
 

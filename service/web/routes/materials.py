@@ -10,13 +10,13 @@ from fastapi.responses import RedirectResponse
 from db.paging import Window
 from db.records import LogFilter
 from db.repositories import friction_models, grasp_logs, materials
+from estimators.method_names import ModelMethod
 from service.domain import curate
 from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.dependencies import CurrentContext
 from service.http.paging import CursorText, Page
 from service.http.schemas.common import Force, Velocity
 from service.http.schemas.materials import NewMaterial
-from service.http.schemas.models import ModelMethod
 from service.web.forms import EMPTY_IS_NONE, FormRoute, checked
 from service.web.friction import coefficients, friction_at, listed, sections, usual_model
 from service.web.rendering import render

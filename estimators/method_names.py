@@ -1,0 +1,11 @@
+"""The names of the methods, for who offers them without loading the numerics behind."""
+
+from typing import Literal, get_args
+
+ModelMethod = Literal["ols", "robust", "conjugate", "hierarchical", "bayes"]
+"""What a fitted model may be fitted by."""
+
+FitMethod = Literal[ModelMethod, "auto"]
+"""What a fit may be asked for; "auto" takes the method that the data call for."""
+
+METHODS: tuple[FitMethod, ...] = get_args(FitMethod)
