@@ -157,11 +157,25 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
+class ContactFriction:
+    """Friction that a contact as a whole tells, with its 95 % interval, and what it was found from.
+
+    Where it ``is_bound``, friction is at least ``low``, and ``high`` is None.
+    """
+
+    coefficient: float
+    low: float
+    high: float | None
+    is_bound: bool
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class Detection:
     """What a detector said of a log, in numbers; the histories are in the blob of hash ``history_blob``.
 
     ``noise`` m; ``seconds`` that the detection took; ``onsets`` … ``releases`` count events; ``findings`` against the
-    log, None where an older version did not look for any.
+    log, None where an older version did not look for any; ``contact_friction``: None where nothing is known of it.
     """
 
     method: str
@@ -176,6 +190,7 @@ class Detection:
     seconds: float
     history_blob: str
     findings: tuple[Finding, ...] | None = None
+    contact_friction: ContactFriction | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -241,6 +241,7 @@ class DetectionRow(Base):
     seconds: Mapped[float]
     history_blob: Mapped[str] = mapped_column(String(64), index=True)
     findings: Mapped[list[Any] | None] = mapped_column(JSON(none_as_null=True))
+    contact_friction: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
     created_at: Mapped[datetime] = mapped_column(default=now)
 
 

@@ -6,6 +6,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from slipcore.checks import Finding, check_log
+from slipcore.collection import Collected, collect_friction, collect_samples
 from slipcore.defaults import (
     LOOKAHEAD,
     CheckOptions,
@@ -21,7 +22,7 @@ from slipcore.frames import Frame, FrictionLaw, GraspLog, GroundTruth
 from slipcore.options import Option, describe_options
 from slipcore.patch.friction import contact_friction
 from slipcore.patch.record import ContactFriction, Patch
-from slipcore.samples import FrictionSamples, collect_samples
+from slipcore.samples import FrictionSamples
 from slipcore.slip_state import EventList, SlipEvents, SlipHistory, SlipState
 from slipcore.warm_up import warm_up
 
@@ -48,6 +49,7 @@ __all__ = [
     "LOOKAHEAD",
     "METHODS",
     "CheckOptions",
+    "Collected",
     "ContactFriction",
     "DetectorState",
     "ElementForces",
@@ -75,6 +77,7 @@ __all__ = [
     "StrainRateOptions",
     "UnknownScale",
     "check_log",
+    "collect_friction",
     "collect_history",
     "collect_samples",
     "contact_factor",

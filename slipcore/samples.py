@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -16,16 +16,20 @@ from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.slip_state import SlipHistory
 
 Scalar = TypeVar("Scalar", bound=np.generic)
+KIND = "<U7"
+"""Of the names of kinds."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrictionSamples:
-    """Friction observed at slipping micro-elements, one entry an element and frame: arrays [k].
+    """Friction observed at slipping micro-elements, one entry an element and frame, or of whole contacts: arrays [k].
 
     ``friction_coefficient`` f_t/f_n [-], ``tangential_velocity`` m/s (≥ 0), ``normal_force`` N and
     ``tangential_force`` N of the element (paper, eq. 38–39, as magnitudes), ``time`` s, ``element`` row-major index,
     ``weight`` probability that the element did slip, ``element_area`` m², ``normal_force_noise`` N: standard deviation
-    of the noise that is still in ``normal_force``.
+    of the noise that is still in ``normal_force``. ``kind``: "element", or "contact" where the whole of a patch slid or
+    pivoted: its ``normal_force`` is then the mean of its elements, weighted by force, and its ``element`` lies beyond
+    the lattice.
     """
 
     friction_coefficient: FloatArray
@@ -37,9 +41,12 @@ class FrictionSamples:
     weight: FloatArray
     element_area: float
     normal_force_noise: float = 0.0
+    kind: NDArray[np.str_] = field(default_factory=lambda: np.empty(0, KIND))
 
     def __post_init__(self) -> None:
         count = len(self.friction_coefficient)
+        if len(self.kind) == 0:
+            object.__setattr__(self, "kind", np.full(count, "element", KIND))  # the record is frozen
         for name in self.arrays():
             shape = np.shape(getattr(self, name))
             if shape != (count,):
@@ -48,10 +55,14 @@ class FrictionSamples:
     @classmethod
     def arrays(cls) -> tuple[str, ...]:
         """Names of the arrays [k]."""
-        return tuple(entry.name for entry in fields(cls)[:-2])
+        return tuple(entry.name for entry in fields(cls) if entry.name not in {"element_area", "normal_force_noise"})
 
     def __len__(self) -> int:
         return len(self.friction_coefficient)
+
+    def take(self, rows: NDArray[np.bool_]) -> "FrictionSamples":
+        """Some of the samples."""
+        return replace(self, **{name: getattr(self, name)[rows] for name in self.arrays()})
 
     def at_element_area(self, element_area: float) -> "FrictionSamples":
         """The same pressures on elements of another area, m²: forces scale with it, friction and velocity do not."""
@@ -77,7 +88,7 @@ class FrictionSamples:
         return cls(**joined, element_area=area, normal_force_noise=noise)
 
 
-def collect_samples(log: GraspLog, history: SlipHistory, **options: float) -> FrictionSamples:
+def element_samples(log: GraspLog, history: SlipHistory, **options: float) -> FrictionSamples:
     """Observe friction where ``history`` says that elements of ``log`` slip: f_t/f_n, velocity and forces.
 
     Only at compressed elements in contact, of observable velocity above what noise alone makes (a stuck point's

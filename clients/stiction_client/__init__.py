@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from stiction_client.planner import RequiredForce, RequiredForces, required_normal_force
     from stiction_client.records import (
         AuditEntry,
+        ContactFriction,
         Detection,
         Finding,
         FrictionAnswer,
@@ -103,6 +104,7 @@ _LAZY = {
     "required_normal_force": "stiction_client.planner",
     "AuditEntry": "stiction_client.records",
     "Detection": "stiction_client.records",
+    "ContactFriction": "stiction_client.records",
     "Finding": "stiction_client.records",
     "FrictionAnswer": "stiction_client.records",
     "GraspLogReceipt": "stiction_client.records",
@@ -120,6 +122,7 @@ __all__ = [
     "Command",
     "ConnectionFailed",
     "Contact",
+    "ContactFriction",
     "Contacts",
     "ControlSettings",
     "ControllerState",

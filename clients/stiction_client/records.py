@@ -88,9 +88,22 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
+class ContactFriction:
+    """Friction that a contact as a whole tells, with its 95 % interval; where it ``is_bound`` friction is at least
+    ``low``, and ``high`` is None.
+    """
+
+    coefficient: float
+    low: float
+    high: float | None
+    is_bound: bool
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
 class Detection:
     """What was seen in a grasp log: events of each kind, friction samples, frames, smallest stick ratio, and findings
-    against it (None where the service did not look for any).
+    against it (None where the service did not look for any), and what the contact as a whole tells of friction.
     """
 
     method: str
@@ -102,6 +115,7 @@ class Detection:
     samples: int
     seconds: float
     findings: tuple[Finding, ...] | None = None
+    contact_friction: ContactFriction | None = None
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "Detection":
@@ -109,6 +123,8 @@ class Detection:
         values = _values(cls, record)
         if values.get("findings") is not None:
             values["findings"] = tuple(Finding(**_values(Finding, each)) for each in values["findings"])
+        if values.get("contact_friction") is not None:
+            values["contact_friction"] = ContactFriction(**_values(ContactFriction, values["contact_friction"]))
         return cls(**values)
 
 

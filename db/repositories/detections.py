@@ -5,7 +5,7 @@ from dataclasses import asdict, fields
 from sqlalchemy import ColumnElement, select, update
 from sqlalchemy.orm import Session
 
-from db.records import Detection, Finding, SamplesOfLog, SampleSummary
+from db.records import ContactFriction, Detection, Finding, SamplesOfLog, SampleSummary
 from db.tables import DetectionRow, GraspLogRow, SampleSummaryRow
 
 
@@ -90,7 +90,8 @@ def detection_record(row: DetectionRow | None) -> Detection | None:
         return None
     found = {entry.name: getattr(row, entry.name) for entry in fields(Detection)}
     findings = None if row.findings is None else tuple(Finding(**each) for each in row.findings)
-    return Detection(**found | {"findings": findings})
+    contact = None if row.contact_friction is None else ContactFriction(**row.contact_friction)
+    return Detection(**found | {"findings": findings, "contact_friction": contact})
 
 
 def samples_record(row: SampleSummaryRow | None) -> SampleSummary | None:

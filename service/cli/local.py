@@ -83,14 +83,19 @@ def check(
     from slipcore.defaults import DEFAULT_METHOD
 
     grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
-    findings = check_log(grasp, detect_slip(grasp, method=method or DEFAULT_METHOD, lookahead=LOOKAHEAD))
+    history = detect_slip(grasp, method=method or DEFAULT_METHOD, lookahead=LOOKAHEAD)
+    findings, contact = check_log(grasp, history), _contact_record(grasp, history)
     if json:
-        print_json({"log": log.name, "findings": [asdict(finding) for finding in findings]})
-    elif findings:
-        for finding in findings:
-            typer.echo(f"{finding.name}: {finding.evidence}\n  {finding.remedy}")
-    else:
+        print_json(
+            {"log": log.name, "findings": [asdict(finding) for finding in findings], "contact_friction": contact}
+        )
+        return
+    for finding in findings:
+        typer.echo(f"{finding.name}: {finding.evidence}\n  {finding.remedy}")
+    if not findings:
         typer.echo(f"{log.name}: nothing found against it")
+    if contact is not None:
+        typer.echo(f"friction of the contact: {_contact_line(contact)}")
 
 
 def fit(
@@ -204,8 +209,24 @@ def _detection_summary(log: "GraspLog", history: "SlipHistory", seconds: float) 
         "releases": len(events.release),
         "marker_noise": history.noise if log.is_scaled else None,
         "seconds": round(seconds, 6),
+        "contact_friction": _contact_record(log, history),
         **({} if log.is_scaled else {"unknown": "the scale: no noise, velocity or friction can be told in SI units"}),
     }
+
+
+def _contact_record(log: "GraspLog", history: "SlipHistory") -> dict[str, Any] | None:
+    from slipcore import contact_friction
+
+    found = contact_friction(log.time, history.patches)
+    return None if found is None else asdict(found) | {"high": None if found.is_bound else found.high}
+
+
+def _contact_line(found: dict[str, Any] | None) -> str | None:
+    if found is None:
+        return None
+    if found["is_bound"]:
+        return f"at least {number(found['low'])}: {found['reason']}"
+    return f"{number(found['coefficient'])}, {interval((found['low'], found['high']))}: {found['reason']}"
 
 
 def _detection_lines(summary: dict[str, Any]) -> list[tuple[str, str | None]]:
@@ -216,6 +237,7 @@ def _detection_lines(summary: dict[str, Any]) -> list[tuple[str, str | None]]:
         ("in contact", f"{summary['frames_in_contact']} frames; {summary['frames_in_macro_slip']} slip as a whole"),
         ("stick ratio", seen.get("smallest_stick_ratio") and f"{seen['smallest_stick_ratio']} at its smallest"),
         ("elements", f"{summary['touches']} touch, {begin} begin to slip, {end} stick again"),
+        ("friction of the contact", _contact_line(summary["contact_friction"])),
         ("marker noise", None if noise is None else f"{number(1e6 * noise)} µm"),
         ("computed in", f"{seen['seconds']} s"),
         ("unknown", summary.get("unknown")),

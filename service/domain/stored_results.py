@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import estimators
 import slipcore
 import stiction_client
-from db.records import Detection, Finding, NewModel, SampleSummary, Scale, Scales, StoredModel
+from db.records import ContactFriction, Detection, Finding, NewModel, SampleSummary, Scale, Scales, StoredModel
 from service.formats.npy import HEADER_LOCK
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.samples import FrictionSamples
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 EVENT_KINDS = ("onset", "end", "touch", "release")
 SAMPLE_ARRAYS = FrictionSamples.arrays()
+"""Of these the last, the kind, is stored as whether it is "contact"; older versions stored none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,15 +63,18 @@ def decode_history(path: Path, *, with_maps: bool = True) -> StoredHistory:
 def encode_samples(samples: FrictionSamples) -> bytes:
     """Samples as bytes, the same for the same samples."""
     common = np.array([samples.element_area, samples.normal_force_noise])
-    return _pack([*(getattr(samples, name) for name in SAMPLE_ARRAYS), common])
+    numbers = [getattr(samples, name) for name in SAMPLE_ARRAYS[:-1]]
+    return _pack([*numbers, samples.kind == "contact", common])
 
 
 def decode_samples(path: Path) -> FrictionSamples:
-    """The samples in a blob; those stored by older versions tell no noise of f_n."""
+    """The samples in a blob; those stored by older versions tell no noise of f_n, and are all of elements."""
     *arrays, common = _unpack(path)
+    of_contact = arrays.pop() if len(arrays) == len(SAMPLE_ARRAYS) else np.zeros(len(arrays[0]), bool)
+    kind = np.where(of_contact, "contact", "element")
     element_area, noise = (*np.atleast_1d(common).tolist(), 0.0)[:2]
     return FrictionSamples(
-        **dict(zip(SAMPLE_ARRAYS, arrays, strict=True)), element_area=element_area, normal_force_noise=noise
+        **dict(zip(SAMPLE_ARRAYS, [*arrays, kind], strict=True)), element_area=element_area, normal_force_noise=noise
     )
 
 
@@ -79,11 +83,13 @@ def summarise_history(
     seconds: float,
     blob: str,
     findings: Sequence[slipcore.Finding] = (),
+    contact: slipcore.ContactFriction | None = None,
     *,
     is_scaled: bool = True,
 ) -> Detection:
-    """A history in numbers, with the ``findings`` against its log; a length only where that is in metres
-    (``is_scaled``).
+    """A history in numbers, with the ``findings`` against its log and the friction of its ``contact``.
+
+    A length only where it is in metres (``is_scaled``).
     """
     in_contact = ~np.isnan(history.stick_ratio)
     events = history.events
@@ -100,7 +106,13 @@ def summarise_history(
         seconds=seconds,
         history_blob=blob,
         findings=tuple(Finding(each.name, each.evidence, each.remedy) for each in findings),
+        contact_friction=None if contact is None else _stored_contact(contact),
     )
+
+
+def _stored_contact(contact: slipcore.ContactFriction) -> ContactFriction:
+    known = contact.coefficient, contact.low, finite_or_none(contact.high)
+    return ContactFriction(*known, contact.is_bound, contact.reason)
 
 
 def summarise_samples(samples: FrictionSamples, none_because: str | None, blob: str) -> SampleSummary:

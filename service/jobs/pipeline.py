@@ -33,7 +33,7 @@ from service.domain.stored_results import (
     to_new_model,
 )
 from service.observability import logs, traces
-from slipcore import FrictionSamples, GraspLog, SlipcoreError, SlipHistory
+from slipcore import Collected, ContactFriction, FrictionSamples, GraspLog, SlipcoreError, SlipHistory
 
 logger = logging.getLogger(__name__)
 
@@ -128,10 +128,12 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
     with run.stage("slip_state"):
         history = slipcore.detect_slip(log, method=stored.detector, lookahead=slipcore.LOOKAHEAD)
     with run.stage("samples"):
-        samples, none_because = _collect(log, history)
-        findings = slipcore.check_log(log, history, samples)
+        found, none_because = _collect(log, history)
+        samples, findings = found.samples, slipcore.check_log(log, history, found.elements)
         blob = run.blobs.put(encode_history(history))
-        detection = summarise_history(history, run.seconds["slip_state"], blob, findings, is_scaled=log.is_scaled)
+        detection = summarise_history(
+            history, run.seconds["slip_state"], blob, findings, found.contact, is_scaled=log.is_scaled
+        )
         summary = summarise_samples(samples, none_because, run.blobs.put(encode_samples(samples)))
     with run.database.write() as session:
         jobs.start_stage(session, run.claim, "samples", run.seconds)  # nobody else has stored them meanwhile
@@ -173,24 +175,30 @@ def fit_material(run: Run, material: str) -> None:
         _store_models(run, session, material_id, models)
 
 
-def _collect(log: GraspLog, history: SlipHistory) -> tuple[FrictionSamples, str | None]:
-    """The samples, and if there are none, why."""
+def _collect(log: GraspLog, history: SlipHistory) -> tuple[Collected, str | None]:
+    """What is known of friction, and if there are no samples, why."""
     if not log.is_scaled:
         return _no_samples(log), "the log's scale is unknown; friction needs velocities in m/s, not pixels a second"
     if log.force is None:
         return _no_samples(log), "the log has no forces; friction is tangential over normal force"
     if not history.contact.any():
         return _no_samples(log), f"no element was in contact in any of the {len(log)} frames"
-    samples = slipcore.collect_samples(log, history)
-    if len(samples) == 0:
+    found = slipcore.collect_friction(log, history)
+    if len(found.samples) == 0:
         slipping = int(history.slip.sum())
-        return samples, f"no slip gave a friction sample ({slipping} slipping elements in {len(log)} frames)"
-    return samples, None
+        because = f"no slip gave a friction sample ({slipping} slipping elements in {len(log)} frames)"
+        return found, "; ".join(filter(None, (found.elements_left_out or because, _bound(found.contact))))
+    return found, None
 
 
-def _no_samples(log: GraspLog) -> FrictionSamples:
+def _bound(contact: ContactFriction | None) -> str | None:
+    return None if contact is None else f"by the load that the contact bore, friction is at least {contact.low:.2g}"
+
+
+def _no_samples(log: GraspLog) -> Collected:
     none = np.empty(0)
-    return FrictionSamples(none, none, none, none, none, none.astype(int), none, log.element_area)
+    samples = FrictionSamples(none, none, none, none, none, none.astype(int), none, log.element_area)
+    return Collected(samples, samples, None, None)
 
 
 def _fit(run: Run, parts: Sequence[SamplesOfLog]) -> list[FrictionModel]:

@@ -12,7 +12,7 @@ from slipcore.defaults import CheckOptions, choose_options
 from slipcore.element_forces import element_forces
 from slipcore.errors import NoForces, UnknownScale
 from slipcore.frames import GraspLog
-from slipcore.samples import FrictionSamples, collect_samples, normals_of
+from slipcore.samples import FrictionSamples, element_samples, normals_of
 from slipcore.slip_state import SlipHistory
 
 __all__ = ["AGAINST_FRICTION", "Finding", "check_log"]
@@ -29,6 +29,7 @@ CHECKS: tuple[Check, ...] = (
     contact.moving_contact,
     friction.friction_by_force,
     friction.friction_by_place,
+    friction.friction_against_contact,
 )
 """In the order in which findings are told: the recording first, then what was found in it."""
 
@@ -53,7 +54,7 @@ def check_log(
 ) -> list[Finding]:
     """Look for what makes friction from this log doubtful; an empty list is no proof that all is well.
 
-    ``history``: what a detector found in it; ``samples`` that were collected from it, else they are; ``options``: see
+    ``history``: what a detector found in it; ``samples`` of its elements, else they are collected; ``options``: see
     ``defaults.CheckOptions``. Raises ``InvalidInput`` for an option that does not exist or is out of its range.
     """
     limits = choose_options(CheckOptions, options)
@@ -66,6 +67,6 @@ def check_log(
 
 def _samples(log: GraspLog, history: SlipHistory) -> FrictionSamples | None:
     try:
-        return collect_samples(log, history)
+        return element_samples(log, history)
     except (NoForces, UnknownScale):
         return None

@@ -5,6 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from slipcore.checks.subject import Finding, Subject
+from slipcore.collection import contradiction
+from slipcore.patch.friction import contact_friction
 
 LEAST_OF_A_PLACE, LEAST_PLACES = 5, 4
 """Samples of an element, and such elements, from which scatter between places is told from noise."""
@@ -44,3 +46,16 @@ def friction_by_place(seen: Subject) -> Iterator[Finding]:
     if between > seen.limits.place_scatter * middle > 0.0:
         evidence = f"friction differs by {between / middle:.0%} from element to element, and stays so"
         yield Finding("friction differs by place", evidence, "calibrate the sensor's elements, or clean its surface")
+
+
+def friction_against_contact(seen: Subject) -> Iterator[Finding]:
+    """Elements whose friction the whole contact contradicts."""
+    contact = contact_friction(seen.log.time, seen.history.patches)
+    if seen.samples is None or not len(seen.samples) or contact is None:
+        return
+    evidence = contradiction(seen.samples, contact, seen.history.patches)
+    if evidence is not None:
+        remedy = (
+            "the contact is believed, and no element: record a grasp that slides or pivots, or calibrate the sensor"
+        )
+        yield Finding("contact contradicts elements", evidence, remedy)

@@ -13,6 +13,7 @@ import stiction_client
 from stiction_client import (
     AsyncFrictionClient,
     ConnectionFailed,
+    ContactFriction,
     Finding,
     FrictionClient,
     GraspLogReceipt,
@@ -177,6 +178,9 @@ def test_a_grasp_log_is_asked_for(ask: Ask, service: Service, answers: SimpleNam
     told = {"name": "no rest", "evidence": "e", "remedy": "r", "of a newer service": 1}
     newer = {**answers.grasp_log, "detection": {**answers.grasp_log["detection"], "findings": [told]}}
     assert ask(service(newer), "grasp_log", "g1").detection.findings == (Finding("no rest", "e", "r"),)
+    contact = {"coefficient": 0.6, "low": 0.5, "high": None, "is_bound": True, "reason": "it held"}
+    newer["detection"] = {**newer["detection"], "contact_friction": contact}
+    assert ask(service(newer), "grasp_log", "g1").detection.contact_friction == ContactFriction(**contact)
     assert server.requests[0].url.path == "/v1/grasp-logs/g1"
 
 

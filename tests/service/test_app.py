@@ -115,7 +115,7 @@ def test_no_numerics_run_in_the_server_process(
     def here(*_: object, **__: object) -> None:
         raise AssertionError("numerics in the server process")
 
-    for module, name in ((slipcore, "detect_slip"), (slipcore, "collect_samples"), (estimators, "fit")):
+    for module, name in ((slipcore, "detect_slip"), (slipcore, "collect_friction"), (estimators, "fit")):
         monkeypatch.setattr(module, name, here)
     assert wait(client, upload(client, content, material=material).json()["job"]["id"])["status"] == "done"
 

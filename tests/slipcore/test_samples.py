@@ -1,5 +1,5 @@
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,10 +11,10 @@ from slipcore import (
     NoForces,
     SlipHistory,
     UnknownScale,
-    collect_samples,
     detect_slip,
 )
 from slipcore.contact import RampSchedule, tangential_ramp
+from slipcore.samples import element_samples
 
 Scene = Callable[..., GraspLog]
 
@@ -30,7 +30,7 @@ def ramp() -> tuple[GraspLog, SlipHistory]:
 def test_friction_of_a_ramp_is_found_within_two_percent_from_detected_slip(friction: float, known_motion: bool) -> None:
     log = tangential_ramp(friction=friction, marker_noise=1e-6, force_noise=2e-3, seed=21)
     log = log if known_motion else replace(log, object_pose=None)
-    samples = collect_samples(log, detect_slip(log))
+    samples = element_samples(log, detect_slip(log))
     assert len(samples) > 300
     found = np.average(samples.friction_coefficient, weights=samples.weight)
     assert found == pytest.approx(friction, rel=0.02)
@@ -38,7 +38,7 @@ def test_friction_of_a_ramp_is_found_within_two_percent_from_detected_slip(frict
 
 def test_friction_of_a_ramp_without_noise_is_exact() -> None:
     log = tangential_ramp(friction=0.5)
-    samples = collect_samples(log, detect_slip(log))
+    samples = element_samples(log, detect_slip(log))
     assert len(samples) > 1000
     # What slips by 10 µm/s is at the Coulomb limit; the median leaves out the frame in which the front passes.
     # A smooth force looks like 0.1 µN of noise, which is taken off.
@@ -47,10 +47,11 @@ def test_friction_of_a_ramp_without_noise_is_exact() -> None:
 
 
 def check_samples(samples: FrictionSamples, log: GraspLog, history: SlipHistory) -> None:
-    for entry in fields(samples)[:-2]:
-        values = getattr(samples, entry.name)
+    assert (samples.kind == "element").all()
+    for name in sorted(set(samples.arrays()) - {"kind"}):
+        values = getattr(samples, name)
         assert values.shape == (len(samples),)
-        assert values.dtype == (np.int64 if entry.name == "element" else np.float64)
+        assert values.dtype == (np.int64 if name == "element" else np.float64)
         assert np.isfinite(values).all()
     assert (samples.normal_force > 0.0).all()
     assert (samples.tangential_force >= 0.0).all()
@@ -71,32 +72,32 @@ def check_samples(samples: FrictionSamples, log: GraspLog, history: SlipHistory)
 
 
 def test_samples_keep_their_invariants_on_a_ramp(ramp: tuple[GraspLog, SlipHistory]) -> None:
-    samples = collect_samples(*ramp)
+    samples = element_samples(*ramp)
     assert len(samples) > 1000
     check_samples(samples, *ramp)
 
 
 def test_samples_keep_their_invariants_on_real_recordings(recording: GraspLog) -> None:
     history = detect_slip(recording)
-    check_samples(collect_samples(recording, history), recording, history)
+    check_samples(element_samples(recording, history), recording, history)
 
 
 def test_samples_lie_above_the_velocity_and_force_that_noise_makes(ramp: tuple[GraspLog, SlipHistory]) -> None:
-    samples = collect_samples(*ramp)
+    samples = element_samples(*ramp)
     interval = 2 / 30  # from the frame before to the next
     assert samples.tangential_velocity.min() > 2.8 * np.sqrt(2.0) * 1e-6 / interval
     assert samples.normal_force.min() > 19 * 2e-3
 
 
 def test_a_given_force_noise_takes_the_place_of_the_estimate(ramp: tuple[GraspLog, SlipHistory]) -> None:
-    assert collect_samples(*ramp, force_noise=5e-3).normal_force.min() > 20 * 5e-3
+    assert element_samples(*ramp, force_noise=5e-3).normal_force.min() > 20 * 5e-3
 
 
 def test_without_noise_in_mind_slow_points_drag_the_friction_down(ramp: tuple[GraspLog, SlipHistory]) -> None:
     log, history = ramp
     everywhere = replace(history, slip=history.contact, probability=history.contact.astype(float))
-    careless = collect_samples(log, everywhere, velocity_to_noise=0.0, least_velocity=0.0, least_force_share=0.0)
-    careful = collect_samples(log, everywhere)
+    careless = element_samples(log, everywhere, velocity_to_noise=0.0, least_velocity=0.0, least_force_share=0.0)
+    careful = element_samples(log, everywhere)
     assert careless.friction_coefficient.mean() < 0.3
     assert careful.friction_coefficient.mean() > 0.36
 
@@ -104,8 +105,8 @@ def test_without_noise_in_mind_slow_points_drag_the_friction_down(ramp: tuple[Gr
 def test_noise_does_not_lengthen_small_tangential_forces() -> None:
     log = tangential_ramp(friction=0.2, normal_force=3.0, force_noise=2e-3, seed=22)
     history = detect_slip(log)
-    corrected = collect_samples(log, history)
-    plain = collect_samples(log, history, force_noise=1e-9, force_to_noise=0.0)
+    corrected = element_samples(log, history)
+    plain = element_samples(log, history, force_noise=1e-9, force_to_noise=0.0)
     assert plain.friction_coefficient.mean() > 0.2 * 1.01
     assert corrected.friction_coefficient.mean() == pytest.approx(0.2, rel=0.006)
 
@@ -114,7 +115,7 @@ def test_noise_of_the_normal_force_makes_no_slope_of_friction_over_it() -> None:
     slopes = []
     for seed in range(4):
         log = tangential_ramp(friction=0.8, force_noise=4e-3, marker_noise=1e-6, seed=30 + seed)
-        samples = collect_samples(log, detect_slip(log), force_to_noise=8.0)
+        samples = element_samples(log, detect_slip(log), force_to_noise=8.0)
         slopes.append(np.polyfit(samples.normal_force, samples.friction_coefficient, 1)[0])
         raw = log.force[np.searchsorted(log.time, samples.time), samples.element // 20, samples.element % 20, 2]
         careless = np.polyfit(-raw, samples.friction_coefficient, 1)[0]
@@ -125,7 +126,7 @@ def test_noise_of_the_normal_force_makes_no_slope_of_friction_over_it() -> None:
 def test_no_slip_gives_an_empty_set_of_samples() -> None:
     schedule = RampSchedule(rest=0.2, press=0.5, settle=0.3, shear=0.0, hold=0.5)
     log = tangential_ramp(tangential_force=0.0, schedule=schedule)
-    samples = collect_samples(log, detect_slip(log))
+    samples = element_samples(log, detect_slip(log))
     assert len(samples) == 0
     check_samples(samples, log, detect_slip(log))
 
@@ -134,7 +135,7 @@ def test_unobservable_velocity_gives_no_sample() -> None:
     log = tangential_ramp()
     history = detect_slip(log)
     blind = replace(history, velocity=np.full_like(history.velocity, np.nan))
-    assert len(collect_samples(log, blind)) == 0
+    assert len(element_samples(log, blind)) == 0
 
 
 def test_the_probability_of_slip_is_the_weight_and_unlikely_slip_is_left_out(
@@ -142,37 +143,37 @@ def test_the_probability_of_slip_is_the_weight_and_unlikely_slip_is_left_out(
 ) -> None:
     log, history = ramp
     likely = replace(history, probability=0.7 * history.slip)
-    np.testing.assert_allclose(collect_samples(log, likely).weight, 0.7, rtol=1e-15)
-    assert len(collect_samples(log, likely, least_weight=0.8)) == 0
+    np.testing.assert_allclose(element_samples(log, likely).weight, 0.7, rtol=1e-15)
+    assert len(element_samples(log, likely, least_weight=0.8)) == 0
 
 
 def test_a_log_of_unknown_scale_is_refused() -> None:
     log = replace(tangential_ramp(), metadata={"scale": "unknown"})
     with pytest.raises(UnknownScale, match="velocities in m/s"):
-        collect_samples(log, detect_slip(log))
+        element_samples(log, detect_slip(log))
 
 
 def test_a_log_without_forces_is_refused() -> None:
     log = replace(tangential_ramp(), force=None)
     with pytest.raises(NoForces, match="force"):
-        collect_samples(log, detect_slip(log))
+        element_samples(log, detect_slip(log))
 
 
 def test_a_history_of_another_log_is_refused(ramp: tuple[GraspLog, SlipHistory], short_ramp: GraspLog) -> None:
     log, history = ramp
     with pytest.raises(InvalidInput, match="history is of shape"):
-        collect_samples(short_ramp, history)
+        element_samples(short_ramp, history)
     with pytest.raises(InvalidInput, match="history is at other times"):
-        collect_samples(log, replace(history, time=history.time + 1.0))
+        element_samples(log, replace(history, time=history.time + 1.0))
 
 
 def test_an_unknown_option_is_refused(ramp: tuple[GraspLog, SlipHistory]) -> None:
     with pytest.raises(InvalidInput, match=r"option is least_speed; allowed: .*least_velocity"):
-        collect_samples(*ramp, least_speed=1.0)
+        element_samples(*ramp, least_speed=1.0)
 
 
 def test_samples_join_as_the_same_pressures_on_the_smallest_elements(ramp: tuple[GraspLog, SlipHistory]) -> None:
-    samples = collect_samples(*ramp)
+    samples = element_samples(*ramp)
     area = samples.element_area
     both = FrictionSamples.concatenate([samples, samples.at_element_area(2.0 * area)])
     assert both.element_area == area

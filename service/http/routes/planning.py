@@ -24,7 +24,7 @@ from service.http.problems import (
     UPLOAD_TOO_LARGE,
 )
 from service.http.schemas.planning import GraspForceOut, NewGraspForce, NewRecognition, RecognitionOut, SamplesIn
-from slipcore.samples import FrictionSamples
+from slipcore.samples import KIND, FrictionSamples
 
 router = APIRouter(prefix="/v1", tags=["planning"], route_class=LongJsonRoute)
 
@@ -63,6 +63,7 @@ def recognise_material(context: CurrentContext, asked: NewRecognition) -> Recogn
 
 def _samples(given: SamplesIn) -> FrictionSamples:
     arrays: dict[str, Any] = {
-        name: np.array(value, float) for name, value in given if name not in {"element", "element_area"}
+        name: np.array(value, float) for name, value in given if name not in {"element", "element_area", "kind"}
     }
-    return FrictionSamples(**arrays, element=np.array(given.element), element_area=given.element_area)
+    kind = np.array(given.kind or [], KIND)
+    return FrictionSamples(**arrays, element=np.array(given.element), element_area=given.element_area, kind=kind)

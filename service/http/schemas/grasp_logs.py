@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.config import JsonDict
 
-from db.records import StoredGraspLog, Withdrawal
+from db.records import Detection, StoredGraspLog, Withdrawal
 from service.http.schemas.common import MOMENT_EXAMPLE, Body, Next, Text
 from service.http.schemas.jobs import JOB_EXAMPLE, JobOut
 
@@ -15,6 +15,13 @@ FINDING_EXAMPLE: JsonDict = {
     "name": "no rest",
     "evidence": "68 elements touch in the first frame",
     "remedy": "begin the recording before the touch: what was before is not known",
+}
+CONTACT_FRICTION_EXAMPLE: JsonDict = {
+    "coefficient": 0.61,
+    "low": 0.57,
+    "high": 0.65,
+    "is_bound": False,
+    "reason": "the load grew no more in 58 frames of pivoting",
 }
 DETECTION_EXAMPLE: JsonDict = {
     "method": "filter",
@@ -26,6 +33,7 @@ DETECTION_EXAMPLE: JsonDict = {
     "samples": 1932,
     "seconds": 0.06,
     "findings": [FINDING_EXAMPLE],
+    "contact_friction": CONTACT_FRICTION_EXAMPLE,
 }
 GRASP_LOG_EXAMPLE: JsonDict = {
     "id": "7c9e6679742540de944be07fc1f90ae7",
@@ -86,6 +94,18 @@ class FindingOut(BaseModel):
     remedy: Annotated[str, Field(description="What to do about it")]
 
 
+class ContactFrictionOut(BaseModel):
+    """Friction that the contact as a whole tells, whatever its elements show."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [CONTACT_FRICTION_EXAMPLE]})
+
+    coefficient: Annotated[float, Field(description="Least friction that bears the load; the friction unless a bound")]
+    low: Annotated[float, Field(description="Of its 95 % interval")]
+    high: Annotated[float | None, Field(description="Of its 95 % interval; null for a bound")]
+    is_bound: Annotated[bool, Field(description="Whether no slip of the whole contact was seen: it is `low` or more")]
+    reason: Annotated[str, Field(description="What it was found from, or why there is no more than a bound")]
+
+
 class DetectionOut(BaseModel):
     """What the detector found in a log."""
 
@@ -95,12 +115,15 @@ class DetectionOut(BaseModel):
     noise: Annotated[float | None, Field(description="Estimated noise of a marker coordinate, m")]
     stick_ratio_min: Annotated[float | None, Field(description="Least stick area over contact area; null: no contact")]
     contact_frames: int
-    macro_slip_frames: Annotated[int, Field(description="Frames in which no element in contact sticks")]
+    macro_slip_frames: Annotated[int, Field(description="Frames in which the whole contact slips")]
     events: EventCounts
     samples: Annotated[int, Field(description="Number of friction samples")]
     seconds: Annotated[float, Field(description="What the detection took")]
     findings: Annotated[
         list[FindingOut] | None, Field(description="Against the log; null where an older version did not look for any")
+    ]
+    contact_friction: Annotated[
+        ContactFrictionOut | None, Field(description="Of the whole contact; null without forces or contact")
     ]
 
 
@@ -147,6 +170,10 @@ class GraspLogOut(BaseModel):
         )
 
 
+def _contact_friction_out(found: Detection) -> ContactFrictionOut | None:
+    return None if found.contact_friction is None else ContactFrictionOut(**asdict(found.contact_friction))
+
+
 def _detection_out(log: StoredGraspLog) -> DetectionOut | None:
     found = log.detection
     if found is None or log.samples is None:
@@ -161,6 +188,7 @@ def _detection_out(log: StoredGraspLog) -> DetectionOut | None:
         samples=log.samples.count,
         seconds=found.seconds,
         findings=None if found.findings is None else [FindingOut(**asdict(each)) for each in found.findings],
+        contact_friction=_contact_friction_out(found),
     )
 
 

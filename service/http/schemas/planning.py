@@ -1,6 +1,6 @@
 """What a planner asks beyond a look-up: how hard to grip, and which material it is."""
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -116,6 +116,7 @@ class SamplesIn(Body):
     time: list[Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]]
     element: list[Annotated[int, Field(ge=0, lt=2**31)]]
     weight: list[Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]]
+    kind: Annotated[list[Literal["element", "contact"]] | None, Field(description="Without, all of elements")] = None
     element_area: Area
 
     @model_validator(mode="after")

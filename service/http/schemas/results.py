@@ -13,6 +13,7 @@ SAMPLES_EXAMPLE: JsonDict = {
     "time": [2.133],
     "element": [190],
     "weight": [0.97],
+    "kind": ["element"],
     "element_area": 1.0e-6,
 }
 
@@ -69,4 +70,5 @@ class SamplesOut(BaseModel):
     time: Annotated[list[float], Field(description="s")]
     element: Annotated[list[int], Field(description="Row-major index on the lattice")]
     weight: Annotated[list[float], Field(description="Probability that the element did slip")]
+    kind: Annotated[list[str], Field(description="`element`, or `contact` of a patch that slid or pivoted as a whole")]
     element_area: Annotated[float, Field(description="m²")]

@@ -107,12 +107,19 @@ def test_diagnostics_that_json_cannot_say_are_left_empty(samples: FrictionSample
     assert stored_results.to_new_model(fitted).diagnostics == {"rhat": None, "why": "short", "n": 3.0}
 
 
+def test_samples_keep_their_kind(samples: FrictionSamples, tmp_path: Path) -> None:
+    path, kind = tmp_path / "samples", np.where(np.arange(len(samples)) % 3 == 0, "contact", "element")
+    path.write_bytes(stored_results.encode_samples(replace(samples, kind=kind)))
+    assert stored_results.decode_samples(path).kind.tolist() == kind.tolist()
+
+
 def test_samples_stored_without_their_noise_are_still_read(samples: FrictionSamples, tmp_path: Path) -> None:
     path = tmp_path / "samples"
-    arrays = [getattr(samples, name) for name in stored_results.SAMPLE_ARRAYS]
+    arrays = [getattr(samples, name) for name in stored_results.SAMPLE_ARRAYS if name != "kind"]
     path.write_bytes(stored_results._pack([*arrays, np.array(samples.element_area)]))
     found = stored_results.decode_samples(path)
     assert (found.element_area, found.normal_force_noise) == (samples.element_area, 0.0)
+    assert set(found.kind) == {"element"}
     np.testing.assert_array_equal(found.normal_force, samples.normal_force)
 
 

@@ -80,7 +80,7 @@ def shop(database: Database, blobs: BlobStore) -> Shop:
 def calls(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     """Names of the numerics that were called."""
     made: list[str] = []
-    for module, name in ((slipcore, "detect_slip"), (slipcore, "collect_samples"), (estimators, "fit")):
+    for module, name in ((slipcore, "detect_slip"), (slipcore, "collect_friction"), (estimators, "fit")):
         original: Callable[..., Any] = getattr(module, name)
 
         def noted(*given: Any, _name: str = name, _original: Callable[..., Any] = original, **options: Any) -> Any:
@@ -96,7 +96,7 @@ def test_a_log_goes_through_all_stages(shop: Shop, content: bytes, calls: list[s
     job = shop.run(job_id)
     assert (job.status, job.model_version) == ("done", 1)
     assert list(job.seconds) == ["frames", "slip_state", "samples", "friction_model", "material"]
-    assert calls == ["detect_slip", "collect_samples", "fit", "fit"]
+    assert calls == ["detect_slip", "collect_friction", "fit", "fit"]
     found = shop.log(log_id)
     assert found.samples is not None
     assert {stored.model.method: stored.model.n for stored in shop.material().models} == {
@@ -146,7 +146,7 @@ def test_a_job_that_is_done_is_not_done_again(shop: Shop, content: bytes, calls:
 
 
 @pytest.mark.parametrize(
-    ("module", "name"), [(slipcore, "detect_slip"), (slipcore, "collect_samples"), (estimators, "fit")]
+    ("module", "name"), [(slipcore, "detect_slip"), (slipcore, "collect_friction"), (estimators, "fit")]
 )
 def test_a_worker_whose_job_went_to_another_stores_nothing_more(
     shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch, module: ModuleType, name: str
@@ -170,7 +170,7 @@ def test_a_worker_whose_job_went_to_another_stores_nothing_more(
 @pytest.mark.parametrize(
     ("dies_in", "left_to_do"),
     [
-        ("detections.add", ["detect_slip", "collect_samples", "fit", "fit"]),
+        ("detections.add", ["detect_slip", "collect_friction", "fit", "fit"]),
         ("friction_models.add", ["fit", "fit"]),
         ("jobs.finish", ["fit", "fit"]),
     ],

@@ -1,6 +1,6 @@
 import hashlib
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from service import formats
-from slipcore import LOOKAHEAD, GraspLog, collect_samples, detect_slip
+from slipcore import LOOKAHEAD, GraspLog, collect_samples, contact_friction, detect_slip
 from stiction_client.container import encode
 
 Upload = Callable[..., httpx.Response]
@@ -35,6 +35,9 @@ def test_what_was_found_is_what_the_numerics_find(client: httpx.Client, fitted: 
     assert found["stick_ratio_min"] == np.nanmin(history.stick_ratio)
     assert found["contact_frames"] == int(history.contact.any(axis=(1, 2)).sum())
     assert found["findings"] == []
+    contact = contact_friction(history.time, history.patches)
+    assert contact is not None
+    assert found["contact_friction"] == asdict(contact) | {"high": None}
     assert found["events"] == {kind: len(getattr(history.events, kind)) for kind in found["events"]}
     stored = client.get(f"/v1/grasp-logs/{fitted['id']}/samples").json()
     for name, values in stored.items():

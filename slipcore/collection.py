@@ -1,0 +1,109 @@
+"""Friction samples of a grasp: of its elements, and of its contacts as a whole."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from slipcore.frames import BoolArray, FloatArray, GraspLog
+from slipcore.patch.friction import contact_friction
+from slipcore.patch.plateau import runs
+from slipcore.patch.record import ContactFriction, Patch
+from slipcore.samples import KIND, FrictionSamples, element_samples
+from slipcore.slip_state import SlipHistory
+
+AGREEMENT = 0.15
+"""Share by which the friction of elements, weakly or strongly pressed, may lie beyond the contact's interval: slopes
+that are real make a few per cent of it, forces that are smoothed 40 to 100."""
+LEAST_SAMPLES = 40
+"""Of elements from which quarters of them are compared."""
+
+
+class Collected(NamedTuple):
+    """What a grasp tells of friction: the ``samples`` that are believed, those of all ``elements``, what the
+    ``contact`` as a whole tells (None without forces or contact), and why elements are left out (None: they are not).
+    """
+
+    samples: FrictionSamples
+    elements: FrictionSamples
+    contact: ContactFriction | None
+    elements_left_out: str | None
+
+
+def collect_samples(log: GraspLog, history: SlipHistory, **options: float) -> FrictionSamples:
+    """The samples of ``collect_friction``, of which this takes the arguments and raises the errors."""
+    return collect_friction(log, history, **options).samples
+
+
+def collect_friction(log: GraspLog, history: SlipHistory, **options: float) -> Collected:
+    """Observe friction at the elements of ``log`` that slip by ``history``, and of contacts that slide or pivot.
+
+    Where these contradict each other the contact is believed: smoothed forces and tilted normals hardly change its
+    sums. Elements of a contact that rolls tell nothing, for what slips by its motion does not.
+    ``options``: see ``defaults.SampleOptions``. Raises ``NoForces`` for a log without forces, ``UnknownScale`` for one
+    whose lengths are not in metres, ``InvalidInput`` for a history of another log and for bad options.
+    """
+    elements = element_samples(log, history, **options)
+    contact = contact_friction(log.time, history.patches)
+    left_out = None if contact is None or not len(elements) else contradiction(elements, contact, history.patches)
+    parts = [_contact_samples(log, number, patch, elements) for number, patch in enumerate(history.patches)]
+    kept = elements.take(np.full(len(elements), left_out is None))
+    return Collected(FrictionSamples.concatenate([kept, *parts]), elements, contact, left_out)
+
+
+def contradiction(elements: FrictionSamples, contact: ContactFriction, patches: Sequence[Patch]) -> str | None:
+    """Why the elements cannot be right, if the contact is."""
+    if contact.is_bound and _rolls(patches):
+        return contact.reason
+    if len(elements) < LEAST_SAMPLES:
+        return None
+    low, high = np.quantile(elements.normal_force, [0.25, 0.75])
+    weakly, strongly = (
+        float(np.median(elements.friction_coefficient[chosen]))
+        for chosen in (elements.normal_force <= low, elements.normal_force >= high)
+    )
+    least, most = (1.0 - AGREEMENT) * contact.low, (1.0 + AGREEMENT) * contact.high
+    if least <= min(weakly, strongly) and max(weakly, strongly) <= most:
+        return None
+    told = f"{'at least ' if contact.is_bound else ''}{contact.low if contact.is_bound else contact.coefficient:.2f}"
+    return (
+        f"elements show friction of {weakly:.2f} where they press least and {strongly:.2f} where they press most, "
+        f"the contact as a whole {told}"
+    )
+
+
+def _rolls(patches: Sequence[Patch]) -> bool:
+    """Whether the contact rolls for most of its time."""
+    regime = np.concatenate([patch.regime for patch in patches])
+    return bool(np.count_nonzero(regime == "rolling") > 0.5 * np.count_nonzero(regime != "none"))
+
+
+def _contact_samples(log: GraspLog, number: int, patch: Patch, elements: FrictionSamples) -> FrictionSamples:
+    """One sample a frame of a patch on a plateau.
+
+    The law of friction is linear: a contact's friction is the law's at the means, weighted by force, of velocity and of
+    its elements' normal force. These are taken over each plateau, for what they vary in it is mostly their noise.
+    """
+    on, count = patch.plateau, int(np.count_nonzero(patch.plateau))
+    speed, force = (_means_of_runs(field, on)[on] for field in (patch.speed, patch.element_force))
+    beyond = log.grid[0] * log.grid[1] + number
+    return FrictionSamples(
+        friction_coefficient=patch.load_ratio[on],
+        tangential_velocity=speed,
+        normal_force=force,
+        tangential_force=patch.load_ratio[on] * force,
+        time=log.time[on],
+        element=np.full(count, beyond),
+        weight=np.ones(count),
+        element_area=log.element_area,
+        normal_force_noise=elements.normal_force_noise,
+        kind=np.full(count, "contact", KIND),
+    )
+
+
+def _means_of_runs(field: FloatArray, chosen: BoolArray) -> FloatArray:
+    """The field [t] with each stretch of chosen frames levelled to its mean."""
+    level = field.copy()
+    for run in runs(chosen):
+        level[run] = field[run].mean()
+    return level
