@@ -20,7 +20,7 @@ import slipcore
 import stiction_client
 from estimators import fitting
 from service import cli
-from slipcore import contact
+from slipcore import contact, forces
 from slipcore.contact import reference
 
 ROOT = Path(__file__).parents[1]
@@ -141,7 +141,7 @@ def test_each_method_is_documented(page: str, methods: list[str]) -> None:
 
 
 @pytest.mark.parametrize(
-    "module", [slipcore, contact, reference, estimators, stiction_client], ids=lambda m: m.__name__
+    "module", [slipcore, contact, reference, forces, estimators, stiction_client], ids=lambda m: m.__name__
 )
 def test_each_public_name_is_in_the_reference_with_a_docstring(module: ModuleType) -> None:
     assert f"::: {module.__name__}\n" in (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")

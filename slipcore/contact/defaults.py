@@ -92,6 +92,18 @@ class LayerDefaults(Options):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class InteriorDefaults(Options):
+    """Displacement below the surface (``elasticity/interior.py``)."""
+
+    cell_tolerance: Annotated[float, Option(1e-15, 1e-2, "-", "well below what any marker's noise shows")] = 1e-9
+    """Of Gauss quadrature over a cell, as a share of the response."""
+    near: Annotated[int, Option(1, 100, "cells", "beyond, the distance alone makes the response smooth")] = 4
+    """Cells around the load that are integrated with as many points as the depth asks for."""
+    most_points: Annotated[int, Option(2, 1000, "points", "enough from a thirtieth of the cell's side on")] = 96
+    """Gauss points along one side of a cell near the load."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class InfluenceDefaults(Options):
     """Influence functions of a half-space (``elasticity/influence.py``)."""
 
@@ -390,6 +402,7 @@ SCHEDULE = ScheduleDefaults()
 SCENE = SceneDefaults()
 FIDELITY = FidelityDefaults()
 LAYER = LayerDefaults()
+INTERIOR = InteriorDefaults()
 INFLUENCE = InfluenceDefaults()
 NORMAL = NormalDefaults()
 TANGENTIAL = TangentialDefaults()
@@ -404,7 +417,7 @@ WORLD = WorldDefaults()
 REFERENCE = ReferenceDefaults()
 
 TABLES = (
-    RAMP, SCHEDULE, SCENE, FIDELITY, LAYER, INFLUENCE, NORMAL, TANGENTIAL, PROJECTION, LIMIT_SURFACE, STEP, PROBE,
-    ACCURACY, CHEAP_TIERS, EXPLAIN, WORLD, REFERENCE,
+    RAMP, SCHEDULE, SCENE, FIDELITY, LAYER, INTERIOR, INFLUENCE, NORMAL, TANGENTIAL, PROJECTION, LIMIT_SURFACE, STEP,
+    PROBE, ACCURACY, CHEAP_TIERS, EXPLAIN, WORLD, REFERENCE,
 )  # fmt: skip
 """All tables of the simulator."""

@@ -98,8 +98,8 @@ def radial_functions(layer: BondedLayer, reach: float) -> RadialFunctions:
 
     A wave's longitudinal L and transverse T give (L + T)/2 with J₀ and (L − T)/2 with J₂; its coupling goes with J₁.
     """
-    k, weight = _wave_numbers(min(reach, LAYER.far), layer.thickness)
-    radius = _radii(reach, layer.thickness)
+    k, weight = wave_numbers(min(reach, LAYER.far), layer.thickness)
+    radius = radii(reach, layer.thickness)
     near = radius <= LAYER.far * layer.thickness
     phase = np.multiply.outer(radius[near], k)
     zero, one = special.j0(phase), special.j1(phase)
@@ -108,7 +108,7 @@ def radial_functions(layer: BondedLayer, reach: float) -> RadialFunctions:
     def transform(bessel: FloatArray, of_wave: FloatArray, of_half_space: FloatArray) -> Chebyshev:
         value = -of_half_space / radius
         value[near] = bessel @ (weight * k * of_wave)
-        return _polynomial(value / (2.0 * np.pi), reach)
+        return polynomial(value / (2.0 * np.pi), reach)
 
     return RadialFunctions(
         normal=transform(zero, base.normal, free.normal),
@@ -122,14 +122,14 @@ def radial_functions(layer: BondedLayer, reach: float) -> RadialFunctions:
     )
 
 
-def _radii(reach: float, thickness: float) -> FloatArray:
+def radii(reach: float, thickness: float) -> FloatArray:
     """Chebyshev points of asinh(r/2h), as distances m."""
     points = np.polynomial.chebyshev.chebpts1(LAYER.degree + 1)
     return np.asarray(2.0 * thickness * np.sinh(0.5 * (points + 1.0) * np.arcsinh(0.5 * reach)))
 
 
-def _polynomial(value: FloatArray, reach: float) -> Chebyshev:
-    """The polynomial through values at ``_radii``, without coefficients that do not count."""
+def polynomial(value: FloatArray, reach: float) -> Chebyshev:
+    """The polynomial through values at ``radii``, without coefficients that do not count."""
     coefficients = scipy.fft.dct(value[::-1], type=2) / len(value)
     coefficients[0] *= 0.5
     size = np.abs(coefficients)
@@ -137,11 +137,11 @@ def _polynomial(value: FloatArray, reach: float) -> Chebyshev:
     return Chebyshev(coefficients[:kept], domain=[0.0, float(np.arcsinh(0.5 * reach))])
 
 
-def _wave_numbers(reach: float, thickness: float) -> tuple[FloatArray, FloatArray]:
-    """Nodes (1/m) and weights of Gauss quadrature over all waves that reach the base."""
-    panels = int(np.ceil(LAYER.deepest_wave * max(reach, 2.0) / LAYER.panel_phase))
+def wave_numbers(reach: float, thickness: float, deepest: float = LAYER.deepest_wave) -> tuple[FloatArray, FloatArray]:
+    """Nodes (1/m) and weights of Gauss quadrature over all waves that reach the base: those of kh up to ``deepest``."""
+    panels = int(np.ceil(deepest * max(reach, 2.0) / LAYER.panel_phase))
     node, weight = np.polynomial.legendre.leggauss(LAYER.panel_points)
-    width = LAYER.deepest_wave / panels
+    width = deepest / panels
     y = width * (np.arange(panels)[:, None] + 0.5 * (node + 1.0)[None, :])
     return y.ravel() / thickness, np.tile(0.5 * width * weight, panels) / thickness
 

@@ -1,0 +1,45 @@
+"""What is believed of traction before any marker is seen: a Gaussian field, alike everywhere on its support."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from slipcore.frames import FloatArray
+
+JITTER = 1e-8
+"""Added to the correlation of a node with itself, so that nodes much closer than a length stay distinct."""
+
+
+class Smoothness(NamedTuple):
+    """Shape of the prior: correlation lengths of ``pressure`` and of ``traction``, in pitches (Matérn 3/2: slopes
+    exist, curvature need not), and the standard deviation of either tangential component as a ``shear`` of that of
+    pressure.
+    """
+
+    pressure: float
+    traction: float
+    shear: float
+
+
+CHOICES: dict[str, tuple[float, ...]] = {
+    "pressure": (3.0, 6.0, 12.0),
+    "traction": (1.5, 3.0, 6.0),
+    "shear": (0.1, 0.3, 1.0),
+}
+"""Values of a prior's shape among which the data choose."""
+USUAL = Smoothness(6.0, 3.0, 0.3)
+"""Where the choice begins, and what is taken where nothing is chosen."""
+
+
+def factors(places: FloatArray, pitch: float, smoothness: Smoothness) -> FloatArray:
+    """L [3, k, k], lower triangular: L Lᵀ is the prior covariance of q_x, q_y and p at ``places`` [k, 2] m, for a
+    pressure of standard deviation 1.
+    """
+    apart = np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1)) / pitch
+    traction = smoothness.shear * _factor(apart / smoothness.traction)
+    return np.stack((traction, traction, _factor(apart / smoothness.pressure)))
+
+
+def _factor(apart: FloatArray) -> FloatArray:
+    reach = np.sqrt(3.0) * apart
+    return np.linalg.cholesky((1.0 + reach) * np.exp(-reach) + JITTER * np.eye(len(apart)))

@@ -1,0 +1,289 @@
+"""Forces on micro-elements from the displacement of markers (stage 2 of logs that have no forces)."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from slipcore.errors import InvalidInput, UnknownScale
+from slipcore.forces.fit import Fit, Observation, Prior, choose_prior, fit
+from slipcore.forces.gel import Gel
+from slipcore.forces.nodes import Nodes
+from slipcore.forces.response import response_matrix
+from slipcore.forces.strength import Criterion
+from slipcore.forces.support import better_support, relevant_nodes, widened
+from slipcore.forces.whole_lattice import WholeLattice, whole_lattice
+from slipcore.frames import BoolArray, FloatArray, GraspLog
+
+DISCRETISATION = 1e-3
+"""Error of bilinear tractions one to a marker, as a share of a frame's largest displacement: up to 1 µm of 1 mm."""
+CHANGE = 0.1
+"""Change of the displacement, as a share of it, after which the contact is sought anew."""
+SIGNIFICANT = 5.0
+"""Standard deviations by which a frame's mean square must exceed that of noise for something to touch."""
+PRESSES, LEAST_PRESSURE = 3.0, 0.03
+"""Standard deviations of a node's pressure, and share of the frame's largest, above which it may be in contact."""
+TOUCHES, LEAST_FORCE = 2.0, 0.06
+"""The same of an element's normal force, above which it is said to be in contact."""
+MODEL_ERROR = (2e-3, 1e-2)
+"""Standard deviation of what bilinear tractions and the shape of the contact leave wrong: of a resultant as a share of
+it, of an element's force as a share of the largest."""
+FORCE_TOLERANCE = 0.01
+"""Standard deviation of a given total force, as a share of it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reconstruction:
+    """Forces by the object, and how well they are known.
+
+    ``force`` [t, n, m, 3] N on each element, z outward, with its standard ``deviation``; ``resultant`` [t, 3] N of the
+    whole contact, also of what lies beyond the lattice, with ``resultant_deviation``; ``contact`` [t, n, m];
+    ``kernel_width`` m: side of the square over which forces are in effect averaged; ``information`` [3]: share of what
+    is known of the resultant's x, y and z that data tell and not the prior (both at the frame that moved markers most;
+    NaN and no information without contact); ``noise`` m of a marker's coordinate that was assumed.
+    """
+
+    force: FloatArray
+    deviation: FloatArray
+    resultant: FloatArray
+    resultant_deviation: FloatArray
+    contact: BoolArray
+    kernel_width: float
+    information: FloatArray
+    noise: float
+
+    def apply(self, log: GraspLog) -> GraspLog:
+        """The log with these forces, which its metadata call reconstructed, and their contact where it knows none."""
+        if self.force.shape != log.displacement.shape:
+            raise InvalidInput("log", f"of shape {list(log.displacement.shape)}", f"{list(self.force.shape)}")
+        normal = np.broadcast_to([0.0, 0.0, 1.0], self.force.shape)  # linear theory: loads act on the undeformed plane
+        return replace(log, force=self.force, normal=normal, metadata={**log.metadata, "force": "reconstructed"})
+
+    @property
+    def force_noise(self) -> float:
+        """Typical standard deviation of an element's normal force in contact, N; 0 without contact."""
+        touching = self.deviation[..., 2][self.contact]
+        return float(np.median(touching)) if touching.size else 0.0
+
+
+def reconstruct(
+    log: GraspLog,
+    gel: Gel,
+    total_force: ArrayLike | None = None,
+    noise: float | None = None,
+    criterion: Criterion = "evidence",
+) -> Reconstruction:
+    """Find the forces that moved a log's markers, by Bayesian inversion of the gel's elastic response.
+
+    ``total_force``: what a gripper or a wrist measured, [t] N of normal force (positive where it presses) or [t, 3] N
+    of the object on the sensor, NaN where unknown; ``noise`` m of a marker's coordinate (None: estimated from the log);
+    ``criterion`` that chooses the strength of the prior. Markers whose z never changes count as seen in the plane only.
+    Raises ``UnknownScale`` for a log not in metres and ``InvalidInput`` for what does not fit.
+    """
+    if not log.is_scaled:
+        raise UnknownScale("forces follow from displacement in m, and the log's scale is unknown")
+    sensor = _Sensor.of(log, gel, _noise(log, noise))
+    recording = _Recording.of(log, sensor, _total_force(total_force, len(log)))
+    result = _nothing(log, sensor.noise)
+    touched = recording.touched()
+    if not touched.any():
+        return result
+    strongest = int(np.argmax(np.where(touched, np.sum(recording.data**2, axis=1), 0.0)))
+    tracker = _Tracker.of(sensor, *recording.frame(strongest), criterion)
+    result = replace(
+        result,
+        information=tracker.key.fit.information(),
+        kernel_width=tracker.key.fit.kernel_width(tracker.key.observation, sensor.nodes.grid.pitch[0]),
+    )
+    for way in (range(strongest, len(log)), range(strongest - 1, -1, -1)):
+        now = tracker
+        for t in way:
+            if touched[t]:
+                now = now.at(*recording.frame(t))
+                _write(result, t, sensor, now.key, recording.frame(t)[1])
+    return result
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Sensor:
+    """What no frame changes, for tractions in Young's moduli: the ``response`` [m, 3, k] m of markers, ``elements`` [e,
+    k] N of theirs by tractions at nodes, and ``load`` N, the force by a traction of 1 at one node.
+    """
+
+    nodes: Nodes
+    response: FloatArray
+    elements: FloatArray
+    load: float
+    axes: tuple[int, ...]
+    noise: float
+
+    @classmethod
+    def of(cls, log: GraspLog, gel: Gel, noise: float) -> "_Sensor":
+        place = log.position[..., :2].reshape(-1, 2)
+        nodes = Nodes.around(place, log.element_area)
+        axes = (0, 1, 2) if log.displacement[..., 2].any() else (0, 1)
+        response = response_matrix(gel, nodes, place)[list(axes)].reshape(len(axes) * len(place), 3, len(nodes))
+        young = gel.young_modulus
+        return cls(nodes, young * response, young * nodes.over_elements(place), young * nodes.area, axes, noise)
+
+
+def _noise(log: GraspLog, noise: float | None) -> float:
+    if noise is None:
+        from slipcore.detection.shared.noise import estimate_noise  # compiled
+
+        plane = log.displacement[..., :2].reshape(len(log), -1, 2).swapaxes(1, 2)
+        return float(np.nan_to_num(estimate_noise(log.time, plane)))
+    if not 0.0 <= noise < np.inf:
+        raise InvalidInput("noise", noise, "0 m or more, finite")
+    return noise
+
+
+def _total_force(given: ArrayLike | None, frames: int) -> FloatArray:
+    """Resultant [t, 3] N in the gel's frame (z into it), NaN where it is not known."""
+    total = np.full((frames, 3), np.nan)
+    if given is not None:
+        force = np.asarray(given, dtype=np.float64)
+        if force.shape not in {(frames,), (frames, 3)} or np.isinf(force).any():
+            raise InvalidInput("total_force", f"of shape {list(force.shape)}", f"finite, [{frames}] or [{frames}, 3] N")
+        total[:, 2 if force.ndim == 1 else slice(3)] = force * (1.0 if force.ndim == 1 else [1.0, 1.0, -1.0])
+    return total
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Recording:
+    """Displacements ``data`` [t, m] m along the axes that are seen, one after the other, z into the gel; which are
+    ``seen`` [t, m]; and ``given`` resultants [t, 3] N, NaN where unknown.
+    """
+
+    sensor: _Sensor
+    data: FloatArray
+    seen: BoolArray
+    given: FloatArray
+
+    @classmethod
+    def of(cls, log: GraspLog, sensor: _Sensor, given: FloatArray) -> "_Recording":
+        inwards = np.moveaxis(log.displacement * [1.0, 1.0, -1.0], -1, 1)[:, list(sensor.axes)]
+        shown = np.ones(inwards.shape, bool) if log.observed is None else log.observed[:, None] & (inwards == inwards)
+        return cls(sensor, inwards.reshape(len(log), -1), shown.reshape(len(log), -1), given)
+
+    def touched(self) -> BoolArray:
+        """Frames [t] in which markers moved by more than noise."""
+        count = np.maximum(self.seen.sum(axis=1), 1)
+        power = np.sum(np.where(self.seen, self.data, 0.0) ** 2, axis=1) / count
+        return np.asarray(power > self.sensor.noise**2 * (1.0 + SIGNIFICANT * np.sqrt(2.0 / count)))
+
+    def frame(self, t: int) -> tuple[Observation, FloatArray]:
+        """What one frame tells: displacements, then the parts of its resultant that are given."""
+        data, given = self.data[t], self.given[t]
+        error = np.hypot(self.sensor.noise, DISCRETISATION * np.abs(data[self.seen[t]]).max(initial=0.0))
+        known = np.flatnonzero(np.isfinite(given))
+        if not known.size and self.seen[t].all():
+            return Observation(self.sensor.response, np.full(len(data), error)), data
+        rows = np.zeros((len(known), *self.sensor.response.shape[1:]))
+        rows[np.arange(len(known)), known] = self.sensor.load
+        largest = np.nanmax(np.abs(self.given), initial=1e-9)
+        tolerance = FORCE_TOLERANCE * np.maximum(np.abs(given[known]), FORCE_TOLERANCE * largest)
+        noise = np.concatenate((np.where(self.seen[t], error, np.inf), tolerance))
+        return Observation(np.concatenate((self.sensor.response, rows)), noise), np.concatenate((data, given[known]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Key:
+    """A frame at which the contact was sought, and the fit that holds until markers have moved on."""
+
+    observation: Observation
+    data: FloatArray
+    fit: Fit
+
+    def holds(self, observation: Observation, data: FloatArray) -> bool:
+        """Whether a frame sees the same markers and differs little."""
+        if len(data) != len(self.data) or ((observation.noise == np.inf) != (self.observation.noise == np.inf)).any():
+            return False
+        change, before = (data - self.data) / self.observation.noise, self.data / self.observation.noise
+        return bool(np.linalg.norm(change) <= CHANGE * np.linalg.norm(before))
+
+    def misfit(self, traction: FloatArray, data: FloatArray) -> float:
+        """Root mean square of the residuals over their noise, at least 1."""
+        explained = self.observation.response[:, :, self.fit.support].reshape(len(data), -1) @ traction.ravel()
+        residual = (data - explained) / self.observation.noise
+        return float(np.sqrt(max(1.0, residual @ residual / max(np.isfinite(self.observation.noise).sum(), 1))))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Tracker:
+    """The contact followed from frame to frame, under one prior; ``lattice`` where depth is seen."""
+
+    sensor: _Sensor
+    prior: Prior
+    key: _Key
+    lattice: WholeLattice | None
+
+    @classmethod
+    def of(cls, sensor: _Sensor, observation: Observation, data: FloatArray, criterion: Criterion) -> "_Tracker":
+        """Begin with a frame, which chooses the prior."""
+        shape, count, lattice = sensor.nodes.grid.shape, len(sensor.response), None
+        if len(sensor.axes) == 3:
+            everywhere = Observation(sensor.response, np.full(count, np.min(observation.noise[:count])))
+            lattice = whole_lattice(everywhere, sensor.nodes, float(np.sqrt(np.mean(data[:count] ** 2))))
+            support = _pressed(lattice, data[:count], shape)
+        else:
+            support = relevant_nodes(observation, data, np.ones(shape, dtype=bool))
+        prior = choose_prior(observation, data, sensor.nodes, support.ravel(), criterion)
+        if lattice is None:
+            support = better_support(observation, data, sensor.nodes, support, prior)
+        key = _Key(observation, data, fit(observation, sensor.nodes, support.ravel(), prior))
+        return cls(sensor, prior, key, lattice)
+
+    def at(self, observation: Observation, data: FloatArray) -> "_Tracker":
+        """Go on to another frame; the contact is sought again only where markers have moved on."""
+        if self.key.holds(observation, data):
+            return self
+        nodes, count = self.sensor.nodes, len(self.sensor.response)
+        if self.lattice is not None:
+            support = _pressed(self.lattice, data[:count], nodes.grid.shape)
+        else:
+            before = self.key.fit.support.reshape(nodes.grid.shape)
+            support = better_support(observation, data, nodes, before, self.prior)
+        return replace(self, key=_Key(observation, data, fit(observation, nodes, support.ravel(), self.prior)))
+
+
+def _pressed(lattice: WholeLattice, data: FloatArray, shape: tuple[int, int]) -> BoolArray:
+    """Nodes [ny, nx] with a pressure that is not noise, and one row around them; never none."""
+    pressure, deviation = lattice.operator[2] @ data, lattice.deviation[2]
+    least = np.maximum(PRESSES * deviation, LEAST_PRESSURE * pressure.max())
+    pressed = (pressure > least) | (pressure == pressure.max())
+    return widened(pressed.reshape(shape), 1)
+
+
+def _nothing(log: GraspLog, noise: float) -> Reconstruction:
+    """Forces of zero, to be written to."""
+    shape = log.displacement.shape
+    return Reconstruction(
+        force=np.zeros(shape),
+        deviation=np.zeros(shape),
+        resultant=np.zeros((len(log), 3)),
+        resultant_deviation=np.zeros((len(log), 3)),
+        contact=np.zeros(shape[:3], dtype=bool),
+        kernel_width=float("nan"),
+        information=np.zeros(3),
+        noise=noise,
+    )
+
+
+def _write(result: Reconstruction, t: int, sensor: _Sensor, key: _Key, data: FloatArray) -> None:
+    """Put one frame's forces into the result; what the fit leaves unexplained beyond noise widens its deviations."""
+    support, grid = key.fit.support, result.contact.shape[1:]
+    traction = key.fit.traction(data)
+    elements = sensor.elements[:, support]
+    outward = np.array([1.0, 1.0, -1.0])
+    misfit = key.misfit(traction, data)
+    force = (elements @ traction.T) * outward
+    of_all, of_element = MODEL_ERROR
+    deviation = np.hypot(misfit * key.fit.deviation(elements).T, of_element * np.abs(force).max())
+    result.force[t], result.deviation[t] = force.reshape(*grid, 3), deviation.reshape(*grid, 3)
+    result.resultant[t] = sensor.load * traction.sum(axis=1) * outward
+    total = sensor.load * key.fit.deviation(np.ones((1, elements.shape[1])))[:, 0]
+    result.resultant_deviation[t] = np.hypot(misfit * total, of_all * np.linalg.norm(result.resultant[t]))
+    normal = -force[:, 2]
+    least = np.maximum(TOUCHES * deviation[:, 2], LEAST_FORCE * normal.max())
+    result.contact[t] = ((normal > least) & (elements.sum(axis=1) > 0.5 * sensor.load)).reshape(grid)

@@ -1,0 +1,90 @@
+"""Displacement of markers by traction on the surface: the forward operator."""
+
+import numpy as np
+from scipy.ndimage import convolve1d, map_coordinates
+
+from slipcore.contact.elasticity.bonded_layer import LayerBase
+from slipcore.contact.elasticity.grid import Grid
+from slipcore.contact.elasticity.influence import ElasticBody, HalfSpace
+from slipcore.contact.elasticity.interior import Below, Interior
+from slipcore.contact.elasticity.operator import ElasticOperator
+from slipcore.forces.gel import Gel
+from slipcore.forces.nodes import Nodes
+from slipcore.frames import FloatArray
+
+CELLS = 7
+"""Cells a pitch, an odd number, of which hat functions are made and between which is interpolated."""
+FINER, NEAR = 7, 3
+"""Within ``NEAR`` pitches of a hat function it is made of ``FINER`` times as small cells: 2e-4 of the response at its
+peak, where ``CELLS`` alone leave 1e-2."""
+
+ODD_X, ODD_Y = frozenset({"xy", "zx", "xz"}), frozenset({"xy", "zy", "yz"})
+"""Components that change their sign with x, and with y."""
+
+
+def response_matrix(gel: Gel, nodes: Nodes, position: FloatArray) -> FloatArray:
+    """Displacement of markers by traction on the nodes' hat functions: [3, j, 3, k] m/Pa.
+
+    ``position`` [j, 2] m: markers at rest, at the gel's ``marker_depth``. Directions are x, y and *into* the gel, of
+    displacement first and of traction (x, y, pressure) last. Normal and tangential directions are coupled.
+    """
+    pitch = nodes.grid.pitch[0]
+    offset = (position[:, None, :] - nodes.places()[None]) / (pitch / CELLS)
+    reach = int(np.ceil(np.abs(offset).max())) + 3  # a cubic spline ends three cells beyond
+    far, near = hat_responses(gel, pitch, CELLS, reach), hat_responses(gel, pitch, CELLS * FINER, NEAR * CELLS * FINER)
+    middle = (slice(reach - NEAR * CELLS, reach + NEAR * CELLS + 1),) * 2
+    matrix = np.empty((3, len(position), 3, len(nodes)))
+    for component, table in far.items():
+        table[middle] = near[component][::FINER, ::FINER]
+        value = map_coordinates(table, [offset[..., 1] + reach, offset[..., 0] + reach], order=3)
+        for to, by in _places(component):
+            matrix[to, :, by] = value
+    return matrix
+
+
+def hat_responses(gel: Gel, pitch: float, cells: int, reach: int) -> dict[Below, FloatArray]:
+    """Displacements (m) by 1 Pa on a hat function of half-width ``pitch``, made of so many cells a pitch.
+
+    At offsets of up to ``reach`` cells along y and x from its centre, each [2 reach + 1, 2 reach + 1].
+    """
+    side = reach + cells + 1
+    kernels = cell_responses(gel, Grid((side, side), (pitch / cells, pitch / cells)))
+    return {component: _by_hats(_mirrored(kernel, component), cells) for component, kernel in kernels.items()}
+
+
+def cell_responses(gel: Gel, grid: Grid) -> dict[Below, FloatArray]:
+    """Displacements (m) by 1 Pa on one cell at the first quadrant's offsets, by the contact simulator's kernels."""
+    if gel.marker_depth > 0.0:
+        return Interior(gel.young_modulus, gel.poisson_ratio, gel.thickness, gel.marker_depth).influences(grid)
+    bodies: list[ElasticBody] = [HalfSpace.from_young(gel.young_modulus, gel.poisson_ratio)]
+    if np.isfinite(gel.thickness):
+        bodies.append(LayerBase(gel.thickness, gel.young_modulus, gel.poisson_ratio))
+    operator = ElasticOperator(tuple(bodies), grid)
+    surface: dict[Below, FloatArray] = {}
+    for component in ("nn", "xx", "xy", "yy", "zx", "zy"):
+        kernel = operator.kernel(component)
+        surface[component] = np.zeros(grid.shape) if kernel is None else kernel
+    return surface | {"xz": -surface["zx"], "yz": -surface["zy"]}
+
+
+def _places(component: Below) -> tuple[tuple[int, int], ...]:
+    """Directions of displacement and of traction that a component couples."""
+    to, by = ("xyz".index(letter) for letter in component.replace("n", "z"))
+    return ((to, by), (by, to)) if component == "xy" else ((to, by),)
+
+
+def _mirrored(quadrant: FloatArray, component: Below) -> FloatArray:
+    """Kernel at all offsets, [2 ny − 1, 2 nx − 1]."""
+    left = quadrant[:, :0:-1] * (-1.0 if component in ODD_X else 1.0)
+    half = np.concatenate((left, quadrant), axis=1)
+    return np.concatenate((half[:0:-1] * (-1.0 if component in ODD_Y else 1.0), half))
+
+
+def _by_hats(kernel: FloatArray, cells: int) -> FloatArray:
+    """Response to a hat function of ``cells`` cells half-width, from that to one cell; without the cells it reaches."""
+    weight = 1.0 - np.abs(np.arange(-cells, cells + 1)) / cells
+    weight[cells] -= 0.25 / cells  # means of the hat over the cell in its middle
+    weight[[0, -1]] = 0.125 / cells  # and over those at its foot
+    for axis in (0, 1):
+        kernel = convolve1d(kernel, weight, axis=axis)
+    return np.ascontiguousarray(kernel[cells:-cells, cells:-cells])

@@ -1,0 +1,89 @@
+"""The strength of a Gaussian prior, chosen by the data through singular values.
+
+With d = A L c g/σ + e, e and c standard normal, and A L/σ = U s Vᵀ: along each singular direction the data y = Uᵀ d/σ
+have the variance 1 + g² s².
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import scipy.linalg
+from scipy.optimize import minimize_scalar
+
+from slipcore.errors import InvalidInput
+from slipcore.frames import FloatArray
+
+Criterion = Literal["evidence", "gcv", "discrepancy"]
+
+
+MOST_STRENGTH = 1.0
+"""Standard deviation of pressure in Young's moduli: linear elasticity ends far below, and a model that misses what the
+data show must not explain it by pressures that no gel bears."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Spectrum:
+    """Singular values ``s`` [r] and their directions ``u`` [m, r] of data."""
+
+    u: FloatArray
+    s: FloatArray
+
+    @classmethod
+    def of(cls, whitened: FloatArray) -> "Spectrum":
+        """Of data that are already divided by their noise, [m, p]."""
+        u, s, _ = scipy.linalg.svd(whitened, full_matrices=False, check_finite=False)
+        return cls(u, s)
+
+    @property
+    def condition(self) -> float:
+        """Largest over smallest singular value."""
+        return float(self.s[0] / self.s[-1]) if self.s[-1] > 0.0 else np.inf
+
+    def choose(self, data: FloatArray, rest: float, count: int, criterion: Criterion) -> float:
+        """The strength that a criterion prefers for whitened data [m], up to ``MOST_STRENGTH``.
+
+        ``rest``: sum of squares of further data that no coefficient reaches; ``count`` of all data. Raises
+        ``InvalidInput`` for a criterion unknown.
+        """
+        if criterion not in CRITERIA:
+            raise InvalidInput("criterion", criterion, ", ".join(CRITERIA))
+        y = data @ self.u
+
+        def price(log_strength: float) -> float:
+            return CRITERIA[criterion](self.s, y, rest, count, float(np.exp(log_strength)))
+
+        low, high = np.log(min(1e-2 / self.s[0], 1e-3 * MOST_STRENGTH)), np.log(MOST_STRENGTH)
+        grid = np.linspace(low, high, 41)
+        best = int(np.argmin([price(at) for at in grid]))
+        around = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
+        return float(np.exp(minimize_scalar(price, bounds=around, method="bounded").x))
+
+    def log_evidence(self, data: FloatArray, strength: float) -> float:
+        """Log probability of whitened data [m], without what no choice changes."""
+        return -_evidence(self.s, data @ self.u, 0.0, len(data), strength)
+
+
+def _evidence(s: FloatArray, y: FloatArray, rest: float, _count: int, strength: float) -> float:
+    spread = 1.0 + (strength * s) ** 2
+    return 0.5 * float(np.sum(y**2 / spread) + np.sum(np.log(spread)) + rest)
+
+
+def _gcv(s: FloatArray, y: FloatArray, rest: float, count: int, strength: float) -> float:
+    left = 1.0 / (1.0 + (strength * s) ** 2)
+    return float(np.log(np.sum((left * y) ** 2) + rest) - 2.0 * np.log(count - len(y) + left.sum()))
+
+
+def _discrepancy(s: FloatArray, y: FloatArray, rest: float, count: int, strength: float) -> float:
+    left = 1.0 / (1.0 + (strength * s) ** 2)
+    return float(np.abs(np.log((np.sum((left * y) ** 2) + rest) / count)))
+
+
+CRITERIA: dict[str, Callable[[FloatArray, FloatArray, float, int, float], float]] = {
+    "evidence": _evidence,
+    "gcv": _gcv,
+    "discrepancy": _discrepancy,
+}
+"""What the strength of a prior minimises: minus the log marginal likelihood; generalised cross-validation; how far the
+residual is from the noise (Morozov)."""

@@ -1,0 +1,112 @@
+"""Where the object touches: nodes without which the displacement cannot be explained.
+
+Each node has a variance, shared by its three tractions, and all of them are raised to what makes the displacement most
+probable (automatic relevance determination; MacKay, Neural Comput. 4 (1992) 415; Tipping, J. Mach. Learn. Res. 1 (2001)
+211). Nodes that the data do not need fall to zero and are left out. A contact is no scatter of single nodes, so each
+node's variance is estimated with its neighbours' (Fang et al., IEEE Trans. Signal Process. 63 (2015) 360). Only *where*
+is found so; how much comes from a fit on that support.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.linalg
+from scipy.ndimage import binary_closing, binary_dilation, binary_erosion, convolve1d, generate_binary_structure
+
+from slipcore.forces.fit import Observation, Prior, log_evidence
+from slipcore.forces.nodes import Nodes
+from slipcore.forces.strength import MOST_STRENGTH
+from slipcore.frames import BoolArray, FloatArray
+
+MOST_ROUNDS = 40
+LEAST_SHARE = 1e-3
+"""Variance, as a share of the largest, under which a node is left out."""
+SETTLED = 0.02
+"""Mean change of the logarithms of variances at which they have converged."""
+SHEAR = 0.3
+"""Standard deviation of a tangential component over that of pressure: of the size of friction coefficients."""
+COUPLING = (0.1, 1.0, 0.1)
+"""Weights of a node and of those beside it, along each axis. Without them every other node of a contact is left out;
+with (¼, 1, ¼) the contact grows by half an element more."""
+
+MOST_STEPS = 6
+STEPS: tuple[Callable[[BoolArray], BoolArray], ...] = (binary_dilation, binary_erosion, binary_closing)
+"""How a contact may change: by one row of nodes at its rim, or over a gap."""
+
+
+def relevant_nodes(observation: Observation, data: FloatArray, candidates: BoolArray) -> BoolArray:
+    """Nodes [ny, nx] among ``candidates`` that displacement ``data`` [m] m needs."""
+    chosen = np.flatnonzero(candidates)
+    scale = np.array([SHEAR, SHEAR, 1.0])[:, None]
+    used = observation.response[:, :, chosen] * (scale / observation.noise[:, None, None])
+    data = data / observation.noise
+    variance = np.full(len(chosen), float(data @ data) / float(np.sum(used**2)))
+    for _ in range(MOST_ROUNDS):
+        gain, freedom = _explained(used, data, np.sqrt(variance))
+        new = _pooled(variance * gain, chosen, candidates.shape)
+        new /= np.maximum(_pooled(freedom, chosen, candidates.shape), 1e-12)
+        new = np.minimum(new, MOST_STRENGTH**2)
+        kept = new > LEAST_SHARE * new.max()
+        change = float(np.abs(np.log(new[kept] / variance[kept])).mean())
+        chosen, used, variance = chosen[kept], used[:, :, kept], new[kept]
+        if change < SETTLED:
+            break
+    support = np.zeros(candidates.shape, dtype=bool)
+    support.flat[chosen] = True
+    return support
+
+
+def better_support(
+    observation: Observation, data: FloatArray, nodes: Nodes, support: BoolArray, prior: Prior
+) -> BoolArray:
+    """The support [ny, nx] that explains data [m] best among those that grow, shrink or close step by step from one."""
+
+    def evidence(of: BoolArray) -> float:
+        return log_evidence(observation, data, nodes, of.ravel(), prior)
+
+    best, most = support, evidence(support)
+    for _ in range(MOST_STEPS):
+        others = [change(best) for change in STEPS]
+        judged = [(evidence(other), i) for i, other in enumerate(others) if other.any() and (other != best).any()]
+        found, which = max(judged, default=(-np.inf, 0))
+        if found <= most:
+            break
+        best, most = others[which], found
+    return best
+
+
+def widened(nodes: BoolArray, by: int) -> BoolArray:
+    """Nodes [ny, nx], and those within so many rows and columns of them."""
+    return np.asarray(binary_dilation(nodes, generate_binary_structure(2, 2), iterations=by), dtype=bool)
+
+
+def _pooled(
+    values: FloatArray, chosen: np.ndarray[tuple[int], np.dtype[np.intp]], shape: tuple[int, ...]
+) -> FloatArray:
+    """Sums of values of the chosen nodes with their neighbours', weighted by ``COUPLING``."""
+    field = np.zeros(shape)
+    field.flat[chosen] = values
+    for axis in (0, 1):
+        field = convolve1d(field, COUPLING, axis=axis, mode="constant")
+    return np.asarray(field.flat[chosen])
+
+
+def _explained(response: FloatArray, data: FloatArray, deviation: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Of each node: squared posterior mean, and how many of its values the data determine, both in prior variances."""
+    m, _, k = response.shape
+    weighted = (response * deviation).reshape(m, 3 * k)
+    if m <= 3 * k:
+        total = weighted @ weighted.T
+        total[np.diag_indices(m)] += 1.0
+        lower = scipy.linalg.cholesky(total, lower=True, overwrite_a=True, check_finite=False)
+        seen = scipy.linalg.solve_triangular(
+            lower, np.column_stack((data, weighted)), lower=True, overwrite_b=True, check_finite=False
+        )
+        mean, share = seen[:, 1:].T @ seen[:, 0], np.sum(seen[:, 1:] ** 2, axis=0)
+    else:
+        total = weighted.T @ weighted
+        total[np.diag_indices(3 * k)] += 1.0
+        lower = scipy.linalg.cholesky(total, lower=True, overwrite_a=True, check_finite=False)
+        inverse = scipy.linalg.solve_triangular(lower, np.eye(3 * k), lower=True, check_finite=False)
+        mean, share = inverse.T @ (inverse @ (weighted.T @ data)), 1.0 - np.sum(inverse**2, axis=0)
+    return np.sum(mean.reshape(3, k) ** 2, axis=0), np.sum(share.reshape(3, k), axis=0)

@@ -1,0 +1,41 @@
+"""A scene of an independent solver, seen by a sensor that measures no forces."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from slipcore import GraspLog
+
+SCENES = Path(__file__).parents[2] / "data" / "contact"
+Pressed = Callable[..., GraspLog]
+
+
+@pytest.fixture(scope="session")
+def pressed() -> Pressed:
+    """A sphere pressed with up to 10 N and sheared on a bonded layer of 5 mm (see the scenes' README), and its forces.
+
+    Of it: some ``frames`` (0 to 7), with ``noise`` m, the ``axes`` that are seen, and a ``crop`` of the lattice.
+    """
+    outward = np.array([1.0, 1.0, -1.0])
+    force = np.load(SCENES / "cond1_layer5c_forces.npz")["f"].transpose(0, 2, 1, 3) * outward
+    with np.load(SCENES / "cond1_layer5c.npz") as scene:
+        moved = 1e-3 * scene["u"].transpose(0, 2, 1, 3) * outward
+        x, y = np.meshgrid(1e-3 * scene["x"], 1e-3 * scene["y"], indexing="ij")
+    position = np.stack((x, y, np.zeros_like(x)), axis=-1)
+
+    def make(frames: list[int], noise: float = 0.0, axes: int = 3, crop: slice = slice(None)) -> GraspLog:
+        seen = moved[frames][:, crop, crop] + noise * np.random.default_rng(4).standard_normal(
+            (len(frames), *position[crop, crop].shape)
+        )
+        seen[..., axes:] = 0.0
+        return GraspLog(
+            time=0.1 * np.arange(len(frames)),
+            position=position[crop, crop],
+            displacement=seen,
+            element_area=0.75e-3**2,
+            force=force[frames][:, crop, crop],
+        )
+
+    return make

@@ -1,0 +1,160 @@
+"""Forces found from displacement, against the forces that an independent solver knows."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from slipcore import GraspLog, InvalidInput, UnknownScale
+from slipcore.forces import Gel, Reconstruction, reconstruct
+
+GEL = Gel(young_modulus=1e6, poisson_ratio=0.49, thickness=5e-3)
+Pressed = Callable[..., GraspLog]
+LATE = [3, 6]
+MIDDLE = slice(4, 16)
+
+
+def truth(log: GraspLog) -> np.ndarray:
+    assert log.force is not None
+    return log.force
+
+
+def relative(found: np.ndarray, expected: np.ndarray) -> float:
+    return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
+
+
+def check_resultant(log: GraspLog, found: Reconstruction, share: float) -> None:
+    total = truth(log).sum(axis=(1, 2))
+    size = np.linalg.norm(total, axis=1, keepdims=True)
+    np.testing.assert_array_less(np.abs(found.resultant - total) / size, share)
+
+
+def test_with_depth_forces_are_met(pressed: Pressed) -> None:
+    log = pressed(LATE, noise=1e-6)
+    found = reconstruct(log, GEL, noise=1e-6)
+    check_resultant(log, found, 0.003)
+    assert relative(found.force[..., :2], truth(log)[..., :2]) < 0.07
+    assert relative(found.force[..., 2], truth(log)[..., 2]) < 0.03
+    within = np.abs(found.force - truth(log)) < 1.96 * found.deviation
+    assert within[found.contact].mean() > 0.9
+    assert (found.information > 0.99).all()
+    assert 0.5e-3 < found.kernel_width < 2e-3
+
+
+def test_in_the_plane_alone_the_contact_is_found_and_with_it_the_normal_force_on_a_layer(pressed: Pressed) -> None:
+    log = pressed(LATE, noise=1e-6, axes=2)
+    found = reconstruct(log, GEL, noise=1e-6)
+    check_resultant(log, found, 0.01)
+    assert relative(found.force[..., :2], truth(log)[..., :2]) < 0.1
+    assert relative(found.force[..., 2], truth(log)[..., 2]) < 0.3
+    touching = np.hypot(*np.moveaxis(log.position[..., :2], -1, 0)) < 4e-3
+    assert abs(found.contact[1].sum() / touching.sum() - 1.0) < 0.3
+
+
+def test_what_is_only_the_priors_is_said(pressed: Pressed) -> None:
+    """In the plane an incompressible half-space shows nothing of pressure; a given force is then all that is known."""
+    log = pressed(LATE, noise=1e-6, axes=2, crop=MIDDLE)
+    blind = Gel(1e6, 0.5)
+    alone = reconstruct(log, blind, noise=1e-6)
+    assert alone.information[2] < 0.01
+    assert (alone.information[:2] > 0.9).all()
+    assert (alone.resultant_deviation[:, 2] > 0.5).all()
+    given = reconstruct(log, blind, total_force=np.array([10.0, 10.0]), noise=1e-6)
+    assert given.information[2] > 0.9
+    np.testing.assert_allclose(given.resultant[:, 2], -10.0, rtol=0.03)
+
+
+def test_nothing_touches_where_nothing_moves_but_noise(pressed: Pressed) -> None:
+    still = replace(pressed(LATE, crop=MIDDLE), displacement=np.zeros((2, 12, 12, 3)))
+    noisy = replace(still, displacement=1e-6 * np.random.default_rng(1).standard_normal((2, 12, 12, 3)))
+    for log, noise in ((still, 0.0), (still, None), (noisy, 1e-6)):
+        found = reconstruct(log, GEL, noise=noise)
+        assert not found.force.any()
+        assert not found.contact.any()
+        assert not found.information.any()
+        assert found.force_noise == 0.0
+
+
+@pytest.mark.parametrize("axes", [2, 3])
+def test_noise_free_markers_are_followed(pressed: Pressed, axes: int) -> None:
+    log = pressed([6, 6], axes=axes)
+    check_resultant(log, reconstruct(log, GEL, noise=0.0), 0.02)
+
+
+@pytest.mark.parametrize("axes", [2, 3])
+def test_a_contact_that_the_lattice_cuts_is_found_beyond_its_edge(pressed: Pressed, axes: int) -> None:
+    whole, cut = pressed(LATE, noise=1e-6, axes=axes), pressed(LATE, noise=1e-6, axes=axes, crop=slice(7, 20))
+    total, inside = (truth(log).sum(axis=(1, 2))[:, 2] for log in (whole, cut))
+    found = reconstruct(cut, GEL, noise=1e-6)
+    assert (inside > 0.9 * total).all()
+    element_sum = found.force[..., 2].sum(axis=(1, 2))
+    np.testing.assert_allclose(element_sum, inside, rtol=0.05)
+
+
+@pytest.mark.parametrize(
+    "crop", [np.s_[9:10, 9:10], np.s_[4:16, 9:10], np.s_[9:11, 9:11]], ids=["one marker", "a line", "four markers"]
+)
+def test_few_markers_and_markers_on_a_line_give_finite_forces(pressed: Pressed, crop: tuple[slice, slice]) -> None:
+    whole = pressed(LATE, noise=1e-6)
+    few = replace(
+        whole,
+        position=whole.position[crop],
+        displacement=whole.displacement[:, *crop],
+        force=truth(whole)[:, *crop],
+    )
+    found = reconstruct(few, GEL, noise=1e-6)
+    assert np.isfinite(found.force).all()
+    assert (found.resultant_deviation > 0.0).all()
+    assert (found.resultant[:, 2] < 0.0).all()
+
+
+def test_a_gel_of_another_stiffness_gives_forces_of_that_scale(pressed: Pressed) -> None:
+    log = pressed([6, 6], noise=1e-6, axes=2, crop=MIDDLE)
+    soft, stiff = (
+        reconstruct(log, Gel(young, GEL.poisson_ratio, GEL.thickness), noise=1e-6).resultant for young in (1e3, 1e12)
+    )
+    np.testing.assert_allclose(1e9 * soft, stiff, rtol=1e-6, atol=1e-6 * np.abs(stiff).max())
+
+
+def test_markers_that_are_lost_tell_nothing(pressed: Pressed) -> None:
+    log = pressed(LATE, noise=1e-6, axes=2)
+    observed = np.random.default_rng(3).random(log.displacement.shape[:3]) > 0.1
+    placeholder = np.where(observed[..., None], log.displacement, 1e-3 * np.array([1.0, 0.0, 0.0]))
+    found = reconstruct(replace(log, displacement=placeholder, observed=observed), GEL, noise=1e-6)
+    check_resultant(log, found, 0.02)
+
+
+@pytest.mark.parametrize("criterion", ["gcv", "discrepancy"])
+def test_other_criteria_find_the_resultant_too(pressed: Pressed, criterion: str) -> None:
+    log = pressed(LATE, noise=3e-6, crop=MIDDLE)
+    check_resultant(log, reconstruct(log, GEL, noise=3e-6, criterion=criterion), 0.02)  # type: ignore[arg-type]
+
+
+def test_noise_is_estimated_where_it_is_not_given(pressed: Pressed) -> None:
+    log = pressed([6] * 14, noise=3e-6, axes=2, crop=MIDDLE)
+    assert 2e-6 < reconstruct(log, GEL).noise < 5e-6
+
+
+def test_the_log_with_these_forces_says_where_they_come_from(pressed: Pressed) -> None:
+    log = replace(pressed(LATE, crop=MIDDLE), force=None)
+    found = reconstruct(log, GEL, noise=1e-6)
+    made = found.apply(log)
+    assert made.force is not None
+    assert made.metadata["force"] == "reconstructed"
+    np.testing.assert_array_equal(made.force, found.force)
+    assert found.force_noise > 0.0
+    with pytest.raises(InvalidInput, match="log is of shape"):
+        found.apply(pressed(LATE))
+
+
+def test_what_does_not_fit_is_refused_by_name(pressed: Pressed) -> None:
+    log = pressed(LATE, crop=MIDDLE)
+    with pytest.raises(UnknownScale):
+        reconstruct(replace(log, metadata={"scale": "unknown"}), GEL)
+    with pytest.raises(InvalidInput, match="noise is -1"):
+        reconstruct(log, GEL, noise=-1.0)
+    with pytest.raises(InvalidInput, match="total_force is of shape"):
+        reconstruct(log, GEL, total_force=np.ones(5))
+    with pytest.raises(InvalidInput, match="criterion is l-curve"):
+        reconstruct(log, GEL, noise=1e-6, criterion="l-curve")  # type: ignore[arg-type]

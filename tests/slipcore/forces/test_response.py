@@ -1,0 +1,91 @@
+"""Displacement of markers by traction on nodes."""
+
+import numpy as np
+import pytest
+
+from slipcore import InvalidInput
+from slipcore.forces.gel import Gel
+from slipcore.forces.nodes import MARGIN, Nodes
+from slipcore.forces.response import response_matrix
+
+PITCH = 0.5e-3
+LINE = PITCH * (np.arange(9) - 4.0)
+MARKERS = np.stack(np.meshgrid(LINE, LINE, indexing="ij"), axis=-1).reshape(-1, 2)
+NODES = Nodes.around(MARKERS, PITCH**2)
+
+
+def test_nodes_reach_beyond_the_markers_and_share_their_area_among_elements() -> None:
+    assert len(NODES) == (9 + 2 * MARGIN) ** 2
+    shares = NODES.over_elements(MARKERS)
+    np.testing.assert_allclose(shares.sum(axis=1), PITCH**2, rtol=1e-12)
+    between = NODES.over_elements(MARKERS + 0.3 * PITCH)
+    np.testing.assert_allclose(between.sum(axis=1), PITCH**2, rtol=1e-12)
+
+
+def test_too_fine_elements_are_refused() -> None:
+    with pytest.raises(InvalidInput, match="element_area is 1e-12"):
+        Nodes.around(MARKERS, 1e-12)
+
+
+def test_hertzian_pressure_moves_markers_as_a_sphere_does() -> None:
+    errors = []
+    for pitch in (PITCH, 0.5 * PITCH):
+        nodes = Nodes.around(MARKERS, pitch**2)
+        contact = 1.6e-3
+        reach = np.hypot(*nodes.places().T) / contact
+        pressure = 1e5 * np.sqrt(np.maximum(1.0 - reach**2, 0.0))
+        inside = np.hypot(*MARKERS.T) < 0.8 * contact
+        moved = response_matrix(Gel(1e6, 0.3), nodes, MARKERS)[2, :, 2] @ pressure
+        modulus = 1e6 / (1.0 - 0.3**2)
+        exact = np.pi * 1e5 / (4.0 * modulus * contact) * (2.0 * contact**2 - np.sum(MARKERS**2, axis=1))
+        errors.append(float(np.abs(moved / exact - 1.0)[inside].max()))
+    assert errors[0] < 0.03
+    assert errors[1] < 0.5 * errors[0]
+
+
+@pytest.mark.parametrize("depth", [0.0, 1e-3])
+def test_a_thick_layer_is_a_half_space(depth: float) -> None:
+    thick = response_matrix(Gel(1e6, 0.45, 10.0, depth), NODES, MARKERS)
+    free = response_matrix(Gel(1e6, 0.45, marker_depth=depth), NODES, MARKERS)
+    np.testing.assert_allclose(thick, free, rtol=0.0, atol=1e-3 * np.abs(free).max())
+
+
+@pytest.mark.parametrize("thickness", [5e-3, np.inf])
+def test_markers_close_to_the_surface_move_as_the_surface(thickness: float) -> None:
+    surface = response_matrix(Gel(1e6, 0.45, thickness), NODES, MARKERS[:3])
+    errors = [
+        np.abs(response_matrix(Gel(1e6, 0.45, thickness, depth), NODES, MARKERS[:3]) - surface).max()
+        for depth in (4e-6, 2e-6)
+    ]
+    assert errors[1] < 0.55 * errors[0] < 0.02 * np.abs(surface).max()
+
+
+def test_a_stiffer_gel_moves_less_and_coupling_has_its_sign() -> None:
+    soft, stiff = (response_matrix(Gel(young, 0.3, 3e-3), NODES, MARKERS) for young in (1e6, 1e7))
+    np.testing.assert_allclose(soft, 10.0 * stiff, rtol=0.0, atol=1e-9 * soft.max())
+    np.testing.assert_allclose(soft[0, :, 2], -soft[2, :, 0], rtol=0.0, atol=1e-20)
+
+
+def test_markers_between_nodes_are_met_as_well_as_on_them() -> None:
+    gel, shift = Gel(1e6, 0.49, 3e-3, 0.3e-3), np.array([0.31, -0.17]) * PITCH
+    smooth = np.exp(-np.sum(NODES.places() ** 2, axis=1) / (2.0 * (2.0 * PITCH) ** 2))
+    moved = response_matrix(gel, NODES, MARKERS + shift)[2, :, 2] @ smooth
+    back = response_matrix(gel, NODES, MARKERS)[2, :, 2] @ np.exp(
+        -np.sum((NODES.places() + shift) ** 2, axis=1) / (2.0 * (2.0 * PITCH) ** 2)
+    )
+    np.testing.assert_allclose(moved, back, rtol=0.0, atol=2e-3 * np.abs(moved).max())
+
+
+@pytest.mark.parametrize(
+    ("entry", "value"),
+    [
+        ("young_modulus", 0.0),
+        ("poisson_ratio", 0.51),
+        ("thickness", 0.0),
+        ("marker_depth", 2e-3),
+        ("thickness", np.nan),
+    ],
+)
+def test_an_impossible_gel_is_refused_by_name(entry: str, value: float) -> None:
+    with pytest.raises(InvalidInput, match=entry):
+        Gel(**{"young_modulus": 1e6, "poisson_ratio": 0.49, "thickness": 2e-3} | {entry: value})
