@@ -8,6 +8,9 @@ estimators-coverage.json and estimators-coverage.png.
 """
 
 import os
+from dataclasses import replace
+
+from estimators.defaults import LINEAR
 
 os.environ["OMP_NUM_THREADS"] = "1"  # before numpy is first imported: small products gain nothing from threads
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
@@ -15,7 +18,6 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"
 import argparse
 import json
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -215,7 +217,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=list(METHODS), default=list(METHODS))
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
-    ols.STATSMODELS_LIMIT = 0  # its errors stand in the diagnostics only
+    ols.LINEAR = replace(LINEAR, statsmodels=0)  # its errors stand in the diagnostics only
     path = options.output / "estimators-coverage.json"
     known = json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
     rows = table(options.fits, options.cross, options.only)

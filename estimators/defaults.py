@@ -1,133 +1,394 @@
-"""Every default of estimators, with unit, source and valid range."""
+"""Every default of estimators, with unit, valid range and source.
+
+"Trials": chosen by benchmarks/estimators.py on simulated samples, at the same result; "bound": stops what does not
+converge, with an error or with what was found. What ±50 % of each changes stands in docs/sensitivity.md.
+"""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slipcore.options import Option, Options
 
-@dataclass(frozen=True, slots=True)
-class Reference:
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reference(Options):
     """What matters to a grasp: the spans over which a slope is of consequence, and the size of the quantities."""
 
-    tangential_velocity: float = 5e-3
-    """m/s, > 0; incipient slip of a fingertip runs at 0.1 to 10 mm/s."""
-    pressure: float = 5e4
-    """Pa, > 0; a fingertip of 1 to 2 cm² that carries 5 to 10 N."""
-    friction: float = 0.5
-    """-, > 0; between polished metal (0.1) and rubber on dry paper (1)."""
-    scatter: float = 0.05
-    """-, > 0; standard deviation of friction between elements, a tenth of the friction itself."""
+    tangential_velocity: Annotated[float, Option(1e-9, 10.0, "m/s", "incipient slip runs at 0.1 to 10 mm/s")] = 5e-3
+    pressure: Annotated[float, Option(1.0, 1e8, "Pa", "a fingertip of 1 to 2 cm² that carries 5 to 10 N")] = 5e4
+    friction: Annotated[float, Option(1e-3, 10.0, "-", "between polished metal, 0.1, and rubber on dry paper, 1")] = 0.5
+    scatter: Annotated[float, Option(1e-6, 1.0, "-", "a tenth of the friction itself")] = 0.05
+    """Standard deviation of friction between elements."""
 
     def spans(self, element_area: float) -> NDArray[np.float64]:
         """Spans [2] of v (m/s) and of an element's f_n (N), from the area of the element in m²."""
         return np.array([self.tangential_velocity, self.pressure * element_area])
 
 
-@dataclass(frozen=True, slots=True)
-class Identifiability:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Identifiability(Options):
     """When a coefficient counts as known."""
 
-    effect: float = 0.1
-    """-, 0 to 1; largest half-width of its 95 % interval, as a change of μ over the span, in parts of the mean μ."""
-    prior_shift: float = 0.5
-    """Posterior standard deviations; largest move of a known coefficient when the prior is made twice as wide."""
-    collinear: float = 1e-10
-    """-, 1e-14 to 1e-6; smallest singular value of the equilibrated regressors that still counts as a direction."""
-    ill_conditioned: float = 1e3
-    """-, ≥ 1; scaled condition number from which the factor is computed again in extended precision."""
+    effect: Annotated[float, Option(0.0, 1.0, "-", "a tenth of a grip force is a usual margin")] = 0.1
+    """Largest half-width of its interval, as a change of μ over the span, in parts of the mean μ."""
+    prior_shift: Annotated[float, Option(0.0, 10.0, "standard deviations", "the data say more than the prior")] = 0.5
+    """Largest move of a known coefficient when the prior is made twice as wide."""
+    collinear: Annotated[float, Option(1e-14, 1e-6, "-", "rounding of float32 samples squared")] = 1e-10
+    """Smallest singular value of the equilibrated regressors that still counts as a direction."""
+    ill_conditioned: Annotated[float, Option(1.0, 1e15, "-", "three digits lost")] = 1e3
+    """Scaled condition number from which the factor is computed again in extended precision."""
+    hidden: Annotated[float, Option(1e-15, 0.1, "-", "rounding")] = 1e-8
+    """Share in a direction that is not seen from which a coefficient is not told."""
+    rounding: Annotated[float, Option(1.0, 1000.0, "ulp", "rounding of a mean of many")] = 8.0
+    """Spread of a column, in units of its mean's last digit, up to which it is constant."""
+    interval: Annotated[float, Option(0.5, 0.9999, "-", "custom")] = 0.95
+    """Level of the intervals that are reported and that calibrated standard errors are made for."""
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Probabilities below the interval's two ends."""
+        tail = round(0.5 * (1.0 - self.interval), 15)
+        return tail, 1.0 - tail
 
 
-@dataclass(frozen=True, slots=True)
-class Prior:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prior(Options):
     """Weak conjugate prior: β | σ² ~ N((μ₀, 0, 0), σ² V₀), σ² ~ IG(ν₀/2, ν₀ s₀²/2).
 
     V₀ is such that at σ = s₀ the standard deviation of β₀ is ``width``, and that of each slope changes μ by ``width``
     over its reference span: the prior weighs as much as (s₀/width)² = 1/400 of one sample.
     """
 
-    width: float = 1.0
-    """-, > 0; no known pair of dry surfaces lies outside 0.5 ± 2."""
-    degrees_of_freedom: float = 0.1
-    """ν₀, > 0; the prior's say in σ weighs as much as a tenth of one sample."""
-    effect_degrees_of_freedom: float = 4.0
-    """> 0; of the half-Student-t prior of the scatter between places: weak, yet with a mean and a variance."""
-    grasp_scatter: float = 0.07
-    """-, > 0; scale of the half-Student-t prior of the scatter between grasps, as a part of the friction itself.
+    width: Annotated[float, Option(1e-3, 1e3, "-", "no known pair of dry surfaces lies outside 0.5 ± 2")] = 1.0
+    degrees_of_freedom: Annotated[float, Option(1e-6, 100.0, "-", "as much as a tenth of one sample says of σ")] = 0.1
+    """ν₀."""
+    effect_degrees_of_freedom: Annotated[float, Option(1.0, 100.0, "-", "weak, yet with a mean and a variance")] = 4.0
+    """Of the half-Student-t prior of the scatter between places."""
+    grasp_scatter: Annotated[float, Option(1e-4, 10.0, "-", "over materials 7 to 24 %: the prior's median is 5 %")] = (
+        0.07
+    )
+    """Scale of the half-Student-t prior of the scatter between grasps, as a part of the friction itself."""
+    grasp_degrees_of_freedom: Annotated[float, Option(1.0, 100.0, "-", "one in ten lies above 13 %")] = 7.0
+    """Of that prior. Three leave a single grasp without any model at a slip probability of 1e-3."""
+    least_span: Annotated[float, Option(1e-9, 1.0, "-", "where all are equal, any prior of a slope is one")] = 1e-3
+    """Least part of the largest value of v or f_n that counts as the range seen."""
+    nu_shape: Annotated[float, Option(0.1, 100.0, "-", "Juárez & Steel, J. Bus. Econ. Stat. 28 (2010) 52")] = 2.0
+    """Shape of the gamma prior of the degrees of freedom of Student-t errors."""
+    nu_rate: Annotated[float, Option(1e-4, 10.0, "-", "Juárez & Steel (2010): mean 20, any tails")] = 0.1
+    """Its rate."""
+    clean: Annotated[float, Option(1.0, 100.0, "-", "a sixth of the samples on average, none as likely as any")] = 4.0
+    """Part of outliers π ~ Beta(1, this) below ½; with a majority the two components would trade places."""
+    outlier_ratio: Annotated[float, Option(0.1, 1000.0, "-", "outliers as narrow as the rest are none")] = 6.0
+    """Median of the scatter of outliers over that of the rest, less 1 (log-normal)."""
+    outlier_ratio_spread: Annotated[float, Option(0.01, 10.0, "-", "3.6 to 9.9 within one deviation")] = 0.5
+    """Standard deviation of its logarithm."""
+    outlier_offset: Annotated[float, Option(-10.0, 10.0, "-", "below the plane, as false slip is")] = -0.1
+    """Mean of the outliers' mean residual (normal)."""
+    outlier_offset_spread: Annotated[float, Option(0.001, 10.0, "-", "either side is possible")] = 0.2
+    """Standard deviation of it."""
+    force_noise: Annotated[float, Option(1e-4, 10.0, "-", "forces reconstructed to a few per cent")] = 0.05
+    """Scale of the half-Student-t prior of the noise of forces, in parts of the root mean square of f_n."""
+    most_noise: Annotated[float, Option(0.1, 1.0, "-", "of what varies, some is real")] = 0.98
+    """Largest square of that noise, as a share of the variance of the measured f_n."""
 
-    Over materials friction scatters by 7 to 24 % between grasps; the prior's median is 5 %, and one in ten lies above
-    13 %.
-    """
-    grasp_degrees_of_freedom: float = 7.0
-    """> 0; of that prior. Three leave a single grasp without any answer at a slip probability of 1e-3."""
 
-
-@dataclass(frozen=True, slots=True)
-class ChainSettings:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChainSettings(Options):
     """How a posterior is sampled, and when the sampling stops."""
 
-    walkers: tuple[int, int] = (16, 440)
-    """Fewest and most, even: as many as bring the accuracy within one block, so that the overhead a step is shared."""
-    block: int = 130
-    """Steps before the first look at the chain: 50 τ of a good proposal, and enough for R̂ to tell it from others."""
-    batch: int = 10
-    """Steps whose proposals are drawn and looked at together: the overhead of a call is shared."""
-    chain_lengths: float = 50.0
-    """Steps in units of the integrated autocorrelation time, from which that time is believed (emcee's rule)."""
-    accuracy: float = 0.02
-    """Posterior standard deviations; Monte-Carlo error of mean, 5 % and 95 % quantile at which sampling stops."""
-    accuracy_per_sample: float = 0.05
-    """The same where each step of each walker reads all samples: an effective sample size of 2,000."""
-    accuracy_of_scales: float = 0.05
-    """The same where only scales are sampled: the coefficients, known exactly given them, are told ten times better."""
-    max_steps: int = 3000
-    """Steps after which a chain that does not converge is given up."""
-    min_acceptance: float = 0.3
-    """Acceptance of the independence proposal below which differential evolution takes over (house trials)."""
-    proposal_degrees_of_freedom: float = 10.0
-    """Of the multivariate Student-t proposal: tails heavier than the posterior's, at an acceptance of 0.88."""
-    local: float = 0.25
-    """0 to 1; part of small steps where the proposal's weights are uneven: they free walkers stuck in a tail."""
-    even: float = 0.85
-    """0 to 1; evenness of the proposal's weights (effective number over number) from which no small steps are taken."""
-    max_split_rhat: float = 1.01
-    """Vehtari et al. (2021), Bayesian Analysis 16:667."""
-    kept_draws: int = 4000
+    fewest_walkers: Annotated[int, Option(8, 10_000, "walkers", "emcee wants more than twice the dimension")] = 16
+    """Even."""
+    most_walkers: Annotated[int, Option(8, 100_000, "walkers", "shares a call's overhead within one block")] = 440
+    """Even."""
+    block: Annotated[int, Option(1, 10_000, "steps", "50 τ of a good proposal, enough for R̂")] = 130
+    """Before the first look at the chain."""
+    batch: Annotated[int, Option(1, 1000, "steps", "shares a call's overhead")] = 10
+    """Whose proposals are drawn and looked at together."""
+    chain_lengths: Annotated[float, Option(5.0, 1000.0, "τ", "emcee's rule")] = 50.0
+    """Steps in units of the integrated autocorrelation time, from which that time is believed."""
+    window: Annotated[float, Option(1.0, 100.0, "τ", "Sokal (1989); emcee's")] = 5.0
+    """Lags that the time is summed over; steps of the chain that are dropped as burn-in."""
+    longest_series: Annotated[int, Option(1000, 10_000_000, "draws", "τ to a few per cent")] = 2**15
+    """Draws that the time is read from."""
+    accuracy: Annotated[float, Option(1e-4, 1.0, "standard deviations", "an effective sample size of 10,000")] = 0.02
+    """Monte-Carlo error of mean, 5 % and 95 % quantile at which sampling stops."""
+    accuracy_per_sample: Annotated[float, Option(1e-4, 1.0, "standard deviations", "a sample size of 2,000")] = 0.05
+    """The same where each step of each walker reads all samples."""
+    accuracy_of_scales: Annotated[float, Option(1e-4, 1.0, "standard deviations", "the rest is known exactly")] = 0.05
+    """The same where only scales are sampled: coefficients, known exactly given them, come out ten times better."""
+    max_steps: Annotated[int, Option(10, 1_000_000, "steps", "bound")] = 3000
+    min_acceptance: Annotated[float, Option(0.0, 1.0, "-", "trials")] = 0.3
+    """Acceptance of the independence proposal below which differential evolution takes over."""
+    proposal_degrees_of_freedom: Annotated[float, Option(1.0, 1000.0, "-", "heavier tails than a posterior's")] = 10.0
+    """Of the multivariate Student-t proposal: an acceptance of 0.88."""
+    local: Annotated[float, Option(0.0, 1.0, "-", "trials")] = 0.25
+    """Part of small steps where the proposal's weights are uneven: they free walkers stuck in a tail."""
+    local_slowness: Annotated[float, Option(1.0, 100.0, "-", "trials: small steps make chains so much slower")] = 3.0
+    """By which the number of walkers is then larger."""
+    local_step: Annotated[float, Option(0.01, 100.0, "-", "Gelman, Roberts & Gilks (1996)")] = 2.4
+    """Standard deviation of small steps, times √dimension."""
+    even: Annotated[float, Option(0.0, 1.0, "-", "trials")] = 0.85
+    """Evenness of the proposal's weights (effective number over number) from which no small steps are taken."""
+    max_split_rhat: Annotated[float, Option(1.0, 2.0, "-", "Vehtari et al., Bayesian Analysis 16 (2021) 667")] = 1.01
+    kept_draws: Annotated[int, Option(1, 1_000_000, "draws", "quantiles of 1 % to a tenth of it")] = 4000
     """Draws that a model keeps."""
+    tail: Annotated[float, Option(0.001, 0.5, "-", "Vehtari et al. (2021)")] = 0.05
+    """Probability beyond the quantiles, one on either side, whose error is watched."""
+    candidates: Annotated[int, Option(1, 1000, "proposals", "trials")] = 8
+    """A walker, of which its start is chosen."""
+    tail_error: Annotated[float, Option(0.1, 100.0, "-", "√(0.05 · 0.95)/φ(z₀.₀₅) for a normal density")] = 2.1
+    """Standard error of the watched quantiles times the root of the effective sample size."""
+    expected_time: Annotated[float, Option(1.0, 1000.0, "steps", "at an acceptance of 0.88")] = 1.4
+    """Autocorrelation time that walkers are planned for."""
+    more_walkers: Annotated[float, Option(1.0, 10.0, "-", "the worst of all parameters counts")] = 1.5
+    more_steps: Annotated[float, Option(1.0, 10.0, "-", "a tenth to spare: a chain is seldom looked at again")] = 1.1
+    largest_exponent: Annotated[float, Option(10.0, 700.0, "-", "far tails of a proposal are only rejected")] = 200.0
+    """Logarithms of positive parameters are cut there."""
 
 
-@dataclass(frozen=True, slots=True)
-class Recognition:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProposalSettings(Options):
+    """Proposals for a density that is not normal: ``sampling/{proposal,adaptation,laplace,normal_score}.py``."""
+
+    defensive: Annotated[
+        float, Option(0.01, 1.0, "-", "defensive mixture: Hesterberg, Technometrics 37 (1995) 185")
+    ] = 0.1
+    """Part of proposals that always come from the widest component: no region is left without any."""
+    least_part: Annotated[float, Option(0.0, 0.1, "-", "a component may come back")] = 1e-3
+    enough: Annotated[float, Option(0.01, 1.0, "-", "weights whose mean and covariance can be taken")] = 0.2
+    """Evenness to which weights are flattened."""
+    thinnest: Annotated[float, Option(1e-12, 1.0, "-", "a hundredth of the width, squared")] = 1e-4
+    """Least spread of a component along any direction, as a share of the widest's."""
+    components: Annotated[int, Option(1, 100, "components", "trials")] = 5
+    """Of a mixture, beside the widest."""
+    rounds: Annotated[int, Option(1, 1000, "rounds", "bound")] = 8
+    """Of a mixture's fit."""
+    draws: Annotated[int, Option(10, 1_000_000, "draws", "trials")] = 1500
+    """Of each round."""
+    wide: Annotated[float, Option(1.0, 10.0, "-", "beyond all points of the pilot run")] = 1.3
+    """Of the widest component at first, over the points' spread."""
+    narrow: Annotated[float, Option(0.01, 1.0, "-", "trials")] = 0.7
+    """Of the others."""
+    first_fits: Annotated[int, Option(0, 100, "steps", "EM settles on a pilot's points in a few")] = 3
+    pilot_walkers: Annotated[int, Option(10, 10_000, "walkers", "trials")] = 100
+    """Of the run that finds where the mass is."""
+    pilot_steps: Annotated[int, Option(10, 100_000, "steps", "trials")] = 200
+    """Of which the second half counts."""
+    pilot_thin: Annotated[int, Option(1, 1000, "steps", "τ of differential evolution is longer")] = 5
+    pilot_candidates: Annotated[int, Option(1, 1000, "draws", "trials")] = 8
+    """A walker, from which its start is chosen."""
+    pilot_floor: Annotated[float, Option(0.0, 0.1, "-", "as many starts as walkers")] = 1e-12
+    difference: Annotated[float, Option(1e-4, 1.0, "standard deviations", "wide enough for 10⁶ rounded terms")] = 0.1
+    """Finite-difference step of Laplace's approximation."""
+    fall: Annotated[float, Option(1.0, 1000.0, "-", "a density of e⁻¹⁰ of the mode's is none")] = 10.0
+    """What the edge of the support counts for in a difference of the log density."""
+    newton_steps: Annotated[int, Option(1, 10_000, "steps", "bound")] = 60
+    close: Annotated[float, Option(1e-6, 1.0, "standard deviations", "a proposal gains nothing from a better mode")] = (
+        0.02
+    )
+    """Newton step at which the mode is found."""
+    flattest: Annotated[float, Option(1.0, 1000.0, "standard deviations", "of the start")] = 3.0
+    """Spread along a direction without curvature."""
+    longest_step: Annotated[float, Option(0.1, 1000.0, "standard deviations", "far away, curvature misleads")] = 4.0
+    refine_rounds: Annotated[int, Option(1, 1000, "rounds", "bound")] = 8
+    refine_draws: Annotated[int, Option(10, 1_000_000, "draws", "trials")] = 400
+    refine_even: Annotated[float, Option(0.01, 1.0, "-", "trials")] = 0.6
+    """Evenness of weights at which refinement ends."""
+    coarse_samples: Annotated[int, Option(100, 10_000_000, "samples", "tell where to look")] = 4000
+    """Samples on which the mode is looked for first."""
+    score_knots: Annotated[int, Option(10, 100_000, "knots", "linear between them: 1e-4 of a score")] = 400
+    score_depth: Annotated[float, Option(1.0, 300.0, "-", "a normal score of about 5.5")] = 18.0
+    """Fall of a log density at which the map to normal scores ends."""
+    least_rise: Annotated[float, Option(0.0, 0.1, "-", "rounding of scores")] = 1e-6
+    """Of the score from knot to knot."""
+    start_spread: Annotated[float, Option(1e-3, 10.0, "-", "log σ of 50 samples")] = 0.1
+    """Spread of a scale's logarithm where the mode is looked for."""
+    start_nu: Annotated[float, Option(1.0, 1000.0, "-", "moderate tails")] = 6.0
+    start_nu_spread: Annotated[float, Option(1e-3, 10.0, "-", "the prior's, about")] = 0.5
+    start_part: Annotated[float, Option(0.01, 0.79, "-", "6 % of the samples")] = 0.4
+    """Cube root of the part of outliers."""
+    start_noise: Annotated[float, Option(0.01, 0.99, "-", "well within the variation of f_n")] = 0.3
+    """Largest noise of forces, as a share of that variation."""
+    largest_root: Annotated[float, Option(10.0, 1e100, "-", "all of the scatter is noise long before")] = 1e30
+    """Of the noise of forces over the scatter, which is cut there."""
+    start_noise_spread: Annotated[float, Option(0.01, 10.0, "-", "trials")] = 0.3
+    """Spread of the noise's root, as a share of it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GridSettings(Options):
+    """The hierarchical posterior on a grid, and what summarises it (``linear/{posterior_grid,normal_mixture}.py``)."""
+
+    least_tau: Annotated[float, Option(1e-9, 0.1, "-", "what does not matter")] = 1e-4
+    """Between grasps."""
+    least_omega: Annotated[float, Option(1e-9, 0.1, "-", "what does not matter")] = 1e-5
+    """Between places."""
+    most_scatter: Annotated[float, Option(0.1, 100.0, "-", "absurd")] = 3.0
+    """Of either."""
+    coarse: Annotated[int, Option(4, 100, "nodes", "trials")] = 12
+    """A scale, of the first two grids."""
+    fine: Annotated[int, Option(4, 200, "nodes", "trials")] = 20
+    """A scale, of the others."""
+    sigma_nodes: Annotated[int, Option(1, 50, "nodes", "Gauss–Hermite: exact to the 13th moment")] = 7
+    depth: Annotated[float, Option(1.0, 100.0, "-", "a density of e⁻¹⁰ of the mode's is none")] = 10.0
+    """Fall of the log density that the grid spans."""
+    rounds: Annotated[int, Option(3, 100, "grids", "bound")] = 5
+    settled: Annotated[float, Option(0.1, 1.0, "-", "trials")] = 0.6
+    """Share of a grid that must matter for it to be the last."""
+    no_scatter: Annotated[float, Option(10.0, 300.0, "-", "e⁶⁰: any scatter between explains all within")] = 60.0
+    """Logarithm of the variance between over that within at which the least σ is looked for."""
+    taps: Annotated[int, Option(2, 12, "nodes", "a cubic's error showed in the log density")] = 6
+    """A scale, that sums over grasps are interpolated from where emcee walks."""
+    middle: Annotated[float, Option(0.6, 0.999, "-", "of a 95 % interval")] = 0.975
+    """Lower of the quantiles at which a Student-t is matched to a mixture."""
+    extreme: Annotated[float, Option(0.9, 0.99999, "-", "a planner's slip probability of 1e-3")] = 0.999
+    """Upper of them."""
+    most_freedom: Annotated[float, Option(30.0, 1e9, "-", "quantiles of 1e-3 are then normal to 1e-4")] = 1e4
+    """Degrees of freedom from which a Student-t is taken as normal."""
+    quantile_steps: Annotated[int, Option(10, 1000, "steps", "a bracket halved 60 times is rounding")] = 60
+    quantile_rounding: Annotated[float, Option(1e-15, 1e-2, "-", "far below a Monte-Carlo error")] = 1e-10
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobustSettings(Options):
+    """The M-estimate (``linear/m_estimate.py``)."""
+
+    subsets: Annotated[int, Option(10, 100_000, "fits", "none clean at 45 % outliers: chance below 1e-39")] = 500
+    """Elemental fits tried."""
+    subset_samples: Annotated[int, Option(50, 10_000_000, "samples", "medians to 3 %")] = 2000
+    """That these are compared on."""
+    regular: Annotated[float, Option(10.0, 1e15, "-", "half of the digits")] = 1e8
+    """Largest condition number of an elemental fit."""
+    improved: Annotated[int, Option(1, 100, "fits", "Rousseeuw & Van Driessen (2006) improve the ten best")] = 5
+    concentrations: Annotated[int, Option(1, 1000, "steps", "bound; each lowers the trimmed sum of squares")] = 20
+    same: Annotated[float, Option(1e-15, 1e-2, "-", "rounding")] = 1e-10
+    """Relative change of coefficients that is none."""
+    near: Annotated[float, Option(1.0, 10.0, "scales", "0.3 % of normal errors lie beyond")] = 3.0
+    """From which a sample does not count while the scale is found."""
+    inflated: Annotated[float, Option(1.0, 100.0, "-", "45 % outliers inflate by 2.5")] = 4.0
+    """Most that outliers inflate the start's scale by."""
+    scale_tolerance: Annotated[float, Option(1e-12, 0.1, "-", "far below a scale's own error")] = 1e-3
+    """Relative change of the scale at which it is found."""
+    step_tolerance: Annotated[float, Option(1e-15, 0.1, "scales", "far below a coefficient's own error")] = 1e-8
+    """Of the M-step."""
+    least_scale: Annotated[float, Option(0.0, 1e-3, "-", "rounding")] = 1e-12
+    """In units of the median response, below which a scale is rounding."""
+    rounding: Annotated[float, Option(1.0, 1000.0, "ulp", "rounding of least squares")] = 8.0
+    """Move of the coefficients, in units of their last digit, that is none."""
+    iterations: Annotated[int, Option(1, 10_000, "steps", "bound")] = 200
+    huber: Annotated[float, Option(0.1, 100.0, "-", "95 % efficiency at normal errors (Huber, 1981)")] = 1.345
+    tukey: Annotated[float, Option(0.1, 100.0, "-", "95 % efficiency at normal errors (Beaton & Tukey, 1974)")] = 4.685
+    nodes: Annotated[int, Option(101, 1_000_001, "nodes", "to rounding")] = 4001
+    """Of the trapezium rule over standard normal errors."""
+    reach: Annotated[float, Option(6.0, 38.0, "standard deviations", "1e-15 of a normal lies beyond")] = 8.0
+    """Of that rule."""
+    least_slope: Annotated[float, Option(0.01, 1.0, "-", "errors grow by five at most")] = 0.2
+    """Of ψ over ψ(u)/u, in the mean: below it the correction of errors would diverge."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClusterSettings(Options):
+    """Errors that samples share (``linear/{cluster_errors,shared_errors,observations,grasp_statistics}.py``)."""
+
+    few: Annotated[int, Option(1, 100, "clusters", "9 for the three coefficients")] = 3
+    """A direction, from which the cluster-robust variance stands alone."""
+    dominant: Annotated[float, Option(0.5, 1.0, "-", "what is left of a variance by one cluster is noise")] = 0.8
+    """Share of the information on a direction above which the cluster that holds it is alone there."""
+    alone: Annotated[float, Option(1e-15, 1e-2, "-", "rounding")] = 1e-8
+    """What a cluster leaves of a direction that it determines."""
+    shared_level: Annotated[float, Option(1e-12, 0.5, "-", "one false alarm in a thousand fits")] = 1e-3
+    """Level of the test that errors are shared within the elements of a grasp."""
+    time_blocks: Annotated[int, Option(2, 1000, "blocks", "enough for a variance, long enough to be independent")] = 20
+    """That the record of a single element is cut into."""
+    most_places: Annotated[int, Option(2, 1_000_000, "places", "32 bytes each: less than 16 kB a grasp")] = 480
+    """That are kept one by one."""
+    most_groups: Annotated[int, Option(2, 1_000_000, "groups", "88 bytes each")] = 170
+    """Of places of about the same weight that more places are pooled into."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinearSettings(Options):
+    """Least squares (``linear/least_squares.py``, ``methods/ols.py``)."""
+
+    min_samples: Annotated[int, Option(4, 1000, "samples", "three coefficients and a scatter")] = 4
+    chunk: Annotated[int, Option(4, 10_000_000, "rows", "fit the processor's cache")] = 8192
+    """That are worked on at once."""
+    unbounded: Annotated[float, Option(1e8, 1e300, "-", "JSON has no infinity")] = 1e16
+    """Reported in place of an infinite condition number or variance inflation."""
+    statsmodels: Annotated[int, Option(0, 1_000_000_000, "samples", "it takes seconds beyond")] = 20_000
+    """Up to which statsmodels adds its classical, HC3 and CR1 errors for comparison."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recognition(Options):
     """The population of materials from which one that is not known comes."""
 
-    unknown: float = 0.05
-    """0 to 1; prior probability that a grasp is of none of the known materials."""
-    level: float = 0.25
-    """-, > 0; standard deviation of β₀ between materials."""
-    slope: float = 0.1
-    """-, > 0; standard deviation of each slope between materials, as a change of μ over its reference span."""
-    scatter_freedom: float = 2.0
-    """> 0; degrees of freedom of σ² between materials, about the square of the reference scatter."""
+    unknown: Annotated[float, Option(0.0, 1.0, "-", "one in twenty")] = 0.05
+    """Prior probability that a grasp is of none of the known materials."""
+    level: Annotated[float, Option(1e-3, 10.0, "-", "known pairs lie between 0.1 and 1")] = 0.25
+    """Standard deviation of β₀ between materials."""
+    slope: Annotated[float, Option(1e-4, 10.0, "-", "a fifth of the friction itself")] = 0.1
+    """Standard deviation of each slope between materials, as a change of μ over its reference span."""
+    scatter_freedom: Annotated[float, Option(0.1, 100.0, "-", "weak, yet proper")] = 2.0
+    """Degrees of freedom of σ² between materials, about the square of the reference scatter."""
+    least_scatter: Annotated[float, Option(1e-12, 0.1, "-", "rounding of reported friction")] = 1e-6
+    """Of a material, in parts of the mean friction: a model without scatter still meets rounded data."""
 
 
-@dataclass(frozen=True, slots=True)
-class Automatic:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Automatic(Options):
     """When the data call for more than least squares."""
 
-    downweighted: float = 0.03
-    """0.011 to 1; part of the samples that Tukey's loss gives less than half weight (normal errors: 0.011)."""
-    least_outliers: float = 3.0
-    """> 0; so many samples that lie far off show more than chance in few samples."""
+    downweighted: Annotated[float, Option(0.011, 1.0, "-", "three times what normal errors leave, 0.011")] = 0.03
+    """Part of the samples that Tukey's loss gives less than half weight."""
+    least_outliers: Annotated[float, Option(0.1, 1000.0, "samples", "chance makes one or two in few samples")] = 3.0
+    """So many samples that lie far off show more than chance."""
+    half_weight: Annotated[float, Option(1.0, 10.0, "standard deviations", "Tukey's loss; 1.1 % of normal errors")] = (
+        2.535
+    )
+    """From which that loss gives a sample less than half weight."""
+    far: Annotated[float, Option(1.0, 10.0, "standard deviations", "0.3 % of normal errors")] = 3.0
+    """From which samples are left out where too many lie far off."""
+    fewest: Annotated[int, Option(2, 1000, "samples", "a median to 0.4 of their deviation")] = 8
+    """Of a place, from which its median says what is the place's."""
 
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChangeSettings(Options):
+    """The sequential test for a changed surface (``online.py``)."""
+
+    alarm: Annotated[float, Option(1e-12, 0.5, "-", "one false alarm in a thousand stretches")] = 1e-3
+    spread: Annotated[float, Option(1e-3, 100.0, "standard deviations", "a shift of half a deviation matters")] = 0.5
+    """Of the shifts that are looked for."""
+    reset_after: Annotated[int, Option(1, 1_000_000_000, "samples", "a late change is not buried")] = 1000
+    farthest: Annotated[float, Option(3.0, 38.0, "standard deviations", "beyond, one sample would decide alone")] = 8.0
+    """Score that any sample counts for at most."""
+    largest_exponent: Annotated[float, Option(10.0, 709.0, "-", "exp must not overflow")] = 700.0
+
+
+ROUNDING = 1e-12
+"""Relative difference that is rounding."""
+NORMAL_MAD = 0.674489750196082
+"""Φ⁻¹(¾): median of |ε|/σ for normal ε."""
 
 AUTOMATIC = Automatic()
+CHANGE = ChangeSettings()
+CLUSTERS = ClusterSettings()
+GRID = GridSettings()
+LINEAR = LinearSettings()
 RECOGNITION = Recognition()
 REFERENCE = Reference()
 IDENTIFIABILITY = Identifiability()
 PRIOR = Prior()
+PROPOSAL = ProposalSettings()
+ROBUST = RobustSettings()
 SAMPLING = ChainSettings()
-MIN_SAMPLES = 4
-"""Three coefficients and a scatter need four samples."""
 
-SHARED_LEVEL = 1e-3
-"""0 to 1; level of the test that errors are shared within the elements of a grasp."""
+TABLES = (
+    AUTOMATIC, CHANGE, CLUSTERS, GRID, LINEAR, RECOGNITION, REFERENCE, IDENTIFIABILITY, PRIOR, PROPOSAL, ROBUST,
+    SAMPLING,
+)  # fmt: skip
+"""All tables of estimators."""

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
+from estimators.defaults import IDENTIFIABILITY
 from estimators.errors import InvalidSamples
 from stiction_client.support import Kind, Support, extrapolation, support, widening
 
@@ -83,7 +84,7 @@ class FrictionModel:
         """Standard errors of the coefficients, [3]."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
-    def interval(self, level: float = 0.95) -> FloatArray:
+    def interval(self, level: float = IDENTIFIABILITY.interval) -> FloatArray:
         """Central interval of each coefficient at ``level``: [3, 2]; from the draws where there are any."""
         _check_probability("level", level)
         if self.draws is not None:

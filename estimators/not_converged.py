@@ -1,4 +1,4 @@
-"""The error of a fit that stopped before its answer could be trusted."""
+"""The error of a fit that stopped before its result could be trusted."""
 
 from estimators.errors import EstimatorError
 from estimators.friction_model import FrictionModel

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import special
 
+from estimators.defaults import CHANGE
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 
@@ -25,9 +26,9 @@ class ChangeDetector:
     """
 
     model: FrictionModel
-    alarm: float = 1e-3
-    spread: float = 0.5
-    reset_after: int = 1000
+    alarm: float = CHANGE.alarm
+    spread: float = CHANGE.spread
+    reset_after: int = CHANGE.reset_after
     total: float = 0.0
     count: int = 0
 
@@ -43,7 +44,8 @@ class ChangeDetector:
     def e_value(self) -> float:
         """How many times likelier the deviations are under some constant shift than under none, mixed over λ."""
         precision = 1.0 / self.spread**2 + self.count
-        return float(np.exp(min(0.5 * self.total**2 / precision - 0.5 * np.log(precision * self.spread**2), 700.0)))
+        log = 0.5 * self.total**2 / precision - 0.5 * np.log(precision * self.spread**2)
+        return float(np.exp(min(log, CHANGE.largest_exponent)))
 
     @property
     def evidence(self) -> float:
@@ -79,4 +81,4 @@ class ChangeDetector:
         if not np.isfinite(deviation):
             raise InvalidSamples("sample", (v, f_n, mu), "finite numbers")
         score = special.ndtri(special.stdtr(freedom, -abs(deviation)))
-        return float(np.copysign(min(-score, 8.0), deviation))
+        return float(np.copysign(min(-score, CHANGE.farthest), deviation))

@@ -82,7 +82,9 @@ def _of_material(data: FitData, model: FrictionModel) -> float:
         scale = float(np.hypot(model.scales.between_places.value, model.scales.within.value))
         covariance += model.scales.between_grasps.value**2 * np.outer(model.coefficients, model.coefficients)
     freedom = model.n - 3.0 if model.scatter_degrees_of_freedom is None else model.scatter_degrees_of_freedom
-    floor = 1e-6 * max(abs(float(data.mean_friction)), 1e-6)  # a model without scatter still meets rounded data
+    floor = RECOGNITION.least_scatter * max(
+        abs(float(data.mean_friction)), RECOGNITION.least_scatter
+    )  # a model without scatter still meets rounded data
     return log_predictive(triangle, data.effective_n, model.coefficients, covariance, max(scale, floor), freedom)
 
 

@@ -30,6 +30,8 @@ class Limits:
     """s; 1 MHz down to one frame a minute. A longer single gap is allowed."""
     span: float = 1e9
     """s from the first frame to the last; thirty years. A clock that was set meanwhile shows more."""
+    clock: float = 1e12
+    """s; times in ms or µs since 1970 lie within, but have the wrong interval."""
     yaw: float = 1e3
     """rad, cumulative."""
     normal_length: float = 1e-3
@@ -43,21 +45,56 @@ class Limits:
 LIMITS = Limits()
 
 
-@dataclass(frozen=True, slots=True)
-class NoiseDefaults:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoiseDefaults(Options):
     """The online estimate of measurement noise."""
 
-    memory: int = 31
-    """Frames whose estimates are kept; about a second at 30 fps, so that a burst of motion is outvoted."""
-    series: int = 64
-    """Most elements that are looked at, evenly chosen: a frame's estimate then errs by 10 %, the median by 2 %."""
-    least_series: int = 4
-    """Series that must have changed for a frame to tell anything."""
-    deviation_to_sigma: float = 1.4826022185056018
-    """1/Φ⁻¹(¾): median absolute deviation of a normal distribution to its standard deviation."""
+    memory: Annotated[int, Option(1, 10_000, "frames", "a second at 30 fps: a burst of motion is outvoted")] = 31
+    """Whose estimates are kept."""
+    series: Annotated[int, Option(4, 100_000, "elements", "a frame then errs by 10 %, the median by 2 %")] = 64
+    """That are looked at at most, evenly chosen."""
+    least_series: Annotated[int, Option(2, 1000, "elements", "a median of fewer is one of them")] = 4
+    """That must have changed for a frame to tell anything."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NumericsDefaults(Options):
+    """What keeps the filter's numbers finite (``detection/filter``)."""
+
+    least_spread: Annotated[float, Option(0.0, 1e-12, "m²", "far below a marker's variance")] = 1e-30
+    """Weighted spread of points about their centre."""
+    least_lever: Annotated[float, Option(1e-12, 1e-3, "m", "far below a pitch")] = 1e-9
+    """Of the moment of a contact's forces."""
+    stretch_variance: Annotated[float, Option(0.0, 1e-4, "-", "rounding of a fit of many points")] = 1e-14
+    """Allowed beside what linear theory of a rotation makes."""
+    yaw_variance: Annotated[float, Option(0.0, 1e-4, "rad²", "rounding of a fit of many points")] = 1e-16
+    """The same of a given pose's yaw."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MarkerDefaults(Options):
+    """How markers that lie anywhere are laid onto a lattice (``markers.py``)."""
+
+    reach: Annotated[float, Option(1.0, 10.0, "pitches", "about twelve markers")] = 2.0
+    """A lost marker moves on as those do that lie within so many mean distances."""
+    neighbours: Annotated[int, Option(1, 100, "markers", "all within that reach on a square lattice")] = 12
+    candidates: Annotated[int, Option(1, 100, "markers", "more would lie farther than a cell's diagonal")] = 8
+    """Nearest markers among which an element finds its own."""
+    farthest: Annotated[float, Option(0.5, 2.0, "pitches", "half a cell's diagonal, and a little")] = 0.75
+    """An element's own marker from its place."""
+    sparsest: Annotated[int, Option(1, 10_000, "places", "a disk in its box has 1.3, a ring a few")] = 16
+    """Of the bounding box to one marker, at most."""
+    narrowest: Annotated[float, Option(1e-3, 1.0, "-", "6°: strain is ten times as noisy")] = 0.1
+    """Sine of the angle between rows and columns; where markers cross them more narrowly, one is left out."""
+
+
+DEVIATION_TO_SIGMA = 1.4826022185056018
+"""1/Φ⁻¹(¾): median absolute deviation of a normal distribution to its standard deviation."""
 NOISE = NoiseDefaults()
+NUMERICS = NumericsDefaults()
+MARKERS = MarkerDefaults()
+TABLES = (NOISE, NUMERICS, MARKERS)
+"""What is not an option of a method."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -193,9 +230,9 @@ class FilterOptions(ContactOptions):
     ratio_memory: Annotated[float, Option(1e-3, 1e4, "s", "tuning scenes")] = 1.5
     """Time constant of what is learnt about it."""
     ratio_weight: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 1.2
-    """Weight of the force ratio as evidence; 0 leaves it out."""
+    """Weight of the log-odds from the force ratio; 0 leaves them out."""
     ratio_limit: Annotated[float, Option(0.0, 100.0, "log-odds", "tuning scenes")] = 6.0
-    """Most evidence of one force ratio."""
+    """Largest log-odds from one force ratio."""
     ratio_slip: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.85
     """Least slip probability of an element whose ratio is learnt for all."""
     ratio_slip_of_element: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.9
@@ -382,6 +419,12 @@ class CheckOptions(Options):
     """Largest standard deviation of friction between elements, as a share of it."""
     least_samples: Annotated[int, Option(8, 1000000, "samples", "quarters of ten samples")] = 40
     """Samples from which friction is compared."""
+    samples_of_place: Annotated[int, Option(2, 1000000, "samples", "a mean to half of their scatter")] = 5
+    """Samples of an element from which its friction counts."""
+    least_places: Annotated[int, Option(2, 1000000, "elements", "a deviation to 40 %")] = 4
+    """Such elements from which friction by place is compared."""
+    symmetric: Annotated[int, Option(1, 1000, "elements", "a contact about a lattice's corner")] = 4
+    """Elements that may share the largest reading where nothing but symmetry makes them alike."""
 
 
 METHOD_NAMES = (

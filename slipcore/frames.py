@@ -273,9 +273,11 @@ def _check_time(time: FloatArray) -> None:
     if step[worst] <= 0.0:
         value = f"{time[worst + 1]:.9g} s at frame {worst + 1}, after {time[worst]:.9g} s"
         raise InvalidInput("time", value, "strictly increasing seconds")
-    if not abs(time[0]) <= 1e12 or not time[-1] - time[0] <= LIMITS.span:
+    if not abs(time[0]) <= LIMITS.clock or not time[-1] - time[0] <= LIMITS.span:
         value = f"{time[0]:.6g} to {time[-1]:.6g} s"
-        raise InvalidInput("time", value, f"at most {LIMITS.span:g} s in all, begun within 1e12 s of 0 (is it in s?)")
+        raise InvalidInput(
+            "time", value, f"at most {LIMITS.span:g} s in all, begun within {LIMITS.clock:g} s of 0 (is it in s?)"
+        )
     low, high = LIMITS.median_interval
     median = float(np.median(step))
     if not low <= median <= high:

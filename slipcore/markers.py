@@ -2,7 +2,7 @@
 
 Each element *is* one marker, at the marker's own place: nothing is interpolated. An element without a marker, or whose
 marker is lost in a frame, is not observed. Its displacement then is a placeholder that moves on as the markers around
-it do, so that its neighbours' derivatives and a detector's memory stay sound; a detector answers nothing for it.
+it do, so that its neighbours' derivatives and a detector's memory stay sound; a detector tells nothing of it.
 """
 
 from collections.abc import Iterator, Mapping
@@ -14,21 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import binary_dilation, generate_binary_structure
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
+from slipcore.defaults import MARKERS
 from slipcore.detection.shared.strain import lattice_steps
 from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray, GraspLog
-
-REACH = 2.0
-"""A lost marker moves on as those do that lie within so many mean distances: about twelve."""
-NEIGHBOURS = 12
-CANDIDATES = 8
-"""Nearest markers among which an element finds its own."""
-FARTHEST = 0.75
-"""An element's own marker is at most so many pitches from its place: half a cell's diagonal, and a little."""
-SPARSEST = 16
-"""Places of the bounding box to one marker, at most."""
-NARROWEST = 0.1
-"""Least sine of the angle between rows and columns; where markers would cross them more narrowly, one is left out."""
 
 
 class MarkerFrame(NamedTuple):
@@ -69,9 +58,9 @@ class MarkerLattice:
             raise InvalidInput("markers", f"of shape {list(rest.shape)}", "4 or more finite points, shape [k, 3]")
         pitch = mean_spacing(rest[:, :2])
         places = _places(rest[:, :2], pitch)
-        marker, own = _assign(rest[:, :2], places, FARTHEST * pitch)
+        marker, own = _assign(rest[:, :2], places, MARKERS.farthest * pitch)
         position, occupied = _positions(rest, marker, own, places)
-        return cls(position, pitch**2, marker, occupied, *_neighbours(rest[:, :2], REACH * pitch))
+        return cls(position, pitch**2, marker, occupied, *_neighbours(rest[:, :2], MARKERS.reach * pitch))
 
     def step(self, before: MarkerFrame | None, displacement: ArrayLike) -> MarkerFrame:
         """Take the markers' next displacement [k, 3] m, NaN where one is lost. Raises ``InvalidInput``."""
@@ -144,9 +133,9 @@ def _places(markers: FloatArray, pitch: float) -> FloatArray:
     """Lattice points [n, m, 2] m, centred in the markers' bounding box, which they must fill to some degree."""
     low, high = markers.min(axis=0), markers.max(axis=0)
     cells = np.maximum(np.rint((high - low) / pitch), 1.0)
-    if not np.prod(cells + 1.0) <= SPARSEST * len(markers):
+    if not np.prod(cells + 1.0) <= MARKERS.sparsest * len(markers):
         value = f"{len(markers)} in a band across {cells[0] + 1:.0f} × {cells[1] + 1:.0f} places"
-        raise InvalidInput("markers", value, f"one marker in {SPARSEST} places of their bounding box, or more")
+        raise InvalidInput("markers", value, f"one marker in {MARKERS.sparsest} places of their bounding box, or more")
     axes = [
         0.5 * (first + last) + pitch * (np.arange(count + 1.0) - 0.5 * count)
         for first, last, count in zip(low, high, cells, strict=True)
@@ -157,7 +146,7 @@ def _places(markers: FloatArray, pitch: float) -> FloatArray:
 def _assign(markers: FloatArray, places: FloatArray, farthest: float) -> tuple[NDArray[np.intp], BoolArray]:
     """Marker of each place [n, m], and whether it is its own: pairs are taken nearest first."""
     flat = places.reshape(-1, 2)
-    distance, index = _nearest(markers, flat, CANDIDATES)
+    distance, index = _nearest(markers, flat, MARKERS.candidates)
     marker, own = np.array(index[:, 0], dtype=np.intp), np.zeros(len(flat), bool)
     free = np.ones(len(markers), bool)
     for pair in np.argsort(distance, axis=None, kind="stable")[: np.count_nonzero(distance <= farthest)]:
@@ -189,13 +178,13 @@ def _positions(
 def _folded(position: FloatArray) -> BoolArray:
     """Where rows and columns [n, m] do not cross widely enough in the plane, from x to y."""
     (x_i, y_i, _), (x_j, y_j, _) = lattice_steps(position)
-    folded: BoolArray = x_i * y_j - x_j * y_i <= NARROWEST * np.hypot(x_i, y_i) * np.hypot(x_j, y_j)
+    folded: BoolArray = x_i * y_j - x_j * y_i <= MARKERS.narrowest * np.hypot(x_i, y_i) * np.hypot(x_j, y_j)
     return folded
 
 
 def _neighbours(markers: FloatArray, reach: float) -> tuple[NDArray[np.intp], FloatArray]:
     """Nearest other markers [k, K] of each, and their biweight by distance."""
-    distance, index = _nearest(markers, markers, NEIGHBOURS + 1)
+    distance, index = _nearest(markers, markers, MARKERS.neighbours + 1)
     return index[:, 1:], np.maximum(1.0 - (distance[:, 1:] / reach) ** 2, 0.0) ** 2
 
 

@@ -95,10 +95,12 @@ def test_imports_run_one_way(package: str) -> None:
         assert not extra, f"{path.relative_to(ROOT)} imports {sorted(extra)}"
 
 
-def test_estimators_know_of_slipcore_only_its_samples_and_its_compiler() -> None:
+def test_estimators_know_of_slipcore_only_its_samples_compiler_and_options() -> None:
     for path in sorted((ROOT / "estimators").rglob("*.py")):
         modules = {name for name in imported_modules(path) if name.split(".")[0] == "slipcore"}
-        assert all(name.startswith(("slipcore.samples", "slipcore.compilation")) for name in modules), path
+        assert all(
+            name.startswith(("slipcore.samples", "slipcore.compilation", "slipcore.options")) for name in modules
+        ), path
 
 
 def test_estimators_know_of_the_client_only_what_says_how_far_a_model_is_to_be_trusted() -> None:
@@ -344,3 +346,34 @@ def test_no_file_names_a_package_registry_or_this_machine() -> None:
         text = path.read_text(encoding="utf-8")
         assert "--index-url" not in text, path
         assert "://pypi" not in text, path
+
+
+MOST_PARAMETERS = 8
+
+
+def parameters(path: Path) -> dict[str, list[ast.arg]]:
+    """What each function of a file is given, but for the object or class that it belongs to."""
+    return {
+        f"{path}:{node.lineno} {node.name}": [
+            argument
+            for argument in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)
+            if argument.arg not in {"self", "cls"}
+        ]
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+    }
+
+
+@pytest.mark.parametrize("package", ["slipcore", "estimators"])
+def test_no_function_of_the_numerics_takes_more_than_eight_parameters_and_all_are_typed(package: str) -> None:
+    found = {name: given for path in (ROOT / package).rglob("*.py") for name, given in parameters(path).items()}
+    assert found
+    assert {name: len(given) for name, given in found.items() if len(given) > MOST_PARAMETERS} == {}
+    assert [name for name, given in found.items() if any(argument.annotation is None for argument in given)] == []
+
+
+def test_a_wide_function_is_seen(tmp_path: Path) -> None:
+    path = tmp_path / "wide.py"
+    path.write_text("class A:\n    def f(self, a, b, c, d, e, *, f, g, h, i): ...")
+    (given,) = parameters(path).values()
+    assert len(given) == 9

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.defaults import IDENTIFIABILITY, PRIOR, PROPOSAL
 from estimators.errors import InvalidSamples
 from estimators.likelihoods.kernels import sum_log_normal
 from estimators.likelihoods.per_sample import PerSample, Rows, per_sample
@@ -13,9 +14,6 @@ from estimators.linear.fit_data import FitData
 from estimators.linear.priors import log_half_student
 
 FloatArray = NDArray[np.float64]
-
-NOISE = 0.05
-"""Scale of the half-Student-t prior of the force noise, in parts of the root mean square of f_n."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,13 +37,13 @@ class ErrorsInVariables:
 
     def start(self, scale: float) -> FloatArray:
         """The robust scale, half of its square noise, but noise well within the variation of f_n."""
-        noise = min(float(np.sqrt(0.5)) * scale, 0.3 * self.gain * float(np.sqrt(self.variance)))
+        noise = min(float(np.sqrt(0.5)) * scale, PROPOSAL.start_noise * self.gain * float(np.sqrt(self.variance)))
         root = float(np.sqrt(noise / np.sqrt(scale**2 - noise**2)))
-        return np.array([[np.log(scale), root], [0.1, 0.3 * root]])
+        return np.array([[np.log(scale), root], [PROPOSAL.start_spread, PROPOSAL.start_noise_spread * root]])
 
     def natural(self, coordinates: FloatArray) -> FloatArray:
         """(σ, s)."""
-        ratio = np.clip(coordinates[:, 1], 0.0, 1e30) ** 2
+        ratio = np.clip(coordinates[:, 1], 0.0, PROPOSAL.largest_root) ** 2
         sigma = bounded_exp(coordinates[:, 0]) / np.hypot(1.0, ratio)
         return np.column_stack([sigma, ratio * sigma / self.gain])
 
@@ -56,7 +54,7 @@ class ErrorsInVariables:
         """
         root = coordinates[:, 1]
         sigma, noise = self.natural(coordinates).T
-        inside = (root > 0.0) & (noise**2 < 0.98 * self.variance)
+        inside = (root > 0.0) & (noise**2 < PRIOR.most_noise * self.variance)
         log = log_half_student(noise, self.noise_scale) + np.log(np.where(inside, root, 1.0) * sigma)
         return np.where(inside, log, -np.inf)
 
@@ -76,11 +74,11 @@ def errors_in_variables(data: FitData) -> PerSample:
     f_n, weight = observations.normal_force, observations.weight
     mean = float(np.average(f_n, weights=weight))
     variance = float(np.average((f_n - mean) ** 2, weights=weight))
-    if variance <= (16.0 * np.finfo(float).eps * mean) ** 2:
+    if variance <= (2.0 * IDENTIFIABILITY.rounding * np.finfo(float).eps * mean) ** 2:
         raise InvalidSamples("normal_force", f"{mean:.6g} N in every sample", "forces that vary, as noisy ones do")
     size = float(np.sqrt(np.average(f_n**2, weights=weight)))
     friction = float(np.average(observations.tangential_force, weights=weight)) / mean
-    scale = NOISE * size
+    scale = PRIOR.force_noise * size
     terms = ErrorsInVariables(
         mean=mean,
         variance=variance,

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.defaults import SAMPLING
+from estimators.defaults import GRID, SAMPLING
 from estimators.likelihoods.posterior import Summary
 from estimators.linear.fit_data import FitData
 from estimators.linear.hierarchical import Products
@@ -16,9 +16,6 @@ from estimators.sampling.normal_score import NormalScore, normal_score
 from estimators.sampling.proposal import StudentMixture, standard
 
 FloatArray = NDArray[np.float64]
-
-TAPS = 6
-"""Nodes a scale that the sums over grasps are interpolated from; a cubic's error showed in the log density."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,13 +110,13 @@ def _score(nodes: FloatArray, log_density: FloatArray) -> NormalScore:
 
 
 def _taps(nodes: FloatArray, at: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
-    """The ``TAPS`` equally spaced nodes about each point and their Lagrange weights, [k, TAPS] each."""
+    """The ``taps`` equally spaced nodes about each point and their Lagrange weights, [k, taps] each."""
     step = nodes[1] - nodes[0]
     place = np.clip((at - nodes[0]) / step, 0.0, len(nodes) - 1.0)
-    start = np.clip(np.floor(place).astype(np.int64) - TAPS // 2 + 1, 0, len(nodes) - TAPS)
+    start = np.clip(np.floor(place).astype(np.int64) - GRID.taps // 2 + 1, 0, len(nodes) - GRID.taps)
     x = (place - start)[:, None]
-    others = [[other for other in range(TAPS) if other != tap] for tap in range(TAPS)]
+    others = [[other for other in range(GRID.taps) if other != tap] for tap in range(GRID.taps)]
     weight = np.stack(
         [np.prod([(x[:, 0] - m) / (tap - m) for m in rest], axis=0) for tap, rest in enumerate(others)], axis=1
     )
-    return start[:, None] + np.arange(TAPS), weight
+    return start[:, None] + np.arange(GRID.taps), weight

@@ -5,22 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.defaults import PRIOR, PROPOSAL
 from estimators.likelihoods.kernels import sum_log_mixture
 from estimators.likelihoods.per_sample import PerSample, Rows, per_sample
 from estimators.likelihoods.posterior import bounded_exp
 from estimators.linear.fit_data import FitData
 
 FloatArray = NDArray[np.float64]
-
-CLEAN = 4.0
-"""Part of outliers π ~ Beta(1, 4) below ½: a sixth of the samples on average, and none at all as likely as any.
-
-A majority would not be outliers: the two components would trade places, at a plane that is the prior's own.
-"""
-RATIO = (6.0, 0.5)
-"""Scatter of outliers over that of the rest, less 1: log-normal about 6, as outliers as narrow as the rest are none."""
-OFFSET = (-0.1, 0.2)
-"""Mean of the outliers' residuals, normal: below the plane, as false slip is."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,13 +23,20 @@ class Outlier:
 
     names: tuple[str, ...] = ("sigma", "outlier_part", "outlier_scatter", "outlier_offset")
     prior: str = (
-        f"part of outliers ~ Beta(1, {CLEAN:g}) below 1/2; their scatter sigma (1 + kappa), "
-        f"log kappa ~ N(log {RATIO[0]:g}, {RATIO[1]:g}^2); their mean residual ~ N({OFFSET[0]:g}, {OFFSET[1]:g}^2)"
+        f"part of outliers ~ Beta(1, {PRIOR.clean:g}) below 1/2; their scatter sigma (1 + kappa), log kappa ~ "
+        f"N(log {PRIOR.outlier_ratio:g}, {PRIOR.outlier_ratio_spread:g}^2); their mean residual ~ "
+        f"N({PRIOR.outlier_offset:g}, {PRIOR.outlier_offset_spread:g}^2)"
     )
 
     def start(self, scale: float) -> FloatArray:
         """The robust scale, and the middle of the priors."""
-        return np.array([[np.log(scale), 0.4, np.log(RATIO[0]), OFFSET[0]], [0.1, 0.1, RATIO[1], 0.1]])
+        spread = PROPOSAL.start_spread
+        return np.array(
+            [
+                [np.log(scale), PROPOSAL.start_part, np.log(PRIOR.outlier_ratio), PRIOR.outlier_offset],
+                [spread, spread, PRIOR.outlier_ratio_spread, spread],
+            ]
+        )
 
     def natural(self, coordinates: FloatArray) -> FloatArray:
         """(σ, π, σ(1 + κ), δ)."""
@@ -51,8 +49,9 @@ class Outlier:
         _, root, log_ratio, offset = coordinates.T
         inside = (root > 0.0) & (root**3 < 0.5)
         part = np.where(inside, root, 0.5)
-        log = 2.0 * np.log(part) + (CLEAN - 1.0) * np.log1p(-(part**3))
-        log -= 0.5 * ((log_ratio - np.log(RATIO[0])) / RATIO[1]) ** 2 + 0.5 * ((offset - OFFSET[0]) / OFFSET[1]) ** 2
+        log = 2.0 * np.log(part) + (PRIOR.clean - 1.0) * np.log1p(-(part**3))
+        ratio = (log_ratio - np.log(PRIOR.outlier_ratio)) / PRIOR.outlier_ratio_spread
+        log -= 0.5 * ratio**2 + 0.5 * ((offset - PRIOR.outlier_offset) / PRIOR.outlier_offset_spread) ** 2
         return np.where(inside, log, -np.inf)
 
     def log_likelihood(self, beta: FloatArray, natural: FloatArray, rows: Rows) -> FloatArray:

@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.defaults import PRIOR, REFERENCE, SAMPLING
+from estimators.defaults import PRIOR, PROPOSAL, REFERENCE, SAMPLING
 from estimators.errors import InvalidSamples
 from estimators.likelihoods.posterior import Summary, Whitening, corners, scatter, supported
 from estimators.linear.fit_data import FitData
@@ -18,9 +18,6 @@ from estimators.sampling.laplace import laplace, refine
 from estimators.sampling.proposal import StudentMixture, standard
 
 FloatArray = NDArray[np.float64]
-
-COARSE = 4000
-"""Samples on which the mode is looked for first."""
 
 
 class Rows(NamedTuple):
@@ -161,8 +158,8 @@ def per_sample(data: FitData, terms: Terms, name: str) -> PerSample:
         proposal=standard(3 + len(initial)),
         local=SAMPLING.local,
     )
-    if len(observations) > 2 * COARSE:  # a few samples tell where to look
-        posterior = _rewhitened(posterior, len(observations) // COARSE)
+    if len(observations) > 2 * PROPOSAL.coarse_samples:  # a few samples tell where to look
+        posterior = _rewhitened(posterior, len(observations) // PROPOSAL.coarse_samples)
     return _proposing(_rewhitened(posterior, 1))
 
 

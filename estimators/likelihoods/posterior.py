@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.defaults import ROUNDING, SAMPLING
 from estimators.friction_model import Domain, Scales
 from estimators.sampling.proposal import StudentMixture
 
@@ -14,15 +15,19 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Summary:
-    """What a friction model needs of a posterior: see ``FrictionModel``; ``draws`` [k, names] in natural parameters."""
+    """What a fit found of the coefficients and the scatter: see ``FrictionModel``.
 
-    coefficients: FloatArray
+    ``draws`` [k, names] in natural parameters, and the ``monte_carlo_error``, where a posterior was sampled.
+    """
+
+    coefficients: NDArray[np.floating]
     covariance: FloatArray
     scale: float
     degrees_of_freedom: float
-    draws: FloatArray
     scatter_degrees_of_freedom: float
     scales: Scales | None = None
+    draws: FloatArray | None = None
+    monte_carlo_error: float = 0.0
 
 
 class Posterior(Protocol):
@@ -81,7 +86,7 @@ def scatter(variance: FloatArray) -> tuple[float, float]:
     """
     precision = 1.0 / variance
     mean = float(precision.mean())
-    return float(1.0 / np.sqrt(mean)), float(2.0 * mean**2 / max(precision.var(), 1e-12 * mean**2))
+    return float(1.0 / np.sqrt(mean)), float(2.0 * mean**2 / max(precision.var(), ROUNDING * mean**2))
 
 
 def corners(domain: Domain) -> FloatArray:
@@ -96,4 +101,4 @@ def supported(log_density: FloatArray, beta: FloatArray, at: FloatArray) -> Floa
 
 def bounded_exp(x: FloatArray) -> FloatArray:
     """Exponential that neither overflows nor reaches zero: far tails of a proposal are only rejected."""
-    return np.asarray(np.exp(np.clip(x, -200.0, 200.0)))
+    return np.asarray(np.exp(np.clip(x, -SAMPLING.largest_exponent, SAMPLING.largest_exponent)))

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from estimators.defaults import PRIOR, PROPOSAL
 from estimators.likelihoods.kernels import sum_log1p_square
 from estimators.likelihoods.per_sample import PerSample, Rows, per_sample
 from estimators.likelihoods.posterior import bounded_exp
@@ -13,20 +14,17 @@ from estimators.linear.fit_data import FitData
 
 FloatArray = NDArray[np.float64]
 
-SHAPE, RATE = 2.0, 0.1
-"""Gamma prior of ν (Juárez & Steel, 2010, J. Bus. Econ. Stat. 28:52): mean 20, heavy and light tails both allowed."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StudentT:
     """Coordinates (log σ, log ν)."""
 
     names: tuple[str, ...] = ("sigma", "nu")
-    prior: str = f"nu ~ Gamma({SHAPE:g}, rate {RATE:g})"
+    prior: str = f"nu ~ Gamma({PRIOR.nu_shape:g}, rate {PRIOR.nu_rate:g})"
 
     def start(self, scale: float) -> FloatArray:
         """The robust scale, and moderate tails."""
-        return np.array([[np.log(scale), np.log(6.0)], [0.1, 0.5]])
+        return np.array([[np.log(scale), np.log(PROPOSAL.start_nu)], [PROPOSAL.start_spread, PROPOSAL.start_nu_spread]])
 
     def natural(self, coordinates: FloatArray) -> FloatArray:
         """(σ, ν)."""
@@ -34,7 +32,7 @@ class StudentT:
 
     def log_prior(self, coordinates: FloatArray) -> FloatArray:
         """That of log ν."""
-        return np.asarray(SHAPE * coordinates[:, 1] - RATE * bounded_exp(coordinates[:, 1]))
+        return np.asarray(PRIOR.nu_shape * coordinates[:, 1] - PRIOR.nu_rate * bounded_exp(coordinates[:, 1]))
 
     def log_likelihood(self, beta: FloatArray, natural: FloatArray, rows: Rows) -> FloatArray:
         """Sum of w log t_ν(r/σ)/σ."""

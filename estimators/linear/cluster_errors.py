@@ -5,14 +5,10 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.defaults import CLUSTERS
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-
-FEW = 3
-"""Clusters a direction from which the cluster-robust variance stands alone: 9 clusters for the three coefficients."""
-
-DOMINANT = 0.8
-"""Share of the information on a direction above which the cluster that holds it is alone there."""
 
 
 def cluster_sums(
@@ -43,7 +39,7 @@ def cluster_robust(square: FloatArray, score: FloatArray, scale: float) -> Float
 
     CR2 of Bell & McCaffrey (2002), Σ A_g s_g s_g' A_g with A_g = (I − Q_g'Q_g)^{-1/2}, is unbiased where errors are
     independent after all. But G clusters span G − 1 directions at most, and a direction that one cluster alone
-    determines leaves no residual: both would come out as *certain*. So with fewer than ``FEW`` clusters a direction no
+    determines leaves no residual: both would come out as *certain*. So with fewer than ``few`` clusters a direction no
     direction is given less than the classical variance, with fewer clusters than directions + 2 none less than the
     mean over directions; and however many they are, a direction that one of them dominates is given no less than the
     worst has: how far a cluster is off as a whole, only the others tell.
@@ -53,7 +49,7 @@ def cluster_robust(square: FloatArray, score: FloatArray, scale: float) -> Float
     moved = np.einsum("gij,gj,gkj,gk->gi", vectors, _inverse_root(values), vectors, score, optimize=True)
     covariance = moved.T @ moved
     worst = max(scale**2, float(np.linalg.eigvalsh(covariance)[-1]))
-    if count < FEW * size:
+    if count < CLUSTERS.few * size:
         covariance = _raise_all(
             covariance, scale**2 if count >= size + 2 else max(scale**2, np.trace(covariance) / size)
         )
@@ -82,7 +78,7 @@ def satterthwaite(square: FloatArray, contrasts: FloatArray) -> FloatArray:
 def _inverse_root(values: FloatArray) -> FloatArray:
     """(1 − value)^{-1/2}, and 0 where a cluster alone determines a direction."""
     remainder = 1.0 - values
-    return np.where(remainder > 1e-8, 1.0 / np.sqrt(np.maximum(remainder, 1e-8)), 0.0)
+    return np.where(remainder > CLUSTERS.alone, 1.0 / np.sqrt(np.maximum(remainder, CLUSTERS.alone)), 0.0)
 
 
 def _raise_all(covariance: FloatArray, least: float) -> FloatArray:
@@ -93,6 +89,6 @@ def _raise_all(covariance: FloatArray, least: float) -> FloatArray:
 
 def _raise_dominated(covariance: FloatArray, share: FloatArray, direction: FloatArray, least: float) -> FloatArray:
     """At least this variance along the directions of which one cluster alone holds most of what is known."""
-    for u in direction[share > DOMINANT]:
+    for u in direction[share > CLUSTERS.dominant]:
         covariance = covariance + max(0.0, least - float(u @ covariance @ u)) * np.outer(u, u)
     return covariance

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from estimators.defaults import IDENTIFIABILITY
 from estimators.linear.cluster_errors import cluster_robust, satterthwaite
 from estimators.linear.least_squares import LinearFit
 from estimators.linear.orthonormal import in_coefficients
@@ -39,6 +40,6 @@ def clustered_errors(
     found = satterthwaite(square, np.concatenate([at_mean, np.where(known, root, at_mean)]))
     freedom, degrees = min(float(found[0]), most), np.minimum(found[1:], most)
     covariance = cluster_robust(square, score, scale)
-    ratio = special.stdtrit(degrees, 0.975) / special.stdtrit(freedom, 0.975)
+    ratio = special.stdtrit(degrees, IDENTIFIABILITY.ends[1]) / special.stdtrit(freedom, IDENTIFIABILITY.ends[1])
     scaled = linear.prior_covariance + np.outer(ratio, ratio) * (root @ covariance @ root.T)
     return CoefficientErrors(scaled, freedom, degrees, np.sqrt(np.diag(in_coefficients(linear, covariance))))

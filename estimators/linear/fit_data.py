@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.defaults import MIN_SAMPLES
+from estimators.defaults import LINEAR
 from estimators.errors import InvalidSamples, TooFewSamples
 from estimators.friction_model import Domain
 from estimators.linear.grasp_statistics import Columns, GraspStatistics
@@ -113,9 +113,9 @@ def _from_samples(observations: Observations) -> FitData:
 
 def _from_moments(moments: list[SufficientStatistics]) -> FitData:
     whole = moments[0].merge(*moments[1:])
-    if whole.n < MIN_SAMPLES or whole.effective_n <= MIN_SAMPLES - 1:
+    if whole.n < LINEAR.min_samples or whole.effective_n <= LINEAR.min_samples - 1:
         value = f"{whole.n}, worth {whole.effective_n:.3g} by their weights"
-        raise TooFewSamples("samples", value, f"at least {MIN_SAMPLES}")
+        raise TooFewSamples("samples", value, f"at least {LINEAR.min_samples}")
     blocks = tuple(part.at_element_area(whole.element_area) for part in moments if part.n)
     return FitData(
         factor=relative(whole.factor, whole),

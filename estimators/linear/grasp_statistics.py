@@ -7,16 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.defaults import CLUSTERS, ROUNDING
 from estimators.errors import InvalidSamples
 from estimators.linear.least_squares import factorise, upper_triangle
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-MAX_PLACES = 480
-"""Places that are kept one by one: 32 bytes each, so that a grasp takes less than 16 kB."""
-MAX_GROUPS = 170
-"""Groups of places of about the same weight that more places are pooled into: 88 bytes each."""
 
 HEADER = struct.Struct("<2I8d")
 UPPER = np.triu_indices(3)
@@ -39,7 +36,7 @@ class GraspStatistics:
     group is one place. ``within`` [3, 3]: triangular factor of all samples about the means of their places.
     ``total_weight`` Σw and ``weight_square`` Σw² give the effective number of samples.
 
-    Exact up to ``MAX_PLACES`` places; beyond, places whose weights differ by a few per cent count as alike.
+    Exact up to ``most_places`` places; beyond, places whose weights differ by a few per cent count as alike.
     """
 
     count: FloatArray
@@ -131,10 +128,10 @@ def _pooled(weight: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArra
 
     Σ W mean meanᵀ over the places stays exact; that all places of a group have its mean weight is approximate.
     """
-    if len(weight) <= MAX_PLACES:
+    if len(weight) <= CLUSTERS.most_places:
         return np.ones(len(weight)), weight, mean, np.zeros((len(weight), 3, 3))
     height = np.log(weight / weight.min())
-    bins = np.floor(height / (height.max() or 1.0) * (1.0 - 1e-12) * MAX_GROUPS).astype(np.int64)
+    bins = np.floor(height / (height.max() or 1.0) * (1.0 - ROUNDING) * CLUSTERS.most_groups).astype(np.int64)
     groups = [np.flatnonzero(bins == code) for code in np.unique(bins)]
     count = np.array([float(len(group)) for group in groups])
     typical = np.array([weight[group].mean() for group in groups])

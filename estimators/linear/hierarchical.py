@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from estimators.defaults import PRIOR, REFERENCE
+from estimators.defaults import PRIOR, REFERENCE, ROUNDING
 from estimators.linear.grasp_statistics import GraspStatistics
 from estimators.linear.normal_inverse_gamma import NormalInverseGamma
 from estimators.linear.priors import log_half_student
@@ -100,7 +100,7 @@ class Hierarchical:
     def log_sigma(self, products: Products) -> tuple[FloatArray, float]:
         """Mean [k] and spread of log σ at points [k], the priors of β, τ and ω left aside: σ² is inverse-gamma then."""
         square = products.square
-        precision = square[:, WHOLE[:3, :3]] + 1e-12 * np.eye(3)
+        precision = square[:, WHOLE[:3, :3]] + ROUNDING * np.eye(3)
         solved = np.linalg.solve(precision, square[:, WHOLE[:3, 3], None])[..., 0]
         misfit = square[:, WHOLE[3, 3]] - np.einsum("ki,ki->k", solved, square[:, WHOLE[:3, 3]])
         total = np.maximum(misfit, 0.0) + PRIOR.degrees_of_freedom * REFERENCE.scatter**2

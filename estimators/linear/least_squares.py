@@ -7,15 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
-from estimators.defaults import IDENTIFIABILITY
+from estimators.defaults import IDENTIFIABILITY, LINEAR
 
 FloatArray = NDArray[np.float64]
 RealArray = NDArray[np.floating]
-
-UNBOUNDED = 1e16
-"""Reported in place of an infinite condition number or variance inflation."""
-CHUNK = 8192
-"""Rows that are worked on at once: they fit the processor's cache, so memory and time stay bounded."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,16 +123,16 @@ def equilibrate(triangle: RealArray) -> tuple[FloatArray, FloatArray]:
 
 
 def condition_number(triangle: RealArray) -> float:
-    """Condition number after scaling the columns to norm 1; at most ``UNBOUNDED``."""
+    """Condition number after scaling the columns to norm 1; at most ``unbounded``."""
     values = np.linalg.svd(equilibrate(triangle)[0], compute_uv=False)
-    return float(values[0] / max(values[-1], values[0] / UNBOUNDED)) if len(values) and values[0] > 0.0 else 1.0
+    return float(values[0] / max(values[-1], values[0] / LINEAR.unbounded)) if len(values) and values[0] > 0.0 else 1.0
 
 
 def _chunks(
     columns: RealArray, weight: FloatArray | None, intercept: bool, precision: np.dtype[np.floating]
 ) -> Iterator[Factor]:
-    for start in range(0, len(columns), CHUNK):
-        rows = slice(start, start + CHUNK)
+    for start in range(0, len(columns), LINEAR.chunk):
+        rows = slice(start, start + LINEAR.chunk)
         yield _block(columns[rows].astype(precision), None if weight is None else weight[rows], intercept)
 
 
@@ -184,7 +179,7 @@ def _householder(rows: RealArray) -> RealArray:
 def _blank_constant(regressors: RealArray, mean: RealArray, weight: float) -> None:
     """Set to zero, in place, the columns whose spread is nothing but the rounding of their mean."""
     norms = np.sqrt(np.sum(np.square(regressors), axis=0))
-    regressors[:, norms <= 8.0 * np.finfo(np.float64).eps * np.sqrt(weight) * np.abs(mean)] = 0.0
+    regressors[:, norms <= IDENTIFIABILITY.rounding * np.finfo(np.float64).eps * np.sqrt(weight) * np.abs(mean)] = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -206,7 +201,7 @@ def _directions(regressors: RealArray, response: RealArray) -> _Seen:
     if rank == size:
         return _Seen(triangular_inverse(regressors), response, np.zeros((size, 0)), size, condition)
     basis = (vt[:rank].T / values[:rank] / norms[:, None]).astype(np.longdouble)
-    return _Seen(basis, u[:, :rank].T @ response, vt[rank:].T / norms[:, None], rank, UNBOUNDED)
+    return _Seen(basis, u[:, :rank].T @ response, vt[rank:].T / norms[:, None], rank, LINEAR.unbounded)
 
 
 def _least_prior(seen: _Seen, spans: FloatArray) -> tuple[FloatArray, RealArray]:
@@ -227,8 +222,8 @@ def _missed(regressors: RealArray, response: RealArray, seen: _Seen) -> float:
 def _inflation(regressors: RealArray, seen: _Seen) -> FloatArray:
     """Variance inflation [p]: variance of a slope over what it were with the other regressors away."""
     factors = np.sum(np.square(seen.basis), axis=1) * np.sum(np.square(regressors), axis=0)
-    hidden = np.any(np.abs(seen.unseen) > 1e-8 * np.abs(seen.unseen).max(initial=0.0), axis=1)
-    return np.where(hidden, UNBOUNDED, np.maximum(factors.astype(float), 1.0))
+    hidden = np.any(np.abs(seen.unseen) > IDENTIFIABILITY.hidden * np.abs(seen.unseen).max(initial=0.0), axis=1)
+    return np.where(hidden, LINEAR.unbounded, np.maximum(factors.astype(float), 1.0))
 
 
 def triangular_inverse(upper: RealArray) -> RealArray:

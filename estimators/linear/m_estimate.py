@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.defaults import REFERENCE
+from estimators.defaults import NORMAL_MAD, REFERENCE, ROBUST
 from estimators.linear.cluster_errors import cluster_sums
 from estimators.linear.coefficient_errors import CoefficientErrors, clustered_errors
 from estimators.linear.fit_data import FitData
@@ -17,18 +17,6 @@ from estimators.linear.orthonormal import orthonormal
 
 FloatArray = NDArray[np.float64]
 
-SUBSETS = 500
-"""Elemental fits tried: with 45 % outliers, the chance that none of them is clean is below 1e-39."""
-SUBSET_SAMPLES = 2000
-"""Samples that the elemental fits are compared on."""
-CONCENTRATIONS = 20
-"""Concentration steps of the best elemental fits; each lowers the trimmed sum of squares."""
-NEAR, INFLATED = 3.0, 4.0
-"""Scales from which a sample does not count while the scale is found; most that outliers inflate the start's by."""
-ITERATIONS = 200
-NORMAL_MAD = 0.674489750196082
-"""Median of |ε|/σ for normal ε."""
-
 
 class Loss(NamedTuple):
     """An M-estimator: ``weight`` ψ(u)/u and ``slope`` ψ'(u); tuned to 95 % efficiency at normal errors."""
@@ -37,18 +25,18 @@ class Loss(NamedTuple):
     slope: Callable[[FloatArray], FloatArray]
 
 
-def _tukey_weight(u: FloatArray, c: float = 4.685) -> FloatArray:
+def _tukey_weight(u: FloatArray, c: float = ROBUST.tukey) -> FloatArray:
     return np.asarray(np.square(np.maximum(1.0 - np.square(u / c), 0.0)))
 
 
-def _tukey_slope(u: FloatArray, c: float = 4.685) -> FloatArray:
+def _tukey_slope(u: FloatArray, c: float = ROBUST.tukey) -> FloatArray:
     return np.where(np.abs(u) < c, (1.0 - (u / c) ** 2) * (1.0 - 5.0 * (u / c) ** 2), 0.0)
 
 
 LOSSES = {
     "huber": Loss(
-        lambda u: 1.345 / np.maximum(np.abs(u), 1.345),
-        lambda u: (np.abs(u) <= 1.345).astype(float),
+        lambda u: ROBUST.huber / np.maximum(np.abs(u), ROBUST.huber),
+        lambda u: (np.abs(u) <= ROBUST.huber).astype(float),
     ),
     "tukey": Loss(_tukey_weight, _tukey_slope),
 }
@@ -94,39 +82,41 @@ def m_estimate(data: FitData, observations: Observations, loss: Loss, seed: int 
 def high_breakdown(design: FloatArray, response: FloatArray, rng: np.random.Generator) -> Plane:
     """Plane that half of the samples lie closest to (least trimmed squares; Rousseeuw & Van Driessen, 2006).
 
-    ``design`` [n, r] and ``response`` [n]. Elemental fits are compared on at most ``SUBSET_SAMPLES`` samples by their
+    ``design`` [n, r] and ``response`` [n]. Elemental fits are compared on at most ``subset_samples`` samples by their
     median residual; the best of the five best is improved on all.
     """
     count, size = design.shape
-    rows = rng.integers(0, count, (SUBSETS, size))
-    regular = np.linalg.cond(design[rows]) < 1e8
+    rows = rng.integers(0, count, (ROBUST.subsets, size))
+    regular = np.linalg.cond(design[rows]) < ROBUST.regular
     elemental = np.linalg.solve(design[rows[regular]], response[rows[regular], None])[..., 0]
     elemental = np.vstack([elemental, _least_squares(design, response)])  # should no subset be regular
-    shown = rng.choice(count, min(count, SUBSET_SAMPLES), replace=False)
+    shown = rng.choice(count, min(count, ROBUST.subset_samples), replace=False)
     median = np.median(np.abs(response[shown] - elemental @ design[shown].T), axis=1)
-    best = elemental[np.argsort(median)[:5]]
+    best = elemental[np.argsort(median)[: ROBUST.improved]]
     planes = [_concentrate(design[shown], response[shown], coefficients) for coefficients in best]
     return _concentrate(design, response, min(planes, key=lambda plane: plane.scale).coefficients)
 
 
 def rescaled(design: FloatArray, response: FloatArray, start: Plane) -> Plane:
-    """The start, its scale freed of outliers: that of what lies within ``NEAR`` scales, again until it stays the same.
+    """The start, its scale freed of outliers: that of what lies within ``near`` scales, again until it stays the same.
 
     The median residual is that of the best half; with 45 % of outliers it is 2.5 times too large, and an M-estimate
     that trusts it takes the nearer outliers for good samples. A tighter loss finds the scale of the rest, by itself no
     smaller than what half of the samples could have been inflated by.
     """
     least = _least_scale(response)
-    loss, plane = Loss(*(partial(rule, c=NEAR) for rule in (_tukey_weight, _tukey_slope))), start
+    loss, plane = Loss(*(partial(rule, c=ROBUST.near) for rule in (_tukey_weight, _tukey_slope))), start
     consistent = normal_square(loss)
-    for _ in range(ITERATIONS):
+    for _ in range(ROBUST.iterations):
         known = max(plane.scale, least)
         u = (response - design @ plane.coefficients) / known
         weight = loss.weight(u)
         half = np.sqrt(weight)
         scale = known * float(np.sqrt(np.average(u**2, weights=weight) / consistent))
-        moved = Plane(_least_squares(design * half[:, None], response * half), max(scale, start.scale / INFLATED))
-        if abs(moved.scale - plane.scale) <= 1e-3 * plane.scale:
+        moved = Plane(
+            _least_squares(design * half[:, None], response * half), max(scale, start.scale / ROBUST.inflated)
+        )
+        if abs(moved.scale - plane.scale) <= ROBUST.scale_tolerance * plane.scale:
             return moved
         plane = moved
     return plane
@@ -135,16 +125,16 @@ def rescaled(design: FloatArray, response: FloatArray, start: Plane) -> Plane:
 def _least_scale(response: FloatArray) -> float:
     """Below it a scale is rounding: most samples may lie on the plane to the last digit, or all have one friction."""
     size = np.abs(response[response != 0.0])
-    return max(1e-12 * float(np.median(size)), np.finfo(float).tiny) if size.size else np.finfo(float).tiny
+    return max(ROBUST.least_scale * float(np.median(size)), np.finfo(float).tiny) if size.size else np.finfo(float).tiny
 
 
 def _concentrate(design: FloatArray, response: FloatArray, coefficients: FloatArray) -> Plane:
     """Refit to the closer half until it stays the same."""
     half = (len(response) + design.shape[1] + 1) // 2
-    for _ in range(CONCENTRATIONS):
+    for _ in range(ROBUST.concentrations):
         closest = np.argpartition(np.abs(response - design @ coefficients), half - 1)[:half]
         moved = _least_squares(design[closest], response[closest])
-        if np.allclose(moved, coefficients, rtol=1e-10, atol=0.0):
+        if np.allclose(moved, coefficients, rtol=ROBUST.same, atol=0.0):
             break
         coefficients = moved
     distance = np.sort(np.abs(response - design @ coefficients))
@@ -162,21 +152,21 @@ def _m_step(
     """Iteratively reweighted least squares from the start, its scale kept; the weights [n], and whether it settled."""
     coefficients = start.coefficients
     scale = max(start.scale, _least_scale(residual / root))
-    for _ in range(ITERATIONS):
+    for _ in range(ROBUST.iterations):
         weight = loss.weight((residual - design @ coefficients) / root / scale)
         half = np.sqrt(weight)
         moved = _least_squares(design * half[:, None], residual * half)
         step = float(np.linalg.norm(moved - coefficients))
         coefficients = moved
-        rounding = 8.0 * np.finfo(float).eps * float(np.linalg.norm(moved))
-        if step <= max(1e-8 * scale * np.sqrt(len(coefficients)), rounding):
+        rounding = ROBUST.rounding * np.finfo(float).eps * float(np.linalg.norm(moved))
+        if step <= max(ROBUST.step_tolerance * scale * np.sqrt(len(coefficients)), rounding):
             return Plane(coefficients, scale), weight, True
     return Plane(coefficients, scale), weight, False
 
 
 def normal_square(loss: Loss) -> float:
     """Mean of u² under the loss's weights at standard normal u: what makes a weighted variance consistent."""
-    u = np.linspace(-8.0, 8.0, 4001)
+    u = np.linspace(-ROBUST.reach, ROBUST.reach, ROBUST.nodes)
     weight = loss.weight(u) * np.exp(-0.5 * u**2)
     return float(weight @ u**2 / weight.sum())
 
@@ -189,7 +179,7 @@ def _weighted_fit(observations: Observations, weight: FloatArray, plane: Plane, 
     design, residual = orthonormal(kept, linear)
     u = residual / np.sqrt(kept.weight) / plane.scale
     base = observations.weight[used]
-    correction = float(base @ weight[used] / max(base @ loss.slope(u), 0.2 * (base @ weight[used])))
+    correction = float(base @ weight[used] / max(base @ loss.slope(u), ROBUST.least_slope * (base @ weight[used])))
     scale = plane.scale * float(np.sqrt(np.average(u**2, weights=kept.weight) / normal_square(loss)))
     downweighted = float(np.average(weight < 0.5, weights=observations.weight))
     sums = cluster_sums([(design, residual, kept.cluster)], kept.clusters)

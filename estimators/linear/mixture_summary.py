@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from estimators.defaults import IDENTIFIABILITY
 from estimators.friction_model import Scale, Scales
 from estimators.linear.normal_mixture import Student, matched_student, mixture_quantile
 from estimators.linear.posterior_grid import Nodes
@@ -51,11 +52,11 @@ def _widened(covariance: FloatArray, nodes: Nodes, away: FloatArray, degrees_of_
     scale = np.empty(3)
     for k in range(3):
         half = _half_width(nodes.weight, away[:, k], np.sqrt(nodes.covariance[:, k, k]))
-        scale[k] = half / special.stdtrit(degrees_of_freedom, 0.975)
+        scale[k] = half / special.stdtrit(degrees_of_freedom, IDENTIFIABILITY.ends[1])
     ratio = np.where(deviation > 0.0, scale / np.where(deviation > 0.0, deviation, 1.0), 0.0)
     return np.asarray(covariance * np.outer(ratio, ratio))
 
 
 def _half_width(weight: FloatArray, mean: FloatArray, deviation: FloatArray) -> float:
-    low, high = mixture_quantile(weight, mean, deviation, [0.025, 0.975])
+    low, high = mixture_quantile(weight, mean, deviation, IDENTIFIABILITY.ends)
     return float(0.5 * (high - low))

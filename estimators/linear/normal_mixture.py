@@ -6,13 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-FloatArray = NDArray[np.float64]
+from estimators.defaults import GRID
 
-MATCHED = (0.975, 0.999)
-"""Quantiles at which a Student-t is matched: that of a 95 % interval, and one that a planner asks for."""
-MOST_FREEDOM = 1e4
-"""Degrees of freedom from which a Student-t is taken as normal."""
-STEPS = 60
+FloatArray = NDArray[np.float64]
 
 
 class Student(NamedTuple):
@@ -31,8 +27,8 @@ def mixture_quantile(weight: FloatArray, mean: FloatArray, deviation: FloatArray
     safe = np.maximum(deviation, np.finfo(float).tiny)
     ends = mean + special.ndtri(wanted)[:, None] * deviation
     low, high = ends.min(axis=1), ends.max(axis=1)
-    at, close = ends @ weight, 1e-10 * (np.abs(ends).max() + np.finfo(float).tiny)
-    for _ in range(STEPS):
+    at, close = ends @ weight, GRID.quantile_rounding * (np.abs(ends).max() + np.finfo(float).tiny)
+    for _ in range(GRID.quantile_steps):
         score = (at[:, None] - mean) / safe
         over = special.ndtr(score) @ weight - wanted
         low, high = np.where(over < 0.0, at, low), np.where(over < 0.0, high, at)
@@ -46,17 +42,19 @@ def mixture_quantile(weight: FloatArray, mean: FloatArray, deviation: FloatArray
 
 
 def matched_student(weight: FloatArray, mean: FloatArray, deviation: FloatArray) -> Student:
-    """The Student-t whose quantiles ``MATCHED`` are half the distances between those of a mixture and their mirrors."""
-    levels = np.array(MATCHED)
+    """The Student-t whose ``middle`` and ``extreme`` quantiles are half the distances between a mixture's and their
+    mirrors.
+    """
+    levels = np.array([GRID.middle, GRID.extreme])
     inner, outer = 0.5 * (
         mixture_quantile(weight, mean, deviation, levels) - mixture_quantile(weight, mean, deviation, 1.0 - levels)
     )
     if not inner > 0.0:
-        return Student(0.0, MOST_FREEDOM)
-    low, high = 0.0, float(np.log(MOST_FREEDOM))
-    for _ in range(STEPS):
+        return Student(0.0, GRID.most_freedom)
+    low, high = 0.0, float(np.log(GRID.most_freedom))
+    for _ in range(GRID.quantile_steps):
         middle = 0.5 * (low + high)
         near, far = special.stdtrit(np.exp(middle), levels)
         low, high = (middle, high) if far / near > outer / inner else (low, middle)
     freedom = float(np.exp(0.5 * (low + high)))
-    return Student(float(inner / special.stdtrit(freedom, MATCHED[0])), freedom)
+    return Student(float(inner / special.stdtrit(freedom, GRID.middle)), freedom)

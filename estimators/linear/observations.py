@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.defaults import MIN_SAMPLES
+from estimators.defaults import CLUSTERS, LINEAR
 from estimators.errors import InvalidSamples, TooFewSamples
 
 if TYPE_CHECKING:  # a type only: importing it would load the whole of slipcore
@@ -15,9 +15,6 @@ if TYPE_CHECKING:  # a type only: importing it would load the whole of slipcore
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-
-TIME_BLOCKS = 20
-"""Blocks that the record of a single element is cut into: enough for a variance, long enough to be independent."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,7 +86,7 @@ def observe(samples: "FrictionSamples | Sequence[FrictionSamples]") -> Observati
     area = common_element_area([part.element_area for part in parts])
     parts = [part if part.element_area == area else part.at_element_area(area) for part in parts]
     if sum(map(len, parts)) == 0:
-        raise TooFewSamples("samples", "none (no slip was seen)", f"at least {MIN_SAMPLES}")
+        raise TooFewSamples("samples", "none (no slip was seen)", f"at least {LINEAR.min_samples}")
     values = check_columns(parts)
     weight = _relative_weight(values.pop("weight"))
     used = positive(weight)
@@ -175,11 +172,11 @@ def _relative_weight(weight: FloatArray) -> FloatArray:
 
 
 def _check_count(weight: FloatArray) -> None:
-    if len(weight) < MIN_SAMPLES:
-        raise TooFewSamples("samples", f"{len(weight)} of positive weight", f"at least {MIN_SAMPLES}")
+    if len(weight) < LINEAR.min_samples:
+        raise TooFewSamples("samples", f"{len(weight)} of positive weight", f"at least {LINEAR.min_samples}")
     effective = float(weight.sum())
-    if effective <= MIN_SAMPLES - 1:
-        raise TooFewSamples("samples", f"worth {effective:.3g} by their weights", f"more than {MIN_SAMPLES - 1}")
+    if effective <= LINEAR.min_samples - 1:
+        raise TooFewSamples("samples", f"worth {effective:.3g} by their weights", f"more than {LINEAR.min_samples - 1}")
 
 
 def _labels(arrays: Sequence[NDArray[np.integer]]) -> IntArray:
@@ -197,7 +194,7 @@ def _clusters(
         return codes, "element"
     order = np.argsort(joined([part.time for part in parts])[used], kind="stable")
     block = np.empty(len(order), dtype=np.int64)
-    block[order] = np.arange(len(order)) * min(TIME_BLOCKS, len(order)) // len(order)
+    block[order] = np.arange(len(order)) * min(CLUSTERS.time_blocks, len(order)) // len(order)
     return block, "time block"
 
 

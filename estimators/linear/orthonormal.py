@@ -5,7 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.linear.least_squares import CHUNK, LinearFit
+from estimators.defaults import LINEAR
+from estimators.linear.least_squares import LinearFit
 from estimators.linear.observations import IntArray, Observations
 
 FloatArray = NDArray[np.float64]
@@ -20,7 +21,7 @@ def orthonormal_blocks(
     observations: Observations, linear: LinearFit
 ) -> Iterator[tuple[FloatArray, FloatArray, IntArray]]:
     """The same with the cluster of each row, some rows at a time: as many as fit a cache, or as there are clusters."""
-    size, effective_n = max(CHUNK, observations.clusters), observations.effective_n
+    size, effective_n = max(LINEAR.chunk, observations.clusters), observations.effective_n
     for start in range(0, len(observations), size):
         rows = slice(start, start + size)
         yield *_rows(observations, linear, effective_n, rows), observations.cluster[rows]

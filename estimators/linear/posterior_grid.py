@@ -8,6 +8,7 @@ from numpy.polynomial.hermite_e import hermegauss
 from numpy.typing import NDArray
 from scipy import special
 
+from estimators.defaults import GRID
 from estimators.linear.fit_data import FitData
 from estimators.linear.hierarchical import Hierarchical, Products, hierarchical
 from estimators.linear.normal_inverse_gamma import exact_posterior
@@ -15,14 +16,7 @@ from estimators.linear.priors import weak_spans
 
 FloatArray = NDArray[np.float64]
 
-TAU, OMEGA = (1e-4, 3.0), (1e-5, 3.0)
-"""-; where the scales between grasps and between places are looked for: from what does not matter to what is absurd."""
-COARSE, FINE = 12, 20
-"""Nodes a scale of the first grids and of the last."""
-DEPTH = 10.0
-"""The grid spans where the log density is at most this much below its maximum."""
-ROUNDS = 5
-SIGMA_NODES, SIGMA_WEIGHTS = hermegauss(7)
+SIGMA_NODES, SIGMA_WEIGHTS = hermegauss(GRID.sigma_nodes)
 
 
 class Nodes(NamedTuple):
@@ -67,10 +61,10 @@ def posterior_grid(data: FitData) -> PosteriorGrid:
     pooled = exact_posterior(data)
     model = hierarchical(grasps, pooled, weak_spans(data.domain, data.element_area), data.mean_row())
     box = _widest(model)
-    for turn in range(ROUNDS):
-        grid = _evaluated(model, box, COARSE if turn < 2 else FINE)
+    for turn in range(GRID.rounds):
+        grid = _evaluated(model, box, GRID.coarse if turn < 2 else GRID.fine)
         closer = _closer(grid)
-        settled = turn >= 2 and bool((np.ptp(closer, axis=1) > 0.6 * np.ptp(box, axis=1)).all())
+        settled = turn >= 2 and bool((np.ptp(closer, axis=1) > GRID.settled * np.ptp(box, axis=1)).all())
         if settled:
             break
         box = closer
@@ -81,9 +75,11 @@ def posterior_grid(data: FitData) -> PosteriorGrid:
 def _widest(model: Hierarchical) -> FloatArray:
     """Range of (log λ, log ρ), [2, 2], that covers the scales for any σ that the data allow."""
     most = float(np.log(model.pooled.scale))
-    least = float(model.log_sigma(model.products(np.array([60.0]), np.array([60.0])))[0][0])
+    far = np.array([GRID.no_scatter])
+    least = float(model.log_sigma(model.products(far, far))[0][0])
     low, high = min(least, most), max(least, most)
-    return 2.0 * np.array([[np.log(a) - high, np.log(b) - low] for a, b in (TAU, OMEGA)])
+    last = np.log(GRID.most_scatter) - low
+    return 2.0 * np.array([[np.log(first) - high, last] for first in (GRID.least_tau, GRID.least_omega)])
 
 
 def _evaluated(model: Hierarchical, box: FloatArray, count: int) -> PosteriorGrid:
@@ -107,7 +103,7 @@ def _evaluated(model: Hierarchical, box: FloatArray, count: int) -> PosteriorGri
 
 def _closer(grid: PosteriorGrid) -> FloatArray:
     """The box [2, 2] in which the density matters, a node wider on each side."""
-    matters = grid.log_marginal > grid.log_marginal.max() - DEPTH
+    matters = grid.log_marginal > grid.log_marginal.max() - GRID.depth
     box = np.empty((2, 2))
     for axis, values in enumerate((grid.log_lambda, grid.log_rho)):
         inside = np.flatnonzero(matters.any(axis=1 - axis))

@@ -8,9 +8,6 @@ from estimators.friction_model import Domain
 
 FloatArray = NDArray[np.float64]
 
-LEAST_SPAN = 1e-3
-"""Least part of the largest value that counts as the range seen: where all are equal, any prior of a slope is one."""
-
 
 def prior_rows(element_area: float, prior: Prior = PRIOR) -> FloatArray:
     """The prior of β as rows [3, 4] of a least-squares problem in (1, v, f_n | μ), each with error σ."""
@@ -27,7 +24,7 @@ def weak_spans(domain: Domain, element_area: float) -> FloatArray:
     Over a sliver of v or f_n a prior made for millimetres a second and for newtons would be strong.
     """
     seen = np.array([domain.tangential_velocity, domain.normal_force])
-    width = np.maximum(seen[:, 1] - seen[:, 0], LEAST_SPAN * seen[:, 1])
+    width = np.maximum(seen[:, 1] - seen[:, 0], PRIOR.least_span * seen[:, 1])
     spans = REFERENCE.spans(element_area)
     return np.where(width > 0.0, np.minimum(spans, width), spans)
 

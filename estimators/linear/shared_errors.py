@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
-from estimators.defaults import REFERENCE, SHARED_LEVEL
+from estimators.defaults import CLUSTERS, REFERENCE
 from estimators.linear.fit_data import FitData
 from estimators.linear.least_squares import LinearFit, solve
 from estimators.linear.observations import IntArray, Observations
@@ -32,7 +32,7 @@ def shared_by_elements(data: FitData) -> float:
     element = _means(place, residual)
     inside = float(((residual - element[place]) ** 2).sum()) / within
     across = float(count @ element**2) / between
-    if not inside > 0.0 or fdtrc(between, within, across / inside) > SHARED_LEVEL:
+    if not inside > 0.0 or fdtrc(between, within, across / inside) > CLUSTERS.shared_level:
         return 0.0
     typical = (len(place) - float(count @ count) / len(place)) / max(len(count) - 1, 1)
     variance = (across - inside) / typical

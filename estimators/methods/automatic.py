@@ -5,22 +5,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.defaults import AUTOMATIC
+from estimators.defaults import AUTOMATIC, NORMAL_MAD
 from estimators.friction_model import FrictionModel
 from estimators.linear.fit_data import FitData
-from estimators.linear.m_estimate import LOSSES, NORMAL_MAD, m_estimate
+from estimators.linear.m_estimate import LOSSES, m_estimate
 from estimators.linear.observations import IntArray, Observations
 from estimators.linear.shared_errors import plane
 from estimators.methods import ols
 
 FloatArray = NDArray[np.float64]
-
-HALF_WEIGHT = 2.535
-"""Standard deviations from which Tukey's loss gives a sample less than half weight; 1.1 % of normal errors do so."""
-FAR = 3.0
-"""Standard deviations from which samples are left out where too many lie far off; 0.3 % of normal errors do."""
-FEWEST = 8
-"""Samples of a place from which its median says what is the place's."""
 
 
 class Choice(NamedTuple):
@@ -38,11 +31,13 @@ def choose(data: FitData) -> Choice:
     """
     if data.observations is not None:
         distance = distances(data, data.observations)
-        part = float(np.average(distance > HALF_WEIGHT, weights=data.observations.weight))
+        part = float(np.average(distance > AUTOMATIC.half_weight, weights=data.observations.weight))
         if part > AUTOMATIC.downweighted and part * data.n >= AUTOMATIC.least_outliers:
-            near = distance <= FAR
+            near = distance <= AUTOMATIC.far
             told = f"{part:.1%} of the samples lie far off their place; normal errors leave 1.1%"
-            return Choice(data.kept(near), f"{told}; without the {np.count_nonzero(~near)} beyond {FAR:g} deviations")
+            return Choice(
+                data.kept(near), f"{told}; without the {np.count_nonzero(~near)} beyond {AUTOMATIC.far:g} deviations"
+            )
     return Choice(data, "friction may scatter between grasps, between places and within them")
 
 
@@ -55,7 +50,7 @@ def distances(data: FitData, observations: Observations) -> FloatArray:
     linear = m_estimate(data, observations, LOSSES["tukey"]).linear
     residual = observations.friction - plane(linear, observations)
     place = observations.place()
-    known = np.bincount(place)[place] >= FEWEST
+    known = np.bincount(place)[place] >= AUTOMATIC.fewest
     if 2 * np.count_nonzero(known) > len(known):
         residual = np.where(known, residual - _medians(place, residual)[place], 0.0)
         known &= residual != 0.0  # a median's own distance of 0 says nothing of the scatter

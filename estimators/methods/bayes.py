@@ -3,6 +3,7 @@
 import time
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -67,7 +68,7 @@ def fit(
     walkers disagree. A chain that is sound but was stopped by ``seconds`` before ``accuracy`` says so in
     ``diagnostics["stopped"]`` and in ``cost.monte_carlo_error``. ``diagnostics["shared_by_elements"]`` is the part of
     the errors' variance that samples of an element share; where it is not 0 these intervals are too narrow. Moments
-    know of no elements, and nothing is said of it then.
+    know of no elements: the entry is then missing.
     """
     begin = time.perf_counter()
     name = default_likelihood(data) if likelihood is None else _present_name(likelihood)
@@ -77,26 +78,14 @@ def fit(
     posterior = LIKELIHOODS[name].posterior(data)
     left = None if seconds is None else max(seconds - (time.perf_counter() - begin), 0.0)
     chain = sample(posterior.log_probability, posterior.proposal, goal, left, seed, posterior.local)
-    summary = posterior.summarise(chain.flat(), np.random.default_rng([seed, 1]))
+    found = posterior.summarise(chain.flat(), np.random.default_rng([seed, 1]))
     diagnostics: Diagnostics = {"likelihood": name, "prior": posterior.prior, "draws": ", ".join(posterior.names)}
     diagnostics |= _convergence(chain, posterior) | sensitivity(data, exact_posterior(data))
     independent = name != "hierarchical" and data.cluster_kind != "element"
     if independent and data.observations is not None:  # moments cannot tell
         diagnostics["shared_by_elements"] = shared_by_elements(data)
-    model = report(
-        data,
-        "bayes",
-        summary.coefficients,
-        summary.covariance,
-        summary.scale,
-        summary.degrees_of_freedom,
-        begin,
-        diagnostics,
-        monte_carlo_error=chain.monte_carlo_error,
-        draws=summary.draws,
-        scatter_degrees_of_freedom=summary.scatter_degrees_of_freedom,
-        scales=summary.scales,
-    )
+    found = replace(found, monte_carlo_error=chain.monte_carlo_error)
+    model = report(data, "bayes", found, begin, diagnostics)
     if chain.trouble:
         raise NotConverged(chain.trouble, model)
     return model

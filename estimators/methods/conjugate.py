@@ -1,4 +1,4 @@
-"""The exact answer for independent errors: normal-inverse-gamma posterior with a Student-t prediction."""
+"""The exact posterior for independent errors: normal-inverse-gamma with a Student-t prediction."""
 
 import time
 
@@ -6,6 +6,7 @@ import numpy as np
 
 from estimators.defaults import PRIOR
 from estimators.friction_model import FrictionModel
+from estimators.likelihoods.posterior import Summary
 from estimators.linear.fit_data import FitData
 from estimators.linear.normal_inverse_gamma import NormalInverseGamma, exact_posterior
 from estimators.linear.priors import conjugate_prior, prior_rows
@@ -17,17 +18,9 @@ def fit(data: FitData) -> FrictionModel:
     begin = time.perf_counter()
     exact = exact_posterior(data)
     diagnostics: Diagnostics = {"assumes": "independent Gaussian errors", "prior": conjugate_prior()}
-    return report(
-        data,
-        "conjugate",
-        exact.mean,
-        exact.covariance,
-        exact.scale,
-        exact.degrees_of_freedom,
-        begin,
-        diagnostics | sensitivity(data, exact),
-        scatter_degrees_of_freedom=exact.degrees_of_freedom,
-    )
+    degrees = exact.degrees_of_freedom
+    found = Summary(exact.mean, exact.covariance, exact.scale, degrees, degrees)
+    return report(data, "conjugate", found, begin, diagnostics | sensitivity(data, exact))
 
 
 def sensitivity(data: FitData, exact: NormalInverseGamma) -> Diagnostics:

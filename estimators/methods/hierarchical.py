@@ -1,8 +1,9 @@
-"""The exact answer where grasps and places scatter: the hierarchical posterior on a grid, no sampling."""
+"""The exact posterior where grasps and places scatter: on a grid, no sampling."""
 
 import time
 
 from estimators.friction_model import FrictionModel
+from estimators.likelihoods.posterior import Summary
 from estimators.linear.fit_data import FitData
 from estimators.linear.mixture_summary import summarise
 from estimators.linear.posterior_grid import posterior_grid
@@ -19,15 +20,13 @@ def fit(data: FitData) -> FrictionModel:
     grid = posterior_grid(data)
     found = summarise(grid.nodes, data.mean_row())
     diagnostics: Diagnostics = {"prior": structured(), "nodes": float(len(grid.nodes.weight))}
-    return report(
-        data,
-        "hierarchical",
+    diagnostics |= by_coefficient("prior_sensitivity", grid.prior_shift())
+    summary = Summary(
         found.coefficients,
         found.covariance,
         found.scatter.scale,
         found.degrees_of_freedom,
-        begin,
-        diagnostics | by_coefficient("prior_sensitivity", grid.prior_shift()),
-        scatter_degrees_of_freedom=found.scatter.degrees_of_freedom,
-        scales=found.scales,
+        found.scatter.degrees_of_freedom,
+        found.scales,
     )
+    return report(data, "hierarchical", summary, begin, diagnostics)

@@ -18,7 +18,7 @@ def effects(covariance: FloatArray, degrees_of_freedom: float, data: FitData) ->
     """
     largest = np.array([data.domain.tangential_velocity[1], data.domain.normal_force[1]])
     span = np.concatenate([[1.0], np.maximum(REFERENCE.spans(data.element_area), largest)])
-    half = special.stdtrit(degrees_of_freedom, 0.975) * np.sqrt(np.diag(covariance)) * span
+    half = special.stdtrit(degrees_of_freedom, IDENTIFIABILITY.ends[1]) * np.sqrt(np.diag(covariance)) * span
     mean = abs(data.mean_friction)
     return np.asarray(half / max(mean, np.finfo(float).tiny))
 

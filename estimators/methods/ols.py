@@ -6,8 +6,9 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.defaults import REFERENCE
+from estimators.defaults import LINEAR, REFERENCE
 from estimators.friction_model import FrictionModel
+from estimators.likelihoods.posterior import Summary
 from estimators.linear.cluster_errors import cluster_sums
 from estimators.linear.coefficient_errors import CoefficientErrors, clustered_errors
 from estimators.linear.fit_data import FitData
@@ -18,9 +19,6 @@ from estimators.methods.reporting import Diagnostics, by_coefficient, report
 
 FloatArray = NDArray[np.float64]
 Rows = tuple[FloatArray, FloatArray, IntArray]
-
-STATSMODELS_LIMIT = 20_000
-"""Samples up to which statsmodels adds its classical, HC3 and CR1 errors for comparison; it takes seconds beyond."""
 
 
 def fit(data: FitData) -> FrictionModel:
@@ -40,18 +38,8 @@ def fit(data: FitData) -> FrictionModel:
         **by_coefficient("standard_error_classical", np.sqrt(np.diag(classical(linear, scale)))),
         **_of_clusters(data, linear, errors),
     }
-    return report(
-        data,
-        "ols",
-        linear.coefficients,
-        errors.covariance,
-        scale,
-        errors.degrees_of_freedom,
-        begin,
-        diagnostics,
-        linear,
-        scatter_degrees_of_freedom=residual_degrees,
-    )
+    found = Summary(linear.coefficients, errors.covariance, scale, errors.degrees_of_freedom, residual_degrees)
+    return report(data, "ols", found, begin, diagnostics, linear)
 
 
 def classical(linear: LinearFit, scale: float) -> FloatArray:
@@ -83,7 +71,7 @@ def _of_clusters(data: FitData, linear: LinearFit, errors: CoefficientErrors) ->
     told = by_coefficient("standard_error_cluster", errors.standard)
     told |= by_coefficient("degrees_of_freedom", errors.degrees)
     observations = data.observations
-    if observations is not None and len(observations) <= STATSMODELS_LIMIT:
+    if observations is not None and len(observations) <= LINEAR.statsmodels:
         told |= _statsmodels_errors(*orthonormal(observations, linear), observations.cluster, linear)
     return told
 

@@ -1,4 +1,4 @@
-"""What every method says of its data and its answer, in one form."""
+"""What every method reports of its data and of what it found, in one form."""
 
 import time
 
@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from estimators.defaults import REFERENCE
 from estimators.friction_model import Cost, FrictionModel, Scales
+from estimators.likelihoods.posterior import Summary
 from estimators.linear.fit_data import FitData
 from estimators.linear.least_squares import LinearFit, solve
 from estimators.methods.identifiability import effects, identifiable
@@ -37,39 +38,31 @@ def describe(data: FitData, linear: LinearFit | None = None) -> Diagnostics:
 def report(
     data: FitData,
     method: str,
-    coefficients: NDArray[np.floating],
-    covariance: FloatArray,
-    scale: float,
-    degrees_of_freedom: float,
+    found: Summary,
     begin: float,
     diagnostics: Diagnostics,
     linear: LinearFit | None = None,
-    monte_carlo_error: float = 0.0,
-    draws: FloatArray | None = None,
-    *,
-    scatter_degrees_of_freedom: float,
-    scales: Scales | None = None,
 ) -> FrictionModel:
     """The friction model, with what its uncertainty does to friction; ``begin``: when the fit began."""
-    if scales is not None:
-        diagnostics = diagnostics | _told(scales)
-    effect = effects(covariance, degrees_of_freedom, data)
+    if found.scales is not None:
+        diagnostics = diagnostics | _told(found.scales)
+    effect = effects(found.covariance, found.degrees_of_freedom, data)
     prior_shift = np.array([float(diagnostics.get(f"prior_sensitivity_beta{k}", 0.0)) for k in range(3)])
     return FrictionModel(
         method=method,
-        coefficients=np.asarray(coefficients, dtype=float),
-        covariance=covariance,
-        scale=scale,
+        coefficients=np.asarray(found.coefficients, dtype=float),
+        covariance=found.covariance,
+        scale=found.scale,
         n=data.n,
-        degrees_of_freedom=degrees_of_freedom,
+        degrees_of_freedom=found.degrees_of_freedom,
         domain=data.domain,
         identifiable=identifiable(effect, prior_shift),
         element_area=data.element_area,
         diagnostics=describe(data, linear) | by_coefficient("effect", effect) | diagnostics,
-        cost=Cost(time.perf_counter() - begin, monte_carlo_error),
-        draws=draws,
-        scales=scales,
-        scatter_degrees_of_freedom=scatter_degrees_of_freedom,
+        cost=Cost(time.perf_counter() - begin, found.monte_carlo_error),
+        draws=found.draws,
+        scales=found.scales,
+        scatter_degrees_of_freedom=found.scatter_degrees_of_freedom,
     )
 
 

@@ -2,11 +2,13 @@
 
 import time
 
+from estimators.defaults import ROBUST
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
+from estimators.likelihoods.posterior import Summary
 from estimators.linear.fit_data import FitData
-from estimators.linear.m_estimate import ITERATIONS, LOSSES, m_estimate
-from estimators.methods.reporting import by_coefficient, report
+from estimators.linear.m_estimate import LOSSES, m_estimate
+from estimators.methods.reporting import Diagnostics, by_coefficient, report
 from estimators.not_converged import NotConverged
 
 
@@ -20,22 +22,15 @@ def fit(data: FitData, loss: str = "tukey", seed: int = 0) -> FrictionModel:
     begin = time.perf_counter()
     found = m_estimate(data, data.raw("robust"), LOSSES[loss], seed)
     degrees = data.effective_n - 1.0 - found.linear.rank
-    model = report(
-        data,
-        "robust",
-        found.linear.coefficients,
-        found.errors.covariance,
-        found.scale,
-        found.errors.degrees_of_freedom,
-        begin,
-        {
-            "loss": loss,
-            "downweighted": found.downweighted,
-            **by_coefficient("standard_error_cluster", found.errors.standard),
-            **by_coefficient("degrees_of_freedom", found.errors.degrees),
-        },
-        scatter_degrees_of_freedom=degrees,
-    )
+    coefficients, errors = found.linear.coefficients, found.errors
+    diagnostics: Diagnostics = {
+        "loss": loss,
+        "downweighted": found.downweighted,
+        **by_coefficient("standard_error_cluster", errors.standard),
+        **by_coefficient("degrees_of_freedom", errors.degrees),
+    }
+    summary = Summary(coefficients, errors.covariance, found.scale, errors.degrees_of_freedom, degrees)
+    model = report(data, "robust", summary, begin, diagnostics)
     if not found.settled:
-        raise NotConverged(f"the {loss} estimate still moves after {ITERATIONS} iterations", model)
+        raise NotConverged(f"the {loss} estimate still moves after {ROBUST.iterations} iterations", model)
     return model

@@ -6,16 +6,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.defaults import SAMPLING
-from estimators.sampling.proposal import DEFENSIVE, StudentMixture, evenness, flattened, root_of, standard
+from estimators.defaults import PROPOSAL, SAMPLING
+from estimators.sampling.proposal import StudentMixture, evenness, flattened, root_of, standard
 
 FloatArray = NDArray[np.float64]
 LogDensity = Callable[[FloatArray], FloatArray]
 
-COMPONENTS, ROUNDS, DRAWS = 5, 8, 1500
-"""Of the mixture, of its fit, and of each round of the fit."""
-PILOT_WALKERS, PILOT_STEPS = 100, 200
-"""Of the run that finds where the mass is, of which the second half counts."""
+
+PILOT_WIDTHS = 2.0 ** np.arange(4)
+"""Of the draws that walkers of the pilot run start from: near and far."""
 
 
 class Fit(NamedTuple):
@@ -29,11 +28,11 @@ def adapted(log_density: LogDensity, dimension: int, rng: np.random.Generator) -
     """Proposal for a density that one component about 0 does not suit: a mixture grown on a short pilot run."""
     x = _pilot(log_density, dimension, rng)
     proposal, even = _split(x, rng), np.ones(len(x))
-    for _ in range(3):
+    for _ in range(PROPOSAL.first_fits):
         proposal = proposal.fitted(x, even)
     best = Fit(proposal, 0.0)
-    for _ in range(ROUNDS):
-        x = proposal.draw(rng, DRAWS)
+    for _ in range(PROPOSAL.rounds):
+        x = proposal.draw(rng, PROPOSAL.draws)
         log_weight = log_density(x) - proposal.log_density(x)
         if not np.isfinite(log_weight.max()):
             break
@@ -51,17 +50,18 @@ def _pilot(log_density: LogDensity, dimension: int, rng: np.random.Generator) ->
     from estimators.sampling.ensemble import VectorisedSampler
 
     near = standard(dimension)
-    x = near.draw(rng, 8 * PILOT_WALKERS) * rng.choice([1.0, 2.0, 4.0, 8.0], (8 * PILOT_WALKERS, 1))
+    count = PROPOSAL.pilot_candidates * PROPOSAL.pilot_walkers
+    x = near.draw(rng, count) * rng.choice(PILOT_WIDTHS, (count, 1))
     log_weight = log_density(x) - near.log_density(x)
     possible = np.isfinite(log_weight)
     if possible.sum() < 2 * dimension:
         return np.asarray(x)
-    weight = flattened(log_weight[possible]) + 1e-12
-    start = x[possible][rng.choice(len(weight), PILOT_WALKERS, p=weight / weight.sum())]
-    sampler = VectorisedSampler(PILOT_WALKERS, dimension, log_density, moves=DEMove(), vectorize=True)
+    weight = flattened(log_weight[possible]) + PROPOSAL.pilot_floor
+    start = x[possible][rng.choice(len(weight), PROPOSAL.pilot_walkers, p=weight / weight.sum())]
+    sampler = VectorisedSampler(PROPOSAL.pilot_walkers, dimension, log_density, moves=DEMove(), vectorize=True)
     sampler.random_state = np.random.RandomState(rng.integers(2**31)).get_state()
-    sampler.run_mcmc(start, PILOT_STEPS, skip_initial_state_check=True)
-    chain = sampler.get_chain(discard=PILOT_STEPS // 2, thin=5, flat=True)
+    sampler.run_mcmc(start, PROPOSAL.pilot_steps, skip_initial_state_check=True)
+    chain = sampler.get_chain(discard=PROPOSAL.pilot_steps // 2, thin=PROPOSAL.pilot_thin, flat=True)
     return np.asarray(chain)
 
 
@@ -69,6 +69,10 @@ def _split(x: FloatArray, rng: np.random.Generator) -> StudentMixture:
     """A component as wide as all points [k, d], and others about some of them."""
     size = x.shape[1]
     wide = root_of(np.cov(x.T).reshape(size, size), np.eye(size))
-    root = np.concatenate([1.3 * wide[None], np.repeat(0.7 * wide[None], COMPONENTS, axis=0)])
-    part = np.concatenate([[DEFENSIVE], np.full(COMPONENTS, (1.0 - DEFENSIVE) / COMPONENTS)])
-    return StudentMixture(part, np.vstack([x.mean(axis=0), x[rng.choice(len(x), COMPONENTS)]]), root)
+    root = np.concatenate(
+        [PROPOSAL.wide * wide[None], np.repeat(PROPOSAL.narrow * wide[None], PROPOSAL.components, axis=0)]
+    )
+    part = np.concatenate(
+        [[PROPOSAL.defensive], np.full(PROPOSAL.components, (1.0 - PROPOSAL.defensive) / PROPOSAL.components)]
+    )
+    return StudentMixture(part, np.vstack([x.mean(axis=0), x[rng.choice(len(x), PROPOSAL.components)]]), root)

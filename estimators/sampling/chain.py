@@ -15,10 +15,6 @@ from estimators.sampling.proposal import StudentMixture, flattened
 FloatArray = NDArray[np.float64]
 LogProbability = Callable[[FloatArray], FloatArray]
 
-TAILS = (0.05, 0.95)
-CANDIDATES = 8
-"""Proposals a walker of which its start is chosen."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chain:
@@ -65,8 +61,10 @@ def sample(
 
     deadline = np.inf if seconds is None else time.perf_counter() + seconds
     goal = SAMPLING.accuracy if accuracy is None else accuracy
-    task = _Task(log_probability, proposal, _walkers(goal, 3.0 if local > 0.0 else 1.0), goal, deadline, seed)
-    small = GaussianMove((2.4**2 / proposal.dimension) * np.ones(proposal.dimension))  # Gelman, Roberts & Gilks (1996)
+    task = _Task(
+        log_probability, proposal, _walkers(goal, SAMPLING.local_slowness if local > 0.0 else 1.0), goal, deadline, seed
+    )
+    small = GaussianMove((SAMPLING.local_step**2 / proposal.dimension) * np.ones(proposal.dimension))
     chain = _run(task, [(IndependenceMove(proposal), 1.0 - local), (small, local)], "independence")
     if chain.acceptance >= SAMPLING.min_acceptance:
         return chain
@@ -80,13 +78,13 @@ def autocorrelation_time(series: FloatArray) -> FloatArray:
     transform would cost more than the chain. Of long chains as many walkers are read as hold 2¹⁵ draws.
     """
     steps = len(series)
-    centred = (series - series.mean(axis=(0, 1)))[:, : max(16, 2**15 // steps)]
+    centred = (series - series.mean(axis=(0, 1)))[:, : max(16, SAMPLING.longest_series // steps)]
     variance = np.einsum("swd,swd->d", centred, centred)
     variance[variance == 0.0] = 1.0
     times = np.ones_like(variance)
     growing = np.ones(len(variance), dtype=bool)
     for lag in range(1, steps):
-        growing &= lag < 5.0 * times
+        growing &= lag < SAMPLING.window * times
         if not growing.any():
             break
         covariance = np.einsum("swd,swd->d", centred[lag:], centred[:-lag])
@@ -112,7 +110,7 @@ def monte_carlo_error(draws: FloatArray, times: FloatArray) -> float:
     ranked = np.sort(draws.reshape(-1, draws.shape[-1]), axis=0)
     count, last = len(ranked), len(ranked) - 1
     errors = [np.sqrt(times / count) * ranked.std(axis=0)]
-    for tail in TAILS:
+    for tail in (SAMPLING.tail, 1.0 - SAMPLING.tail):
         below = (draws <= ranked[int(tail * last)]).astype(float)
         step = np.sqrt(tail * (1.0 - tail) * autocorrelation_time(below) / count)
         rows = np.clip([tail - step, tail + step], 0.0, 1.0) * last
@@ -144,7 +142,7 @@ def _run(task: _Task, move: object, name: str) -> Chain:
     start = _start(task, random)
     sampler.random_state = random.get_state()
     state = State(start, log_prob=task.log_probability(start))
-    cost = (time.perf_counter() - begin) / (CANDIDATES + 1)  # of a step: as many walkers are looked at
+    cost = (time.perf_counter() - begin) / (SAMPLING.candidates + 1)  # of a step: as many walkers are looked at
     steps = int(np.clip((task.deadline - time.perf_counter()) / cost, SAMPLING.batch, SAMPLING.block))
     begin = time.perf_counter()
     while True:
@@ -160,18 +158,19 @@ def _run(task: _Task, move: object, name: str) -> Chain:
 
 
 def _walkers(goal: float, slowness: float) -> int:
-    """Even number of walkers whose first block should do: the 5 % quantile's error is 2.1/√ESS, τ about 1.4.
+    """Even number of walkers whose first block should do: a quantile's error is ``tail_error``/√ESS.
 
-    Half as many again are drawn, as the worst of all parameters counts and a second look costs as much as they do.
+    More are drawn, as the worst of all parameters counts and a second look costs as much as they do.
     """
-    fewest, most = SAMPLING.walkers
-    draws = 1.5 * 1.4 * slowness * (2.1 / goal) ** 2
+    fewest, most = SAMPLING.fewest_walkers, SAMPLING.most_walkers
+    slowness *= SAMPLING.more_walkers * SAMPLING.expected_time
+    draws = slowness * (SAMPLING.tail_error / goal) ** 2
     return 2 * int(np.clip(np.ceil(draws / SAMPLING.block / 2.0), fewest // 2, most // 2))
 
 
 def _start(task: _Task, random: np.random.RandomState) -> FloatArray:
     """Walkers [w, d] near the posterior already: proposals resampled by their importance, never all of them one."""
-    candidates = task.proposal.draw(random, CANDIDATES * task.walkers)
+    candidates = task.proposal.draw(random, SAMPLING.candidates * task.walkers)
     log_weight = task.log_probability(candidates) - task.proposal.log_density(candidates)
     if not np.isfinite(log_weight.max()):
         raise InvalidSamples("mean friction", "0 or less with near certainty", "above 0 over the range of the data")
@@ -187,13 +186,13 @@ def _missing(chain: Chain, goal: float) -> float:
     """Steps that the chain still lacks, with a tenth to spare, so that it seldom has to be looked at again."""
     length = len(chain.draws)
     accurate = length * (chain.monte_carlo_error / goal) ** 2
-    wanted = 1.1 * max(accurate, SAMPLING.chain_lengths * float(chain.autocorrelation_time.max()))
+    wanted = SAMPLING.more_steps * max(accurate, SAMPLING.chain_lengths * float(chain.autocorrelation_time.max()))
     return float(SAMPLING.batch * np.ceil(max(wanted - length, SAMPLING.block / 4) / SAMPLING.batch))
 
 
 def _judge(draws: FloatArray, acceptance: float, move: str) -> Chain:
     """Drop the burn-in of five autocorrelation times and tell what the rest is worth."""
-    burn_in = min(int(np.ceil(5.0 * autocorrelation_time(draws).max())), len(draws) // 2)
+    burn_in = min(int(np.ceil(SAMPLING.window * autocorrelation_time(draws).max())), len(draws) // 2)
     kept = draws[burn_in:]
     times = autocorrelation_time(kept)
     rhat = split_rhat(kept) if move == "independence" else np.nan

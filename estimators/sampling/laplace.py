@@ -5,44 +5,40 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from estimators.defaults import PROPOSAL
 from estimators.sampling.proposal import evenness, flattened, root_of, standard
 
 FloatArray = NDArray[np.float64]
 LogDensity = Callable[[FloatArray], FloatArray]
 
-STEP = 0.1
-"""Finite-difference step, in units of the start's spread: wide enough for sums of 10⁶ rounded terms."""
-FALL = 10.0
-"""What the edge of the support counts for in a difference of the log density."""
-ITERATIONS = 60
-CLOSE = 0.02
-"""Newton step, in standard deviations, below which a proposal gains nothing from a better mode."""
-ROUNDS, DRAWS, EVEN = 8, 400, 0.6
-"""Rounds and draws of the refinement, and the evenness of weights at which it ends."""
+
 LENGTHS = np.array([1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.001])
+"""Shares of a Newton step that are tried at once."""
 
 
 def laplace(log_density: LogDensity, start: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Mode [d] and root [d, d] of the covariance (root rootᵀ), by Newton steps from ``start`` [d].
 
     ``log_density`` takes [k, d] in coordinates whose posterior spread is about 1; every iteration is two calls, one
-    for all differences and one for all step lengths. Directions without curvature get a spread of 3.
+    for all differences and one for all step lengths. Directions without curvature get the flattest spread.
     """
     mode = np.array(start, dtype=float)
     root = np.eye(len(mode))
-    for _ in range(ITERATIONS):
+    for _ in range(PROPOSAL.newton_steps):
         gradient, hessian = _differences(log_density, mode, root)
         values, vectors = np.linalg.eigh(-hessian)
-        spread = vectors / np.sqrt(np.maximum(values, 1.0 / 9.0))
+        spread = vectors / np.sqrt(np.maximum(values, PROPOSAL.flattest**-2))
         step = spread @ (spread.T @ gradient)
         size = float(np.linalg.norm(spread.T @ gradient))
-        lengths = np.concatenate([LENGTHS, LENGTHS * 4.0 / max(size, 4.0)])  # far away, no more than 4 spreads at once
+        lengths = np.concatenate(
+            [LENGTHS, LENGTHS * PROPOSAL.longest_step / max(size, PROPOSAL.longest_step)]
+        )  # far away, only so far at once
         trial = mode + lengths[:, None] * (root @ step)
         heights = log_density(np.vstack([trial, mode]))
         best = int(np.nanargmax(heights))
         mode = trial[best] if best < len(trial) else mode
         root = root @ spread
-        if size < CLOSE or best == len(trial):
+        if size < PROPOSAL.close or best == len(trial):
             break
     return mode, root
 
@@ -51,16 +47,16 @@ def _differences(log_density: LogDensity, at: FloatArray, root: FloatArray) -> t
     """Gradient and Hessian along the columns of ``root``, by central differences in one call."""
     size = len(at)
     first, second = np.triu_indices(size, 1)
-    unit = STEP * np.eye(size)
+    unit = PROPOSAL.difference * np.eye(size)
     moves = np.vstack([np.zeros((1, size)), unit, -unit, unit[first] + unit[second], -unit[first] - unit[second]])
     value = log_density(at + moves @ root.T)
-    value = np.where(np.isfinite(value), value, value[0] - FALL)
+    value = np.where(np.isfinite(value), value, value[0] - PROPOSAL.fall)
     centre, plus, minus = value[0], value[1 : size + 1], value[size + 1 : 2 * size + 1]
     both = value[2 * size + 1 :].reshape(2, -1).sum(axis=0)
     hessian = np.diag(plus + minus - 2.0 * centre)
     curve = np.diag(hessian)
     hessian[first, second] = hessian[second, first] = 0.5 * (both - 2.0 * centre - curve[first] - curve[second])
-    return (plus - minus) / (2.0 * STEP), hessian / STEP**2
+    return (plus - minus) / (2.0 * PROPOSAL.difference), hessian / PROPOSAL.difference**2
 
 
 def refine(
@@ -69,15 +65,15 @@ def refine(
     """Centre [d] and root [d, d] closer to a skewed density than mode and curvature are, and how even weights are then.
 
     Adaptive importance sampling (Cappé et al., 2004): draws from a Student-t are weighted by the density, their weights
-    flattened until a fifth of them counts, and their mean and covariance taken, until the weights are even enough.
+    flattened until enough of them counts, and their mean and covariance taken, until the weights are even enough.
     """
     proposal, even = standard(len(centre)), 0.0
-    for _ in range(ROUNDS):
-        draws = proposal.draw(rng, DRAWS)
+    for _ in range(PROPOSAL.refine_rounds):
+        draws = proposal.draw(rng, PROPOSAL.refine_draws)
         at = centre + draws @ root.T
         log_weight = log_density(at) - proposal.log_density(draws)
         even = evenness(log_weight) if np.isfinite(log_weight.max()) else 0.0
-        if not np.isfinite(log_weight.max()) or even > EVEN:
+        if not np.isfinite(log_weight.max()) or even > PROPOSAL.refine_even:
             break
         weight = flattened(log_weight)
         centre = weight @ at / weight.sum()

@@ -7,11 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-FloatArray = NDArray[np.float64]
+from estimators.defaults import PROPOSAL
 
-KNOTS = 400
-DEPTH = 18.0
-"""Knots stop where the log density has fallen by this much: the normal score is then about 5.5."""
+FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,16 +31,18 @@ def normal_score(log_density: Callable[[FloatArray], FloatArray], lowest: float,
 
     The map is only as close as its knots; whoever samples in u takes the slope into account, and is exact.
     """
-    value = np.linspace(lowest, highest, KNOTS)
+    value = np.linspace(lowest, highest, PROPOSAL.score_knots)
     for _ in range(2):  # the second grid spans only what the first found to matter
         log = log_density(value)
-        matters = np.flatnonzero(log > log.max() - DEPTH)
-        value = np.linspace(value[max(matters[0] - 1, 0)], value[min(matters[-1] + 1, KNOTS - 1)], KNOTS)
+        matters = np.flatnonzero(log > log.max() - PROPOSAL.score_depth)
+        value = np.linspace(
+            value[max(matters[0] - 1, 0)], value[min(matters[-1] + 1, PROPOSAL.score_knots - 1)], PROPOSAL.score_knots
+        )
     density = np.exp(log_density(value) - log.max())
     mass = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
     below, above = mass / mass[-1], (mass[-1] - mass) / mass[-1]
     score = np.where(below < 0.5, special.ndtri(below), -special.ndtri(above))
     finite = np.isfinite(score)
     score, value = score[finite], value[finite]
-    rising = np.concatenate([[True], np.diff(score) > 1e-6])
+    rising = np.concatenate([[True], np.diff(score) > PROPOSAL.least_rise])
     return NormalScore(score[rising], value[rising])

@@ -6,14 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from estimators.defaults import SAMPLING
+from estimators.defaults import PROPOSAL, SAMPLING
 
 FloatArray = NDArray[np.float64]
 Random = np.random.Generator | np.random.RandomState
 
-DEFENSIVE = 0.1
-"""Part of proposals that always come from the widest component: no region is left without any."""
+TINY = 1e-100
+"""Weight of a component that nothing came near; its inverse square is farther off than any other."""
 POWERS = np.array([1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02])
+"""Powers of the weights that are tried, the largest first."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,17 +47,17 @@ class StudentMixture:
     def fitted(self, x: FloatArray, weight: FloatArray) -> "StudentMixture":
         """The components moved to weighted points x [k, d]: one step of EM for a mixture (Cappé et al., 2008).
 
-        The first component stays as it is, and keeps a part of at least ``DEFENSIVE``.
+        The first component stays as it is, and keeps a part of at least ``defensive``.
         """
         degrees = SAMPLING.proposal_degrees_of_freedom
         logs, squares = self._logs(x)
         share = special.softmax(logs, axis=1) * (weight / weight.sum())[:, None]
         weighted_share = share * (degrees + self.dimension) / (degrees + squares)
-        part = np.maximum(share.sum(axis=0), 1e-3)
-        part[0] = max(part[0], DEFENSIVE)
+        part = np.maximum(share.sum(axis=0), PROPOSAL.least_part)
+        part[0] = max(part[0], PROPOSAL.defensive)
         centre, root = self.centre.copy(), self.root.copy()
         for k in range(1, len(part)):
-            if not weighted_share[:, k].sum() > 1e-100:
+            if not weighted_share[:, k].sum() > TINY:
                 continue  # nothing came near it
             centre[k] = weighted_share[:, k] @ x / weighted_share[:, k].sum()
             away = x - centre[k]
@@ -70,7 +71,7 @@ class StudentMixture:
         inverse = np.linalg.inv(self.root)
         z = np.einsum("mij,kmj->kmi", inverse, x[:, None] - self.centre)
         with np.errstate(over="ignore"):
-            squares = np.minimum(np.einsum("kmi,kmi->km", z, z), 1e200)  # so far off that no component is near
+            squares = np.minimum(np.einsum("kmi,kmi->km", z, z), 1.0 / TINY**2)  # so far off that no component is near
         height = np.log(self.part) + np.linalg.slogdet(inverse)[1]
         return height - 0.5 * (degrees + size) * np.log1p(squares / degrees), squares
 
@@ -81,8 +82,8 @@ def standard(dimension: int) -> StudentMixture:
 
 
 def flattened(log_weight: FloatArray) -> FloatArray:
-    """Weights [k] raised to the largest power at which a fifth of them counts."""
-    power = next((power for power in POWERS if evenness(power * log_weight) > 0.2), POWERS[-1])
+    """Weights [k] raised to the largest power at which enough of them count."""
+    power = next((power for power in POWERS if evenness(power * log_weight) > PROPOSAL.enough), POWERS[-1])
     return np.asarray(np.exp(power * (log_weight - log_weight.max())))
 
 
@@ -93,6 +94,6 @@ def evenness(log_weight: FloatArray) -> float:
 
 
 def root_of(spread: FloatArray, wide: FloatArray) -> FloatArray:
-    """Root [d, d] of a spread that few points may have made: nowhere thinner than a hundredth of ``wide``."""
-    values, vectors = np.linalg.eigh(spread + 1e-4 * wide @ wide.T)
+    """Root [d, d] of a spread that few points may have made: nowhere much thinner than ``wide``."""
+    values, vectors = np.linalg.eigh(spread + PROPOSAL.thinnest * wide @ wide.T)
     return np.asarray(vectors * np.sqrt(np.maximum(values, np.finfo(float).tiny)))

@@ -8,9 +8,6 @@ from slipcore.checks.subject import Finding, Subject
 from slipcore.collection import contradiction
 from slipcore.patch.friction import contact_friction
 
-LEAST_OF_A_PLACE, LEAST_PLACES = 5, 4
-"""Samples of an element, and such elements, from which scatter between places is told from noise."""
-
 
 def friction_by_force(seen: Subject) -> Iterator[Finding]:
     """Friction that depends on the element's force more than it would by a law within one contact."""
@@ -37,8 +34,8 @@ def friction_by_place(seen: Subject) -> Iterator[Finding]:
     _, place, count = np.unique(seen.samples.element, return_inverse=True, return_counts=True)
     mean = np.bincount(place, friction) / count
     within = np.bincount(place, (friction - mean[place]) ** 2)
-    enough = count >= LEAST_OF_A_PLACE
-    if np.count_nonzero(enough) < LEAST_PLACES:
+    enough = count >= seen.limits.samples_of_place
+    if np.count_nonzero(enough) < seen.limits.least_places:
         return
     noise = within[enough] / (count[enough] - 1) / count[enough]
     between = float(np.sqrt(max(np.var(mean[enough], ddof=1) - noise.mean(), 0.0)))

@@ -6,9 +6,6 @@ import numpy as np
 
 from slipcore.checks.subject import Finding, Subject
 
-SYMMETRIC = 4
-"""Elements that may share the largest reading where nothing but symmetry makes them alike."""
-
 
 def time_unit(seen: Subject) -> Iterator[Finding]:
     """Frames too far apart for slip."""
@@ -42,7 +39,7 @@ def force_unit(seen: Subject) -> Iterator[Finding]:
         return
     largest = float(seen.forces.normal.max()) / seen.log.element_area
     if largest > seen.limits.largest_pressure:
-        evidence = f"{1e-6 * largest:.3g} MPa on an element"
+        evidence = f"{largest / 1e6:.3g} MPa on an element"
         yield Finding("force too large", evidence, "make sure of N (not mN, g or raw counts) and of the element's area")
 
 
@@ -66,7 +63,7 @@ def saturation(seen: Subject) -> Iterator[Finding]:
         size, contact = np.abs(field).max(axis=-1), seen.history.contact
         at_most = ((size == size.max(where=contact, initial=0.0)) & contact).any(axis=0)
         ended, touched = int(np.count_nonzero(at_most)), int(np.count_nonzero(contact.any(axis=0)))
-        if ended > max(SYMMETRIC, seen.limits.saturated_share * touched):
+        if ended > max(seen.limits.symmetric, seen.limits.saturated_share * touched):
             evidence = f"{ended} of the {touched} elements that touch reach the largest {name}, to the last digit"
             yield Finding("saturation", evidence, "press less, or choose a wider range of the sensor")
 

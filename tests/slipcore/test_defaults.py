@@ -1,26 +1,10 @@
-from dataclasses import fields
-
 import pytest
 
 from slipcore import METHODS, FilterOptions, InvalidInput, SampleOptions, describe_options
-from slipcore.contact import defaults as contact
 from slipcore.defaults import METHOD_NAMES, choose_options
 from slipcore.options import Options
 
 KINDS = [SampleOptions, *(method.options for method in METHODS.values())]
-TABLES = [*KINDS, *(type(table) for table in contact.TABLES)]
-
-
-@pytest.mark.parametrize("kind", TABLES)
-def test_every_option_has_a_unit_a_source_and_a_default_in_its_range(kind: type[Options]) -> None:
-    described = describe_options(kind)
-    assert described
-    for entry in fields(kind):
-        option = described[entry.name]
-        assert option.unit
-        assert option.source
-        assert option.low < option.high
-        assert entry.name == "force_noise" or option.low <= entry.default <= option.high
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -40,8 +24,3 @@ def test_the_names_of_the_methods_are_those_of_the_table() -> None:
 def test_a_former_option_is_ignored_with_a_warning() -> None:
     with pytest.warns(DeprecationWarning, match="option onset_time has no effect"):
         assert choose_options(FilterOptions, {"onset_time": 10.0, "creep": 1e-6}) == FilterOptions(creep=1e-6)
-
-
-def test_every_table_of_the_simulator_is_among_them() -> None:
-    kinds = {kind for kind in vars(contact).values() if isinstance(kind, type) and issubclass(kind, Options)}
-    assert kinds - {Options} == {type(table) for table in contact.TABLES}

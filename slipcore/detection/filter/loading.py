@@ -4,10 +4,13 @@ import math
 from typing import NamedTuple
 
 from slipcore.compilation import compiled, unpack
+from slipcore.defaults import NUMERICS
 from slipcore.detection.filter.pose import Anchors
 from slipcore.detection.filter.state import FRICTION, LOADING
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.frames import FloatArray
+
+_LEAST_LEVER = NUMERICS.least_lever
 
 
 class Loading(NamedTuple):
@@ -54,7 +57,7 @@ def step_loading(
     force_x = force_y = normal = 0.0
     if force.size:
         force_x, force_y, normal = force[0].sum(), force[1].sum(), -force[2].sum()
-    twist = moment / max(math.sqrt(lever / count), 1e-9)
+    twist = moment / max(math.sqrt(lever / count), _LEAST_LEVER)
     return Loading(
         loading.depth + gain * (deeper.mean() / interval - loading.depth),
         loading.motion + gain * (math.sqrt(moved / count) / interval - loading.motion),

@@ -6,8 +6,15 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.compilation import compiled
+from slipcore.defaults import NUMERICS
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.frames import FloatArray
+
+_LEAST_SPREAD, _STRETCH_VARIANCE, _YAW_VARIANCE = (
+    NUMERICS.least_spread,
+    NUMERICS.stretch_variance,
+    NUMERICS.yaw_variance,
+)
 
 
 class Pose(NamedTuple):
@@ -90,14 +97,14 @@ def fit_pose(anchors: Anchors, weight: FloatArray, given: FloatArray) -> tuple[P
         sine += w * (px * qy - py * qx)
         cosine += w * (px * qx + py * qy)
         spread += w * (px * px + py * py)
-    spread = max(spread, 1e-30)
+    spread = max(spread, _LEAST_SPREAD)
     yaw = math.atan2(sine, cosine)
     variance = 1.0 / spread
     turned = given[2] if given.size else yaw
-    room = 0.25 * turned**4 + 1e-14
+    room = 0.25 * turned**4 + _STRETCH_VARIANCE
     stretch = 1.0 + (math.hypot(sine, cosine) / spread - 1.0) * room / (room + variance)
     if given.size:
-        room = turned**6 / 9.0 + 1e-16
+        room = turned**6 / 9.0 + _YAW_VARIANCE
         difference = math.atan2(math.sin(yaw - turned), math.cos(yaw - turned))
         pose = pose_at(given[0], given[1], turned + difference * room / (room + variance), stretch)
         return pose, PoseVariance(0.0, 0.0, mx, my)
@@ -121,7 +128,7 @@ def find_pose(
     """
     if len(anchors.x) < 2:
         known = pose_at(given[0], given[1], given[2], 1.0) if given.size else before
-        return known, PoseVariance(0.0, 1e-30, 0.0, 0.0)
+        return known, PoseVariance(0.0, _LEAST_SPREAD, 0.0, 0.0)
     base = np.maximum(anchors.stick * anchors.stick, tuning.least_weight) / (variance + anchors.variance)
     pose, spread = fit_pose(anchors, base, given)
     weight = np.empty(len(base))

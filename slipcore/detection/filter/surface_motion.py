@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from slipcore.compilation import compiled
+from slipcore.defaults import NUMERICS
 from slipcore.detection.filter.pose import (
     Anchors,
     Pose,
@@ -19,6 +20,7 @@ from slipcore.detection.filter.tuning import Tuning
 from slipcore.detection.shared.records import FrameArrays
 from slipcore.frames import FloatArray
 
+_LEAST_SPREAD = NUMERICS.least_spread
 NOT_GIVEN = np.zeros(0)
 
 
@@ -84,7 +86,7 @@ def learn_following(
     ax, ay = place_on_object(before, x, y)
     fx, fy = place_of_object(fitted, ax, ay)
     size = dx * dx + dy * dy
-    weight = 1.0 / (spread.place + tuning.following_variance * size + 1e-30)
+    weight = 1.0 / (spread.place + tuning.following_variance * size + _LEAST_SPREAD)
     along = (fx - x) * dx + (fy - y) * dy
     begins = common[FOLLOWING + 1] < tuning.following_learning * tuning.following_weight
     if along > tuning.following_least * size and (begins or anchors.stick.mean() > tuning.following_stick):

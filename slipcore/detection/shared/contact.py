@@ -6,11 +6,11 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.compilation import compiled
-from slipcore.defaults import NOISE
+from slipcore.defaults import DEVIATION_TO_SIGMA, NOISE
 from slipcore.detection.shared.noise import median
 from slipcore.frames import BoolArray, FloatArray
 
-_LEAST, _TO_SIGMA = NOISE.least_series, NOISE.deviation_to_sigma
+_LEAST = NOISE.least_series
 
 
 class Touch(NamedTuple):
@@ -134,4 +134,4 @@ def spatial_noise(pressing: FloatArray) -> float:
         if value < 0.0:
             pulling[count] = -value
             count += 1
-    return _TO_SIGMA * median(pulling[:count]) if count >= _LEAST else math.nan
+    return DEVIATION_TO_SIGMA * median(pulling[:count]) if count >= _LEAST else math.nan

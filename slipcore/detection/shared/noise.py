@@ -5,10 +5,10 @@ import math
 import numpy as np
 
 from slipcore.compilation import compiled
-from slipcore.defaults import NOISE
+from slipcore.defaults import DEVIATION_TO_SIGMA, NOISE
 from slipcore.frames import FloatArray
 
-_LEAST, _MEMORY, _TO_SIGMA = NOISE.least_series, NOISE.memory, NOISE.deviation_to_sigma
+_LEAST, _MEMORY = NOISE.least_series, NOISE.memory
 
 
 @compiled
@@ -68,7 +68,7 @@ def noise_of_three(first: FloatArray, middle: FloatArray, last: FloatArray, shar
             residual[a, s] = abs(residual[a, s] - about)
         total += median(residual[a, :count]) ** 2
     gain = math.sqrt(1.0 + (1.0 - share) ** 2 + share**2)
-    return _TO_SIGMA * math.sqrt(total / axes) / gain
+    return DEVIATION_TO_SIGMA * math.sqrt(total / axes) / gain
 
 
 @compiled

@@ -8,6 +8,7 @@ import pytest
 
 import estimators
 from estimators import Moments
+from estimators.defaults import CLUSTERS
 from estimators.linear import grasp_statistics
 from estimators.linear.grasp_statistics import Columns, GraspStatistics
 from slipcore.samples import FrictionSamples
@@ -44,7 +45,7 @@ def test_places_beyond_the_limit_are_pooled_without_losing_a_sum() -> None:
     data = columns(20_000, places=4096)
     grasp = GraspStatistics.from_columns(data)
     rows = np.column_stack([np.ones(len(data.values)), data.values])
-    assert len(grasp.count) <= grasp_statistics.MAX_GROUPS
+    assert len(grasp.count) <= CLUSTERS.most_groups
     assert grasp.count.sum() == 4096
     np.testing.assert_allclose(whole(grasp), (rows * data.weight[:, None]).T @ rows, rtol=1e-11, atol=1e-11)
 
@@ -52,7 +53,7 @@ def test_places_beyond_the_limit_are_pooled_without_losing_a_sum() -> None:
 def test_pooling_places_hardly_moves_the_posterior(samples: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     grasps = [samples(2000, seed=g, elements=100) for g in range(4)]
     exact = estimators.fit(grasps, method="hierarchical")
-    monkeypatch.setattr(grasp_statistics, "MAX_PLACES", 10)
+    monkeypatch.setattr(grasp_statistics, "CLUSTERS", replace(CLUSTERS, most_places=10))
     pooled = estimators.fit(grasps, method="hierarchical")
     away = np.abs(pooled.coefficients - exact.coefficients) / exact.standard_errors
     assert 0.0 < away.max() < 0.01

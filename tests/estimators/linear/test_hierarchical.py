@@ -1,5 +1,6 @@
 """The hierarchical model against the dense normal density that it stands for."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from scipy import stats
 
 import estimators
-from estimators.defaults import PRIOR, REFERENCE
+from estimators.defaults import GRID, PRIOR, REFERENCE
 from estimators.linear import posterior_grid as grids
 from estimators.linear.fit_data import FitData, gather
 from estimators.linear.hierarchical import hierarchical, log_prior
@@ -78,7 +79,8 @@ def test_a_finer_grid_changes_nothing(count: int, monkeypatch: pytest.MonkeyPatc
     data = gather([grasp(k) for k in range(count)])
     coarse = posterior_grid(data).nodes
     nodes, weights = np.polynomial.hermite_e.hermegauss(15)
-    for name, value in (("FINE", 60), ("DEPTH", 14.0), ("SIGMA_NODES", nodes), ("SIGMA_WEIGHTS", weights)):
+    finer = replace(GRID, fine=60, depth=14.0)
+    for name, value in (("GRID", finer), ("SIGMA_NODES", nodes), ("SIGMA_WEIGHTS", weights)):
         monkeypatch.setattr(grids, name, value)
     fine = posterior_grid(data).nodes
     for k in range(3):

@@ -1,12 +1,14 @@
 """The least-squares core on hard problems, against 120-digit solutions and closed forms."""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import mpmath
 import numpy as np
 import pytest
 
+from estimators.defaults import LINEAR
 from estimators.linear.least_squares import Factor, condition_number, factorise, merge, solve
 
 STRD = Path(__file__).parents[4] / "shared" / "data" / "strd"
@@ -106,7 +108,7 @@ def test_weights_act_as_repeated_rows() -> None:
 def test_chunks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
     columns = np.random.default_rng(0).standard_normal((1000, 3)) + 5.0
     whole = factorise(columns)
-    monkeypatch.setattr("estimators.linear.least_squares.CHUNK", 7)
+    monkeypatch.setattr("estimators.linear.least_squares.LINEAR", replace(LINEAR, chunk=7))
     np.testing.assert_allclose(factorise(columns).triangle, whole.triangle, rtol=1e-12, atol=1e-13)
 
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import estimators
-from estimators.linear.observations import TIME_BLOCKS, observe
+from estimators.defaults import CLUSTERS
+from estimators.linear.observations import observe
 from slipcore.samples import FrictionSamples
 
 Make = Callable[..., FrictionSamples]
@@ -77,7 +78,7 @@ def test_clusters_are_grasps_else_elements_else_stretches_of_time(samples: Make)
     assert observe([samples(50), samples(50)]).cluster_kind == "grasp"
     assert observe(samples(50)).cluster_kind == "element"
     record = observe(samples(50, elements=1))
-    assert (record.cluster_kind, record.clusters) == ("time block", TIME_BLOCKS)
+    assert (record.cluster_kind, record.clusters) == ("time block", CLUSTERS.time_blocks)
     assert (np.diff(record.cluster) >= 0).all()
 
 

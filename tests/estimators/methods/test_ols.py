@@ -1,6 +1,7 @@
 """Least squares: the plane, its cluster-robust errors, and data that do not determine a plane."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import statsmodels.api as sm
 from scipy import stats
 
 import estimators
-from estimators.defaults import REFERENCE
+from estimators.defaults import LINEAR, REFERENCE
 from estimators.methods import ols
 from slipcore.samples import FrictionSamples
 
@@ -189,7 +190,7 @@ def test_narrow_range_of_velocity_is_not_identifiable_and_a_wide_one_is(samples:
 
 def test_large_samples_leave_statsmodels_out(samples: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     small = estimators.fit(samples(300))
-    monkeypatch.setattr(ols, "STATSMODELS_LIMIT", 0)
+    monkeypatch.setattr(ols, "LINEAR", replace(LINEAR, statsmodels=0))
     large = estimators.fit(samples(300))
     assert "standard_error_hc3_beta0" in small.diagnostics
     assert "standard_error_hc3_beta0" not in large.diagnostics
