@@ -1,4 +1,4 @@
-"""Local slip: what a detector says of one frame and of a whole log (stage 4: slip_state)."""
+"""Local slip: what a detector finds in one frame and in a whole log (stage 4: slip_state)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ from slipcore.patch.record import Patch
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SlipState:
-    """A detector's answer for one frame.
+    """What a detector finds in one frame.
 
     ``contact``, ``slip`` [n, m] bool; ``probability`` of slip [n, m]; ``stick_ratio``: stick area over contact area
     (paper, eq. 37 corrected), NaN without contact; ``velocity`` [n, m, 2] m/s, tangential velocity of the surface
     relative to the object, NaN where it is unobservable; ``macro_slip``: no element in contact sticks; ``observed``
-    [n, m], or None for all: of an element that was not, nothing is said, as if it did not touch.
+    [n, m], or None for all: of an element that was not, nothing is known, as if it did not touch.
     """
 
     time: float
@@ -31,7 +31,7 @@ class SlipState:
     observed: BoolArray | None = None
 
     def masked(self, observed: BoolArray, throughout: BoolArray) -> "SlipState":
-        """The answer without the elements [n, m] that were not ``observed``, nor velocity where not ``throughout``."""
+        """The state without the elements [n, m] that were not ``observed``, nor velocity where not ``throughout``."""
         contact, slip = self.contact & observed, self.slip & observed
         return SlipState(
             self.time,
@@ -68,7 +68,7 @@ class SlipEvents:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SlipHistory:
-    """A detector's answer for a whole log: the fields of ``SlipState`` with a leading axis [t].
+    """What a detector finds in a whole log: the fields of ``SlipState`` with a leading axis [t].
 
     ``noise``: estimated standard deviation of one marker coordinate, m (NaN where it could not be estimated);
     ``patches``: the contact as a whole (docs/patches.md), of a whole log alone; ``macro_slip`` is also where all of
@@ -89,12 +89,12 @@ class SlipHistory:
     patches: tuple[Patch, ...] = ()
 
 
-def observed_over_time(answers: Sequence[SlipState]) -> BoolArray | None:
+def observed_over_time(slip_states: Sequence[SlipState]) -> BoolArray | None:
     """Which elements were observed, [t, n, m]; None where all were, always."""
-    if all(answer.observed is None for answer in answers):
+    if all(state.observed is None for state in slip_states):
         return None
     return np.array(
-        [np.ones_like(answer.contact) if answer.observed is None else answer.observed for answer in answers]
+        [np.ones_like(state.contact) if state.observed is None else state.observed for state in slip_states]
     )
 
 

@@ -13,14 +13,8 @@ from slipcore import GraspLog, GroundTruth, SlipHistory, detect_slip
 from slipcore.contact.effects import ForceNoise, MarkerNoise, SensorSampling
 from slipcore.contact.plan.plan import Effect
 from slipcore.contact.scene import Scene
-from slipcore.detection.shared.strain import (
-    Lattice,
-    displacement_gradient,
-    frobenius,
-    green_lagrange,
-    lattice_steps,
-    signed_rate,
-)
+from slipcore.detection.shared.strain import Lattice, displacement_gradient, frobenius, green_lagrange, lattice_steps
+from slipcore.detection.strain_rate.reference import signed_rate
 from slipcore.frames import BoolArray, FloatArray
 
 METHODS = ("filter", "strain_rate", "strain_rate_literal")

@@ -209,7 +209,7 @@ class LimitSurfaceDefaults(Options):
     rank: Annotated[float, Option(1e-16, 1e-3, "-", "rounding")] = 1e-14
     """Least singular value of the friction matrix, as a share of the largest."""
     free_motion: Annotated[float, Option(0.0, 0.1, "-", "far above rounding, far below any load")] = 1e-6
-    """Share of a load that may be missed before some motion is said to meet no friction."""
+    """Share of a load that may be missed before some motion is taken to meet no friction."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Whole logs: the fold of the detector's steps, and what later frames say of earlier ones."""
+"""Whole logs: the fold of the detector's steps, and what later frames tell of earlier ones."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ import numpy as np
 from slipcore.defaults import DEFAULT_METHOD, MOST_LOOKAHEAD
 from slipcore.detection.detector import DetectorState, init, masked, slip_state, step
 from slipcore.detection.methods import find_method
-from slipcore.detection.shared.answer import answer
+from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.interface import CompiledMethod
 from slipcore.detection.whole_log import history_of
 from slipcore.errors import InvalidInput
@@ -28,12 +28,12 @@ def detect_slip(log: GraspLog, method: str = DEFAULT_METHOD, *, lookahead: int =
     state = init(log.position, log.element_area, method, **options)
     if isinstance(find_method(method), CompiledMethod):
         return with_patches(log, history_of(log, state, checked_lookahead(lookahead)))
-    smoother, answers = FixedLagSmoother(state, lookahead), []
+    smoother, settled_states = FixedLagSmoother(state, lookahead), []
     for frame in log.frames():
         state, now = step(state, frame)
         if (settled := smoother.take(state, now)) is not None:
-            answers.append(settled)
-    return with_patches(log, collect_history([*answers, *smoother.rest()], state))
+            settled_states.append(settled)
+    return with_patches(log, collect_history([*settled_states, *smoother.rest()], state))
 
 
 def with_patches(log: GraspLog, history: SlipHistory, **options: float) -> SlipHistory:
@@ -55,9 +55,9 @@ def checked_lookahead(lookahead: int) -> int:
 
 
 class FixedLagSmoother:
-    """A running detector's answers, each ``lookahead`` frames late and revised by what came meanwhile.
+    """A running detector's slip states, each ``lookahead`` frames late and revised by what came meanwhile.
 
-    A fixed-lag smoother (Kim, 1994) of the two states of method "filter"; the answers of other methods, which keep no
+    A fixed-lag smoother (Kim, 1994) of the two states of method "filter"; the states of other methods, which keep no
     posterior, are late but the same. ``start`` is the detector's state before the first frame that is taken.
     """
 
@@ -65,21 +65,21 @@ class FixedLagSmoother:
         self._lookahead = checked_lookahead(lookahead)
         method = find_method(start.setup.method)
         self._revise = method.revise if lookahead and isinstance(method, CompiledMethod) else None
-        self._states, self._answers = deque([start]), deque[SlipState]()
+        self._states, self._recent = deque([start]), deque[SlipState]()
         self._revised = start.memory
 
     def take(self, state: DetectorState, now: SlipState) -> SlipState | None:
-        """The detector's state after a frame, and its answer: what is settled by it, if anything."""
+        """The detector's state after a frame, and its slip state: what is settled by it, if anything."""
         self._states.append(state)
-        self._answers.append(now)
-        return self._settle() if len(self._answers) > self._lookahead else None
+        self._recent.append(now)
+        return self._settle() if len(self._recent) > self._lookahead else None
 
     def rest(self) -> list[SlipState]:
         """The last frames, with what lookahead there is."""
-        return [self._settle() for _ in range(len(self._answers))]
+        return [self._settle() for _ in range(len(self._recent))]
 
     def _settle(self) -> SlipState:
-        now, before = self._answers.popleft(), self._states.popleft()
+        now, before = self._recent.popleft(), self._states.popleft()
         if self._revise is None:
             return now
         after = self._states[0]
@@ -87,7 +87,7 @@ class FixedLagSmoother:
         decision = self._revise([state.memory.elements for state in self._states], before.setup.by_force.settings)
         revised = after.memory._replace(slip=np.empty_like(contact), probability=np.empty(contact.shape))
         velocity = np.empty((*contact.shape, 2))
-        touching, slipping = answer(
+        touching, slipping = apply_decision(
             before.setup.lattice.position, before.frame, after.frame, contact & before.memory.contact, decision,
             self._revised, revised, velocity,
         )  # fmt: skip
@@ -96,18 +96,18 @@ class FixedLagSmoother:
         return masked(settled, after.observed, before.observed)
 
 
-def collect_history(answers: Sequence[SlipState], state: DetectorState) -> SlipHistory:
-    """The history that a detector's answers add up to, with the ``state`` that it ended in.
+def collect_history(slip_states: Sequence[SlipState], state: DetectorState) -> SlipHistory:
+    """The history that a detector's slip states add up to, with the ``state`` that it ended in.
 
     Raises ``InvalidInput`` when there are none.
     """
-    if not answers:
-        raise InvalidInput("answers", "empty", "at least one frame's slip state")
+    if not slip_states:
+        raise InvalidInput("slip_states", "empty", "at least one frame's slip state")
     time, contact, slip, probability, ratio, velocity, macro_slip = (
-        np.array([getattr(answer, name) for answer in answers])
+        np.array([getattr(each, name) for each in slip_states])
         for name in ("time", "contact", "slip", "probability", "stick_ratio", "velocity", "macro_slip")
     )
-    observed = observed_over_time(answers)
+    observed = observed_over_time(slip_states)
     events = slip_events(time, contact, slip, observed)
     noise, method = state.noise, state.setup.method
     return SlipHistory(time, contact, slip, probability, ratio, velocity, macro_slip, events, noise, method, observed)

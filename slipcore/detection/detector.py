@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from slipcore.defaults import DEFAULT_METHOD, LIMITS, NOISE, ContactOptions, choose_options
 from slipcore.detection.methods import find_method
-from slipcore.detection.shared.answer import answer
 from slipcore.detection.shared.contact import Touch
+from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.interface import CompiledMethod, Observation, Start
 from slipcore.detection.shared.observe import observe
 from slipcore.detection.shared.records import FrameArrays, Memory, Sensor
@@ -124,7 +124,7 @@ def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
     setup, seen, last = state.setup, frame_arrays(frame), _unwritten(state.frame)
     method, memory = find_method(setup.method), state.memory
     sensor = setup.by_shape if frame.force is None else setup.by_force
-    after, of_method = _room_like(memory), None
+    after, of_method = _empty_like(memory), None
     velocity = np.empty((*memory.probability.shape, 2))
     if isinstance(method, CompiledMethod):
         arguments = sensor, last, seen, memory, after
@@ -134,7 +134,9 @@ def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
         observation = Observation(seen.time - last.time, seen.displacement, seen.force, after.contact, *surface[:5])
         of_method, decision = method.step(state.of_method, setup.lattice, observation, setup.options)
         noise = surface.marker_noise
-        touching, slipping = answer(sensor.position, last, seen, surface.stays, decision, memory, after, velocity)
+        touching, slipping = apply_decision(
+            sensor.position, last, seen, surface.stays, decision, memory, after, velocity
+        )
     now = slip_state(frame.time, after, velocity, touching, slipping)
     return DetectorState(setup, seen, frame.observed, after, of_method, noise), masked(
         now, frame.observed, state.observed
@@ -165,7 +167,7 @@ def _unwritten(frame: FrameArrays) -> FrameArrays:
     )
 
 
-def _room_like(memory: Memory) -> Memory:
+def _empty_like(memory: Memory) -> Memory:
     """Arrays to fill, of the same shapes."""
     return Memory(
         np.empty_like(memory.contact),
@@ -178,7 +180,7 @@ def _room_like(memory: Memory) -> Memory:
 
 
 def slip_state(time: float, memory: Memory, velocity: FloatArray, touching: int, slipping: int) -> SlipState:
-    """The answer of a step, with the number of elements that touch and of those that slip."""
+    """The slip state of a step, with the number of elements that touch and of those that slip."""
     ratio = 1.0 - slipping / touching if touching else math.nan
     contact, slip, probability = (
         _read_only(memory.contact),
@@ -190,7 +192,7 @@ def slip_state(time: float, memory: Memory, velocity: FloatArray, touching: int,
 
 
 def masked(now: SlipState, observed: BoolArray | None, before: BoolArray | None) -> SlipState:
-    """The answer without what was not observed; the detector itself goes on with the placeholders."""
+    """The slip state without what was not observed; the detector itself goes on with the placeholders."""
     if observed is None:
         return now
     return now.masked(observed, observed if before is None else observed & before)
@@ -234,8 +236,8 @@ class SlipDetector:
         forces that are given for some frames only; the detector then stays as it was.
         """
         frame = _checked(self.state, time, displacement, force, object_pose, normal, contact, observed)
-        self.state, answer = step(self.state, frame)
-        return answer
+        self.state, now = step(self.state, frame)
+        return now
 
 
 def _checked(

@@ -6,29 +6,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipcore.detection.detector import NO_FIELD, NO_MASK, NO_POSE, DetectorState, step
-from slipcore.detection.fold import Answers, Recording, fold
+from slipcore.detection.fold import FrameResults, Recording, fold
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.slip_state import SlipHistory, slip_events
 
 
 def history_of(log: GraspLog, state: DetectorState, lookahead: int) -> SlipHistory:
-    """What a compiled method's detector in its ``state`` before a log says of it, as frame by frame to the last bit."""
-    setup, answers = state.setup, _room(log)
+    """What a compiled method finds in a log, from its ``state`` before it; as frame by frame to the last bit."""
+    setup, results = state.setup, _empty_results(log)
     state, first = step(state, next(log.frames()))
     memory = state.memory
-    answers.contact[0], answers.slip[0], answers.velocity[0] = memory.contact, memory.slip, first.velocity
-    answers.probability[0] = memory.probability
-    answers.touching[0], answers.slipping[0] = memory.contact.sum(), memory.slip.sum()
+    results.contact[0], results.slip[0], results.velocity[0] = memory.contact, memory.slip, first.velocity
+    results.probability[0] = memory.probability
+    results.touching[0], results.slipping[0] = memory.contact.sum(), memory.slip.sum()
     is_filter = setup.method == "filter"
     sensor = setup.by_shape if log.force is None else setup.by_force
-    noise = fold(is_filter, sensor, _recording(log), memory, lookahead if is_filter else 0, answers)
-    return _history(log, setup.method, noise, answers)
+    noise = fold(is_filter, sensor, _recording(log), memory, lookahead if is_filter else 0, results)
+    return _history(log, setup.method, noise, results)
 
 
-def _room(log: GraspLog) -> Answers:
+def _empty_results(log: GraspLog) -> FrameResults:
     shape = log.displacement.shape[:3]
     counts = np.empty(len(log), np.int64), np.empty(len(log), np.int64)
-    return Answers(np.empty(shape, bool), np.empty(shape, bool), np.empty(shape), np.empty((*shape, 2)), *counts)
+    return FrameResults(np.empty(shape, bool), np.empty(shape, bool), np.empty(shape), np.empty((*shape, 2)), *counts)
 
 
 def _recording(log: GraspLog) -> Recording:
@@ -50,23 +50,23 @@ def _frames(field: NDArray[Any] | None, none: NDArray[Any], log: GraspLog) -> ND
     return frames
 
 
-def _history(log: GraspLog, method: str, noise: float, answers: Answers) -> SlipHistory:
-    contact, slip, probability, velocity, touching, slipping = answers
+def _history(log: GraspLog, method: str, noise: float, results: FrameResults) -> SlipHistory:
+    contact, slip, probability, velocity, touching, slipping = results
     if log.observed is not None:
-        contact, slip, probability, velocity = _masked(log.observed, answers)
+        contact, slip, probability, velocity = _masked(log.observed, results)
         touching, slipping = (np.count_nonzero(field, axis=(1, 2)) for field in (contact, slip))
     ratio = np.full(len(log), np.nan)
     np.divide(slipping, touching, out=ratio, where=touching > 0)
     events = slip_events(log.time, contact, slip, log.observed)
     macro_slip = (touching > 0) & (touching == slipping)
-    said = contact, slip, probability, 1.0 - ratio, velocity, macro_slip
-    return SlipHistory(log.time, *said, events, noise, method, log.observed)
+    fields = contact, slip, probability, 1.0 - ratio, velocity, macro_slip
+    return SlipHistory(log.time, *fields, events, noise, method, log.observed)
 
 
-def _masked(observed: BoolArray, answers: Answers) -> tuple[BoolArray, BoolArray, FloatArray, FloatArray]:
+def _masked(observed: BoolArray, results: FrameResults) -> tuple[BoolArray, BoolArray, FloatArray, FloatArray]:
     """As ``SlipState.masked`` of each frame: what was not observed, and no velocity unless it was so before."""
     throughout = observed.copy()
     throughout[1:] &= observed[:-1]
-    velocity = np.where(throughout[..., None], answers.velocity, np.nan)
-    contact, slip = answers.contact & observed, answers.slip & observed
-    return contact, slip, np.where(observed, answers.probability, 0.0), velocity
+    velocity = np.where(throughout[..., None], results.velocity, np.nan)
+    contact, slip = results.contact & observed, results.slip & observed
+    return contact, slip, np.where(observed, results.probability, 0.0), velocity

@@ -3,9 +3,9 @@ from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.detection.filter.run import run_filter
 from slipcore.detection.filter.smoothing import look_back
 from slipcore.detection.filter.step import decide
-from slipcore.detection.shared.answer import answer
+from slipcore.detection.shared.decision import apply_decision
 
-KERNELS = (run_filter, look_back, decide, answer)
+KERNELS = (run_filter, look_back, decide, apply_decision)
 
 
 def test_after_warming_up_no_first_frame_compiles() -> None:

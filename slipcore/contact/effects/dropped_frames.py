@@ -16,7 +16,7 @@ class DroppedFrames:
 
     probability: float
 
-    why: ClassVar[str] = "a gap changes the time step, and must not change a detector's answer"
+    why: ClassVar[str] = "a gap changes the time step, and must not change what a detector finds"
     cost: ClassVar[str] = "nothing"
     stage: ClassVar[int] = 1
 

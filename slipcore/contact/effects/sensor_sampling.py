@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from slipcore.contact.defaults import RAMP
-from slipcore.contact.plan.plan import Plan, Sampling
+from slipcore.contact.plan.plan import Plan, SamplingPlan
 from slipcore.errors import InvalidInput
 
 
@@ -37,4 +37,4 @@ class SensorSampling:
         """Set the sampling; a scene has one sensor."""
         if plan.sampling is not None:
             raise InvalidInput("sensor samplings", "two", "one")
-        return replace(plan, sampling=Sampling(self.points, self.pitch, self.frame_rate))
+        return replace(plan, sampling=SamplingPlan(self.points, self.pitch, self.frame_rate))

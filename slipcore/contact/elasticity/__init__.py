@@ -1,1 +1,1 @@
-"""How elastic bodies answer tractions: grid, influence functions, convolutions."""
+"""How elastic bodies give way to tractions: grid, influence functions, convolutions."""

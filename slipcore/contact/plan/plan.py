@@ -46,7 +46,7 @@ def ramp(channel: Channel, value: float, start: float, duration: float) -> Histo
 
 
 @dataclass(frozen=True, slots=True)
-class Sampling:
+class SamplingPlan:
     """Where and when a sensor looks: ``points`` a side at ``pitch`` m, ``frame_rate`` 1/s."""
 
     points: tuple[int, int]
@@ -54,7 +54,7 @@ class Sampling:
     frame_rate: float
 
 
-class Observation(Protocol):
+class ObservationEffect(Protocol):
     """What a sensor makes of the truth; it never reaches the mechanics.
 
     ``stage`` orders observations: 1 frames, 2 drift, 3 noise. Each draws from a generator of its own.
@@ -81,8 +81,8 @@ class Plan:
     young_modulus: float
     poisson_ratio: float
     seed: int
-    sampling: Sampling | None = None
-    observations: tuple[Observation, ...] = ()
+    sampling: SamplingPlan | None = None
+    observations: tuple[ObservationEffect, ...] = ()
 
     def drives(self, channel: Channel) -> bool:
         """Whether anything drives a channel."""

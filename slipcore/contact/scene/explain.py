@@ -9,7 +9,7 @@ import numpy as np
 from slipcore.contact.defaults import EXPLAIN
 from slipcore.contact.effects.finite_layer import FiniteLayer
 from slipcore.contact.plan.description import SceneDescription
-from slipcore.contact.plan.plan import Effect, Plan, Sampling
+from slipcore.contact.plan.plan import Effect, Plan, SamplingPlan
 from slipcore.contact.scene.simulate import observe
 from slipcore.contact.tiers.accuracy import Difference, difference
 from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach, run
@@ -99,15 +99,15 @@ def explain(scene: SceneDescription, seed: int = 0) -> Explanation:
     return Explanation(scene.name, whole.seconds, whole.applications, reports, proposals)
 
 
-def _few_frames(plan: Plan) -> Sampling:
+def _few_frames(plan: Plan) -> SamplingPlan:
     """The plan's sampling at few frames; points over the contact where it has none."""
     rate = EXPLAIN.frames / plan.duration
     if plan.sampling is not None:
         return replace(plan.sampling, frame_rate=rate)
-    return Sampling((COARSE_RUNS.cells, COARSE_RUNS.cells), 2.0 * contact_reach(plan) / COARSE_RUNS.cells, rate)
+    return SamplingPlan((COARSE_RUNS.cells, COARSE_RUNS.cells), 2.0 * contact_reach(plan) / COARSE_RUNS.cells, rate)
 
 
-def _measure(scene: SceneDescription, sampling: Sampling, seed: int) -> Measured:
+def _measure(scene: SceneDescription, sampling: SamplingPlan, seed: int) -> Measured:
     plan, seconds = replace(scene.plan(seed), sampling=sampling), np.inf
     for _ in range(EXPLAIN.repeats):
         began = time.perf_counter()
@@ -116,7 +116,7 @@ def _measure(scene: SceneDescription, sampling: Sampling, seed: int) -> Measured
     return Measured(scene, plan, log, observe(plan, log), seconds, int(log.metadata["applications"]))
 
 
-def _report(whole: Measured, effect: Effect, sampling: Sampling, seed: int) -> EffectReport:
+def _report(whole: Measured, effect: Effect, sampling: SamplingPlan, seed: int) -> EffectReport:
     """The scene with and without one effect."""
     kind = type(effect)
     rest = tuple(other for other in whole.scene.effects if other is not effect)

@@ -15,7 +15,7 @@ HeightField = Callable[[FloatArray, FloatArray], FloatArray]
 """Gap m between undeformed bodies at points x, y m; infinite where there is no surface."""
 FrictionField = Callable[[FloatArray, FloatArray], FloatArray]
 """What a place (x, y m) adds to the friction coefficient."""
-FrictionLaw = Callable[[FloatArray], FloatArray]
+FrictionTerm = Callable[[FloatArray], FloatArray]
 """What a pressure (Pa) or a slip velocity (m/s) adds to the friction coefficient."""
 
 
@@ -46,8 +46,8 @@ class Problem:
     obstacle: tuple[ElasticBody, ...] = ()
     heights: tuple[HeightField, ...] = ()
     friction_fields: tuple[FrictionField, ...] = ()
-    pressure_laws: tuple[FrictionLaw, ...] = ()
-    velocity_laws: tuple[FrictionLaw, ...] = ()
+    pressure_laws: tuple[FrictionTerm, ...] = ()
+    velocity_laws: tuple[FrictionTerm, ...] = ()
     coupled: bool = False
     spread: bool = False
     creep: tuple[MaxwellBranch, ...] = ()

@@ -82,10 +82,10 @@ def solve_tangential(
     """
     if not limit.any():
         return _frictionless(offset, control)
-    return _Problem(operator, points, limit, offset, control).solve(start, tolerance, max_iterations)
+    return _TangentialStep(operator, points, limit, offset, control).solve(start, tolerance, max_iterations)
 
 
-class _Problem:
+class _TangentialStep:
     """The step with lengths and sums scaled, so that neither units nor the size of the contact matter."""
 
     def __init__(

@@ -8,9 +8,9 @@ import numpy as np
 
 from slipcore.contact.defaults import ACCURACY, PROBE
 from slipcore.contact.errors import NotConverged
-from slipcore.contact.plan.plan import Plan, Sampling
+from slipcore.contact.plan.plan import Plan, SamplingPlan
 from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach, run
-from slipcore.contact.tiers.sampling import lattice
+from slipcore.contact.tiers.sampling import sensor_grid
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray, GraspLog
 
@@ -140,7 +140,7 @@ def _next_seconds(last: Refined, target: float) -> float:
 
 def _across(plan: Plan, reach: float, cells: int) -> int:
     """Cells that a fidelity really has across the contact, after rounding to the sensor's pitch."""
-    return int(2.0 * reach / lattice(plan.sampling, reach, cells).grid.pitch[0])
+    return int(2.0 * reach / sensor_grid(plan.sampling, reach, cells).grid.pitch[0])
 
 
 def _sampled(plan: Plan) -> Plan:
@@ -149,4 +149,4 @@ def _sampled(plan: Plan) -> Plan:
         return plan
     pitch = 2.0 * PROBE.room * contact_reach(plan) / ACCURACY.points
     rate = ACCURACY.frames / plan.duration
-    return replace(plan, sampling=Sampling((ACCURACY.points, ACCURACY.points), pitch, rate))
+    return replace(plan, sampling=SamplingPlan((ACCURACY.points, ACCURACY.points), pitch, rate))

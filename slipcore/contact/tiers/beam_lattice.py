@@ -19,7 +19,7 @@ from slipcore.contact.plan.plan import Plan
 from slipcore.contact.solver.normal import solve_normal
 from slipcore.contact.tiers import boundary_elements
 from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach
-from slipcore.contact.tiers.sampling import lattice
+from slipcore.contact.tiers.sampling import sensor_grid
 from slipcore.frames import FloatArray, GraspLog
 
 NAME = "beams"
@@ -71,7 +71,7 @@ def fitted(plan: Plan) -> Beams:
     """Beams that carry, where the bodies would be under a traction like the pressure, as nearly that traction as they
     can (least squares over the contact at the largest normal force).
     """
-    grid = lattice(plan.sampling, PROBE.room * contact_reach(plan), ONE_CELL_AN_ELEMENT.cells).grid
+    grid = sensor_grid(plan.sampling, PROBE.room * contact_reach(plan), ONE_CELL_AN_ELEMENT.cells).grid
     operators = Operators(plan.problem.finger)
     force = max(plan.value("normal_force", float(t)) for t in np.append(plan.corners(), plan.duration))
     height, tolerance = plan.problem.height(grid), CHEAP_TIERS.beam_tolerance
@@ -80,9 +80,9 @@ def fitted(plan: Plan) -> Beams:
     along_y = operators.on(grid).tangential(np.stack((np.zeros_like(pressure), pressure)))[1]
     moved, touching = 0.5 * (along_x + along_y), pressure > 0.0
     pull = _to_neighbours(moved) / grid.cell_area
-    answers = np.stack((moved[touching], pull[touching]), axis=1)
-    scale = np.linalg.norm(answers, axis=0)
-    bending, tie = np.linalg.lstsq(answers / scale, pressure[touching], rcond=None)[0] / scale
+    responses = np.stack((moved[touching], pull[touching]), axis=1)
+    scale = np.linalg.norm(responses, axis=0)
+    bending, tie = np.linalg.lstsq(responses / scale, pressure[touching], rcond=None)[0] / scale
     return Beams(plan.problem.finger, float(bending), float(tie))
 
 

@@ -16,11 +16,11 @@ from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
 from slipcore.contact.solver.resolution import summary
 from slipcore.contact.tiers.sampling import (
     FrameRecord,
-    Lattice,
+    SensorGrid,
     frame_record,
     frame_times,
     grasp_log,
-    lattice,
+    sensor_grid,
     untouched,
 )
 from slipcore.errors import InvalidInput
@@ -47,7 +47,7 @@ def run(plan: Plan, fidelity: Fidelity | None = None) -> GraspLog:
     """
     fidelity = Fidelity() if fidelity is None else fidelity
     began = time.perf_counter()
-    where = lattice(plan.sampling, PROBE.room * contact_reach(plan), fidelity.cells)
+    where = sensor_grid(plan.sampling, PROBE.room * contact_reach(plan), fidelity.cells)
     solver = QuasiStatic(plan.problem, where.grid, fidelity.tolerance, FIDELITY.normal_share * fidelity.tolerance)
     times = frame_times(plan)
     frames, warnings = _frames(plan, solver, where, times, fidelity.substeps)
@@ -64,7 +64,7 @@ def run(plan: Plan, fidelity: Fidelity | None = None) -> GraspLog:
 
 
 def _frames(
-    plan: Plan, solver: QuasiStatic, where: Lattice, times: FloatArray, substeps: int
+    plan: Plan, solver: QuasiStatic, where: SensorGrid, times: FloatArray, substeps: int
 ) -> tuple[list[FrameRecord], list[tuple[str, ...]]]:
     """Records of all frames, and of each load step what the grid does not resolve."""
     corners, state = plan.corners(), solver.start()

@@ -19,7 +19,7 @@ from slipcore.contact.plan.plan import Plan
 from slipcore.contact.reference.elastic_pair import Compliance, elastic_pair, half_space
 from slipcore.contact.reference.hertz import HertzContact
 from slipcore.contact.reference.mindlin_deresiewicz import MindlinDeresiewicz
-from slipcore.contact.tiers.sampling import FrameRecord, Lattice, frame_times, grasp_log, untouched
+from slipcore.contact.tiers.sampling import FrameRecord, SensorGrid, frame_times, grasp_log, untouched
 from slipcore.frames import FloatArray, GraspLog
 
 NAME = "closed form"
@@ -96,7 +96,7 @@ def run(scene: SceneDescription, plan: Plan) -> GraspLog:
     assert case is not None  # the caller has asked for the accuracy
     assert sampling is not None
     (n, m), pitch = sampling.points, sampling.pitch
-    where, times = Lattice(Grid((m, n), (pitch, pitch)), (n, m), 1), frame_times(plan)
+    where, times = SensorGrid(Grid((m, n), (pitch, pitch)), (n, m), 1), frame_times(plan)
     state = MindlinDeresiewicz(HertzContact(1.0 / case.curvature, 0.0, case.both), scene.friction)
     corners, frames, steps = plan.corners(), [untouched(where)], 0
     for begin, end in pairwise(times):
@@ -133,7 +133,7 @@ def _holds(state: MindlinDeresiewicz, normal: float, pull: float) -> bool:
     return unchanged and normal == state.contact.normal_force
 
 
-def _frame(state: MindlinDeresiewicz, case: SphereOnPlane, where: Lattice, stuck: float) -> FrameRecord:
+def _frame(state: MindlinDeresiewicz, case: SphereOnPlane, where: SensorGrid, stuck: float) -> FrameRecord:
     """The state at the sensor's points; ``stuck``: radius inside which nothing has moved since the last frame."""
     if state.contact.normal_force == 0.0:
         return untouched(where)
@@ -174,7 +174,7 @@ def _sticking_radius(state: MindlinDeresiewicz) -> float:
     return HertzContact(state.contact.sphere_radius, level, state.contact.compliance).contact_radius
 
 
-def _element_forces(state: MindlinDeresiewicz, case: SphereOnPlane, where: Lattice) -> FloatArray:
+def _element_forces(state: MindlinDeresiewicz, case: SphereOnPlane, where: SensorGrid) -> FloatArray:
     """Force [n, m, 3] N on each element: means over ``element_samples``² of its points."""
     offset = (np.arange(CHEAP_TIERS.element_samples) + 0.5) / CHEAP_TIERS.element_samples - 0.5
     dx, dy = np.meshgrid(offset * where.pitch, offset * where.pitch)

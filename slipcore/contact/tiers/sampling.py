@@ -7,13 +7,13 @@ import numpy as np
 
 from slipcore.contact.defaults import ACCURACY, CHEAP_TIERS
 from slipcore.contact.elasticity.grid import Grid
-from slipcore.contact.plan.plan import Plan, Sampling
+from slipcore.contact.plan.plan import Plan, SamplingPlan
 from slipcore.contact.solver.quasi_static import StepResult
 from slipcore.frames import BoolArray, FloatArray, GraspLog, GroundTruth
 
 
 @dataclass(frozen=True, slots=True)
-class Lattice:
+class SensorGrid:
     """Sensor points on a grid: ``points`` along x and y, each the centre of ``cells`` × ``cells`` cells (an odd
     number).
     """
@@ -52,21 +52,21 @@ class Lattice:
         return slice(first_y, first_y + m * self.cells), slice(first_x, first_x + n * self.cells)
 
 
-def lattice(sampling: Sampling | None, reach: float, cells_across: int) -> Lattice:
+def sensor_grid(sampling: SamplingPlan | None, reach: float, cells_across: int) -> SensorGrid:
     """Points and grid for a contact that reaches ``reach`` m from the centre, with that many cells across it at least.
 
     Points are cell centres, so that the truth at a point is exact. Without a sensor every cell is a point.
     """
     width = 2.0 * reach
     if sampling is None:
-        return Lattice(Grid.square(cells_across, width), (cells_across, cells_across), 1)
+        return SensorGrid(Grid.square(cells_across, width), (cells_across, cells_across), 1)
     cells = max(int(np.ceil(cells_across * sampling.pitch / width)), 1)
     cells += 1 - cells % 2
     pitch = sampling.pitch / cells
     needed = int(np.ceil(width / pitch))
     sides = [max(count * cells, needed) for count in sampling.points]
     nx, ny = (side + (side - count * cells) % 2 for side, count in zip(sides, sampling.points, strict=True))
-    return Lattice(Grid((ny, nx), (pitch, pitch)), sampling.points, cells)
+    return SensorGrid(Grid((ny, nx), (pitch, pitch)), sampling.points, cells)
 
 
 def frame_times(plan: Plan) -> FloatArray:
@@ -90,30 +90,30 @@ class FrameRecord:
     stick_ratio: float
 
 
-def frame_record(lattice: Lattice, steps: Sequence[StepResult]) -> FrameRecord:
+def frame_record(grid: SensorGrid, steps: Sequence[StepResult]) -> FrameRecord:
     """What the sensor sees at the end of the steps since the last frame; a point moved if it did in any of them."""
     last = steps[-1]
     outward = np.array([1.0, 1.0, -1.0])
     moved = np.logical_or.reduce([step.moved for step in steps])
     return FrameRecord(
-        displacement=np.moveaxis(lattice.at_points(last.displacement), 0, -1) * outward,
-        force=np.moveaxis(lattice.over_elements(last.force), 0, -1) * outward,
+        displacement=np.moveaxis(grid.at_points(last.displacement), 0, -1) * outward,
+        force=np.moveaxis(grid.over_elements(last.force), 0, -1) * outward,
         pose=last.pose,
-        contact=np.asarray(lattice.at_points(last.contact), dtype=bool),
-        moved=np.asarray(lattice.at_points(moved), dtype=bool),
-        at_limit=np.asarray(lattice.at_points(last.at_limit), dtype=bool),
+        contact=np.asarray(grid.at_points(last.contact), dtype=bool),
+        moved=np.asarray(grid.at_points(moved), dtype=bool),
+        at_limit=np.asarray(grid.at_points(last.at_limit), dtype=bool),
         stick_ratio=last.stick_ratio,
     )
 
 
-def untouched(lattice: Lattice) -> FrameRecord:
+def untouched(grid: SensorGrid) -> FrameRecord:
     """A frame before anything touches."""
-    nothing, none = np.zeros((*lattice.points, 3)), np.zeros(lattice.points, dtype=bool)
+    nothing, none = np.zeros((*grid.points, 3)), np.zeros(grid.points, dtype=bool)
     return FrameRecord(nothing, nothing, np.zeros(3), none, none, none, float("nan"))
 
 
 def grasp_log(
-    plan: Plan, lattice: Lattice, time: FloatArray, frames: Sequence[FrameRecord], metadata: dict[str, str]
+    plan: Plan, grid: SensorGrid, time: FloatArray, frames: Sequence[FrameRecord], metadata: dict[str, str]
 ) -> GraspLog:
     """The log of all frames, with truth and before any observation effect."""
     force = np.stack([frame.force for frame in frames])
@@ -126,9 +126,9 @@ def grasp_log(
     )
     return GraspLog(
         time=time,
-        position=lattice.position(),
+        position=grid.position(),
         displacement=np.stack([frame.displacement for frame in frames]),
-        element_area=lattice.pitch**2,
+        element_area=grid.pitch**2,
         force=force,
         normal=np.broadcast_to([0.0, 0.0, 1.0], force.shape),  # linear theory: loads act on the undeformed plane
         object_pose=np.stack([frame.pose for frame in frames]),

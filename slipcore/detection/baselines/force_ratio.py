@@ -1,7 +1,7 @@
 """The break-away ratio of forces, after Song et al. 2014 (the paper's [12]), element by element.
 
 Assumed here: the ratio is that of one element and not of the finger, and the break-away ratio is an option, for that
-work finds it by exploring the surface before the grasp. Without forces nothing can be said: no slip, probability ½.
+work finds it by exploring the surface before the grasp. Without forces nothing is known: no slip, probability ½.
 """
 
 import numpy as np

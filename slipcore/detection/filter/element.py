@@ -40,7 +40,7 @@ class Measurement(NamedTuple):
     motion_y: float
     motion_variance: float
     readiness: float
-    force_evidence: float
+    force_log_odds: float
     x: float
     y: float
 
@@ -60,7 +60,7 @@ def update_element(
     """Mix, predict and correct the two states (Blom and Bar-Shalom, IEEE Trans. Autom. Control 33 (1988) 780).
 
     With p the slip probability, a and b those that a sticking element begins to slip and a slipping one sticks:
-    predicted p' = p(1 − b) + (1 − p)a; log-odds += log N(z; slip) − log N(z; stick) + force evidence. A marker far
+    predicted p' = p(1 − b) + (1 − p)a; log-odds += log N(z; slip) − log N(z; stick) + those from forces. A marker far
     from both predictions was lost and found elsewhere: it tells nothing, but is believed if it stays there.
     """
     p, size2 = old[PROBABILITY, i, j], seen.motion_x * seen.motion_x + seen.motion_y * seen.motion_y
@@ -88,7 +88,7 @@ def update_element(
         stuck = Estimate(stuck.x, stuck.y, stuck.variance + tuning.outlier_spread * stick2)
         slid = Estimate(slid.x, slid.y, slid.variance + tuning.outlier_spread * slip2)
     odds = math.log(slip_probability / (1.0 - slip_probability)) + trust * min(max(gained, -most), most)
-    odds = min(max(odds + seen.force_evidence, -most), most)
+    odds = min(max(odds + seen.force_log_odds, -most), most)
     new[ONSET, i, j], new[END, i, j], new[PROBABILITY, i, j] = onset, end, 1.0 / (1.0 + math.exp(-odds))
     new[STICK_X, i, j], new[STICK_Y, i, j], new[STICK_VARIANCE, i, j] = correct(stuck, seen, noise, trust)
     new[SLIP_X, i, j], new[SLIP_Y, i, j], new[SLIP_VARIANCE, i, j] = correct(slid, seen, noise, trust)

@@ -1,4 +1,4 @@
-"""Evidence of slip in f_t/f_n of an element, without a friction coefficient given."""
+"""Log-odds of slip from f_t/f_n of an element, without a friction coefficient given."""
 
 import math
 
@@ -25,7 +25,7 @@ def log_normal_cdf(z: float) -> float:
 
 
 @compiled
-def ratio_evidence(
+def ratio_log_odds(
     ratio: float, noise: float, own: float, known: float, friction: float, gain: float, tuning: Tuning
 ) -> float:
     """Log-likelihood ratio of slip at a force ratio: near the one it slips at, against anywhere below it.
@@ -73,7 +73,7 @@ def weigh_forces(
 
     ``noise`` of an element's normal force, N.
     """
-    evidence, variance = np.zeros(len(places)), np.zeros(len(places))
+    log_odds, variance = np.zeros(len(places)), np.zeros(len(places))
     gain, memory = low_pass(interval, tuning.force_smoothing), -math.expm1(-interval / tuning.ratio_memory)
     left = gain / (2.0 - gain)
     least = max(tuning.force_to_noise * noise * math.sqrt(left), tuning.ratio_least_force)
@@ -85,17 +85,17 @@ def weigh_forces(
             variance[e] = noise * noise * left * (1.0 + ratio * ratio) / (normal * normal)
     learn_ratios(elements, places, variance, least, memory, tuning, after, common)
     if not common[FRICTION + 1] > 0.0:
-        return evidence
+        return log_odds
     friction = common[FRICTION] / common[FRICTION + 1]
     for e in range(len(places)):
         i, j = places[e]
         if friction > 0.0 and after[NORMAL, i, j] > least:
             ratio = after[TANGENTIAL, i, j] / after[NORMAL, i, j]
             own, known = after[RATIO, i, j], after[RATIO_WEIGHT, i, j]
-            gained = ratio_evidence(ratio, variance[e], own, known, friction, memory, tuning)
+            gained = ratio_log_odds(ratio, variance[e], own, known, friction, memory, tuning)
             limited = min(max(gained, -tuning.ratio_limit), tuning.ratio_limit)
-            evidence[e] = limited * tuning.ratio_weight * gain
-    return evidence
+            log_odds[e] = limited * tuning.ratio_weight * gain
+    return log_odds
 
 
 @compiled

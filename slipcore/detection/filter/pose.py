@@ -77,8 +77,11 @@ def place_of_object(pose: Pose, x: float, y: float) -> tuple[float, float]:
 def fit_pose(anchors: Anchors, weight: FloatArray, given: FloatArray) -> tuple[Pose, PoseVariance]:
     """Weighted Procrustes fit of the pose that carries each anchor to its marker, and its variance.
 
-    A stretch is allowed as far as linear theory of so large a rotation would make one; of a ``given`` pose (empty if
-    there is none) only the stretch and, within that of linear theory, the yaw.
+    With anchors p and markers q about their weighted means: yaw φ = atan2(Σw p×q, Σw p·q), stretch s = √((Σw p×q)² +
+    (Σw p·q)²)/Σw p² (Umeyama, IEEE Trans. Pattern Anal. Mach. Intell. 13 (1991) 376). Linear theory makes of a
+    rotation φ a stretch of √(1 + φ²) ≈ 1 + φ²/2 and a yaw of atan φ ≈ φ − φ³/3. So s − 1 is normal about 0 with
+    variance φ⁴/4 beforehand, and the yaw about that of a ``given`` pose (empty if there is none; its place is kept)
+    with φ⁶/9; each is shrunk to that by its share of the sum with 1/Σw p², the variance of the fit.
     """
     total = mx = my = ax = ay = 0.0
     for e in range(len(weight)):
@@ -151,8 +154,9 @@ def object_motion(
     the reference of the next step.
 
     A fitted pose jitters though nothing moves. What it strays from the ``reference`` by less than ``play`` standard
-    deviations (root mean square over the anchors) is no motion; the rest is, and takes the reference with it. So all
-    of a long motion counts, however many frames it is cut into, and of a jitter nothing.
+    deviations (root mean square over the anchors) is no motion; the rest is, and takes the reference with it: motion
+    = (1 − ``play`` √(Σσ²/Σd²)) d for distances d of variance σ², as in positive-part shrinkage. So all of a long motion
+    counts, however many frames it is cut into, and of a jitter nothing.
     """
     count = len(anchors.x)
     motion_x, motion_y, variance = np.zeros(count), np.zeros(count), np.empty(count)

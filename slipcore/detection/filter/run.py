@@ -1,10 +1,10 @@
-"""A whole step of method ``filter`` in one call: observe, decide, answer."""
+"""A whole step of method ``filter`` in one call: observe, decide, and what follows."""
 
 import numpy as np
 
 from slipcore.compilation import compiled
 from slipcore.detection.filter.step import step_filter
-from slipcore.detection.shared.answer import answer
+from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.observe import observe
 from slipcore.detection.shared.records import Decision, FrameArrays, Memory, Sensor, named
 from slipcore.frames import FloatArray
@@ -22,5 +22,5 @@ def run_filter(
     surface = observe(sensor, frame, before, after)
     decision = Decision(np.empty(shape, np.bool_), np.empty(shape))
     step_filter(sensor, last, frame, surface, before, after, decision)
-    touching, slipping = answer(sensor.position, last, frame, surface.stays, decision, before, after, velocity)
+    touching, slipping = apply_decision(sensor.position, last, frame, surface.stays, decision, before, after, velocity)
     return surface.marker_noise, touching, slipping

@@ -61,7 +61,7 @@ def step_elements(
     after: Memory,
     tuning: Tuning,
 ) -> None:
-    """The object's motion, the load's change and the forces' evidence; then each element that stays in contact."""
+    """The object's motion, the load's change and the forces' log-odds; then each element that stays in contact."""
     marker_noise = tuning.unknown_noise if math.isnan(surface.marker_noise) else surface.marker_noise
     variance = (tuning.noise_margin * marker_noise) ** 2 + tuning.displacement_floor**2
     pressing_noise = 0.0 if math.isnan(surface.pressing_noise) else surface.pressing_noise
@@ -84,17 +84,17 @@ def step_elements(
     readiness = tuning.onset_under_restick if restick else 1.0
     if math.isnan(surface.marker_noise):
         readiness = 0.0  # nothing begins to slip before noise is known
-    evidence = np.zeros(len(places))
+    log_odds = np.zeros(len(places))
     follow_forces(elements, surface, has_force, low_pass(interval, tuning.force_smoothing), after.elements)
     if change.size:
-        evidence = weigh_forces(elements, places, force_noise, interval, tuning, after.elements, after.common)
+        log_odds = weigh_forces(elements, places, force_noise, interval, tuning, after.elements, after.common)
     start_elements(position, frame.displacement, after.contact, surface.stays, pose, variance, after.elements)
     increment = Increment(interval, variance, restick, after.common[STILL] > tuning.hold_time)
     for e in range(len(places)):
         i, j = places[e]
         near = tuning.onset_inside + tuning.onset_at_front * slip_of_neighbours(elements, after.contact, i, j)
         x, y = place_on_object(pose, anchors.marker_x[e], anchors.marker_y[e])
-        seen = Measurement(motion_x[e], motion_y[e], motion_variance[e], readiness * near, evidence[e], x, y)
+        seen = Measurement(motion_x[e], motion_y[e], motion_variance[e], readiness * near, log_odds[e], x, y)
         update_element(elements, after.elements, i, j, seen, increment, tuning)
 
 

@@ -81,7 +81,10 @@ def learn_following(
     tuning: Tuning,
     common: FloatArray,
 ) -> None:
-    """Learn the share of the body's motion that the surface of a soft object follows, while little slips."""
+    """Learn the share of the body's motion that the surface of a soft object follows, while little slips.
+
+    Least squares of the fitted motion f on the carried one d: Σw f·d/Σw d², w the inverse variance of a step.
+    """
     x, y, dx, dy = carried
     ax, ay = place_on_object(before, x, y)
     fx, fy = place_of_object(fitted, ax, ay)

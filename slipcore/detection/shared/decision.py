@@ -1,4 +1,4 @@
-"""What a decision means: slip of what may slip, stick ratio, and velocity relative to the object."""
+"""What follows from a decision: slip of what may slip, stick ratio, and velocity relative to the object."""
 
 import math
 
@@ -6,12 +6,12 @@ import numpy as np
 
 from slipcore.compilation import compiled
 from slipcore.detection.shared.records import Decision, FrameArrays, Memory
-from slipcore.detection.shared.rigid_motion import Motion, fit_motion
+from slipcore.detection.shared.rigid_motion import RigidMotion, fit_motion
 from slipcore.frames import BoolArray, FloatArray
 
 
 @compiled
-def answer(
+def apply_decision(
     position: FloatArray,
     last: FrameArrays,
     frame: FrameArrays,
@@ -46,7 +46,7 @@ def answer(
                 weight[i, j] = (1.0 - p) * (1.0 - before.probability[i, j])
     if known:
         dx, dy, turn = pose[0] - pose_before[0], pose[1] - pose_before[1], pose[2] - pose_before[2]
-        motion = Motion(pose_before[0], pose_before[1], dx, dy, turn)
+        motion = RigidMotion(pose_before[0], pose_before[1], dx, dy, turn)
     else:
         motion = fit_motion(position, start, end, weight)
     sine, versine = math.sin(motion.rotation), 2.0 * math.sin(0.5 * motion.rotation) ** 2

@@ -1,4 +1,4 @@
-"""What a detection method is given, and what it answers."""
+"""What a detection method is given, and what it decides."""
 
 from collections.abc import Callable, Sequence
 from typing import Generic, NamedTuple, TypeVar

@@ -11,8 +11,11 @@ from slipcore.frames import FloatArray
 EPSILON = float(np.finfo(float).eps)
 
 
-class Motion(NamedTuple):
-    """Turn by ``rotation`` rad about (x, y) m and carry by (dx, dy) m; all NaN where the motion is unobservable."""
+class RigidMotion(NamedTuple):
+    """A finite motion in the plane: turn by ``rotation`` rad about (x, y) m and carry by (dx, dy) m.
+
+    All NaN where the motion is unobservable.
+    """
 
     x: float
     y: float
@@ -20,9 +23,26 @@ class Motion(NamedTuple):
     dy: float
     rotation: float
 
+    def displacement(self, points: FloatArray) -> FloatArray:
+        """How far the motion carries points [..., 2] m: [..., 2] m; exact for finite rotation.
+
+        cos φ − 1 is taken as −2 sin²(φ/2), so that a tiny motion of far points keeps its digits.
+        """
+        sine, versine = math.sin(self.rotation), 2.0 * math.sin(0.5 * self.rotation) ** 2
+        x, y = points[..., 0] - self.x, points[..., 1] - self.y
+        moved = np.empty_like(points)
+        moved[..., 0] = self.dx - versine * x - sine * y
+        moved[..., 1] = self.dy + sine * x - versine * y
+        return moved
+
+    @property
+    def observable(self) -> bool:
+        """Whether the motion is known."""
+        return math.isfinite(self.rotation)
+
 
 @compiled
-def fit_motion(position: FloatArray, start: FloatArray, end: FloatArray, weight: FloatArray) -> Motion:
+def fit_motion(position: FloatArray, start: FloatArray, end: FloatArray, weight: FloatArray) -> RigidMotion:
     """The rigid motion that best explains how points went from displacement ``start`` to ``end`` of their ``position``.
 
     All [n, m, 2 or more] m; ``weight`` [n, m] ≥ 0. Weighted least squares in closed form (planar Procrustes problem).
@@ -43,7 +63,7 @@ def fit_motion(position: FloatArray, start: FloatArray, end: FloatArray, weight:
             v += w * (end[i, j, 1] - start[i, j, 1])
             size = max(size, abs(px), abs(py))
     if not total > 0.0:
-        return Motion(math.nan, math.nan, math.nan, math.nan, math.nan)
+        return RigidMotion(math.nan, math.nan, math.nan, math.nan, math.nan)
     x, y, u, v = x / total, y / total, u / total, v / total
     spread = across = along = 0.0
     for i in range(n):
@@ -57,36 +77,8 @@ def fit_motion(position: FloatArray, start: FloatArray, end: FloatArray, weight:
             across += w * (rx * dv - ry * du)
             along += w * (rx * du + ry * dv)
     if not spread > (EPSILON * size) ** 2 * total:
-        return Motion(math.nan, math.nan, math.nan, math.nan, math.nan)
-    return Motion(x, y, u, v, math.atan2(across, spread + along))
-
-
-class RigidMotion(NamedTuple):
-    """A finite motion in the plane: turn by ``rotation`` rad about ``start`` and carry it by ``translation`` m.
-
-    ``start`` and ``translation`` are (x, y) in m. All NaN where the motion is unobservable.
-    """
-
-    start: tuple[float, float]
-    translation: tuple[float, float]
-    rotation: float
-
-    def displacement(self, points: FloatArray) -> FloatArray:
-        """How far the motion carries points [..., 2] m: [..., 2] m; exact for finite rotation.
-
-        cos φ − 1 is taken as −2 sin²(φ/2), so that a tiny motion of far points keeps its digits.
-        """
-        sine, versine = math.sin(self.rotation), 2.0 * math.sin(0.5 * self.rotation) ** 2
-        x, y = points[..., 0] - self.start[0], points[..., 1] - self.start[1]
-        moved = np.empty_like(points)
-        moved[..., 0] = self.translation[0] - versine * x - sine * y
-        moved[..., 1] = self.translation[1] + sine * x - versine * y
-        return moved
-
-    @property
-    def observable(self) -> bool:
-        """Whether the motion is known."""
-        return math.isfinite(self.rotation)
+        return RigidMotion(math.nan, math.nan, math.nan, math.nan, math.nan)
+    return RigidMotion(x, y, u, v, math.atan2(across, spread + along))
 
 
 def fit_rigid_motion(points: FloatArray, moved: FloatArray, weight: FloatArray | None = None) -> RigidMotion:
@@ -97,5 +89,4 @@ def fit_rigid_motion(points: FloatArray, moved: FloatArray, weight: FloatArray |
     """
     start, moved = np.zeros((1, *points.shape)), np.ascontiguousarray(moved)[None]
     w = np.ones(len(points)) if weight is None else weight
-    found = fit_motion(np.ascontiguousarray(points)[None], start, moved, np.ascontiguousarray(w)[None])
-    return RigidMotion((found.x, found.y), (found.dx, found.dy), found.rotation)
+    return fit_motion(np.ascontiguousarray(points)[None], start, moved, np.ascontiguousarray(w)[None])

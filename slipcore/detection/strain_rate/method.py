@@ -6,14 +6,14 @@ from slipcore.defaults import StrainRateOptions
 from slipcore.detection.shared.interface import CompiledMethod, Start
 from slipcore.detection.shared.strain import Lattice
 from slipcore.detection.strain_rate.run import run_strain_rate
-from slipcore.detection.strain_rate.step import NOISE, ROWS, Settings
+from slipcore.detection.strain_rate.step import NOISE, ROWS, StrainRateSettings
 
 
 def start(lattice: Lattice, options: StrainRateOptions) -> Start:
     """At rest."""
     elements = np.zeros((ROWS, *lattice.position.shape[:2]))
     elements[NOISE] = lattice.strain_noise
-    values = [getattr(options, name) for name in Settings._fields[:-1]]
+    values = [getattr(options, name) for name in StrainRateSettings._fields[:-1]]
     return Start(np.array([*values, lattice.strain_noise.mean()]), elements, np.zeros(0))
 
 

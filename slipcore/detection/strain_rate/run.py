@@ -1,9 +1,9 @@
-"""A whole step of method ``strain_rate`` in one call: observe, decide, answer."""
+"""A whole step of method ``strain_rate`` in one call: observe, decide, and what follows."""
 
 import numpy as np
 
 from slipcore.compilation import compiled
-from slipcore.detection.shared.answer import answer
+from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.observe import observe
 from slipcore.detection.shared.records import Decision, FrameArrays, Memory, Sensor, named
 from slipcore.detection.strain_rate.step import step_strain_rate
@@ -23,5 +23,5 @@ def run_strain_rate(
     decision = Decision(np.empty(shape, np.bool_), np.empty(shape))
     interval = frame.time - last.time
     step_strain_rate(sensor, frame.displacement, surface, interval, before.elements, after.elements, decision)
-    touching, slipping = answer(sensor.position, last, frame, surface.stays, decision, before, after, velocity)
+    touching, slipping = apply_decision(sensor.position, last, frame, surface.stays, decision, before, after, velocity)
     return surface.marker_noise, touching, slipping

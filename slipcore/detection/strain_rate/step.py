@@ -18,7 +18,7 @@ and what does not change, its strain's noise for marker noise of 1, 1/m."""
 _LEAST_NORMAL = 1.0 / LIMITS.inclination
 
 
-class Settings(NamedTuple):
+class StrainRateSettings(NamedTuple):
     """``StrainRateOptions`` as numbers for the kernel, in the same units, and the lattice's mean strain noise, 1/m."""
 
     smoothing_time: float
@@ -32,12 +32,12 @@ class Settings(NamedTuple):
     mean_noise: float
 
 
-SETTINGS = len(Settings._fields)
+SETTINGS = len(StrainRateSettings._fields)
 
 
 @compiled
 def surface_strains(inverse_jacobian: FloatArray, displacement: FloatArray, normal: FloatArray) -> FloatArray:
-    """Green–Lagrange strain xx, yy, xy [3, n, m], corrected for inclination, as ``strain.surface_strain``."""
+    """Green–Lagrange strain xx, yy, xy [3, n, m], corrected for inclination, as ``reference.surface_strain``."""
     n, m, _ = displacement.shape
     strain = np.empty((3, n, m))
     for i in range(n):
@@ -64,7 +64,7 @@ def step_strain_rate(
     decision: Decision,
 ) -> None:
     """Fill the last two: the memory of the ``elements`` [11, n, m] after the step, and the decision."""
-    chosen, noise = Settings(*unpack(sensor.settings, SETTINGS)), surface.marker_noise
+    chosen, noise = StrainRateSettings(*unpack(sensor.settings, SETTINGS)), surface.marker_noise
     strain = surface_strains(sensor.inverse_jacobian, displacement, surface.normal)
     if math.isnan(noise):  # a rate that may be noise alone would live on in the low-pass
         after[:] = elements
@@ -82,7 +82,7 @@ def step_strain_rate(
 
 
 @compiled
-def smoothing_weight(strain_noise: float, interval: float, chosen: Settings) -> float:
+def smoothing_weight(strain_noise: float, interval: float, chosen: StrainRateSettings) -> float:
     """Weight of the newest rate: exact for a first-order low-pass and a strain that moves in straight lines.
 
     As much low-pass as the noise calls for: its trace in the rate is about strain noise over time constant.
@@ -100,13 +100,13 @@ def step_elements(
     floor: FloatArray,
     interval: float,
     low_pass: float,
-    chosen: Settings,
+    chosen: StrainRateSettings,
     new: FloatArray,
 ) -> None:
     """A positive extreme of the signed rate begins slip, a negative one ends it; in between the state holds.
 
     The rate ‖Ė‖_F sign(E:Ė) is compared with its exponentially forgetting mean and deviation, with a ``floor`` under
-    the latter; an extreme value is learnt from with its influence only, and each touch begins a new story.
+    the latter; an extreme value is learnt from with its influence only, and each touch starts anew.
     Written without branches, which would make it three times as slow.
     """
     forgotten = -math.expm1(-interval / chosen.memory_time)

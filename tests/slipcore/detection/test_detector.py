@@ -212,7 +212,7 @@ def test_a_lattice_without_strain_and_an_absurd_area_are_refused() -> None:
 
 
 def test_a_history_of_nothing_is_refused() -> None:
-    with pytest.raises(InvalidInput, match="answers is empty"):
+    with pytest.raises(InvalidInput, match="slip_states is empty"):
         collect_history([], init(lattice(), 1e-6))
 
 

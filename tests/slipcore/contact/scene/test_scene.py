@@ -9,7 +9,7 @@ from slipcore.contact.effects import FlatSurface, SensorSampling, TangentialLoad
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.scene import Finger, Press, Scene, simulate
 from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach
-from slipcore.contact.tiers.sampling import Lattice, lattice
+from slipcore.contact.tiers.sampling import SensorGrid, sensor_grid
 from slipcore.errors import InvalidInput
 
 TEXT = """
@@ -71,7 +71,7 @@ def test_a_missing_scene_names_the_library() -> None:
 
 
 def test_points_are_cell_centres_and_elements_sums_of_cells() -> None:
-    where = lattice(SensorSampling((4, 3), pitch=1e-3).extend(Scene("s").plan()).sampling, 3e-3, 16)
+    where = sensor_grid(SensorSampling((4, 3), pitch=1e-3).extend(Scene("s").plan()).sampling, 3e-3, 16)
     assert where.cells % 2 == 1
     assert where.pitch == pytest.approx(1e-3)
     position = where.position()
@@ -84,7 +84,7 @@ def test_points_are_cell_centres_and_elements_sums_of_cells() -> None:
 
 
 def test_a_lattice_of_cells_is_the_grid() -> None:
-    where = Lattice(Grid.square(6, 1.0), (6, 6), 1)
+    where = SensorGrid(Grid.square(6, 1.0), (6, 6), 1)
     field = np.arange(36.0).reshape(6, 6)
     np.testing.assert_array_equal(where.at_points(field), field.T)
     np.testing.assert_array_equal(where.over_elements(field), field.T)

@@ -9,7 +9,7 @@ from slipcore import FilterOptions, GraspLog, SlipHistory, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.detection.filter import state
 from slipcore.detection.filter.element import Increment, Measurement, update_element
-from slipcore.detection.filter.force_ratio import log_normal_cdf, ratio_evidence
+from slipcore.detection.filter.force_ratio import log_normal_cdf, ratio_log_odds
 from slipcore.detection.filter.pose import Anchors, find_pose, place_of_object, place_on_object, pose_at
 from slipcore.detection.filter.tuning import Tuning, settings_of
 
@@ -83,7 +83,7 @@ def test_the_log_of_the_normal_distribution_holds_far_out() -> None:
 
 def test_evidence_of_a_force_ratio_rises_to_the_one_that_slips() -> None:
     tuning = TUNING._replace(ratio_spread=0.1, ratio_difference=0.15)
-    evidence = [ratio_evidence(r, 1e-4, 0.0, 0.0, 0.4, 0.03, tuning) for r in (0.1, 0.25, 0.4, 0.5)]
+    evidence = [ratio_log_odds(r, 1e-4, 0.0, 0.0, 0.4, 0.03, tuning) for r in (0.1, 0.25, 0.4, 0.5)]
     assert evidence[0] < evidence[1] < 0.0 < evidence[2] <= evidence[3]
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from slipcore.detection.shared.answer import answer
+from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.records import Decision, FrameArrays, Memory
 from slipcore.detection.shared.rigid_motion import fit_motion
 
@@ -34,7 +34,7 @@ def said(end: np.ndarray, slips: np.ndarray, poses: tuple[np.ndarray, np.ndarray
     before = Memory(contact, nothing, likely * 0.0, *NO_MEMORY)
     after = Memory(contact, np.empty(SHAPE, bool), np.empty(SHAPE), *NO_MEMORY)
     velocity = np.empty((*SHAPE, 2))
-    counts = answer(POSITION, last, frame, stays, Decision(slips, likely), before, after, velocity)
+    counts = apply_decision(POSITION, last, frame, stays, Decision(slips, likely), before, after, velocity)
     return *counts, after.slip, after.probability, velocity
 
 

@@ -49,12 +49,12 @@ def test_the_fit_is_the_least_squares_optimum() -> None:
     def cost(motion: RigidMotion) -> float:
         return float(weight @ ((moved - motion.displacement(POINTS)) ** 2).sum(axis=1))
 
-    (x, y), step = best.translation, 1e-6
+    step = 1e-6
     for other in (
         best._replace(rotation=best.rotation + 1e-3),
         best._replace(rotation=best.rotation - 1e-3),
-        best._replace(translation=(x + step, y)),
-        best._replace(translation=(x, y - step)),
+        best._replace(dx=best.dx + step),
+        best._replace(dy=best.dy - step),
     ):
         assert cost(other) > cost(best)
 

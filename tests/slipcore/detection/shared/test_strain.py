@@ -14,10 +14,8 @@ from slipcore.detection.shared.strain import (
     lattice_steps,
     literal_rate,
     principal_strains,
-    signed_rate,
-    surface_normal,
-    surface_strain,
 )
+from slipcore.detection.strain_rate.reference import signed_rate, surface_normal, surface_strain
 
 EPS = np.finfo(float).eps
 
