@@ -9,6 +9,7 @@ from scipy import special
 
 from estimators.defaults import IDENTIFIABILITY
 from estimators.errors import InvalidSamples
+from slipcore.references import ESTIMATION, LIKELIHOODS, cited
 from stiction_client.support import Kind, Support, extrapolation, support, widening
 
 FloatArray = NDArray[np.float64]
@@ -83,6 +84,12 @@ class FrictionModel:
     def standard_errors(self) -> FloatArray:
         """Standard errors of the coefficients, [3]."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """The papers behind the method and its likelihood."""
+        likelihood = str(self.diagnostics.get("likelihood", ""))
+        return cited(ESTIMATION.get(self.method, ()), LIKELIHOODS.get(likelihood, ()))
 
     def interval(self, level: float = IDENTIFIABILITY.interval) -> FloatArray:
         """Central interval of each coefficient at ``level``: [3, 2]; from the draws where there are any."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from slipcore.element_forces import stick_ratio
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.patch.record import Patch
+from slipcore.references import DETECTION, cited
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,6 +88,11 @@ class SlipHistory:
     method: str
     observed: BoolArray | None = None
     patches: tuple[Patch, ...] = ()
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """The papers behind the method; none of one that this package does not know."""
+        return cited(DETECTION.get(self.method, ()))
 
 
 def observed_over_time(slip_states: Sequence[SlipState]) -> BoolArray | None:

@@ -95,12 +95,11 @@ def test_imports_run_one_way(package: str) -> None:
         assert not extra, f"{path.relative_to(ROOT)} imports {sorted(extra)}"
 
 
-def test_estimators_know_of_slipcore_only_its_samples_compiler_and_options() -> None:
+def test_estimators_know_of_slipcore_only_its_samples_compiler_options_and_references() -> None:
+    known = tuple(f"slipcore.{name}" for name in ("samples", "compilation", "options", "references"))
     for path in sorted((ROOT / "estimators").rglob("*.py")):
         modules = {name for name in imported_modules(path) if name.split(".")[0] == "slipcore"}
-        assert all(
-            name.startswith(("slipcore.samples", "slipcore.compilation", "slipcore.options")) for name in modules
-        ), path
+        assert all(name.startswith(known) for name in modules), path
 
 
 def test_estimators_know_of_the_client_only_what_says_how_far_a_model_is_to_be_trusted() -> None:

@@ -10,6 +10,7 @@ from slipcore.contact.plan.plan import Effect, Plan, ramp
 from slipcore.contact.solver.problem import HeightField, Problem
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray, FrictionLaw
+from slipcore.references import EFFECTS, cited
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,3 +94,8 @@ class SceneDescription:
     def present(self) -> tuple[Effect, ...]:
         """The effects that have any strength."""
         return tuple(effect for effect in self.effects if not effect.absent)
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """The papers behind the effects that are present; none of an effect that this package does not know."""
+        return cited(*(EFFECTS.get(type(effect).__name__, ()) for effect in self.present()))
