@@ -87,8 +87,8 @@ class LayerDefaults(Options):
     """Coefficients of the polynomials that are left out, as a share of the largest."""
     cell_tolerance: Annotated[float, Option(1e-15, 1e-2, "-", "below the polynomials' error")] = 1e-12
     """Of Gauss quadrature over a cell, as a share of the function."""
-    chunk: Annotated[int, Option(1, 1024, "cells", "growing boxes find their kernels made")] = 32
-    """Kernels are made for multiples of so many cells a side, and cut to size."""
+    chunk: Annotated[int, Option(1, 1024, "cells", "growing boxes find their influence made")] = 32
+    """It is made for multiples of so many cells a side, and cut to size."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,12 +5,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from slipcore.contact.plan.plan import Plan
+from slipcore.contact.plan.plan import Observed
 from slipcore.frames import GraspLog
 
 
 @dataclass(frozen=True, slots=True)
-class GelDrift:
+class GelDrift(Observed):
     """Offset of all points that grows at ``velocity`` (x, y, z) m/s from the first frame on."""
 
     velocity: tuple[float, float, float]
@@ -23,10 +23,6 @@ class GelDrift:
     def absent(self) -> bool:
         """Whether nothing drifts."""
         return not any(self.velocity)
-
-    def extend(self, plan: Plan) -> Plan:
-        """Add an observation."""
-        return replace(plan, observations=(*plan.observations, self))
 
     def observe(self, log: GraspLog, rng: np.random.Generator) -> GraspLog:  # noqa: ARG002 - nothing random here
         """The log with the offset on its displacements."""

@@ -5,13 +5,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from slipcore.contact.plan.plan import Plan
+from slipcore.contact.plan.plan import Observed
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog, GroundTruth
 
 
 @dataclass(frozen=True, slots=True)
-class DroppedFrames:
+class DroppedFrames(Observed):
     """Each frame but the first and the last is lost with ``probability``."""
 
     probability: float
@@ -28,10 +28,6 @@ class DroppedFrames:
     def absent(self) -> bool:
         """Whether all frames arrive."""
         return self.probability == 0.0
-
-    def extend(self, plan: Plan) -> Plan:
-        """Add an observation."""
-        return replace(plan, observations=(*plan.observations, self))
 
     def observe(self, log: GraspLog, rng: np.random.Generator) -> GraspLog:
         """The log without the lost frames; a point that moved in a lost frame moved before the next one kept."""

@@ -15,7 +15,7 @@ class FiniteLayer:
     thickness: float
 
     why: ClassVar[str] = "the base stiffens a gel not thick against the contact, and pressing shears it at any ν"
-    cost: ClassVar[str] = "kernels, made once a grid; nothing a step"
+    cost: ClassVar[str] = "influence functions, made once a grid; nothing a step"
 
     def __post_init__(self) -> None:
         if not self.thickness > 0.0:

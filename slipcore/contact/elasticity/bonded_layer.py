@@ -2,7 +2,7 @@
 
 The layer's compliance less that of a half-space decays as (kh)² exp(−2kh) with the wave number, so its transform to
 space is smooth over the layer's thickness h: three radial functions, each an integral over wave numbers with a Bessel
-function, held as a polynomial in asinh(r/2h). The half-space itself keeps its own exact kernels, so a layer that is
+function, held as a polynomial in asinh(r/2h). The half-space itself keeps its own exact influence, so a layer that is
 thick against the contact meets it without any loss.
 """
 

@@ -28,7 +28,7 @@ class ElasticOperator:
     """Compliance of the bodies in contact on one box: pressure and traction [..., ny, nx] Pa to displacement m.
 
     Symbols are made when first used, so what is never asked for costs nothing. ``count`` may be shared by many boxes;
-    ``source``: an operator on a larger grid of the same pitch, whose kernels hold this one's.
+    ``source``: an operator on a larger grid of the same pitch, whose influences hold this one's.
     """
 
     __slots__ = (
@@ -157,7 +157,7 @@ class ElasticOperator:
 
 class Operators:
     """The compliance of the same bodies on boxes of any size; kept, because setting one up costs several
-    applications. Boxes within ``whole`` take their kernels from it.
+    applications. Boxes within ``whole`` take their influences from it.
     """
 
     __slots__ = ("_known", "_source", "bodies", "count")
@@ -177,7 +177,7 @@ class Operators:
         return self._known[key]
 
     def _holding(self, grid: Grid) -> ElasticOperator | None:
-        """The source of kernels, if the grid is a part of its."""
+        """The source of influences, if the grid is a part of its."""
         if self._source is None or self._source.grid.pitch != grid.pitch:
             return None
         fits = all(n <= most for n, most in zip(fast_lengths(grid.shape), self._source.grid.shape, strict=True))

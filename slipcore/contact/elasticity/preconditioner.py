@@ -12,24 +12,24 @@ from slipcore.frames import FloatArray
 
 
 def circulant_symbol(quadrant: FloatArray, odd: bool = False) -> FloatArray:
-    """Spectrum [ny, nx // 2 + 1] of the nearest circulant to a kernel given in its first quadrant.
+    """Spectrum [ny, nx // 2 + 1] of the nearest circulant to an influence given in its first quadrant.
 
-    ``odd``: the kernel is odd in both directions, not even.
+    ``odd``: the influence is odd in both directions, not even.
     """
     sign = -1.0 if odd else 1.0
     wrapped = _average(_average(quadrant, sign).T, sign).T
     return np.ascontiguousarray(np.fft.rfft2(wrapped).real)
 
 
-def _average(kernel: FloatArray, sign: float) -> FloatArray:
-    size = len(kernel)
+def _average(influence: FloatArray, sign: float) -> FloatArray:
+    size = len(influence)
     share = (np.arange(size) / size)[:, None]
-    mirrored = np.concatenate((np.zeros_like(kernel[:1]), kernel[:0:-1]))
-    return (1.0 - share) * kernel + sign * share * mirrored
+    mirrored = np.concatenate((np.zeros_like(influence[:1]), influence[:0:-1]))
+    return (1.0 - share) * influence + sign * share * mirrored
 
 
 class NormalInverse:
-    """Approximate pressure [ny, nx] that makes a normal displacement; the kernel ``nn`` reaches over a larger box."""
+    """Approximate pressure [ny, nx] that makes a normal displacement; the influence ``nn`` is of a larger box."""
 
     __slots__ = ("_inverse", "_transform")
 
@@ -46,7 +46,7 @@ class NormalInverse:
 
 
 class TangentialInverse:
-    """Approximate traction [2, ny, nx] that makes a tangential displacement [2, ny, nx]; kernels as above."""
+    """Approximate traction [2, ny, nx] that makes a tangential displacement [2, ny, nx]; influences as above."""
 
     __slots__ = ("_inverse", "_transform")
 

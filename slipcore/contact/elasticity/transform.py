@@ -58,7 +58,7 @@ class Transform:
         return rows[..., :nx].copy()
 
     def symbol(self, quadrant: FloatArray, odd_y: bool = False, odd_x: bool = False) -> FloatArray:
-        """Spectrum of a kernel given in its first quadrant: real, or its imaginary part if odd in one direction."""
+        """Spectrum of an influence given in its first quadrant: real, or its imaginary part if odd in one direction."""
         (ny, nx), (padded_y, padded_x) = self.shape, self.lengths
         whole = np.zeros(self.lengths)
         whole[:ny, :nx] = quadrant

@@ -1,6 +1,6 @@
 """What a scene comes to once all its effects have added their part: mechanics, loads over time, observation."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Protocol, Self, get_args
 
 import numpy as np
@@ -64,6 +64,16 @@ class ObservationEffect(Protocol):
 
     def observe(self, log: GraspLog, rng: np.random.Generator) -> GraspLog:
         """The log as seen through this."""
+
+
+class Observed:
+    """What every observation effect adds to the plan: itself."""
+
+    __slots__ = ()
+
+    def extend(self: ObservationEffect, plan: "Plan") -> "Plan":
+        """Add an observation."""
+        return replace(plan, observations=(*plan.observations, self))
 
 
 @dataclass(frozen=True, slots=True)
