@@ -1,0 +1,255 @@
+"""What half and one and a half of each default does: `python -m benchmarks.sensitivity [--page docs/sensitivity.md]`.
+
+Detectors: change of the mean F1 on scenes that no default was chosen on. Contact: change of the largest error against a
+fine solution, and of the operators' applications. Estimators: change of the error of friction at working points and of
+its interval's width, over simulated grasps. Each value is kept in its range.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, fields
+from functools import cache
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import estimators
+from benchmarks.detector_accuracy import FORCE_NOISE, INPUTS, score
+from benchmarks.detector_scenes import Case, cases, observed, phases, scoring, simulated
+from benchmarks.pages import options, picture_folder, save, write
+from benchmarks.scatter import TRUTH, Kind, grasp
+from estimators import defaults as of_estimators
+from slipcore import METHODS, FrictionSamples, GraspLog, detect_slip
+from slipcore.contact import defaults as of_contact
+from slipcore.contact.effects import FiniteLayer, LoadPath, NormalTangentialCoupling, SensorSampling, VelocityFriction
+from slipcore.contact.elasticity import bonded_layer
+from slipcore.contact.scene import Scene
+from slipcore.contact.tiers.accuracy import difference, simulate_to
+from slipcore.contact.tiers.boundary_elements import Fidelity, run
+from slipcore.errors import SlipcoreError
+from slipcore.options import Option, Options, describe_options
+
+MARKER_NOISE = 1e-6
+FACTORS = (0.5, 1.5)
+HELD_OUT = ("lift, hold, set down", "grip tightens", "soft fruit", "stage turns and slides", "slow gel, twisted")
+"""Of the scenes that detectors are only scored on: holds, a growing grip, motion, creep, an object that gives way."""
+DEAD = 1e-3
+"""Relative change below which a default has no effect to speak of."""
+SENSOR = SensorSampling((8, 8), 1.5e-3, 4.0)
+SCENES = {
+    "shear": Scene("shear", (SENSOR, LoadPath((1.0, 1.5, 2.0), force_x=(0.0, 3.2, -1.0)))),
+    "layer": Scene(
+        "layer", (SENSOR, FiniteLayer(5e-3), NormalTangentialCoupling(), LoadPath((1.0, 2.0), force_x=(0.0, 2.5)))
+    ),
+    "velocity": Scene("velocity", (SENSOR, VelocityFriction(5.0), LoadPath((1.0, 2.0), force_y=(0.0, 3.0)))),
+}
+FINE = Fidelity(64, 4, 1e-6)
+OF_SOLVER = ("FIDELITY", "LAYER", "INFLUENCE", "NORMAL", "TANGENTIAL", "LIMIT_SURFACE", "STEP", "PROBE")
+OF_REQUESTS = ("ACCURACY",)
+OF_FITS = ("AUTOMATIC", "CLUSTERS", "GRID", "LINEAR", "REFERENCE", "IDENTIFIABILITY", "PRIOR", "ROBUST")
+OF_SAMPLED = ("PRIOR", "PROPOSAL", "SAMPLING")
+KINDS = (Kind(), Kind(between_grasps=0.1, heavy=True), Kind(between_places=0.05, force_noise=5e-3))
+WORKING_POINTS = np.array([[1.0, v, f_n] for v in (5e-4, 4e-3) for f_n in (0.05, 0.2)])
+LIKELIHOODS = ("student_t", "outlier", "errors_in_variables")
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One default: ``changes`` of each measure at half of its value and at one and a half of it; or why none."""
+
+    table: str
+    name: str
+    default: float
+    unit: str
+    changes: dict[str, tuple[float, float]]
+    failed: str = ""
+
+    @property
+    def largest(self) -> float:
+        """Largest change of any measure."""
+        return max((abs(value) for pair in self.changes.values() for value in pair), default=float("nan"))
+
+
+def neighbours(value: float, option: Option) -> Iterator[float]:
+    """Half and one and a half of a value, in its range; a whole number moves by one at least."""
+    for factor in FACTORS:
+        moved: float = factor * value
+        if isinstance(value, int):
+            moved = min(round(moved), value - 1) if factor < 1.0 else max(round(moved), value + 1)
+        bounded = min(max(moved, option.low), option.high)
+        yield int(bounded) if isinstance(value, int) else bounded
+
+
+def rows(
+    label: str, kind: type[Options], measure: Callable[[str, float], Mapping[str, float]], start: Mapping[str, float]
+) -> Iterator[Row]:
+    """A row for each default of a table; ``measure`` takes a name and a value."""
+    for entry in fields(kind):
+        option, found, failed = describe_options(kind)[entry.name], [], ""
+        for value in neighbours(entry.default, option):
+            try:
+                found.append(measure(entry.name, value))
+            except (SlipcoreError, estimators.EstimatorError, estimators.NotConverged) as error:
+                failed = f"{value:g}: {type(error).__name__}"
+        changes = {key: tuple(each[key] - start[key] for each in found) for key in start} if len(found) == 2 else {}
+        yield Row(label, entry.name, entry.default, option.unit, changes, failed)
+
+
+@contextmanager
+def changed(table: Options, name: str, value: float) -> Iterator[None]:
+    """One entry of a table with another value; tables are frozen so that nothing but this changes them."""
+    before = getattr(table, name)
+    object.__setattr__(table, name, value)
+    try:
+        yield
+    finally:
+        object.__setattr__(table, name, before)
+        bonded_layer._influence.cache_clear()
+        bonded_layer.radial_functions.cache_clear()
+
+
+def of_detectors() -> list[Row]:
+    """Options of the two methods that are not there for comparison."""
+    held_out = [Case(each.name, log := simulated(each), phases(log)) for each in scoring() if each.name in HELD_OUT]
+    seen = [
+        (case, observed(case.log, MARKER_NOISE, FORCE_NOISE, inputs, seed=5))
+        for case in [*cases("reference"), *held_out]
+        for inputs in INPUTS
+    ]
+    found: list[Row] = []
+    for method in ("filter", "strain_rate"):
+        start = f1(seen, method)
+        found += rows(
+            method, METHODS[method].options, lambda name, value, m=method: f1(seen, m, **{name: value}), start
+        )
+    return found
+
+
+def f1(seen: list[tuple[Case, GraspLog]], method: str, **chosen: float) -> dict[str, float]:
+    """Mean F1 of a method with one option chosen."""
+    return {"F1": float(np.mean([score(case, log, detect_slip(log, method, **chosen)).f1 for case, log in seen]))}
+
+
+@cache
+def fine(name: str) -> GraspLog:
+    """A solution that others are compared with."""
+    return run(SCENES[name].plan(), FINE)
+
+
+def solved() -> dict[str, float]:
+    """Largest error over the scenes at the default fidelity, and applications of operators, in logarithms."""
+    chosen = of_contact.FIDELITY
+    fidelity = Fidelity(chosen.cells, chosen.substeps, chosen.tolerance)
+    return told({name: run(scene.plan(), fidelity) for name, scene in SCENES.items()})
+
+
+def asked() -> dict[str, float]:
+    """The same of a scene that asks for an accuracy."""
+    return told({"shear": simulate_to(SCENES["shear"].plan(), accuracy=0.1).log})
+
+
+def told(logs: Mapping[str, GraspLog]) -> dict[str, float]:
+    """Error and cost of some logs; changes of logarithms are relative."""
+    error = max(difference(log, fine(name)).largest for name, log in logs.items())
+    applications = sum(int(log.metadata["applications"]) for log in logs.values())
+    return {"error": float(np.log(error)), "applications": float(np.log(applications))}
+
+
+def of_solver() -> list[Row]:
+    """Numbers of the contact simulator; those that compiled loops hold fixed stay as they are."""
+    return of_tables(of_contact, OF_SOLVER, solved) + of_tables(of_contact, OF_REQUESTS, asked)
+
+
+def of_tables(module: object, names: tuple[str, ...], measure: Callable[[], dict[str, float]]) -> list[Row]:
+    """Rows of all entries of some tables."""
+    found: list[Row] = []
+    start = measure()
+    for label in names:
+        table = getattr(module, label)
+
+        def with_value(name: str, value: float, table: Options = table) -> dict[str, float]:
+            with changed(table, name, value):
+                return measure()
+
+        found += rows(label, type(table), with_value, start)
+    return found
+
+
+@cache
+def grasps() -> tuple[list[FrictionSamples], ...]:
+    """Two grasps of each kind."""
+    return tuple([grasp(kind, np.random.default_rng([seed, 3])) for seed in range(2)] for kind in KINDS)
+
+
+def fits() -> dict[str, float]:
+    """Of what needs no sampling."""
+    methods = ("ols", "robust", "auto")
+    return summary(estimators.fit(data, method=method, seed=1) for data in grasps() for method in methods)
+
+
+def sampled() -> dict[str, float]:
+    """Of likelihoods that are sampled, for one grasp."""
+    data = grasps()[-1][0]
+    return summary(estimators.fit(data, "bayes", likelihood=name, accuracy=0.2, seed=1) for name in LIKELIHOODS)
+
+
+def summary(models: Iterable[estimators.FrictionModel]) -> dict[str, float]:
+    """Error of friction and width of its interval at the working points, in logarithms of their means."""
+    errors, widths = [], []
+    for model in models:
+        errors.append(WORKING_POINTS @ (model.coefficients - TRUTH))
+        widths.append(np.sqrt(np.einsum("ki,ij,kj->k", WORKING_POINTS, model.covariance, WORKING_POINTS)))
+    return {"error": float(np.log(np.mean(np.square(errors))) / 2), "width": float(np.log(np.mean(widths)))}
+
+
+def of_fits() -> list[Row]:
+    """Numbers of the estimators."""
+    return of_tables(of_estimators, OF_FITS, fits) + of_tables(of_estimators, OF_SAMPLED, sampled)
+
+
+PARTS = {"detector": of_detectors, "contact": of_solver, "estimators": of_fits}
+
+
+def table_of(found: list[Row]) -> str:
+    """A Markdown table of what counts, the most sensitive first, and below it the names of the rest."""
+    measures = next((list(row.changes) for row in found if row.changes), [])
+    lines = [
+        "| of | default | value | " + " | ".join(f"{name}, half | {name}, one and a half" for name in measures) + " |",
+        "|---|---|---|" + "---|---|" * len(measures),
+    ]
+    ordered = sorted(found, key=lambda row: -np.nan_to_num(row.largest, nan=np.inf))
+    for row in (row for row in ordered if not row.largest < DEAD):
+        cells = [f"{value:+.3f}" for name in measures for value in row.changes.get(name, ())]
+        cells = cells or [row.failed] + [""] * (2 * len(measures) - 1)
+        lines.append(f"| {row.table} | `{row.name}` | {row.default:g} {row.unit} | " + " | ".join(cells) + " |")
+    quiet = [f"`{row.name}` of {row.table}" for row in found if row.largest < DEAD]
+    return "\n".join(lines) + (f"\n\nLess than {DEAD:g} by either: {', '.join(quiet)}." if quiet else "")
+
+
+def draw(found: list[Row]) -> Figure:
+    """The largest change of each default, on a logarithmic scale."""
+    known = sorted((row for row in found if row.changes), key=lambda row: row.largest)
+    figure = Figure(figsize=(7.0, max(2.0, 0.14 * len(known))), layout="constrained")
+    axes = figure.subplots()
+    size = [max(row.largest, 1e-6) for row in known]
+    axes.barh(range(len(known)), size, color=["#888" if value < DEAD else "#07a" for value in size])
+    axes.set_yticks(range(len(known)), [f"{row.table} {row.name}" for row in known], fontsize=5)
+    axes.set(xscale="log", xlabel="largest change by ±50 %")
+    return figure
+
+
+def main() -> None:
+    """Measure, write JSON, a picture and the page's tables."""
+    parser = options(__doc__)
+    parser.add_argument("--only", choices=tuple(PARTS), help="one part")
+    arguments = parser.parse_args()
+    for part in [arguments.only] if arguments.only else PARTS:
+        found = PARTS[part]()
+        save(draw(found), picture_folder(arguments) / f"sensitivity-{part}.png")
+        numbers = [asdict(row) for row in found]
+        write(numbers, {part: table_of(found)}, arguments, f"sensitivity-{part}.json")
+        print(table_of(found))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,55 @@
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+import pytest
+
+from benchmarks.sensitivity import Row, changed, neighbours, rows, table_of
+from slipcore.errors import InvalidInput
+from slipcore.options import Option, Options
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table(Options):
+    """A table to try with."""
+
+    share: Annotated[float, Option(0.0, 0.6, "-", "a test")] = 0.5
+    count: Annotated[int, Option(1, 9, "steps", "a test")] = 2
+
+
+def test_half_and_one_and_a_half_stay_in_the_range_and_whole() -> None:
+    assert list(neighbours(0.5, Option(0.0, 0.6, "-", ""))) == [0.25, 0.6]
+    assert list(neighbours(1, Option(1, 9, "-", ""))) == [1, 2]
+    assert list(neighbours(7, Option(1, 9, "-", ""))) == [4, 9]
+
+
+def test_a_changed_table_is_what_it_was_afterwards_even_by_way_of_an_error() -> None:
+    table = Table()
+    with pytest.raises(InvalidInput, match=r"0\.1"), changed(table, "share", 0.1):
+        raise InvalidInput("share", table.share, "0.5")
+    assert table == Table()
+
+
+def test_a_row_tells_each_change_or_what_failed() -> None:
+    def measure(name: str, value: float) -> dict[str, float]:
+        if name == "count":
+            raise InvalidInput("count", value, "2")
+        return {"F1": 2.0 * value}
+
+    share, count = rows("table", Table, measure, {"F1": 1.0})
+    assert share.changes == {"F1": (-0.5, pytest.approx(0.2))}
+    assert share.largest == 0.5
+    assert (count.changes, count.failed) == ({}, "3: InvalidInput")
+    assert math.isnan(count.largest)
+
+
+def test_the_most_sensitive_comes_first_after_what_fails_and_the_rest_below_the_table() -> None:
+    quiet, loud, small = (
+        Row("a", name, 1.0, "m", {"F1": (0.0, change)})
+        for name, change in (("quiet", 1e-4), ("loud", 0.3), ("small", 0.01))
+    )
+    broken = Row("a", "broken", 1.0, "m", {}, "0.5: NotConverged")
+    lines = table_of([quiet, small, broken, loud]).splitlines()
+    assert [line.split("`")[1] for line in lines[2:5]] == ["broken", "loud", "small"]
+    assert lines[3] == "| a | `loud` | 1 m | +0.000 | +0.300 |"
+    assert lines[-1] == "Less than 0.001 by either: `quiet` of a."
