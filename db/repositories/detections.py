@@ -76,6 +76,16 @@ def any_samples(session: Session, material_id: int) -> bool:
     return session.scalar(query) is not None
 
 
+def least_friction(session: Session, material_id: int) -> float | None:
+    """What friction is at least, by the loads that the contacts in a material's logs bore; None where none tells."""
+    query = (
+        select(DetectionRow.contact_friction)
+        .join(GraspLogRow, GraspLogRow.id == DetectionRow.grasp_log_id)
+        .where(GraspLogRow.material_id == material_id, GraspLogRow.withdrawn_at.is_(None))
+    )
+    return max((float(found["low"]) for found in session.scalars(query) if found is not None), default=None)
+
+
 def _that_count(material_id: int) -> tuple[ColumnElement[bool], ...]:
     return (
         GraspLogRow.material_id == material_id,

@@ -15,7 +15,7 @@ from sqlalchemy.orm import Session
 from db.database import Database
 from db.errors import NotFound, StorageUnavailable
 from db.records import Job, StoredModel
-from db.repositories import friction_models, materials
+from db.repositories import detections, friction_models, materials
 from service.domain.errors import NoModel
 from service.domain.recommended import AUTO, disagreeing, recommended
 from service.domain.stored_results import to_friction_model
@@ -183,7 +183,18 @@ def _current(session: Session, material: str, method: str) -> tuple[StoredModel,
         found = recommended(models)
         if found is not None:
             return found.stored, found.because, models
-    raise NoModel(f"material {material!r} has no model fitted by {method!r} yet", method)
+    raise NoModel(f"material {material!r} has no model fitted by {method!r} yet{_bound(session, material_id)}", method)
+
+
+def _bound(session: Session, material_id: int) -> str:
+    """What a planner can rely on without a model, if anything."""
+    least = detections.least_friction(session, material_id)
+    if least is None or least <= 0.0:
+        return ""
+    return (
+        f"; by the loads that its contacts bore friction is at least {least:.2g}, so that a normal force of "
+        f"{1.0 / least:.2g} times the tangential load holds"
+    )
 
 
 def _tag(stored: StoredModel, disagreement: str | None) -> str:

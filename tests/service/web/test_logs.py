@@ -38,6 +38,9 @@ def test_a_log_that_went_all_the_way_has_a_player_with_frames(
     again = client.get(player["data-frames"], headers={"if-none-match": answer.headers["etag"]})
     assert again.status_code == 304
     assert "done" in page.text
+    contact = fitted["detection"]["contact_friction"]
+    assert "Friction of the whole contact" in page.text
+    assert contact["reason"] in page.text
 
 
 @ON_SQLITE

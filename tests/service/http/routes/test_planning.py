@@ -1,10 +1,14 @@
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 
+from slipcore import GraspLog
 from stiction_client import FrictionClient, grasp, required_normal_force
+from stiction_client.container import encode
 
 Wait = Callable[[httpx.Client, str], dict[str, Any]]
 LOAD = {"material": "fitted", "tangential_load": 0.5, "contact_area": 1e-4}
@@ -39,6 +43,24 @@ def test_the_grasp_force_is_the_planners_own(
     assert (named["method"], named["chosen_because"]) == ("ols", None)
     assert (told["of"], told["elements"]) == (expected.of, expected.elements)
     assert told["friction_coefficient"] == pytest.approx(expected.friction_coefficient)
+
+
+def test_without_a_model_a_planner_is_told_what_the_load_of_a_held_contact_says(
+    client: httpx.Client, ramp: GraspLog, upload: Callable[..., httpx.Response], wait: Wait
+) -> None:
+    """A contact that was pressed and pulled at so little that nothing slipped."""
+    assert ramp.force is not None
+    pulled = ramp.force + 0.25 * np.abs(ramp.force[..., 2:]) * np.array([1.0, 0.0, 0.0]) - ramp.force * [1.0, 1.0, 0.0]
+    still = replace(ramp, force=pulled, displacement=ramp.displacement * [0.0, 0.0, 1.0], object_pose=None, truth=None)
+    client.post("/v1/materials", json={"name": "held"}).raise_for_status()
+    accepted = upload(client, encode(still), material="held")
+    job = wait(client, accepted.json()["job"]["id"])
+    assert job["status"] == "refused"
+    assert "friction is at least 0.2" in job["reason"]
+    answer = client.post("/v1/grasp-force", json=LOAD | {"material": "held"})
+    assert (answer.status_code, answer.json()["type"]) == (409, "/problems/no-model")
+    assert "friction is at least 0.2" in answer.json()["detail"]
+    assert "times the tangential load holds" in answer.json()["detail"]
 
 
 def test_a_load_that_no_force_holds_is_refused_with_the_most_that_is_held(client: httpx.Client) -> None:
