@@ -10,48 +10,12 @@ from scipy import special
 from estimators.defaults import IDENTIFIABILITY
 from estimators.errors import InvalidSamples
 from slipcore.references import ESTIMATION, LIKELIHOODS, cited
+from stiction_client.model import Cost, Domain, Scale, Scales
 from stiction_client.support import Kind, Support, extrapolation, support, widening
 
+__all__ = ["Cost", "Domain", "FrictionModel", "Scale", "Scales"]
+
 FloatArray = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class Domain:
-    """Range of the data behind a model: tangential velocity, m/s, and normal force of an element, N."""
-
-    tangential_velocity: tuple[float, float]
-    normal_force: tuple[float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Scale:
-    """A standard deviation as data tell it: ``value`` times a Student-t on ``degrees_of_freedom`` is what it draws."""
-
-    value: float
-    degrees_of_freedom: float
-
-    def quantile(self, level: float) -> float:
-        """Quantile of one draw."""
-        return float(self.value * special.stdtrit(self.degrees_of_freedom, level))
-
-
-@dataclass(frozen=True, slots=True)
-class Scales:
-    """How friction scatters: ``between_grasps`` τ, as a part of friction itself; ``between_places`` ω of a grasp and
-    ``within`` a place σ, as friction [-].
-    """
-
-    between_grasps: Scale
-    between_places: Scale
-    within: Scale
-
-
-@dataclass(frozen=True, slots=True)
-class Cost:
-    """What a fit cost: ``seconds``, and the Monte-Carlo error it left, in posterior standard deviations (0: exact)."""
-
-    seconds: float
-    monte_carlo_error: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,7 +3,7 @@
 import io
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -170,33 +170,20 @@ def to_friction_model(stored: NewModel) -> "FrictionModel":
 
 
 def to_client_model(stored: StoredModel) -> "stiction_client.FrictionModel":
-    """A stored model as planners have it, who get it as the service's answer."""
+    """A stored model as planners have it, who get it as the service's answer: the numbers of the fit, and whose it is.
+
+    What the diagnostics could not say in JSON stays None.
+    """
     model = to_friction_model(stored.model)
+    fitted = {each.name: getattr(model, each.name) for each in fields(model) if each.name != "draws"}
     return stiction_client.FrictionModel(
+        **fitted | {"diagnostics": stored.model.diagnostics},
         material=stored.material,
-        method=model.method,
         version=stored.version,
-        coefficients=model.coefficients,
-        covariance=model.covariance,
-        scale=model.scale,
-        n=model.n,
-        degrees_of_freedom=model.degrees_of_freedom,
-        scatter_degrees_of_freedom=model.scatter_degrees_of_freedom,
-        domain=stiction_client.Domain(model.domain.tangential_velocity, model.domain.normal_force),
-        identifiable=model.identifiable,
-        element_area=model.element_area,
-        cost=stiction_client.Cost(model.cost.seconds, model.cost.monte_carlo_error),
         current=stored.current,
-        diagnostics=stored.model.diagnostics,
-        created_at=stored.created_at.isoformat(),
-        scales=None if model.scales is None else _client_scales(model.scales),
         outdated=stored.outdated,
+        created_at=stored.created_at.isoformat(),
     )
-
-
-def _client_scales(scales: "estimators.Scales") -> "stiction_client.Scales":
-    each = (scales.between_grasps, scales.between_places, scales.within)
-    return stiction_client.Scales(*(stiction_client.Scale(scale.value, scale.degrees_of_freedom) for scale in each))
 
 
 def _stored_scales(scales: "estimators.Scales") -> Scales:

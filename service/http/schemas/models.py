@@ -1,6 +1,5 @@
 """Friction models, and the fits and look-ups that are asked of them."""
 
-from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated, Literal, Self
 
@@ -117,29 +116,8 @@ class FrictionModelOut(BaseModel):
     @classmethod
     def of(cls, stored: StoredModel) -> "FrictionModelOut":
         """The stored model as an answer, with what it rests on at rest and in the middle of its normal forces."""
-        model, told = stored.model, to_client_model(stored)
-        return cls(
-            material=stored.material,
-            method=model.method,
-            version=stored.version,
-            current=stored.current,
-            outdated=stored.outdated,
-            coefficients=list(model.coefficients),
-            covariance=[list(line) for line in model.covariance],
-            scale=model.scale,
-            n=model.n,
-            degrees_of_freedom=model.degrees_of_freedom,
-            scatter_degrees_of_freedom=model.scatter_degrees_of_freedom,
-            domain=DomainOut(tangential_velocity=model.tangential_velocity, normal_force=model.normal_force),
-            identifiable=list(model.identifiable),
-            element_area=model.element_area,
-            diagnostics=dict(model.diagnostics),
-            cost=CostOut(seconds=model.cost_seconds, monte_carlo_error=model.monte_carlo_error),
-            created_at=stored.created_at,
-            scales=None if model.scales is None else ScalesOut.model_validate(asdict(model.scales)),
-            support=told.support,
-            advice=told.advice,
-        )
+        model = to_client_model(stored)
+        return cls.model_validate({**model.to_json(), "support": model.support, "advice": model.advice})
 
 
 class FrictionModelsOut(BaseModel):
