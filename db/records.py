@@ -12,6 +12,7 @@ AuditAction = Literal[
     "material.created",
     "material.changed",
     "material.merged",
+    "material.surface_changed",
     "alias.added",
     "alias.removed",
     "owner.added",

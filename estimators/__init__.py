@@ -8,6 +8,7 @@ from estimators.errors import EstimatorError, InvalidSamples, TooFewSamples
 from estimators.warm_up import warm_up
 
 if TYPE_CHECKING:
+    from estimators.change_alarm import ChangeAlarm
     from estimators.fitting import fit, needs_samples
     from estimators.friction_model import Cost, Domain, FrictionModel, Scale, Scales
     from estimators.moments import Moments
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from estimators.recognition import recognise
 
 _LAZY = {
+    "ChangeAlarm": "estimators.change_alarm",
     "fit": "estimators.fitting",
     "needs_samples": "estimators.fitting",
     "Cost": "estimators.friction_model",
@@ -33,6 +35,7 @@ _LAZY = {
 __version__ = version("stiction")
 
 __all__ = [
+    "ChangeAlarm",
     "ChangeDetector",
     "Cost",
     "Domain",

@@ -63,7 +63,9 @@ class Model(Protocol):
 
     @property
     def diagnostics(self) -> Mapping[str, Any]:
-        """``doubtful_logs``, where there is one: which findings speak against its logs."""
+        """``doubtful_logs``, where there is one: which findings speak against its logs; ``surface_change``: by how much
+        the newest of them differ from those before.
+        """
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +91,9 @@ def support(model: Model, tangential_velocity: float, normal_force: float, stale
     doubt = _implausible(model)
     if doubt is not None:
         return Support("implausible", doubt)
+    changed = model.diagnostics.get("surface_change")
+    if changed:
+        return Support("stale", f"{changed}: clean the surface; if it stays so, withdraw the logs before")
     if stale is not None:
         return Support("stale", f"the model is outdated: {stale}")
     kind = kinds(model, tangential_velocity, normal_force)
@@ -108,7 +113,7 @@ def kinds(
     v, f_n = np.broadcast_arrays(np.asarray(tangential_velocity, float), np.asarray(normal_force, float))
     if _implausible(model) is not None:
         return np.full(v.shape, "implausible")
-    if stale is not None:
+    if stale is not None or model.diagnostics.get("surface_change"):
         return np.full(v.shape, "stale")
     unknown = ~(uncertainty(model, *within(model.domain, v, f_n)) <= UNCERTAIN) | ~model.identifiable.any()
     (low, high), fastest = model.domain.normal_force, model.domain.tangential_velocity[1]

@@ -19,7 +19,7 @@ import slipcore
 from db.blobs import BlobStore, disk_errors_named
 from db.database import Database
 from db.records import Claim, Job, SamplesOfLog, SampleSummary
-from db.repositories import detections, friction_models, grasp_logs, jobs, materials
+from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials
 from estimators import EstimatorError, FrictionModel, Moments
 from service import formats
 from service.domain.doubtful_logs import with_doubts
@@ -32,6 +32,7 @@ from service.domain.stored_results import (
     summarise_samples,
     to_new_model,
 )
+from service.domain.surface_change import MARK, with_change
 from service.observability import logs, traces
 from slipcore import Collected, ContactFriction, FrictionSamples, GraspLog, SlipcoreError, SlipHistory
 
@@ -205,9 +206,9 @@ def _fit(run: Run, parts: Sequence[SamplesOfLog]) -> list[FrictionModel]:
     """The models of the job's methods."""
     if not parts:
         raise Refused("no grasp log of this material has friction samples yet")
-    if run.job.kind == "ingest":
-        return _all_that_fit(run, parts)
-    return [_fit_by(run, parts, run.job.method, len(parts))]
+    ingested = run.job.kind == "ingest"
+    models = _all_that_fit(run, parts) if ingested else [_fit_by(run, parts, run.job.method, len(parts))]
+    return with_change(models, [_moments(run, part) for part in parts])
 
 
 def _all_that_fit(run: Run, parts: Sequence[SamplesOfLog]) -> list[FrictionModel]:
@@ -259,7 +260,18 @@ def _store_models(run: Run, session: Session, material_id: int, models: Sequence
         jobs.start_stage(
             session, run.claim, "material", run.seconds
         )  # before the models, of which a job may have one a method
+        _note_change(run, session, material_id, models[0])
         versions = [friction_models.add(session, material_id, run.job.id, to_new_model(model)) for model in models]
         if run.job.kind == "ingest":
             queue_cheap_refits(session, material_id, run.job.requested_by)
     jobs.finish(session, run.claim, "done", model_version=versions[0], seconds=run.seconds)
+
+
+def _note_change(run: Run, session: Session, material_id: int, model: FrictionModel) -> None:
+    """Record in the audit trail that the surface has changed, where the models before did not say so."""
+    if MARK not in model.diagnostics:
+        return
+    before = friction_models.all_current(session, [material_id]).get(material_id, [])
+    if not any(MARK in stored.model.diagnostics for stored in before):
+        told = {"change": model.diagnostics[MARK], "grasp_log": run.job.grasp_log_id}
+        audit.add(session, audit.SERVICE, "material.surface_changed", str(run.job.material), told)

@@ -39,6 +39,7 @@ def test_each_kind_of_support_and_what_to_do(make_model: Make) -> None:
         (replace(known, outdated=True), 0.0, 0.1): ("stale", "ask for a fit"),
         (replace(known, current=False), 0.0, 0.1): ("stale", "fetch the current model"),
         (make_model((0.4, 0.0, -1.5), EXACT), 0.0, 0.1): ("implausible", "comes out at -0.05, at 1e-05 m/s and 0.3 N"),
+        (replace(known, diagnostics={"surface_change": "friction is lower"}), 0.0, 0.1): ("stale", "clean the surface"),
         (replace(known, diagnostics={"doubtful_logs": "1 of 4 logs is doubtful"}), 0.0, 0.1): (
             "implausible",
             "1 of 4 logs is doubtful: mend",

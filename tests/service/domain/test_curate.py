@@ -1,5 +1,6 @@
 from collections.abc import Callable
 from contextlib import closing
+from dataclasses import replace
 from threading import Thread
 from typing import Any
 
@@ -10,8 +11,9 @@ import slipcore
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import NotFound
-from db.records import Claim, Job, NewGraspLog
-from db.repositories import grasp_logs, jobs, materials, runners
+from db.paging import Window
+from db.records import AuditFilter, Claim, Job, NewGraspLog
+from db.repositories import audit, grasp_logs, jobs, materials, runners
 from service.domain import curate
 from service.domain.context import Context
 from service.domain.errors import DomainError, InvalidValue, NoModel
@@ -168,6 +170,25 @@ def test_a_log_that_is_withdrawn_before_its_samples_are_stored_outdates_no_model
     shop.work()
     assert shop.model("paper", "robust") == before
     assert [job.method for job in curate.restore(shop.context, log_id)[1]] == ["hierarchical", "ols", "robust"]
+
+
+def test_a_surface_that_changed_is_marked_on_its_models_and_recorded_once(
+    shop: Shop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def marked(models: list[Any], logs: list[Any]) -> list[Any]:
+        assert len(logs) == len(seen)
+        return [replace(model, diagnostics={**model.diagnostics, "surface_change": "lower"}) for model in models]
+
+    seen = [shop.ingest("paper", 0)]
+    assert shop.friction("paper").support != "stale"
+    monkeypatch.setattr(pipeline, "with_change", marked)
+    for number in (1, 2):
+        seen.append("")
+        shop.ingest("paper", number)
+    assert shop.friction("paper").advice.startswith("lower: clean the surface")
+    with shop.database.read() as session:
+        found = audit.list_all(session, Window("id"), AuditFilter(action="material.surface_changed"))
+    assert [(entry.subject, entry.details["change"]) for entry in found] == [("paper", "lower")]
 
 
 def test_a_doubtful_log_makes_friction_implausible_until_it_is_withdrawn(

@@ -1,0 +1,142 @@
+"""Whether a material's surface has changed: new grasps beside those before, looked at after each of them.
+
+The friction of a grasp as a part of what the law expects scatters about one level with τ between grasps and the error
+of its own samples. For each grasp after which it may have changed, the evidence is the probability of all levels with a
+shift from there on, over that with none; level, shift and τ are integrated out. Were nothing changed, each would be a
+martingale of mean 1 from its start, and their sum over all starts grows by 1 a grasp: it reaches 1/``rate`` no sooner
+than after 1/``rate`` grasps on average, however often one looks (Shiryaev–Roberts; Shin, Ramdas & Rinaldo, 2024,
+"E-detectors", New England Journal of Statistics in Data Science 2:229).
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from estimators.defaults import PRIOR
+from estimators.errors import InvalidSamples
+from estimators.friction_model import FrictionModel
+from estimators.linear.grasp_statistics import GraspStatistics
+from estimators.linear.priors import log_half_student
+
+FloatArray = NDArray[np.float64]
+
+TAUS = np.geomspace(1e-3, 1.0, 40)
+"""Scatter between grasps, as a part of friction, over which is summed."""
+
+LONGEST = 1000
+"""Grasps that are looked at: those before say no more of τ, and a change so long ago is the material."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeAlarm:
+    """Grasps so far: ``levels`` of their friction, as parts of what the law expects, and their ``variances``.
+
+    ``rate``: at most so many false alarms a grasp, on average; ``shift``: standard deviation of a change of friction,
+    up or down, as a part of it; ``reference``: grasps before which none can have happened.
+    """
+
+    rate: float = 1e-3
+    shift: float = 0.2
+    reference: int = 3
+    levels: tuple[float, ...] = ()
+    variances: tuple[float, ...] = ()
+
+    @classmethod
+    def init(cls, rate: float = 1e-3, shift: float = 0.2, reference: int = 3) -> "ChangeAlarm":
+        """An alarm that has seen no grasp; raises ``InvalidSamples`` for settings that cannot be."""
+        for name, value, right, allowed in (
+            ("rate", rate, 0.0 < rate < 1.0, "above 0 and below 1"),
+            ("shift", shift, 0.0 < shift < math.inf, "above 0"),
+            ("reference", reference, reference >= 1, "at least 1"),
+        ):
+            if not right:
+                raise InvalidSamples(name, value, allowed)
+        return cls(rate, shift, reference)
+
+    def step(self, level: float, variance: float) -> "ChangeAlarm":
+        """The alarm after one more grasp; see ``grasp_level``."""
+        if not (math.isfinite(level) and 0.0 <= variance < math.inf):
+            raise InvalidSamples("level and variance", (level, variance), "finite, the variance at least 0")
+        levels, variances = (*self.levels, level), (*self.variances, variance)
+        return replace(self, levels=levels[-LONGEST:], variances=variances[-LONGEST:])
+
+    @property
+    def e_values(self) -> FloatArray:
+        """Evidence [grasps] that friction has changed just before each grasp; 0 for those of the ``reference``."""
+        count = len(self.levels)
+        if count <= self.reference:
+            return np.zeros(count)
+        log = _log_evidence(np.array(self.levels), np.array(self.variances), self.shift)
+        log[: self.reference] = -np.inf
+        return np.exp(np.minimum(log, 700.0))
+
+    @property
+    def e_detector(self) -> float:
+        """Their sum; were nothing changed, the number of grasps after the reference is its mean."""
+        return float(self.e_values.sum())
+
+    @property
+    def changed(self) -> bool:
+        """Whether the sum has reached 1/``rate``."""
+        return self.e_detector >= 1.0 / self.rate
+
+    @property
+    def since(self) -> int | None:
+        """Index of the first grasp of the changed surface, the likeliest; None while there is no alarm."""
+        return int(np.argmax(self.e_values)) if self.changed else None
+
+    @property
+    def change(self) -> float:
+        """By what part friction differs since then, on average; 0 while there is no alarm."""
+        if self.since is None:
+            return 0.0
+        before, after = np.mean(self.levels[: self.since]), np.mean(self.levels[self.since :])
+        return float(after / before - 1.0) if before else 0.0
+
+
+def grasp_level(model: FrictionModel, grasp: GraspStatistics) -> tuple[float, float]:
+    """Friction of a grasp as a part of what the ``model`` expects of its places, and the variance of that part.
+
+    Places are weighted by the scatter between and within them; the law's own error is all grasps' alike.
+    """
+    places, within = model.scale, 0.0
+    if model.scales is not None:
+        places, within = model.scales.between_places.value, model.scales.within.value
+    least = (1e-9 * max(float(np.abs(grasp.mean[:, 2]).max()), 1e-9)) ** 2  # without scatter all count alike
+    weight = grasp.count / (places**2 + within**2 / grasp.weight + least)
+    expected = model.coefficients[0] + grasp.mean[:, :2] @ model.coefficients[1:]
+    information = float(weight @ expected**2)
+    if not information > 0.0:
+        raise InvalidSamples("friction expected of a grasp", 0.0, "not 0 at all of its places")
+    return float(weight @ (expected * grasp.mean[:, 2])) / information, 1.0 / information
+
+
+def watched(model: FrictionModel, grasps: Sequence[GraspStatistics], rate: float = 1e-3) -> ChangeAlarm:
+    """The alarm after these grasps, oldest first."""
+    alarm = ChangeAlarm.init(rate)
+    told = [grasp_level(model, grasp) for grasp in grasps[-LONGEST:]]
+    return replace(alarm, levels=tuple(level for level, _ in told), variances=tuple(error for _, error in told))
+
+
+def _log_evidence(level: FloatArray, variance: FloatArray, shift: float) -> FloatArray:
+    """Log of p(levels | shifted from grasp j on) over p(levels | not), for each j [n].
+
+    Given τ all is Gaussian: with w = 1/(τ² + s²), flat level m and δ ~ N(0, shift²), sums of w, wy, wy² tell it.
+    """
+    centred = level - level.mean()
+    weight = 1.0 / (TAUS[:, None] ** 2 + variance)
+    whole = [(weight * power).sum(axis=1)[:, None] for power in (np.ones_like(centred), centred, centred**2)]
+    later = [np.cumsum((weight * power)[:, ::-1], axis=1)[:, ::-1] for power in (np.ones_like(centred), centred)]
+    unchanged = 0.5 * (np.log(weight).sum(axis=1)[:, None] - np.log(whole[0]) - whole[2] + whole[1] ** 2 / whole[0])
+    # δ given τ: what is left of the later grasps' deviation once the common level is taken away
+    information = later[0] * (1.0 - later[0] / whole[0])
+    deviation = later[1] - later[0] * whole[1] / whole[0]
+    precision = information + shift**-2
+    gain = 0.5 * (deviation**2 / precision - np.log(precision * shift**2))
+    prior = log_half_student(TAUS, PRIOR.grasp_scatter, PRIOR.grasp_degrees_of_freedom) + np.log(TAUS)
+    null = prior[:, None] + unchanged
+    return np.asarray(special.logsumexp(null + gain, axis=0) - special.logsumexp(null))

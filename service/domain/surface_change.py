@@ -1,0 +1,33 @@
+"""Whether a material's surface has changed, by the logs that its models are fitted to."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from estimators import FrictionModel, Moments
+from estimators.change_alarm import ChangeAlarm, watched
+
+MARK = "surface_change"
+"""Diagnostic of a model in whose data the surface has changed."""
+
+
+def with_change(models: Sequence[FrictionModel], logs: Sequence[Moments]) -> list[FrictionModel]:
+    """The models, marked where friction of the newest ``logs``, oldest first, is another than of those before.
+
+    The first of the models that tells scatter between grasps apart is the law; without such a model nothing is marked.
+    """
+    law = next((model for model in models if model.scales is not None), None)
+    if law is None:
+        return list(models)
+    alarm = watched(law, [grasp for log in logs for grasp in log.at_element_area(law.element_area).grasps])
+    if not alarm.changed:
+        return list(models)
+    told = _told(alarm)
+    return [replace(model, diagnostics={**model.diagnostics, MARK: told}) for model in models]
+
+
+def _told(alarm: ChangeAlarm) -> str:
+    before = alarm.since or 0
+    after = len(alarm.levels) - before
+    way = "lower" if alarm.change < 0.0 else "higher"
+    newest = "the newest grasp" if after == 1 else f"the newest {after} grasps"
+    return f"friction of {newest} is {abs(alarm.change):.0%} {way} than of the {before} before"

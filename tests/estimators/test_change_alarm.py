@@ -1,0 +1,112 @@
+"""The surface-change alarm: its evidence against numerical integration, its rate and its delay."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import estimators
+from estimators import ChangeAlarm, InvalidSamples, Moments
+from estimators.change_alarm import TAUS, grasp_level, watched
+from estimators.defaults import PRIOR
+from slipcore.samples import FrictionSamples
+
+
+def alarm_of(levels: list[float], variance: float = 1e-4) -> ChangeAlarm:
+    alarm = ChangeAlarm.init()
+    for level in levels:
+        alarm = alarm.step(level, variance)
+    return alarm
+
+
+def test_evidence_is_the_ratio_of_two_integrals() -> None:
+    """Level, shift and τ by quadrature in place of closed forms."""
+    levels, shift, variance, start = np.array([1.02, 0.97, 1.01, 0.83, 0.86]), 0.2, 1e-4, 3
+    side = np.linspace(-0.6, 0.6, 801)
+    m, delta = np.meshgrid(0.95 + side, side)
+    cell = (side[1] - side[0]) ** 2
+
+    def given(tau: float) -> tuple[float, float]:
+        deviation = math.sqrt(tau**2 + variance)
+        log = [stats.norm.logpdf(levels, m[..., None] + moved, deviation).sum(axis=-1) for moved in (0.0, later)]
+        density = stats.norm.pdf(delta, 0.0, shift) * cell
+        return float((np.exp(log[0]) * density).sum()), float((np.exp(log[1]) * density).sum())
+
+    later = delta[..., None] * (np.arange(len(levels)) >= start)
+    prior = stats.t.pdf(TAUS / PRIOR.grasp_scatter, PRIOR.grasp_degrees_of_freedom) * TAUS
+    null, moved = prior @ np.array([given(tau) for tau in TAUS])
+    assert alarm_of(levels.tolist(), variance).e_values[start] == pytest.approx(moved / null, rel=0.01)
+
+
+def test_a_surface_that_stays_as_it_is_raises_an_alarm_in_a_thousand_grasps_at_most() -> None:
+    alarms, grasps = 0, 0
+    for seed in range(40):
+        rng, alarm = np.random.default_rng(seed), ChangeAlarm.init()
+        for level in 1.0 + 0.07 * rng.standard_normal(100):
+            alarm, grasps = alarm.step(float(level), 1e-4), grasps + 1
+            if alarm.changed:
+                alarms, alarm = alarms + 1, ChangeAlarm.init()
+    assert alarms <= stats.poisson.ppf(0.999, 1e-3 * grasps)
+
+
+def test_friction_that_falls_by_a_fifth_is_found_within_five_grasps() -> None:
+    found, since = [], []
+    for seed in range(20):
+        levels = 1.0 + 0.05 * np.random.default_rng(seed).standard_normal(35)
+        levels[30:] *= 0.8
+        alarm = alarm_of(levels.tolist())
+        found.append(alarm.changed)
+        if alarm.changed:
+            assert alarm.since is not None
+            since.append(alarm.since)
+            assert alarm.change == pytest.approx(-0.2, abs=0.1)
+    assert np.mean(found) >= 0.95
+    assert abs(np.median(since) - 30) <= 1
+
+
+def test_few_grasps_tell_of_no_change() -> None:
+    for levels in ([], [1.0], [1.0, 0.2], [1.0, 1.0, 0.5]):
+        alarm = alarm_of(levels)
+        assert (alarm.changed, alarm.since, alarm.change, alarm.e_detector) == (False, None, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_the_unit_of_force_does_not_matter(factor: float) -> None:
+    model, grasps = fitted(1.0)
+    other, scaled = fitted(factor)
+    for one, same in zip(grasps, scaled, strict=True):
+        np.testing.assert_allclose(grasp_level(other, same), grasp_level(model, one), rtol=1e-6)
+
+
+def fitted(factor: float) -> tuple[estimators.FrictionModel, tuple]:
+    """Eight grasps whose friction differs, the last by a third, with forces times a factor."""
+    rng, parts = np.random.default_rng(3), []
+    for scale in [1.0] * 7 + [0.67]:
+        v, f_n = rng.uniform(1e-4, 4e-3, 200), rng.uniform(0.05, 0.2, 200)
+        mu = scale * (0.45 + 8.0 * v - 0.8 * f_n) + 0.02 * rng.standard_normal(200)
+        element, one = np.arange(200) % 20, np.ones(200)
+        parts.append(FrictionSamples(mu, v, f_n * factor, mu * f_n * factor, v, element, one, 1e-6 * factor))
+    moments = [Moments.from_samples(part) for part in parts]
+    return estimators.fit(moments, method="hierarchical"), moments[0].merge(*moments[1:]).grasps
+
+
+def test_the_level_of_a_grasp_is_its_part_of_the_law() -> None:
+    model, grasps = fitted(1.0)
+    levels = [grasp_level(model, grasp)[0] for grasp in grasps]
+    assert levels[-1] / np.mean(levels[:-1]) == pytest.approx(0.67, abs=0.02)
+    alarm = watched(model, grasps)
+    assert alarm.levels == tuple(levels)
+    assert alarm.e_values.argmax() == 7
+
+
+@pytest.mark.parametrize(("level", "variance"), [(math.nan, 0.0), (1.0, -1.0), (1.0, math.inf)])
+def test_a_level_that_is_no_number_is_refused(level: float, variance: float) -> None:
+    with pytest.raises(InvalidSamples, match="level and variance"):
+        ChangeAlarm.init().step(level, variance)
+
+
+@pytest.mark.parametrize("settings", [{"rate": 0.0}, {"shift": 0.0}, {"reference": 0}])
+def test_settings_that_cannot_be_are_refused(settings: dict[str, float]) -> None:
+    with pytest.raises(InvalidSamples, match=next(iter(settings))):
+        ChangeAlarm.init(**settings)
