@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from estimators.change_alarm import ChangeAlarm
     from estimators.fitting import fit, needs_samples
     from estimators.friction_model import Cost, Domain, FrictionModel, Scale, Scales
+    from estimators.grasp_design import NextGrasp, Probing, WorkingPoint, next_grasp
     from estimators.moments import Moments
     from estimators.not_converged import NotConverged
     from estimators.online import ChangeDetector
@@ -26,6 +27,10 @@ _LAZY = {
     "Scale": "estimators.friction_model",
     "Scales": "estimators.friction_model",
     "Moments": "estimators.moments",
+    "NextGrasp": "estimators.grasp_design",
+    "Probing": "estimators.grasp_design",
+    "WorkingPoint": "estimators.grasp_design",
+    "next_grasp": "estimators.grasp_design",
     "NotConverged": "estimators.not_converged",
     "ChangeDetector": "estimators.online",
     "recognise": "estimators.recognition",
@@ -43,12 +48,16 @@ __all__ = [
     "FrictionModel",
     "InvalidSamples",
     "Moments",
+    "NextGrasp",
     "NotConverged",
+    "Probing",
     "Scale",
     "Scales",
     "TooFewSamples",
+    "WorkingPoint",
     "fit",
     "needs_samples",
+    "next_grasp",
     "recognise",
     "warm_up",
 ]

@@ -61,6 +61,7 @@ if TYPE_CHECKING:
         GraspLogReceipt,
         Job,
         Material,
+        NextGrasp,
         Recognition,
     )
 
@@ -110,6 +111,7 @@ _LAZY = {
     "GraspLogReceipt": "stiction_client.records",
     "Job": "stiction_client.records",
     "Material": "stiction_client.records",
+    "NextGrasp": "stiction_client.records",
     "Recognition": "stiction_client.records",
 }
 """Names whose modules load httpx or numpy: a program pays for what it uses."""
@@ -145,6 +147,7 @@ __all__ = [
     "JobTimedOut",
     "Material",
     "MujocoPair",
+    "NextGrasp",
     "NoFeasibleForce",
     "NoModel",
     "Observation",

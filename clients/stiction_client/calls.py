@@ -30,7 +30,7 @@ from stiction_client.errors import (
     UnexpectedAnswer,
 )
 from stiction_client.model import FrictionModel
-from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt, Job, Material, Recognition
+from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt, Job, Material, NextGrasp, Recognition
 
 ATTEMPTS = 3
 """Times that a request is tried before a broken connection, or a service that is busy, is an error."""
@@ -257,6 +257,12 @@ def friction(
     params = _given(v=tangential_velocity, fn=normal_force, quantile=quantile, method=method, of=of, elements=elements)
     answer = yield from _get(f"/v1/materials/{_part(name)}/friction", params)
     return _record(FrictionAnswer.from_json, answer)
+
+
+def next_grasp(name: str, working_point: Mapping[str, float | str | None]) -> Call[NextGrasp]:
+    """Ask what to record next."""
+    answer = yield from _get(f"/v1/materials/{_part(name)}/next-grasp", _given(**working_point))
+    return _record(NextGrasp.from_json, answer)
 
 
 def recognise(grasp: Any, materials: Sequence[str] | None, method: str) -> Call[Recognition]:

@@ -15,7 +15,7 @@ from stiction_client.calls import Call, Ended, Pause, Reply, Request, T
 from stiction_client.container import GraspLogLike
 from stiction_client.errors import ConnectionFailed
 from stiction_client.model import FrictionModel
-from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt, Job, Material, Recognition
+from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt, Job, Material, NextGrasp, Recognition
 
 DEFAULT_URL = "http://127.0.0.1:8000"
 
@@ -146,6 +146,27 @@ class FrictionClient:
         these are given).
         """
         return self._run(calls.friction(name, v, fn, quantile, method, of, elements))
+
+    def next_grasp(
+        self,
+        name: str,
+        fn: float | None = None,
+        v: float = 0.0,
+        quantile: float = 1e-2,
+        elements: int = 60,
+        *,
+        method: str | None = None,
+        load: float = 0.0,
+        drop_probability: float = 1e-3,
+    ) -> NextGrasp:
+        """What to record next, to know friction at ``fn`` N an element and ``v`` m/s best per second of robot time.
+
+        Without ``fn`` in the middle of the data; ``quantile`` and ``elements`` as a planner asks for them. The contact
+        bears ``load`` N meanwhile, which it drops with at most ``drop_probability``.
+        """
+        asked = {"fn": fn, "v": v, "quantile": quantile, "elements": elements, "method": method}
+        bounds = {"load": load, "drop_probability": drop_probability}
+        return self._run(calls.next_grasp(name, asked | bounds))
 
     def recognise(self, grasp: Any, materials: Sequence[str] | None = None, method: str = "ols") -> Recognition:
         """Which material a grasp was of: a stored log (its receipt or id), or friction samples as slipcore gives them.
@@ -306,6 +327,23 @@ class AsyncFrictionClient:
     ) -> FrictionAnswer:
         """As ``FrictionClient.friction``."""
         return await self._run(calls.friction(name, v, fn, quantile, method, of, elements))
+
+    async def next_grasp(
+        self,
+        name: str,
+        fn: float | None = None,
+        v: float = 0.0,
+        quantile: float = 1e-2,
+        elements: int = 60,
+        *,
+        method: str | None = None,
+        load: float = 0.0,
+        drop_probability: float = 1e-3,
+    ) -> NextGrasp:
+        """As ``FrictionClient.next_grasp``."""
+        asked = {"fn": fn, "v": v, "quantile": quantile, "elements": elements, "method": method}
+        bounds = {"load": load, "drop_probability": drop_probability}
+        return await self._run(calls.next_grasp(name, asked | bounds))
 
     async def recognise(self, grasp: Any, materials: Sequence[str] | None = None, method: str = "ols") -> Recognition:
         """As ``FrictionClient.recognise``."""

@@ -194,6 +194,35 @@ class FrictionAnswer:
 
 
 @dataclass(frozen=True, slots=True)
+class NextGrasp:
+    """The grasp of a material to record next: mean ``normal_force`` of an element N, ``slip_length`` m, ``speed`` m/s
+    and ``direction`` rad of the slip; ``seconds`` that it takes.
+
+    ``uncertainty``: half-width of the 95 % interval of the friction expected at the working point, and as it is
+    expected ``after``; ``conservative_friction``, ``support`` and ``advice`` of what is known there now.
+    """
+
+    material: str
+    method: str
+    version: int
+    normal_force: float
+    slip_length: float
+    speed: float
+    direction: float
+    seconds: float
+    uncertainty: float
+    after: float
+    conservative_friction: float
+    support: str
+    advice: str
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "NextGrasp":
+        """The grasp in the service's answer."""
+        return cls(**_values(cls, record))
+
+
+@dataclass(frozen=True, slots=True)
 class Recognition:
     """How probable it is that a grasp was of each material, the likeliest first; ``unknown``: of none of them.
 

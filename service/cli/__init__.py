@@ -51,6 +51,7 @@ for command in (
     audit.audit,
 ):
     app.command()(command)
+app.command("next")(remote.next_grasp)
 app.add_typer(materials.app, name="materials")
 app.add_typer(logs.app, name="logs")
 app.add_typer(jobs.app, name="jobs")

@@ -19,7 +19,7 @@ from service.cli.progress import counted
 from service.formatting import at_least, number
 
 if TYPE_CHECKING:
-    from stiction_client import FrictionAnswer, FrictionClient, FrictionModel, RequiredForce
+    from stiction_client import FrictionAnswer, FrictionClient, FrictionModel, NextGrasp, RequiredForce
 
 Url = Annotated[str, typer.Option("--url", envvar="STICTION_URL", help="Address of the service.")]
 Key = Annotated[str | None, typer.Option("--key", envvar="STICTION_KEY", help="Access key, where the service asks.")]
@@ -115,6 +115,41 @@ def lookup(
         print_lines(f"Friction of {material}", _friction_lines(answer))
 
 
+def next_grasp(
+    material: MaterialName,
+    normal_force: Annotated[
+        float | None,
+        typer.Option(help="Where friction is to be known: N an element; by default the middle of the data."),
+    ] = None,
+    velocity: Velocity = 0.0,
+    quantile: Annotated[float, typer.Option(help="Quantile of friction that the planner asks for.")] = 1e-2,
+    elements: Annotated[int, typer.Option(min=1, help="Elements of the planner's contact.")] = 60,
+    load: Annotated[float, typer.Option(help="Load that the contact bears while it is probed, N.")] = 0.0,
+    drop_probability: Annotated[float, typer.Option(help="With which it may drop that load.")] = 1e-3,
+    method: Method = "auto",
+    url: Url = DEFAULT_URL,
+    key: Key = None,
+    json: Json = False,
+) -> None:
+    """Say which grasp to record next, to know friction best per second of robot time."""
+
+    with connected(url, key) as client:
+        told = client.next_grasp(
+            material,
+            normal_force,
+            velocity,
+            quantile,
+            elements,
+            method=method,
+            load=load,
+            drop_probability=drop_probability,
+        )
+    if json:
+        print_json(asdict(told))
+    else:
+        print_lines(f"Record next of {material}", _probe_lines(told))
+
+
 def plan(
     material: MaterialName,
     load: Annotated[float, typer.Option(help="Tangential load that the finger must hold, N.")],
@@ -208,6 +243,18 @@ def _friction_lines(answer: "FrictionAnswer") -> list[tuple[str, str | None]]:
         ("model", f"{answer.method}, version {answer.version}"),
         ("because", answer.chosen_because),
         ("warning", answer.warning),
+        ("support", answer.support and f"{answer.support}: {answer.advice}"),
+    ]
+
+
+def _probe_lines(told: "NextGrasp") -> list[tuple[str, str | None]]:
+    slip = f"{number(told.slip_length)} m at {number(told.speed)} m/s, towards {number(told.direction)} rad"
+    return [
+        ("press with", f"{number(told.normal_force)} N an element"),
+        ("slip by", slip),
+        ("takes", f"{number(told.seconds)} s"),
+        ("known to", f"± {number(told.uncertainty)} now, ± {number(told.after)} after that"),
+        ("support", f"{told.support}: {told.advice}"),
     ]
 
 
@@ -222,4 +269,5 @@ def _grip_lines(grip: "RequiredForce", model: "FrictionModel") -> list[tuple[str
         ("μ", f"{number(grip.friction_coefficient)}, so low in {whose} at {number(grip.element_force)} N an element"),
         ("model", f"{model.method}, version {model.version}"),
         ("warning", grip.warning),
+        ("support", f"{grip.support}: {grip.advice}"),
     ]

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from db.records import Material, StoredModel
 from service.domain.recommended import disagreeing, recommended
+from service.domain.record_next import RecordNext, record_next
 from service.domain.stored_results import to_friction_model
 from service.web.charts import Chart, Curve, draw
 from stiction_client.support import OUTDATED, Support
@@ -71,6 +72,13 @@ def friction_at(
     low, high = (float(model.predict(v, f_n, quantile=level)) for level in LEVELS)
     support = model.support_at(v, f_n, OUTDATED if stored.outdated else None)
     return Friction(v, f_n, float(model.predict(v, f_n)), (low, high), support, disagreeing(stored, others))
+
+
+def next_of(stored: StoredModel, at: Friction) -> RecordNext | None:
+    """What to record next to know friction ``at`` its working point; None without a normal force."""
+    if not at.normal_force > 0.0:
+        return None
+    return record_next(stored, at.normal_force, at.tangential_velocity)
 
 
 @dataclass(frozen=True, slots=True)

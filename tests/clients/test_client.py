@@ -116,6 +116,30 @@ def test_friction_is_looked_up_with_what_was_given(ask: Ask, service: Service, a
     assert dict(server.requests[1].url.params) == {"v": "0.001", "fn": "0.05", "method": "bayes"}
 
 
+def test_what_to_record_next_is_asked_for(ask: Ask, service: Service) -> None:
+    told = {
+        "material": "paper",
+        "method": "hierarchical",
+        "version": 3,
+        "normal_force": 0.05,
+        "slip_length": 1e-3,
+        "speed": 2e-3,
+        "direction": 0.9,
+        "seconds": 4.5,
+        "uncertainty": 0.06,
+        "after": 0.04,
+        "conservative_friction": 0.31,
+        "support": "not identified",
+        "advice": "record more grasps",
+    }
+    server = service(told)
+    answer = ask(server, "next_grasp", "paper", 0.05, load=1.0)
+    assert server.requests[0].url.path == "/v1/materials/paper/next-grasp"
+    asked = {"fn": "0.05", "v": "0.0", "quantile": "0.01", "elements": "60", "load": "1.0", "drop_probability": "0.001"}
+    assert dict(server.requests[0].url.params) == asked
+    assert (answer.normal_force, answer.after, answer.support) == (0.05, 0.04, "not identified")
+
+
 def test_a_material_is_created(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
     server = service(httpx.Response(201, json=answers.material))
     assert ask(server, "create_material", "paper", description="80 g/m²").description == "80 g/m²"

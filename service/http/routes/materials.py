@@ -1,5 +1,6 @@
 """Materials, their models and their friction."""
 
+from dataclasses import asdict
 from typing import Annotated, Literal
 from urllib.parse import quote
 
@@ -10,6 +11,7 @@ from estimators.method_names import ModelMethod
 from service.domain import curate
 from service.domain.fit import request_fit
 from service.domain.look_up import Question, look_up
+from service.domain.record_next import record_next
 from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.bodies import JsonRoute
 from service.http.conditional import NOT_MODIFIED, conditional, tagged
@@ -31,7 +33,15 @@ from service.http.problems import (
 )
 from service.http.schemas.jobs import JobOut
 from service.http.schemas.materials import MaterialOut, MaterialsOut, NewMaterial
-from service.http.schemas.models import FrictionModelOut, FrictionModelsOut, FrictionOut, LookUpQuery, NewFit
+from service.http.schemas.models import (
+    FrictionModelOut,
+    FrictionModelsOut,
+    FrictionOut,
+    LookUpQuery,
+    NewFit,
+    NextGraspOut,
+    NextGraspQuery,
+)
 
 router = APIRouter(prefix="/v1/materials", tags=["materials"], route_class=JsonRoute)
 
@@ -119,6 +129,20 @@ async def read_friction(
     known = await context.models.get(context.database, name, asked.method)
     question = Question(asked.v, asked.fn, asked.quantile, *asked.averaged())
     return conditional(request, known.tag, lambda: FrictionOut.json_of(look_up(known, question)))
+
+
+@router.get(
+    "/{name}/next-grasp",
+    dependencies=[READ],
+    summary="Ask what to record next",
+    responses=problems(UNKNOWN_MATERIAL, NO_MODEL, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+)
+def read_next_grasp(context: CurrentContext, name: str, asked: Annotated[NextGraspQuery, Query()]) -> NextGraspOut:
+    """The grasp that most narrows friction at the planner's working point, per second of robot time."""
+    known = context.models.read(context.database, name, asked.method)
+    force = asked.fn or 0.5 * sum(known.stored.model.normal_force)
+    at = (force, asked.v, asked.quantile, asked.elements)
+    return NextGraspOut.model_validate(asdict(record_next(known.stored, *at, asked.load, asked.drop_probability)))
 
 
 @router.post(

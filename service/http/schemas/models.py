@@ -167,6 +167,60 @@ class LookUpQuery(BaseModel):
         return "contact", self.elements
 
 
+class NextGraspQuery(BaseModel):
+    """Where friction is to be known, and what a probe bears: the parameters of the address."""
+
+    fn: Annotated[Force | None, Field(gt=0.0, description="N on an element; without, the middle of the data")] = None
+    v: Annotated[Velocity, Field(description="Tangential velocity, m/s")] = 0.0
+    quantile: Annotated[float, Field(ge=SMALLEST_TAIL, lt=0.5, description="Of friction that a planner asks for")] = (
+        1e-2
+    )
+    elements: Annotated[int, Field(ge=1, le=10**9, description="Elements of the planner's contact")] = 60
+    method: Annotated[FitMethod, Field(description="Whose current model answers; `auto`: the recommended one")] = "auto"
+    load: Annotated[float, Field(ge=0.0, le=1e6, description="N that the contact bears while it is probed")] = 0.0
+    drop_probability: Annotated[float, Field(ge=1e-12, le=0.5, description="With which it may drop that load")] = 1e-3
+
+
+class NextGraspOut(BaseModel):
+    """The grasp to record next."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "material": "paper",
+                    "method": "hierarchical",
+                    "version": 3,
+                    "normal_force": 0.05,
+                    "slip_length": 0.001,
+                    "speed": 0.002,
+                    "direction": 0.92,
+                    "seconds": 4.5,
+                    "uncertainty": 0.061,
+                    "after": 0.043,
+                    "conservative_friction": 0.31,
+                    "support": "not identified",
+                    "advice": "the expected friction is known to within ± 15% only: record more grasps",
+                }
+            ]
+        }
+    )
+
+    material: str
+    method: str
+    version: int
+    normal_force: Annotated[float, Field(description="Mean of the contact's elements, N")]
+    slip_length: Annotated[float, Field(description="m")]
+    speed: Annotated[float, Field(description="Of the slip, m/s")]
+    direction: Annotated[float, Field(description="Of the slip, rad; directions are spread evenly")]
+    seconds: Annotated[float, Field(description="That the grasp takes")]
+    uncertainty: Annotated[float, Field(description="Half-width of the 95 % interval of the expected friction now")]
+    after: Annotated[float, Field(description="The same as it is expected after the grasp")]
+    conservative_friction: Annotated[float, Field(description="The quantile at the working point now")]
+    support: SupportKind
+    advice: Advice
+
+
 class FrictionOut(BaseModel):
     """Friction coefficient of a material at a tangential velocity and an element's normal force."""
 

@@ -18,7 +18,7 @@ from service.http.paging import CursorText, Page
 from service.http.schemas.common import Force, Velocity
 from service.http.schemas.materials import NewMaterial
 from service.web.forms import EMPTY_IS_NONE, FormRoute, checked
-from service.web.friction import coefficients, friction_at, listed, sections, usual_model
+from service.web.friction import coefficients, friction_at, listed, next_of, sections, usual_model
 from service.web.rendering import render
 
 router = APIRouter(include_in_schema=False, route_class=FormRoute)
@@ -90,6 +90,7 @@ def show_material(
         stored=stored,
         friction=shown,
         coefficients=[] if stored is None else coefficients(stored),
+        next_grasp=None if stored is None or shown is None else next_of(stored, shown),
         charts=[] if stored is None or shown is None else sections(stored, shown),
         asked={"fn": fn, "v": v, "method": method},
         versions=versions,

@@ -113,6 +113,21 @@ def test_the_friction_of_a_fitted_material_is_its_truth(client: httpx.Client) ->
 
 
 @pytest.mark.usefixtures("fitted")
+def test_what_to_record_next_is_told(client: httpx.Client) -> None:
+    told = client.get("/v1/materials/fitted/next-grasp", params={"fn": 0.3, "quantile": 1e-3}).json()
+    assert (told["material"], told["method"], told["support"]) == ("fitted", "hierarchical", "not identified")
+    assert 0.0 < told["after"] < told["uncertainty"]
+    assert told["normal_force"] > 0.0
+    at = {"fn": 0.3, "quantile": 1e-3, "elements": 60}
+    assert (
+        told["conservative_friction"]
+        == client.get("/v1/materials/fitted/friction", params=at).json()["friction_coefficient"]
+    )
+    too_much = client.get("/v1/materials/fitted/next-grasp", params={"load": 1e5})
+    assert (too_much.status_code, too_much.json()["name"]) == (422, "load")
+
+
+@pytest.mark.usefixtures("fitted")
 def test_a_low_quantile_lies_below_the_mean_and_a_high_one_above(client: httpx.Client) -> None:
     answers = [
         client.get("/v1/materials/fitted/friction", params={"v": 1e-4, "fn": 0.1, "quantile": quantile}).json()

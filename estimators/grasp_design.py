@@ -1,0 +1,198 @@
+"""What to record next: the grasp that most narrows what a planner is told, per second of robot time.
+
+A c-optimal design, one grasp ahead (Elfving, 1952; Chaloner & Verdinelli, 1995, Statistical Science 10:273): of all
+grasps that a robot can make, the one after which the friction at the planner's working point is known best.
+"""
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from estimators.errors import InvalidSamples
+from estimators.friction_model import FrictionModel, Scales
+
+FloatArray = NDArray[np.float64]
+
+GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
+"""rad; directions that far apart fill the circle evenly, however many there are."""
+
+NODES, WEIGHTS = np.array([-1.0, 0.0, 1.0]), np.array([1.0, 2.0, 1.0]) / 4.0
+"""Of a grasp's places about their mean, in standard deviations over √2."""
+
+
+FORCES = 25
+"""Normal forces that are tried, at equal ratios: 8 % apart where the greatest is six times the least."""
+
+
+@dataclass(frozen=True, slots=True)
+class WorkingPoint:
+    """What a planner asks of friction: the ``quantile`` of a contact of so many ``elements`` at an element's normal
+    force (N) and a tangential velocity (m/s), 0 for a grasp that holds.
+    """
+
+    normal_force: float
+    tangential_velocity: float = 0.0
+    quantile: float = 1e-2
+    elements: int = 60
+
+    def __post_init__(self) -> None:
+        for name, value, allowed in (
+            ("normal_force", 0.0 < self.normal_force < math.inf, "N an element, above 0"),
+            ("tangential_velocity", 0.0 <= self.tangential_velocity < math.inf, "m/s, at least 0"),
+            ("quantile", 0.0 < self.quantile < 0.5, "above 0 and below 0.5"),
+            ("elements", self.elements >= 1, "at least 1"),
+        ):
+            if not value:
+                raise InvalidSamples(name, getattr(self, name), allowed)
+
+
+@dataclass(frozen=True, slots=True)
+class Probing:
+    """What the robot can do, and what a probe is like.
+
+    ``normal_force`` N: least and greatest mean of a contact's elements; ``speed`` m/s and ``length`` m of the slip that
+    may be chosen; ``seconds`` for a grasp beside its slip; ``frame_rate`` 1/s of the sensor; ``load`` N that the
+    contact bears meanwhile, which it drops with at most ``drop_probability``; parts of a probe: ``slipping`` of the
+    contact's elements, whose normal forces and velocities have the standard deviations ``force_spread`` and
+    ``velocity_spread``, in parts of their means.
+    """
+
+    normal_force: tuple[float, float] | None = None
+    speed: tuple[float, ...] = (5e-4, 1e-3, 2e-3, 4e-3)
+    length: tuple[float, ...] = (5e-4, 1e-3, 2e-3)
+    seconds: float = 4.0
+    frame_rate: float = 30.0
+    load: float = 0.0
+    drop_probability: float = 1e-3
+    slipping: float = 0.5
+    force_spread: float = 0.3
+    velocity_spread: float = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class NextGrasp:
+    """The grasp to record: mean ``normal_force`` of an element N, ``slip_length`` m, ``speed`` m/s and ``direction``
+    rad of the slip; ``seconds`` that it takes.
+
+    ``uncertainty``: half-width of the 95 % interval of the friction expected at the working point, now and as it is
+    expected ``after``; ``conservative_friction`` there now.
+    """
+
+    normal_force: float
+    slip_length: float
+    speed: float
+    direction: float
+    seconds: float
+    uncertainty: float
+    after: float
+    conservative_friction: float
+
+
+def next_grasp(
+    model: FrictionModel, working_point: WorkingPoint, probing: Probing | None = None, grasps: int = 0
+) -> NextGrasp:
+    """The grasp that most narrows friction at the working point per second of robot time.
+
+    ``grasps`` made so far choose its direction, of which the law knows nothing: directions are spread evenly. Raises
+    ``InvalidSamples`` where no grasp that the robot can make bears its load.
+    """
+    probing = probing or Probing()
+    point = np.array([1.0, working_point.tangential_velocity, working_point.normal_force])
+    variance = float(point @ model.covariance @ point)
+    designs = [
+        Design(force, speed, length, working_point.elements, probing)
+        for force in _forces(model, working_point, probing)
+        for speed, length in itertools.product(probing.speed, probing.length)
+    ]
+    if not designs:
+        allowed = f"what friction holds, but for {probing.drop_probability:g} of the grasps: lay it on a table"
+        raise InvalidSamples("load", probing.load, allowed)
+    after = [
+        max(float(point @ updated(model.covariance, design.information(model)) @ point), 0.0) for design in designs
+    ]
+    seconds = np.array([design.seconds for design in designs])
+    best = int(np.argmax((math.sqrt(variance) - np.sqrt(after)) / seconds))
+    score = float(special.stdtrit(model.degrees_of_freedom, 0.975))
+    told = model.predict(point[1], point[2], working_point.quantile, "contact", working_point.elements)
+    return NextGrasp(
+        normal_force=designs[best].normal_force,
+        slip_length=designs[best].length,
+        speed=designs[best].speed,
+        direction=grasps * GOLDEN_ANGLE % (2.0 * math.pi),
+        seconds=designs[best].seconds,
+        uncertainty=score * math.sqrt(variance),
+        after=score * math.sqrt(after[best]),
+        conservative_friction=float(told),
+    )
+
+
+def updated(covariance: FloatArray, information: FloatArray) -> FloatArray:
+    """Covariance [3, 3] of β after data of the ``information`` [3, 3], (Σ⁻¹ + M)⁻¹; also where Σ is singular."""
+    return np.asarray(np.linalg.solve(np.eye(3) + covariance @ information, covariance))
+
+
+@dataclass(frozen=True, slots=True)
+class Design:
+    """A grasp that could be made: mean ``normal_force`` of an element (N), ``speed`` m/s and ``length`` m of its slip,
+    of which the contact has so many ``elements``.
+    """
+
+    normal_force: float
+    speed: float
+    length: float
+    elements: int
+    probing: Probing
+
+    @property
+    def seconds(self) -> float:
+        """Robot time."""
+        return self.probing.seconds + self.length / self.speed
+
+    def places(self) -> tuple[FloatArray, FloatArray]:
+        """x = (1, v, f_n) [9, 3] of the grasp's places, at half of the speed on average, and the number of each [9]."""
+        v = 0.5 * self.speed * (1.0 + math.sqrt(2.0) * self.probing.velocity_spread * NODES)
+        f_n = self.normal_force * (1.0 + math.sqrt(2.0) * self.probing.force_spread * NODES)
+        grid = np.array([[1.0, *pair] for pair in itertools.product(np.maximum(v, 0.0), f_n)])
+        return grid, max(self.probing.slipping * self.elements, 1.0) * np.outer(WEIGHTS, WEIGHTS).ravel()
+
+    def information(self, model: FrictionModel) -> FloatArray:
+        """What the grasp would tell of β [3, 3]: that of its places, less what is told along β by how grasps differ.
+
+        With A = Σ x xᵀ/d over its places and scatter τ of the whole law, M = A − A b bᵀ A τ²/(1 + τ² bᵀ A b), b = β
+        (Sherman & Morrison), as in the fit.
+        """
+        between, places, within = scatter(model)
+        x, count = self.places()
+        frames = max(self.probing.frame_rate * self.length / self.speed, 1.0)
+        whole = (x.T * (count / (places**2 + within**2 / frames))) @ x
+        along = whole @ model.coefficients
+        shared = between**2 / (1.0 + between**2 * float(model.coefficients @ along))
+        return np.asarray(whole - shared * np.outer(along, along))
+
+
+def scatter(model: FrictionModel) -> tuple[float, float, float]:
+    """τ, ω and σ of the model; all scatter as that of whole grasps where its method does not tell them apart."""
+    least = 1e-6 * max(abs(float(model.coefficients[0])), 1e-6)  # scatter of 0 would make one grasp tell all
+    if model.scales is None:
+        middle = [1.0, *(0.5 * sum(ends) for ends in (model.domain.tangential_velocity, model.domain.normal_force))]
+        friction = abs(float(np.dot(middle, model.coefficients)))
+        return model.scale / max(friction, least), 0.0, max(model.scale, least)
+    told: Scales = model.scales
+    return told.between_grasps.value, told.between_places.value, max(told.within.value, least)
+
+
+def _forces(model: FrictionModel, working_point: WorkingPoint, probing: Probing) -> list[float]:
+    """Mean normal forces of an element, N, at which a grasp bears the load."""
+    low, high = probing.normal_force or (
+        min(0.5 * model.domain.normal_force[0], working_point.normal_force),
+        max(2.0 * model.domain.normal_force[1], working_point.normal_force),
+    )
+    if not 0.0 < low <= high < math.inf:
+        raise InvalidSamples("normal_force", (low, high), "N an element, above 0, the least first")
+    forces = np.append(np.geomspace(low, high, FORCES), np.clip(working_point.normal_force, low, high))
+    held = model.predict(0.0, forces, probing.drop_probability, "contact", working_point.elements)
+    return [float(force) for force in forces[held * forces * working_point.elements >= probing.load]]

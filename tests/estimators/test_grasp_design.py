@@ -1,0 +1,129 @@
+"""What to record next: closed forms of the design, and what it chooses."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimators import Cost, Domain, FrictionModel, InvalidSamples, Probing, Scale, Scales, WorkingPoint, next_grasp
+from estimators.grasp_design import GOLDEN_ANGLE, Design, updated
+
+POINT = WorkingPoint(0.1)
+
+
+def model(covariance: np.ndarray | None = None, scales: Scales | None = None) -> FrictionModel:
+    return FrictionModel(
+        method="hierarchical",
+        coefficients=np.array([0.45, 8.0, -0.8]),
+        covariance=np.diag([4e-4, 4.0, 0.04]) if covariance is None else covariance,
+        scale=0.05,
+        n=1000,
+        degrees_of_freedom=8.0,
+        scatter_degrees_of_freedom=100.0,
+        domain=Domain((2e-4, 4e-3), (0.05, 0.2)),
+        identifiable=np.ones(3, dtype=bool),
+        element_area=1e-6,
+        cost=Cost(0.0),
+        scales=scales or Scales(Scale(0.05, 8.0), Scale(0.02, 50.0), Scale(0.03, 900.0)),
+    )
+
+
+def test_information_is_that_of_the_grasps_covariance() -> None:
+    """XᵀV⁻¹X with V written out: one row a place, its variance on the diagonal and τ² (Xβ)(Xβ)ᵀ in common."""
+    known, probing = model(), Probing(slipping=1.0)
+    design = Design(0.1, 2e-3, 1e-3, 16, probing)
+    x, count = design.places()
+    rows = np.repeat(x, count.astype(int), axis=0)
+    assert len(rows) == 16
+    law = rows @ known.coefficients
+    frames = 30.0 * 0.5
+    covariance = (0.02**2 + 0.03**2 / frames) * np.eye(16) + 0.05**2 * np.outer(law, law)
+    expected = rows.T @ np.linalg.solve(covariance, rows)
+    np.testing.assert_allclose(design.information(known), expected, rtol=1e-10)
+
+
+def test_an_update_is_bayes_rule_also_where_nothing_is_uncertain() -> None:
+    covariance, information = model().covariance, np.diag([1e3, 1e-2, 10.0])
+    np.testing.assert_allclose(
+        updated(covariance, information), np.linalg.inv(np.linalg.inv(covariance) + information), rtol=1e-12
+    )
+    assert (updated(np.zeros((3, 3)), information) == 0.0).all()
+
+
+def test_a_slope_is_asked_for_far_out_and_a_level_where_it_is_needed() -> None:
+    """Elfving: a line through a known point is told best far out; where nothing is known, at the point itself."""
+    slope, level = np.diag([1e-8, 1e-8, 0.25]), np.diag([1.0, 1e-8, 4.0])
+    for force in (0.03, 0.35):
+        assert next_grasp(model(slope), WorkingPoint(force)).normal_force >= 0.35
+        assert next_grasp(model(level), WorkingPoint(force)).normal_force == pytest.approx(force, rel=0.3)
+
+
+def test_a_quick_grasp_is_worth_more_where_slip_tells_nothing_of_it() -> None:
+    """Without scatter within and between places all slips tell the same: the shortest is taken."""
+    scales = Scales(Scale(0.05, 8.0), Scale(0.0, 50.0), Scale(1e-6, 900.0))
+    found = next_grasp(model(np.diag([1e-3, 0.0, 0.0]), scales), POINT)
+    assert (found.slip_length, found.speed) == (5e-4, 4e-3)
+    assert found.seconds == pytest.approx(4.0 + 0.125)
+
+
+def test_a_load_asks_for_forces_that_hold_it_and_one_too_great_is_refused() -> None:
+    known = model()
+    probing = Probing(load=1.0)
+    found = next_grasp(known, WorkingPoint(0.05), probing)
+    held = float(known.predict(0.0, found.normal_force, 1e-3, "contact", 60)) * found.normal_force * 60
+    assert held >= 1.0
+    with pytest.raises(InvalidSamples, match="load is 1000000"):
+        next_grasp(known, POINT, replace(probing, load=1e6))
+
+
+def test_directions_are_spread_over_the_circle() -> None:
+    found = np.sort([next_grasp(model(), POINT, grasps=count).direction for count in range(8)])
+    gaps = np.diff([*found, found[0] + 2.0 * math.pi])
+    assert gaps.max() < 2.7 * gaps.min()
+    assert next_grasp(model(), POINT, grasps=1).direction == pytest.approx(GOLDEN_ANGLE)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1e6])
+def test_the_choice_does_not_depend_on_the_unit_of_force(unit: float) -> None:
+    known, scaling = model(), np.array([1.0, 1.0, 1.0 / unit])
+    same = replace(
+        known,
+        coefficients=known.coefficients * scaling,
+        covariance=known.covariance * np.outer(scaling, scaling),
+        domain=Domain((2e-4, 4e-3), (0.05 * unit, 0.2 * unit)),
+    )
+    found, expected = next_grasp(same, WorkingPoint(0.1 * unit)), next_grasp(known, POINT)
+    assert found.normal_force == pytest.approx(expected.normal_force * unit)
+    assert (found.speed, found.slip_length) == (expected.speed, expected.slip_length)
+    assert found.after == pytest.approx(expected.after)
+
+
+@pytest.mark.parametrize(
+    "known",
+    [
+        model(np.zeros((3, 3))),
+        model(scales=Scales(Scale(0.0, 8.0), Scale(0.0, 8.0), Scale(0.0, 8.0))),
+        replace(model(), coefficients=np.zeros(3)),
+        replace(model(), scales=None),
+        replace(model(), domain=Domain((1e-3, 1e-3), (0.1, 0.1))),
+    ],
+    ids=["all known", "no scatter", "no friction", "no scales", "one point"],
+)
+def test_hard_cases_have_an_answer(known: FrictionModel) -> None:
+    found = next_grasp(known, POINT)
+    assert 0.0 <= found.after <= found.uncertainty * (1.0 + 1e-12)
+    assert found.normal_force > 0.0
+
+
+@pytest.mark.parametrize(
+    "changes", [{"normal_force": 0.0}, {"tangential_velocity": -1.0}, {"quantile": 0.5}, {"elements": 0}]
+)
+def test_a_working_point_that_cannot_be_is_refused(changes: dict[str, float]) -> None:
+    with pytest.raises(InvalidSamples, match=next(iter(changes))):
+        replace(POINT, **changes)
+
+
+def test_forces_that_cannot_be_are_refused() -> None:
+    with pytest.raises(InvalidSamples, match="normal_force"):
+        next_grasp(model(), POINT, Probing(normal_force=(0.2, 0.1)))
