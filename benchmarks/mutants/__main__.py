@@ -8,6 +8,7 @@ ends a run early. `--only slipcore/frames.py:12` tries every mutant of a file or
 
 import argparse
 import math
+import shutil
 import time
 import tomllib
 from collections.abc import Callable, Iterator
@@ -24,6 +25,8 @@ from benchmarks.pages import options as page_options
 from benchmarks.pages import picture_folder, write
 
 EXPLAINED = Path(__file__).with_name("explained.toml")
+PAGE = Path(__file__).with_name("page.md")
+"""What a page is made of that is not there yet."""
 
 
 def main() -> None:
@@ -93,6 +96,8 @@ def _write(copy: ScratchCopy, drawn: list[Edit], found: dict[str, Verdict], opti
     made = tables(drawn, found, reasons, sample.lines_of(copy.root))
     print(made["score"])
     picture_folder(options)
+    if options.page is not None and not options.page.exists():
+        shutil.copyfile(PAGE, options.page)
     records = [asdict(found[edit.key]) for edit in drawn if edit.key in found]
     write(records, made, options, "mutants.json")
 

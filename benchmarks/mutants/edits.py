@@ -58,7 +58,8 @@ class Edit:
     @property
     def key(self) -> str:
         """What it is known by while other lines of the file come and go."""
-        return f"{self.path} | {self.scope} | {self.statement} | {self.old} → {self.new} | {self.nth}"
+        old, new = (" ".join(text.split()) for text in (self.old, self.new))
+        return f"{self.path} | {self.scope} | {self.statement} | {old} → {new} | {self.nth}"
 
     def undone(self) -> "Edit":
         """The edit that changes nothing, for comparison."""

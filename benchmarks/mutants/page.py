@@ -1,4 +1,4 @@
-"""What a run found, as the tables of docs/mutants.md."""
+"""What a run found, as the tables of page.md."""
 
 from collections.abc import Mapping
 

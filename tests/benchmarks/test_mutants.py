@@ -12,11 +12,13 @@ import pytest
 from coverage.numbits import nums_to_numbits
 
 from benchmarks.mutants import sample, verdicts
+from benchmarks.mutants.__main__ import PAGE
 from benchmarks.mutants.edits import Edit, edits
 from benchmarks.mutants.page import tables
 from benchmarks.mutants.reach import Reach
 from benchmarks.mutants.scratch_copy import ScratchCopy
 from benchmarks.mutants.verdicts import Court, Verdict
+from benchmarks.pages import renew
 
 PROGRAM = '''\
 """A program."""
@@ -233,3 +235,10 @@ def test_the_page_tells_score_and_survivors(copy: ScratchCopy) -> None:
     assert made["explained"].endswith("x > LIMIT` | the limit itself is never met |")
     assert "`+` → `-`" in made["survivors"]
     assert "`>` → `>=`" not in made["survivors"]
+
+
+def test_a_new_page_has_a_place_for_each_table(tmp_path: Path) -> None:
+    page = tmp_path / "mutants.md"
+    page.write_text(PAGE.read_text())
+    renew(page, tables([], {}, {}, {"slipcore": 20}))
+    assert "| slipcore | 20 | 0 | 0 | 0 | 0 | 0 | – |" in page.read_text()
