@@ -54,7 +54,8 @@ class JoinedWrites:
     def _flush(self) -> None:
         if self._waiting:
             waiting, self._waiting, self._size = self._waiting, [], 0
-            self._transport.write(waiting[0] if len(waiting) == 1 else b"".join(waiting))
+            if not self._transport.is_closing():  # the client may have gone since it was written
+                self._transport.write(waiting[0] if len(waiting) == 1 else b"".join(waiting))
 
     def __getattr__(self, name: str) -> Any:
         """All that writes nothing is the transport's own."""

@@ -14,12 +14,16 @@ class Sent:
 
     def __init__(self) -> None:
         self.told: list[bytes | str] = []
+        self.is_closed = False
 
     def write(self, data: bytes) -> None:
         self.told.append(data)
 
     def get_write_buffer_size(self) -> int:
         return 5
+
+    def is_closing(self) -> bool:
+        return self.is_closed
 
     def __getattr__(self, name: str) -> object:
         return lambda: self.told.append(name)
@@ -57,6 +61,17 @@ def test_nothing_is_overtaken_by_the_end() -> None:
 def test_a_long_body_does_not_gather_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(joined_writes, "MOST_WAITING_BYTES", 5)
     assert told("head", "body", "more", "turn") == [b"headbody", b"more"]
+
+
+def test_nothing_is_sent_to_a_client_that_has_gone_since() -> None:
+    async def told_when_it_goes() -> list[bytes | str]:
+        sent = Sent()
+        JoinedWrites(cast(asyncio.Transport, sent), asyncio.get_running_loop()).write(b"answer")
+        sent.is_closed = True
+        await asyncio.sleep(0)
+        return sent.told
+
+    assert asyncio.run(told_when_it_goes()) == []
 
 
 def test_what_waits_counts_as_not_sent() -> None:
