@@ -1,7 +1,8 @@
 """HTTP connections that cannot be kept waiting, whichever parser reads them.
 
 Who is slow with a request's headers is let go, and so is who goes on with a body after its answer. No address may
-hold all connections, and a request that two parsers could read differently is refused.
+hold all connections, who sends requests without waiting for answers is read no faster than he is answered, and a
+request that two parsers could read differently is refused.
 """
 
 import asyncio
@@ -11,6 +12,7 @@ from typing import Any
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn.config import Config
+from uvicorn.protocols.http.flow_control import FlowControl
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from service.http.joined_writes import JoinedWrites
@@ -32,6 +34,17 @@ Refusal = tuple[ProblemType, str]
 """What a request is refused as, and why."""
 
 
+class _HoldingFlow(FlowControl):
+    """Reads nothing from the network while the connection holds bytes back that it has not parsed."""
+
+    is_holding = False
+
+    def resume_reading(self) -> None:
+        """Go on reading, unless bytes are held back: who waits for more of a request has it among those."""
+        if not self.is_holding:
+            super().resume_reading()
+
+
 class BoundedConnection(asyncio.Protocol):
     """What is added to either of the server's own protocols: its bounds, and its refusals as problem details.
 
@@ -39,6 +52,7 @@ class BoundedConnection(asyncio.Protocol):
     """
 
     transport: asyncio.Transport
+    flow: FlowControl
     loop: asyncio.AbstractEventLoop
     config: Config
     client: tuple[str, int] | None
@@ -57,6 +71,7 @@ class BoundedConnection(asyncio.Protocol):
         self._most, self.limit_concurrency = self.limit_concurrency, None  # its own refusal is plain text
         self._per_address = per_address
         self._is_beyond = False
+        self._held = b""
         self.idle_since = self.loop.time()
 
     @property
@@ -67,12 +82,42 @@ class BoundedConnection(asyncio.Protocol):
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Begin to wait for a request."""
         super().connection_made(JoinedWrites(transport, self.loop))  # type: ignore[arg-type]  # in a transport's place
+        self.flow = self._flow = _HoldingFlow(self.transport)
         if hasattr(transport, "max_size"):  # asyncio's own; other event loops choose by themselves
             transport.max_size = RECEIVED_BYTES
         self._make_room()
         self._wait_for_headers()
 
     def data_received(self, data: bytes) -> None:
+        """Parse until a request is whole, and hold back what is behind it until it is answered (RFC 9112, 9.3.2).
+
+        Parsed requests take many times the bytes that they are sent in.
+        """
+        data, parsed = self._held + data, 0
+        while parsed < len(data) and self._may_parse():
+            end = parsed + self._parsed_at_once()
+            self._parse(data[parsed:end])
+            parsed = end
+        self._hold(data[parsed:] if self._is_open() else b"")
+
+    def _hold(self, data: bytes) -> None:
+        self._held, self._flow.is_holding = data, bool(data)
+        if data:
+            self.flow.pause_reading()
+
+    def _is_open(self) -> bool:
+        """Whether more requests may come: neither closed, nor a WebSocket by now."""
+        return not self.transport.is_closing() and self.transport.get_protocol() is self
+
+    def _may_parse(self) -> bool:
+        """Whether no whole request waits for its answer."""
+        return self._is_open() and (self.is_idle or bool(self.cycle.more_body))
+
+    def _parsed_at_once(self) -> int:
+        """Bytes that the parser may be given: by itself it makes requests of all that it has."""
+        raise NotImplementedError
+
+    def _parse(self, data: bytes) -> None:
         """Go on waiting unless the headers are there, and the body while it is read."""
         super().data_received(data)
         if self.transport.get_protocol() is not self:  # it became a WebSocket
@@ -93,13 +138,18 @@ class BoundedConnection(asyncio.Protocol):
             self._end(*(refusal or (BAD_REQUEST, "a WebSocket is asked for before another answer is whole")))
 
     def on_response_complete(self) -> None:
-        """Begin to be idle."""
+        """Begin to be idle, or go on with what came behind the request."""
         self.idle_since = self.loop.time()
+        held = self._held
+        self._hold(b"")
         super().on_response_complete()  # type: ignore[misc]  # of the server's protocol
+        if held:
+            self.data_received(held)
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the connection."""
         self._stop_waiting()
+        self._hold(b"")
         super().connection_lost(exc)
 
     def shutdown(self) -> None:
@@ -167,6 +217,10 @@ class BoundedConnection(asyncio.Protocol):
 
 class H11Connection(BoundedConnection, H11Protocol):
     """Read by h11, in Python: where the compiled parser is not installed."""
+
+    def _parsed_at_once(self) -> int:
+        """All that comes: h11 goes no further than to the end of a request."""
+        return RECEIVED_BYTES
 
 
 def ambiguity(scope: Scope) -> str | None:

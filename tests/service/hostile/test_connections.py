@@ -126,6 +126,12 @@ def test_a_body_behind_an_offer_of_another_protocol_is_read(
     assert answer.count(b"HTTP/1.1 ") == 2
 
 
+@pytest.mark.parametrize("offer", OFFERS, ids=["h2c", "unknown"])
+def test_every_request_that_offers_another_protocol_is_answered(address: Address, offer: bytes) -> None:
+    answer = told(address, 4 * (b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n" + offer + b"\r\n") + NEXT)
+    assert answer.count(b"HTTP/1.1 200") == 5
+
+
 def test_an_offer_does_not_hide_an_ambiguous_body(address: Address) -> None:
     sent = RECOGNISE + OFFERS[0] + b"Content-Length: 5\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n" + HIDDEN
     answer = told(address, sent)

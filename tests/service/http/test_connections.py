@@ -1,6 +1,7 @@
 """Real sockets, since what is tested stands between the network and the application."""
 
 import asyncio
+import gc
 import json
 import socket
 import threading
@@ -24,11 +25,14 @@ Connect = Callable[[], socket.socket]
 
 
 async def hello(scope: Scope, receive: Receive, send: Send) -> None:
-    """Answers when it has the whole body, or early."""
+    """Answers when it has the whole body, or early; the path comes back as a header."""
     assert scope["type"] == "http"
     while scope["path"] != "/early" and (await receive()).get("more_body"):
         pass
-    await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"5")]})
+    if scope["path"] == "/slow":
+        await asyncio.sleep(PATIENCE)
+    headers = [(b"content-length", b"5"), (b"path", scope["raw_path"])]
+    await send({"type": "http.response.start", "status": 200, "headers": headers})
     await send({"type": "http.response.body", "body": b"hello"})
 
 
@@ -199,3 +203,67 @@ def test_whoever_comes_when_all_connections_are_taken_is_told_so(connect: Connec
     again = connect()
     again.sendall(b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n")
     assert rest(again).endswith(b"hello")
+
+
+KINDS = (
+    b"GET /%d HTTP/1.1\r\nHost: a\r\n\r\n",
+    b"POST /%d HTTP/1.1\r\nHost: a\r\nContent-Length: 3000\r\n\r\n" + b"x" * 3000,
+    b"POST /%d HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n3\r\nxyz\r\n0\r\n\r\n",
+    b"GET /%d HTTP/1.1\r\nHost: a\r\nConnection: Upgrade\r\nUpgrade: h2c\r\n\r\n",
+)
+LAST = b"GET /last HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n"
+
+
+@pytest.mark.parametrize("piece", [7_001, 10**6])
+def test_requests_that_do_not_wait_for_answers_are_all_answered_in_their_order(connect: Connect, piece: int) -> None:
+    sent = b"".join(KINDS[k % len(KINDS)] % k for k in range(400)) + LAST
+    connection = connect()
+    for at in range(0, len(sent), piece):
+        connection.sendall(sent[at : at + piece])
+    paths = [line[6:] for line in rest(connection).split(b"\r\n") if line.startswith(b"path: ")]
+    assert paths == [*(b"/%d" % k for k in range(400)), b"/last"]
+
+
+def parsed_requests() -> int:
+    return sum(type(each).__name__ == "RequestResponseCycle" for each in gc.get_objects())
+
+
+@pytest.mark.parametrize("kind", [KINDS[0], KINDS[2]], ids=["GET", "chunked"])
+def test_requests_that_wait_for_others_of_their_connection_are_not_parsed(connect: Connect, kind: bytes) -> None:
+    connection = connect()
+    connection.sendall(b"GET /slow HTTP/1.1\r\nHost: a\r\n\r\n")
+    connection.setblocking(False)
+    before, after = parsed_requests(), 0
+    with suppress(BlockingIOError):
+        connection.sendall(kind % 1 * (2**20 // len(kind)))
+    began = time.monotonic()
+    while time.monotonic() - began < PATIENCE:
+        after = max(after, parsed_requests() - before)
+    assert after < 100
+
+
+def test_whoever_waits_for_more_of_a_request_has_nothing_behind_it_read(
+    connect: Connect, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held: list[int] = []
+    hold = BoundedConnection._hold
+
+    def look(self: BoundedConnection, data: bytes) -> None:
+        hold(self, data)
+        held.append(len(data))
+
+    monkeypatch.setattr(BoundedConnection, "_hold", look)
+    connection = connect()
+    request = b"POST /slow HTTP/1.1\r\nHost: a\r\nContent-Length: 1\r\n\r\nx"
+    sender = threading.Thread(target=send_until_shut, args=(connection, request * 2**17))
+    sender.start()
+    for _ in range(4):
+        assert connection.recv(65536).startswith(b"HTTP/1.1 200")
+    connection.shutdown(socket.SHUT_RDWR)
+    sender.join()
+    assert 0 < max(held) <= connections.RECEIVED_BYTES
+
+
+def send_until_shut(connection: socket.socket, data: bytes) -> None:
+    with suppress(OSError):
+        connection.sendall(data)
