@@ -57,7 +57,8 @@ def sent(loop: JumpingLoop, pauses: list[float], body: bytes) -> list[Message]:
         await asyncio.sleep(3600.0 if pause is None else pause)
         if pause is None:
             return {"type": "http.disconnect"}
-        return {"type": "http.request", "body": body, "more_body": parts.__length_hint__() > 0}
+        message = {"type": "http.request", "body": body}
+        return message | {"more_body": True} if parts.__length_hint__() else message  # what is not told is no more
 
     async def send(message: Message) -> None:
         answers.append(message)
