@@ -5,7 +5,7 @@ import pytest
 
 from db.blobs import BlobStore
 from db.database import Database
-from db.errors import StorageUnavailable
+from db.errors import ClaimLost, StorageUnavailable
 from db.records import Claim
 from db.repositories import jobs, materials
 from service.jobs import pipeline, worker
@@ -70,6 +70,19 @@ def test_a_job_that_was_cancelled_stores_no_end(
         run(database, tmp_path, mine)
         with database.read() as session:
             assert jobs.get(session, mine.job_id).reason == "no longer wanted"
+
+
+def test_what_another_runner_has_taken_over_is_left_to_it(
+    database: Database, tmp_path: Path, mine: Claim, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def lose(*_: object) -> None:
+        raise ClaimLost(mine.job_id)
+
+    monkeypatch.setattr(pipeline, "run_job", lose)
+    run(database, tmp_path, mine)
+    assert caplog.messages == [f"{ClaimLost(mine.job_id)}; what was done of it stays"]
+    with database.read() as session:
+        assert jobs.get(session, mine.job_id).status == "running"
 
 
 def test_warming_up_tries_what_a_job_needs(caplog: pytest.LogCaptureFixture) -> None:

@@ -1,0 +1,61 @@
+"""How long the answer about a job that goes on is kept back."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from service.domain import await_job
+
+SECONDS = 0.4
+
+
+@pytest.fixture
+def wait(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[Any, float]]:
+    """Ask for a job whose looks are given, the last for good; what was told, and after how many seconds."""
+
+    def asked(*finished_at: str | None, most: float = SECONDS, ends_after: float | None = None) -> tuple[Any, float]:
+        looks = list(finished_at)
+        found = lambda *_: SimpleNamespace(finished_at=looks.pop(0) if len(looks) > 1 else looks[0])  # noqa: E731
+        monkeypatch.setattr(await_job, "_look", found)
+
+        async def ask() -> Any:
+            ending = asyncio.Event()
+            if ends_after is not None:
+                asyncio.get_running_loop().call_later(ends_after, ending.set)
+            context: Any = SimpleNamespace(jobs=SimpleNamespace(ending=lambda _: ending))
+            return await await_job.await_job(context, "id", most)
+
+        began = time.monotonic()
+        return asyncio.run(ask()).finished_at, time.monotonic() - began
+
+    return asked
+
+
+def test_one_that_goes_on_is_waited_for_as_long_as_was_asked(wait: Callable[..., tuple[Any, float]]) -> None:
+    finished_at, seconds = wait(None)
+    assert finished_at is None
+    assert seconds >= SECONDS
+
+
+def test_one_that_has_ended_is_told_at_once(
+    wait: Callable[..., tuple[Any, float]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(await_job, "LOOK_SECONDS", 60.0)
+    assert wait("now")[0] == "now"
+
+
+def test_one_that_ends_elsewhere_is_found_at_the_next_look(wait: Callable[..., tuple[Any, float]]) -> None:
+    assert wait(None, "now")[0] == "now"
+
+
+def test_one_that_ends_here_is_not_waited_for_until_the_next_look(
+    wait: Callable[..., tuple[Any, float]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(await_job, "LOOK_SECONDS", 60.0)
+    finished_at, seconds = wait(None, "now", most=60.0, ends_after=0.05)
+    assert finished_at == "now"
+    assert 0.05 <= seconds < 30.0
