@@ -187,7 +187,8 @@ def _collect(log: GraspLog, history: SlipHistory) -> tuple[Collected, str | None
     found = slipcore.collect_friction(log, history)
     if len(found.samples) == 0:
         slipping = int(history.slip.sum())
-        because = f"no slip gave a friction sample ({slipping} slipping elements in {len(log)} frames)"
+        seen = f"no slip gave a friction sample ({slipping} slipping elements in {len(log)} frames)"
+        because = f"{seen}; an element counts once all around it slips: load it further, or press less"
         return found, "; ".join(filter(None, (found.elements_left_out or because, _bound(found.contact))))
     return found, None
 

@@ -1,4 +1,3 @@
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,10 +12,8 @@ from slipcore import (
     UnknownScale,
     detect_slip,
 )
-from slipcore.contact import RampSchedule, tangential_ramp
+from slipcore.contact import RampSchedule, Scene, simulate, tangential_ramp
 from slipcore.samples import element_samples
-
-Scene = Callable[..., GraspLog]
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +28,7 @@ def test_friction_of_a_ramp_is_found_within_two_percent_from_detected_slip(frict
     log = tangential_ramp(friction=friction, marker_noise=1e-6, force_noise=2e-3, seed=21)
     log = log if known_motion else replace(log, object_pose=None)
     samples = element_samples(log, detect_slip(log))
-    assert len(samples) > 300
+    assert len(samples) > 100
     found = np.average(samples.friction_coefficient, weights=samples.weight)
     assert found == pytest.approx(friction, rel=0.02)
 
@@ -39,11 +36,18 @@ def test_friction_of_a_ramp_is_found_within_two_percent_from_detected_slip(frict
 def test_friction_of_a_ramp_without_noise_is_exact() -> None:
     log = tangential_ramp(friction=0.5)
     samples = element_samples(log, detect_slip(log))
-    assert len(samples) > 1000
+    assert len(samples) > 500
     # What slips by 10 µm/s is at the Coulomb limit; the median leaves out the frame in which the front passes.
     # A smooth force looks like 0.1 µN of noise, which is taken off.
     np.testing.assert_allclose(np.median(samples.friction_coefficient), 0.5, rtol=1e-6)
     assert samples.friction_coefficient.max() <= 0.5 * (1.0 + 1e-9)
+
+
+def test_elements_that_slip_in_part_do_not_lower_friction() -> None:
+    log = simulate(Scene.from_toml("fig10_normal_force_rises"), seed=1)  # elements of 3 × 3 cells
+    samples = element_samples(log, detect_slip(log))
+    assert len(samples) > 100
+    np.testing.assert_allclose(samples.friction_coefficient, 0.4, rtol=0, atol=5e-4)  # with those in part 0.3966
 
 
 def check_samples(samples: FrictionSamples, log: GraspLog, history: SlipHistory) -> None:
@@ -66,14 +70,14 @@ def check_samples(samples: FrictionSamples, log: GraspLog, history: SlipHistory)
     assert history.contact[frame, row, column].all()
     assert samples.element_area == log.element_area
     for i, j in ((-1, 0), (1, 0), (0, -1), (0, 1)):
-        assert history.contact[
-            frame, np.clip(row + i, 0, log.grid[0] - 1), np.clip(column + j, 0, log.grid[1] - 1)
-        ].all()
+        beside = np.clip(row + i, 0, log.grid[0] - 1), np.clip(column + j, 0, log.grid[1] - 1)
+        assert history.contact[frame, *beside].all()
+        assert history.slip[frame - 1, *beside].all()  # the front has passed: none of the element still sticks
 
 
 def test_samples_keep_their_invariants_on_a_ramp(ramp: tuple[GraspLog, SlipHistory]) -> None:
     samples = element_samples(*ramp)
-    assert len(samples) > 1000
+    assert len(samples) > 500
     check_samples(samples, *ramp)
 
 
