@@ -185,7 +185,11 @@ def test_fit_finds_the_friction_that_the_ramps_were_made_with(run: Run, ramps: l
     code, out, _ = run("fit", *ramps, "--json")
     model = json.loads(out)
     assert code == 0
-    assert model["coefficients"][0] == pytest.approx(0.5, rel=0.02)  # the 2 % that the project promises
+    zeroth, _, per_force = model["coefficients"]
+    observed = sum(model["domain"]["normal_force"]) / 2.0
+    assert zeroth + per_force * observed == pytest.approx(0.5, rel=0.02)  # the 2 % that the project promises
+    low, high = model["interval_95"][0]
+    assert low < 0.5 < high
     code, out, _ = run("fit", *ramps)
     assert code == 0
     assert "β₁ [s/m]" in out
