@@ -1,7 +1,8 @@
 """What a model's answer at a working point rests on: the data, an extrapolation, or nothing to rely on."""
 
+import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -96,13 +97,12 @@ def support(model: Model, tangential_velocity: float, normal_force: float, stale
         return Support("stale", f"{changed}: clean the surface; if it stays so, withdraw the logs before")
     if stale is not None:
         return Support("stale", f"the model is outdated: {stale}")
-    kind = kinds(model, tangential_velocity, normal_force)
-    if kind == "not identified":
-        return Support("not identified", _ignorance(model, tangential_velocity, normal_force))
-    if kind == "extrapolated":
-        outside = extrapolation(model.domain, tangential_velocity, normal_force)
-        return Support("extrapolated", f"{outside}: record a grasp there")
     part = float(uncertainty(model, *within(model.domain, tangential_velocity, normal_force)))
+    if not part <= UNCERTAIN or not model.identifiable.any():
+        return Support("not identified", _ignorance(part))
+    outside = extrapolation(model.domain, tangential_velocity, normal_force)
+    if outside is not None:
+        return Support("extrapolated", f"{outside}: record a grasp there")
     return Support("supported", f"the samples tell the expected friction to within ± {part:.1%}")
 
 
@@ -212,7 +212,10 @@ def _implausible(model: Model) -> str | None:
     doubtful = model.diagnostics.get("doubtful_logs")
     if doubtful:
         return f"{doubtful}: mend what the finding names, or withdraw the log"
-    for v, f_n, friction in _corners(model):
+    b0, b1, b2 = model.coefficients.tolist()
+    velocities, forces = model.domain.tangential_velocity, model.domain.normal_force
+    for v, f_n in itertools.product(velocities, forces):  # between which friction is linear
+        friction = b0 + b1 * v + b2 * f_n
         if not 0.0 < friction < math.inf:
             return (
                 f"friction within the data comes out at {friction:.3g}, at {v:.4g} m/s and {f_n:.4g} N an element: "
@@ -221,16 +224,9 @@ def _implausible(model: Model) -> str | None:
     return None
 
 
-def _corners(model: Model) -> Iterator[tuple[float, float, float]]:
-    """The bounds of the data, between which friction is linear, with the friction expected there."""
-    for v in model.domain.tangential_velocity:
-        for f_n in model.domain.normal_force:
-            yield v, f_n, float(np.dot([1.0, v, f_n], model.coefficients))
-
-
-def _ignorance(model: Model, tangential_velocity: float, normal_force: float) -> str:
-    part = float(uncertainty(model, *within(model.domain, tangential_velocity, normal_force)))
-    if part > UNCERTAIN or math.isnan(part):
+def _ignorance(part: float) -> str:
+    """What to do where friction is known to such a ``part`` of itself, or no coefficient is."""
+    if not part <= UNCERTAIN:
         return f"the expected friction is known to within ± {part:.0%} only: record more grasps"
     return (
         f"no coefficient is known, only friction near the middle of the samples (± {part:.1%}): "
