@@ -1,14 +1,16 @@
 """Runs chosen tests in a copy of the repository, each time in a new process that has the libraries loaded.
 
 Started as a file, with the names of libraries as arguments and the copy as its working folder: no module of ours is
-imported before a trial, so that each trial sees the copy as it is then. Reads one request a line (tests, seconds) and
-answers each by one line of JSON.
+imported before a trial, so that each trial sees the copy as it is then. Reads one request a line (tests, seconds of
+processor time) and answers each by one line of JSON.
 """
 
 import contextlib
 import importlib
 import json
+import math
 import os
+import resource
 import signal
 import sys
 import tempfile
@@ -17,6 +19,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+STANDSTILL = 20.0
+"""Seconds that a trial may take for each of processor time that it may use: it may wait, and share the machine."""
 
 
 class Chosen:
@@ -58,8 +63,9 @@ def _trial(tests: list[str], seconds: float) -> dict[str, Any]:
         answer = Path(folder, "answer.json")
         process = os.fork()
         if not process:
+            resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds), math.ceil(seconds) + 1))
             _run(tests, answer, Path(folder))
-        is_over = _wait(process, began + seconds)
+        is_over = _wait(process, began + STANDSTILL * seconds)
         told = (
             json.loads(answer.read_text()) if answer.exists() else {"ran": 0, "failed": "" if not is_over else "crash"}
         )
@@ -87,16 +93,16 @@ def _run(tests: list[str], answer: Path, folder: Path) -> None:
 
 
 def _wait(process: int, deadline: float) -> bool:
-    """Whether a trial ends in time; nothing of it is left."""
-    done = 0
+    """Whether a trial ends by itself; nothing of it is left."""
+    done = status = 0
     while not done and time.monotonic() < deadline:
-        done, _ = os.waitpid(process, os.WNOHANG)
+        done, status = os.waitpid(process, os.WNOHANG)
         time.sleep(0.02)
     with contextlib.suppress(ProcessLookupError):
         os.killpg(process, signal.SIGKILL)
     if not done:
         os.waitpid(process, 0)
-    return bool(done)
+    return bool(done) and not (os.WIFSIGNALED(status) and os.WTERMSIG(status) in {signal.SIGXCPU, signal.SIGKILL})
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ PATIENCE = 5.0
 """How many times as long tests may take, before a mutant counts as one that never ends."""
 
 COMPILING = 240.0
-"""Seconds on top of that, in which all kernels are compiled anew."""
+"""Seconds of processor time on top of that, in which all kernels are compiled anew."""
 
 LIBRARIES = """
 numpy scipy.fft scipy.optimize scipy.sparse scipy.spatial scipy.special scipy.stats numba pandas statsmodels.api emcee

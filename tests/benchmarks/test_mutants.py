@@ -110,7 +110,7 @@ def _cover(data: Path, lines: dict[str, list[int]]) -> None:
 
 @pytest.fixture
 def court(copy: ScratchCopy) -> Iterator[Court]:
-    with closing(Court(copy, ["slipcore/program.py"], libraries="", compiling=5.0)) as court:
+    with closing(Court(copy, ["slipcore/program.py"], libraries="", compiling=2.0)) as court:
         yield court
 
 
