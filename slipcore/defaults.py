@@ -187,8 +187,6 @@ class FilterOptions(ContactOptions):
     """Onset rate amid sticking neighbours, relative to these."""
     onset_at_front: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 3.8
     """Onset rate that slipping neighbours, or the rim, add to it."""
-    onset_under_restick: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.02
-    """Factor on onset rates while everything sticks again under growing load."""
     end_length: Annotated[float, Option(1e-9, 1.0, "m", "tuning scenes")] = 0.0001
     """Motion of the object within which slip ends."""
     hold_time: Annotated[float, Option(0.0, 1e6, "s", "tuning scenes")] = 0.5
@@ -211,8 +209,6 @@ class FilterOptions(ContactOptions):
     """Squared error of a step's share of the motion."""
     following_learning: Annotated[float, Option(0.0, 1000000.0, "-", "tuning scenes")] = 50.0
     """Prior weights within which the share is learnt from every step."""
-    following_least: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.15
-    """Least share that a step may show."""
     following_stick: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.7
     """Mean probability of stick above which the share is learnt later on."""
     following_whole: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.9
@@ -261,10 +257,6 @@ class FilterOptions(ContactOptions):
     """Least rate of indentation over its noise."""
     pressing_force_deviations: Annotated[float, Option(0.0, 100.0, "standard deviations", "tuning scenes")] = 4.0
     """Least rate of the normal force over its noise."""
-    pressing_sideways_variances: Annotated[float, Option(0.0, 100.0, "-", "two components of force and the moment")] = (
-        3.0
-    )
-    """Variances of noise taken off the squared tangential rate."""
     stiffness_ratio: Annotated[float, Option(0.0, 10.0, "-", "2(1 − ν)/(2 − ν) at ν ≈ ½ (Mindlin)")] = 0.67
     """Tangential over normal stiffness of a stuck contact."""
     least_transition: Annotated[float, Option(1e-15, 0.1, "-", "numerics")] = 1e-06
@@ -444,8 +436,11 @@ LOOKAHEAD = 2
 MOST_LOOKAHEAD = 100
 """Frames; each one costs time and memory, and what lies further ahead tells nothing."""
 
-FORMER_OPTIONS = frozenset({"onset_time", "end_time", "motion_margin"})
-"""Of method ``filter`` until slip began and ended by motion and load alone; ignored with a warning for one version."""
+FORMER_OPTIONS = frozenset(
+    {"onset_time", "end_time", "motion_margin", "onset_under_restick", "following_least", "pressing_sideways_variances"}
+)
+"""Of method ``filter``: the first three until slip began and ended by motion and load alone, the others until it was
+measured that they change nothing; ignored with a warning for one version."""
 
 Kind = TypeVar("Kind", bound=Options)
 

@@ -111,8 +111,7 @@ def restick_by_force(
     ``noise`` of a change of the resultant, N; ``slope``: least growth of F_T for that of F_N that can slip.
     """
     rate = noise / interval * math.sqrt(gain / (2.0 - gain)) * gain + tuning.pressing_force_floor
-    sideways = loading.force_x**2 + loading.force_y**2 + loading.twist**2
-    sideways = math.sqrt(max(0.0, sideways - tuning.pressing_sideways_variances * rate * rate))
+    sideways = math.sqrt(loading.force_x**2 + loading.force_y**2 + loading.twist**2)
     return loading.normal > tuning.pressing_force_deviations * rate and sideways < slope * loading.normal
 
 

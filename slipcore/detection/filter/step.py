@@ -81,9 +81,7 @@ def step_elements(
     deeper = indentation_change(places, last.displacement, frame.displacement)
     noise = interval, variance, force_noise
     restick = restick_under_load(common, after.common, anchors, (motion_x, motion_y), deeper, change, noise, tuning)
-    readiness = tuning.onset_under_restick if restick else 1.0
-    if math.isnan(surface.marker_noise):
-        readiness = 0.0  # nothing begins to slip before noise is known
+    readiness = 0.0 if restick or math.isnan(surface.marker_noise) else 1.0  # nor does it begin before noise is known
     log_odds = np.zeros(len(places))
     follow_forces(elements, surface, has_force, low_pass(interval, tuning.force_smoothing), after.elements)
     if change.size:

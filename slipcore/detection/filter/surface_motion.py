@@ -92,7 +92,7 @@ def learn_following(
     weight = 1.0 / (spread.place + tuning.following_variance * size + _LEAST_SPREAD)
     along = (fx - x) * dx + (fy - y) * dy
     begins = common[FOLLOWING + 1] < tuning.following_learning * tuning.following_weight
-    if along > tuning.following_least * size and (begins or anchors.stick.mean() > tuning.following_stick):
+    if along > 0.0 and (begins or anchors.stick.mean() > tuning.following_stick):
         common[FOLLOWING] += weight * along
         common[FOLLOWING + 1] += weight * size
 

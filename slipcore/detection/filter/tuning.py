@@ -24,7 +24,6 @@ class Tuning(NamedTuple):
     onset_length: float
     onset_inside: float
     onset_at_front: float
-    onset_under_restick: float
     end_length: float
     hold_time: float
     least_weight: float
@@ -35,7 +34,6 @@ class Tuning(NamedTuple):
     following_weight: float
     following_variance: float
     following_learning: float
-    following_least: float
     following_stick: float
     following_whole: float
     following_deviations: float
@@ -60,7 +58,6 @@ class Tuning(NamedTuple):
     pressing_rate: float
     pressing_deviations: float
     pressing_force_deviations: float
-    pressing_sideways_variances: float
     stiffness_ratio: float
     least_transition: float
     largest_log_odds: float
