@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from estimators.defaults import PRIOR
+from estimators.defaults import ALARM, CHANGE, PRIOR
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.linear.grasp_statistics import GraspStatistics
@@ -24,11 +24,8 @@ from estimators.linear.priors import log_half_student
 
 FloatArray = NDArray[np.float64]
 
-TAUS = np.geomspace(1e-3, 1.0, 40)
+TAUS = np.geomspace(ALARM.least_tau, ALARM.most_tau, ALARM.nodes)
 """Scatter between grasps, as a part of friction, over which is summed."""
-
-LONGEST = 1000
-"""Grasps that are looked at: those before say no more of τ, and a change so long ago is the material."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,14 +36,16 @@ class ChangeAlarm:
     up or down, as a part of it; ``reference``: grasps before which none can have happened.
     """
 
-    rate: float = 1e-3
-    shift: float = 0.2
-    reference: int = 3
+    rate: float = ALARM.rate
+    shift: float = ALARM.shift
+    reference: int = ALARM.reference
     levels: tuple[float, ...] = ()
     variances: tuple[float, ...] = ()
 
     @classmethod
-    def init(cls, rate: float = 1e-3, shift: float = 0.2, reference: int = 3) -> "ChangeAlarm":
+    def init(
+        cls, rate: float = ALARM.rate, shift: float = ALARM.shift, reference: int = ALARM.reference
+    ) -> "ChangeAlarm":
         """An alarm that has seen no grasp; raises ``InvalidSamples`` for settings that cannot be."""
         for name, value, right, allowed in (
             ("rate", rate, 0.0 < rate < 1.0, "above 0 and below 1"),
@@ -62,7 +61,7 @@ class ChangeAlarm:
         if not (math.isfinite(level) and 0.0 <= variance < math.inf):
             raise InvalidSamples("level and variance", (level, variance), "finite, the variance at least 0")
         levels, variances = (*self.levels, level), (*self.variances, variance)
-        return replace(self, levels=levels[-LONGEST:], variances=variances[-LONGEST:])
+        return replace(self, levels=levels[-ALARM.longest :], variances=variances[-ALARM.longest :])
 
     @property
     def e_values(self) -> FloatArray:
@@ -72,7 +71,7 @@ class ChangeAlarm:
             return np.zeros(count)
         log = _log_evidence(np.array(self.levels), np.array(self.variances), self.shift)
         log[: self.reference] = -np.inf
-        return np.exp(np.minimum(log, 700.0))
+        return np.exp(np.minimum(log, CHANGE.largest_exponent))
 
     @property
     def e_detector(self) -> float:
@@ -106,7 +105,8 @@ def grasp_level(model: FrictionModel, grasp: GraspStatistics) -> tuple[float, fl
     places, within = model.scale, 0.0
     if model.scales is not None:
         places, within = model.scales.between_places.value, model.scales.within.value
-    least = (1e-9 * max(float(np.abs(grasp.mean[:, 2]).max()), 1e-9)) ** 2  # without scatter all count alike
+    largest = float(np.abs(grasp.mean[:, 2]).max())
+    least = (ALARM.least_scatter * max(largest, ALARM.least_scatter)) ** 2
     weight = grasp.count / (places**2 + within**2 / grasp.weight + least)
     expected = model.coefficients[0] + grasp.mean[:, :2] @ model.coefficients[1:]
     information = float(weight @ expected**2)
@@ -115,10 +115,10 @@ def grasp_level(model: FrictionModel, grasp: GraspStatistics) -> tuple[float, fl
     return float(weight @ (expected * grasp.mean[:, 2])) / information, 1.0 / information
 
 
-def watched(model: FrictionModel, grasps: Sequence[GraspStatistics], rate: float = 1e-3) -> ChangeAlarm:
+def watched(model: FrictionModel, grasps: Sequence[GraspStatistics], rate: float = ALARM.rate) -> ChangeAlarm:
     """The alarm after these grasps, oldest first."""
     alarm = ChangeAlarm.init(rate)
-    told = [grasp_level(model, grasp) for grasp in grasps[-LONGEST:]]
+    told = [grasp_level(model, grasp) for grasp in grasps[-ALARM.longest :]]
     return replace(alarm, levels=tuple(level for level, _ in told), variances=tuple(error for _, error in told))
 
 

@@ -369,14 +369,62 @@ class ChangeSettings(Options):
     largest_exponent: Annotated[float, Option(10.0, 709.0, "-", "exp must not overflow")] = 700.0
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AlarmSettings(Options):
+    """The alarm of changed surfaces, grasp by grasp (``change_alarm.py``)."""
+
+    rate: Annotated[float, Option(1e-12, 0.999, "-", "one false alarm in a thousand grasps")] = 1e-3
+    shift: Annotated[float, Option(1e-3, 10.0, "-", "a fifth of friction matters to a grip")] = 0.2
+    """Standard deviation of a change of friction, as a part of it."""
+    reference: Annotated[int, Option(1, 1000, "grasps", "fewer do not tell their scatter")] = 3
+    """Before which none can have happened."""
+    longest: Annotated[int, Option(10, 1_000_000, "grasps", "a change so long ago is the material")] = 1000
+    """That are looked at: those before say no more of τ."""
+    least_tau: Annotated[float, Option(1e-6, 0.1, "-", "below what any sensor repeats")] = 1e-3
+    """Scatter between grasps, as a part of friction, from which is summed."""
+    most_tau: Annotated[float, Option(0.1, 10.0, "-", "as large as friction itself")] = 1.0
+    """To which is summed."""
+    nodes: Annotated[int, Option(5, 1000, "nodes", "19 % apart: far closer than τ is known")] = 40
+    """Of that sum, at equal ratios."""
+    least_scatter: Annotated[float, Option(0.0, 1e-3, "-", "rounding: without scatter all places count alike")] = 1e-9
+    """Of a place, in parts of friction."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DesignSettings(Options):
+    """Which grasp to record next (``grasp_design.py``)."""
+
+    quantile: Annotated[float, Option(1e-6, 0.5, "-", "a slip in a hundred grasps")] = 1e-2
+    """Of friction, that a planner asks for."""
+    elements: Annotated[int, Option(1, 100_000, "elements", "a fingertip's contact at a pitch of 1 mm")] = 60
+    """Of the contact that is planned for."""
+    seconds: Annotated[float, Option(0.0, 1e4, "s", "to grasp and let go")] = 4.0
+    """For a grasp beside its slip."""
+    frame_rate: Annotated[float, Option(1.0, 1e5, "1/s", "paper, Section IV-A")] = 30.0
+    drop_probability: Annotated[float, Option(1e-9, 0.5, "-", "one in a thousand probes")] = 1e-3
+    """With which a probe may drop what it bears."""
+    slipping: Annotated[float, Option(0.01, 1.0, "-", "half way of the slip front")] = 0.5
+    """Part of a contact's elements that slip in a probe."""
+    force_spread: Annotated[float, Option(0.0, 2.0, "-", "Hertz's pressure: about 0.35 over its area")] = 0.3
+    """Standard deviation of their normal forces, in parts of the mean."""
+    velocity_spread: Annotated[float, Option(0.0, 2.0, "-", "slip grows towards the rim")] = 0.5
+    """The same of their velocities."""
+    forces: Annotated[int, Option(2, 1000, "forces", "8 % apart where the greatest is six times the least")] = 25
+    """That are tried, at equal ratios."""
+    least_scatter: Annotated[float, Option(0.0, 1e-2, "-", "scatter of 0 would make one grasp tell all")] = 1e-6
+    """Of a model, in parts of friction."""
+
+
 ROUNDING = 1e-12
 """Relative difference that is rounding."""
 NORMAL_MAD = 0.674489750196082
 """Φ⁻¹(¾): median of |ε|/σ for normal ε."""
 
+ALARM = AlarmSettings()
 AUTOMATIC = Automatic()
 CHANGE = ChangeSettings()
 CLUSTERS = ClusterSettings()
+DESIGN = DesignSettings()
 GRID = GridSettings()
 LINEAR = LinearSettings()
 RECOGNITION = Recognition()
@@ -388,7 +436,7 @@ ROBUST = RobustSettings()
 SAMPLING = ChainSettings()
 
 TABLES = (
-    AUTOMATIC, CHANGE, CLUSTERS, GRID, LINEAR, RECOGNITION, REFERENCE, IDENTIFIABILITY, PRIOR, PROPOSAL, ROBUST,
-    SAMPLING,
+    ALARM, AUTOMATIC, CHANGE, CLUSTERS, DESIGN, GRID, LINEAR, RECOGNITION, REFERENCE, IDENTIFIABILITY, PRIOR, PROPOSAL,
+    ROBUST, SAMPLING,
 )  # fmt: skip
 """All tables of estimators."""

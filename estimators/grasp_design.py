@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from estimators.defaults import DESIGN, IDENTIFIABILITY
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel, Scales
 
@@ -24,8 +25,8 @@ NODES, WEIGHTS = np.array([-1.0, 0.0, 1.0]), np.array([1.0, 2.0, 1.0]) / 4.0
 """Of a grasp's places about their mean, in standard deviations over √2."""
 
 
-FORCES = 25
-"""Normal forces that are tried, at equal ratios: 8 % apart where the greatest is six times the least."""
+SPEEDS, LENGTHS = 5e-4 * 2.0 ** np.arange(4), 5e-4 * 2.0 ** np.arange(3)
+"""Of a probe's slip, m/s and m, that a robot may choose unless it is told otherwise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +37,8 @@ class WorkingPoint:
 
     normal_force: float
     tangential_velocity: float = 0.0
-    quantile: float = 1e-2
-    elements: int = 60
+    quantile: float = DESIGN.quantile
+    elements: int = DESIGN.elements
 
     def __post_init__(self) -> None:
         for name, value, allowed in (
@@ -62,15 +63,15 @@ class Probing:
     """
 
     normal_force: tuple[float, float] | None = None
-    speed: tuple[float, ...] = (5e-4, 1e-3, 2e-3, 4e-3)
-    length: tuple[float, ...] = (5e-4, 1e-3, 2e-3)
-    seconds: float = 4.0
-    frame_rate: float = 30.0
+    speed: tuple[float, ...] = tuple(SPEEDS.tolist())
+    length: tuple[float, ...] = tuple(LENGTHS.tolist())
+    seconds: float = DESIGN.seconds
+    frame_rate: float = DESIGN.frame_rate
     load: float = 0.0
-    drop_probability: float = 1e-3
-    slipping: float = 0.5
-    force_spread: float = 0.3
-    velocity_spread: float = 0.5
+    drop_probability: float = DESIGN.drop_probability
+    slipping: float = DESIGN.slipping
+    force_spread: float = DESIGN.force_spread
+    velocity_spread: float = DESIGN.velocity_spread
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +117,7 @@ def next_grasp(
     ]
     seconds = np.array([design.seconds for design in designs])
     best = int(np.argmax((math.sqrt(variance) - np.sqrt(after)) / seconds))
-    score = float(special.stdtrit(model.degrees_of_freedom, 0.975))
+    score = float(special.stdtrit(model.degrees_of_freedom, IDENTIFIABILITY.ends[1]))
     told = model.predict(point[1], point[2], working_point.quantile, "contact", working_point.elements)
     return NextGrasp(
         normal_force=designs[best].normal_force,
@@ -176,7 +177,7 @@ class Design:
 
 def scatter(model: FrictionModel) -> tuple[float, float, float]:
     """τ, ω and σ of the model; all scatter as that of whole grasps where its method does not tell them apart."""
-    least = 1e-6 * max(abs(float(model.coefficients[0])), 1e-6)  # scatter of 0 would make one grasp tell all
+    least = DESIGN.least_scatter * max(abs(float(model.coefficients[0])), DESIGN.least_scatter)
     if model.scales is None:
         middle = [1.0, *(0.5 * sum(ends) for ends in (model.domain.tangential_velocity, model.domain.normal_force))]
         friction = abs(float(np.dot(middle, model.coefficients)))
@@ -193,6 +194,6 @@ def _forces(model: FrictionModel, working_point: WorkingPoint, probing: Probing)
     )
     if not 0.0 < low <= high < math.inf:
         raise InvalidSamples("normal_force", (low, high), "N an element, above 0, the least first")
-    forces = np.append(np.geomspace(low, high, FORCES), np.clip(working_point.normal_force, low, high))
+    forces = np.append(np.geomspace(low, high, DESIGN.forces), np.clip(working_point.normal_force, low, high))
     held = model.predict(0.0, forces, probing.drop_probability, "contact", working_point.elements)
     return [float(force) for force in forces[held * forces * working_point.elements >= probing.load]]
