@@ -3,9 +3,7 @@
 Also, where that is wanted, files to which nothing refers (``service.jobs.garbage``), and the audit trail's old entries.
 """
 
-import asyncio
 import logging
-import threading
 import time
 from collections.abc import Callable
 from datetime import datetime, timedelta
@@ -17,6 +15,7 @@ from db.records import Actor
 from db.repositories import audit, uploads
 from db.tables import now
 from service.jobs import garbage
+from service.periodic_thread import PeriodicThread
 
 logger = logging.getLogger(__name__)
 
@@ -89,8 +88,7 @@ class Retention:
         self._grace = None if unreferenced_days is None else timedelta(days=unreferenced_days)
         self._audit_age = None if audit_days is None else timedelta(days=audit_days)
         self._next_garbage = 0.0
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._go_on, name="retention", daemon=True)
+        self._thread = PeriodicThread("retention", LOOK_SECONDS, self._look)
 
     def start(self) -> None:
         """Begin, where something is to be kept for some days only."""
@@ -99,16 +97,11 @@ class Retention:
 
     async def stop(self) -> None:
         """End after the files that are being deleted."""
-        self._stopping.set()
-        if self._thread.ident is not None:
-            await asyncio.to_thread(self._thread.join)
-
-    def _go_on(self) -> None:
-        while not self._stopping.wait(LOOK_SECONDS):
-            if self._leads():
-                self._look()
+        await self._thread.stop()
 
     def _look(self) -> None:
+        if not self._leads():
+            return
         try:
             if self._age is not None:
                 self._prune(self._age)
@@ -122,7 +115,7 @@ class Retention:
             logger.exception("nothing old is deleted")
 
     def _prune(self, age: timedelta) -> None:
-        if deleted := prune(self._database, self._blobs, now() - age, self._stopping.is_set):
+        if deleted := prune(self._database, self._blobs, now() - age, lambda: self._thread.is_stopping):
             logger.info("deleted %d uploads older than %s", deleted, age)
 
     def _forget_changes(self, age: timedelta) -> None:
@@ -135,5 +128,5 @@ class Retention:
         self._next_garbage = time.monotonic() + GARBAGE_SECONDS
         if deleted := garbage.delete_set_aside(self._database, self._blobs, grace):
             logger.info("deleted %d files that nothing referred to for %s", deleted, grace)
-        if count := garbage.set_aside(self._database, self._blobs, stop=self._stopping.is_set):
+        if count := garbage.set_aside(self._database, self._blobs, stop=lambda: self._thread.is_stopping):
             logger.info("set %d files aside, to which nothing refers", count)

@@ -1,15 +1,14 @@
 """Read the stored files again and again, at a set pace, so that a flipped bit is found while there is a backup."""
 
-import asyncio
 import logging
 import random
-import threading
 from collections.abc import Callable, Iterator
 
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import BlobDamaged, DatabaseError, NotFound
 from service.domain.damage import record_damage
+from service.periodic_thread import PeriodicThread
 
 logger = logging.getLogger(__name__)
 
@@ -32,8 +31,7 @@ class Scrub:
     ) -> None:
         self._database, self._blobs, self._pace, self._leads = database, blobs, bytes_per_second, leads
         self.bytes = self.passes = 0
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._go_on, name="scrub", daemon=True)
+        self._thread = PeriodicThread("scrub", REST_SECONDS, self._look)
 
     def start(self) -> None:
         """Begin, where there is something to read."""
@@ -42,28 +40,26 @@ class Scrub:
 
     async def stop(self) -> None:
         """End after the file that is being read."""
-        self._stopping.set()
-        if self._thread.ident is not None:
-            await asyncio.to_thread(self._thread.join)
+        await self._thread.stop()
 
     def read_all(self) -> None:
         """One pass over all files, at the set pace; ends early once it is told to stop."""
         for sha256 in self._hashes():
             size = self._read(sha256)
             self.bytes += size
-            if self._stopping.wait(size / self._pace):
+            if self._thread.sleep(size / self._pace):
                 return
         self.passes += 1
 
-    def _go_on(self) -> None:
-        while not self._stopping.wait(REST_SECONDS):
-            if self._leads():
-                try:
-                    self.read_all()
-                except DatabaseError as error:
-                    logger.warning("files are not read through: %s", error)
-                except Exception:
-                    logger.exception("files are not read through")
+    def _look(self) -> None:
+        if not self._leads():
+            return
+        try:
+            self.read_all()
+        except DatabaseError as error:
+            logger.warning("files are not read through: %s", error)
+        except Exception:
+            logger.exception("files are not read through")
 
     def _hashes(self) -> Iterator[str]:
         first = random.randrange(PREFIXES)

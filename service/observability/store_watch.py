@@ -1,13 +1,12 @@
 """Looks now and then whether database and files are well, so that a monitor that asks often costs nothing."""
 
-import asyncio
-import threading
 import time
 
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import DatabaseError
 from db.repositories import stores
+from service.periodic_thread import PeriodicThread
 
 LOOK_SECONDS = 10.0
 """s between two looks."""
@@ -24,8 +23,7 @@ class StoreWatch:
         self.trouble: str | None = None
         self._damage: str | None = None  # of the pages, which are read more seldom
         self._next_pages = 0.0
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._go_on, name="store watch", daemon=True)
+        self._thread = PeriodicThread("store watch", LOOK_SECONDS, self.look)
 
     def start(self) -> None:
         """Begin."""
@@ -33,9 +31,7 @@ class StoreWatch:
 
     async def stop(self) -> None:
         """End after the present look."""
-        self._stopping.set()
-        if self._thread.ident is not None:
-            await asyncio.to_thread(self._thread.join)
+        await self._thread.stop()
 
     def look(self) -> None:
         """Ask, write and read."""
@@ -63,7 +59,3 @@ class StoreWatch:
             self._damage = None
         end = time.monotonic()
         self._next_pages = end + (end - begin) / SHARE_OF_TIME
-
-    def _go_on(self) -> None:
-        while not self._stopping.wait(LOOK_SECONDS):
-            self.look()

@@ -1,5 +1,6 @@
 """A disk that forgets: a bit of a stored file is not what it was. It is an error with a name, never another result."""
 
+import asyncio
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -121,6 +122,5 @@ def test_only_the_process_that_leads_scrubs_and_only_if_it_is_to(
     leads[0] = True
     while not other.passes:
         time.sleep(0.001)
-    other._stopping.set()
-    other._thread.join()
-    assert off._thread.ident is None
+    asyncio.run(other.stop())
+    assert off.passes == 0
