@@ -17,6 +17,7 @@ AuditAction = Literal[
     "alias.removed",
     "owner.added",
     "owner.removed",
+    "sensor.described",
     "grasp_log.uploaded",
     "grasp_log.withdrawn",
     "grasp_log.restored",
@@ -146,6 +147,28 @@ class Runner:
     name: str
     beats: int
     started_at: datetime
+
+
+@dataclass(frozen=True, slots=True)
+class Gel:
+    """The mechanics of a sensor's gel, from which forces follow where it measures none.
+
+    ``young_modulus`` Pa; ``thickness`` m from its surface to a rigid base, None where it is thick against any contact;
+    ``marker_depth`` m of the markers below the surface.
+    """
+
+    young_modulus: float
+    poisson_ratio: float
+    thickness: float | None
+    marker_depth: float
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """A sensor that logs come from; ``gel`` is None where it was not described."""
+
+    name: str
+    gel: Gel | None
 
 
 @dataclass(frozen=True, slots=True)

@@ -106,13 +106,20 @@ class MaterialOwnerRow(Base):
 
 
 class SensorRow(Base):
-    """A tactile sensor that logs come from."""
+    """A tactile sensor that logs come from, with the mechanics of its gel where they are known.
+
+    ``young_modulus`` Pa; ``thickness`` m down to a rigid base, NULL without one; ``marker_depth`` m.
+    """
 
     __tablename__ = "sensors"
 
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str] = mapped_column(String(200), unique=True)
     created_at: Mapped[datetime] = mapped_column(default=now)
+    young_modulus: Mapped[float | None]
+    poisson_ratio: Mapped[float | None]
+    thickness: Mapped[float | None]
+    marker_depth: Mapped[float | None]
 
 
 class GraspLogRow(Base):

@@ -19,7 +19,19 @@ from service.http.context import ServerContext
 from service.http.head_requests import HeadRequests
 from service.http.lookups import Lookups
 from service.http.request_middleware import RequestMiddleware
-from service.http.routes import audit, curation, grasp_logs, health, jobs, materials, metrics, owners, planning, stream
+from service.http.routes import (
+    audit,
+    curation,
+    grasp_logs,
+    health,
+    jobs,
+    materials,
+    metrics,
+    owners,
+    planning,
+    sensors,
+    stream,
+)
 from service.http.start_refusal import StartRefusal
 from service.jobs.executors import executor_for_short_jobs, executors
 from service.jobs.retention import Retention
@@ -81,7 +93,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         },
         generate_unique_id_function=openapi.operation_id,
     )
-    for module in (health, metrics, materials, owners, grasp_logs, curation, planning, jobs, stream, audit):
+    for module in (health, metrics, materials, owners, grasp_logs, curation, sensors, planning, jobs, stream, audit):
         app.include_router(module.router)
     app.include_router(pages.router)
     access.check_routes(app)

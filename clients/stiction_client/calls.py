@@ -314,6 +314,16 @@ def _owners(record: Mapping[str, Any]) -> list[str]:
     return [str(owner) for owner in record["owners"]]
 
 
+def sensors() -> Call[list[dict[str, Any]]]:
+    """Ask for all sensors."""
+    return _record(lambda record: [dict(each) for each in record["items"]], (yield from _get("/v1/sensors")))
+
+
+def describe_sensor(name: str, gel: Mapping[str, float | None]) -> Call[dict[str, Any]]:
+    """Say what a sensor's gel is."""
+    return _record(dict, (yield from _ask(Request("PUT", f"/v1/sensors/{_part(name)}", json=dict(gel)))))
+
+
 def audit(actor: str | None, action: str | None, subject: str | None, limit: int) -> Call[list[AuditEntry]]:
     """Ask for the newest entries of the audit trail, page after page up to ``limit``."""
     found: list[AuditEntry] = []

@@ -203,6 +203,21 @@ class FrictionClient:
         """Take a material from an owner."""
         self._run(calls.remove_owner(name, owner))
 
+    def sensors(self) -> list[dict[str, Any]]:
+        """All sensors: their ``name`` and ``gel``, None where nobody described it."""
+        return self._run(calls.sensors())
+
+    def describe_sensor(
+        self,
+        name: str,
+        young_modulus: float,
+        poisson_ratio: float,
+        thickness: float | None = None,
+        marker_depth: float = 0.0,
+    ) -> dict[str, Any]:
+        """Describe a sensor's gel (Pa, m; thickness None: a half-space), from which forces of its logs then follow."""
+        return self._run(calls.describe_sensor(name, _gel(young_modulus, poisson_ratio, thickness, marker_depth)))
+
     def audit(
         self, actor: str | None = None, action: str | None = None, subject: str | None = None, limit: int = 100
     ) -> list[AuditEntry]:
@@ -377,6 +392,21 @@ class AsyncFrictionClient:
         """As ``FrictionClient.remove_owner``."""
         await self._run(calls.remove_owner(name, owner))
 
+    async def sensors(self) -> list[dict[str, Any]]:
+        """As ``FrictionClient.sensors``."""
+        return await self._run(calls.sensors())
+
+    async def describe_sensor(
+        self,
+        name: str,
+        young_modulus: float,
+        poisson_ratio: float,
+        thickness: float | None = None,
+        marker_depth: float = 0.0,
+    ) -> dict[str, Any]:
+        """As ``FrictionClient.describe_sensor``."""
+        return await self._run(calls.describe_sensor(name, _gel(young_modulus, poisson_ratio, thickness, marker_depth)))
+
     async def audit(
         self, actor: str | None = None, action: str | None = None, subject: str | None = None, limit: int = 100
     ) -> list[AuditEntry]:
@@ -443,3 +473,14 @@ def _job_id(job: Job | GraspLogReceipt | str) -> str:
     if isinstance(job, GraspLogReceipt):
         return job.job.id
     return job.id if isinstance(job, Job) else job
+
+
+def _gel(
+    young_modulus: float, poisson_ratio: float, thickness: float | None, marker_depth: float
+) -> dict[str, float | None]:
+    return {
+        "young_modulus": young_modulus,
+        "poisson_ratio": poisson_ratio,
+        "thickness": thickness,
+        "marker_depth": marker_depth,
+    }

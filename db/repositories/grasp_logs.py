@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session, aliased
 from db.errors import AlreadyExists, NotFound
 from db.paging import Window, windowed
 from db.records import LogFilter, NewGraspLog, StoredGraspLog, Withdrawal
-from db.repositories import detections, jobs
+from db.repositories import detections, jobs, sensors
 from db.tables import DetectionRow, GraspLogRow, JobRow, MaterialRow, SampleSummaryRow, SensorRow, now
 
 _WHOLE = (
@@ -32,7 +32,7 @@ def add(session: Session, log: NewGraspLog) -> str:
         format=log.format,
         detector=log.detector,
         material_id=log.material_id,
-        sensor_id=_sensor_id(session, log.sensor),
+        sensor_id=sensors.find_or_add(session, log.sensor),
         frames=log.frames,
         duration=log.duration,
         grid_rows=log.grid[0],
@@ -176,20 +176,6 @@ def _withdrawal(row: GraspLogRow) -> Withdrawal | None:
     if row.withdrawn_at is None or row.withdrawn_because is None:
         return None
     return Withdrawal(row.withdrawn_at, row.withdrawn_because, row.withdrawn_by)
-
-
-def _sensor_id(session: Session, name: str) -> int:
-    query = select(SensorRow.id).where(SensorRow.name == name)
-    found = session.scalar(query)
-    if found is not None:
-        return found
-    try:
-        with session.begin_nested():
-            row = SensorRow(name=name)
-            session.add(row)
-    except IntegrityError:  # another writer was faster
-        return session.execute(query).scalar_one()
-    return row.id
 
 
 def count_and_bytes(session: Session) -> tuple[int, int, int]:

@@ -7,7 +7,21 @@ from typing import Annotated
 
 import typer
 
-from service.cli import audit, blobs, database, jobs, keys, local, logs, materials, owners, remote, running, simulation
+from service.cli import (
+    audit,
+    blobs,
+    database,
+    jobs,
+    keys,
+    local,
+    logs,
+    materials,
+    owners,
+    remote,
+    running,
+    sensors,
+    simulation,
+)
 from service.cli.exit_codes import exit_code, message
 
 app = typer.Typer(
@@ -56,6 +70,7 @@ app.add_typer(materials.app, name="materials")
 app.add_typer(logs.app, name="logs")
 app.add_typer(jobs.app, name="jobs")
 app.add_typer(owners.app, name="owners")
+app.add_typer(sensors.app, name="sensors")
 app.add_typer(database.app, name="db")
 app.add_typer(blobs.app, name="blobs")
 app.add_typer(keys.app, name="keys")

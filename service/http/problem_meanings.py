@@ -56,6 +56,10 @@ MEANINGS: dict[str, Meaning] = {
         "The material has no such owner.",
         "",
     ),
+    "unknown-sensor": Meaning(
+        "No sensor has this name: no log came from it, and nobody described it.",
+        "",
+    ),
     "unknown-grasp-log": Meaning(
         "No grasp log has this id.",
         "",

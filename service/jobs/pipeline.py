@@ -6,10 +6,12 @@ worker that was taken for dead, or whose job was cancelled, stores nothing.
 """
 
 import logging
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 from sqlalchemy.orm import Session
@@ -19,7 +21,7 @@ import slipcore
 from db.blobs import BlobStore, disk_errors_named
 from db.database import Database
 from db.records import Claim, Job, SamplesOfLog, SampleSummary
-from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials
+from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, sensors
 from estimators import EstimatorError, FrictionModel, Moments
 from service import formats
 from service.domain.doubtful_logs import with_doubts
@@ -34,7 +36,10 @@ from service.domain.stored_results import (
 )
 from service.domain.surface_change import MARK, with_change
 from service.observability import logs, traces
-from slipcore import Collected, ContactFriction, FrictionSamples, GraspLog, SlipcoreError, SlipHistory
+from slipcore import Collected, ContactFriction, Finding, FrictionSamples, GraspLog, SlipcoreError, SlipHistory
+
+if TYPE_CHECKING:
+    from slipcore.forces import Reconstruction
 
 logger = logging.getLogger(__name__)
 
@@ -119,18 +124,20 @@ def _take_through_the_stages(run: Run) -> None:
 
 
 def find_samples(run: Run, log_id: str) -> SampleSummary:
-    """Frames → strain → events → slip_state → samples → moments of one log."""
+    """Frames → forces where they are missing → slip_state → samples → moments of one log."""
     with run.database.read() as session:
         stored = grasp_logs.get(session, log_id)
     if stored.samples is not None:
         return stored.samples
     with run.stage("frames"), disk_errors_named():
         log = formats.read(run.blobs.path(stored.sha256))
+    log, reconstruction = _with_forces(run, log, stored.sensor)
     with run.stage("slip_state"):
         history = slipcore.detect_slip(log, method=stored.detector, lookahead=slipcore.LOOKAHEAD)
     with run.stage("samples"):
-        found, none_because = _collect(log, history)
+        found, none_because = _collect(log, history, reconstruction)
         samples, findings = found.samples, slipcore.check_log(log, history, found.elements)
+        findings = [*_said(reconstruction), *findings]
         blob = run.blobs.put(encode_history(history))
         detection = summarise_history(
             history, run.seconds["slip_state"], blob, findings, found.contact, is_scaled=log.is_scaled
@@ -176,15 +183,49 @@ def fit_material(run: Run, material: str) -> None:
         _store_models(run, session, material_id, models)
 
 
-def _collect(log: GraspLog, history: SlipHistory) -> tuple[Collected, str | None]:
-    """What is known of friction, and if there are no samples, why."""
+def _with_forces(run: Run, log: GraspLog, sensor: str) -> "tuple[GraspLog, Reconstruction | None]":
+    """The log, with reconstructed forces where it has none and its sensor's gel is described."""
+    if log.force is not None or not log.is_scaled:
+        return log, None
+    with run.database.read() as session:
+        gel = sensors.get(session, sensor).gel
+    if gel is None:
+        return log, None
+    from slipcore.forces import Gel, reconstruct  # few logs need it
+
+    with run.stage("forces"):
+        thickness = math.inf if gel.thickness is None else gel.thickness
+        found = reconstruct(log, Gel(gel.young_modulus, gel.poisson_ratio, thickness, gel.marker_depth))
+        return found.apply(log), found
+
+
+def _said(reconstruction: "Reconstruction | None") -> list[Finding]:
+    """That forces are reconstructed, and how well they are known."""
+    if reconstruction is None:
+        return []
+    told = ", ".join(f"{axis} {share:.0%}" for axis, share in zip("xyz", reconstruction.information, strict=True))
+    evidence = (
+        f"forces follow from displacement by the sensor's gel, in effect averaged over "
+        f"{1e3 * reconstruction.kernel_width:.2g} mm; share of the resultant that data tell: {told}"
+    )
+    return [Finding("reconstructed forces", evidence, "friction is as sure as the description of the sensor's gel")]
+
+
+def _collect(
+    log: GraspLog, history: SlipHistory, reconstruction: "Reconstruction | None"
+) -> tuple[Collected, str | None]:
+    """What is known of friction, and if there are no samples, why; noise of reconstructed forces is theirs."""
     if not log.is_scaled:
         return _no_samples(log), "the log's scale is unknown; friction needs velocities in m/s, not pixels a second"
     if log.force is None:
-        return _no_samples(log), "the log has no forces; friction is tangential over normal force"
+        return _no_samples(log), (
+            "the log has no forces; friction is tangential over normal force. If a sensor sees only its markers move, "
+            f"describe the gel of sensor {log.sensor!r}: forces of logs that come in later follow from it"
+        )
     if not history.contact.any():
         return _no_samples(log), f"no element was in contact in any of the {len(log)} frames"
-    found = slipcore.collect_friction(log, history)
+    options = {} if reconstruction is None else {"force_noise": reconstruction.force_noise}
+    found = slipcore.collect_friction(log, history, **options)
     if len(found.samples) == 0:
         slipping = int(history.slip.sum())
         seen = f"no slip gave a friction sample ({slipping} slipping elements in {len(log)} frames)"

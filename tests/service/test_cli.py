@@ -440,3 +440,12 @@ def test_owners_and_the_audit_trail_from_the_command_line(run: Run, url: str) ->
     entries = json.loads(run("audit", "--subject", "owned", "--json", "--url", url)[1])["entries"]
     assert [entry["action"] for entry in entries] == ["owner.removed", "owner.added", "material.created"]
     assert "owner.added" in run("audit", "--action", "owner.added", "--url", url)[1]
+
+
+def test_a_sensor_is_described_and_listed_from_the_command_line(run: Run, url: str) -> None:
+    gel = ("--young-modulus", "2.5e5", "--poisson-ratio", "0.48", "--thickness", "0.004")
+    assert run("sensors", "describe", "GelSight Mini", *gel, "--url", url)[0] == 0
+    listed = run("sensors", "list", "--url", url)[1]
+    assert "GelSight Mini" in listed
+    assert "250000" in listed.replace(",", "").replace(" ", "") or "2.5e+05" in listed
+    assert run("sensors", "describe", "GelSight Mini", *gel[:-1], "-1", "--url", url)[0] == SERVICE_REFUSED

@@ -15,7 +15,10 @@ from service.web.rendering import render
 router = APIRouter(include_in_schema=False)
 
 ON_A_PAGE = 50
-STAGES = {"ingest": ("frames", "slip_state", "samples", "friction_model", "material"), "fit": ("friction_model",)}
+STAGES = {
+    "ingest": ("frames", "forces", "slip_state", "samples", "friction_model", "material"),
+    "fit": ("friction_model",),
+}
 """In their order, by the kind of the job (``service.jobs.pipeline``)."""
 
 

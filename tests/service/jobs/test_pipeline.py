@@ -12,14 +12,15 @@ import slipcore
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import ClaimLost
-from db.records import Claim, Detection, Job, Material, NewGraspLog, StoredGraspLog
-from db.repositories import detections, friction_models, grasp_logs, jobs, materials, runners
+from db.records import Claim, Detection, Gel, Job, Material, NewGraspLog, StoredGraspLog
+from db.repositories import detections, friction_models, grasp_logs, jobs, materials, runners, sensors
 from db.tables import JobRow, SampleSummaryRow
 from estimators import InvalidSamples, Moments
 from service.domain.recommended import recommended
 from service.domain.stored_results import SAMPLE_ARRAYS, encode_samples, summarise_samples
 from service.jobs import pipeline
-from slipcore import FrictionSamples, GraspLog
+from slipcore import FrictionSamples, GraspLog, forces
+from slipcore.forces import reconstruct
 from stiction_client.container import encode
 
 NOTHING_DETECTED = Detection("strain_rate", None, None, 0, 0, 0, 0, 0, 0, 0.1, "0" * 64)
@@ -339,3 +340,38 @@ def test_what_one_method_cannot_fit_another_may(monkeypatch: pytest.MonkeyPatch)
     unfit = {"auto", "ols"}
     with pytest.raises(InvalidSamples, match="auto"):
         pipeline._all_that_fit(cast(Any, None), [])
+
+
+@pytest.fixture(scope="module")
+def blind(ramp: GraspLog) -> GraspLog:
+    """A few frames of the ramp, without forces."""
+    return GraspLog(ramp.time[30::13], ramp.position, ramp.displacement[30::13], ramp.element_area)
+
+
+def test_forces_that_a_described_sensor_lacks_are_reconstructed(shop: Shop, blind: GraspLog) -> None:
+    with shop.database.write() as session:
+        sensors.describe(session, "s", Gel(1e6, 0.49, None, 0.0))
+    log_id, job_id = shop.ingest(encode(blind))
+    job = shop.run(job_id)
+    assert list(job.seconds)[:3] == ["frames", "forces", "slip_state"]
+    found = shop.log(log_id).detection
+    assert found is not None
+    assert found.findings is not None
+    assert found.findings[0].name == "reconstructed forces"
+    assert "data tell: x 100%, y 100%, z 100%" in found.findings[0].evidence
+
+
+def test_without_a_description_a_log_without_forces_is_refused_with_advice(shop: Shop, blind: GraspLog) -> None:
+    job = shop.run(shop.ingest(encode(blind))[1])
+    assert job.status == "refused"
+    assert job.reason is not None
+    assert job.reason.startswith("the log has no forces")
+    assert "describe the gel of sensor" in job.reason
+    assert "forces" not in job.seconds
+
+
+def test_samples_carry_the_noise_of_reconstructed_forces(blind: GraspLog) -> None:
+    found = reconstruct(blind, forces.Gel(1e6, 0.49))
+    log = found.apply(blind)
+    collected, _ = pipeline._collect(log, slipcore.detect_slip(log), found)
+    assert collected.elements.normal_force_noise == pytest.approx(found.force_noise / np.sqrt(2.0))

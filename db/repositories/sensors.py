@@ -1,0 +1,53 @@
+"""Queries on sensors and the mechanics of their gels."""
+
+from sqlalchemy import select
+from sqlalchemy.exc import IntegrityError
+from sqlalchemy.orm import Session
+
+from db.errors import NotFound
+from db.records import Gel, Sensor
+from db.tables import SensorRow
+from db.text import is_storable
+
+
+def find_or_add(session: Session, name: str) -> int:
+    """The key of the sensor of this name, which is stored if it is not yet."""
+    query = select(SensorRow.id).where(SensorRow.name == name)
+    found = session.scalar(query)
+    if found is not None:
+        return found
+    try:
+        with session.begin_nested():
+            row = SensorRow(name=name)
+            session.add(row)
+    except IntegrityError:  # another writer was faster
+        return session.execute(query).scalar_one()
+    return row.id
+
+
+def get(session: Session, name: str) -> Sensor:
+    """A sensor with what is known of its gel; raises ``NotFound``."""
+    row = session.scalar(select(SensorRow).where(SensorRow.name == name)) if is_storable(name) else None
+    if row is None:
+        raise NotFound("sensor", name)
+    return _record(row)
+
+
+def list_all(session: Session) -> list[Sensor]:
+    """All sensors, by name."""
+    return [_record(row) for row in session.scalars(select(SensorRow).order_by(SensorRow.name))]
+
+
+def describe(session: Session, name: str, gel: Gel) -> Sensor:
+    """Store the mechanics of a sensor's gel, in place of what was stored; the sensor need not be known before."""
+    row = session.get_one(SensorRow, find_or_add(session, name))
+    row.young_modulus, row.poisson_ratio = gel.young_modulus, gel.poisson_ratio
+    row.thickness, row.marker_depth = gel.thickness, gel.marker_depth
+    session.flush()
+    return _record(row)
+
+
+def _record(row: SensorRow) -> Sensor:
+    if row.young_modulus is None or row.poisson_ratio is None:
+        return Sensor(row.name, None)
+    return Sensor(row.name, Gel(row.young_modulus, row.poisson_ratio, row.thickness, row.marker_depth or 0.0))

@@ -1,0 +1,27 @@
+"""What is known of sensors: the mechanics of their gels, from which forces are reconstructed."""
+
+from dataclasses import asdict
+
+from db.records import Gel, Sensor
+from db.repositories import audit, sensors
+from service.domain.context import Context
+from service.domain.principal import Principal
+
+
+def find(context: Context, name: str) -> Sensor:
+    """One sensor; raises ``NotFound``."""
+    with context.database.read() as session:
+        return sensors.get(session, name)
+
+
+def list_all(context: Context) -> list[Sensor]:
+    """All sensors that logs come from, or that were described."""
+    with context.database.read() as session:
+        return sensors.list_all(session)
+
+
+def describe(context: Context, name: str, gel: Gel, principal: Principal) -> Sensor:
+    """Store the mechanics of a sensor's gel: forces of logs that come in from then on follow from it."""
+    with context.database.write() as session:
+        audit.add(session, principal.actor, "sensor.described", name, asdict(gel))
+        return sensors.describe(session, name, gel)
