@@ -215,6 +215,8 @@ class FilterOptions(ContactOptions):
     """Share above which the surface follows all of the motion."""
     following_deviations: Annotated[float, Option(0.0, 100.0, "standard deviations", "3 σ")] = 3.0
     """Least distance of a share from 1 that counts."""
+    pose_noise_least: Annotated[float, Option(0.0, 1e6, "-", "less may be the fit's own")] = 2.0
+    """Least variance of that noise over that of the pose fitted to the markers."""
     force_noise_margin: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 1.1
     """Factor on the estimated noise of element forces."""
     force_smoothing: Annotated[float, Option(0.0, 10.0, "s", "tuning scenes")] = 0.036

@@ -5,14 +5,21 @@ be if it stuck (x, y m, variance m²) and if it slipped (the same); its force lo
 force ratio that it slipped at with the weight of that knowledge; and how probable it was, before this frame was seen,
 that it began to slip if it stuck and that it stuck again if it slipped.
 
-``common`` [19] is what elements share: the pose; the loading; the slipping force ratio (weighted sum, weight); the
-share in which the surface follows the known motion (the same); the pose from which motion counts; and for how long
-there has been none, s.
+``common`` is what elements share: the pose; the loading; the slipping force ratio (weighted sum, weight); the
+share in which the surface follows the known motion (the same); the pose from which motion counts; for how long there
+has been none, s; and of a given pose: how it was corrected for noise, how far the markers' pose lay from it in the
+last two frames, of how many frames that is known, and what second differences of it say of the noise of place, m, and
+yaw, rad.
 """
+
+from slipcore.defaults import NOISE
 
 ROWS = 13
 (
     PROBABILITY, STICK_X, STICK_Y, STICK_VARIANCE, SLIP_X, SLIP_Y, SLIP_VARIANCE, NORMAL, TANGENTIAL, RATIO,
     RATIO_WEIGHT, ONSET, END,
 ) = range(ROWS)  # fmt: skip
-POSE, LOADING, FRICTION, FOLLOWING, REFERENCE, STILL, COMMON = 0, 4, 10, 12, 14, 18, 19
+POSE, LOADING, FRICTION, FOLLOWING, REFERENCE, STILL = 0, 4, 10, 12, 14, 18
+CORRECTION, LAST_OFFSETS, OFFSET_FRAMES, NOISE_OF_PLACE = 19, 22, 28, 29
+NOISE_OF_YAW = NOISE_OF_PLACE + 1 + NOISE.memory
+COMMON = NOISE_OF_YAW + 1 + NOISE.memory

@@ -15,7 +15,8 @@ from slipcore.detection.filter.pose import (
     place_on_object,
     pose_at,
 )
-from slipcore.detection.filter.state import FOLLOWING, POSE
+from slipcore.detection.filter.pose_noise import without_noise
+from slipcore.detection.filter.state import COMMON, CORRECTION, FOLLOWING, POSE
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.detection.shared.records import FrameArrays
 from slipcore.frames import FloatArray
@@ -41,12 +42,17 @@ def step_pose(
         step[2] = math.atan2(math.sin(step[2]), math.cos(step[2]))
         if len(anchors.x) < 2:
             common[FOLLOWING] = common[FOLLOWING + 1] = tuning.following_weight
-            known = frame.object_pose.copy()
+            common[CORRECTION:COMMON] = 0.0
+            known, left = frame.object_pose.copy(), spread
         else:
             learn_following(anchors, before, pose, spread, body_motion(anchors, last.object_pose, step), tuning, common)
             share = following_share(common, tuning)
-            known = np.array([before.x + share * step[0], before.y + share * step[1], before.yaw + share * step[2]])
+            was = before.x - common[CORRECTION], before.y - common[CORRECTION + 1], before.yaw - common[CORRECTION + 2]
+            now = pose_at(was[0] + share * step[0], was[1] + share * step[1], was[2] + share * step[2], 1.0)
+            known, left = without_noise(now, step, pose, spread, tuning, common)
         pose, spread = find_pose(anchors, before, known, variance, tuning)
+        if len(anchors.x) >= 2:
+            spread = left
     store_pose(common, POSE, pose)
     return pose, spread
 

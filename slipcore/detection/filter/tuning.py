@@ -32,6 +32,7 @@ class Tuning(NamedTuple):
     outlier_spread: float
     motion_play: float
     following_weight: float
+    pose_noise_least: float
     following_variance: float
     following_learning: float
     following_stick: float
