@@ -77,6 +77,13 @@ class InsufficientScope(DomainError):
         self.scope, self.needed = scope, needed
 
 
+class KeyEnded(DomainError):
+    """The access key with which something was begun was revoked, or has expired, before it was done."""
+
+    def __init__(self) -> None:
+        super().__init__("the access key was revoked or has expired since this began; allowed: a valid one")
+
+
 class NotOwner(DomainError):
     """A material has ``owners``, and who asks is none of them."""
 

@@ -9,9 +9,12 @@ from datetime import UTC, datetime
 from functools import lru_cache
 from typing import get_args
 
+from sqlalchemy.orm import Session
+
 from db.database import Database
 from db.records import AccessKey, Scope
 from db.repositories import access_keys
+from service.domain.errors import KeyEnded
 from service.settings import Settings
 
 SCOPES: tuple[Scope, ...] = get_args(Scope)
@@ -51,6 +54,12 @@ def is_key(text: str, stored: AccessKey) -> bool:
 def is_valid(stored: AccessKey) -> bool:
     """Whether a key is neither revoked nor expired."""
     return stored.revoked_at is None and (stored.expires_at is None or datetime.now(UTC) < stored.expires_at)
+
+
+def check_not_ended(session: Session, key_id: str | None) -> None:
+    """Look again at the key of something that took its time; raises ``KeyEnded``. None is where none was asked for."""
+    if key_id is not None and not is_valid(access_keys.get(session, key_id)):
+        raise KeyEnded
 
 
 @lru_cache(maxsize=1024)

@@ -16,6 +16,7 @@ from service import formats
 from service.domain import curate, quotas
 from service.domain.context import Context
 from service.domain.errors import InvalidGraspLog, InvalidValue, UnsupportedFormat, UploadInterrupted
+from service.domain.keys import check_not_ended
 from service.domain.ownership import check_may_add
 from service.domain.principal import ANONYMOUS, Principal
 from service.domain.queueing import INGEST_METHODS, queue
@@ -151,10 +152,11 @@ def store(context: Context, received: ReceivedLog, make_rows: Callable[[Session]
 def accept(session: Session, context: Context, received: ReceivedLog) -> StoredUpload:
     """Store a new log with its job; a known one whose job failed, which is our fault, or was cancelled gets another.
 
-    Quotas are looked at once more: others of the same key may have been stored since this one's body began. Raises
-    ``NotOwner``, ``QuotaExceeded`` and ``StorageQuotaExceeded``.
+    Key and quotas are looked at once more: it may have been revoked, and others of it stored, since this one's body
+    began. Raises ``KeyEnded``, ``NotOwner``, ``QuotaExceeded`` and ``StorageQuotaExceeded``.
     """
     settings, principal = context.settings, received.principal
+    check_not_ended(session, principal.key_id)
     quotas.lock(session, settings, principal.key_id)
     log = replace(received.log, material_id=_material(session, received))
     quotas.check_log(session, settings, principal.key_id, log)

@@ -18,6 +18,7 @@ from service.domain.keys import SCOPES
 from service.domain.principal import Principal
 
 CHALLENGE = 'Bearer realm="stiction"'
+CHALLENGE_OF_INVALID_KEY = f'{CHALLENGE}, error="invalid_token"'
 _PUBLIC_PAGES = ("/docs", "/redoc", "/login", "/logout", "/problems")
 PUBLIC_PATHS = frozenset({"/healthz", "/readyz", "/openapi.json", *_PUBLIC_PAGES})
 PUBLIC_FOLDERS = ("/assets/", "/problems/")

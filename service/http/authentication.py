@@ -18,7 +18,7 @@ from service.domain import keys
 from service.domain.context import Context
 from service.domain.keys import NO_KEY, is_loopback
 from service.http import origin, problems, sessions
-from service.http.access import CHALLENGE, EVERYTHING, Access, is_public
+from service.http.access import CHALLENGE, CHALLENGE_OF_INVALID_KEY, EVERYTHING, Access, is_public
 from service.http.problems import INVALID_KEY, KEY_REQUIRED, MISDIRECTED_REQUEST, TOO_MANY_REQUESTS, Problem
 from service.http.rate_limit import RateLimit
 from service.settings import Settings
@@ -178,7 +178,7 @@ class Authenticator:
         except StorageUnavailable as error:
             raise problems.storage_unavailable(error) from error
         if found is None:
-            headers = {"WWW-Authenticate": f'{CHALLENGE}, error="invalid_token"'}
+            headers = {"WWW-Authenticate": CHALLENGE_OF_INVALID_KEY}
             raise Problem(INVALID_KEY, "the access key is unknown, revoked, expired or garbled", headers=headers)
         return found
 

@@ -16,7 +16,7 @@ from db.errors import AlreadyExists, BlobDamaged, NotFound, StorageUnavailable
 from service.domain import errors
 from service.domain.damage import record_damage
 from service.domain.errors import DomainError, InsufficientScope
-from service.http.access import challenge_of_scope
+from service.http.access import CHALLENGE_OF_INVALID_KEY, challenge_of_scope
 from service.http.problems import (
     BAD_REQUEST,
     FILE_DAMAGED,
@@ -25,6 +25,7 @@ from service.http.problems import (
     INSUFFICIENT_SCOPE,
     INTERNAL_ERROR,
     INVALID_GRASP_LOG,
+    INVALID_KEY,
     INVALID_REQUEST,
     INVALID_SAMPLES,
     JOB_ENDED,
@@ -69,6 +70,7 @@ OF_USE_CASES: Mapping[type[DomainError], ProblemType] = {
     errors.StorageQuotaExceeded: STORAGE_QUOTA_EXCEEDED,
     errors.QuotaExceeded: QUOTA_EXCEEDED,
     errors.InsufficientScope: INSUFFICIENT_SCOPE,
+    errors.KeyEnded: INVALID_KEY,
     errors.NotOwner: NOT_OWNER,
     errors.UploadInterrupted: UPLOAD_INTERRUPTED,
     errors.FileDeleted: FILE_DELETED,
@@ -111,6 +113,8 @@ def problem_of(error: DomainError) -> Problem:
         headers["Retry-After"] = str(error.retry_seconds)
     if isinstance(error, InsufficientScope):
         headers["WWW-Authenticate"] = challenge_of_scope(error.needed)
+    if isinstance(error, errors.KeyEnded):
+        headers["WWW-Authenticate"] = CHALLENGE_OF_INVALID_KEY
     about = {"name": error.name, "value": error.value, "allowed": error.allowed}
     return Problem(OF_USE_CASES[type(error)], str(error), **about, headers=headers, more=error.facts)
 

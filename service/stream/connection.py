@@ -3,6 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import msgspec
@@ -11,7 +12,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from db.blobs import Spool
 from db.errors import NotFound, StorageUnavailable
 from service.domain.context import Context
-from service.domain.errors import DomainError
+from service.domain.errors import DomainError, KeyEnded
+from service.domain.keys import check_not_ended
 from service.domain.principal import Principal
 from service.domain.upload import UploadRequest, check_target
 from service.formats.reading import Description
@@ -29,6 +31,7 @@ from service.stream.messages import (
 )
 from service.stream.sessions import (
     FINISHED,
+    KEY_ENDED,
     NOT_UNDERSTOOD,
     PATIENCE,
     REFUSED,
@@ -48,6 +51,9 @@ Store = Callable[[Spool, Description, UploadRequest], dict[str, Any]]
 Sent = tuple[Callable[[bytes], Incoming], bytes]
 """A message as it came, and its decoder: in lists, 1 MiB of it may take 50 times as much."""
 
+KEY_SECONDS = 2.0
+"""s between looks at the key of a connection: so long one that has ended may still be used."""
+
 MOST_WAITING_IN, MOST_WAITING_OUT = 8, 64
 """Messages of one connection between network and detector: beyond the first the client waits, beyond the second it is
 dropped, for it does not read."""
@@ -62,6 +68,8 @@ async def serve(socket: WebSocket, context: Context, streams: Streams, principal
         await _close(socket, end.code, end.reason)
     except InvalidInput as error:
         await _close(socket, REFUSED, f"{error.name} is {error.value}; allowed: {error.allowed}")
+    except KeyEnded as error:
+        await _close(socket, KEY_ENDED, str(error))
     except (DomainError, NotFound) as error:
         await _close(socket, REFUSED, str(error))
     except StorageUnavailable as error:
@@ -125,8 +133,9 @@ class _Connection:
             await self._send(answer)
 
     async def _carry(self, session: Session) -> None:
-        """Read, work and write at once until one of them ends."""
-        tasks = [asyncio.create_task(part) for part in (self._read(), self._work(session), self._write())]
+        """Read, work and write at once, while the key is valid, until one of them ends."""
+        parts = self._read(), self._work(session), self._write(), self._watch_key()
+        tasks = [asyncio.create_task(part) for part in parts]
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
             done.pop().result()
@@ -142,6 +151,17 @@ class _Connection:
     async def _write(self) -> None:
         while True:
             await self._send(await self._outgoing.get())
+
+    async def _watch_key(self) -> None:
+        while True:
+            await asyncio.sleep(KEY_SECONDS)
+            with suppress(StorageUnavailable):  # frames go on while the database is away
+                await asyncio.to_thread(self._check_key)
+
+    def _check_key(self) -> None:
+        if self._principal.key_id is not None:
+            with self._context.database.read() as session:
+                check_not_ended(session, self._principal.key_id)
 
     async def _work(self, session: Session) -> None:
         while True:

@@ -3,7 +3,7 @@
 import hmac
 import json
 import time
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from datetime import timedelta
 from typing import Any
 
@@ -13,8 +13,8 @@ from sqlalchemy import event
 
 from db.database import Database
 from db.paging import Window
-from db.records import AuditFilter
-from db.repositories import access_keys, audit
+from db.records import AuditFilter, LogFilter
+from db.repositories import access_keys, audit, grasp_logs
 from db.tables import now
 from service import cli
 from service.cli.durations import moment_to_come
@@ -122,3 +122,22 @@ def test_a_moment_that_is_none_or_past_is_refused(text: str) -> None:
 
 def test_a_date_is_its_beginning_in_utc() -> None:
     assert moment_to_come("expires", "2999-01-31", now()).isoformat() == "2999-01-31T00:00:00+00:00"
+
+
+def test_nothing_is_stored_for_a_key_that_is_revoked_while_the_upload_comes(
+    reach: Reach, make: Make, database: Database, content: bytes
+) -> None:
+    text = make("upload")
+
+    async def parts() -> AsyncIterator[bytes]:
+        yield content[:100]
+        with database.write() as session:
+            access_keys.revoke(session, str(keys.key_id(text)))
+        yield content[100:]
+
+    headers = {"Content-Type": "application/vnd.stiction.grasp-log+npz"}
+    answer = reach(key=text).request("POST", "/v1/grasp-logs", content=parts(), headers=headers)
+    assert (answer.status_code, answer.json()["type"]) == (401, "/problems/invalid-key")
+    assert 'error="invalid_token"' in answer.headers["www-authenticate"]
+    with database.read() as session:
+        assert not grasp_logs.list_all(session, Window("created_at", descending=True), LogFilter())
