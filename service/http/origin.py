@@ -16,6 +16,16 @@ FORWARDING = frozenset(
         b"true-client-ip",
         b"cf-connecting-ip",
         b"fastly-client-ip",
+        b"fly-client-ip",
+        b"client-ip",
+        b"x-remote-addr",
+        b"x-proxyuser-ip",
+        b"x-original-host",
+        b"x-original-url",
+        b"x-envoy-external-address",
+        b"x-azure-clientip",
+        b"x-appengine-user-ip",
+        b"cdn-loop",
     }
 )
 """Headers that only a proxy sends, beside all that begin with ``x-forwarded-``."""

@@ -100,6 +100,7 @@ def test_a_body_needs_a_type_that_no_form_sends(reach: Reach, content: bytes) ->
 @ONLY_SQLITE
 def test_who_comes_through_a_proxy_is_asked_for_a_key(reach: Reach, make: Callable[..., str]) -> None:
     local, with_key = reach(*LOCAL), reach(*LOCAL, key=make())
+    assert {b"client-ip", b"fly-client-ip", b"x-envoy-external-address", b"cdn-loop"} < FORWARDING
     for header in (*FORWARDING, b"x-forwarded-for", b"x-forwarded-host", b"x-forwarded-proto"):
         local.headers = {header.decode().title(): "127.0.0.1"}
         answer = local.get("/v1/materials")
