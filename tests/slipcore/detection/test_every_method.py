@@ -14,6 +14,7 @@ from slipcore.detection.batch import with_patches
 from slipcore.detection.detector import init, step
 from slipcore.detection.shared.interface import Decision, Method, Observation
 from slipcore.detection.shared.strain import Lattice
+from slipcore.patch.regimes import slips_as_a_whole
 
 Same = Callable[[SlipHistory, SlipHistory], None]
 
@@ -99,7 +100,8 @@ def check_invariants(log: GraspLog, history: SlipHistory) -> None:
     assert not history.probability[~history.contact].any()
     np.testing.assert_array_equal(np.isnan(history.stick_ratio), ~touching)
     sticking = (history.contact & ~history.slip).any(axis=(1, 2))
-    np.testing.assert_array_equal(history.macro_slip, touching & ~sticking)
+    of_patches = slips_as_a_whole(history.patches, len(log))
+    np.testing.assert_array_equal(history.macro_slip, (touching & ~sticking) | of_patches)
     touched = history.contact[1:] & ~history.contact[:-1]
     assert not (history.slip[1:] & touched).any()
     known = np.isfinite(history.velocity).all(axis=-1)
