@@ -57,6 +57,10 @@ class UnknownGraspLog(ProblemError):
     """No grasp log has this id."""
 
 
+class UnknownSensor(ProblemError):
+    """No sensor of this name is known."""
+
+
 class UnknownJob(ProblemError):
     """No job has this id."""
 

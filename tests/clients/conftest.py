@@ -228,9 +228,9 @@ def log() -> PlainLog:
 
 @pytest.fixture(scope="session")
 def grasp() -> GraspLog:
-    """Pressed, then sheared with μ = 0.4: 82 frames of 8×8 markers."""
+    """Pressed, then sheared with μ = 0.4: 82 frames of 14×14 markers."""
     schedule = RampSchedule(rest=0.2, press=0.5, settle=0.3, shear=1.5, hold=0.2)
-    return tangential_ramp(points=8, pitch=1.5e-3, schedule=schedule, marker_noise=1e-7, force_noise=1e-6, seed=1)
+    return tangential_ramp(points=14, pitch=0.9e-3, schedule=schedule, marker_noise=1e-7, force_noise=1e-6, seed=1)
 
 
 @pytest.fixture(scope="session")

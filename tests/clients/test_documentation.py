@@ -34,7 +34,7 @@ def test_the_code_of_the_client_page_runs(
     container.write(grasp, "grasp.npz")
     names = run(code_blocks("docs/client.md"), service_url)
     assert names["job"].status == "done"
-    # simulated with μ = 0.4; one grasp does not tell how others differ, so that a thousandth's quantile is far below
+    # simulated with μ = 0.4; one grasp does not tell how others differ, so that a hundredth's quantile is far below
     assert 1.5 / 0.4 < names["grip"].normal_force < 1.5 / 0.1
     printed = capsys.readouterr().out
     for expected in ("press with ", '<pair geom1="fingertip"', "physics:staticFriction", "<drake:mu_static>", "[["):
