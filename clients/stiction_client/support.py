@@ -143,7 +143,8 @@ def disagreement(method: str, model: Model, others: Mapping[str, Model]) -> str 
 def uncertainty(model: Model, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> FloatArray:
     """Half-width of the 95 % interval of the friction expected at v and f_n, in parts of it."""
     mean, half = _interval(model, tangential_velocity, normal_force)
-    return np.asarray(half / np.maximum(mean, np.finfo(float).tiny))
+    unknown = np.full(np.broadcast(mean, half).shape, np.inf)  # of a mean that is nothing beside its uncertainty
+    return np.asarray(np.divide(half, mean, out=unknown, where=mean > 1e-9 * half))
 
 
 def within(domain: Domain, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> tuple[FloatArray, FloatArray]:

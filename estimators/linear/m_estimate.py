@@ -30,7 +30,8 @@ def _tukey_weight(u: FloatArray, c: float = ROBUST.tukey) -> FloatArray:
 
 
 def _tukey_slope(u: FloatArray, c: float = ROBUST.tukey) -> FloatArray:
-    return np.where(np.abs(u) < c, (1.0 - (u / c) ** 2) * (1.0 - 5.0 * (u / c) ** 2), 0.0)
+    square = np.square(np.minimum(np.abs(u) / c, 1.0))  # at most 1: far outliers do not overflow
+    return np.asarray((1.0 - square) * (1.0 - 5.0 * square))
 
 
 LOSSES = {

@@ -180,7 +180,7 @@ def material(client: httpx.Client) -> str:
 @pytest.fixture(scope="session")
 def ramp() -> GraspLog:
     """Pressed, then sheared: 82 frames of 8×8 markers, μ = 0.4."""
-    return tangential_ramp(points=8, pitch=1.5e-3, schedule=SHORT, marker_noise=1e-7, force_noise=1e-6, seed=1)
+    return tangential_ramp(points=14, pitch=0.9e-3, schedule=SHORT, marker_noise=1e-7, force_noise=1e-6, seed=1)
 
 
 @pytest.fixture(scope="session")

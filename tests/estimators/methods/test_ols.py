@@ -149,7 +149,8 @@ def test_constant_velocity_leaves_its_slope_open_and_prediction_valid(samples: M
     np.testing.assert_allclose(model.predict(speed, 0.05), expected, rtol=1e-9)
     width = model.predict(speed, 0.05, 0.95) - model.predict(speed, 0.05, 0.05)
     assert width < 4.5 * model.scale  # the open slope does not reach into the domain
-    assert model.predict(speed + 5e-3, 0.05, 0.05) < 0.0  # and does beyond it
+    assert model.predict(speed + 5e-3, 0.05, 0.05) == 0.0  # and does beyond it, where friction may be anything
+    assert model.predict(speed + 5e-3, 0.05, 0.95) > 1.0
 
 
 def test_a_collinear_pair_splits_the_slope_by_the_prior() -> None:

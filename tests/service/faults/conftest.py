@@ -306,7 +306,7 @@ def fleet(tmp_path: Path, new_url: Callable[..., str], new_fleet: Callable[[Path
 @pytest.fixture(scope="session")
 def contents() -> Callable[[int], list[bytes]]:
     """So many logs of one grasp, each with noise of its own."""
-    grasp = tangential_ramp(points=8, pitch=1.5e-3, schedule=SHORT)
+    grasp = tangential_ramp(points=14, pitch=0.9e-3, schedule=SHORT)
     assert grasp.force is not None
     displacement, force = grasp.displacement, grasp.force
 

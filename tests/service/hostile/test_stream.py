@@ -162,7 +162,7 @@ def converse(streams: Streams, *said: Any, raw: bool = False) -> Socket:
 
     async def go() -> None:
         with suppress(WebSocketDisconnect):
-            await connection.serve(socket, context, Principal(), lambda log: {"id": log.id})
+            await connection.serve(socket, context, context.streams, Principal(), lambda log: {"id": log.id})
 
     asyncio.run(go())
     return socket  # type: ignore[no-any-return]
@@ -250,7 +250,7 @@ def test_messages_wait_as_they_were_sent_and_not_as_lists() -> None:
             return {"type": "websocket.receive", "bytes": bytes(content)}
 
     async def fill() -> int:
-        given: Any = (Socket(), SimpleNamespace(streams=None), None, None)
+        given: Any = (Socket(), SimpleNamespace(), None, None, None)
         reading = asyncio.create_task(connection._Connection(*given)._read())
         await ended.wait()
         held = tracemalloc.get_traced_memory()[0]

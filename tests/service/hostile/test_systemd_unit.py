@@ -151,7 +151,7 @@ def test_the_service_does_its_work_under_the_units_restrictions(restricted: Rest
     key = next(word.strip('",') for word in made.stdout.split() if word.strip('",').startswith("stiction_"))
     with serving(restricted, key) as client:
         client.post("/v1/materials", json={"name": "felt"}).raise_for_status()
-        log = encode(tangential_ramp(points=8, pitch=1.5e-3, schedule=SHORT))
+        log = encode(tangential_ramp(points=14, pitch=0.9e-3, schedule=SHORT))
         sent = client.post("/v1/grasp-logs?material=felt", content=log, headers={"Content-Type": NPZ}).json()
         assert client.get(f"/v1/jobs/{sent['job']['id']}?wait=10").json()["status"] == "done"
     text = (restricted.folder / "log").read_text()

@@ -31,7 +31,7 @@ def test_looks_once_a_second_find_the_samples_of_the_whole_log(ramp: GraspLog) -
     expected = np.count_nonzero(samples.time < looked_until)
     friction = feed(ramp, wait=True)
     assert friction is not None
-    assert friction["samples"] == pytest.approx(expected, rel=0.05, abs=2)  # each look estimates the noise anew
+    assert friction["samples"] == pytest.approx(expected, rel=0.1, abs=2)  # each look estimates the noise anew
     assert np.all(np.isfinite(friction["coefficients"]))
 
 

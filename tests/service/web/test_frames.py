@@ -1,4 +1,5 @@
 import json
+import math
 import struct
 from dataclasses import replace
 from pathlib import Path
@@ -41,7 +42,7 @@ def unpacked(content: bytes) -> tuple[dict[str, Any], dict[str, Any]]:
 
 def test_the_player_gets_what_was_found_and_recorded(ramp: GraspLog, history: SlipHistory, stored: Any) -> None:
     header, arrays = unpacked(frames.pack(stored, ramp))
-    assert (header["rows"], header["columns"], header["step"], header["frames"]) == (8, 8, 1, len(ramp))
+    assert (header["rows"], header["columns"], header["step"], header["frames"]) == (14, 14, 1, len(ramp))
     state = arrays["state"].reshape(history.contact.shape)
     np.testing.assert_array_equal(state > 0, history.contact)
     np.testing.assert_array_equal(state == 2, history.slip & history.contact)
@@ -73,13 +74,14 @@ def test_a_long_log_is_thinned_out(
     monkeypatch.setattr(frames, "MOST_CELLS", history.contact.size // 3)
     header, arrays = unpacked(frames.pack(stored, ramp))
     assert header["step"] in {3, 4}
-    assert arrays["state"].size == len(arrays["time"]) * 64 <= history.contact.size // 3 + 64
+    elements = math.prod(ramp.grid)
+    assert arrays["state"].size == len(arrays["time"]) * elements <= history.contact.size // 3 + elements
 
 
 def test_without_the_upload_the_map_is_there_and_the_forces_are_not(stored: Any) -> None:
     header, arrays = unpacked(frames.pack(stored, None))
     assert {*arrays} == {"time", "stick_ratio", "onset", "state"}
-    assert (header["rows"], header["columns"]) == (8, 8)
+    assert (header["rows"], header["columns"]) == (14, 14)
 
 
 def test_without_a_map_the_curves_are_there(ramp: GraspLog, stored: Any) -> None:

@@ -21,7 +21,7 @@ def test_an_uploaded_log_is_described(
 ) -> None:
     assert fitted["sha256"] == hashlib.sha256(content).hexdigest()
     assert (fitted["bytes"], fitted["format"], fitted["material"]) == (len(content), "npz", "fitted")
-    assert (fitted["sensor"], fitted["frames"], fitted["grid"]) == (ramp.sensor, len(ramp), [8, 8])
+    assert (fitted["sensor"], fitted["frames"], fitted["grid"]) == (ramp.sensor, len(ramp), [14, 14])
     assert fitted["duration"] == ramp.time[-1] - ramp.time[0]
     assert client.get("/v1/materials/fitted").json()["grasp_logs"] == 1
 
