@@ -30,6 +30,7 @@ from db.blobs import BlobStore
 from db.database import Database
 from db.tables import DetectionRow, FrictionModelRow, GraspLogRow, JobRow, RunnerRow, SampleSummaryRow
 from service.jobs import garbage
+from slipcore import GraspLog
 from slipcore.contact.tiers.ramp import RampSchedule, tangential_ramp
 from stiction_client.container import encode
 
@@ -304,9 +305,15 @@ def fleet(tmp_path: Path, new_url: Callable[..., str], new_fleet: Callable[[Path
 
 
 @pytest.fixture(scope="session")
+def ramp() -> GraspLog:
+    """A short log of few markers, so that the network's and the database's faults decide and not what it holds."""
+    return tangential_ramp(points=8, pitch=1.5e-3, schedule=SHORT, marker_noise=1e-7, force_noise=1e-6, seed=1)
+
+
+@pytest.fixture(scope="session")
 def contents() -> Callable[[int], list[bytes]]:
     """So many logs of one grasp, each with noise of its own."""
-    grasp = tangential_ramp(points=14, pitch=0.9e-3, schedule=SHORT)
+    grasp = tangential_ramp(points=8, pitch=1.5e-3, schedule=SHORT)
     assert grasp.force is not None
     displacement, force = grasp.displacement, grasp.force
 
