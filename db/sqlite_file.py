@@ -44,7 +44,10 @@ class SqliteFile:
                 raise self._lost(suffix)
 
     def check_head(self) -> None:
-        """Read its header and schema from the disk, past what connections remember; raises ``sqlite3.Error``."""
+        """Read its header and schema from the disk, past what connections remember.
+
+        Raises ``StorageUnavailable``, ``sqlite3.Error``.
+        """
         self._ask("SELECT count(*) FROM sqlite_master")
 
     def check_pages(self) -> None:
@@ -56,6 +59,7 @@ class SqliteFile:
     def _ask(self, statement: str) -> object:
         if self._first is None or self._path is None:
             return "ok"
+        self.require()  # where a file beside it is gone, even who only reads would make an empty one
         with closing(sqlite3.connect(f"{self._path.as_uri()}?mode=ro", uri=True)) as connection:
             return connection.execute(statement).fetchone()[0]
 

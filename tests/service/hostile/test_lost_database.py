@@ -4,6 +4,7 @@ import shutil
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import httpx
@@ -22,15 +23,26 @@ UNAVAILABLE = (503, "/problems/storage-unavailable")
 
 
 @pytest.fixture
-def running(tmp_path: Path, serving: Any, monkeypatch: pytest.MonkeyPatch) -> Iterator[httpx.Client]:
-    monkeypatch.setattr("service.observability.store_watch.LOOK_SECONDS", 0.05)
-    with serving(Settings(data_folder=tmp_path / "data", workers=0)) as client:
-        yield client
+def between_looks(monkeypatch: pytest.MonkeyPatch) -> Lock:
+    """Hold it to move files one by one: a look that falls into the middle could find anything."""
+    lock, look = Lock(), StoreWatch.look
+
+    def look_alone(watch: StoreWatch) -> None:
+        with lock:
+            look(watch)
+
+    monkeypatch.setattr(StoreWatch, "look", look_alone)
+    return lock
 
 
 @pytest.fixture
-def seldom_watched(tmp_path: Path, serving: Any) -> Iterator[httpx.Client]:
-    """With looks ten seconds apart: what an upload itself notices."""
+def running(
+    tmp_path: Path,
+    serving: Any,
+    monkeypatch: pytest.MonkeyPatch,
+    between_looks: Lock,  # noqa: ARG001 - there before the service begins to look
+) -> Iterator[httpx.Client]:
+    monkeypatch.setattr("service.observability.store_watch.LOOK_SECONDS", 0.05)
     with serving(Settings(data_folder=tmp_path / "data", workers=0)) as client:
         yield client
 
@@ -57,32 +69,41 @@ def database_files(folder: Path) -> list[Path]:
 
 @pytest.mark.parametrize("suffixes", [("-wal",), ("-shm",), ("-wal", "-shm")])
 def test_no_upload_is_accepted_into_a_deleted_write_ahead_log(
-    seldom_watched: httpx.Client, tmp_path: Path, content: bytes, suffixes: tuple[str, ...]
+    running: httpx.Client, tmp_path: Path, content: bytes, suffixes: tuple[str, ...], between_looks: Lock
 ) -> None:
-    log = send(seldom_watched, content).raise_for_status().json()
+    log = send(running, content).raise_for_status().json()
     files = [tmp_path / "data" / f"stiction.sqlite3{suffix}" for suffix in suffixes]
-    for file in files:
-        file.rename(tmp_path / file.name)
-    again = send(seldom_watched, content)
+    with between_looks:
+        for file in files:
+            file.rename(tmp_path / file.name)
+    again = send(running, content)
     assert told(again) == UNAVAILABLE
     assert files[0].name in again.json()["detail"]
-    assert told(seldom_watched.get("/readyz")) == UNAVAILABLE
+    assert told(running.get("/readyz")) == UNAVAILABLE
     assert not any(file.exists() for file in files)
-    for file in files:
-        (tmp_path / file.name).rename(file)
-    assert send(seldom_watched, content).raise_for_status().json()["id"] == log["id"]
+    with between_looks:
+        for file in files:
+            (tmp_path / file.name).rename(file)
+    assert send(running, content).raise_for_status().json()["id"] == log["id"]
 
 
 @pytest.mark.parametrize("is_replaced", [False, True])
 def test_no_upload_is_accepted_into_a_deleted_or_replaced_database(
-    running: httpx.Client, tmp_path: Path, content: bytes, sqlite_template: Path, *, is_replaced: bool
+    running: httpx.Client,
+    tmp_path: Path,
+    content: bytes,
+    sqlite_template: Path,
+    between_looks: Lock,
+    *,
+    is_replaced: bool,
 ) -> None:
     send(running, content).raise_for_status()
     (tmp_path / "away").mkdir()
-    for file in database_files(tmp_path / "data"):
-        file.rename(tmp_path / "away" / file.name)
-    if is_replaced:
-        shutil.copyfile(sqlite_template, tmp_path / "data" / "stiction.sqlite3")
+    with between_looks:
+        for file in database_files(tmp_path / "data"):
+            file.rename(tmp_path / "away" / file.name)
+        if is_replaced:
+            shutil.copyfile(sqlite_template, tmp_path / "data" / "stiction.sqlite3")
     for _ in range(2):
         refused = send(running, content)
         assert told(refused) == UNAVAILABLE
@@ -90,8 +111,9 @@ def test_no_upload_is_accepted_into_a_deleted_or_replaced_database(
     assert told(running.get("/readyz")) == UNAVAILABLE
     assert "deleted or replaced" in wait_for_health(running, "degraded")["trouble"]
     assert len(database_files(tmp_path / "data")) == is_replaced  # no empty one was made in its place
-    for file in database_files(tmp_path / "away"):
-        file.rename(tmp_path / "data" / file.name)
+    with between_looks:
+        for file in database_files(tmp_path / "away"):
+            file.rename(tmp_path / "data" / file.name)
     wait_for_health(running, "ok")
     assert send(running, content).status_code == httpx.codes.OK
 
