@@ -63,6 +63,7 @@ if TYPE_CHECKING:
         Material,
         NextGrasp,
         Recognition,
+        Withdrawal,
     )
 
 _LAZY = {
@@ -113,6 +114,7 @@ _LAZY = {
     "Material": "stiction_client.records",
     "NextGrasp": "stiction_client.records",
     "Recognition": "stiction_client.records",
+    "Withdrawal": "stiction_client.records",
 }
 """Names whose modules load httpx or numpy: a program pays for what it uses."""
 
@@ -162,6 +164,7 @@ __all__ = [
     "StaleModel",
     "StictionError",
     "UnexpectedAnswer",
+    "Withdrawal",
     "antipodal",
     "cone_half_angle",
     "conservative_friction",

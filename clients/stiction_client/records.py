@@ -129,8 +129,19 @@ class Detection:
 
 
 @dataclass(frozen=True, slots=True)
+class Withdrawal:
+    """That a log counts in no fit any more: when (ISO 8601), why, and the id of the key with which it was withdrawn."""
+
+    at: str
+    reason: str
+    by: str | None
+
+
+@dataclass(frozen=True, slots=True)
 class GraspLogReceipt:
-    """A grasp log as the service keeps it, with the job that works on it and, once there, the detection."""
+    """A grasp log as the service keeps it, with the job that works on it and, once there, the detection; where it was
+    withdrawn, how.
+    """
 
     id: str
     sha256: str
@@ -144,19 +155,21 @@ class GraspLogReceipt:
     created_at: str
     job: Job
     detection: Detection | None
+    withdrawal: Withdrawal | None = None
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "GraspLogReceipt":
         """The grasp log in the service's answer."""
         values = _values(cls, record)
         rows, columns = values["grid"]
-        detection = values["detection"]
+        detection, withdrawal = values["detection"], values.get("withdrawal")
         return cls(
             **values
             | {
                 "grid": (rows, columns),
                 "job": Job.from_json(values["job"]),
                 "detection": None if detection is None else Detection.from_json(detection),
+                "withdrawal": None if withdrawal is None else Withdrawal(**_values(Withdrawal, withdrawal)),
             }
         )
 

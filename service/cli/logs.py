@@ -10,7 +10,7 @@ from service.cli.remote import DEFAULT_URL, Json, Key, Url, connected
 from service.formatting import number, size
 
 if TYPE_CHECKING:
-    from stiction_client import Detection, GraspLogReceipt
+    from stiction_client import Detection, GraspLogReceipt, Withdrawal
 
 app = typer.Typer(help="Look at the grasp logs of a service, and withdraw them.", no_args_is_help=True)
 LogId = Annotated[str, typer.Argument(metavar="ID", help="The log's id, as `upload` and `list` show it.")]
@@ -71,8 +71,14 @@ def _lines(log: "GraspLogReceipt") -> list[tuple[str, str | None]]:
         ("holds", f"{held}, {size(log.bytes)} of {log.format}"),
         ("uploaded", when(log.created_at)),
         ("job", f"{log.job.status}{f': {log.job.reason}' if log.job.reason else ''}"),
+        ("withdrawn", None if log.withdrawal is None else _withdrawal(log.withdrawal)),
     ]
     return lines if log.detection is None else lines + _detection_lines(log.detection)
+
+
+def _withdrawal(withdrawal: "Withdrawal") -> str:
+    by = "" if withdrawal.by is None else f" by key {withdrawal.by}"
+    return f"{when(withdrawal.at)}{by}: {withdrawal.reason}"
 
 
 def _detection_lines(seen: "Detection") -> list[tuple[str, str | None]]:

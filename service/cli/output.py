@@ -6,6 +6,7 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
 from typing import Any
+from unicodedata import category
 
 import typer
 
@@ -20,11 +21,16 @@ def print_json(record: Mapping[str, Any]) -> None:
     typer.echo(json.dumps(plain(record), ensure_ascii=False, indent=2))
 
 
+def printable(text: str) -> str:
+    """The text without what moves a terminal's cursor, sets its title or turns its direction: U+FFFD in its place."""
+    return "".join("\ufffd" if category(letter) in {"Cc", "Cf"} else letter for letter in text)
+
+
 def print_lines(title: str, lines: Iterable[tuple[str, str | None]]) -> None:
     """Print what is known of one thing, a line for each name and what is said of it; those of None are left out."""
     told = [(name, text) for name, text in lines if text is not None]
     width = max(len(name) for name, _ in told)
-    typer.echo("\n".join([title, *(f"  {name:<{width}}  {text}" for name, text in told)]))
+    typer.echo("\n".join(printable(line) for line in (title, *(f"  {name:<{width}}  {text}" for name, text in told))))
 
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
@@ -34,12 +40,12 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[obje
     from rich.markup import escape
     from rich.table import Table
 
-    typer.echo(title)
+    typer.echo(printable(title))
     table = Table(box=SIMPLE_HEAD, show_edge=False)
     for column in columns:
         table.add_column(escape(column), overflow="fold")
-    for row in rows:
-        table.add_row(*("" if cell is None else escape(str(cell)) for cell in row))  # units are in brackets, as markup
+    for row in rows:  # units are in brackets, as markup
+        table.add_row(*("" if cell is None else escape(printable(str(cell))) for cell in row))
     Console(width=None if sys.stdout.isatty() else LINE_WIDTH).print(table)
 
 

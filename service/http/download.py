@@ -1,5 +1,6 @@
 """Files as answers, whole or in the ranges that are asked for."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,8 @@ from starlette.types import Message, Receive, Scope, Send
 class Download(FileResponse):
     """A file and its parts; ``close`` is called at the end, however that comes.
 
-    A header Range that cannot be met (416) or read (400) raises ``HTTPException``: by itself it is plain text.
+    A header Range that says nothing of bytes is ignored (RFC 9110, 14.2). One that cannot be met (416), or that ends
+    before it begins (400), raises ``HTTPException``: by itself it is plain text.
     """
 
     def __init__(self, path: Path, close: Callable[[], None], **options: Any) -> None:
@@ -30,14 +32,22 @@ class Download(FileResponse):
                 raise HTTPException(message["status"], REFUSALS[message["status"]], kept)
             await send(message)
 
+        understood = [
+            (name, value)
+            for name, value in scope["headers"]
+            if name != b"range" or RANGE.fullmatch(value.decode("latin-1"))
+        ]
         try:
-            await super().__call__(scope, receive, send_unless_refused)
+            await super().__call__({**scope, "headers": understood}, receive, send_unless_refused)
         finally:
             await run_in_threadpool(self._close)
 
 
+RANGE = re.compile(r"bytes=[ \t]*(?:[0-9]+-[0-9]*|-[0-9]+)(?:[ \t]*,[ \t]*(?:[0-9]+-[0-9]*|-[0-9]+))*", re.IGNORECASE)
+"""What a header Range says of bytes (RFC 9110, 14.1.1)."""
+
 REFUSALS = {
-    400: "the header Range is not understood; allowed: such as bytes=0-1023",
+    400: "the header Range ends before it begins; allowed: such as bytes=0-1023",
     416: "the header Range begins behind the end of the file; allowed: within its length",
 }
 """Why a Range is refused, by the answer's status."""

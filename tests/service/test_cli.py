@@ -346,8 +346,16 @@ def test_materials_and_logs_are_looked_at_and_looked_after(run: Run, ramps: list
     assert run("materials", "merge", "grey felt", "velour", *told)[1] == "velour is part of grey felt now\n"
     assert json.loads(run("materials", "show", "velour", *told, "--json")[1])["name"] == "grey felt"
     assert run("logs", "withdraw", sent[0]["grasp_log"], "--reason", "mislabelled", *told)[0] == 0
+    assert re.search(r"withdrawn +\d{4}-.* UTC: mislabelled\n", run("logs", "show", sent[0]["grasp_log"], *told)[1])
     withdrawn = json.loads(run("logs", "list", "--material", "felt", *told, "--json")[1])["grasp_logs"]
     assert len(withdrawn) == 3
+
+
+def test_what_others_typed_moves_no_terminal(run: Run, url: str) -> None:
+    with FrictionClient(url) as client:
+        client.create_material("loud", "a\x1b[2J\x1b]0;title\x07b\u202ec")
+    out = run("materials", "show", "loud", "--url", url)[1]
+    assert re.search("about +a\ufffd\\[2J\ufffd\\]0;title\ufffdb\ufffdc\n", out)
 
 
 def test_the_version_is_told(run: Run) -> None:

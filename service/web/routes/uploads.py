@@ -31,8 +31,6 @@ router = APIRouter(include_in_schema=False)
 BESIDE_THE_FILE = 2**20
 """Bytes of a form that are not its file: fields, and what stands between them."""
 
-FIELDS = ("material", "create", "sensor", "detector", "format", "scale", "frame_rate", "mapping")
-
 
 class NewUpload(BaseModel):
     """What the form says beside the file; what was left empty is None."""
@@ -62,9 +60,9 @@ async def receive_upload(context: CurrentContext, request: Request, principal: C
     most = context.settings.max_upload_bytes + BESIDE_THE_FILE
     bounded = Request(request.scope, limited(request.receive, most))
     with disk_errors_named():
-        form = await read_form(bounded, context.blobs.unnamed_file, max_files=1, max_fields=len(FIELDS))
+        form = await read_form(bounded, context.blobs.unnamed_file, max_files=1, max_fields=len(NewUpload.model_fields))
     try:
-        fields = {name: text.strip() for name in FIELDS if isinstance(text := form.get(name), str)}
+        fields = {name: text.strip() for name, text in form.items() if isinstance(text, str)}
         on_problem(request, "upload.html", **await run_in_threadpool(_form, context, fields))
         file, wanted = _file(form), checked(NewUpload, fields)
         stored = await upload(context, _chunks(file), _asked(wanted, file, principal))

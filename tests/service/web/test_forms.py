@@ -44,6 +44,7 @@ def test_a_form_stores_a_log_and_leads_to_it(client: httpx.Client, content: byte
         ({"material": "<b>", "create": "true"}, b"x", "name is &lt;b&gt;"),
         ({"scale": "-1"}, b"x", "scale is -1"),
         ({"detector": "magic"}, b"x", "detector is magic"),
+        ({"matreial": "paper"}, b"x", "matreial"),
         ({}, b"x" * (4 * 2**20), "The body is too large"),
     ],
 )

@@ -47,7 +47,7 @@ def test_a_log_that_went_all_the_way_has_a_player_with_frames(
 @pytest.mark.parametrize(
     "path", ["/logs/{id}/frames", "/v1/grasp-logs/{id}/file", "/v1/grasp-logs/{id}/file?format=parquet"]
 )
-@pytest.mark.parametrize(("asked", "status"), [("bytes=999999999-", 416), ("lines=1-2", 400)])
+@pytest.mark.parametrize(("asked", "status"), [("bytes=999999999-", 416), ("bytes=5-2", 400)])
 def test_a_range_that_a_file_does_not_have_is_a_problem_and_leaves_no_file(
     client: httpx.Client, fitted: Any, path: str, asked: str, status: int
 ) -> None:
@@ -56,6 +56,15 @@ def test_a_range_that_a_file_does_not_have_is_a_problem_and_leaves_no_file(
     assert answer.json()["status"] == status
     assert (status == 416) == answer.headers.get("content-range", "").startswith("bytes */")
     assert not list((Path(client.headers["x-data-folder"]) / "spool").iterdir())
+
+
+@ON_SQLITE
+@pytest.mark.parametrize("asked", ["lines=1-2", "bytes=1_0-2_0", "bytes=+1-+5", "bytes=a-b", "bytes=,", "all of it"])
+def test_a_range_that_says_nothing_of_bytes_is_ignored(
+    client: httpx.Client, fitted: Any, content: bytes, asked: str
+) -> None:
+    answer = client.get(f"/v1/grasp-logs/{fitted['id']}/file", headers={"range": asked})
+    assert (answer.status_code, answer.content) == (200, content)
 
 
 @ON_SQLITE
