@@ -36,8 +36,6 @@ def serve(
     _prepare(settings)
     chosen = configuration(settings)
     server = uvicorn.Server(chosen)
-    if settings.port:  # else uvicorn tells which one it got
-        logger.info("materials, grasp logs and jobs to look at: http://%s:%d/", settings.host, settings.port)
     server.run()
     if not server.started:  # its log says why
         error = getattr(getattr(chosen.app, "state", None), "start_error", None)

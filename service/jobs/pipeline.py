@@ -299,9 +299,8 @@ def _note_missing_moments(run: Run, material: str) -> None:
 def _store_models(run: Run, session: Session, material_id: int, models: Sequence[FrictionModel]) -> None:
     """Store the models and close the job, in one transaction with what they were fitted to; it names the first."""
     with run.timed("material"):
-        jobs.start_stage(
-            session, run.claim, "material", run.seconds
-        )  # before the models, of which a job may have one a method
+        # before the models, of which a job may have one a method
+        jobs.start_stage(session, run.claim, "material", run.seconds)
         _note_change(run, session, material_id, models[0])
         versions = [friction_models.add(session, material_id, run.job.id, to_new_model(model)) for model in models]
         if run.job.kind == "ingest":

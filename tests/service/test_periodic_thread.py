@@ -39,4 +39,6 @@ def test_a_step_that_sleeps_is_woken_when_it_is_to_end() -> None:
 
 
 def test_what_never_began_is_stopped_at_once() -> None:
-    asyncio.run(PeriodicThread("test", SOON, lambda: None).stop())
+    thread = PeriodicThread("test", SOON, lambda: None)
+    asyncio.run(asyncio.wait_for(thread.stop(), SOON))
+    assert thread.is_stopping
