@@ -103,9 +103,10 @@ def test_estimators_know_of_slipcore_only_its_samples_compiler_options_and_refer
 
 
 def test_estimators_know_of_the_client_only_its_model_and_how_far_that_is_to_be_trusted() -> None:
+    known = tuple(f"stiction_client.{name}" for name in ("model", "linear_friction", "support"))
     for path in sorted((ROOT / "estimators").rglob("*.py")):
         modules = {name for name in imported_modules(path) if name.split(".")[0] == "stiction_client"}
-        assert all(name.startswith(("stiction_client.model", "stiction_client.support")) for name in modules), path
+        assert all(name.startswith(known) for name in modules), path
 
 
 def test_one_module_decides_how_kernels_are_compiled_and_kept() -> None:

@@ -50,7 +50,8 @@ if TYPE_CHECKING:
         sdf_surface,
         urdf_gazebo,
     )
-    from stiction_client.model import Cost, Domain, FrictionModel, Scale, Scales
+    from stiction_client.linear_friction import Domain, Scale, Scales
+    from stiction_client.model import Cost, FrictionModel
     from stiction_client.planner import RequiredForce, RequiredForces, required_normal_force
     from stiction_client.records import (
         AuditEntry,
@@ -97,10 +98,10 @@ _LAZY = {
     "sdf_surface": "stiction_client.exports",
     "urdf_gazebo": "stiction_client.exports",
     "Cost": "stiction_client.model",
-    "Domain": "stiction_client.model",
+    "Domain": "stiction_client.linear_friction",
     "FrictionModel": "stiction_client.model",
-    "Scale": "stiction_client.model",
-    "Scales": "stiction_client.model",
+    "Scale": "stiction_client.linear_friction",
+    "Scales": "stiction_client.linear_friction",
     "RequiredForce": "stiction_client.planner",
     "RequiredForces": "stiction_client.planner",
     "required_normal_force": "stiction_client.planner",

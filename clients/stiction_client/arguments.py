@@ -3,7 +3,7 @@
 import numpy as np
 
 from stiction_client.errors import InvalidArgument
-from stiction_client.model import Number
+from stiction_client.linear_friction import Number
 
 
 def within(name: str, value: object, low: float, high: float, unit: str = "") -> Number:

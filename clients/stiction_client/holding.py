@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from stiction_client.model import Number
+from stiction_client.linear_friction import Number
 from stiction_client.quantile import FrictionQuantile, Truth
 
 MOST_STEPS = 200

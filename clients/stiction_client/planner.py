@@ -12,7 +12,8 @@ from stiction_client.arguments import within
 from stiction_client.contacts import AREAS, Contact, Contacts
 from stiction_client.errors import Cause, InvalidArgument, NoFeasibleForce
 from stiction_client.holding import LoadedContact, least, select
-from stiction_client.model import KINDS, FloatArray, FrictionModel, Number
+from stiction_client.linear_friction import KINDS, FloatArray, Number
+from stiction_client.model import FrictionModel
 from stiction_client.quantile import FrictionQuantile
 from stiction_client.support import Kind, kinds
 

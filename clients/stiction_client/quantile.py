@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stiction_client.errors import InvalidArgument
-from stiction_client.model import FloatArray, FrictionModel, Number
+from stiction_client.linear_friction import FloatArray, Number
+from stiction_client.model import FrictionModel
 from stiction_client.support import bend, beyond
 
 Truth = bool | np.bool_ | NDArray[np.bool_]

@@ -1,0 +1,207 @@
+"""The mathematics of ``μ = β₀ + β₁ v + β₂ f_n + ε``: one home for whoever has fitted it and whoever plans with it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from stiction_client.errors import InvalidArgument
+from stiction_client.support import Kind, Support, extrapolation, support, widening
+
+FloatArray = NDArray[np.float64]
+
+Number = float | FloatArray
+"""One float, or an array of any shape that broadcasts with the others."""
+
+KINDS = ("element", "contact")
+"""Whose friction a quantile may be of."""
+
+
+@dataclass(frozen=True, slots=True)
+class Domain:
+    """Range of the data behind a model: tangential velocity, m/s, and normal force of an element, N."""
+
+    tangential_velocity: tuple[float, float]
+    normal_force: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """A standard deviation as data tell it: ``value`` times a Student-t on ``degrees_of_freedom`` is what it draws."""
+
+    value: float
+    degrees_of_freedom: float
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "Scale":
+        """The scale in the service's answer."""
+        return cls(float(record["value"]), degrees_from_json(record["degrees_of_freedom"]))
+
+    def to_json(self) -> dict[str, float | None]:
+        """What ``from_json`` reads."""
+        return {"value": self.value, "degrees_of_freedom": degrees_to_json(self.degrees_of_freedom)}
+
+    def quantile(self, level: Number) -> Number:
+        """Quantile of one draw, in the shape of ``level``."""
+        from scipy import special  # takes longer to import than all else of this package
+
+        return cast(Number, self.value * special.stdtrit(self.degrees_of_freedom, level))
+
+
+@dataclass(frozen=True, slots=True)
+class Scales:
+    """How friction scatters: ``between_grasps`` τ, as a part of friction itself; ``between_places`` ω of a grasp and
+    ``within`` a place σ, as friction [-].
+    """
+
+    between_grasps: Scale
+    between_places: Scale
+    within: Scale
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "Scales":
+        """The scales in the service's answer."""
+        return cls(*(Scale.from_json(record[each.name]) for each in fields(cls)))
+
+    def to_json(self) -> dict[str, dict[str, float | None]]:
+        """What ``from_json`` reads."""
+        return {each.name: getattr(self, each.name).to_json() for each in fields(self)}
+
+
+class LinearFriction:
+    """What a fitted model answers, from fields that the records of it have, each with more of its own.
+
+    Bad arguments raise ``refusal``, which takes the thing's name, its value and what is allowed.
+    """
+
+    __slots__ = ()
+
+    refusal: ClassVar[type[ValueError]] = InvalidArgument
+
+    coefficients: FloatArray
+    covariance: FloatArray
+    scale: float
+    degrees_of_freedom: float
+    scatter_degrees_of_freedom: float
+    domain: Domain
+    identifiable: NDArray[np.bool_]
+    diagnostics: Mapping[str, Any]
+    scales: Scales | None
+
+    @property
+    def standard_errors(self) -> FloatArray:
+        """Standard errors of the coefficients, [3]."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    def interval(self, level: float = 0.95) -> FloatArray:
+        """Central interval of each coefficient at ``level``: [3, 2]."""
+        from scipy import special
+
+        self._check_probability("level", level)
+        half = special.stdtrit(self.degrees_of_freedom, 0.5 * (1.0 + level)) * self.standard_errors
+        return np.stack([self.coefficients - half, self.coefficients + half], axis=1)
+
+    def predict(
+        self,
+        tangential_velocity: ArrayLike,
+        normal_force: ArrayLike,
+        quantile: float | None = None,
+        of: str = "element",
+        elements: float | None = None,
+    ) -> FloatArray:
+        """Friction coefficient expected at v (m/s) and f_n (N an element), or a quantile of what a new grasp shows.
+
+        ``of``: one "element", or a "contact", whose friction is the mean over its ``elements``: scatter between grasps
+        stays, that between places and within them averages out. A model without ``scales`` takes all of its scatter
+        as shared.
+
+        The quantile includes the scatter and the uncertainty of the coefficients, whose distances from the mean add
+        as root of squares (Graybill & Wang 1980): exact where all have the same degrees of freedom, and not too narrow
+        in the tails where some have less. Outside the data the ``widening`` adds in the same way (``support.BEND``). No
+        quantile is below 0. Shapes broadcast. Raises ``refusal`` for a quantile outside (0, 1) and for a contact of no
+        elements.
+        """
+        from scipy import special
+
+        count = self._averaged_elements(of, elements)
+        v, f_n = np.broadcast_arrays(np.asarray(tangential_velocity, float), np.asarray(normal_force, float))
+        x = np.stack([np.ones_like(v), v, f_n], axis=-1)
+        mean = x @ self.coefficients
+        if quantile is None:
+            return mean
+        self._check_probability("quantile", quantile)
+        error = np.sqrt(np.maximum(np.einsum("...i,ij,...j->...", x, self.covariance, x), 0.0))
+        shared, own = self.scatter(quantile, count)
+        scatter = np.hypot(shared * mean, own)
+        uncertain = special.stdtrit(self.degrees_of_freedom, quantile) * error
+        distance = np.hypot(np.hypot(scatter, uncertain), special.ndtri(quantile) * widening(self, v, f_n))
+        return np.asarray(np.maximum(mean + np.sign(quantile - 0.5) * distance, 0.0))
+
+    def scatter(self, quantile: Number, elements: Number = 1.0) -> tuple[Number, Number]:
+        """How far scatter takes the mean over so many elements of a new grasp: a part of friction, and what adds [-].
+
+        The two add as root of squares. Shapes broadcast.
+        """
+        from scipy import special
+
+        if self.scales is None:
+            return 0.0, cast(Number, special.stdtrit(self.scatter_degrees_of_freedom, quantile) * self.scale)
+        place, within = self.scales.between_places.quantile(quantile), self.scales.within.quantile(quantile)
+        own = ((place * place + within * within) / elements) ** 0.5
+        return self.scales.between_grasps.quantile(quantile), own
+
+    def extrapolation(self, tangential_velocity: float, normal_force: float) -> str | None:
+        """Which of v (m/s) and f_n (N an element) lies outside the data behind the model; None where neither does.
+
+        Slower than the data is not outside: slip is never observed at rest, and a grasp that holds is the limit v → 0.
+        """
+        return extrapolation(self.domain, tangential_velocity, normal_force)
+
+    @property
+    def stale(self) -> str | None:
+        """Why this is not its material's model any more; None while it is, and where nobody can know."""
+        return None
+
+    def support_at(self, tangential_velocity: float, normal_force: float, stale: str | None = None) -> Support:
+        """What the answer at v (m/s) and f_n (N an element) rests on, and what to do about it.
+
+        ``stale``: why the model is not its material's any more, where the caller knows it and the model does not.
+        """
+        return support(self, tangential_velocity, normal_force, stale or self.stale)
+
+    @property
+    def support(self) -> Kind:
+        """What answers rest on at rest and in the middle of the normal forces observed (``support_at``)."""
+        return self.support_at(0.0, 0.5 * sum(self.domain.normal_force)).kind
+
+    @property
+    def advice(self) -> str:
+        """What to do about it."""
+        return self.support_at(0.0, 0.5 * sum(self.domain.normal_force)).advice
+
+    def _check_probability(self, name: str, value: float) -> None:
+        if not 0.0 < value < 1.0:
+            raise self.refusal(name, value, "above 0 and below 1")
+
+    def _averaged_elements(self, of: str, elements: float | None) -> float:
+        """Over how many elements the scatter of places averages out."""
+        if of not in KINDS:
+            raise self.refusal("of", of, " or ".join(KINDS))
+        if of == "element":
+            return 1.0
+        if elements is None or not 1.0 <= elements < math.inf:
+            raise self.refusal("elements", elements, "the number of elements of the contact, at least 1")
+        return float(elements)
+
+
+def degrees_from_json(value: float | None) -> float:
+    """Degrees of freedom as JSON has them: null is infinitely many, a normal distribution."""
+    return math.inf if value is None else float(value)
+
+
+def degrees_to_json(value: float) -> float | None:
+    """What ``degrees_from_json`` reads."""
+    return value if math.isfinite(value) else None
