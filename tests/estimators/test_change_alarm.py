@@ -23,7 +23,7 @@ def alarm_of(levels: list[float], variance: float = 1e-4) -> ChangeAlarm:
 def test_evidence_is_the_ratio_of_two_integrals() -> None:
     """Level, shift and τ by quadrature in place of closed forms."""
     levels, shift, variance, start = np.array([1.02, 0.97, 1.01, 0.83, 0.86]), 0.2, 1e-4, 3
-    side = np.linspace(-0.6, 0.6, 801)
+    side = np.linspace(-0.6, 0.6, 401)
     m, delta = np.meshgrid(0.95 + side, side)
     cell = (side[1] - side[0]) ** 2
 
