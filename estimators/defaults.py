@@ -403,6 +403,10 @@ class DesignSettings(Options):
     frame_rate: Annotated[float, Option(1.0, 1e5, "1/s", "paper, Section IV-A")] = 30.0
     drop_probability: Annotated[float, Option(1e-9, 0.5, "-", "one in a thousand probes")] = 1e-3
     """With which a probe may drop what it bears."""
+    least_speed: Annotated[float, Option(1e-6, 1.0, "m/s", "17 µm a frame at 30 fps: above markers' noise")] = 5e-4
+    """Slowest slip of a probe that a robot may choose unless it is told otherwise."""
+    least_length: Annotated[float, Option(1e-6, 1.0, "m", "about an element's pitch")] = 5e-4
+    """Shortest slip of a probe, in the same way."""
     slipping: Annotated[float, Option(0.01, 1.0, "-", "half way of the slip front")] = 0.5
     """Part of a contact's elements that slip in a probe."""
     force_spread: Annotated[float, Option(0.0, 2.0, "-", "Hertz's pressure: about 0.35 over its area")] = 0.3
@@ -415,6 +419,10 @@ class DesignSettings(Options):
     """Of a model, in parts of friction."""
 
 
+STEP_SHARES = (1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.001)
+"""Shares of a Newton step that Laplace's approximation tries at once: trials on skewed posteriors."""
+WEIGHT_POWERS = (1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02)
+"""Powers that flatten the weights of draws, the largest first: trials."""
 ROUNDING = 1e-12
 """Relative difference that is rounding."""
 NORMAL_MAD = 0.674489750196082

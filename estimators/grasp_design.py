@@ -25,7 +25,7 @@ NODES, WEIGHTS = np.array([-1.0, 0.0, 1.0]), np.array([1.0, 2.0, 1.0]) / 4.0
 """Of a grasp's places about their mean, in standard deviations over √2."""
 
 
-SPEEDS, LENGTHS = 5e-4 * 2.0 ** np.arange(4), 5e-4 * 2.0 ** np.arange(3)
+SPEEDS, LENGTHS = DESIGN.least_speed * 2.0 ** np.arange(4), DESIGN.least_length * 2.0 ** np.arange(3)
 """Of a probe's slip, m/s and m, that a robot may choose unless it is told otherwise."""
 
 

@@ -5,18 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from slipcore.defaults import COLLECTION
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.patch.friction import contact_friction
 from slipcore.patch.plateau import runs
 from slipcore.patch.record import ContactFriction, Patch
 from slipcore.samples import KIND, FrictionSamples, element_samples
 from slipcore.slip_state import SlipHistory
-
-AGREEMENT = 0.15
-"""Share by which the friction of elements, weakly or strongly pressed, may lie beyond the contact's interval: slopes
-that are real make a few per cent of it, forces that are smoothed 40 to 100."""
-LEAST_SAMPLES = 40
-"""Of elements from which quarters of them are compared."""
 
 
 class Collected(NamedTuple):
@@ -55,14 +50,14 @@ def contradiction(elements: FrictionSamples, contact: ContactFriction, patches: 
     """Why the elements cannot be right, if the contact is."""
     if contact.is_bound and _rolls(patches):
         return contact.reason
-    if len(elements) < LEAST_SAMPLES:
+    if len(elements) < COLLECTION.least_samples:
         return None
     low, high = np.quantile(elements.normal_force, [0.25, 0.75])
     weakly, strongly = (
         float(np.median(elements.friction_coefficient[chosen]))
         for chosen in (elements.normal_force <= low, elements.normal_force >= high)
     )
-    least, most = (1.0 - AGREEMENT) * contact.low, (1.0 + AGREEMENT) * contact.high
+    least, most = (1.0 - COLLECTION.agreement) * contact.low, (1.0 + COLLECTION.agreement) * contact.high
     if least <= min(weakly, strongly) and max(weakly, strongly) <= most:
         return None
     told = f"{'at least ' if contact.is_bound else ''}{contact.low if contact.is_bound else contact.coefficient:.2f}"

@@ -88,12 +88,62 @@ class MarkerDefaults(Options):
     """Sine of the angle between rows and columns; where markers cross them more narrowly, one is left out."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PatchDefaults(Options):
+    """What no user needs to choose of contact patches (``patch/``)."""
+
+    least_load_share: Annotated[float, Option(0.0, 1.0, "-", "elements that flicker bear less")] = 0.05
+    """Of the largest load of all patches together, that a patch must once bear."""
+    least_frames: Annotated[int, Option(1, 1000, "frames", "a rate needs as many")] = 4
+    """That a patch must last."""
+    rate_frames: Annotated[int, Option(3, 1000, "frames", "a line takes two, its error one more and one spare")] = 4
+    """In a window, for a rate with an error of its own."""
+    significant: Annotated[float, Option(0.0, 100.0, "standard errors", "3 σ")] = 3.0
+    """Of a rate, above which it is motion."""
+    aligned: Annotated[float, Option(0.0, 1.0, "-", "noise turns either by less than 37°")] = 0.8
+    """Least cosine between tangential force and motion of a patch that slides."""
+    least_spin: Annotated[float, Option(0.0, 10.0, "-", "what rolls turns less")] = 0.5
+    """Of a patch that pivots: rotation times radius of gyration, over the speed of its centre."""
+    least_square_arm: Annotated[
+        float, Option(0.0, 1.0, "-", "a patch no larger than the sensor's kernel tells no more")
+    ] = 0.25
+    """Mean square arm of the forces that act, as a share of that of the smoothed ones, at least."""
+    descents: Annotated[int, Option(1, 100_000, "steps", "bound")] = 100
+    """Of the search for the load ratio."""
+    settled: Annotated[float, Option(0.0, 0.1, "-", "0.1 %: far below what forces are known to")] = 1e-4
+    """Relative descent at which that search ends."""
+    still: Annotated[float, Option(1e-15, 1e-3, "-", "a weight must not overflow")] = 1e-9
+    """Share of the fastest motion below which an element counts as the motion's centre."""
+    rank: Annotated[float, Option(1e-16, 1e-3, "-", "rounding")] = 1e-14
+    """Least singular value of the friction matrix, as a share of the largest."""
+    free_motion: Annotated[float, Option(0.0, 0.1, "-", "far above rounding, far below any load")] = 1e-6
+    """Share of a load that may be missed before some motion is taken to meet no friction."""
+    rounding: Annotated[float, Option(0.0, 1e-3, "-", "rounding of times")] = 1e-9
+    """By which a window is widened, so that frames at its ends count."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CollectionDefaults(Options):
+    """When the friction of elements contradicts that of their contact (``collection.py``)."""
+
+    agreement: Annotated[
+        float, Option(0.0, 10.0, "-", "slopes that are real make a few per cent of it, smoothed forces 40 to 100")
+    ] = 0.15
+    """Share by which the friction of elements, weakly or strongly pressed, may lie beyond the contact's interval."""
+    least_samples: Annotated[int, Option(4, 1_000_000, "samples", "quarters of ten samples")] = 40
+    """Of elements, from which quarters of them are compared."""
+
+
 DEVIATION_TO_SIGMA = 1.4826022185056018
 """1/Φ⁻¹(¾): median absolute deviation of a normal distribution to its standard deviation."""
+NORMAL_95 = 1.959963984540054
+"""Φ⁻¹(0.975): half-width of the 95 % interval of a normal distribution in standard deviations."""
 NOISE = NoiseDefaults()
 NUMERICS = NumericsDefaults()
 MARKERS = MarkerDefaults()
-TABLES = (NOISE, NUMERICS, MARKERS)
+PATCHES = PatchDefaults()
+COLLECTION = CollectionDefaults()
+TABLES = (NOISE, NUMERICS, MARKERS, PATCHES, COLLECTION)
 """What is not an option of a method."""
 
 

@@ -11,18 +11,20 @@ import pytest
 import estimators.defaults
 import slipcore.contact.defaults
 import slipcore.defaults
+import slipcore.forces.defaults
 from slipcore import METHODS, CheckOptions, SampleOptions
 from slipcore.options import Options, describe_options
 
 ROOT = Path(__file__).parents[1]
-MODULES = (slipcore.defaults, slipcore.contact.defaults, estimators.defaults)
-ROOMS = ("slipcore/detection", "slipcore/contact", "slipcore/checks", "estimators")
+MODULES = (slipcore.defaults, slipcore.contact.defaults, slipcore.forces.defaults, estimators.defaults)
+PACKAGES = ("slipcore", "estimators")
 BASES = {Options, slipcore.defaults.ContactOptions}
 KINDS = [SampleOptions, CheckOptions, slipcore.defaults.PatchOptions, *(method.options for method in METHODS.values())]
 KINDS += [type(table) for module in MODULES for table in module.TABLES]
 
 NOT_TUNED = {
     "slipcore/contact/elasticity/fields.py": "weights of a linear interpolation",
+    "slipcore/warm_up.py": "a log to compile kernels with, of which no result is kept",
     "estimators/likelihoods/kernels.py": "series of the logarithm and exponential, layout of a double",
 }
 """Files whose numbers are mathematics."""
@@ -44,6 +46,7 @@ LAYOUT = {
     "slipcore/detection/strain_rate/step.py": {"ROWS"},
     "slipcore/contact/solver/tangent_space.py": {"OUTSIDE", "STICK", "SLIP"},
     "slipcore/detection/shared/contact.py": {"CURVATURE_NOISE"},
+    "slipcore/patch/regions.py": {"NOWHERE"},
     "estimators/sampling/proposal.py": {"TINY"},
 }
 """Names of rows, states and mathematical constants."""
@@ -84,26 +87,27 @@ def bare_constants(source: str) -> set[str]:
     """Names at a module's top that are given plain numbers."""
     found: set[str] = set()
     for node in ast.parse(source).body:
-        if isinstance(node, ast.Assign) and is_plain(node.value):
-            found |= {name.id for target in node.targets for name in ast.walk(target) if isinstance(name, ast.Name)}
+        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None and is_plain(node.value):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            found |= {name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)}
     return found
 
 
 def bare_numbers(source: str) -> list[str]:
-    """Decimals inside of functions and classes that no plain formula has: other than whole numbers of quarters."""
-    bodies = [node for node in ast.parse(source).body if isinstance(node, ast.FunctionDef | ast.ClassDef)]
+    """Decimals that no plain formula has, other than whole numbers of quarters; without ``bare_constants``."""
+    parts = [node for node in ast.parse(source).body if not is_plain(getattr(node, "value", None) or ast.Pass())]
     return [
         f"line {number.lineno}: {number.value}"
-        for body in bodies
-        for number in numbers(body)
+        for part in parts
+        for number in numbers(part)
         if isinstance(number.value, float) and not (number.value <= 1e6 and (4.0 * number.value).is_integer())
     ]
 
 
 def sources() -> Iterator[tuple[str, str]]:
-    """Every file of these rooms but the tables and what has no tuning, with its text."""
-    for room in ROOMS:
-        for path in sorted((ROOT / room).rglob("*.py")):
+    """Every file of these packages but the tables and what has no tuning, with its text."""
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).rglob("*.py")):
             name = str(path.relative_to(ROOT))
             if path.name != "defaults.py" and "/reference/" not in name and name not in NOT_TUNED:
                 yield name, path.read_text(encoding="utf-8")
@@ -116,7 +120,15 @@ def test_no_number_that_changes_results_stands_outside_of_the_tables() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["LIMIT = 3", "NEAR, FAR = 1.0, -2.0", "def f(x):\n    return x > 1e-3", "class A:\n    b: float = 0.1"]
+    "text",
+    [
+        "LIMIT = 3",
+        "LIMIT: float = 3.0",
+        "NEAR, FAR = 1.0, -2.0",
+        "SPEEDS = 5e-4 * np.arange(4)",
+        "def f(x):\n    return x > 1e-3",
+        "class A:\n    b: float = 0.1",
+    ],
 )
 def test_a_bare_number_is_found(text: str) -> None:
     assert bare_constants(text) or bare_numbers(text)

@@ -5,15 +5,11 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.defaults import PROPOSAL
+from estimators.defaults import PROPOSAL, STEP_SHARES
 from estimators.sampling.proposal import evenness, flattened, root_of, standard
 
 FloatArray = NDArray[np.float64]
 LogDensity = Callable[[FloatArray], FloatArray]
-
-
-LENGTHS = np.array([1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.001])
-"""Shares of a Newton step that are tried at once."""
 
 
 def laplace(log_density: LogDensity, start: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -30,9 +26,9 @@ def laplace(log_density: LogDensity, start: FloatArray) -> tuple[FloatArray, Flo
         spread = vectors / np.sqrt(np.maximum(values, PROPOSAL.flattest**-2))
         step = spread @ (spread.T @ gradient)
         size = float(np.linalg.norm(spread.T @ gradient))
-        lengths = np.concatenate(
-            [LENGTHS, LENGTHS * PROPOSAL.longest_step / max(size, PROPOSAL.longest_step)]
-        )  # far away, only so far at once
+        shares = np.array(STEP_SHARES)
+        within = shares * PROPOSAL.longest_step / max(size, PROPOSAL.longest_step)  # far away, only so far at once
+        lengths = np.concatenate([shares, within])
         trial = mode + lengths[:, None] * (root @ step)
         heights = log_density(np.vstack([trial, mode]))
         best = int(np.nanargmax(heights))

@@ -6,15 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from estimators.defaults import PROPOSAL, SAMPLING
+from estimators.defaults import PROPOSAL, SAMPLING, WEIGHT_POWERS
 
 FloatArray = NDArray[np.float64]
 Random = np.random.Generator | np.random.RandomState
 
 TINY = 1e-100
 """Weight of a component that nothing came near; its inverse square is farther off than any other."""
-POWERS = np.array([1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02])
-"""Powers of the weights that are tried, the largest first."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +81,8 @@ def standard(dimension: int) -> StudentMixture:
 
 def flattened(log_weight: FloatArray) -> FloatArray:
     """Weights [k] raised to the largest power at which enough of them count."""
-    power = next((power for power in POWERS if evenness(power * log_weight) > PROPOSAL.enough), POWERS[-1])
+    enough = (power for power in WEIGHT_POWERS if evenness(power * log_weight) > PROPOSAL.enough)
+    power = next(enough, WEIGHT_POWERS[-1])
     return np.asarray(np.exp(power * (log_weight - log_weight.max())))
 
 

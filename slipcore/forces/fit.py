@@ -5,16 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
+from slipcore.forces.defaults import FIT
 from slipcore.forces.nodes import Nodes
-from slipcore.forces.prior import CHOICES, USUAL, Smoothness, factors
+from slipcore.forces.prior import Smoothness, choices, factors, usual
 from slipcore.forces.strength import Criterion, Spectrum
 from slipcore.frames import BoolArray, FloatArray
-
-ROUNDS = 30
-"""Changes of the set of nodes without pressure until it is given up to look for a better one."""
-PULL = 0.05
-"""Share of the largest pressure by which any may seem to pull: so far bilinear pressures overshoot at a contact's rim,
-and to forbid it costs 0.3 % of the normal force."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +48,7 @@ class Fit:
     prior_root: FloatArray
 
     def traction(self, data: FloatArray) -> FloatArray:
-        """The most probable tractions [3, j] that do not pull but for ``PULL``, given data [m].
+        """The most probable tractions [3, j] that pull no more than ``FIT.tension`` allows, given data [m].
 
         A quadratic programme, solved by active sets: pressures below the bound are conditioned on lying at it, and
         freed again where they would push.
@@ -61,10 +56,10 @@ class Fit:
         mean = self.operator @ data
         first = len(mean) * 2 // 3
         pressure = self.root[first:]
-        excess = mean[first:] + PULL * max(float(mean[first:].max()), 0.0)
+        excess = mean[first:] + FIT.tension * max(float(mean[first:].max()), 0.0)
         held, change = np.zeros(len(excess), dtype=bool), np.zeros(len(mean))
-        for _ in range(ROUNDS):
-            wrong = (excess + change[first:] < -1e-9 * np.abs(excess).max()) & ~held
+        for _ in range(FIT.rounds):
+            wrong = (excess + change[first:] < -FIT.rounding * np.abs(excess).max()) & ~held
             if held.any():
                 wrong[np.flatnonzero(held)[_push(pressure[held], excess[held]) > 0.0]] = True
             if not wrong.any():
@@ -137,8 +132,9 @@ def choose_prior(
         strength = spectrum.choose(y, rest, len(data), by)
         return spectrum.log_evidence(y, strength), strength
 
-    best, evidence = USUAL, judge(USUAL, "evidence")[0]
-    for name, values in CHOICES.items():
+    best = usual()
+    evidence = judge(best, "evidence")[0]
+    for name, values in choices().items():
         for value in values:
             other = best._replace(**{name: value})
             if other != best and (found := judge(other, "evidence")[0]) > evidence:

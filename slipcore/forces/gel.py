@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from slipcore.errors import InvalidInput
+from slipcore.forces.defaults import GEL
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,10 +19,13 @@ class Gel:
     marker_depth: float = 0.0
 
     def __post_init__(self) -> None:
-        _check("young_modulus", self.young_modulus, 1e2 <= self.young_modulus <= 1e12, "100 to 1e12 Pa")
+        softest, stiffest = GEL.young_modulus
+        inside = softest <= self.young_modulus <= stiffest
+        _check("young_modulus", self.young_modulus, inside, f"{softest:g} to {stiffest:g} Pa")
         _check("poisson_ratio", self.poisson_ratio, 0.0 <= self.poisson_ratio <= 0.5, "0 to 0.5")
-        _check("thickness", self.thickness, self.thickness >= 1e-6, "1e-6 m or more, inf for a half-space")
-        inside = 0.0 <= self.marker_depth < min(self.thickness, 1.0)
+        thick = self.thickness >= GEL.thickness
+        _check("thickness", self.thickness, thick, f"{GEL.thickness:g} m or more, inf for a half-space")
+        inside = 0.0 <= self.marker_depth < min(self.thickness, GEL.marker_depth)
         _check("marker_depth", self.marker_depth, inside, f"0 m to less than the thickness, {self.thickness:g} m")
 
 

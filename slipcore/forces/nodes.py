@@ -6,12 +6,8 @@ import numpy as np
 
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.errors import InvalidInput
+from slipcore.forces.defaults import NODES
 from slipcore.frames import FloatArray
-
-MARGIN = 4
-"""Nodes beyond the outermost markers: a contact that the lattice cuts acts on its markers from there, too."""
-MOST_NODES = 20_000
-"""More would take over 10 GB of memory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,16 +18,16 @@ class Nodes:
 
     @classmethod
     def around(cls, position: FloatArray, element_area: float) -> "Nodes":
-        """Nodes one to an element of markers at ``position`` [j, 2] m, and ``MARGIN`` rows more on every side.
+        """Nodes one to an element of markers at ``position`` [j, 2] m, and ``NODES.margin`` rows more on every side.
 
         Raises ``InvalidInput`` where elements are far smaller than the markers lie apart.
         """
         pitch = float(np.sqrt(element_area))
         low, high = position.min(axis=0), position.max(axis=0)
-        nx, ny = (round(side / pitch) + 1 + 2 * MARGIN for side in high - low)
-        if nx * ny > MOST_NODES:
+        nx, ny = (round(side / pitch) + 1 + 2 * NODES.margin for side in high - low)
+        if nx * ny > NODES.most:
             raise InvalidInput(
-                "element_area", f"{element_area:.3g} m²", f"an area that needs at most {MOST_NODES} nodes"
+                "element_area", f"{element_area:.3g} m²", f"an area that needs at most {NODES.most} nodes"
             )
         x, y = 0.5 * (low + high)
         return cls(Grid((ny, nx), (pitch, pitch), (float(x), float(y))))

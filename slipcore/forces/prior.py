@@ -4,10 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from slipcore.forces.defaults import PRIOR
 from slipcore.frames import FloatArray
-
-JITTER = 1e-8
-"""Added to the correlation of a node with itself, so that nodes much closer than a length stay distinct."""
 
 
 class Smoothness(NamedTuple):
@@ -21,14 +19,19 @@ class Smoothness(NamedTuple):
     shear: float
 
 
-CHOICES: dict[str, tuple[float, ...]] = {
-    "pressure": (3.0, 6.0, 12.0),
-    "traction": (1.5, 3.0, 6.0),
-    "shear": (0.1, 0.3, 1.0),
-}
-"""Values of a prior's shape among which the data choose."""
-USUAL = Smoothness(6.0, 3.0, 0.3)
-"""Where the choice begins, and what is taken where nothing is chosen."""
+def usual() -> Smoothness:
+    """Where the choice begins, and what is taken where nothing is chosen."""
+    return Smoothness(PRIOR.pressure_length, PRIOR.traction_length, PRIOR.shear)
+
+
+def choices() -> dict[str, tuple[float, ...]]:
+    """Values of each property of a prior's shape among which the data choose."""
+    pressure, traction, shear = usual()
+    return {
+        "pressure": (pressure / PRIOR.length_factor, pressure, pressure * PRIOR.length_factor),
+        "traction": (traction / PRIOR.length_factor, traction, traction * PRIOR.length_factor),
+        "shear": (PRIOR.least_shear, shear, PRIOR.largest_shear),
+    }
 
 
 def factors(places: FloatArray, pitch: float, smoothness: Smoothness) -> FloatArray:
@@ -42,4 +45,4 @@ def factors(places: FloatArray, pitch: float, smoothness: Smoothness) -> FloatAr
 
 def _factor(apart: FloatArray) -> FloatArray:
     reach = np.sqrt(3.0) * apart
-    return np.linalg.cholesky((1.0 + reach) * np.exp(-reach) + JITTER * np.eye(len(apart)))
+    return np.linalg.cholesky((1.0 + reach) * np.exp(-reach) + PRIOR.jitter * np.eye(len(apart)))

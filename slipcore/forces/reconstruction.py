@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from slipcore.errors import InvalidInput, UnknownScale
+from slipcore.forces.defaults import RECONSTRUCTION
 from slipcore.forces.fit import Fit, Observation, Prior, choose_prior, fit
 from slipcore.forces.gel import Gel
 from slipcore.forces.nodes import Nodes
@@ -14,22 +15,6 @@ from slipcore.forces.strength import Criterion
 from slipcore.forces.support import better_support, relevant_nodes, widened
 from slipcore.forces.whole_lattice import WholeLattice, whole_lattice
 from slipcore.frames import BoolArray, FloatArray, GraspLog
-
-DISCRETISATION = 1e-3
-"""Error of bilinear tractions one to a marker, as a share of a frame's largest displacement: up to 1 µm of 1 mm."""
-CHANGE = 0.1
-"""Change of the displacement, as a share of it, after which the contact is sought anew."""
-SIGNIFICANT = 5.0
-"""Standard deviations by which a frame's mean square must exceed that of noise for something to touch."""
-PRESSES, LEAST_PRESSURE = 3.0, 0.03
-"""Standard deviations of a node's pressure, and share of the frame's largest, above which it may be in contact."""
-TOUCHES, LEAST_FORCE = 2.0, 0.06
-"""The same of an element's normal force, above which it is said to be in contact."""
-MODEL_ERROR = (2e-3, 1e-2)
-"""Standard deviation of what bilinear tractions and the shape of the contact leave wrong: of a resultant as a share of
-it, of an element's force as a share of the largest."""
-FORCE_TOLERANCE = 0.01
-"""Standard deviation of a given total force, as a share of it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,19 +155,21 @@ class _Recording:
         """Frames [t] in which markers moved by more than noise."""
         count = np.maximum(self.seen.sum(axis=1), 1)
         power = np.sum(np.where(self.seen, self.data, 0.0) ** 2, axis=1) / count
-        return np.asarray(power > self.sensor.noise**2 * (1.0 + SIGNIFICANT * np.sqrt(2.0 / count)))
+        return np.asarray(power > self.sensor.noise**2 * (1.0 + RECONSTRUCTION.significant * np.sqrt(2.0 / count)))
 
     def frame(self, t: int) -> tuple[Observation, FloatArray]:
         """What one frame tells: displacements, then the parts of its resultant that are given."""
         data, given = self.data[t], self.given[t]
-        error = np.hypot(self.sensor.noise, DISCRETISATION * np.abs(data[self.seen[t]]).max(initial=0.0))
+        largest = np.abs(data[self.seen[t]]).max(initial=0.0)
+        error = np.hypot(self.sensor.noise, RECONSTRUCTION.discretisation * largest)
         known = np.flatnonzero(np.isfinite(given))
         if not known.size and self.seen[t].all():
             return Observation(self.sensor.response, np.full(len(data), error)), data
         rows = np.zeros((len(known), *self.sensor.response.shape[1:]))
         rows[np.arange(len(known)), known] = self.sensor.load
-        largest = np.nanmax(np.abs(self.given), initial=1e-9)
-        tolerance = FORCE_TOLERANCE * np.maximum(np.abs(given[known]), FORCE_TOLERANCE * largest)
+        share = RECONSTRUCTION.force_tolerance
+        largest = np.nanmax(np.abs(self.given), initial=RECONSTRUCTION.least_force)
+        tolerance = share * np.maximum(np.abs(given[known]), share * largest)
         noise = np.concatenate((np.where(self.seen[t], error, np.inf), tolerance))
         return Observation(np.concatenate((self.sensor.response, rows)), noise), np.concatenate((data, given[known]))
 
@@ -200,7 +187,7 @@ class _Key:
         if len(data) != len(self.data) or ((observation.noise == np.inf) != (self.observation.noise == np.inf)).any():
             return False
         change, before = (data - self.data) / self.observation.noise, self.data / self.observation.noise
-        return bool(np.linalg.norm(change) <= CHANGE * np.linalg.norm(before))
+        return bool(np.linalg.norm(change) <= RECONSTRUCTION.change * np.linalg.norm(before))
 
     def misfit(self, traction: FloatArray, data: FloatArray) -> float:
         """Root mean square of the residuals over their noise, at least 1."""
@@ -250,7 +237,8 @@ class _Tracker:
 def _pressed(lattice: WholeLattice, data: FloatArray, shape: tuple[int, int]) -> BoolArray:
     """Nodes [ny, nx] with a pressure that is not noise, and one row around them; never none."""
     pressure, deviation = lattice.operator[2] @ data, lattice.deviation[2]
-    least = np.maximum(PRESSES * deviation, LEAST_PRESSURE * pressure.max())
+    noise = RECONSTRUCTION.node_significance * deviation
+    least = np.maximum(noise, RECONSTRUCTION.node_share * pressure.max())
     pressed = (pressure > least) | (pressure == pressure.max())
     return widened(pressed.reshape(shape), 1)
 
@@ -278,12 +266,14 @@ def _write(result: Reconstruction, t: int, sensor: _Sensor, key: _Key, data: Flo
     outward = np.array([1.0, 1.0, -1.0])
     misfit = key.misfit(traction, data)
     force = (elements @ traction.T) * outward
-    of_all, of_element = MODEL_ERROR
-    deviation = np.hypot(misfit * key.fit.deviation(elements).T, of_element * np.abs(force).max())
+    of_element = RECONSTRUCTION.element_error * np.abs(force).max()
+    deviation = np.hypot(misfit * key.fit.deviation(elements).T, of_element)
     result.force[t], result.deviation[t] = force.reshape(*grid, 3), deviation.reshape(*grid, 3)
     result.resultant[t] = sensor.load * traction.sum(axis=1) * outward
+    of_all = RECONSTRUCTION.resultant_error * np.linalg.norm(result.resultant[t])
     total = sensor.load * key.fit.deviation(np.ones((1, elements.shape[1])))[:, 0]
-    result.resultant_deviation[t] = np.hypot(misfit * total, of_all * np.linalg.norm(result.resultant[t]))
-    normal = -force[:, 2]
-    least = np.maximum(TOUCHES * deviation[:, 2], LEAST_FORCE * normal.max())
-    result.contact[t] = ((normal > least) & (elements.sum(axis=1) > 0.5 * sensor.load)).reshape(grid)
+    result.resultant_deviation[t] = np.hypot(misfit * total, of_all)
+    normal, covered = -force[:, 2], elements.sum(axis=1) > RECONSTRUCTION.covered * sensor.load
+    noise = RECONSTRUCTION.element_significance * deviation[:, 2]
+    touches = normal > np.maximum(noise, RECONSTRUCTION.element_share * normal.max())
+    result.contact[t] = (touches & covered).reshape(grid)

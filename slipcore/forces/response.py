@@ -8,15 +8,10 @@ from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import ElasticBody, HalfSpace
 from slipcore.contact.elasticity.interior import Below, Interior
 from slipcore.contact.elasticity.operator import ElasticOperator
+from slipcore.forces.defaults import RESPONSE
 from slipcore.forces.gel import Gel
 from slipcore.forces.nodes import Nodes
 from slipcore.frames import FloatArray
-
-CELLS = 7
-"""Cells a pitch, an odd number, of which hat functions are made and between which is interpolated."""
-FINER, NEAR = 7, 3
-"""Within ``NEAR`` pitches of a hat function it is made of ``FINER`` times as small cells: 2e-4 of the response at its
-peak, where ``CELLS`` alone leave 1e-2."""
 
 ODD_X, ODD_Y = frozenset({"xy", "zx", "xz"}), frozenset({"xy", "zy", "yz"})
 """Components that change their sign with x, and with y."""
@@ -28,14 +23,15 @@ def response_matrix(gel: Gel, nodes: Nodes, position: FloatArray) -> FloatArray:
     ``position`` [j, 2] m: markers at rest, at the gel's ``marker_depth``. Directions are x, y and *into* the gel, of
     displacement first and of traction (x, y, pressure) last. Normal and tangential directions are coupled.
     """
-    pitch = nodes.grid.pitch[0]
-    offset = (position[:, None, :] - nodes.places()[None]) / (pitch / CELLS)
+    pitch, cells, finer = nodes.grid.pitch[0], RESPONSE.cells, RESPONSE.finer
+    offset = (position[:, None, :] - nodes.places()[None]) / (pitch / cells)
     reach = int(np.ceil(np.abs(offset).max())) + 3  # a cubic spline ends three cells beyond
-    far, near = hat_responses(gel, pitch, CELLS, reach), hat_responses(gel, pitch, CELLS * FINER, NEAR * CELLS * FINER)
-    middle = (slice(reach - NEAR * CELLS, reach + NEAR * CELLS + 1),) * 2
+    close = RESPONSE.near * cells
+    far, near = hat_responses(gel, pitch, cells, reach), hat_responses(gel, pitch, cells * finer, close * finer)
+    middle = (slice(reach - close, reach + close + 1),) * 2
     matrix = np.empty((3, len(position), 3, len(nodes)))
     for component, table in far.items():
-        table[middle] = near[component][::FINER, ::FINER]
+        table[middle] = near[component][::finer, ::finer]
         value = map_coordinates(table, [offset[..., 1] + reach, offset[..., 0] + reach], order=3)
         for to, by in _places(component):
             matrix[to, :, by] = value
@@ -84,7 +80,7 @@ def _by_hats(kernel: FloatArray, cells: int) -> FloatArray:
     """Response to a hat function of ``cells`` cells half-width, from that to one cell; without the cells it reaches."""
     weight = 1.0 - np.abs(np.arange(-cells, cells + 1)) / cells
     weight[cells] -= 0.25 / cells  # means of the hat over the cell in its middle
-    weight[[0, -1]] = 0.125 / cells  # and over those at its foot
+    weight[[0, -1]] = 1.0 / (8.0 * cells)  # and over those at its foot
     for axis in (0, 1):
         kernel = convolve1d(kernel, weight, axis=axis)
     return np.ascontiguousarray(kernel[cells:-cells, cells:-cells])

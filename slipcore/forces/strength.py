@@ -13,14 +13,10 @@ import scipy.linalg
 from scipy.optimize import minimize_scalar
 
 from slipcore.errors import InvalidInput
+from slipcore.forces.defaults import STRENGTH
 from slipcore.frames import FloatArray
 
 Criterion = Literal["evidence", "gcv", "discrepancy"]
-
-
-MOST_STRENGTH = 1.0
-"""Standard deviation of pressure in Young's moduli: linear elasticity ends far below, and a model that misses what the
-data show must not explain it by pressures that no gel bears."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +38,7 @@ class Spectrum:
         return float(self.s[0] / self.s[-1]) if self.s[-1] > 0.0 else np.inf
 
     def choose(self, data: FloatArray, rest: float, count: int, criterion: Criterion) -> float:
-        """The strength that a criterion prefers for whitened data [m], up to ``MOST_STRENGTH``.
+        """The strength that a criterion prefers for whitened data [m], up to ``STRENGTH.largest``.
 
         ``rest``: sum of squares of further data that no coefficient reaches; ``count`` of all data. Raises
         ``InvalidInput`` for a criterion unknown.
@@ -54,8 +50,8 @@ class Spectrum:
         def price(log_strength: float) -> float:
             return CRITERIA[criterion](self.s, y, rest, count, float(np.exp(log_strength)))
 
-        low, high = np.log(min(1e-2 / self.s[0], 1e-3 * MOST_STRENGTH)), np.log(MOST_STRENGTH)
-        grid = np.linspace(low, high, 41)
+        least = min(STRENGTH.least_signal / self.s[0], STRENGTH.least_share * STRENGTH.largest)
+        grid = np.linspace(np.log(least), np.log(STRENGTH.largest), STRENGTH.grid)
         best = int(np.argmin([price(at) for at in grid]))
         around = (grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)])
         return float(np.exp(minimize_scalar(price, bounds=around, method="bounded").x))

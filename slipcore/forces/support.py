@@ -13,23 +13,11 @@ import numpy as np
 import scipy.linalg
 from scipy.ndimage import binary_closing, binary_dilation, binary_erosion, convolve1d, generate_binary_structure
 
+from slipcore.forces.defaults import STRENGTH, SUPPORT
 from slipcore.forces.fit import Observation, Prior, log_evidence
 from slipcore.forces.nodes import Nodes
-from slipcore.forces.strength import MOST_STRENGTH
 from slipcore.frames import BoolArray, FloatArray
 
-MOST_ROUNDS = 40
-LEAST_SHARE = 1e-3
-"""Variance, as a share of the largest, under which a node is left out."""
-SETTLED = 0.02
-"""Mean change of the logarithms of variances at which they have converged."""
-SHEAR = 0.3
-"""Standard deviation of a tangential component over that of pressure: of the size of friction coefficients."""
-COUPLING = (0.1, 1.0, 0.1)
-"""Weights of a node and of those beside it, along each axis. Without them every other node of a contact is left out;
-with (¼, 1, ¼) the contact grows by half an element more."""
-
-MOST_STEPS = 6
 STEPS: tuple[Callable[[BoolArray], BoolArray], ...] = (binary_dilation, binary_erosion, binary_closing)
 """How a contact may change: by one row of nodes at its rim, or over a gap."""
 
@@ -37,19 +25,19 @@ STEPS: tuple[Callable[[BoolArray], BoolArray], ...] = (binary_dilation, binary_e
 def relevant_nodes(observation: Observation, data: FloatArray, candidates: BoolArray) -> BoolArray:
     """Nodes [ny, nx] among ``candidates`` that displacement ``data`` [m] m needs."""
     chosen = np.flatnonzero(candidates)
-    scale = np.array([SHEAR, SHEAR, 1.0])[:, None]
+    scale = np.array([SUPPORT.shear, SUPPORT.shear, 1.0])[:, None]
     used = observation.response[:, :, chosen] * (scale / observation.noise[:, None, None])
     data = data / observation.noise
     variance = np.full(len(chosen), float(data @ data) / float(np.sum(used**2)))
-    for _ in range(MOST_ROUNDS):
+    for _ in range(SUPPORT.rounds):
         gain, freedom = _explained(used, data, np.sqrt(variance))
         new = _pooled(variance * gain, chosen, candidates.shape)
-        new /= np.maximum(_pooled(freedom, chosen, candidates.shape), 1e-12)
-        new = np.minimum(new, MOST_STRENGTH**2)
-        kept = new > LEAST_SHARE * new.max()
+        new /= np.maximum(_pooled(freedom, chosen, candidates.shape), SUPPORT.least_freedom)
+        new = np.minimum(new, STRENGTH.largest**2)
+        kept = new > SUPPORT.least_share * new.max()
         change = float(np.abs(np.log(new[kept] / variance[kept])).mean())
         chosen, used, variance = chosen[kept], used[:, :, kept], new[kept]
-        if change < SETTLED:
+        if change < SUPPORT.settled:
             break
     support = np.zeros(candidates.shape, dtype=bool)
     support.flat[chosen] = True
@@ -65,7 +53,7 @@ def better_support(
         return log_evidence(observation, data, nodes, of.ravel(), prior)
 
     best, most = support, evidence(support)
-    for _ in range(MOST_STEPS):
+    for _ in range(SUPPORT.steps):
         others = [change(best) for change in STEPS]
         judged = [(evidence(other), i) for i, other in enumerate(others) if other.any() and (other != best).any()]
         found, which = max(judged, default=(-np.inf, 0))
@@ -83,11 +71,11 @@ def widened(nodes: BoolArray, by: int) -> BoolArray:
 def _pooled(
     values: FloatArray, chosen: np.ndarray[tuple[int], np.dtype[np.intp]], shape: tuple[int, ...]
 ) -> FloatArray:
-    """Sums of values of the chosen nodes with their neighbours', weighted by ``COUPLING``."""
+    """Sums of values of the chosen nodes with their neighbours', weighted by ``SUPPORT.coupling``."""
     field = np.zeros(shape)
     field.flat[chosen] = values
     for axis in (0, 1):
-        field = convolve1d(field, COUPLING, axis=axis, mode="constant")
+        field = convolve1d(field, (SUPPORT.coupling, 1.0, SUPPORT.coupling), axis=axis, mode="constant")
     return np.asarray(field.flat[chosen])
 
 

@@ -9,14 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
+from slipcore.forces.defaults import LATTICE
 from slipcore.forces.fit import Observation
 from slipcore.forces.nodes import Nodes
-from slipcore.forces.prior import USUAL, factors
+from slipcore.forces.prior import factors, usual
 from slipcore.frames import FloatArray
-
-LOCAL = 5.0
-"""Prior standard deviation over that which explains the displacement if the whole lattice were loaded alike: contacts
-cover a twentieth of it and more."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,11 +30,11 @@ def whole_lattice(observation: Observation, nodes: Nodes, typical: float) -> Who
     Of the m × m covariance of the data only the triangular factor is made, by QR: no condition number is squared.
     """
     m, _, k = observation.response.shape
-    root = factors(nodes.places(), nodes.grid.pitch[0], USUAL)
+    root = factors(nodes.places(), nodes.grid.pitch[0], usual())
     whitened = observation.response / observation.noise[:, None, None]
     spread = np.concatenate([whitened[:, axis] @ root[axis] for axis in range(3)], axis=1)
     level = typical / float(np.median(observation.noise))
-    strength = LOCAL * level * np.sqrt(m) / float(np.linalg.norm(spread))
+    strength = LATTICE.concentration * level * np.sqrt(m) / float(np.linalg.norm(spread))
     stacked = np.concatenate((strength * spread.T, np.eye(m)))
     upper = scipy.linalg.qr(stacked, mode="r", overwrite_a=True, check_finite=False)[0][:m]
     seen = scipy.linalg.solve_triangular(upper, strength * spread, trans="T", check_finite=False)

@@ -6,7 +6,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from slipcore.defaults import PatchOptions, choose_options
+from slipcore.defaults import PATCHES, PatchOptions, choose_options
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.patch.motion import Stretch, motion_over_markers
 from slipcore.patch.plateau import find_plateaus
@@ -18,11 +18,6 @@ from slipcore.patch.resultants import Resultants, resultants
 from slipcore.samples import normals_of
 
 Scalar = TypeVar("Scalar", bound=np.generic)
-
-LEAST_SHARE = 0.05
-"""Of the largest load of all patches together that one must once bear, or it is an element that flickers."""
-LEAST_FRAMES = 4
-"""Frames that a patch lasts."""
 
 
 def follow_patches(log: GraspLog, contact: BoolArray, slip: BoolArray, **options: float) -> tuple[Patch, ...]:
@@ -47,8 +42,8 @@ def _that_matter(labels: NDArray[np.int64], count: int, pressing: FloatArray) ->
     frames = len(labels)
     key = (labels + 1 + (count + 1) * np.arange(frames)[:, None, None]).ravel()
     borne = np.bincount(key, pressing.ravel(), frames * (count + 1)).reshape(frames, count + 1)[:, 1:]
-    lasts = (borne > 0.0).sum(axis=0) >= LEAST_FRAMES
-    least = LEAST_SHARE * borne.sum(axis=1).max(initial=0.0)
+    lasts = (borne > 0.0).sum(axis=0) >= PATCHES.least_frames
+    least = PATCHES.least_load_share * borne.sum(axis=1).max(initial=0.0)
     return [int(number) for number in np.flatnonzero(lasts & (borne.max(axis=0, initial=0.0) > least))]
 
 

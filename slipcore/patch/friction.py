@@ -4,13 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from slipcore.defaults import PatchOptions, choose_options
+from slipcore.defaults import NORMAL_95, PatchOptions, choose_options
 from slipcore.frames import FloatArray
 from slipcore.patch.local_rates import moving_mean
 from slipcore.patch.record import ContactFriction, Patch
-
-NORMAL_95 = 1.959963984540054
-"""Half-width of the 95 % interval in standard errors."""
 
 
 def contact_friction(time: FloatArray, patches: Sequence[Patch], **options: float) -> ContactFriction | None:

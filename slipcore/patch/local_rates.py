@@ -3,12 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from slipcore.defaults import PATCHES
 from slipcore.frames import FloatArray
 
 IntArray = NDArray[np.int64]
-
-LEAST_FRAMES = 4
-"""In a window, for a rate with an error of its own."""
 
 
 def local_rates(time: FloatArray, values: FloatArray, window: float) -> tuple[FloatArray, FloatArray]:
@@ -28,7 +26,7 @@ def local_rates(time: FloatArray, values: FloatArray, window: float) -> tuple[Fl
         slope = (sty - st * sy / n) / spread
         rest = np.maximum(syy - sy * sy / n - slope * slope * spread, 0.0)
         error = np.sqrt(rest / (n - 2.0) / spread)
-    told = (n >= LEAST_FRAMES) & known
+    told = (n >= PATCHES.rate_frames) & known
     return np.where(told, slope, np.nan), np.where(told, error, np.nan)
 
 
@@ -42,7 +40,7 @@ def moving_mean(time: FloatArray, values: FloatArray, window: float) -> FloatArr
 
 def _bounds(time: FloatArray, window: float) -> tuple[IntArray, IntArray]:
     """First frame in each frame's window, and the one after its last."""
-    half = 0.5 * window * (1.0 + 1e-9)
+    half = 0.5 * window * (1.0 + PATCHES.rounding)
     return np.searchsorted(time, time - half), np.searchsorted(time, time + half, side="right")
 
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slipcore.defaults import PatchOptions
+from slipcore.defaults import PATCHES, PatchOptions
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.patch.local_rates import local_rates
 
@@ -64,13 +64,9 @@ def motion_over_markers(
 def _motion(rate: FloatArray, error: FloatArray, gyration: FloatArray, least: float) -> Motion:
     velocity, turning = rate[:, :2], rate[:, 2] * gyration
     speed, spin = np.hypot(*velocity.T), np.abs(turning)
-    travels = speed > np.maximum(least, SIGNIFICANT * np.hypot(error[:, 0], error[:, 1]))
-    turns = spin > np.maximum(least, SIGNIFICANT * error[:, 2] * gyration)
+    travels = speed > np.maximum(least, PATCHES.significant * np.hypot(error[:, 0], error[:, 1]))
+    turns = spin > np.maximum(least, PATCHES.significant * error[:, 2] * gyration)
     return Motion(velocity, turning, travels, turns, travels)
-
-
-SIGNIFICANT = 3.0
-"""Standard errors of a rate."""
 
 
 def _marker_motion(seen: Stretch, weight: FloatArray) -> tuple[FloatArray, FloatArray]:

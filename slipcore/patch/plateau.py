@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slipcore.defaults import PatchOptions
+from slipcore.defaults import PATCHES, PatchOptions
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.patch.motion import Motion
 
@@ -38,8 +38,8 @@ def find_plateaus(
     ``held`` [t] count.
     """
     speed = np.nan_to_num(np.hypot(*motion.velocity.T))
-    along = np.vecdot(force, motion.velocity) > ALIGNED * np.hypot(*force.T) * speed
-    pivots = held & motion.turns & (np.abs(motion.turning) > LEAST_SPIN * speed)
+    along = np.vecdot(force, motion.velocity) > PATCHES.aligned * np.hypot(*force.T) * speed
+    pivots = held & motion.turns & (np.abs(motion.turning) > PATCHES.least_spin * speed)
     slides = held & motion.travels & ~pivots & along & (ratio > options.rolling_resistance)
     most = float(ratio[held].max(initial=0.0))
     pitches = motion.speed / pitch
@@ -47,12 +47,6 @@ def find_plateaus(
     way = speed * np.gradient(time) * motion.travels
     rolls = way[sliding].sum() < options.sliding_share * way.sum()
     return Plateaus(pivoting, sliding & ~rolls)
-
-
-ALIGNED = 0.8
-"""Cosine between force and motion: noise turns either by less."""
-LEAST_SPIN = 0.5
-"""Of the speed of the centre; what rolls turns less."""
 
 
 def _plateaus(

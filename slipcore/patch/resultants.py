@@ -6,13 +6,13 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.compilation import compiled
+from slipcore.defaults import PATCHES
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.limit_surface import Descent, find_limit_load
 
-CLOSE_ENOUGH = Descent(descents=100, settled=1e-4, still=1e-9, rank=1e-14, free_motion=1e-6)
-"""To 0.1 %, far below what forces are known to."""
-LEAST_SHARE = 0.25
-"""Of its mean square arm, taken for that of the forces that act: a patch no larger than the kernel tells no more."""
+CLOSE_ENOUGH = Descent(PATCHES.descents, PATCHES.settled, PATCHES.still, PATCHES.rank, PATCHES.free_motion)
+"""To 0.1 %."""
+_LEAST_SQUARE_ARM = PATCHES.least_square_arm
 
 
 class Resultants(NamedTuple):
@@ -71,7 +71,7 @@ def _of_frame(
     mean_square = -(pressing * (x * x + y * y)).sum() / total[2]
     share = 1.0
     if mean_square > 0.0:
-        share = math.sqrt(max(1.0 - 2.0 * kernel_width**2 / mean_square, LEAST_SHARE))
+        share = math.sqrt(max(1.0 - 2.0 * kernel_width**2 / mean_square, _LEAST_SQUARE_ARM))
     load, arm = np.array([total[0], total[1], moment]), share * np.stack((x, y))
     factor = find_limit_load(pressing, arm, load, np.ones(3, np.bool_), CLOSE_ENOUGH).factor
     ratio = 1.0 / factor if factor > 0.0 else math.hypot(total[0], total[1]) / -total[2]

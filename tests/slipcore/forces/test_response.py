@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from slipcore import InvalidInput
+from slipcore.forces.defaults import NODES as OF_NODES
 from slipcore.forces.gel import Gel
-from slipcore.forces.nodes import MARGIN, Nodes
+from slipcore.forces.nodes import Nodes
 from slipcore.forces.response import response_matrix
 
 PITCH = 0.5e-3
@@ -15,7 +16,7 @@ NODES = Nodes.around(MARKERS, PITCH**2)
 
 
 def test_nodes_reach_beyond_the_markers_and_share_their_area_among_elements() -> None:
-    assert len(NODES) == (9 + 2 * MARGIN) ** 2
+    assert len(NODES) == (9 + 2 * OF_NODES.margin) ** 2
     shares = NODES.over_elements(MARKERS)
     np.testing.assert_allclose(shares.sum(axis=1), PITCH**2, rtol=1e-12)
     between = NODES.over_elements(MARKERS + 0.3 * PITCH)

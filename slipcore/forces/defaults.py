@@ -1,0 +1,162 @@
+"""Every default of forces from displacement, with unit, valid range and source.
+
+"Scenes", "trials": chosen on the independent solver's scenes in tests/data/contact; "rounding": what double precision
+leaves; "bound": stops what does not converge. What ±50 % of each changes stands in docs/sensitivity.md.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from slipcore.options import Option, Options
+
+
+@dataclass(frozen=True, slots=True)
+class GelLimits:
+    """What a sensor's gel can plausibly be; outside, the units are almost surely wrong."""
+
+    young_modulus: tuple[float, float] = (1e2, 1e12)
+    """Pa; softer than any gel, stiffer than any solid."""
+    thickness: float = 1e-6
+    """m, at least."""
+    marker_depth: float = 1.0
+    """m, at most."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NodeDefaults(Options):
+    """Where traction is sought (``nodes.py``)."""
+
+    margin: Annotated[int, Option(0, 100, "nodes", "scenes cut by the lattice")] = 4
+    """Beyond the outermost markers: a contact that the lattice cuts acts on its markers from there, too."""
+    most: Annotated[int, Option(1, 1_000_000, "nodes", "more would take over 10 GB of memory")] = 20_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResponseDefaults(Options):
+    """Displacement by traction on a node (``response.py``)."""
+
+    cells: Annotated[int, Option(1, 100, "cells", "1e-2 of the response at its peak, and less far away")] = 7
+    """Along a pitch, of which hat functions are made and between which is interpolated."""
+    finer: Annotated[int, Option(1, 100, "-", "2e-4 of the response at its peak; 1e-2 without")] = 7
+    """How many times smaller cells are near a node."""
+    near: Annotated[int, Option(1, 100, "pitches", "beyond, the coarser cells do as well")] = 3
+    """Within which they are."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PriorDefaults(Options):
+    """What is believed of traction before any marker is seen (``prior.py``)."""
+
+    pressure_length: Annotated[float, Option(0.1, 100.0, "pitches", "trials")] = 6.0
+    """Correlation length of pressure, from which the choice begins."""
+    traction_length: Annotated[float, Option(0.1, 100.0, "pitches", "a slip front is narrower than a contact")] = 3.0
+    """The same of tangential traction."""
+    length_factor: Annotated[float, Option(1.0, 100.0, "-", "the evidence is flat between")] = 2.0
+    """By which lengths that the data may choose instead are shorter and longer."""
+    shear: Annotated[float, Option(0.01, 10.0, "-", "of the size of friction coefficients")] = 0.3
+    """Standard deviation of a tangential component over that of pressure, from which the choice begins."""
+    least_shear: Annotated[float, Option(0.001, 10.0, "-", "an object that is pressed alone")] = 0.1
+    """Smallest such ratio that the data may choose."""
+    largest_shear: Annotated[float, Option(0.01, 100.0, "-", "rubber on a clean face")] = 1.0
+    """Largest such ratio that the data may choose."""
+    jitter: Annotated[float, Option(0.0, 1e-3, "-", "rounding of a thousand nodes' Cholesky factor")] = 1e-8
+    """Added to the correlation of a node with itself, so that nodes much closer than a length stay distinct."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StrengthDefaults(Options):
+    """Choice of the prior's strength, the standard deviation of pressure (``strength.py``)."""
+
+    largest: Annotated[float, Option(1e-3, 100.0, "Young's moduli", "linear elasticity ends far below")] = 1.0
+    """A model that misses what the data show must not explain it by pressures that no gel bears."""
+    least_share: Annotated[float, Option(1e-9, 0.1, "-", "1 kPa on a gel of 1 MPa: 0.1 N on 1 cm²")] = 1e-3
+    """Smallest strength that is tried, as a share of the largest."""
+    least_signal: Annotated[float, Option(1e-6, 1.0, "-", "a prior that explains nothing of the data")] = 1e-2
+    """The same in units of what makes the strongest singular direction equal to noise; the lesser counts."""
+    grid: Annotated[int, Option(3, 1000, "strengths", "brackets the best, which is refined")] = 41
+    """Tried at equal ratios before the best is refined."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SupportDefaults(Options):
+    """Search for the nodes in contact (``support.py``)."""
+
+    rounds: Annotated[int, Option(1, 1000, "rounds", "bound; scenes take 8 to 21")] = 40
+    least_share: Annotated[float, Option(0.0, 0.1, "-", "a pressure of 3 % of the largest")] = 1e-3
+    """Variance, as a share of the largest, under which a node is left out."""
+    settled: Annotated[float, Option(1e-9, 1.0, "-", "supports change no more")] = 0.02
+    """Mean change of the logarithms of variances at which they have converged."""
+    shear: Annotated[float, Option(0.01, 10.0, "-", "of the size of friction coefficients")] = 0.3
+    """Standard deviation of a tangential component over that of pressure."""
+    coupling: Annotated[float, Option(0.0, 1.0, "-", "scenes: with 1/4 a contact grows by half an element more")] = 0.1
+    """Weight of the nodes beside a node in its variance; with 0 every other node of a contact is left out."""
+    least_freedom: Annotated[float, Option(0.0, 1e-3, "-", "rounding")] = 1e-12
+    """Least number of its values that the data are taken to determine of a node."""
+    steps: Annotated[int, Option(0, 100, "rows", "bound")] = 6
+    """Most rows by which a contact then grows or shrinks."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FitDefaults(Options):
+    """Tractions on a known contact (``fit.py``)."""
+
+    rounds: Annotated[int, Option(1, 1000, "rounds", "bound")] = 30
+    """Changes of the set of nodes without pressure until it is given up to look for a better one."""
+    tension: Annotated[float, Option(0.0, 1.0, "-", "scenes: to forbid it costs 0.3 % of the normal force")] = 0.05
+    """Share of the largest pressure by which any may seem to pull: so far bilinear pressures overshoot at a contact's
+    rim."""
+    rounding: Annotated[float, Option(0.0, 1e-3, "-", "rounding")] = 1e-9
+    """Share of the largest pressure by which one may lie below that bound."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LatticeDefaults(Options):
+    """Traction anywhere under the lattice (``whole_lattice.py``)."""
+
+    concentration: Annotated[float, Option(1.0, 100.0, "-", "contacts cover a twentieth of the lattice and more")] = 5.0
+    """Prior standard deviation over that which explains the displacement if the whole lattice were loaded alike."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReconstructionDefaults(Options):
+    """A whole log (``reconstruction.py``)."""
+
+    discretisation: Annotated[float, Option(0.0, 0.1, "-", "scenes: up to 1 µm of 1 mm")] = 1e-3
+    """Error of bilinear tractions one to a marker, as a share of a frame's largest displacement."""
+    change: Annotated[float, Option(0.0, 10.0, "-", "trials")] = 0.1
+    """Change of the displacement, as a share of it, after which the contact is sought anew."""
+    significant: Annotated[float, Option(0.0, 100.0, "standard deviations", "one false touch in 10⁶ frames")] = 5.0
+    """By which a frame's mean square must exceed that of noise for something to touch."""
+    node_significance: Annotated[float, Option(0.0, 100.0, "standard deviations", "3 σ")] = 3.0
+    """Of a node's pressure, above which it may be in contact."""
+    node_share: Annotated[float, Option(0.0, 1.0, "-", "bilinear pressures overshoot by so much")] = 0.03
+    """Of the frame's largest pressure, above which a node may be in contact."""
+    element_significance: Annotated[float, Option(0.0, 100.0, "standard deviations", "2 σ")] = 2.0
+    """Of an element's normal force, above which it is said to be in contact."""
+    element_share: Annotated[float, Option(0.0, 1.0, "-", "scenes: the rim of Hertz's pressure")] = 0.06
+    """Of the frame's largest normal force, above which an element is said to be in contact."""
+    covered: Annotated[float, Option(0.0, 1.0, "-", "its marker then lies inside")] = 0.5
+    """Share of an element's area that must lie over the contact."""
+    resultant_error: Annotated[float, Option(0.0, 1.0, "-", "scenes")] = 2e-3
+    """Standard deviation of what bilinear tractions and the shape of the contact leave wrong of a resultant, as a share
+    of it."""
+    element_error: Annotated[float, Option(0.0, 1.0, "-", "scenes")] = 1e-2
+    """The same of an element's force, as a share of the largest."""
+    force_tolerance: Annotated[float, Option(1e-6, 1.0, "-", "usual of force sensors")] = 0.01
+    """Standard deviation of a given total force, as a share of it, and of this share of the largest given one."""
+    least_force: Annotated[float, Option(0.0, 1e-3, "N", "far below what force sensors resolve")] = 1e-9
+    """Taken for the largest given force where all are 0."""
+
+
+GEL = GelLimits()
+NODES = NodeDefaults()
+RESPONSE = ResponseDefaults()
+PRIOR = PriorDefaults()
+STRENGTH = StrengthDefaults()
+SUPPORT = SupportDefaults()
+FIT = FitDefaults()
+LATTICE = LatticeDefaults()
+RECONSTRUCTION = ReconstructionDefaults()
+
+TABLES = (NODES, RESPONSE, PRIOR, STRENGTH, SUPPORT, FIT, LATTICE, RECONSTRUCTION)
+"""All tables of forces from displacement."""
