@@ -13,6 +13,7 @@ import numpy as np
 import scipy.linalg
 from scipy.ndimage import binary_closing, binary_dilation, binary_erosion, convolve1d, generate_binary_structure
 
+from slipcore.forces.covariance import covariance_root
 from slipcore.forces.defaults import STRENGTH, SUPPORT
 from slipcore.forces.fit import Observation, Prior, log_evidence
 from slipcore.forces.nodes import Nodes
@@ -30,7 +31,8 @@ def relevant_nodes(observation: Observation, data: FloatArray, candidates: BoolA
     data = data / observation.noise
     variance = np.full(len(chosen), float(data @ data) / float(np.sum(used**2)))
     for _ in range(SUPPORT.rounds):
-        gain, freedom = _explained(used, data, np.sqrt(variance))
+        used, data = condensed(used, data)
+        gain, freedom = node_relevance(used, data, np.sqrt(variance))
         new = _pooled(variance * gain, chosen, candidates.shape)
         new /= np.maximum(_pooled(freedom, chosen, candidates.shape), SUPPORT.least_freedom)
         new = np.minimum(new, STRENGTH.largest**2)
@@ -79,22 +81,25 @@ def _pooled(
     return np.asarray(field.flat[chosen])
 
 
-def _explained(response: FloatArray, data: FloatArray, deviation: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Of each node: squared posterior mean, and how many of its values the data determine, both in prior variances."""
+def condensed(response: FloatArray, data: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The same problem in no more data than it has unknowns, by QR: without the part of the data that none reaches."""
+    m, _, k = response.shape
+    if m <= 3 * k:
+        return response, data
+    both = np.column_stack((response.reshape(m, 3 * k), data))
+    upper = scipy.linalg.qr(both, mode="r", overwrite_a=True, check_finite=False)[0][: 3 * k]
+    return upper[:, :-1].reshape(3 * k, 3, k), upper[:, -1]
+
+
+def node_relevance(response: FloatArray, data: FloatArray, deviation: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Of each node: squared posterior mean, and how many of its values the data determine, both in prior variances.
+
+    With W [m, 3 k] the response in prior deviations, the mean is Wᵀ(1 + W Wᵀ)⁻¹d, and of a value with the column w the
+    data determine wᵀ(1 + W Wᵀ)⁻¹w.
+    """
     m, _, k = response.shape
     weighted = (response * deviation).reshape(m, 3 * k)
-    if m <= 3 * k:
-        total = weighted @ weighted.T
-        total[np.diag_indices(m)] += 1.0
-        lower = scipy.linalg.cholesky(total, lower=True, overwrite_a=True, check_finite=False)
-        seen = scipy.linalg.solve_triangular(
-            lower, np.column_stack((data, weighted)), lower=True, overwrite_b=True, check_finite=False
-        )
-        mean, share = seen[:, 1:].T @ seen[:, 0], np.sum(seen[:, 1:] ** 2, axis=0)
-    else:
-        total = weighted.T @ weighted
-        total[np.diag_indices(3 * k)] += 1.0
-        lower = scipy.linalg.cholesky(total, lower=True, overwrite_a=True, check_finite=False)
-        inverse = scipy.linalg.solve_triangular(lower, np.eye(3 * k), lower=True, check_finite=False)
-        mean, share = inverse.T @ (inverse @ (weighted.T @ data)), 1.0 - np.sum(inverse**2, axis=0)
+    root, both = covariance_root(weighted), np.column_stack((data, weighted))
+    seen = scipy.linalg.solve_triangular(root, both, trans="T", overwrite_b=True, check_finite=False)
+    mean, share = seen[:, 1:].T @ seen[:, 0], np.sum(seen[:, 1:] ** 2, axis=0)
     return np.sum(mean.reshape(3, k) ** 2, axis=0), np.sum(share.reshape(3, k), axis=0)

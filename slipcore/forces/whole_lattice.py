@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
+from slipcore.forces.covariance import covariance_root
 from slipcore.forces.defaults import LATTICE
 from slipcore.forces.fit import Observation
 from slipcore.forces.nodes import Nodes
@@ -25,18 +26,14 @@ class WholeLattice:
 
 
 def whole_lattice(observation: Observation, nodes: Nodes, typical: float) -> WholeLattice:
-    """The operator for displacements of the root mean square ``typical`` m.
-
-    Of the m × m covariance of the data only the triangular factor is made, by QR: no condition number is squared.
-    """
+    """The operator for displacements of the root mean square ``typical`` m."""
     m, _, k = observation.response.shape
     root = factors(nodes.places(), nodes.grid.pitch[0], usual())
     whitened = observation.response / observation.noise[:, None, None]
     spread = np.concatenate([whitened[:, axis] @ root[axis] for axis in range(3)], axis=1)
     level = typical / float(np.median(observation.noise))
     strength = LATTICE.concentration * level * np.sqrt(m) / float(np.linalg.norm(spread))
-    stacked = np.concatenate((strength * spread.T, np.eye(m)))
-    upper = scipy.linalg.qr(stacked, mode="r", overwrite_a=True, check_finite=False)[0][:m]
+    upper = covariance_root(strength * spread)
     seen = scipy.linalg.solve_triangular(upper, strength * spread, trans="T", check_finite=False)
     gain = scipy.linalg.solve_triangular(upper, seen, check_finite=False)
     parts = [strength * (root[axis] @ gain[:, axis * k : (axis + 1) * k].T) for axis in range(3)]

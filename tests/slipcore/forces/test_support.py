@@ -1,0 +1,68 @@
+"""Where the object touches: relevance of nodes against closed forms."""
+
+import numpy as np
+import pytest
+from scipy.linalg import hadamard
+
+from slipcore.forces.covariance import covariance_root
+from slipcore.forces.fit import Observation
+from slipcore.forces.support import condensed, node_relevance, relevant_nodes, widened
+
+NODES = 16
+
+
+def known_spectrum(values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A response [16, 3, 16] = U s Vᵀ, exact in binary: U and the parts of V are Hadamard matrices, s powers of 2."""
+    u = hadamard(NODES) / 4.0
+    v = np.zeros((3, NODES, NODES))
+    for i in range(NODES):
+        v[i % 3, :, i] = u[:, i]
+    v = v.reshape(3 * NODES, NODES)
+    return (u * values @ v.T).reshape(NODES, 3, NODES), u, v
+
+
+@pytest.mark.parametrize("largest", [2.0**4, 2.0**22])
+def test_relevance_is_that_of_the_singular_value_decomposition(largest: float) -> None:
+    """Mean v s/(1 + s²) uᵀd and share v² s²/(1 + s²), also where 1 is nothing beside s²."""
+    values = largest * 2.0 ** -np.arange(0.0, 2.0 * NODES, 2.0)
+    response, u, v = known_spectrum(values)
+    data = u @ values
+    gain, freedom = node_relevance(response, data, np.ones(NODES))
+    mean, share = v @ (values**2 / (1.0 + values**2)), v**2 @ (values**2 / (1.0 + values**2))
+    np.testing.assert_allclose(gain, (mean.reshape(3, NODES) ** 2).sum(axis=0), rtol=1e-8)
+    np.testing.assert_allclose(freedom, share.reshape(3, NODES).sum(axis=0), rtol=1e-8)
+
+
+def test_the_root_of_a_covariance_keeps_what_is_small_beside_its_largest_eigenvalue() -> None:
+    """1 + S Sᵀ of one strong direction: |det R| = √(1 + s²), and directions across it keep the variance 1."""
+    direction = hadamard(NODES)[:, 3] / 4.0
+    root = covariance_root(2.0**24 * np.outer(direction, [0.6, 0.8]))
+    assert abs(np.prod(np.diag(root))) == pytest.approx(2.0**24, rel=1e-7)
+    across = hadamard(NODES)[:, 5] / 4.0
+    np.testing.assert_allclose(np.linalg.norm(np.linalg.solve(root.T, across)), 1.0, rtol=1e-7)
+    np.testing.assert_array_equal(np.tril(root, -1), 0.0)
+
+
+def test_more_data_than_unknowns_are_condensed_without_loss() -> None:
+    rng = np.random.default_rng(1)
+    response, data, deviation = rng.standard_normal((40, 3, 5)), rng.standard_normal(40), rng.random(5)
+    fewer, of_them = condensed(response, data)
+    assert fewer.shape == (15, 3, 5)
+    for found, expected in zip(
+        node_relevance(fewer, of_them, deviation), node_relevance(response, data, deviation), strict=True
+    ):
+        np.testing.assert_allclose(found, expected, rtol=1e-10)
+    assert condensed(fewer, of_them)[0] is fewer
+
+
+@pytest.mark.parametrize("noise", [1e-3, 1e-9])
+def test_nodes_that_data_show_directly_are_found_with_the_row_beside_them(noise: float) -> None:
+    """Every traction seen by itself: the support is where it is not zero, and as far as coupling reaches."""
+    shape = (7, 8)
+    count = shape[0] * shape[1]
+    loaded = np.zeros(shape, dtype=bool)
+    loaded[2:5, 3:7] = True
+    response = np.eye(3 * count).reshape(3 * count, 3, count)
+    data = np.concatenate([0.2 * loaded.ravel(), np.zeros(count), 0.7 * loaded.ravel()])
+    found = relevant_nodes(Observation(response, np.full(3 * count, noise)), data, np.ones(shape, dtype=bool))
+    np.testing.assert_array_equal(found, widened(loaded, 1))
