@@ -88,7 +88,7 @@ def condensed(response: FloatArray, data: FloatArray) -> tuple[FloatArray, Float
         return response, data
     both = np.column_stack((response.reshape(m, 3 * k), data))
     upper = scipy.linalg.qr(both, mode="r", overwrite_a=True, check_finite=False)[0][: 3 * k]
-    return upper[:, :-1].reshape(3 * k, 3, k), upper[:, -1]
+    return np.asarray(upper[:, :-1].reshape(3 * k, 3, k)), np.asarray(upper[:, -1])
 
 
 def node_relevance(response: FloatArray, data: FloatArray, deviation: FloatArray) -> tuple[FloatArray, FloatArray]:
