@@ -17,7 +17,7 @@ from service.formats import tac3d
 from service.report.pictures import slip_over_time
 from slipcore import GraspLog, SlipHistory, detect_slip, element_forces
 from slipcore.frames import BoolArray
-from slipcore.samples import normals_of
+from slipcore.surface.log_normals import normals_of
 
 RECORDINGS = Path(".cache/tac3d/PyTac3D/example_data")
 NAMES = ("example_1/AD2-0065L", "example_2/HDL1-GWH0021", "example_2/HDL1-GWH0022")

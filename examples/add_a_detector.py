@@ -15,9 +15,9 @@ from slipcore.contact import tangential_ramp
 from slipcore.defaults import ContactOptions
 from slipcore.detection.baselines.since_touch import threshold_method
 from slipcore.detection.shared.interface import Observation
-from slipcore.detection.shared.strain import Lattice
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.options import Option
+from slipcore.surface.strain import Lattice
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

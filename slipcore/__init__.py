@@ -21,7 +21,7 @@ from slipcore.errors import InvalidInput, NoForces, SlipcoreError, UnknownScale
 from slipcore.frames import Frame, FrictionLaw, GraspLog, GroundTruth
 from slipcore.options import Option, describe_options
 from slipcore.patch.friction import contact_friction
-from slipcore.patch.record import ContactFriction, Patch
+from slipcore.patch_record import ContactFriction, Patch
 from slipcore.samples import FrictionSamples
 from slipcore.slip_state import EventList, SlipEvents, SlipHistory, SlipState
 from slipcore.warm_up import warm_up

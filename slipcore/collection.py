@@ -9,7 +9,7 @@ from slipcore.defaults import COLLECTION
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.patch.friction import contact_friction
 from slipcore.patch.plateau import runs
-from slipcore.patch.record import ContactFriction, Patch
+from slipcore.patch_record import ContactFriction, Patch
 from slipcore.samples import KIND, FrictionSamples, element_samples
 from slipcore.slip_state import SlipHistory
 

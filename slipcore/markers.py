@@ -15,9 +15,9 @@ from scipy.ndimage import binary_dilation, generate_binary_structure
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from slipcore.defaults import MARKERS
-from slipcore.detection.shared.strain import lattice_steps
 from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray, GraspLog
+from slipcore.surface.strain import lattice_steps
 
 
 class MarkerFrame(NamedTuple):

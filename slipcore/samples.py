@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipcore.defaults import SampleOptions, choose_options
-from slipcore.detection.shared.strain import Lattice
 from slipcore.element_forces import ElementForces, element_forces
 from slipcore.errors import InvalidInput, NoForces, UnknownScale
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.slip_state import SlipHistory
+from slipcore.surface.log_normals import normals_of
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 KIND = "<U7"
@@ -154,18 +154,6 @@ def _inside(region: BoolArray) -> BoolArray:
     return inside
 
 
-def normals_of(log: GraspLog) -> FloatArray:
-    """Outward normals [t, n, m, 3] of a log, from the deformed shape where it has none."""
-    if log.normal is not None:
-        return log.normal
-    from slipcore.detection.shared.surface import normals_over_time  # compiled: who only holds samples goes without
-
-    lattice = Lattice.at_rest(log.position)
-    normals = np.empty_like(log.displacement)
-    normals_over_time(lattice.steps, lattice.orientation, log.displacement, normals)
-    return normals
-
-
 def _check_same(log: GraspLog, history: SlipHistory) -> None:
     expected = (len(log), *log.grid)
     if history.contact.shape != expected:
@@ -208,7 +196,7 @@ class _ForceNoise(NamedTuple):
 def _force_noise(log: GraspLog, forces: ElementForces, options: SampleOptions) -> _ForceNoise:
     if not np.isnan(options.force_noise):
         return _ForceNoise(options.force_noise, options.force_noise)
-    from slipcore.detection.shared.noise import estimate_noise  # compiled, as above
+    from slipcore.noise import estimate_noise  # compiled, as above
 
     assert log.force is not None
     plane = log.force[..., :2].reshape(len(log), -1, 2).swapaxes(1, 2)

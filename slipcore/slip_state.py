@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from slipcore.element_forces import stick_ratio
 from slipcore.frames import BoolArray, FloatArray
-from slipcore.patch.record import Patch
+from slipcore.patch_record import Patch
 from slipcore.references import DETECTION, cited
 
 

@@ -5,6 +5,7 @@ import importlib
 import importlib.metadata
 import subprocess
 import sys
+from collections import defaultdict
 from collections.abc import Collection, Mapping
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -72,9 +73,25 @@ def modules_of(folder: Path, package: str) -> dict[str, Path]:
     return {".".join(name[:-1] if name[-1] == "__init__" else name): path for path, name in parts.items()}
 
 
-def circle(modules: Mapping[str, Path]) -> list[str]:
-    """Modules that import one another in a circle, if there are such."""
-    graph = {name: imported_here(path, modules) - {name} for name, path in modules.items()}
+def graph_of(modules: Mapping[str, Path]) -> dict[str, set[str]]:
+    """Each module with those that it imports."""
+    return {name: imported_here(path, modules) - {name} for name, path in modules.items()}
+
+
+def within(graph: Mapping[str, Collection[str]], folder: str) -> dict[str, set[str]]:
+    """The files and folders in a folder with those beside them that anything in them imports."""
+    depth = folder.count(".") + 2
+    parts = defaultdict[str, set[str]](set)
+    for name, others in graph.items():
+        if name.startswith(f"{folder}."):
+            part = ".".join(name.split(".")[:depth])
+            beside = {".".join(other.split(".")[:depth]) for other in others if other.startswith(f"{folder}.")}
+            parts[part] |= beside - {part}
+    return parts
+
+
+def circle(graph: Mapping[str, Collection[str]]) -> list[str]:
+    """Names that lead to one another in a circle, if there are such."""
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
@@ -119,7 +136,27 @@ def test_no_modules_import_one_another_in_a_circle(package: str) -> None:
     folder = ROOT / package
     modules = modules_of(folder.parent, folder.name)
     assert modules
-    assert circle(modules) == []
+    assert circle(graph_of(modules)) == []
+
+
+@pytest.mark.parametrize("package", ["slipcore", "estimators", "migrations", CLIENT])
+def test_no_folders_import_one_another_in_a_circle(package: str) -> None:
+    folder = ROOT / package
+    modules = modules_of(folder.parent, folder.name)
+    graph = graph_of(modules)
+    assert {name: found for name in modules if (found := circle(within(graph, name)))} == {}
+
+
+def test_a_circle_of_folders_is_found_though_none_of_their_modules_is_in_one(tmp_path: Path) -> None:
+    files = {"hall/door": "import house.stairs.step", "hall/floor": "", "stairs/step": "", "stairs/rail": ""}
+    files["stairs/rail"] = "def lazily():\n    from house.hall import floor"
+    for name, text in files.items():
+        path = tmp_path / "house" / f"{name}.py"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    graph = graph_of(modules_of(tmp_path, "house"))
+    assert circle(graph) == []
+    assert set(circle(within(graph, "house"))) == {"house.hall", "house.stairs"}
 
 
 @pytest.mark.parametrize(
@@ -134,7 +171,7 @@ def test_a_circle_is_found_however_it_is_closed(tmp_path: Path, back: str) -> No
     (tmp_path / "house").mkdir()
     for name, text in {"__init__": "", "hall": "from house.stairs import up", "stairs": back}.items():
         (tmp_path / "house" / f"{name}.py").write_text(text)
-    assert set(circle(modules_of(tmp_path, "house"))) == {"house.hall", "house.stairs"}
+    assert set(circle(graph_of(modules_of(tmp_path, "house")))) == {"house.hall", "house.stairs"}
 
 
 ESTIMATOR_ROOMS = ("linear", "sampling", "likelihoods", "methods")

@@ -13,9 +13,9 @@ from slipcore import GraspLog, GroundTruth, SlipHistory, detect_slip
 from slipcore.contact.effects import ForceNoise, MarkerNoise, SensorSampling
 from slipcore.contact.plan.plan import Effect
 from slipcore.contact.scene import Scene
-from slipcore.detection.shared.strain import Lattice, displacement_gradient, frobenius, green_lagrange, lattice_steps
 from slipcore.detection.strain_rate.reference import signed_rate
 from slipcore.frames import BoolArray, FloatArray
+from slipcore.surface.strain import Lattice, displacement_gradient, frobenius, green_lagrange, lattice_steps
 
 METHODS = ("filter", "strain_rate", "strain_rate_literal")
 COLOURS = {"filter": "#2b6cb0", "strain_rate": "#dd6b20", "strain_rate_literal": "#805ad5", "truth": "#1a202c"}

@@ -12,8 +12,9 @@ from slipcore.defaults import CheckOptions, choose_options
 from slipcore.element_forces import element_forces
 from slipcore.errors import NoForces, UnknownScale
 from slipcore.frames import GraspLog
-from slipcore.samples import FrictionSamples, element_samples, normals_of
+from slipcore.samples import FrictionSamples, element_samples
 from slipcore.slip_state import SlipHistory
+from slipcore.surface.log_normals import normals_of
 
 __all__ = ["AGAINST_FRICTION", "Finding", "check_log"]
 

@@ -17,7 +17,6 @@ from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.interface import CompiledMethod, Observation, Start
 from slipcore.detection.shared.observe import observe
 from slipcore.detection.shared.records import FrameArrays, Memory, Sensor
-from slipcore.detection.shared.strain import Lattice
 from slipcore.errors import InvalidInput
 from slipcore.frames import (
     BoolArray,
@@ -30,6 +29,7 @@ from slipcore.frames import (
     check_pose,
 )
 from slipcore.slip_state import SlipState
+from slipcore.surface.strain import Lattice
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 

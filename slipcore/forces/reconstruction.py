@@ -114,7 +114,7 @@ class _Sensor:
 
 def _noise(log: GraspLog, noise: float | None) -> float:
     if noise is None:
-        from slipcore.detection.shared.noise import estimate_noise  # compiled
+        from slipcore.noise import estimate_noise  # compiled
 
         plane = log.displacement[..., :2].reshape(len(log), -1, 2).swapaxes(1, 2)
         return float(np.nan_to_num(estimate_noise(log.time, plane)))

@@ -11,11 +11,11 @@ from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.patch.motion import Stretch, motion_over_markers
 from slipcore.patch.plateau import find_plateaus
 from slipcore.patch.pose import lattice_pose
-from slipcore.patch.record import Patch
 from slipcore.patch.regimes import regimes
 from slipcore.patch.regions import follow_regions, widened
 from slipcore.patch.resultants import Resultants, resultants
-from slipcore.samples import normals_of
+from slipcore.patch_record import Patch
+from slipcore.surface.log_normals import normals_of
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 

@@ -7,7 +7,7 @@ import numpy as np
 from slipcore.defaults import NORMAL_95, PatchOptions, choose_options
 from slipcore.frames import FloatArray
 from slipcore.patch.local_rates import moving_mean
-from slipcore.patch.record import ContactFriction, Patch
+from slipcore.patch_record import ContactFriction, Patch
 
 
 def contact_friction(time: FloatArray, patches: Sequence[Patch], **options: float) -> ContactFriction | None:

@@ -9,7 +9,7 @@ from slipcore.defaults import PatchOptions
 from slipcore.frames import BoolArray
 from slipcore.patch.motion import Motion
 from slipcore.patch.plateau import Plateaus
-from slipcore.patch.record import MACRO_SLIP, REGIMES, Patch
+from slipcore.patch_record import MACRO_SLIP, REGIMES, Patch
 
 
 def regimes(

@@ -8,7 +8,7 @@ import pytest
 
 from slipcore import FrictionLaw, GraspLog, GroundTruth, SlipHistory
 from slipcore.contact import RampSchedule, tangential_ramp
-from slipcore.detection.shared.strain import Lattice
+from slipcore.surface.strain import Lattice
 
 RECORDINGS = Path(".cache/tac3d/PyTac3D/example_data")
 REFERENCE_SCENES = Path("../shared/data/contact")

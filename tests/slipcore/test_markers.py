@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from slipcore import GraspLog, GroundTruth, InvalidInput, SlipDetector, SlipHistory, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
-from slipcore.detection.shared.strain import Lattice
 from slipcore.markers import MarkerLattice, mean_spacing, on_lattice
+from slipcore.surface.strain import Lattice
 
 PITCH = 1e-3
 

@@ -20,8 +20,9 @@ from slipcore.contact.defaults import TANGENTIAL, TINY
 from slipcore.contact.elasticity.fields import doubled, halved, inner, resultants, rigid_displacement
 from slipcore.contact.elasticity.operator import ElasticOperator
 from slipcore.contact.errors import InfeasibleLoad, NotConverged
-from slipcore.contact.solver.limit_surface import limit_load, sliding_traction
+from slipcore.contact.limit_surface import limit_load
 from slipcore.contact.solver.projection import project
+from slipcore.contact.solver.sliding import sliding_traction
 from slipcore.contact.solver.tangent_space import TangentSpace
 from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray

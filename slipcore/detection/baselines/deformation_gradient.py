@@ -10,8 +10,8 @@ import numpy as np
 from slipcore.defaults import DeformationGradientOptions
 from slipcore.detection.baselines.since_touch import threshold_method
 from slipcore.detection.shared.interface import Observation
-from slipcore.detection.shared.strain import Lattice, displacement_gradient, lattice_steps
 from slipcore.frames import BoolArray, FloatArray
+from slipcore.surface.strain import Lattice, displacement_gradient, lattice_steps
 
 
 def measure(lattice: Lattice, seen: Observation) -> FloatArray:

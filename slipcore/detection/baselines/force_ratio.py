@@ -9,7 +9,7 @@ import numpy as np
 from slipcore.defaults import ForceRatioOptions
 from slipcore.detection.shared.interface import Method, Observation
 from slipcore.detection.shared.records import Decision
-from slipcore.detection.shared.strain import Lattice
+from slipcore.surface.strain import Lattice
 
 
 def init(_: Lattice, __: ForceRatioOptions) -> None:

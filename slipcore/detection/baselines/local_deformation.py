@@ -11,8 +11,8 @@ import numpy as np
 from slipcore.defaults import LocalDeformationOptions
 from slipcore.detection.baselines.since_touch import threshold_method
 from slipcore.detection.shared.interface import Observation
-from slipcore.detection.shared.strain import Lattice, lattice_steps
 from slipcore.frames import BoolArray, FloatArray
+from slipcore.surface.strain import Lattice, lattice_steps
 
 
 def measure(_: Lattice, seen: Observation) -> FloatArray:

@@ -12,8 +12,8 @@ from slipcore.defaults import RigidFitOptions
 from slipcore.detection.baselines.since_touch import threshold_method
 from slipcore.detection.shared.interface import Observation
 from slipcore.detection.shared.rigid_motion import fit_rigid_motion
-from slipcore.detection.shared.strain import Lattice
 from slipcore.frames import BoolArray, FloatArray
+from slipcore.surface.strain import Lattice
 
 
 def measure(_: Lattice, seen: Observation) -> FloatArray:

@@ -9,8 +9,8 @@ import numpy as np
 from slipcore.defaults import ContactOptions
 from slipcore.detection.shared.interface import Method, Observation
 from slipcore.detection.shared.records import Decision
-from slipcore.detection.shared.strain import Lattice
 from slipcore.frames import BoolArray, FloatArray
+from slipcore.surface.strain import Lattice
 
 Options = TypeVar("Options", bound=ContactOptions)
 

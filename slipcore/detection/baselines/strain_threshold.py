@@ -3,8 +3,8 @@
 from slipcore.defaults import StrainThresholdOptions
 from slipcore.detection.baselines.since_touch import threshold_method
 from slipcore.detection.shared.interface import Observation
-from slipcore.detection.shared.strain import Lattice, displacement_gradient, frobenius, green_lagrange, lattice_steps
 from slipcore.frames import BoolArray, FloatArray
+from slipcore.surface.strain import Lattice, displacement_gradient, frobenius, green_lagrange, lattice_steps
 
 
 def measure(lattice: Lattice, seen: Observation) -> FloatArray:

@@ -13,8 +13,8 @@ from slipcore.detection.filter.step import decide
 from slipcore.detection.filter.tuning import LEAST_TRANSITION, THRESHOLD, settings_of
 from slipcore.detection.shared.interface import CompiledMethod, Start
 from slipcore.detection.shared.records import Decision
-from slipcore.detection.shared.strain import Lattice
 from slipcore.frames import FloatArray
+from slipcore.surface.strain import Lattice
 
 
 def start(lattice: Lattice, options: FilterOptions) -> Start:

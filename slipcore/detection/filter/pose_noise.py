@@ -9,8 +9,8 @@ from slipcore.defaults import DEVIATION_TO_SIGMA, NOISE
 from slipcore.detection.filter.pose import Pose, PoseVariance, place_of_object, place_on_object, pose_at
 from slipcore.detection.filter.state import CORRECTION, LAST_OFFSETS, NOISE_OF_PLACE, NOISE_OF_YAW, OFFSET_FRAMES
 from slipcore.detection.filter.tuning import Tuning
-from slipcore.detection.shared.noise import recent_median, remember
 from slipcore.frames import FloatArray
+from slipcore.noise import recent_median, remember
 
 _RING = 1 + NOISE.memory
 SECOND_DIFFERENCE = math.sqrt(6.0)

@@ -7,8 +7,8 @@ import numpy as np
 
 from slipcore.compilation import compiled
 from slipcore.defaults import DEVIATION_TO_SIGMA, NOISE
-from slipcore.detection.shared.noise import median
 from slipcore.frames import BoolArray, FloatArray
+from slipcore.noise import median
 
 _LEAST = NOISE.least_series
 

@@ -5,8 +5,8 @@ from typing import Generic, NamedTuple, TypeVar
 
 from slipcore.defaults import ContactOptions
 from slipcore.detection.shared.records import Decision
-from slipcore.detection.shared.strain import Lattice
 from slipcore.frames import BoolArray, FloatArray
+from slipcore.surface.strain import Lattice
 
 State = TypeVar("State")
 Options = TypeVar("Options", bound=ContactOptions)

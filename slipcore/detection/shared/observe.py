@@ -5,10 +5,10 @@ import numpy as np
 from slipcore.compilation import compiled, unpack
 from slipcore.defaults import NOISE
 from slipcore.detection.shared.contact import TOUCH, Touch, find_contact
-from slipcore.detection.shared.noise import noise_of_three, recent_median, remember
 from slipcore.detection.shared.records import FrameArrays, Memory, Sensor, Surface
-from slipcore.detection.shared.surface import split_forces, surface_normals
 from slipcore.frames import FloatArray
+from slipcore.noise import noise_of_three, recent_median, remember
+from slipcore.surface.normals import split_forces, surface_normals
 
 SERIES = NOISE.series
 

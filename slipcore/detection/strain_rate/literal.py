@@ -7,7 +7,9 @@ import numpy as np
 from slipcore.defaults import StrainRateLiteralOptions
 from slipcore.detection.shared.interface import Method, Observation
 from slipcore.detection.shared.records import Decision
-from slipcore.detection.shared.strain import (
+from slipcore.detection.strain_rate.lagged_score import LaggedScore, init_lagged_score, step_lagged_score
+from slipcore.frames import BoolArray, FloatArray
+from slipcore.surface.strain import (
     Lattice,
     displacement_gradient,
     green_lagrange,
@@ -16,8 +18,6 @@ from slipcore.detection.shared.strain import (
     literal_rate,
     principal_strains,
 )
-from slipcore.detection.strain_rate.lagged_score import LaggedScore, init_lagged_score, step_lagged_score
-from slipcore.frames import BoolArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,9 +4,9 @@ import numpy as np
 
 from slipcore.defaults import StrainRateOptions
 from slipcore.detection.shared.interface import CompiledMethod, Start
-from slipcore.detection.shared.strain import Lattice
 from slipcore.detection.strain_rate.run import run_strain_rate
 from slipcore.detection.strain_rate.step import NOISE, ROWS, StrainRateSettings
+from slipcore.surface.strain import Lattice
 
 
 def start(lattice: Lattice, options: StrainRateOptions) -> Start:

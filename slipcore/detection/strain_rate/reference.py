@@ -5,14 +5,14 @@ Nothing that detects slip uses it.
 
 import numpy as np
 
-from slipcore.detection.shared.strain import (
+from slipcore.frames import FloatArray
+from slipcore.surface.strain import (
     Lattice,
     displacement_gradient,
     frobenius,
     green_lagrange,
     inclination_factor,
 )
-from slipcore.frames import FloatArray
 
 
 def surface_normal(lattice: Lattice, steps: FloatArray) -> FloatArray:

@@ -8,8 +8,8 @@ import numpy as np
 from slipcore.compilation import compiled, unpack
 from slipcore.defaults import LIMITS
 from slipcore.detection.shared.records import Decision, Sensor, Surface
-from slipcore.detection.shared.surface import steps_at
 from slipcore.frames import BoolArray, FloatArray
+from slipcore.surface.normals import steps_at
 
 XX, YY, XY, RATE_XX, RATE_YY, RATE_XY, MEAN, VARIANCE, AGE, SLIP, NOISE = range(11)
 ROWS = 11

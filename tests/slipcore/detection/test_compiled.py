@@ -10,11 +10,11 @@ from slipcore import GraspLog, detect_slip, detection
 from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.detection.methods import METHODS
 from slipcore.detection.shared.contact import curvature
-from slipcore.detection.shared.strain import Lattice, lattice_steps
-from slipcore.detection.shared.surface import split_forces, surface_normals
 from slipcore.detection.strain_rate.reference import surface_normal, surface_strain
 from slipcore.detection.strain_rate.step import surface_strains
 from slipcore.element_forces import element_forces
+from slipcore.surface.normals import split_forces, surface_normals
+from slipcore.surface.strain import Lattice, lattice_steps
 
 
 def short_log() -> GraspLog:

@@ -13,8 +13,8 @@ from slipcore.defaults import ContactOptions
 from slipcore.detection.batch import with_patches
 from slipcore.detection.detector import init, step
 from slipcore.detection.shared.interface import Decision, Method, Observation
-from slipcore.detection.shared.strain import Lattice
 from slipcore.patch.regimes import slips_as_a_whole
+from slipcore.surface.strain import Lattice
 
 Same = Callable[[SlipHistory, SlipHistory], None]
 

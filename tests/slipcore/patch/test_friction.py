@@ -7,7 +7,7 @@ from slipcore import GraspLog, InvalidInput, detect_slip
 from slipcore.detection.batch import with_patches
 from slipcore.patch.following import follow_patches
 from slipcore.patch.friction import contact_friction
-from slipcore.patch.record import ContactFriction, Patch
+from slipcore.patch_record import ContactFriction, Patch
 from tests.slipcore.conftest import RECORDINGS, read_recording
 from tests.slipcore.patch.grasps import PITCH, PIVOT, SLIDE, grasp, ramp_and_go
 

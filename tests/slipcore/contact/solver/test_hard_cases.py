@@ -12,11 +12,11 @@ from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import HalfSpace, MirroredBody
 from slipcore.contact.elasticity.operator import Operators
 from slipcore.contact.errors import InfeasibleLoad
+from slipcore.contact.limit_surface import limit_load
 from slipcore.contact.plan.plan import Plan
 from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
 from slipcore.contact.reference.torsion import sliding_moment
 from slipcore.contact.scene import Scene
-from slipcore.contact.solver.limit_surface import limit_load
 from slipcore.contact.solver.normal import solve_normal
 from slipcore.contact.solver.problem import Problem, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult

@@ -5,8 +5,9 @@ import pytest
 from scipy.optimize import minimize
 
 from slipcore.contact.elasticity.fields import resultants, rigid_displacement
-from slipcore.contact.solver.limit_surface import limit_load, sliding_traction
+from slipcore.contact.limit_surface import limit_load
 from slipcore.contact.solver.projection import project
+from slipcore.contact.solver.sliding import sliding_traction
 
 GIVEN = np.ones(3, dtype=bool)
 

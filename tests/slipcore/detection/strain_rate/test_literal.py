@@ -1,7 +1,7 @@
 import numpy as np
 
 from slipcore import GraspLog, detect_slip
-from slipcore.detection.shared.strain import (
+from slipcore.surface.strain import (
     Lattice,
     displacement_gradient,
     green_lagrange,

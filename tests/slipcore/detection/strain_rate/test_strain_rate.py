@@ -6,11 +6,11 @@ import pytest
 
 from slipcore import GraspLog, StrainRateOptions, detect_slip
 from slipcore.detection.shared.records import Decision, Sensor, Surface
-from slipcore.detection.shared.strain import Lattice, frobenius, lattice_steps
 from slipcore.detection.strain_rate import step as kernel
 from slipcore.detection.strain_rate.method import start
 from slipcore.detection.strain_rate.reference import signed_rate, surface_strain
 from slipcore.detection.strain_rate.step import step_strain_rate
+from slipcore.surface.strain import Lattice, frobenius, lattice_steps
 
 INTERVAL = 1 / 30
 OPTIONS = StrainRateOptions()

@@ -5,7 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from slipcore import InvalidInput
-from slipcore.detection.shared.strain import (
+from slipcore.detection.strain_rate.reference import signed_rate, surface_normal, surface_strain
+from slipcore.surface.strain import (
     Lattice,
     displacement_gradient,
     frobenius,
@@ -15,7 +16,6 @@ from slipcore.detection.shared.strain import (
     literal_rate,
     principal_strains,
 )
-from slipcore.detection.strain_rate.reference import signed_rate, surface_normal, surface_strain
 
 EPS = np.finfo(float).eps
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from slipcore.detection.shared.noise import estimate_noise
 from slipcore.detection.shared.observe import step_noise
+from slipcore.noise import estimate_noise
 
 
 def smooth(time: np.ndarray) -> np.ndarray:
