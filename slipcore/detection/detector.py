@@ -89,8 +89,11 @@ def init(position: ArrayLike, element_area: float, method: str = DEFAULT_METHOD,
         start = found.start(lattice, chosen)
     else:
         of_method = found.init(lattice, chosen)
-    rest = lattice.position, lattice.steps, lattice.inverse_jacobian, lattice.orientation
-    by_force, by_shape = (Sensor(*rest, touch, start.settings) for touch in touch_thresholds(chosen, area))
+    # copies that can be written to, as unpickled arrays can: kernels are compiled for one type
+    rest = [np.array(array) for array in (lattice.position, lattice.steps, lattice.inverse_jacobian)]
+    by_force, by_shape = (
+        Sensor(*rest, lattice.orientation, touch, start.settings) for touch in touch_thresholds(chosen, area)
+    )
     shape = lattice.position.shape
     frame = FrameArrays(-math.inf, _read_only(np.zeros(shape)), NO_FIELD, NO_POSE, NO_FIELD, NO_MASK)
     noise = np.zeros((9, max(1 + NOISE.memory, NOISE.series)))

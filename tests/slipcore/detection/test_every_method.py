@@ -1,5 +1,6 @@
 """What every method of detection keeps to; a new one comes under these checks by being in ``METHODS``."""
 
+import itertools
 import pickle
 from collections.abc import Callable
 from dataclasses import replace
@@ -74,6 +75,19 @@ def test_streaming_equals_batch_and_a_cut_stream_goes_on_as_if_it_were_whole(
 ) -> None:
     check_streaming_is_batch(short_ramp, method, same_history)
     check_streaming_is_batch(replace(short_ramp, force=None, object_pose=None, normal=None), method, same_history)
+
+
+@EACH_METHOD
+def test_a_stream_that_goes_on_elsewhere_needs_no_kernel_of_its_own(short_ramp: GraspLog, method: str) -> None:
+    """Compiling another takes 15 s, in the middle of a grasp."""
+    run = getattr(METHODS[method], "run", None)
+    if run is None:
+        pytest.skip("a method in numpy")
+    first, second = itertools.islice(short_ramp.frames(), 2)
+    state, _ = step(init(short_ramp.position, short_ramp.element_area, method), first)
+    known = list(run.signatures)
+    step(pickle.loads(pickle.dumps(state)), second)
+    assert run.signatures == known
 
 
 @EACH_METHOD
