@@ -89,10 +89,10 @@ def init(position: ArrayLike, element_area: float, method: str = DEFAULT_METHOD,
         start = found.start(lattice, chosen)
     else:
         of_method = found.init(lattice, chosen)
-    # copies that can be written to, as unpickled arrays can: kernels are compiled for one type
-    rest = [np.array(array) for array in (lattice.position, lattice.steps, lattice.inverse_jacobian)]
-    by_force, by_shape = (
-        Sensor(*rest, lattice.orientation, touch, start.settings) for touch in touch_thresholds(chosen, area)
+    position_at_rest, steps, inverse = map(np.array, (lattice.position, lattice.steps, lattice.inverse_jacobian))
+    by_force, by_shape = (  # copies that can be written to, as unpickled ones can: kernels are compiled for one type
+        Sensor(position_at_rest, steps, inverse, lattice.orientation, touch, start.settings)
+        for touch in touch_thresholds(chosen, area)
     )
     shape = lattice.position.shape
     frame = FrameArrays(-math.inf, _read_only(np.zeros(shape)), NO_FIELD, NO_POSE, NO_FIELD, NO_MASK)
