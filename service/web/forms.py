@@ -11,6 +11,7 @@ from starlette.datastructures import FormData
 from starlette.exceptions import HTTPException
 from starlette.formparsers import MultiPartException, MultiPartParser
 
+from db.text import is_storable
 from service.http.bodies import limited
 
 MOST_FORM_BYTES = 2**18
@@ -59,9 +60,17 @@ async def read_form(request: Request, make_file: Callable[[], IO[bytes]], **most
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
         return FormData()
     try:
-        return await _FileParser(request, make_file, **most).parse()
+        form = await _FileParser(request, make_file, **most).parse()
     except MultiPartException as error:
         raise HTTPException(400, error.message) from error
+    except (LookupError, UnicodeError) as error:
+        raise HTTPException(400, "the form's text is not in the charset that it names; allowed: UTF-8") from error
+    sent = (text for pair in form.multi_items() for text in pair)
+    texts = (each if isinstance(each, str) else each.filename or "" for each in sent)
+    if not all(map(is_storable, texts)):
+        await form.close()
+        raise HTTPException(400, "the form's text has NUL or surrogates; allowed: any text without them")
+    return form
 
 
 def checked(shape: type[Shape], fields: Mapping[str, str]) -> Shape:

@@ -60,6 +60,23 @@ def test_a_refused_upload_is_told_above_its_form(
 
 
 @ON_SQLITE
+@pytest.mark.parametrize("charset", ["undefined", "punycode", "utf-7", "unicode_escape", "idna"])
+@pytest.mark.parametrize("place", ["field", "field name", "file name"])
+@pytest.mark.parametrize("accepted", ["text/html", "application/json"])
+def test_a_form_in_an_odd_charset_is_refused(client: httpx.Client, charset: str, place: str, accepted: str) -> None:
+    odd = rb"\ud800" if charset == "unicode_escape" else b"+2AA-" if charset == "utf-7" else b"xn--\xff"
+    field, name, file = (odd if place == each else b"x" for each in ("field", "field name", "file name"))
+    begin = b'--X\r\nContent-Disposition: form-data; name="'
+    body = (
+        begin + name + b'"\r\n\r\n' + field + b"\r\n" + begin + b'file"; filename="' + file + b'"\r\n\r\nx\r\n--X--\r\n'
+    )
+    headers = SAME_ORIGIN | {"accept": accepted, "content-type": f"multipart/form-data; boundary=X; charset={charset}"}
+    answer = client.post("/upload", content=body, headers=headers)
+    assert answer.status_code in {400, 415, 422}, answer.text
+    assert answer.headers["content-type"].startswith(("text/html", "application/problem+json"))
+
+
+@ON_SQLITE
 @pytest.mark.parametrize(
     ("more", "file"), [({}, b"no log at all"), ({"detector": "magic"}, b"x"), ({"sensor": "\x07"}, None)]
 )
