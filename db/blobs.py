@@ -235,7 +235,7 @@ class BlobStore:
     def _local_store_id(self) -> str | None:
         with disk_errors_named():
             try:
-                return (self._blobs / STORE_ID).read_text().strip()
+                return (self._blobs / STORE_ID).read_text(errors="backslashreplace").strip()
             except FileNotFoundError:
                 return None
 

@@ -97,7 +97,7 @@ class ObjectStore:
         """The text of an object that is no blob; None where there is none."""
         with _answered("blob store"):
             try:
-                return bytes(self._obstore.get(self._store, key).bytes()).decode()
+                return bytes(self._obstore.get(self._store, key).bytes()).decode(errors="backslashreplace")
             except FileNotFoundError:
                 return None
 

@@ -1,12 +1,18 @@
 """Work that is done again and again in a thread beside the server."""
 
 import asyncio
+import logging
 import threading
 from collections.abc import Callable
 
+logger = logging.getLogger(__name__)
+
 
 class PeriodicThread:
-    """Calls ``step`` every so many ``seconds``; it is told to ``stop`` before a step, and can look meanwhile."""
+    """Calls ``step`` every so many ``seconds``; it is told to ``stop`` before a step, and can look meanwhile.
+
+    A step that fails is logged and comes again: who waits for its work would wait for good otherwise.
+    """
 
     def __init__(self, name: str, seconds: float, step: Callable[[], None]) -> None:
         self._seconds, self._step = seconds, step
@@ -34,4 +40,7 @@ class PeriodicThread:
 
     def _run(self) -> None:
         while not self._stopping.wait(self._seconds):
-            self._step()
+            try:
+                self._step()
+            except Exception:
+                logger.exception("%s: a step failed, the next is in %g s", self._thread.name, self._seconds)

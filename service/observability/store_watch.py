@@ -34,7 +34,7 @@ class StoreWatch:
         await self._thread.stop()
 
     def look(self) -> None:
-        """Ask, write and read."""
+        """Ask, write and read; whatever goes wrong there is trouble, also what nobody thought of."""
         try:
             self._database.ping()
             self._blobs.ping()
@@ -44,6 +44,9 @@ class StoreWatch:
             self._look_at_pages()
         except (DatabaseError, OSError) as error:
             self.trouble = str(error)
+        except Exception as error:
+            self.trouble = f"unexpected {type(error).__name__}; the server's log has it whole"
+            raise
         else:
             self.trouble = self._damage
 

@@ -1,6 +1,8 @@
 import asyncio
 import threading
 
+import pytest
+
 from service.periodic_thread import PeriodicThread
 
 SOON = 10.0
@@ -36,6 +38,22 @@ def test_a_step_that_sleeps_is_woken_when_it_is_to_end() -> None:
     assert begun.wait(SOON)
     asyncio.run(thread.stop())
     assert (woken, thread.is_stopping) == ([True], True)
+
+
+def test_a_step_that_fails_is_logged_and_comes_again(caplog: pytest.LogCaptureFixture) -> None:
+    again, failures = threading.Event(), iter([ValueError("nobody thought of it")])
+
+    def step() -> None:
+        for failure in failures:
+            raise failure
+        again.set()
+
+    thread = PeriodicThread("test", 0.001, step)
+    thread.start()
+    assert again.wait(SOON)
+    asyncio.run(thread.stop())
+    assert "a step failed" in caplog.text
+    assert "nobody thought of it" in caplog.text
 
 
 def test_what_never_began_is_stopped_at_once() -> None:
