@@ -109,12 +109,12 @@ class Database:
         """Make sure that the database answers and has its tables; raises ``StorageUnavailable``."""
         with self.read() as session:
             session.connection().exec_driver_sql("SELECT version_num FROM alembic_version")
-        with _sqlite_errors_named():
+        with sqlite_errors_named():
             self._file.check_head()
 
     def check_pages(self) -> None:
         """Read the whole of an SQLite file; raises ``StorageUnavailable`` where it is damaged."""
-        with _sqlite_errors_named():
+        with sqlite_errors_named():
             self._file.check_pages()
 
     def close(self) -> None:
@@ -126,7 +126,8 @@ class Database:
 
 
 @contextmanager
-def _sqlite_errors_named() -> Iterator[None]:
+def sqlite_errors_named() -> Iterator[None]:
+    """Raise ``StorageUnavailable`` for what SQLite itself says below SQLAlchemy."""
     try:
         yield
     except sqlite3.Error as error:

@@ -14,7 +14,7 @@ from sqlalchemy import Connection, text
 from sqlalchemy.orm import Session
 
 import migrations
-from db.database import Database
+from db.database import Database, sqlite_errors_named
 from db.errors import SchemaMismatch
 from db.tables import Base
 
@@ -111,7 +111,8 @@ def _foreign_keys_off(database: Database, connection: Connection) -> Iterator[No
     sqlite.execute("PRAGMA foreign_keys = OFF")
     try:
         yield
-        broken = sqlite.execute("PRAGMA foreign_key_check").fetchall()
+        with sqlite_errors_named():
+            broken = sqlite.execute("PRAGMA foreign_key_check").fetchall()
         if broken:
             raise SchemaMismatch(f"foreign keys are broken in {sorted({str(row[0]) for row in broken})}")
     finally:

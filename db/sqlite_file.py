@@ -1,17 +1,23 @@
 """The files of an SQLite database, which may be deleted or replaced under the process that has them open.
 
 Whoever writes to a deleted file is told that all went well, and whoever opens its name again gets a new, empty one.
+An older copy that is written over it keeps its name and inode: it shows by what never falls otherwise, the file's size
+and the generation in its header. Nobody here opens the file past SQLite: closing it would end SQLite's locks on it.
 """
 
 import os
 import sqlite3
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 from db.errors import StorageUnavailable
 
 SIDE_FILES = ("-wal", "-shm")
 """What is beside the file as long as any connection has read from it: commits go to the first of them."""
+
+GENERATION = "PRAGMA user_version"
+"""What the file's header says of how often it was looked at; whoever looks writes one more."""
 
 
 class SqliteFile:
@@ -20,15 +26,16 @@ class SqliteFile:
     def __init__(self, path: str | None) -> None:
         self._path = None if path is None else Path(path).absolute()
         self._first: tuple[int, int] | None = None
+        self._size = self._generation = 0
         self._open: set[int] = set()
         self._side_files: list[tuple[int, int] | None] = []
 
     def note_opened(self, connection: object) -> None:
         """Remember the files, which are there once a connection has read anything; in memory there are none."""
         if self._first is None:
-            self._first = self._identity()
+            self._first = _identity(self._stat())
         if not self._open:
-            self._side_files = [self._identity(suffix) for suffix in SIDE_FILES]
+            self._side_files = [_identity(self._stat(suffix)) for suffix in SIDE_FILES]
         self._open.add(id(connection))
 
     def note_closing(self, connection: object) -> None:
@@ -37,10 +44,13 @@ class SqliteFile:
 
     def require(self) -> None:
         """Make sure that they are still there; raises ``StorageUnavailable``."""
-        if self._first is not None and self._identity() != self._first:
-            raise self._lost()
+        if self._first is not None:
+            found = self._stat()
+            if found is None or _identity(found) != self._first or found.st_size < self._size:
+                raise self._lost()
+            self._size = found.st_size
         for suffix, opened in zip(SIDE_FILES, self._side_files, strict=False):
-            if self._identity(suffix) != opened and self._open:
+            if _identity(self._stat(suffix)) != opened and self._open:
                 raise self._lost(suffix)
 
     def check_head(self) -> None:
@@ -49,27 +59,35 @@ class SqliteFile:
         Raises ``StorageUnavailable``, ``sqlite3.Error``.
         """
         self._ask("SELECT count(*) FROM sqlite_master")
+        generation = self._ask(GENERATION) or 0
+        if generation < self._generation:
+            raise self._lost()
+        self._generation = generation
 
     def check_pages(self) -> None:
         """Read every page and look whether they fit together; raises ``StorageUnavailable``, ``sqlite3.Error``."""
         found = self._ask("PRAGMA quick_check(1)")
-        if found != "ok":
+        if found not in (None, "ok"):
             raise StorageUnavailable(f"database file {self._path} is damaged: {found}; allowed: restore a backup")
 
-    def _ask(self, statement: str) -> object:
+    def _ask(self, statement: str) -> Any:
+        """The first cell of the answer; None where there is no file."""
         if self._first is None or self._path is None:
-            return "ok"
+            return None
         self.require()  # where a file beside it is gone, even who only reads would make an empty one
         with closing(sqlite3.connect(f"{self._path.as_uri()}?mode=ro", uri=True)) as connection:
             return connection.execute(statement).fetchone()[0]
 
-    def _identity(self, suffix: str = "") -> tuple[int, int] | None:
+    def _stat(self, suffix: str = "") -> os.stat_result | None:
         try:
-            stat = os.stat(f"{self._path or ''}{suffix}")
+            return os.stat(f"{self._path or ''}{suffix}")
         except OSError:
             return None
-        return stat.st_dev, stat.st_ino
 
     def _lost(self, suffix: str = "") -> StorageUnavailable:
         what = f"database file {self._path}{suffix} was deleted or replaced while it was in use"
         return StorageUnavailable(f"{what}; allowed: the same file put back, or a restart")
+
+
+def _identity(file: os.stat_result | None) -> tuple[int, int] | None:
+    return None if file is None else (file.st_dev, file.st_ino)

@@ -66,11 +66,14 @@ def check(
         bool, typer.Option("--deep", help="Read every file, too: its bytes must be those of before.")
     ] = False,
 ) -> None:
-    """Make sure that the schema is this version's and every file that rows refer to is there; exit code 3 if not."""
+    """Make sure that the schema is this version's, that an SQLite file is whole, and that every file that rows refer to
+    is there; exit code 3 if not.
+    """
     from db import identity, migrate
     from db.backup import damaged
 
     with opened(database_url) as database:
+        database.check_pages()
         migrate.check(database)
         typer.echo("the schema is this version's")
         blobs = opened_blobs()

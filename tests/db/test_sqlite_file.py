@@ -1,9 +1,14 @@
+import shutil
 import sqlite3
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from db.database import Database
 from db.errors import StorageUnavailable
+from db.migrate import upgrade
+from db.repositories import stores
 from db.sqlite_file import SIDE_FILES, SqliteFile
 
 
@@ -22,3 +27,32 @@ def test_a_look_makes_no_file_in_place_of_one_that_is_gone(tmp_path: Path, suffi
         file.check_head()
     assert not beside.exists()
     connection.close()
+
+
+def grow(database: Database) -> None:
+    with database.write() as session:
+        session.connection().exec_driver_sql("CREATE TABLE more AS SELECT randomblob(100000)")
+
+
+def look(database: Database) -> None:
+    with database.write() as session:
+        stores.touch(session)
+
+
+@pytest.mark.parametrize("change", [grow, look])
+def test_an_older_copy_over_the_file_is_noticed(tmp_path: Path, change: Callable[[Database], None]) -> None:
+    """With the inode of before, once the write-ahead log holds nothing that would hide it."""
+    path = tmp_path / "stiction.sqlite3"
+    database = Database(f"sqlite:///{path}")
+    upgrade(database)
+    with database.connect() as connection:
+        connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
+    shutil.copyfile(path, tmp_path / "older")
+    change(database)
+    with database.connect() as connection:
+        connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
+    database.ping()
+    shutil.copyfile(tmp_path / "older", path)
+    with pytest.raises(StorageUnavailable, match="deleted or replaced"):
+        database.ping()
+    database.close()

@@ -408,6 +408,23 @@ def test_check_tells_files_that_are_missing_or_changed(
     assert f"blob {changed} has other bytes than it had: their hash is " in run("db", "check", "--deep")[2]
 
 
+@pytest.mark.parametrize("command", ["check", "upgrade"])
+def test_a_damaged_database_is_told_without_a_traceback(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    monkeypatch.setenv("STICTION_DATA_FOLDER", str(tmp_path))
+    assert run("db", "upgrade")[0] == 0
+    with (tmp_path / "stiction.sqlite3").open("r+b") as file:
+        pages = range(8192, file.seek(0, 2), 4096)  # behind the schema's first two
+        for page in pages:
+            file.seek(page)
+            file.write(b"\xff" * 100)
+    code, _, err = run("db", command)
+    assert code == INPUT_REFUSED
+    assert "malformed" in err or "damaged" in err
+    assert "Traceback" not in err
+
+
 def test_json_holds_no_number_that_json_does_not_know() -> None:
     record: dict[str, Any] = {"a": float("nan"), "b": [float("inf"), 1.5], "c": {"d": (1, None)}}
     assert plain(record) == {"a": None, "b": [None, 1.5], "c": {"d": [1, None]}}

@@ -2,13 +2,14 @@
 
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from threading import Lock
 from typing import Any
 
 import httpx
 import pytest
+from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session
 
 from db.blobs import BlobStore
@@ -198,3 +199,24 @@ def test_a_full_disk_of_the_database_is_told(
     watch.look()
     assert watch.trouble is not None
     assert "database or disk is full" in watch.trouble
+
+
+def test_what_nobody_thought_of_is_trouble_and_the_watch_goes_on(database: Database, blobs: BlobStore) -> None:
+    """As a table that somebody renamed, of which PostgreSQL does not say that it is unavailable."""
+    watch = StoreWatch(database, blobs)
+    with database.write() as session:
+        session.connection().exec_driver_sql("ALTER TABLE store RENAME TO away")
+    with suppress(DBAPIError):  # the thread logs it, and goes on
+        watch.look()
+    assert watch.trouble is not None
+    with database.write() as session:
+        session.connection().exec_driver_sql("ALTER TABLE away RENAME TO store")
+    watch.look()
+    assert watch.trouble is None
+
+
+def test_a_store_id_that_is_no_text_is_another_store(blobs: BlobStore, tmp_path: Path) -> None:
+    blobs.store_id = "a" * 32
+    (tmp_path / "blobs" / "store-id").write_bytes(b"\xff\xfe")
+    with pytest.raises(StorageUnavailable, match=r"is \\xff\\xfe"):
+        blobs.ping()
