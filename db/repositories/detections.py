@@ -2,7 +2,7 @@
 
 from dataclasses import asdict, fields
 
-from sqlalchemy import ColumnElement, select, update
+from sqlalchemy import ColumnElement, delete, select, update
 from sqlalchemy.orm import Session
 
 from db.records import ContactFriction, Detection, Finding, SamplesOfLog, SampleSummary
@@ -29,6 +29,12 @@ def add(session: Session, log_id: str, detection: Detection, samples: SampleSumm
         )
     )
     session.flush()
+
+
+def remove(session: Session, log_id: str) -> None:
+    """Forget what was found in a log, if anything was: it is looked for anew."""
+    for table in (SampleSummaryRow, DetectionRow):
+        session.execute(delete(table).where(table.grasp_log_id == log_id))
 
 
 def samples_of_material(session: Session, material_id: int) -> list[SamplesOfLog]:

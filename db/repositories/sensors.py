@@ -25,12 +25,18 @@ def find_or_add(session: Session, name: str) -> int:
     return row.id
 
 
-def get(session: Session, name: str) -> Sensor:
-    """A sensor with what is known of its gel; raises ``NotFound``."""
+def find(session: Session, name: str) -> Sensor | None:
+    """A sensor with what is known of its gel; None of which nothing was heard yet."""
     row = session.scalar(select(SensorRow).where(SensorRow.name == name)) if is_storable(name) else None
-    if row is None:
+    return None if row is None else _record(row)
+
+
+def get(session: Session, name: str) -> Sensor:
+    """The same; raises ``NotFound``."""
+    found = find(session, name)
+    if found is None:
         raise NotFound("sensor", name)
-    return _record(row)
+    return found
 
 
 def list_all(session: Session) -> list[Sensor]:

@@ -5,7 +5,11 @@ from dataclasses import asdict
 from db.records import Gel, Sensor
 from db.repositories import audit, sensors
 from service.domain.context import Context
+from service.domain.errors import InsufficientScope
 from service.domain.principal import Principal
+
+RECONSTRUCTED = "reconstructed forces"
+"""The finding of a log whose forces follow from its sensor's gel."""
 
 
 def find(context: Context, name: str) -> Sensor:
@@ -21,7 +25,16 @@ def list_all(context: Context) -> list[Sensor]:
 
 
 def describe(context: Context, name: str, gel: Gel, principal: Principal) -> Sensor:
-    """Store the mechanics of a sensor's gel: forces of logs that come in from then on follow from it."""
+    """Store the mechanics of a sensor's gel: forces of logs that come in from then on follow from it.
+
+    All keys' logs of that sensor do: whoever may upload may describe it once, and only admins otherwise. Raises
+    ``InsufficientScope``.
+    """
     with context.database.write() as session:
+        known = sensors.find(session, name)
+        if known is not None and known.gel == gel:
+            return known
+        if known is not None and known.gel is not None and not principal.is_admin:
+            raise InsufficientScope("upload", "admin")
         audit.add(session, principal.actor, "sensor.described", name, asdict(gel))
         return sensors.describe(session, name, gel)

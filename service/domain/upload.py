@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 from db.blobs import Spool, disk_errors_named
 from db.errors import AlreadyExists, NotFound, StorageUnavailable
 from db.records import NewGraspLog, StoredGraspLog
-from db.repositories import audit, grasp_logs, jobs, materials, stores, uploads
+from db.repositories import audit, detections, grasp_logs, jobs, materials, stores, uploads
 from service import formats
 from service.domain import curate, quotas
 from service.domain.context import Context
@@ -21,6 +21,7 @@ from service.domain.ownership import check_may_add
 from service.domain.principal import ANONYMOUS, Principal
 from service.domain.queueing import INGEST_METHODS, queue
 from service.domain.receive import UNPACKING_BYTES, check_encoding, check_expansion, check_size, unpack
+from service.domain.sensors import RECONSTRUCTED
 from service.formats.archive import unpacked_bytes
 from service.formats.reading import Description, FormatSettings, to_its_end
 from slipcore.defaults import METHOD_NAMES
@@ -150,7 +151,7 @@ def store(context: Context, received: ReceivedLog, make_rows: Callable[[Session]
 
 
 def accept(session: Session, context: Context, received: ReceivedLog) -> StoredUpload:
-    """Store a new log with its job; a known one whose job failed, which is our fault, or was cancelled gets another.
+    """Store a new log with its job; a known one that may end otherwise now has its job done again (``_may_differ``).
 
     Key and quotas are looked at once more: it may have been revoked, and others of it stored, since this one's body
     began. Raises ``KeyEnded``, ``NotOwner``, ``QuotaExceeded`` and ``StorageQuotaExceeded``.
@@ -173,15 +174,30 @@ def accept(session: Session, context: Context, received: ReceivedLog) -> StoredU
         )
     except AlreadyExists:
         log_id, is_new = grasp_logs.find_id(session, log.sha256, log.material_id, log.detector), False
-        job = grasp_logs.get(session, log_id).job
-        if job.status not in {"failed", "cancelled"}:
-            return StoredUpload(grasp_logs.get(session, log_id), is_new)
+        known = grasp_logs.get(session, log_id)
+        if not _may_differ(session, known):
+            return StoredUpload(known, is_new)
         quotas.check_job(session, settings, principal.key_id)
-        jobs.requeue(session, job.id, requested_by=principal.key_id)
+        if known.job.status in {"done", "refused"}:  # what was found then follows from another gel, or from none
+            detections.remove(session, log_id)
+        jobs.requeue(session, known.job.id, requested_by=principal.key_id)
     stored = grasp_logs.get(session, log_id)
     told = {"material": stored.material, "sha256": stored.sha256, "bytes": stored.bytes, "new": is_new}
     audit.add(session, principal.actor, "grasp_log.uploaded", log_id, told)
     return StoredUpload(stored, is_new)
+
+
+def _may_differ(session: Session, log: StoredGraspLog) -> bool:
+    """Whether a job that has ended may end otherwise: it failed, which is our fault, was cancelled, or the log's forces
+    follow from its sensor's gel, or would have, and that was described since.
+    """
+    job = log.job
+    if job.status in {"failed", "cancelled"}:
+        return True
+    found = () if log.detection is None else log.detection.findings or ()
+    by_gel = job.status == "refused" or any(finding.name == RECONSTRUCTED for finding in found)
+    ended = job.finished_at
+    return by_gel and ended is not None and audit.is_recorded(session, "sensor.described", log.sensor, ended)
 
 
 def _material(session: Session, received: ReceivedLog) -> int | None:

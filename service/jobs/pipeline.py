@@ -26,6 +26,7 @@ from estimators import EstimatorError, FrictionModel, Moments
 from service import formats
 from service.domain.doubtful_logs import with_doubts
 from service.domain.queueing import INGEST_METHODS, queue_cheap_refits
+from service.domain.sensors import RECONSTRUCTED
 from service.domain.stored_results import (
     decode_samples,
     encode_history,
@@ -208,7 +209,7 @@ def _said(reconstruction: "Reconstruction | None") -> list[Finding]:
         f"forces follow from displacement by the sensor's gel, in effect averaged over "
         f"{1e3 * reconstruction.kernel_width:.2g} mm; share of the resultant that data tell: {told}"
     )
-    return [Finding("reconstructed forces", evidence, "friction is as sure as the description of the sensor's gel")]
+    return [Finding(RECONSTRUCTED, evidence, "friction is as sure as the description of the sensor's gel")]
 
 
 def _collect(
@@ -220,7 +221,7 @@ def _collect(
     if log.force is None:
         return _no_samples(log), (
             "the log has no forces; friction is tangential over normal force. If a sensor sees only its markers move, "
-            f"describe the gel of sensor {log.sensor!r}: forces of logs that come in later follow from it"
+            f"describe the gel of sensor {log.sensor!r}, from which forces follow, and send the log again"
         )
     if not history.contact.any():
         return _no_samples(log), f"no element was in contact in any of the {len(log)} frames"

@@ -1,7 +1,11 @@
+from collections.abc import Callable
 from typing import Any
 
 import httpx
 import pytest
+
+from slipcore import GraspLog
+from stiction_client.container import encode
 
 GEL = {"young_modulus": 2.5e5, "poisson_ratio": 0.48, "thickness": 4e-3, "marker_depth": 5e-4}
 
@@ -40,3 +44,42 @@ def test_a_sensor_is_described_before_or_after_its_first_log(client: httpx.Clien
 def test_an_impossible_gel_is_refused(client: httpx.Client, change: dict[str, Any]) -> None:
     refused = client.put("/v1/sensors/other", json=GEL | change)
     assert (refused.status_code, refused.json()["type"]) == (422, "/problems/invalid-request")
+
+
+def test_one_key_describes_a_sensor_for_all_and_only_an_admin_does_so_again(
+    reach: Callable[..., Any], make: Callable[..., str]
+) -> None:
+    first, other, admin = (reach(key=make(scope)) for scope in ("upload", "upload", "admin"))
+    path = "/v1/sensors/shared"
+    assert first.request("PUT", path, json=GEL).status_code == httpx.codes.OK
+    assert other.request("PUT", path, json=GEL).status_code == httpx.codes.OK  # as it is already
+    for caller in (first, other):
+        refused = caller.request("PUT", path, json=GEL | {"poisson_ratio": 0.0})
+        assert (refused.status_code, refused.json()["type"]) == (403, "/problems/insufficient-scope")
+    assert admin.request("GET", path).json()["gel"] == GEL
+    softer = GEL | {"young_modulus": 2e5}
+    assert admin.request("PUT", path, json=softer).json()["gel"] == softer
+
+
+def test_a_log_that_is_sent_again_once_its_sensor_is_described_anew_is_looked_at_again(
+    client: httpx.Client, material: str, ramp: GraspLog, upload: Any, wait: Any
+) -> None:
+    few = ramp.displacement[60::15, 2:6, 2:6]  # 2 frames, 16 markers: forces of more take seconds
+    content = encode(GraspLog(ramp.time[60::15], ramp.position[2:6, 2:6], few, ramp.element_area))
+
+    def sent(gel: dict[str, float] | None) -> tuple[bool, list[str]]:
+        """Whether there is something to do, and what is found then."""
+        if gel is not None:
+            client.put(f"/v1/sensors/{material}", json=gel).raise_for_status()
+        log = upload(client, content, material=material, sensor=material).raise_for_status().json()
+        wait(client, log["job"]["id"])
+        found = client.get(f"/v1/grasp-logs/{log['id']}").json()["detection"]["findings"]
+        return log["job"]["status"] == "queued", [each["name"] for each in found]
+
+    assert sent(None)[0]
+    assert sent(None)[0] is False
+    is_new, found = sent(GEL)
+    assert is_new
+    assert "reconstructed forces" in found
+    assert sent(GEL) == (False, found)  # described as it was
+    assert sent(GEL | {"young_modulus": 1e6})[0]
