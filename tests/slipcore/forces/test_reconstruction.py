@@ -12,7 +12,8 @@ from slipcore.forces import Gel, Reconstruction, reconstruct
 GEL = Gel(young_modulus=1e6, poisson_ratio=0.49, thickness=5e-3)
 Pressed = Callable[..., GraspLog]
 LATE = [3, 6]
-MIDDLE = slice(4, 16)
+MIDDLE, INSIDE = slice(4, 16), slice(6, 14)
+"""Parts of the lattice: the contact and a little around it, and most of the contact."""
 
 
 def truth(log: GraspLog) -> np.ndarray:
@@ -54,7 +55,7 @@ def test_in_the_plane_alone_the_contact_is_found_and_with_it_the_normal_force_on
 
 def test_what_is_only_the_priors_is_said(pressed: Pressed) -> None:
     """In the plane an incompressible half-space shows nothing of pressure; a given force is then all that is known."""
-    log = pressed(LATE, noise=1e-6, axes=2, crop=MIDDLE)
+    log = pressed(LATE, noise=1e-6, axes=2, crop=INSIDE)
     blind = Gel(1e6, 0.5)
     alone = reconstruct(log, blind, noise=1e-6)
     assert alone.information[2] < 0.01
@@ -66,8 +67,8 @@ def test_what_is_only_the_priors_is_said(pressed: Pressed) -> None:
 
 
 def test_nothing_touches_where_nothing_moves_but_noise(pressed: Pressed) -> None:
-    still = replace(pressed(LATE, crop=MIDDLE), displacement=np.zeros((2, 12, 12, 3)))
-    noisy = replace(still, displacement=1e-6 * np.random.default_rng(1).standard_normal((2, 12, 12, 3)))
+    still = replace(pressed(LATE, crop=INSIDE), displacement=np.zeros((2, 8, 8, 3)))
+    noisy = replace(still, displacement=1e-6 * np.random.default_rng(1).standard_normal((2, 8, 8, 3)))
     for log, noise in ((still, 0.0), (still, None), (noisy, 1e-6)):
         found = reconstruct(log, GEL, noise=noise)
         assert not found.force.any()
@@ -110,7 +111,7 @@ def test_few_markers_and_markers_on_a_line_give_finite_forces(pressed: Pressed, 
 
 
 def test_a_gel_of_another_stiffness_gives_forces_of_that_scale(pressed: Pressed) -> None:
-    log = pressed([6, 6], noise=1e-6, axes=2, crop=MIDDLE)
+    log = pressed([6, 6], noise=1e-6, axes=2, crop=INSIDE)
     soft, stiff = (
         reconstruct(log, Gel(young, GEL.poisson_ratio, GEL.thickness), noise=1e-6).resultant for young in (1e3, 1e12)
     )
@@ -132,12 +133,12 @@ def test_other_criteria_find_the_resultant_too(pressed: Pressed, criterion: str)
 
 
 def test_noise_is_estimated_where_it_is_not_given(pressed: Pressed) -> None:
-    log = pressed([6] * 14, noise=3e-6, axes=2, crop=MIDDLE)
-    assert 2e-6 < reconstruct(log, GEL).noise < 5e-6
+    log = pressed([6] * 14, noise=3e-6, axes=2, crop=INSIDE)
+    assert reconstruct(log, GEL).noise == pytest.approx(3e-6, rel=0.25)
 
 
 def test_the_log_with_these_forces_says_where_they_come_from(pressed: Pressed) -> None:
-    log = replace(pressed(LATE, crop=MIDDLE), force=None)
+    log = replace(pressed(LATE, crop=INSIDE), force=None)
     found = reconstruct(log, GEL, noise=1e-6)
     made = found.apply(log)
     assert made.force is not None
@@ -149,7 +150,7 @@ def test_the_log_with_these_forces_says_where_they_come_from(pressed: Pressed) -
 
 
 def test_what_does_not_fit_is_refused_by_name(pressed: Pressed) -> None:
-    log = pressed(LATE, crop=MIDDLE)
+    log = pressed(LATE, crop=INSIDE)
     with pytest.raises(UnknownScale):
         reconstruct(replace(log, metadata={"scale": "unknown"}), GEL)
     with pytest.raises(InvalidInput, match="noise is -1"):
