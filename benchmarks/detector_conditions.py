@@ -20,28 +20,9 @@ FAST_SCENES = ("quick pull", "swing", "grip loosens")
 """Simulated at other frame rates: fast, reversed, and with a falling normal force."""
 
 
-def chosen_frames(log: GraspLog, kept: np.ndarray) -> GraspLog:
-    """The log with these frames only."""
-    truth = log.truth
-    assert truth is not None
-    assert log.force is not None
-    assert log.object_pose is not None
-    assert log.normal is not None
-    fields = ("contact", "slip_kinematic", "slip_contact_factor", "stick_ratio")
-    return replace(
-        log,
-        time=log.time[kept],
-        displacement=log.displacement[kept],
-        force=log.force[kept],
-        normal=log.normal[kept],
-        object_pose=log.object_pose[kept],
-        truth=replace(truth, **{name: getattr(truth, name)[kept] for name in fields}),
-    )
-
-
 def tenth_dropped(log: GraspLog, rng: np.random.Generator) -> GraspLog:
     """Without a tenth of its frames, chosen at random."""
-    return chosen_frames(log, np.sort(rng.choice(len(log), round(0.9 * len(log)), replace=False)))
+    return log.take(np.sort(rng.choice(len(log), round(0.9 * len(log)), replace=False)))
 
 
 def outliers(log: GraspLog, rng: np.random.Generator) -> GraspLog:

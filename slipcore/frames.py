@@ -1,7 +1,7 @@
 """Grasp logs: tactile frames over time, as they enter slipcore (stage 1: frames)."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -13,6 +13,7 @@ from slipcore.errors import InvalidInput
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+Frames = BoolArray | NDArray[np.int64] | slice
 
 
 class Frame(NamedTuple):
@@ -57,6 +58,11 @@ class GroundTruth:
     slip_contact_factor: BoolArray
     stick_ratio: FloatArray
     friction: FrictionLaw
+
+    def take(self, frames: Frames) -> "GroundTruth":
+        """The truth of some frames; see ``GraspLog.take``."""
+        masks = (self.contact[frames], self.slip_kinematic[frames], self.slip_contact_factor[frames])
+        return GroundTruth(*masks, self.stick_ratio[frames], self.friction)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,6 +138,16 @@ class GraspLog:
 
     def __len__(self) -> int:
         return len(self.time)
+
+    def take(self, frames: Frames) -> "GraspLog":
+        """The log of some frames: a mask [t], ascending numbers or a slice; others count as never recorded.
+
+        Raises ``InvalidInput`` where fewer are left than a log needs, or not in the order of time.
+        """
+        over_time = ("force", "normal", "object_pose", "contact", "observed")
+        known = {name: array[frames] for name in over_time if (array := getattr(self, name)) is not None}
+        truth = None if self.truth is None else self.truth.take(frames)
+        return replace(self, time=self.time[frames], displacement=self.displacement[frames], truth=truth, **known)
 
     def frames(self) -> Iterator[Frame]:
         """Walk through the log as a detector would see it live."""

@@ -9,7 +9,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 
 from benchmarks.detector_scenes import simulated
-from slipcore import GraspLog, GroundTruth, SlipHistory, detect_slip
+from slipcore import GraspLog, SlipHistory, detect_slip
 from slipcore.contact.effects import ForceNoise, MarkerNoise, SensorSampling
 from slipcore.contact.plan.plan import Effect
 from slipcore.contact.scene import Scene
@@ -41,25 +41,6 @@ def scene_log(
     kept = tuple(effect for effect in scene.effects if not isinstance(effect, kinds))
     seen = () if sampling is None else (sampling,)
     return simulated(replace(scene, effects=(*kept, *added, *seen)))
-
-
-def first(log: GraspLog, frames: int) -> GraspLog:
-    """The first frames of a simulated log."""
-    truth, part = log.truth, slice(None, frames)
-    assert truth is not None
-    assert log.force is not None
-    assert log.object_pose is not None
-    assert log.normal is not None
-    masks = (mask[part] for mask in (truth.contact, truth.slip_kinematic, truth.slip_contact_factor))
-    return replace(
-        log,
-        time=log.time[part],
-        displacement=log.displacement[part],
-        force=log.force[part],
-        object_pose=log.object_pose[part],
-        normal=log.normal[part],
-        truth=GroundTruth(*masks, truth.stick_ratio[part], truth.friction),
-    )
 
 
 def detected(log: GraspLog, method: str) -> SlipHistory:

@@ -8,7 +8,6 @@ from benchmarks.pages import table
 from benchmarks.paper.common import (
     COLOURS,
     Finding,
-    first,
     scene_log,
     strain_rates,
     tidy,
@@ -85,7 +84,7 @@ def _half_spaces() -> list[tuple[str, GraspLog]]:
     return [
         ("case 2, half-space, rigid object", scene_log("fig10_normal_force_rises")),
         ("case 2, coupled, object of 2 MPa", scene_log("fig10_normal_force_rises", *soft)),
-        ("case 3, half-space, moved back", first(moved, int(np.searchsorted(moved.time, 3.5)))),
+        ("case 3, half-space, moved back", moved.take(slice(int(np.searchsorted(moved.time, 3.5))))),
     ]
 
 

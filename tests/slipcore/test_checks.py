@@ -92,15 +92,6 @@ def doubled(log: GraspLog) -> GraspLog:
     )
 
 
-def without_beginning(log: GraspLog) -> GraspLog:
-    fields = {
-        name: getattr(log, name)[30:]
-        for name in ("time", "displacement", "force", "normal", "object_pose")
-        if getattr(log, name) is not None
-    }
-    return replace(log, **fields)
-
-
 FAULTS: dict[str, Callable[[GraspLog], GraspLog]] = {
     "slow frames": lambda log: replace(log, time=1e3 * log.time),
     "no displacement": lambda log: replace(log, displacement=np.zeros_like(log.displacement)),
@@ -108,7 +99,7 @@ FAULTS: dict[str, Callable[[GraspLog], GraspLog]] = {
     "force too large": lambda log: with_force(log, 1e2 * np.asarray(log.force)),
     "force pulls": lambda log: with_force(log, -np.asarray(log.force)),
     "saturation": saturated,
-    "no rest": without_beginning,
+    "no rest": lambda log: log.take(slice(30, None)),
     "sideways force without load": with_sideways,
     "contact travels": rolling,
     "friction follows force": with_smoothed_normal,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from slipcore import FrictionLaw, GraspLog, GroundTruth, InvalidInput
-from slipcore.frames import check_element_area, check_frame, check_normal, check_pose, check_position
+from slipcore.frames import Frames, check_element_area, check_frame, check_normal, check_pose, check_position
 
 SHAPE = (4, 3, 5)
 
@@ -327,3 +327,25 @@ def test_a_log_shares_only_what_nobody_can_change(fields: dict[str, Any]) -> Non
     assert not np.shares_memory(GraspLog(**fields).displacement, given)
     fixed = np.frombuffer(given.tobytes()).reshape(given.shape)
     assert np.shares_memory(GraspLog(**fields | {"displacement": fixed}).displacement, fixed)
+
+
+@pytest.mark.parametrize("frames", [slice(1, 3), np.array([1, 2]), np.array([False, True, True, False])])
+def test_some_frames_of_a_log_are_those_of_all_it_has(fields: dict[str, Any], frames: Frames) -> None:
+    masks = {name: np.random.default_rng(2).random(SHAPE) < 0.5 for name in ("contact", "observed")}
+    whole = GraspLog(**fields | masks)
+    part = whole.take(frames)
+    for one, expected in zip(part.frames(), list(whole.frames())[1:3], strict=True):
+        for found, value in zip(one, expected, strict=True):
+            np.testing.assert_array_equal(found, value)
+    assert part.truth is not None
+    np.testing.assert_array_equal(part.truth.stick_ratio, [1.0, 0.5])
+    assert (part.sensor, part.metadata, part.truth.friction) == (whole.sensor, whole.metadata, fields["truth"].friction)
+
+
+def test_frames_that_are_no_log_are_refused(fields: dict[str, Any]) -> None:
+    without = GraspLog(**fields | {"force": None, "normal": None, "object_pose": None, "truth": None})
+    assert without.take(slice(2)).force is None
+    with pytest.raises(InvalidInput, match=r"time is 1 frame\(s\)"):
+        without.take(slice(1))
+    with pytest.raises(InvalidInput, match="time is"):
+        without.take(np.array([2, 1]))

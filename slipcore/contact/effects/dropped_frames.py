@@ -7,7 +7,7 @@ import numpy as np
 
 from slipcore.contact.plan.plan import Observed
 from slipcore.errors import InvalidInput
-from slipcore.frames import GraspLog, GroundTruth
+from slipcore.frames import GraspLog
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,24 +33,9 @@ class DroppedFrames(Observed):
         """The log without the lost frames; a point that moved in a lost frame moved before the next one kept."""
         kept = rng.random(len(log)) >= self.probability
         kept[[0, -1]] = True
-        return replace(
-            log,
-            time=log.time[kept],
-            displacement=log.displacement[kept],
-            force=None if log.force is None else log.force[kept],
-            normal=None if log.normal is None else log.normal[kept],
-            object_pose=None if log.object_pose is None else log.object_pose[kept],
-            truth=None if log.truth is None else _kept_truth(log.truth, kept),
-        )
-
-
-def _kept_truth(truth: GroundTruth, kept: np.ndarray) -> GroundTruth:
-    first = np.concatenate(([0], np.flatnonzero(kept)[:-1] + 1))
-    moved = np.logical_or.reduceat(truth.slip_kinematic, first, axis=0)
-    return replace(
-        truth,
-        contact=truth.contact[kept],
-        slip_kinematic=moved,
-        slip_contact_factor=truth.slip_contact_factor[kept],
-        stick_ratio=truth.stick_ratio[kept],
-    )
+        left = log.take(kept)
+        if log.truth is None or left.truth is None:
+            return left
+        first = np.concatenate(([0], np.flatnonzero(kept)[:-1] + 1))
+        moved = np.logical_or.reduceat(log.truth.slip_kinematic, first, axis=0)
+        return replace(left, truth=replace(left.truth, slip_kinematic=moved))
