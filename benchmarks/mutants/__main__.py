@@ -2,8 +2,10 @@
 
 Draws mutants of the code, tries each with the tests that run its line, and writes mutants.json. All happens in a copy
 below `--work`, whose verdicts stay: a run that was stopped goes on, `--again` tries survivors once more. The first run,
-or `--cover`, runs all tests once to know what they cover; `--cover tests/a.py` adds those of new tests. `--seconds`
-ends a run early. `--only slipcore/frames.py:12` tries every mutant of a file or of one of its lines, and only prints.
+or `--cover`, runs all tests once to know what they cover; `--cover tests/a.py` adds those of new tests. `--near` goes
+without: a mutant is tried with the test files that have the name of its module or import it, and what survives these
+may be killed by others, in a run `--again`. `--seconds` ends a run early. `--only slipcore/frames.py:12` tries every
+mutant of a file or of one of its lines, and only prints.
 """
 
 import argparse
@@ -34,7 +36,7 @@ def main() -> None:
     options = _options()
     copy = ScratchCopy(options.work)
     copy.refresh()
-    if options.cover is not None or not copy.data.exists():
+    if options.cover is not None or not (options.near or copy.data.exists()):
         copy.cover(options.cover or [])
     if options.only:
         _try_place(copy, options.only)
@@ -65,6 +67,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--seconds", type=float, default=math.inf, help="no mutant is begun after so many")
     parser.add_argument("--work", type=Path, default=ROOT / ".cache" / "mutants", help="the copy and all verdicts")
     parser.add_argument("--cover", nargs="*", metavar="TESTS", help="run the tests with coverage first")
+    parser.add_argument("--near", action="store_true", help="do not ask first which tests run which line")
     parser.add_argument("--again", action="store_true", help="try survivors once more")
     parser.add_argument("--only", metavar="PLACE", help="a file, or file:line")
     return parser.parse_args()

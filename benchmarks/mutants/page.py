@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping
 
+from scipy import stats
+
 from benchmarks.mutants.edits import Edit
 from benchmarks.mutants.verdicts import Verdict
 from benchmarks.pages import table
 
-SCORE = ("package", "lines of code", "drawn", "tried", "killed", "survived, explained", "survived", "score")
+SCORE = ("package", "lines of code", "drawn", "tried", "killed", "survived, explained", "survived", "score", "95 %")
 
 Verdicts = Mapping[str, Verdict]
 Reasons = Mapping[str, str]
@@ -34,9 +36,15 @@ def score(drawn: list[Edit], verdicts: Verdicts, reasons: Reasons, lines: Mappin
         killed = sum(verdicts[edit.key].is_killed for edit in tried)
         explained = sum(edit.key in reasons and not verdicts[edit.key].is_killed for edit in tried)
         possible = len(tried) - explained
-        share = f"{killed / possible:.1%}" if possible else "–"
-        rows.append((package, size, len(own), len(tried), killed, explained, possible - killed, share))
+        shares = _share(killed, possible) if possible else ("–", "–")
+        rows.append((package, size, len(own), len(tried), killed, explained, possible - killed, *shares))
     return table(SCORE, rows)
+
+
+def _share(killed: int, possible: int) -> tuple[str, str]:
+    """What part was killed, and in which interval (Wilson's) that of all mutants lies."""
+    low, high = stats.binomtest(killed, possible).proportion_ci(method="wilson")
+    return f"{killed / possible:.1%}", f"{low:.1%} to {high:.1%}"
 
 
 def _place(edit: Edit) -> str:

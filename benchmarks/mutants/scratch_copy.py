@@ -1,5 +1,6 @@
 """The copy of the repository that mutants live in: the checkout itself is never touched."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -21,6 +22,7 @@ class ScratchCopy:
         self._checkout = checkout
         self.root, self.covered, self.kernels = work / "copy", work / "covered", work / "kernels"
         self.data, self.durations = work / "coverage.sqlite3", work / "durations.json"
+        self._tests = work / "tests.json"
 
     def refresh(self) -> None:
         """Make the copy what the checkout is now; what was compiled stays."""
@@ -57,6 +59,17 @@ class ScratchCopy:
         environment = self.environment() | {"COVERAGE_FILE": str(self.data)}
         subprocess.run(command, cwd=self.root, env=environment, check=False)
         self.keep()
+
+    def collected(self) -> list[str]:
+        """The names of all tests, found once."""
+        if not self._tests.exists():
+            command = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-m", "not long", "-p", "no:xdist"]
+            environment, copy = self.environment(), self.root
+            lines = subprocess.run(
+                command, cwd=copy, env=environment, check=True, capture_output=True, text=True
+            ).stdout
+            self._tests.write_text(json.dumps([line for line in lines.splitlines() if "::" in line]))
+        return list(json.loads(self._tests.read_text()))
 
     def keep(self) -> None:
         """Remember the sources that coverage tells of."""

@@ -14,6 +14,7 @@ from coverage.numbits import nums_to_numbits
 from benchmarks.mutants import sample, verdicts
 from benchmarks.mutants.__main__ import PAGE
 from benchmarks.mutants.edits import Edit, edits
+from benchmarks.mutants.nearby import Nearby
 from benchmarks.mutants.page import tables
 from benchmarks.mutants.reach import Reach
 from benchmarks.mutants.scratch_copy import ScratchCopy
@@ -110,7 +111,7 @@ def _cover(data: Path, lines: dict[str, list[int]]) -> None:
 
 @pytest.fixture
 def court(copy: ScratchCopy) -> Iterator[Court]:
-    with closing(Court(copy, ["slipcore/program.py"], libraries="", compiling=2.0)) as court:
+    with closing(Court(copy, ["slipcore/program.py"], libraries="", least=2.0)) as court:
         yield court
 
 
@@ -206,6 +207,42 @@ def test_a_mutant_is_killed_survives_or_never_ends(copy: ScratchCopy, court: Cou
     assert (copy.root / "slipcore/program.py").read_text() == PROGRAM
 
 
+def test_where_nothing_is_known_of_lines_the_files_nearby_are_tried(copy: ScratchCopy) -> None:
+    copy.data.unlink()
+    with closing(Court(copy, ["slipcore/program.py"], libraries="", least=2.0)) as court:
+        verdict = court.try_mutant(change(copy, "and", "or"))
+    assert verdict.by == "tests/slipcore/test_program.py::test_is_large"
+    assert verdict.tests == 3
+
+
+@pytest.mark.parametrize(
+    ("module", "files"),
+    [
+        ("slipcore/shape/cone.py", ["shape/test_cone.py", "test_names.py"]),  # its own first
+        ("slipcore/shape/hidden.py", ["shape/test_solver.py"]),  # no test imports it, but that of what uses it does
+        ("slipcore/shape/unused.py", ["shape/test_cone.py", "shape/test_solver.py"]),
+        ("slipcore/empty/unused.py", ["shape/test_cone.py", "shape/test_solver.py", "test_names.py"]),
+    ],
+)
+def test_files_about_a_module_are_found_nearest_first(tmp_path: Path, module: str, files: list[str]) -> None:
+    sources = {
+        "slipcore/shape/cone.py": "def volume(): ...\n",
+        "slipcore/shape/hidden.py": "",
+        "slipcore/shape/unused.py": "",
+        "slipcore/empty/unused.py": "",
+        "slipcore/shape/solver.py": "from slipcore.shape import hidden\n",
+        "tests/slipcore/shape/test_cone.py": "from slipcore.shape.cone import volume\n",
+        "tests/slipcore/shape/test_solver.py": "import slipcore.shape.solver\n",
+        "tests/slipcore/test_names.py": "from slipcore.shape import volume\n",
+        "tests/db/test_cone.py": "",
+    }
+    for name, text in sources.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    nearby = Nearby(tmp_path, [name for name in sources if not name.startswith("tests")])
+    assert nearby.files(module) == [f"tests/slipcore/{file}" for file in files]
+
+
 def test_a_run_that_was_stopped_goes_on(tmp_path: Path) -> None:
     path = tmp_path / "verdicts.jsonl"
     first, second = (Verdict("a", 1, by, 2, 0, 0.5) for by in ("", "tests/test_a.py::test_b"))
@@ -231,7 +268,7 @@ def test_the_page_tells_score_and_survivors(copy: ScratchCopy) -> None:
     drawn = [killed, explained, missed, waiting]
     found = {edit.key: Verdict(edit.key, 1, "a test" if edit is killed else "", 1, 0, 0.1) for edit in drawn[:3]}
     made = tables(drawn, found, {explained.key: "the limit itself is never met"}, {"slipcore": 20})
-    assert "| slipcore | 20 | 4 | 3 | 1 | 1 | 1 | 50.0% |" in made["score"]
+    assert "| slipcore | 20 | 4 | 3 | 1 | 1 | 1 | 50.0% | 9.5% to 90.5% |" in made["score"]
     assert made["explained"].endswith("x > LIMIT` | the limit itself is never met |")
     assert "`+` → `-`" in made["survivors"]
     assert "`>` → `>=`" not in made["survivors"]
@@ -241,4 +278,4 @@ def test_a_new_page_has_a_place_for_each_table(tmp_path: Path) -> None:
     page = tmp_path / "mutants.md"
     page.write_text(PAGE.read_text())
     renew(page, tables([], {}, {}, {"slipcore": 20}))
-    assert "| slipcore | 20 | 0 | 0 | 0 | 0 | 0 | – |" in page.read_text()
+    assert "| slipcore | 20 | 0 | 0 | 0 | 0 | 0 | – | – |" in page.read_text()
