@@ -40,5 +40,17 @@ def test_an_age_is_told_in_its_largest_unit(seconds: float, text: str) -> None:
     assert formatting.age(now - timedelta(seconds=seconds), now) == text
 
 
+@pytest.mark.parametrize(
+    ("count", "text"), [(999, "999 bytes"), (1000, "1 kB"), (2_500_000, "2.5 MB"), (1_000_000_000, "1 GB")]
+)
+def test_bytes_are_counted_in_powers_of_a_thousand(count: int, text: str) -> None:
+    assert formatting.size(count) == text
+
+
+def test_a_range_has_both_its_ends_or_is_none() -> None:
+    assert formatting.interval((0.1, None)) == "0.100 … –"
+    assert formatting.interval(None) == "–"
+
+
 def test_style_and_scripts_are_light() -> None:
     assert sum(len(asset.content) for asset in all_assets().values()) <= 150_000

@@ -1,3 +1,4 @@
+import inspect
 import re
 from pathlib import Path
 
@@ -5,6 +6,8 @@ import pytest
 from pydantic import ValidationError
 from sqlalchemy import make_url
 
+from service.formats.reading import Readers
+from service.jobs.worker import StoreConfig
 from service.settings import Settings, complaints, unknown_variables
 
 DOCUMENTED = dict(
@@ -36,6 +39,15 @@ def test_the_documented_default_is_the_default(name: str) -> None:
     shown = DOCUMENTED[name.upper()].replace("`", "")
     expected = UNSET[name] if default is None else str(default).lower() if isinstance(default, bool) else str(default)
     assert shown.startswith(expected.removesuffix(".0"))
+
+
+def test_parts_without_settings_do_as_with_the_defaults_of_these() -> None:
+    readers = inspect.signature(Readers).parameters
+    names = {"seconds": "read_seconds", "size": "readers", "room": "reading_bytes"}
+    for argument, setting in names.items():
+        assert readers[argument].default == Settings.model_fields[setting].default
+    config = StoreConfig("sqlite:///x", Path("x"))
+    assert config.job_memory_bytes == Settings.model_fields["job_memory_bytes"].default
 
 
 def test_a_setting_comes_from_the_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -15,22 +15,36 @@ from slipcore.samples import FrictionSamples
 Make = Callable[..., FrictionSamples]
 
 
-def test_the_exact_posterior_satisfies_its_closed_form(samples: Make) -> None:
-    data = samples(50)
-    x = np.column_stack([np.ones(50), data.tangential_velocity, data.normal_force])
+def textbook(data: FrictionSamples, width: float = PRIOR.width) -> tuple[np.ndarray, np.ndarray, float]:
+    """Mean [3] and precision [3, 3] of the coefficients, and the sum of squares, by the normal equations."""
+    x = np.column_stack([np.ones(len(data)), data.tangential_velocity, data.normal_force])
     y = data.friction_coefficient
     spans = np.array([1.0, REFERENCE.tangential_velocity, REFERENCE.pressure * 1e-6])
-    precision = np.diag((REFERENCE.scatter / PRIOR.width * spans) ** 2)
+    precision = np.diag((REFERENCE.scatter / width * spans) ** 2)
     prior_mean = np.array([REFERENCE.friction, 0.0, 0.0])
     updated = precision + x.T @ x
     mean = np.linalg.solve(updated, precision @ prior_mean + x.T @ y)
     square = PRIOR.degrees_of_freedom * REFERENCE.scatter**2 + y @ y + prior_mean @ precision @ prior_mean
-    square -= mean @ updated @ mean
+    return mean, updated, float(square - mean @ updated @ mean)
+
+
+def test_the_exact_posterior_satisfies_its_closed_form(samples: Make) -> None:
+    data = samples(50)
+    mean, updated, square = textbook(data)
     found = exact_posterior(gather(data))
     np.testing.assert_allclose(found.mean, mean, rtol=1e-8)  # the reference squares the condition number
     np.testing.assert_allclose(found.root @ found.root.T, np.linalg.inv(updated), rtol=1e-8)
     np.testing.assert_allclose(found.degrees_of_freedom * found.scale**2, square, rtol=1e-8)
     assert found.degrees_of_freedom == 50 + PRIOR.degrees_of_freedom
+
+
+def test_the_shift_is_that_under_a_prior_twice_as_wide_in_posterior_deviations(samples: Make) -> None:
+    data = samples(20)
+    (mean, updated, square), (wide, _, _) = textbook(data), textbook(data, width=2.0 * PRIOR.width)
+    spread = np.sqrt(square / (20 + PRIOR.degrees_of_freedom) * np.diag(np.linalg.inv(updated)))
+    told = estimators.fit(data, method="conjugate").diagnostics
+    shift = [told[f"prior_sensitivity_beta{k}"] for k in range(3)]
+    np.testing.assert_allclose(shift, np.abs(wide - mean) / spread, rtol=1e-4)
 
 
 def test_exact_draws_follow_the_exact_marginals(samples: Make) -> None:

@@ -1,4 +1,5 @@
 import pickle
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -6,6 +7,8 @@ import numpy as np
 import pytest
 
 from service import formats
+from service.formats.assemble import MAX_CONTENT_BYTES
+from service.formats.npy import MAX_ARRAY_BYTES
 from slipcore import GraspLog, InvalidInput
 from stiction_client import container
 
@@ -20,6 +23,13 @@ def npz_path(log: GraspLog, tmp_path: Path) -> Path:
 @pytest.fixture
 def tac3d_path(recording_fields: Fields, zip_of: Callable[..., Path]) -> Path:
     return zip_of({f"SN/{name}.npy": array for name, array in recording_fields.items()})
+
+
+def test_the_documented_size_of_an_unpacked_log_is_what_is_taken() -> None:
+    page = (Path(__file__).parents[3] / "docs/formats.md").read_text()
+    told = re.search(r"a log may have (\d+) MiB \((\d+) MiB in the formats that other libraries read\)", page)
+    assert told is not None
+    assert [int(size) * 2**20 for size in told.groups()] == [MAX_ARRAY_BYTES, MAX_CONTENT_BYTES]
 
 
 @pytest.mark.parametrize(

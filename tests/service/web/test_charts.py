@@ -11,7 +11,12 @@ def curve(high: float = 0.5, marked: float = 0.5) -> Curve:
 
 @pytest.mark.parametrize(
     ("low", "high", "expected"),
-    [(0.0, 1.0, [0, 0.2, 0.4, 0.6, 0.8, 1.0]), (0.0, 0.27, [0, 0.1, 0.2]), (0.0, 7e-4, [0, 2e-4, 4e-4, 6e-4])],
+    [
+        (0.0, 1.0, [0, 0.2, 0.4, 0.6, 0.8, 1.0]),
+        (0.0, 0.27, [0, 0.1, 0.2]),
+        (0.0, 7e-4, [0, 2e-4, 4e-4, 6e-4]),
+        (2.0, 3.0, [2, 2.2, 2.4, 2.6, 2.8, 3]),
+    ],
 )
 def test_ticks_are_round_numbers(low: float, high: float, expected: list[float]) -> None:
     assert ticks(low, high) == pytest.approx(expected)
