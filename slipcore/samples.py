@@ -110,13 +110,13 @@ def element_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
     _check_same(log, history)
     forces = element_forces(log.force, normals_of(log))
     noise = _force_noise(log, forces, chosen)
-    velocity = _central(log.time, history.velocity)
+    velocity = _central_velocity(log.time, history.velocity)
     speed = np.sqrt(np.vecdot(velocity, velocity))
-    steady = _between(log.time, forces.pressing)
-    weight = _before(history.probability)
+    steady = _of_neighbouring_frames(log.time, forces.pressing)
+    weight = _one_frame_earlier(history.probability)
     keep = (
-        _inside(_before(history.slip))
-        & _inside(history.contact)
+        _interior(_one_frame_earlier(history.slip))
+        & _interior(history.contact)
         & (weight >= chosen.least_weight)
         & _fast_enough(log, history.noise, speed, chosen)
         & _pressed_enough(steady, forces.pressing, noise.normal, chosen)
@@ -136,7 +136,7 @@ def element_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
     )
 
 
-def _before(field: NDArray[Scalar]) -> NDArray[Scalar]:
+def _one_frame_earlier(field: NDArray[Scalar]) -> NDArray[Scalar]:
     """The field [t, ...] as it was one frame earlier; zero in the first.
 
     A detector that looks at the forces finds slip where their noise raises f_t/f_n: samples that it chose by their own
@@ -147,7 +147,7 @@ def _before(field: NDArray[Scalar]) -> NDArray[Scalar]:
     return earlier
 
 
-def _inside(region: BoolArray) -> BoolArray:
+def _interior(region: BoolArray) -> BoolArray:
     """Elements of a region [t, n, m] whose four neighbours are in it; beyond the lattice nothing says otherwise."""
     around = np.pad(region, ((0, 0), (1, 1), (1, 1)), constant_values=True)
     inside: BoolArray = region & around[:, :-2, 1:-1] & around[:, 2:, 1:-1] & around[:, 1:-1, :-2] & around[:, 1:-1, 2:]
@@ -162,7 +162,7 @@ def _check_same(log: GraspLog, history: SlipHistory) -> None:
         raise InvalidInput("history", "at other times than the log", "the log's own")
 
 
-def _central(time: FloatArray, velocity: FloatArray) -> FloatArray:
+def _central_velocity(time: FloatArray, velocity: FloatArray) -> FloatArray:
     """Velocity from the frame before to the next: [t, n, m, 2]; NaN in the first and last frame."""
     central = np.full_like(velocity, np.nan)
     behind, ahead = np.diff(time)[:-1, None, None, None], np.diff(time)[1:, None, None, None]
@@ -170,7 +170,7 @@ def _central(time: FloatArray, velocity: FloatArray) -> FloatArray:
     return central
 
 
-def _between(time: FloatArray, field: FloatArray) -> FloatArray:
+def _of_neighbouring_frames(time: FloatArray, field: FloatArray) -> FloatArray:
     """A field [t, n, m] as the frames before and after have it, at the true times; NaN in the first and last frame."""
     between = np.full_like(field, np.nan)
     share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None, None]

@@ -1,7 +1,7 @@
 """Every default of forces from displacement, with unit, valid range and source.
 
 "Scenes", "trials": chosen on the independent solver's scenes in tests/data/contact; "rounding": what double precision
-leaves; "bound": stops what does not converge. What ±50 % of each changes stands in docs/sensitivity.md.
+leaves; "bound": stops what does not converge.
 """
 
 from dataclasses import dataclass

@@ -69,7 +69,7 @@ def reconstruct(
         raise UnknownScale("forces follow from displacement in m, and the log's scale is unknown")
     sensor = _Sensor.of(log, gel, _noise(log, noise))
     recording = _Recording.of(log, sensor, _total_force(total_force, len(log)))
-    result = _nothing(log, sensor.noise)
+    result = _no_forces(log, sensor.noise)
     touched = recording.touched()
     if not touched.any():
         return result
@@ -85,7 +85,7 @@ def reconstruct(
         for t in way:
             if touched[t]:
                 now = now.at(*recording.frame(t))
-                _write(result, t, sensor, now.key, recording.frame(t)[1])
+                _write_frame(result, t, sensor, now.key, recording.frame(t)[1])
     return result
 
 
@@ -243,7 +243,7 @@ def _pressed(lattice: WholeLattice, data: FloatArray, shape: tuple[int, int]) ->
     return widened(pressed.reshape(shape), 1)
 
 
-def _nothing(log: GraspLog, noise: float) -> Reconstruction:
+def _no_forces(log: GraspLog, noise: float) -> Reconstruction:
     """Forces of zero, to be written to."""
     shape = log.displacement.shape
     return Reconstruction(
@@ -258,7 +258,7 @@ def _nothing(log: GraspLog, noise: float) -> Reconstruction:
     )
 
 
-def _write(result: Reconstruction, t: int, sensor: _Sensor, key: _Key, data: FloatArray) -> None:
+def _write_frame(result: Reconstruction, t: int, sensor: _Sensor, key: _Key, data: FloatArray) -> None:
     """Put one frame's forces into the result; what the fit leaves unexplained beyond noise widens its deviations."""
     support, grid = key.fit.support, result.contact.shape[1:]
     traction = key.fit.traction(data)

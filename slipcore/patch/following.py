@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from slipcore.defaults import PATCHES, PatchOptions, choose_options
 from slipcore.frames import BoolArray, FloatArray, GraspLog
-from slipcore.patch.motion import Stretch, motion_over_markers
+from slipcore.patch.motion import PatchFrames, motion_over_markers
 from slipcore.patch.plateau import find_plateaus
 from slipcore.patch.pose import lattice_pose
 from slipcore.patch.regimes import regimes
@@ -33,11 +33,11 @@ def follow_patches(log: GraspLog, contact: BoolArray, slip: BoolArray, **options
     wide = labels if log.force is None else widened(labels, chosen.margin)
     return tuple(
         _follow(log, normals, pressing, slip, (labels == number, wide == number), chosen)
-        for number in _that_matter(labels, count, pressing)
+        for number in _lasting_and_loaded(labels, count, pressing)
     )
 
 
-def _that_matter(labels: NDArray[np.int64], count: int, pressing: FloatArray) -> list[int]:
+def _lasting_and_loaded(labels: NDArray[np.int64], count: int, pressing: FloatArray) -> list[int]:
     """Numbers of the patches that last, and bear a share of the load."""
     frames = len(labels)
     key = (labels + 1 + (count + 1) * np.arange(frames)[:, None, None]).ravel()
@@ -56,30 +56,34 @@ def _follow(
     options: PatchOptions,
 ) -> Patch:
     """One patch, by its ``regions`` [t, n, m] without and with the margin, from its first frame to its last."""
-    there = np.flatnonzero(regions[0].any(axis=(1, 2)))
-    span = slice(int(there[0]), int(there[-1]) + 1)
+    present = np.flatnonzero(regions[0].any(axis=(1, 2)))
+    span = slice(int(present[0]), int(present[-1]) + 1)
     patch, wide = (region[span] for region in regions)
     pitch = float(np.sqrt(log.element_area))
     object_pose = None if log.object_pose is None else log.object_pose[span]
-    seen = Stretch(log.time[span], log.position, log.displacement[span], object_pose, pitch)
+    kinematics = PatchFrames(log.time[span], log.position, log.displacement[span], object_pose, pitch)
     weight = np.where(patch, pressing[span], 0.0)
     pose, gyration = lattice_pose(weight, log.position, options.least_anisotropy)
-    motion = motion_over_markers(seen, weight, pose, gyration, options)
-    felt = _nothing_felt(len(patch))
+    motion = motion_over_markers(kinematics, weight, pose, gyration, options)
+    resultant = _no_resultants(len(patch))
     if log.force is not None and normals is not None:
-        felt = resultants(log.force[span], normals[span], log.position + seen.displacement, wide, options.kernel_width)
-    held = felt.normal_force >= options.least_force_share * felt.normal_force.max()
-    plateaus = find_plateaus(seen.time, motion, felt.load_ratio, felt.tangential_force, held, pitch, options)
+        resultant = resultants(
+            log.force[span], normals[span], log.position + kinematics.displacement, wide, options.kernel_width
+        )
+    held = resultant.normal_force >= options.least_force_share * resultant.normal_force.max()
+    plateaus = find_plateaus(
+        kinematics.time, motion, resultant.load_ratio, resultant.tangential_force, held, pitch, options
+    )
     regime = regimes(patch, slip[span], motion, plateaus, options)
-    found = Patch(pose, motion.speed, regime, *felt, plateaus.pivoting | plateaus.sliding)
-    return _among(found, span, len(log))
+    found = Patch(pose, motion.speed, regime, *resultant, plateaus.pivoting | plateaus.sliding)
+    return _over_whole_log(found, span, len(log))
 
 
-def _nothing_felt(frames: int) -> Resultants:
+def _no_resultants(frames: int) -> Resultants:
     return Resultants(np.zeros(frames), np.full((frames, 2), np.nan), *(np.full(frames, np.nan) for _ in range(3)))
 
 
-def _among(found: Patch, span: slice, frames: int) -> Patch:
+def _over_whole_log(found: Patch, span: slice, frames: int) -> Patch:
     """The patch of some frames, as of the whole log."""
     arrays = {entry.name: _padded(getattr(found, entry.name), span, frames) for entry in fields(found)}
     return replace(found, **arrays)

@@ -26,8 +26,8 @@ def local_rates(time: FloatArray, values: FloatArray, window: float) -> tuple[Fl
         slope = (sty - st * sy / n) / spread
         rest = np.maximum(syy - sy * sy / n - slope * slope * spread, 0.0)
         error = np.sqrt(rest / (n - 2.0) / spread)
-    told = (n >= PATCHES.rate_frames) & known
-    return np.where(told, slope, np.nan), np.where(told, error, np.nan)
+    enough = (n >= PATCHES.rate_frames) & known
+    return np.where(enough, slope, np.nan), np.where(enough, error, np.nan)
 
 
 def moving_mean(time: FloatArray, values: FloatArray, window: float) -> FloatArray:

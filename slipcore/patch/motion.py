@@ -9,7 +9,7 @@ from slipcore.frames import BoolArray, FloatArray
 from slipcore.patch.local_rates import local_rates
 
 
-class Stretch(NamedTuple):
+class PatchFrames(NamedTuple):
     """What a log has of some frames: ``time`` [t] s, ``position`` [n, m, 3] m of markers at rest, ``displacement``
     [t, n, m, 3] m, ``object_pose`` [t, 3] m, m, rad or None; ``pitch`` m of the lattice.
     """
@@ -40,21 +40,21 @@ class Motion(NamedTuple):
 
 
 def motion_over_markers(
-    seen: Stretch, weight: FloatArray, pose: FloatArray, gyration: FloatArray, options: PatchOptions
+    kinematics: PatchFrames, weight: FloatArray, pose: FloatArray, gyration: FloatArray, options: PatchOptions
 ) -> Motion:
     """By the object's pose where it is known; else by that of the patch on the lattice, [t, 3] m, m, rad.
 
     ``weight`` [t, n, m] of the patch's elements, ``gyration`` [t] m. A patch goes with its object unless this rolls.
     """
-    rate, error = local_rates(seen.time, pose, options.window)
-    of_patch = _motion(rate, error, gyration, options.least_travel * seen.pitch / options.window)
-    if seen.object_pose is None:
+    rate, error = local_rates(kinematics.time, pose, options.window)
+    of_patch = _motion(rate, error, gyration, options.least_travel * kinematics.pitch / options.window)
+    if kinematics.object_pose is None:
         return of_patch
-    markers, centre = _marker_motion(seen, weight)
+    markers, centre = _marker_motion(kinematics, weight)
     (carried, its_error), (own, error) = (
-        local_rates(seen.time, each, options.window) for each in (seen.object_pose, markers)
+        local_rates(kinematics.time, each, options.window) for each in (kinematics.object_pose, markers)
     )
-    arm = centre - seen.object_pose[:, :2]
+    arm = centre - kinematics.object_pose[:, :2]
     at_centre = np.column_stack([carried[:, 0] - carried[:, 2] * arm[:, 1], carried[:, 1] + carried[:, 2] * arm[:, 0]])
     rate = np.column_stack([at_centre, carried[:, 2]]) - own
     of_object = _motion(rate, np.hypot(its_error, error), gyration, options.least_speed)
@@ -69,13 +69,13 @@ def _motion(rate: FloatArray, error: FloatArray, gyration: FloatArray, least: fl
     return Motion(velocity, turning, travels, turns, travels)
 
 
-def _marker_motion(seen: Stretch, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _marker_motion(kinematics: PatchFrames, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Rigid motion of the markers under a patch since rest, [t, 3] m, m, rad (weighted planar Procrustes problem), and
     their centre [t, 2] m.
     """
     total = weight.sum(axis=(1, 2))
     share = weight / np.where(total > 0.0, total, np.nan)[:, None, None]
-    rest, moved = seen.position[..., :2], seen.position[..., :2] + seen.displacement[..., :2]
+    rest, moved = kinematics.position[..., :2], kinematics.position[..., :2] + kinematics.displacement[..., :2]
     middle = np.tensordot(share, rest, axes=([1, 2], [0, 1]))
     centre = (share[..., None] * moved).sum(axis=(1, 2))
     before, after = rest - middle[:, None, None], moved - centre[:, None, None]
