@@ -135,6 +135,9 @@ class ReconstructionDefaults(Options):
     """Of an element's normal force, above which it is said to be in contact."""
     element_share: Annotated[float, Option(0.0, 1.0, "-", "scenes: the rim of Hertz's pressure")] = 0.06
     """Of the frame's largest normal force, above which an element is said to be in contact."""
+    rim_share: Annotated[float, Option(0.0, 1.0, "-", "an ellipse, a cone and a block on 4 mm")] = 0.15
+    """Of the largest normal force around an element, above which it is said to be in contact: else all that a contact
+    covers a little would count."""
     covered: Annotated[float, Option(0.0, 1.0, "-", "its marker then lies inside")] = 0.5
     """Share of an element's area that must lie over the contact."""
     resultant_error: Annotated[float, Option(0.0, 1.0, "-", "scenes")] = 2e-3
@@ -142,6 +145,11 @@ class ReconstructionDefaults(Options):
     of it."""
     element_error: Annotated[float, Option(0.0, 1.0, "-", "scenes")] = 1e-2
     """The same of an element's force, as a share of the largest."""
+    step_error: Annotated[float, Option(0.0, 1.0, "-", "an ellipse, a cone and a block on 4 mm")] = 0.05
+    """The same of an element's force, as a share of its range among the element and those around it."""
+    step_error_in_plane: Annotated[float, Option(0.0, 1.0, "-", "an ellipse, a cone and a block on 4 mm")] = 0.25
+    """The same of a normal force where markers are seen in the plane alone: contacts that explain the displacement
+    alike differ so much at their rims."""
     force_tolerance: Annotated[float, Option(1e-6, 1.0, "-", "usual of force sensors")] = 0.01
     """Standard deviation of a given total force, as a share of it, and of this share of the largest given one."""
     least_force: Annotated[float, Option(0.0, 1e-3, "N", "far below what force sensors resolve")] = 1e-9

@@ -33,6 +33,12 @@ class Observation:
         q, r = scipy.linalg.qr(used, mode="economic", check_finite=False)
         return np.asarray(q), np.asarray(r.reshape(len(r), 3, -1))
 
+    def condition(self, nodes: BoolArray) -> float:
+        """Of the whitened response of some nodes; infinite where data are fewer than tractions."""
+        _, r = self.on(nodes)
+        square = r.reshape(len(r), -1)
+        return Spectrum.of(square).condition if len(r) == square.shape[1] else np.inf
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
@@ -118,9 +124,17 @@ def log_evidence(observation: Observation, data: FloatArray, nodes: Nodes, suppo
 
 
 def choose_prior(
-    observation: Observation, data: FloatArray, nodes: Nodes, support: BoolArray, criterion: Criterion = "evidence"
+    observation: Observation,
+    data: FloatArray,
+    nodes: Nodes,
+    support: BoolArray,
+    criterion: Criterion = "evidence",
+    first: Smoothness | None = None,
 ) -> Prior:
-    """The prior that data [m] speak for: its shape by evidence, property by property; its strength by a criterion."""
+    """The prior that data [m] speak for: its shape by evidence, property by property; its strength by a criterion.
+
+    ``first``: the shape to begin with (None: the usual one).
+    """
     q, r = observation.on(support)
     whitened = data / observation.noise
     y = q.T @ whitened
@@ -132,7 +146,7 @@ def choose_prior(
         strength = spectrum.choose(y, rest, len(data), by)
         return spectrum.log_evidence(y, strength), strength
 
-    best = usual()
+    best = usual() if first is None else first
     evidence = judge(best, "evidence")[0]
     for name, values in choices().items():
         for value in values:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.ndimage import maximum_filter, minimum_filter
 
 from slipcore.errors import InvalidInput, UnknownScale
 from slipcore.forces.defaults import RECONSTRUCTION
@@ -24,7 +25,8 @@ class Reconstruction:
     ``force`` [t, n, m, 3] N on each element, z outward, with its standard ``deviation``; ``resultant`` [t, 3] N of the
     whole contact, also of what lies beyond the lattice, with ``resultant_deviation``; ``contact`` [t, n, m];
     ``kernel_width`` m: side of the square over which forces are in effect averaged; ``information`` [3]: share of what
-    is known of the resultant's x, y and z that data tell and not the prior (both at the frame that moved markers most;
+    is known of the resultant's x, y and z that data tell and not the prior; ``condition``: largest over smallest
+    singular value of the markers' response to traction on the contact (all three at the frame that moved markers most;
     NaN and no information without contact); ``noise`` m of a marker's coordinate that was assumed.
     """
 
@@ -35,6 +37,7 @@ class Reconstruction:
     contact: BoolArray
     kernel_width: float
     information: FloatArray
+    condition: float
     noise: float
 
     def apply(self, log: GraspLog) -> GraspLog:
@@ -78,6 +81,7 @@ def reconstruct(
     result = replace(
         result,
         information=tracker.key.fit.information(),
+        condition=tracker.key.observation.condition(tracker.key.fit.support),
         kernel_width=tracker.key.fit.kernel_width(tracker.key.observation, sensor.nodes.grid.pitch[0]),
     )
     for way in (range(strongest, len(log)), range(strongest - 1, -1, -1)):
@@ -183,11 +187,12 @@ class _Key:
     fit: Fit
 
     def holds(self, observation: Observation, data: FloatArray) -> bool:
-        """Whether a frame sees the same markers and differs little."""
+        """Whether a frame sees the same markers and differs by little more than the noise of both."""
         if len(data) != len(self.data) or ((observation.noise == np.inf) != (self.observation.noise == np.inf)).any():
             return False
         change, before = (data - self.data) / self.observation.noise, self.data / self.observation.noise
-        return bool(np.linalg.norm(change) <= RECONSTRUCTION.change * np.linalg.norm(before))
+        noise = 2.0 * np.isfinite(self.observation.noise).sum()
+        return bool(change @ change <= RECONSTRUCTION.change**2 * (before @ before) + noise)
 
     def misfit(self, traction: FloatArray, data: FloatArray) -> float:
         """Root mean square of the residuals over their noise, at least 1."""
@@ -198,9 +203,10 @@ class _Key:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Tracker:
-    """The contact followed from frame to frame, under one prior; ``lattice`` where depth is seen."""
+    """The contact followed from frame to frame; ``lattice`` where depth is seen."""
 
     sensor: _Sensor
+    criterion: Criterion
     prior: Prior
     key: _Key
     lattice: WholeLattice | None
@@ -208,35 +214,44 @@ class _Tracker:
     @classmethod
     def of(cls, sensor: _Sensor, observation: Observation, data: FloatArray, criterion: Criterion) -> "_Tracker":
         """Begin with a frame, which chooses the prior."""
-        shape, count, lattice = sensor.nodes.grid.shape, len(sensor.response), None
+        nodes, count, lattice = sensor.nodes, len(sensor.response), None
         if len(sensor.axes) == 3:
             everywhere = Observation(sensor.response, np.full(count, np.min(observation.noise[:count])))
-            lattice = whole_lattice(everywhere, sensor.nodes, float(np.sqrt(np.mean(data[:count] ** 2))))
-            support = _pressed(lattice, data[:count], shape)
+            lattice = whole_lattice(everywhere, nodes, float(np.sqrt(np.mean(data[:count] ** 2))))
+            support = _pressed(lattice, data[:count], nodes.grid.shape)
         else:
-            support = relevant_nodes(observation, data, np.ones(shape, dtype=bool))
-        prior = choose_prior(observation, data, sensor.nodes, support.ravel(), criterion)
-        if lattice is None:
-            support = better_support(observation, data, sensor.nodes, support, prior)
-        key = _Key(observation, data, fit(observation, sensor.nodes, support.ravel(), prior))
-        return cls(sensor, prior, key, lattice)
+            support = relevant_nodes(observation, data, np.ones(nodes.grid.shape, dtype=bool))
+        prior = choose_prior(observation, data, nodes, support.ravel(), criterion)
+        key = _Key(observation, data, fit(observation, nodes, support.ravel(), prior))
+        begun = cls(sensor, criterion, prior, key, lattice)
+        return begun if lattice is not None else begun._sought_in_the_plane(observation, data)
 
     def at(self, observation: Observation, data: FloatArray) -> "_Tracker":
         """Go on to another frame; the contact is sought again only where markers have moved on."""
         if self.key.holds(observation, data):
             return self
-        nodes, count = self.sensor.nodes, len(self.sensor.response)
-        if self.lattice is not None:
-            support = _pressed(self.lattice, data[:count], nodes.grid.shape)
-        else:
-            before = self.key.fit.support.reshape(nodes.grid.shape)
-            support = better_support(observation, data, nodes, before, self.prior)
-        return replace(self, key=_Key(observation, data, fit(observation, nodes, support.ravel(), self.prior)))
+        if self.lattice is None:
+            return self._sought_in_the_plane(observation, data)
+        support = _pressed(self.lattice, data[: len(self.sensor.response)], self.sensor.nodes.grid.shape)
+        return self._on(observation, data, support, self.prior)
+
+    def _sought_in_the_plane(self, observation: Observation, data: FloatArray) -> "_Tracker":
+        """With a better contact for a frame, and before it the frame's own prior: one that allows for the shear of
+        another frame lets shear stand for pressure, and the contact shrinks to where it would.
+        """
+        nodes, before = self.sensor.nodes, self.key.fit.support
+        prior = choose_prior(observation, data, nodes, before, self.criterion, self.prior.smoothness)
+        support = better_support(observation, data, nodes, before.reshape(nodes.grid.shape), prior)
+        return self._on(observation, data, support, prior)
+
+    def _on(self, observation: Observation, data: FloatArray, support: BoolArray, prior: Prior) -> "_Tracker":
+        found = fit(observation, self.sensor.nodes, support.ravel(), prior)
+        return replace(self, prior=prior, key=_Key(observation, data, found))
 
 
 def _pressed(lattice: WholeLattice, data: FloatArray, shape: tuple[int, int]) -> BoolArray:
     """Nodes [ny, nx] with a pressure that is not noise, and one row around them; never none."""
-    pressure, deviation = lattice.operator[2] @ data, lattice.deviation[2]
+    pressure, deviation = lattice.operator @ data, lattice.deviation
     noise = RECONSTRUCTION.node_significance * deviation
     least = np.maximum(noise, RECONSTRUCTION.node_share * pressure.max())
     pressed = (pressure > least) | (pressure == pressure.max())
@@ -254,6 +269,7 @@ def _no_forces(log: GraspLog, noise: float) -> Reconstruction:
         contact=np.zeros(shape[:3], dtype=bool),
         kernel_width=float("nan"),
         information=np.zeros(3),
+        condition=float("nan"),
         noise=noise,
     )
 
@@ -265,15 +281,30 @@ def _write_frame(result: Reconstruction, t: int, sensor: _Sensor, key: _Key, dat
     elements = sensor.elements[:, support]
     outward = np.array([1.0, 1.0, -1.0])
     misfit = key.misfit(traction, data)
-    force = (elements @ traction.T) * outward
-    of_element = RECONSTRUCTION.element_error * np.abs(force).max()
-    deviation = np.hypot(misfit * key.fit.deviation(elements).T, of_element)
-    result.force[t], result.deviation[t] = force.reshape(*grid, 3), deviation.reshape(*grid, 3)
+    force = ((elements @ traction.T) * outward).reshape(*grid, 3)
+    spread = np.hypot(
+        misfit * key.fit.deviation(elements).T.reshape(force.shape), RECONSTRUCTION.element_error * np.abs(force).max()
+    )
+    covered = elements.sum(axis=1).reshape(grid) > RECONSTRUCTION.covered * sensor.load
+    result.force[t], result.contact[t] = force, _touching(-force[..., 2], spread[..., 2]) & covered
+    result.deviation[t] = np.hypot(spread, _step_error(force, in_plane=len(sensor.axes) == 2))
     result.resultant[t] = sensor.load * traction.sum(axis=1) * outward
     of_all = RECONSTRUCTION.resultant_error * np.linalg.norm(result.resultant[t])
     total = sensor.load * key.fit.deviation(np.ones((1, elements.shape[1])))[:, 0]
     result.resultant_deviation[t] = np.hypot(misfit * total, of_all)
-    normal, covered = -force[:, 2], elements.sum(axis=1) > RECONSTRUCTION.covered * sensor.load
-    noise = RECONSTRUCTION.element_significance * deviation[:, 2]
-    touches = normal > np.maximum(noise, RECONSTRUCTION.element_share * normal.max())
-    result.contact[t] = (touches & covered).reshape(grid)
+
+
+def _touching(normal: FloatArray, deviation: FloatArray) -> BoolArray:
+    """Elements [n, m] whose normal force is neither noise nor little beside others'."""
+    near = RECONSTRUCTION.rim_share * maximum_filter(normal, 3)
+    least = np.maximum(near, RECONSTRUCTION.element_share * normal.max())
+    return np.asarray(normal > np.maximum(RECONSTRUCTION.element_significance * deviation, least))
+
+
+def _step_error(force: FloatArray, in_plane: bool) -> FloatArray:
+    """Standard deviation [n, m, 3] of what bilinear tractions and the contact leave wrong where force steps."""
+    share = np.full(3, RECONSTRUCTION.step_error)
+    if in_plane:
+        share[2] = RECONSTRUCTION.step_error_in_plane
+    around = 3, 3, 1
+    return np.asarray(share * (maximum_filter(force, around) - minimum_filter(force, around)))

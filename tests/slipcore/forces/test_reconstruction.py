@@ -2,12 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from slipcore import GraspLog, InvalidInput, UnknownScale
 from slipcore.forces import Gel, Reconstruction, reconstruct
+from slipcore.forces.support import better_support
 
 GEL = Gel(young_modulus=1e6, poisson_ratio=0.49, thickness=5e-3)
 Pressed = Callable[..., GraspLog]
@@ -116,6 +118,60 @@ def test_a_gel_of_another_stiffness_gives_forces_of_that_scale(pressed: Pressed)
         reconstruct(log, Gel(young, GEL.poisson_ratio, GEL.thickness), noise=1e-6).resultant for young in (1e3, 1e12)
     )
     np.testing.assert_allclose(1e9 * soft, stiff, rtol=1e-6, atol=1e-6 * np.abs(stiff).max())
+
+
+def test_a_sensor_of_another_size_gives_forces_of_that_scale(pressed: Pressed) -> None:
+    large = pressed([6, 6], noise=1e-6, crop=MIDDLE)
+    shrink = 0.1
+    small = replace(
+        large,
+        position=shrink * large.position,
+        displacement=shrink * large.displacement,
+        element_area=shrink**2 * large.element_area,
+    )
+    of_large = reconstruct(large, GEL, noise=1e-6).resultant
+    thin = replace(GEL, thickness=shrink * GEL.thickness)
+    of_small = reconstruct(small, thin, noise=shrink * 1e-6).resultant
+    np.testing.assert_allclose(of_small, shrink**2 * of_large, rtol=1e-5, atol=1e-12)
+
+
+def test_a_very_thick_layer_is_a_half_space(pressed: Pressed) -> None:
+    log = pressed([6, 6], noise=1e-6, crop=MIDDLE)
+    thick, free = (reconstruct(log, replace(GEL, thickness=h), noise=1e-6).resultant for h in (10.0, np.inf))
+    np.testing.assert_allclose(thick, free, rtol=0.0, atol=2e-3 * np.abs(free).max())
+
+
+def test_how_ill_conditioned_the_problem_is_is_said(pressed: Pressed) -> None:
+    log = pressed([6, 6], noise=1e-6, crop=MIDDLE)
+    surface, below = (reconstruct(log, replace(GEL, marker_depth=d), noise=1e-6).condition for d in (0.0, 1e-3))
+    assert 10.0 < surface < 1e3
+    assert below > 1e3 * surface
+    few = slice(8, 11)
+    one = replace(log, position=log.position[few, few], displacement=log.displacement[:, few, few], force=None)
+    assert reconstruct(one, GEL, noise=1e-6).condition == np.inf
+    still = replace(log, displacement=np.zeros(log.displacement.shape))
+    assert np.isnan(reconstruct(still, GEL, noise=0.0).condition)
+
+
+def test_noise_alone_is_no_reason_to_seek_the_contact_again(pressed: Pressed, monkeypatch: pytest.MonkeyPatch) -> None:
+    sought = []
+
+    def counted(*arguments: Any) -> Any:
+        sought.append(1)
+        return better_support(*arguments)
+
+    monkeypatch.setattr("slipcore.forces.reconstruction.better_support", counted)
+    reconstruct(pressed([0] * 4, noise=3e-6, axes=2, crop=MIDDLE), GEL, noise=3e-6)
+    assert len(sought) == 1
+
+
+def test_a_frame_in_which_no_marker_is_seen_has_no_forces(pressed: Pressed) -> None:
+    log = pressed(LATE, noise=1e-6, crop=MIDDLE)
+    observed = np.ones(log.displacement.shape[:3], dtype=bool)
+    observed[0] = False
+    found = reconstruct(replace(log, observed=observed), GEL, noise=1e-6)
+    assert not found.force[0].any()
+    assert found.contact[1].any()
 
 
 def test_markers_that_are_lost_tell_nothing(pressed: Pressed) -> None:
