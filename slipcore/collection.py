@@ -87,7 +87,7 @@ def _contact_samples(log: GraspLog, number: int, patch: Patch, elements: Frictio
         tangential_velocity=speed,
         normal_force=force,
         tangential_force=patch.load_ratio[on] * force,
-        time=log.time[on],
+        time=log.time[patch.frames][on],
         element=np.full(count, beyond),
         weight=np.ones(count),
         element_area=log.element_area,

@@ -32,15 +32,17 @@ class ContactFriction:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Patch:
-    """A connected contact from its first touch to its last: arrays [t] over the log's frames, NaN where it is absent.
+    """A connected contact from its first touch to its last: arrays [k] over its ``frames`` of the log, of which
+    ``first`` is the number of the first; NaN where it is absent between them.
 
-    ``pose`` [t, 3]: where it lies among the markers at rest, x m, y m and yaw rad of its longer axis; ``speed`` m/s:
+    ``pose`` [k, 3]: where it lies among the markers at rest, x m, y m and yaw rad of its longer axis; ``speed`` m/s:
     mean speed of the object over the markers; ``regime``: one of ``REGIMES``; ``normal_force`` N,
-    ``tangential_force`` [t, 2] N, ``moment`` N·m about its mean normal; ``load_ratio``: least friction coefficient that
+    ``tangential_force`` [k, 2] N, ``moment`` N·m about its mean normal; ``load_ratio``: least friction coefficient that
     bears these; ``element_force`` N: mean normal force of its elements, weighted by force. Without forces all of
     these are NaN.
     """
 
+    first: int
     pose: FloatArray
     speed: FloatArray
     regime: NDArray[np.str_]
@@ -50,3 +52,8 @@ class Patch:
     load_ratio: FloatArray
     element_force: FloatArray
     plateau: NDArray[np.bool_]
+
+    @property
+    def frames(self) -> slice:
+        """Its frames among those of the log."""
+        return slice(self.first, self.first + len(self.pose))

@@ -1,8 +1,5 @@
 """Contact patches of a whole log."""
 
-from dataclasses import fields, replace
-from typing import TypeVar
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,8 +14,6 @@ from slipcore.patch.resultants import Resultants, resultants
 from slipcore.patch_record import Patch
 from slipcore.surface.log_normals import normals_of
 
-Scalar = TypeVar("Scalar", bound=np.generic)
-
 
 def follow_patches(log: GraspLog, contact: BoolArray, slip: BoolArray, **options: float) -> tuple[Patch, ...]:
     """The contact patches of a log, in order of their first touch.
@@ -32,19 +27,29 @@ def follow_patches(log: GraspLog, contact: BoolArray, slip: BoolArray, **options
     normals = None if log.force is None else normals_of(log)
     wide = labels if log.force is None else widened(labels, chosen.margin)
     return tuple(
-        _follow(log, normals, pressing, slip, (labels == number, wide == number), chosen)
-        for number in _lasting_and_loaded(labels, count, pressing)
+        _follow(log, normals, pressing, slip, (labels[span] == number, wide[span] == number), span, chosen)
+        for number, span in _lasting_and_loaded(labels, count, pressing)
     )
 
 
-def _lasting_and_loaded(labels: NDArray[np.int64], count: int, pressing: FloatArray) -> list[int]:
-    """Numbers of the patches that last, and bear a share of the load."""
-    frames = len(labels)
-    key = (labels + 1 + (count + 1) * np.arange(frames)[:, None, None]).ravel()
-    borne = np.bincount(key, pressing.ravel(), frames * (count + 1)).reshape(frames, count + 1)[:, 1:]
-    lasts = (borne > 0.0).sum(axis=0) >= PATCHES.least_frames
-    least = PATCHES.least_load_share * borne.sum(axis=1).max(initial=0.0)
-    return [int(number) for number in np.flatnonzero(lasts & (borne.max(axis=0, initial=0.0) > least))]
+def _lasting_and_loaded(labels: NDArray[np.int64], count: int, pressing: FloatArray) -> list[tuple[int, slice]]:
+    """Numbers of the patches that last, and bear a share of the load, each with its frames from the first to the last.
+
+    Nothing here is of all frames for each patch: a long log of many touches has thousands of them.
+    """
+    touched = np.flatnonzero(labels.ravel() >= 0)
+    element = touched // labels[0].size * count + labels.ravel()[touched]
+    pairs, of_pair = np.unique(element, return_inverse=True)
+    borne = np.bincount(of_pair, pressing.ravel()[touched], len(pairs))
+    frame, number = np.divmod(pairs, max(count, 1))
+    lasts = np.bincount(number[borne > 0.0], minlength=count) >= PATCHES.least_frames
+    most, first, end = np.zeros(count), np.full(count, len(labels)), np.zeros(count, int)
+    np.maximum.at(most, number, borne)
+    np.minimum.at(first, number, frame)
+    np.maximum.at(end, number, frame + 1)
+    least = PATCHES.least_load_share * np.bincount(frame, borne).max(initial=0.0)
+    kept = np.flatnonzero(lasts & (most > least))
+    return [(int(each), slice(int(first[each]), int(end[each]))) for each in kept]
 
 
 def _follow(
@@ -53,12 +58,11 @@ def _follow(
     pressing: FloatArray,
     slip: BoolArray,
     regions: tuple[BoolArray, BoolArray],
+    span: slice,
     options: PatchOptions,
 ) -> Patch:
-    """One patch, by its ``regions`` [t, n, m] without and with the margin, from its first frame to its last."""
-    present = np.flatnonzero(regions[0].any(axis=(1, 2)))
-    span = slice(int(present[0]), int(present[-1]) + 1)
-    patch, wide = (region[span] for region in regions)
+    """One patch, by its ``regions`` [k, n, m] without and with the margin, in the frames of ``span``."""
+    patch, wide = regions
     pitch = float(np.sqrt(log.element_area))
     object_pose = None if log.object_pose is None else log.object_pose[span]
     kinematics = PatchFrames(log.time[span], log.position, log.displacement[span], object_pose, pitch)
@@ -75,23 +79,8 @@ def _follow(
         kinematics.time, motion, resultant.load_ratio, resultant.tangential_force, held, pitch, options
     )
     regime = regimes(patch, slip[span], motion, plateaus, options)
-    found = Patch(pose, motion.speed, regime, *resultant, plateaus.pivoting | plateaus.sliding)
-    return _over_whole_log(found, span, len(log))
+    return Patch(span.start, pose, motion.speed, regime, *resultant, plateaus.pivoting | plateaus.sliding)
 
 
 def _no_resultants(frames: int) -> Resultants:
     return Resultants(np.zeros(frames), np.full((frames, 2), np.nan), *(np.full(frames, np.nan) for _ in range(3)))
-
-
-def _over_whole_log(found: Patch, span: slice, frames: int) -> Patch:
-    """The patch of some frames, as of the whole log."""
-    arrays = {entry.name: _padded(getattr(found, entry.name), span, frames) for entry in fields(found)}
-    return replace(found, **arrays)
-
-
-def _padded(part: NDArray[Scalar], span: slice, frames: int) -> NDArray[Scalar]:
-    """An array [k, ...] of the frames in ``span`` as one of all, [t, ...]: before and after it nothing is known."""
-    nothing = {"f": np.nan, "b": False, "U": "none"}[part.dtype.kind]
-    whole = np.full((frames, *part.shape[1:]), nothing, part.dtype)
-    whole[span] = part
-    return whole

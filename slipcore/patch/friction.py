@@ -41,13 +41,13 @@ def _at_limit(
 def _independent(time: FloatArray, patches: Sequence[Patch], options: PatchOptions) -> float:
     """How many values on the plateaus are about independent: one a window."""
     interval = np.gradient(time)
-    return float(sum(interval[patch.plateau].sum() for patch in patches)) / options.window
+    return float(sum(interval[patch.frames][patch.plateau].sum() for patch in patches)) / options.window
 
 
 def _largest(time: FloatArray, patch: Patch, options: PatchOptions) -> float:
     """Largest load ratio that was held for about a window."""
     held = patch.normal_force >= options.least_force_share * np.nanmax(patch.normal_force)
-    mean = moving_mean(time, np.where(held, patch.load_ratio, np.nan), options.window)
+    mean = moving_mean(time[patch.frames], np.where(held, patch.load_ratio, np.nan), options.window)
     return float(np.nanmax(mean, initial=0.0))
 
 

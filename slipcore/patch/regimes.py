@@ -40,6 +40,6 @@ def slips_as_a_whole(patches: Sequence[Patch], frames: int) -> BoolArray:
     some, others = np.zeros(frames, bool), np.zeros(frames, bool)
     for patch in patches:
         slips = np.isin(patch.regime, MACRO_SLIP)
-        some |= slips
-        others |= (patch.regime != "none") & ~slips
+        some[patch.frames] |= slips
+        others[patch.frames] |= (patch.regime != "none") & ~slips
     return some & ~others

@@ -41,10 +41,7 @@ def resultants(
     smooths over ``kernel_width`` m (standard deviation) reach further out than those that act: their mean square arm is
     larger by twice the square of it, while F_n, F_T and M stay.
     """
-    sums = np.empty((len(force), 6))
-    force, normal, place = (_for_kernels(field) for field in (force, normal, place))
-    for k in range(len(force)):
-        sums[k] = _of_frame(force[k], normal[k], place[k], patch[k], kernel_width)
+    sums = _of_frames(_for_kernels(force), _for_kernels(normal), _for_kernels(place), patch, kernel_width)
     return Resultants(sums[:, 0], sums[:, 1:3], *sums[:, 3:].T)
 
 
@@ -53,6 +50,17 @@ def _for_kernels(field: FloatArray) -> FloatArray:
     view = np.ascontiguousarray(field).view()
     view.flags.writeable = False
     return view
+
+
+@compiled
+def _of_frames(
+    force: FloatArray, normal: FloatArray, place: FloatArray, patch: BoolArray, kernel_width: float
+) -> FloatArray:
+    """Of all frames, [t, 6]."""
+    sums = np.empty((len(force), 6))
+    for k in range(len(force)):
+        sums[k] = _of_frame(force[k], normal[k], place[k], patch[k], kernel_width)
+    return sums
 
 
 @compiled
