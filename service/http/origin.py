@@ -7,28 +7,35 @@ from service.http.problems import CROSS_SITE_REQUEST, Problem
 
 FORWARDING = frozenset(
     {
-        b"forwarded",
         b"via",
         b"x-real-ip",
         b"x-client-ip",
         b"x-cluster-client-ip",
-        b"x-original-forwarded-for",
+        b"x-remote-addr",
+        b"x-remote-ip",
+        b"x-proxyuser-ip",
+        b"x-rewrite-url",
         b"true-client-ip",
-        b"cf-connecting-ip",
         b"fastly-client-ip",
         b"fly-client-ip",
         b"client-ip",
-        b"x-remote-addr",
-        b"x-proxyuser-ip",
-        b"x-original-host",
-        b"x-original-url",
-        b"x-envoy-external-address",
-        b"x-azure-clientip",
-        b"x-appengine-user-ip",
         b"cdn-loop",
     }
 )
-"""Headers that only a proxy sends, beside all that begin with ``x-forwarded-``."""
+"""Headers that only a proxy sends."""
+
+FORWARDING_PREFIXES = (
+    b"forwarded",
+    b"x-forward",
+    b"x-original-",
+    b"x-originating-",
+    b"x-envoy-",
+    b"x-amzn-",
+    b"x-azure-",
+    b"x-appengine-",
+    b"cf-",
+)
+"""How more of them begin."""
 
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 """Of requests that change nothing (RFC 9110); a page of another site cannot read what they are answered."""
@@ -38,7 +45,7 @@ DEFAULT_PORTS = {"http": "80", "https": "443"}
 
 def is_forwarded(scope: Scope) -> bool:
     """Whether somebody asks for somebody else: both ends of the connection then tell nothing of who asks."""
-    return any(name in FORWARDING or name.startswith(b"x-forwarded-") for name, _ in scope["headers"])
+    return any(name in FORWARDING or name.startswith(FORWARDING_PREFIXES) for name, _ in scope["headers"])
 
 
 def check_site(connection: HTTPConnection, *, is_browser: bool = False) -> None:

@@ -82,7 +82,7 @@ async def serve(socket: WebSocket, context: Context, streams: Streams, principal
 async def _close(socket: WebSocket, code: int, reason: str) -> None:
     try:
         await socket.close(code, reason.encode()[:120].decode(errors="ignore"))  # what a close frame holds
-    except RuntimeError:  # it is closed already
+    except (RuntimeError, WebSocketDisconnect):  # it is closed already
         return
 
 
