@@ -11,6 +11,8 @@ OUTPUT ?= demo-output
 CONTACT := from slipcore.contact import Scene, simulate; simulate(Scene.from_toml("table1_condition1"))
 COMPILE := $(BIN)/python -c 'import slipcore; slipcore.warm_up()' & compiling=$$!; \
     $(BIN)/python -c 'import estimators; estimators.warm_up(); $(CONTACT)'; status=$$?; wait $$compiling && exit $$status
+# Two processes of tests share two cores: threads of BLAS beside them wait for each other, at six times the time.
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest
 RESOLUTION := --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
     --no-emit-package stiction --no-emit-package stiction-client
 export UV_PYTHON_DOWNLOADS := never
@@ -35,15 +37,15 @@ types: setup
 
 unit: setup recordings kernels
 	@echo "== tests"
-	$(BIN)/pytest -m "not long" -n 2
+	$(PYTEST) -m "not long" -n 2
 
 coverage: setup recordings kernels  ## the tests again, with the lines that none of them runs; takes a third longer
-	$(BIN)/pytest -m "not long" -n 2 --cov --cov-report=term
+	$(PYTEST) -m "not long" -n 2 --cov --cov-report=term
 	@for package in slipcore estimators db service clients; do echo "$$package:"; \
 	    $(BIN)/coverage report --include="$$package/*" --format=total || exit 1; done
 
 test-long: setup recordings kernels  ## calibration, fuzz and kill campaigns; results stand in docs/long-tests.md
-	$(BIN)/pytest -m long -n 2 --dist worksteal --durations=0
+	$(PYTEST) -m long -n 2 --dist worksteal --durations=0
 
 mutants: setup recordings  ## change the code in 300 small ways and see whether tests fail: docs/mutants.md; hours
 	$(BIN)/python -m benchmarks.mutants --page docs/mutants.md
