@@ -43,10 +43,13 @@ class ScratchCopy:
             (recordings / "tac3d").symlink_to(self._checkout / ".cache" / "tac3d")
 
     def environment(self, kernels: Path | None = None) -> dict[str, str]:
-        """Variables with which Python finds the packages of the copy, not those of the checkout."""
+        """Variables with which Python finds the packages of the copy, not those of the checkout, and pytest takes its
+        options from us alone.
+        """
         path = os.pathsep.join([str(self.root), str(self.root / "clients")])
         return os.environ | {
             "PYTHONPATH": path,
+            "PYTEST_ADDOPTS": "",
             "PYTHONDONTWRITEBYTECODE": "1",
             "NUMBA_CACHE_DIR": str(kernels or self.kernels),
             "TEST_DURATIONS": str(self.durations),
