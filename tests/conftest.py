@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
 
+import hypothesis
 import pytest
 import uvicorn
 from starlette.applications import Starlette
@@ -20,6 +21,9 @@ from db import migrate
 from db.database import Database
 from db.records import Claim
 from db.repositories import jobs, runners
+
+hypothesis.settings.register_profile("suite", derandomize=True, deadline=None)  # the same cases in each run
+hypothesis.settings.load_profile("suite")
 
 FAST = ("fsync=off", "full_page_writes=off", "synchronous_commit=off")
 """No promise for power cuts, which no test makes: a database a test then costs 35 ms."""

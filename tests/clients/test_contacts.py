@@ -125,7 +125,7 @@ def test_many_grasps_at_once_are_each_as_one_alone(make_model: Make, contacts: C
     assert {"held within bounds", "limit"} <= outcomes
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=200, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     contacts=st.sampled_from(list(CONTACTS.values())),
     coefficients=st.tuples(st.floats(-0.1, 1.5), st.floats(-5.0, 5.0), st.floats(-2.0, 0.5)),

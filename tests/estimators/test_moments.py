@@ -37,7 +37,7 @@ def test_a_fit_from_moments_is_the_fit_from_samples(samples: Make) -> None:
 
 
 @given(order=st.permutations(range(8)), cut=st.integers(1, 7))
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30)
 def test_merging_is_free_of_order_and_grouping(order: list[int], cut: int) -> None:
     rng = np.random.default_rng(0)
     rows = rng.uniform(0.0, 1.0, (8, 5, 3)) * [5e-3, 0.1, 0.4]

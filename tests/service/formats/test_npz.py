@@ -247,7 +247,7 @@ def answer_of(read: Callable[[], Any]) -> Any:
         return error
 
 
-@settings(max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(changes=st.lists(st.tuples(st.integers(0, 2**20), st.integers(0, 255)), min_size=1, max_size=6))
 def test_flipped_bytes_give_a_log_or_a_named_error(
     log: GraspLog, tmp_path: Path, changes: list[tuple[int, int]]
@@ -261,7 +261,7 @@ def test_flipped_bytes_give_a_log_or_a_named_error(
     assert isinstance(answer, GraspLog) or answer.name
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(content=st.binary(max_size=200), magic=st.booleans())
 def test_the_npy_reader_answers_any_bytes_with_an_array_or_a_named_error(content: bytes, magic: bool) -> None:
     data = b"\x93NUMPY\x01\x00v\x00" * magic + content

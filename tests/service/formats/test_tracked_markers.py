@@ -219,7 +219,7 @@ CELLS = st.one_of(
     st.binary(max_size=20),
     st.sampled_from([b"", b"# scale: 1e-4\n", b"# frame_rate: 30\n# scale: x\n", b"\xef\xbb\xbf"]),
 )
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_no_file_does_worse_than_be_refused(
     tmp_path: Path, columns: list[str], rows: list[list[str]], tail: bytes, head: bytes
 ) -> None:
@@ -234,7 +234,7 @@ def test_no_file_does_worse_than_be_refused(
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(1, 4))
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_damaged_file_is_read_or_refused(tmp_path: Path, seed: int, damages: int) -> None:
     generator = np.random.default_rng(seed)
     content = bytearray(b"".join(DOTS.read_bytes().splitlines(keepends=True)[:120]))
