@@ -73,8 +73,8 @@ def check(
     from db.backup import damaged
 
     with opened(database_url) as database:
-        database.check_pages()
         migrate.check(database)
+        database.check_pages()  # of a file that was opened: another is nobody's yet
         typer.echo("the schema is this version's")
         blobs = opened_blobs()
         identity.verify(database, blobs)
