@@ -2,7 +2,6 @@
 
 import tracemalloc
 from dataclasses import fields
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -141,12 +140,6 @@ def allocated(*effects: Effect) -> int:
     return peak
 
 
-@cache
-def least_allocated() -> int:
-    """Without any effect, once all is there that is made once."""
-    return min(allocated() for _ in range(4))
-
-
 @pytest.mark.parametrize("name", ZERO)
 def test_an_absent_effect_adds_nothing_to_the_plan_and_allocates_nothing(name: str) -> None:
     effect = ZERO[name]
@@ -157,8 +150,8 @@ def test_an_absent_effect_adds_nothing_to_the_plan_and_allocates_nothing(name: s
     for entry in fields(plan.problem):
         part, other = getattr(plan.problem, entry.name), getattr(without.problem, entry.name)
         assert len(part) == len(other) if isinstance(part, tuple) else part == other
-    most = least_allocated() + FIELD // 2
-    assert any(allocated(effect) <= most for _ in range(4))  # what is not yet freed comes and goes
+    # what is not yet freed, and what threads of other tests allocate, comes and goes: each try has its own comparison
+    assert any(allocated(effect) <= allocated() + FIELD // 2 for _ in range(8))
 
 
 def test_the_counts_tell_an_effect_that_costs_from_one_that_does_not(plain: GraspLog) -> None:
