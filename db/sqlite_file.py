@@ -45,10 +45,10 @@ class SqliteFile:
     def require(self) -> None:
         """Make sure that they are still there; raises ``StorageUnavailable``."""
         if self._first is not None:
-            found = self._stat()
-            if found is None or _identity(found) != self._first or found.st_size < self._size:
+            least, found = self._size, self._stat()  # in this order: another thread may note a later, larger size
+            if found is None or _identity(found) != self._first or found.st_size < least:
                 raise self._lost()
-            self._size = found.st_size
+            self._size = max(self._size, found.st_size)
         for suffix, opened in zip(SIDE_FILES, self._side_files, strict=False):
             if _identity(self._stat(suffix)) != opened and self._open:
                 raise self._lost(suffix)
@@ -59,10 +59,10 @@ class SqliteFile:
         Raises ``StorageUnavailable``, ``sqlite3.Error``.
         """
         self._ask("SELECT count(*) FROM sqlite_master")
-        generation = self._ask(GENERATION) or 0
-        if generation < self._generation:
+        least, generation = self._generation, self._ask(GENERATION) or 0
+        if generation < least:
             raise self._lost()
-        self._generation = generation
+        self._generation = max(self._generation, generation)
 
     def check_pages(self) -> None:
         """Read every page and look whether they fit together; raises ``StorageUnavailable``, ``sqlite3.Error``."""

@@ -1,7 +1,9 @@
 import shutil
 import sqlite3
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -56,3 +58,33 @@ def test_an_older_copy_over_the_file_is_noticed(tmp_path: Path, change: Callable
     with pytest.raises(StorageUnavailable, match="deleted or replaced"):
         database.ping()
     database.close()
+
+
+def test_a_thread_that_looked_earlier_finds_no_fault_in_what_grew_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Commits of other threads make the file larger between a look at it and the comparison."""
+    path = tmp_path / "database"
+    with closing(sqlite3.connect(path, isolation_level=None)) as connection:
+        connection.execute("CREATE TABLE log (id)")
+        file = SqliteFile(str(path))
+        file.note_opened(connection)
+        stat, ask, others = SqliteFile._stat, SqliteFile._ask, iter(range(2))
+
+        def seen_before_others(looked: Callable[..., Any]) -> Callable[..., Any]:
+            def look(self: SqliteFile, *given: str) -> Any:
+                found = looked(self, *given)
+                for number in others:
+                    connection.execute(f"CREATE TABLE more{number} AS SELECT randomblob(100000)")
+                    connection.execute(f"PRAGMA user_version = {number + 1}")
+                    self.check_head()
+                return found
+
+            return look
+
+        monkeypatch.setattr(SqliteFile, "_stat", seen_before_others(stat))
+        file.require()
+        others = iter(range(2, 4))
+        monkeypatch.setattr(SqliteFile, "_stat", stat)
+        monkeypatch.setattr(SqliteFile, "_ask", seen_before_others(ask))
+        file.check_head()
