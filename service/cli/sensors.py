@@ -1,22 +1,36 @@
 """Commands on a service's sensors: list, describe."""
 
+from collections.abc import Mapping
 from typing import Annotated
 
 import typer
 
-from service.cli.output import print_table
-from service.cli.remote import DEFAULT_URL, Key, Url, connected
+from service.cli.output import print_json, print_table
+from service.cli.remote import DEFAULT_URL, Json, Key, Url, connected
+from service.formatting import number
 
 app = typer.Typer(help="Show sensors, and describe their gels.", no_args_is_help=True)
 
 
 @app.command("list")
-def list_sensors(url: Url = DEFAULT_URL, key: Key = None) -> None:
-    """Print all sensors with the mechanics of their gels, where they are described."""
-    columns = ("sensor", "young_modulus", "poisson_ratio", "thickness", "marker_depth")
+def list_sensors(url: Url = DEFAULT_URL, key: Key = None, json: Json = False) -> None:
+    """List all sensors with the mechanics of their gels, where they are described."""
     with connected(url, key) as client:
-        rows = [[each["name"], *((each["gel"] or {}).get(name) for name in columns[1:])] for each in client.sensors()]
-    print_table("Sensors", columns, [["" if cell is None else cell for cell in row] for row in rows])
+        found = client.sensors()
+    if json:
+        print_json({"sensors": found})
+    else:
+        columns = ("sensor", "Young's modulus [Pa]", "Poisson's ratio", "thickness [m]", "marker depth [m]")
+        print_table("Sensors", columns, [[each["name"], *_cells(each["gel"])] for each in found])
+
+
+def _cells(gel: Mapping[str, float | None] | None) -> list[str]:
+    """The mechanics of a gel; a thickness of None is that of a half-space."""
+    if gel is None:
+        return []
+    thickness = gel["thickness"]
+    own, depth = (number(gel[name]) for name in ("young_modulus", "poisson_ratio")), number(gel["marker_depth"])
+    return [*own, "thick" if thickness is None else number(thickness), depth]
 
 
 @app.command()

@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 from db.blobs import Spool, disk_errors_named
 from db.errors import AlreadyExists, NotFound, StorageUnavailable
 from db.records import NewGraspLog, StoredGraspLog
-from db.repositories import audit, detections, grasp_logs, jobs, materials, stores, uploads
+from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, stores, uploads
 from service import formats
 from service.domain import curate, quotas
 from service.domain.context import Context
@@ -178,13 +178,20 @@ def accept(session: Session, context: Context, received: ReceivedLog) -> StoredU
         if not _may_differ(session, known):
             return StoredUpload(known, is_new)
         quotas.check_job(session, settings, principal.key_id)
-        if known.job.status in {"done", "refused"}:  # what was found then follows from another gel, or from none
-            detections.remove(session, log_id)
+        if known.job.status in {"done", "refused"}:
+            _forget(session, log_id, log.material_id)
         jobs.requeue(session, known.job.id, requested_by=principal.key_id)
     stored = grasp_logs.get(session, log_id)
     told = {"material": stored.material, "sha256": stored.sha256, "bytes": stored.bytes, "new": is_new}
     audit.add(session, principal.actor, "grasp_log.uploaded", log_id, told)
     return StoredUpload(stored, is_new)
+
+
+def _forget(session: Session, log_id: str, material_id: int | None) -> None:
+    """Let what was found in a log by another gel, or by none, be looked for anew: its models are outdated meanwhile."""
+    if material_id is not None and detections.has_samples(session, log_id):
+        friction_models.mark_outdated(session, material_id)
+    detections.remove(session, log_id)
 
 
 def _may_differ(session: Session, log: StoredGraspLog) -> bool:

@@ -1,5 +1,6 @@
 """Sensors and the mechanics of their gels."""
 
+from dataclasses import asdict
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -58,18 +59,8 @@ class SensorOut(BaseModel):
     @classmethod
     def of(cls, sensor: Sensor) -> "SensorOut":
         """The stored sensor as an answer."""
-        gel = sensor.gel
-        out = (
-            None
-            if gel is None
-            else GelOut(
-                young_modulus=gel.young_modulus,
-                poisson_ratio=gel.poisson_ratio,
-                thickness=gel.thickness,
-                marker_depth=gel.marker_depth,
-            )
-        )
-        return cls(name=sensor.name, gel=out)
+        gel = None if sensor.gel is None else GelOut.model_validate(asdict(sensor.gel))
+        return cls(name=sensor.name, gel=gel)
 
 
 class SensorsOut(BaseModel):

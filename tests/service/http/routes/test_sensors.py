@@ -3,10 +3,18 @@ from typing import Any
 
 import httpx
 import pytest
+from sqlalchemy import update
 
+from db.blobs import BlobStore
+from db.database import Database
+from db.repositories import jobs, materials, runners
+from db.tables import DetectionRow
+from service.domain.sensors import RECONSTRUCTED
+from service.jobs import pipeline
 from slipcore import GraspLog
 from stiction_client.container import encode
 
+NPZ = "application/vnd.stiction.grasp-log+npz"
 GEL = {"young_modulus": 2.5e5, "poisson_ratio": 0.48, "thickness": 4e-3, "marker_depth": 5e-4}
 
 
@@ -83,3 +91,31 @@ def test_a_log_that_is_sent_again_once_its_sensor_is_described_anew_is_looked_at
     assert "reconstructed forces" in found
     assert sent(GEL) == (False, found)  # described as it was
     assert sent(GEL | {"young_modulus": 1e6})[0]
+
+
+def test_models_of_a_log_that_is_looked_at_again_are_outdated_meanwhile(
+    reach: Callable[..., Any], database: Database, blobs: BlobStore, content: bytes
+) -> None:
+    lab = reach("open")
+    lab.request("POST", "/v1/materials", json={"name": "paper"})
+
+    def upload() -> Any:
+        query, headers = {"material": "paper", "sensor": "gel"}, {"content-type": NPZ}
+        answer = lab.request("POST", "/v1/grasp-logs", params=query, content=content, headers=headers)
+        return answer.raise_for_status().json()
+
+    log = upload()["id"]
+    with database.write() as session:
+        claim = jobs.claim(session, runners.add(session, "host:1"))
+    assert claim is not None
+    pipeline.run_job(database, blobs, claim)
+    by_gel = {"name": RECONSTRUCTED, "evidence": "", "remedy": ""}
+    with database.write() as session:  # as if it had come without forces
+        session.execute(update(DetectionRow).where(DetectionRow.grasp_log_id == log).values(findings=[by_gel]))
+    assert upload()["job"]["status"] == "done"
+    lab.request("PUT", "/v1/sensors/gel", json=GEL).raise_for_status()
+    again = upload()
+    assert (again["id"], again["job"]["status"], again["detection"]) == (log, "queued", None)
+    with database.read() as session:
+        models = materials.get(session, "paper").models
+    assert [stored.outdated for stored in models] == [True, True]
