@@ -10,7 +10,7 @@ from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, text
+from sqlalchemy import Connection, inspect, text
 from sqlalchemy.orm import Session
 
 import migrations
@@ -20,8 +20,13 @@ from db.tables import Base
 
 
 def upgrade(database: Database, revision: str = "head") -> None:
-    """Bring the database up to ``revision``; a new one gets all its tables."""
+    """Bring the database up to ``revision``; a new one gets all its tables.
+
+    Raises ``SchemaMismatch`` for a newer one, and for an SQLite file of another program.
+    """
     _refuse_newer(current(database))
+    if database.is_sqlite:  # in PostgreSQL several programs may share one database
+        _refuse_foreign(database)
     with _migrating(database) as config:
         command.upgrade(config, revision)
 
@@ -79,6 +84,15 @@ def _refuse_newer(found: str | None) -> None:
             f"database revision is {found}; allowed: at most {head()}, the newest that this version of the code knows "
             "(run a newer version)"
         )
+
+
+def _refuse_foreign(database: Database) -> None:
+    with database.connect() as connection:  # one view: another server may be making our tables
+        revision = MigrationContext.configure(connection).get_current_revision()
+        tables = sorted(set(inspect(connection).get_table_names()) - {"alembic_version"})
+    if revision is None and tables:
+        found = f"tables of another program, such as {tables[0]}"
+        raise SchemaMismatch(f"{database} has {found}; allowed: a file of its own")
 
 
 def _scripts() -> ScriptDirectory:

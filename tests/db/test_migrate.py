@@ -242,6 +242,17 @@ def test_servers_that_start_at_once_upgrade_once(empty_database: Database) -> No
 
 
 @ONLY_SQLITE
+def test_a_file_of_another_program_is_refused_by_name_and_left_alone(empty_database: Database) -> None:
+    with empty_database.connect() as connection:
+        connection.exec_driver_sql("CREATE TABLE notes (line TEXT)")
+        connection.commit()
+    with pytest.raises(SchemaMismatch, match="tables of another program, such as notes; allowed: a file of its own"):
+        migrate.upgrade(empty_database)
+    with empty_database.connect() as connection:
+        assert inspect(connection).get_table_names() == ["notes"]
+
+
+@ONLY_SQLITE
 def test_foreign_keys_are_on_again_after_a_migration(empty_database: Database) -> None:
     migrate.upgrade(empty_database)
     with empty_database.read() as session:
