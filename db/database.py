@@ -112,6 +112,13 @@ class Database:
         with sqlite_errors_named():
             self._file.check_head()
 
+    def checkpoint(self) -> None:
+        """Bring what SQLite's write-ahead log holds into the file, which then shows its generation."""
+        if self.is_sqlite:
+            with self.connect() as connection:
+                connection.exec_driver_sql("PRAGMA wal_checkpoint(PASSIVE)")
+            self._file.require()
+
     def check_pages(self) -> None:
         """Read the whole of an SQLite file; raises ``StorageUnavailable`` where it is damaged."""
         with sqlite_errors_named():

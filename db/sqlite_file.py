@@ -2,7 +2,8 @@
 
 Whoever writes to a deleted file is told that all went well, and whoever opens its name again gets a new, empty one.
 An older copy that is written over it keeps its name and inode: it shows by what never falls otherwise, the file's size
-and the generation in its header. Nobody here opens the file past SQLite: closing it would end SQLite's locks on it.
+and the generation in its header. SQLite itself takes the header from the write-ahead log where that has a newer one,
+but for a file that is said to be immutable. Nobody here opens it past SQLite: closing it would end SQLite's locks.
 """
 
 import os
@@ -16,6 +17,9 @@ from db.errors import StorageUnavailable
 SIDE_FILES = ("-wal", "-shm")
 """What is beside the file as long as any connection has read from it: commits go to the first of them."""
 
+ANY_SIZE = "PRAGMA writable_schema = ON"
+"""Lets SQLite take a header that tells more pages than the file has, as it may in the middle of a checkpoint."""
+
 GENERATION = "PRAGMA user_version"
 """What the file's header says of how often it was looked at; whoever looks writes one more."""
 
@@ -26,7 +30,7 @@ class SqliteFile:
     def __init__(self, path: str | None) -> None:
         self._path = None if path is None else Path(path).absolute()
         self._first: tuple[int, int] | None = None
-        self._size = self._generation = 0
+        self._size = self._generation = self._generation_in_file = 0
         self._open: set[int] = set()
         self._side_files: list[tuple[int, int] | None] = []
 
@@ -45,13 +49,28 @@ class SqliteFile:
     def require(self) -> None:
         """Make sure that they are still there; raises ``StorageUnavailable``."""
         if self._first is not None:
-            least, found = self._size, self._stat()  # in this order: another thread may note a later, larger size
-            if found is None or _identity(found) != self._first or found.st_size < least:
-                raise self._lost()
-            self._size = max(self._size, found.st_size)
+            self._require_newer(self._size, self._generation_in_file)  # other threads may note larger ones meanwhile
         for suffix, opened in zip(SIDE_FILES, self._side_files, strict=False):
             if _identity(self._stat(suffix)) != opened and self._open:
                 raise self._lost(suffix)
+
+    def _require_newer(self, size: int, generation: int) -> None:
+        """The first file, which has never been smaller or older than that."""
+        found = self._stat()
+        if found is None or _identity(found) != self._first or found.st_size < size:
+            raise self._lost()
+        in_file = self._read_header()
+        if in_file < generation:
+            raise self._lost()
+        self._size = max(self._size, found.st_size)
+        self._generation_in_file = max(self._generation_in_file, in_file)
+
+    def _read_header(self) -> int:
+        """The generation in the file, whatever is in the write-ahead log."""
+        try:
+            return int(self._first_cell(GENERATION, "immutable=1", ANY_SIZE))
+        except sqlite3.Error as error:
+            raise StorageUnavailable(f"database file {self._path}: {error}; allowed: restore a backup") from error
 
     def check_head(self) -> None:
         """Read its header and schema from the disk, past what connections remember.
@@ -75,7 +94,13 @@ class SqliteFile:
         if self._first is None or self._path is None:
             return None
         self.require()  # where a file beside it is gone, even who only reads would make an empty one
-        with closing(sqlite3.connect(f"{self._path.as_uri()}?mode=ro", uri=True)) as connection:
+        return self._first_cell(statement, "mode=ro")
+
+    def _first_cell(self, statement: str, options: str, *before: str) -> Any:
+        assert self._path is not None
+        with closing(sqlite3.connect(f"{self._path.as_uri()}?{options}", uri=True)) as connection:
+            for each in before:
+                connection.execute(each)
             return connection.execute(statement).fetchone()[0]
 
     def _stat(self, suffix: str = "") -> os.stat_result | None:

@@ -41,6 +41,7 @@ class StoreWatch:
             with self._database.write(durable=False) as session:
                 stores.require(session, self._database.store_id)
                 stores.touch(session)
+            self._database.checkpoint()
             self._look_at_pages()
         except (DatabaseError, OSError) as error:
             self.trouble = str(error)

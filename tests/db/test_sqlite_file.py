@@ -60,6 +60,45 @@ def test_an_older_copy_over_the_file_is_noticed(tmp_path: Path, change: Callable
     database.close()
 
 
+def test_an_older_copy_of_the_same_size_is_noticed_before_a_write(tmp_path: Path) -> None:
+    """SQLite finds header and changes in the write-ahead log and would write on into a mixture of both."""
+    path = tmp_path / "stiction.sqlite3"
+    with closing(Database(f"sqlite:///{path}")) as database:
+        upgrade(database)
+        database.checkpoint()
+        shutil.copyfile(path, tmp_path / "older")
+        look(database)
+        database.checkpoint()
+        assert path.stat().st_size == (tmp_path / "older").stat().st_size
+        look(database)
+        shutil.copyfile(tmp_path / "older", path)
+        with pytest.raises(StorageUnavailable, match="deleted or replaced"):
+            look(database)
+
+
+def test_reading_the_header_leaves_the_locks_of_a_write_to_sqlite(tmp_path: Path) -> None:
+    """POSIX locks of a process end with any descriptor of the file that it closes."""
+    path = tmp_path / "stiction.sqlite3"
+    with closing(Database(f"sqlite:///{path}")) as database:
+        upgrade(database)
+        with database.write() as session:
+            before = locks_of(path)
+            look = sqlite3.connect(f"{path.as_uri()}?immutable=1", uri=True)
+            look.execute("PRAGMA user_version").fetchone()
+            look.close()
+            database.ping()
+            assert locks_of(path) == before
+            assert session.connection().exec_driver_sql("SELECT count(*) FROM store").scalar_one() >= 0
+        assert before
+
+
+def locks_of(path: Path) -> set[str]:
+    """What the system says of locks on the file and on the index of its write-ahead log."""
+    inodes = {Path(f"{path}{suffix}").stat().st_ino for suffix in ("", "-shm")}
+    lines = Path("/proc/locks").read_text(encoding="ascii").splitlines()
+    return {line.split(":", 1)[1] for line in lines if int(line.split()[5].rsplit(":", 1)[1]) in inodes}
+
+
 def test_a_thread_that_looked_earlier_finds_no_fault_in_what_grew_meanwhile(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -119,6 +119,27 @@ def test_no_upload_is_accepted_into_a_deleted_or_replaced_database(
     assert send(running, content).status_code == httpx.codes.OK
 
 
+def test_no_upload_is_accepted_into_an_older_copy_of_the_same_size(
+    running: httpx.Client, tmp_path: Path, content: bytes, between_looks: Lock
+) -> None:
+    """Put over the file with its inode kept, while the write-ahead log holds what came since."""
+    file = tmp_path / "data" / "stiction.sqlite3"
+    send(running, content).raise_for_status()
+    with between_looks:
+        with closing(Database(f"sqlite:///{file}")) as database:
+            database.checkpoint()
+            shutil.copyfile(file, tmp_path / "older")
+            with database.write() as session:
+                stores.touch(session)
+            database.checkpoint()
+        send(running, content).raise_for_status()
+        size = file.stat().st_size
+        shutil.copyfile(tmp_path / "older", file)
+        assert file.stat().st_size == size
+    assert told(send(running, content)) == UNAVAILABLE
+    assert told(running.get("/readyz")) == UNAVAILABLE
+
+
 def test_a_database_deleted_in_the_middle_of_a_write_is_noticed_before_the_answer(tmp_path: Path) -> None:
     with closing(Database(f"sqlite:///{tmp_path / 'stiction.sqlite3'}")) as database:
 
