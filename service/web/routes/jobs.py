@@ -1,12 +1,14 @@
-"""Jobs: what is waiting, under way and done, and how far."""
+"""Jobs: what is waiting, under way and done, and how far; end one that nobody wants."""
 
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
+from fastapi.responses import RedirectResponse
 
 from db.records import JobStatus
 from db.repositories import jobs
-from service.http.access import READ
+from service.domain.cancel import cancel
+from service.http.access import ADMIN, READ, CurrentPrincipal
 from service.http.dependencies import CurrentContext
 from service.http.paging import CursorText, Page
 from service.web.forms import EMPTY_IS_NONE
@@ -34,3 +36,10 @@ def list_jobs(
     with context.database.read() as session:
         found, after = page.cut(jobs.list_all(session, page.window(), status))
     return render(request, "jobs.html", jobs=found, after=after, status=status, stages=STAGES, is_first=cursor is None)
+
+
+@router.post("/jobs/{id}/cancel", dependencies=[ADMIN])
+def cancel_job(context: CurrentContext, id: str, principal: CurrentPrincipal) -> Response:  # noqa: A002  (the path's own name)
+    """End a job, and lead back to the list; raises as the API's route does."""
+    cancel(context, id, principal)
+    return RedirectResponse("/jobs", 303)

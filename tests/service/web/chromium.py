@@ -32,6 +32,7 @@ class Tab:
     def __init__(self, socket: ClientConnection) -> None:
         self.errors: list[str] = []
         self.requests: list[str] = []
+        self.width = 0
         self._socket = socket
         self._numbers = itertools.count(1)
         for domain in ("Page", "Runtime", "Log", "Network", "DOM"):
@@ -72,6 +73,7 @@ class Tab:
 
     def resize(self, width: int) -> None:
         """Be so wide, in CSS pixels."""
+        self.width = width
         self.call(
             "Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=width < 500
         )

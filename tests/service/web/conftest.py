@@ -8,6 +8,9 @@ from db.database import Database
 from db.repositories import materials
 
 HTML = {"accept": "text/html"}
+OWN = {"sec-fetch-site": "same-origin"}
+"""Of a form that one of our own pages sends."""
+
 HOSTILE = [
     "<script>alert(1)</script>",
     "'\"><img src=x onerror=alert(1)>",
@@ -51,6 +54,20 @@ def browser(reach: Any) -> Any:
     caller = reach("open")
     caller.headers |= HTML
     return caller
+
+
+@pytest.fixture
+def session_of(reach: Any, make: Callable[..., str]) -> Callable[[str], Any]:
+    """Log a browser on another machine in, with a new key of a scope."""
+
+    def log_in(scope: str) -> Any:
+        caller = reach("keys")
+        caller.headers |= HTML | OWN
+        answer = caller.request("POST", "/login", data={"key": make(scope)})
+        caller.headers["cookie"] = answer.headers["set-cookie"].partition(";")[0]
+        return caller
+
+    return log_in
 
 
 @pytest.fixture

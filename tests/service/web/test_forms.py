@@ -14,10 +14,9 @@ from starlette.datastructures import UploadFile
 from service.domain import upload
 from service.http.problem_meanings import MEANINGS
 from service.http.problems import PROBLEM_TYPES
-from tests.service.web.conftest import HOSTILE, HTML
+from tests.service.web.conftest import HOSTILE, HTML, OWN
 
 ON_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
-SAME_ORIGIN = {"Sec-Fetch-Site": "same-origin"}
 DOCS = Path(__file__).parents[3] / "docs"
 
 
@@ -70,7 +69,7 @@ def test_a_form_in_an_odd_charset_is_refused(client: httpx.Client, charset: str,
     body = (
         begin + name + b'"\r\n\r\n' + field + b"\r\n" + begin + b'file"; filename="' + file + b'"\r\n\r\nx\r\n--X--\r\n'
     )
-    headers = SAME_ORIGIN | {"accept": accepted, "content-type": f"multipart/form-data; boundary=X; charset={charset}"}
+    headers = OWN | {"accept": accepted, "content-type": f"multipart/form-data; boundary=X; charset={charset}"}
     answer = client.post("/upload", content=body, headers=headers)
     assert answer.status_code in {400, 415, 422}, answer.text
     assert answer.headers["content-type"].startswith(("text/html", "application/problem+json"))
@@ -109,7 +108,7 @@ def test_a_material_that_another_made_known_meanwhile_takes_the_log(
     monkeypatch.setattr(upload, "_check", lambda *_: None)  # as it was before the other came
     add("made meanwhile")
     sent = {"data": {"material": "made meanwhile", "create": "true"}, "files": {"file": ("log.npz", content)}}
-    answer = browser.request("POST", "/upload", **sent, headers=SAME_ORIGIN)
+    answer = browser.request("POST", "/upload", **sent, headers=OWN)
     assert answer.status_code == 303, answer.text
     (log,) = browser.get("/v1/grasp-logs?material=made meanwhile").json()["items"]
     assert answer.headers["location"] == f"/logs/{log['id']}"
@@ -207,7 +206,7 @@ def test_a_form_without_a_file_is_not_read_beyond_its_bound(browser: Any, path: 
     """Whoever sends it: it is parsed before anybody is asked for a key."""
     sent = 2_000_000 // parts
     files = [("file", (f"{part}.bin", b"x" * sent)) for part in range(parts)]
-    answer = browser.request("POST", path, files=files, headers=SAME_ORIGIN)
+    answer = browser.request("POST", path, files=files, headers=OWN)
     assert answer.status_code == 413
 
 
@@ -217,13 +216,13 @@ def test_the_file_of_a_form_is_written_beside_the_blobs_only(
 ) -> None:
     """Where there is room for it, and nobody else may read."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "missing"))
-    answer = browser.request("POST", "/upload", files={"file": ("log.npz", content * 8)}, headers=SAME_ORIGIN)
+    answer = browser.request("POST", "/upload", files={"file": ("log.npz", content * 8)}, headers=OWN)
     assert answer.status_code == 303, answer.text
 
 
 @pytest.mark.parametrize("body", [b"no parts", b"--x\r\nContent-Disposition: form-data\r\n\r\n1\r\n--x--"])
 def test_a_broken_form_is_refused(browser: Any, body: bytes) -> None:
-    headers = {**SAME_ORIGIN, "content-type": "multipart/form-data; boundary=x"}
+    headers = {**OWN, "content-type": "multipart/form-data; boundary=x"}
     assert browser.request("POST", "/upload", content=body, headers=headers).status_code == 400
 
 
@@ -235,5 +234,5 @@ def test_a_form_whose_file_cannot_be_written_is_no_error_of_the_service(
 
     monkeypatch.setattr(UploadFile, "write", write)
     files = {"file": ("log.npz", b"x" * 100)}
-    answer = browser.request("POST", "/upload", files=files, headers=SAME_ORIGIN)
+    answer = browser.request("POST", "/upload", files=files, headers=OWN)
     assert answer.status_code == 503

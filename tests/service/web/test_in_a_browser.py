@@ -42,8 +42,8 @@ def page(tab: Tab, client: httpx.Client) -> Iterator[Tab]:
 
 
 def fits(tab: Tab) -> bool:
-    """Whether nothing reaches beyond the right edge."""
-    return bool(tab.run("document.documentElement.scrollWidth <= window.innerWidth"))
+    """Whether nothing reaches beyond the right edge: a phone's browser widens its window for what does."""
+    return bool(tab.run("document.documentElement.scrollWidth") <= tab.width)
 
 
 @ON_SQLITE

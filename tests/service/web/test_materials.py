@@ -3,10 +3,9 @@ from typing import Any
 
 import pytest
 
-from tests.service.web.conftest import HOSTILE
+from tests.service.web.conftest import HOSTILE, OWN
 
 pytestmark = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
-OWN = {"sec-fetch-site": "same-origin"}
 
 
 def test_an_empty_database_greets_with_two_next_steps(browser: Any, elements: Callable[..., Any]) -> None:
