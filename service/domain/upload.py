@@ -286,7 +286,7 @@ def _identify(spool: Spool, request: UploadRequest) -> tuple[str, int]:
     """The body's format, which must take what was said beside it, and the bytes that it unpacks to."""
     spool.flush()
     with _refusals_named(), disk_errors_named():
-        name = formats.identify(spool.path, request.content_type)
+        name = formats.identify(spool.path, request.content_type, request.settings)
         formats.check_settings(name, request.settings)
         formats.check_start(spool.path, name)
         return name, unpacked_bytes(spool.path)

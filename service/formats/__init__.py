@@ -7,8 +7,8 @@ from pathlib import Path, PurePosixPath
 from types import ModuleType
 from typing import Any
 
+from service.formats import frame_table, tac3d, tracked_markers
 from service.formats import mapping as mappings
-from service.formats import tac3d, tracked_markers
 from service.formats.archive import open_archive
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
@@ -49,6 +49,7 @@ FORMATS = {
     "npz": Format("application/vnd.stiction.grasp-log+npz", "npz.read", settings=(), plain=True),
     "tac3d": Format("application/vnd.tac3d+zip", "tac3d.read", settings=(), plain=True),
     "tracked markers": Format("text/csv", "tracked_markers.read", settings=("scale", "frame_rate")),
+    "frame table": Format("application/vnd.stiction.frame-table+csv", "frame_table.read"),
     "mcap": Format("application/x-mcap", "mcap.read", b"\x89MCAP0\r\n"),
     "rosbag1": Format("application/x-rosbag", "rosbag.read_bag1", b"#ROSBAG V"),
     "rosbag2": Format("application/x-rosbag2", "rosbag.read_bag2", b"SQLite format 3\x00"),
@@ -67,6 +68,8 @@ _WHERE = {
     "frame_rate": "only beside a table of tracked markers: other formats tell times",
     "mapping": "only beside a format of topics, fields or columns",
 }
+
+NO_SETTINGS: Mapping[str, float | str | None] = {}
 
 EXTRA = "formats"
 """The extra that brings the libraries of the formats that need some."""
@@ -100,7 +103,7 @@ def read(path: Path, content_type: str | None = None, **settings: float | str | 
     are not None: of tracked markers ``scale`` (m per pixel) and ``frame_rate`` (1/s), of formats with topics, fields or
     columns the ``mapping`` (JSON). Raises ``UnsupportedFormat``, or ``InvalidInput`` for what is wrong inside.
     """
-    name = identify(path, content_type)
+    name = identify(path, content_type, settings)
     check_settings(name, settings)
     given: dict[str, Any] = {key: value for key, value in settings.items() if value is not None}
     if "mapping" in given:
@@ -121,16 +124,23 @@ def parse_mapping(settings: Mapping[str, float | str | None]) -> mappings.FieldM
     return None if text is None else mappings.parse(str(text))
 
 
-def identify(path: Path, content_type: str | None = None) -> str:
-    """Name of the format of the log at ``path``, a key of ``FORMATS``; raises ``UnsupportedFormat``."""
+def identify(
+    path: Path, content_type: str | None = None, settings: Mapping[str, float | str | None] = NO_SETTINGS
+) -> str:
+    """Name of the format of the log at ``path``, a key of ``FORMATS``; raises ``UnsupportedFormat``.
+
+    Delimited text is a table of tracked markers, or one of frames where the ``settings`` have a mapping.
+    """
+    is_mapped = settings.get("mapping") is not None
     media_type = (content_type or UNSPECIFIC_TYPES[0]).partition(";")[0].strip().lower()
     if media_type in CONTENT_TYPES:
-        return CONTENT_TYPES[media_type]
+        name = CONTENT_TYPES[media_type]
+        return "frame table" if is_mapped and name == "tracked markers" else name
     if media_type not in UNSPECIFIC_TYPES:
         raise UnsupportedFormat("content type", media_type[:100])
     if path.is_dir():
         return "rosbag2" if any(file.suffix in STORAGE for file in path.iterdir()) else "tac3d"
-    return _sniff(path)
+    return _sniff(path, is_mapped)
 
 
 def check_start(path: Path, name: str) -> None:
@@ -158,7 +168,7 @@ def _reader(name: str) -> Callable[..., GraspLog]:
     return reader
 
 
-def _sniff(path: Path) -> str:
+def _sniff(path: Path, is_mapped: bool) -> str:
     with path.open("rb") as stream:
         start = stream.read(SNIFFED_BYTES)
     for name, each in FORMATS.items():
@@ -168,8 +178,13 @@ def _sniff(path: Path) -> str:
         return _sniff_zip(path)
     if start.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
         return "json"
-    if tracked_markers.looks_like(start):
+    if not is_mapped and tracked_markers.looks_like(start):
         return "tracked markers"
+    if frame_table.looks_like(start):
+        if is_mapped:
+            return "frame table"
+        allowed = "columns of tracked markers, or a mapping that says which columns are what (docs/formats.md)"
+        raise UnsupportedFormat("file", f"a table that begins with {start.splitlines()[0][:60]!r}", allowed)
     value = f"of no known format (it starts with {start[:4]!r})" if start else "empty"
     raise UnsupportedFormat("file", value)
 

@@ -22,7 +22,12 @@ UNITS: dict[str, Mapping[str, float]] = {
     "element_area": {"m²": 1.0, "m2": 1.0, "mm²": 1e-6, "mm2": 1e-6},
     "force": {"N": 1.0, "mN": 1e-3},
 }
-"""Factors to SI of what may be given otherwise; ``object_pose`` has a unit a component."""
+"""Factors to SI of what may be given otherwise."""
+COMPONENTS = {
+    "object_pose": (LENGTH, LENGTH, ANGLE),
+    **{name: (UNITS[name],) * 3 for name in ("position", "displacement", "force")},
+}
+"""Those of what may have a unit a component; one that begins with a minus turns that axis."""
 
 _ORIGIN_KEYS = {"field", "topic", "unit", "value"}
 _ALLOWED_ORIGIN = "a field, a list of fields, or an object of field or value, topic and unit"
@@ -113,17 +118,21 @@ def _origin(name: str, given: Any, topic: str | None) -> Origin:
 
 
 def _factors(name: str, unit: Any) -> tuple[float, ...]:
-    if name == "object_pose":
-        if not isinstance(unit, list) or len(unit) != 3:
-            raise InvalidInput("unit of object_pose", repr(unit)[:60], 'one a component, such as ["mm", "mm", "deg"]')
-        return tuple(_factor(name, str(part), kind) for part, kind in zip(unit, (LENGTH, LENGTH, ANGLE), strict=True))
-    return (_factor(name, unit, UNITS.get(name, {})),)
+    kinds = COMPONENTS.get(name, ())
+    if isinstance(unit, list) or name == "object_pose":
+        if not isinstance(unit, list) or len(unit) != len(kinds):
+            allowed = 'one a component, such as ["mm", "mm", "deg"]' if kinds else "one unit"
+            raise InvalidInput(f"unit of {name}", repr(unit)[:60], allowed)
+        return tuple(_factor(name, part, kind, may_turn=True) for part, kind in zip(unit, kinds, strict=True))
+    return (_factor(name, unit, UNITS.get(name, {}), may_turn=bool(kinds)),)
 
 
-def _factor(name: str, unit: Any, units: Mapping[str, float]) -> float:
-    if not isinstance(unit, str) or unit not in units:
+def _factor(name: str, unit: Any, units: Mapping[str, float], *, may_turn: bool) -> float:
+    turns = may_turn and isinstance(unit, str) and unit.startswith("-")
+    plain = unit[1:] if turns else unit
+    if not isinstance(plain, str) or plain not in units:
         raise InvalidInput(f"unit of {name}", repr(unit)[:60], ", ".join(units) or "none: it has no unit")
-    return units[unit]
+    return -units[plain] if turns else units[plain]
 
 
 def _text(name: str, value: Any) -> str:

@@ -1,6 +1,5 @@
 """Tracked markers as text: one row a marker and frame, in pixels or metres (docs/formats.md)."""
 
-import csv
 import math
 from array import array
 from collections.abc import Iterator, Mapping
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from service.formats.delimited import parse_number, rows, split_header, text_lines
 from service.formats.npy import MAX_ARRAY_BYTES
 from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray, GraspLog
@@ -29,7 +29,6 @@ ASSUMED_WIDTH = 15e-3
 """m that the markers span where their scale is unknown: a fingertip's sensor. Detection depends on it a little."""
 MAX_ROWS, ROW = 5_000_000, 7
 """Rows of a file, and numbers that are kept of each."""
-DELIMITERS = ",;\t"
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +59,7 @@ def read(path: Path, scale: float | None = None, frame_rate: float | None = None
     Raises ``InvalidInput`` naming the line and the value that is wrong.
     """
     given = {name: repr(value) for name, value in (("scale", scale), ("frame_rate", frame_rate)) if value is not None}
-    return read_lines(_lines(path), given)
+    return read_lines(text_lines(path), given)
 
 
 def read_lines(lines: Iterator[str], given: Mapping[str, str] = MappingProxyType({})) -> GraspLog:
@@ -95,8 +94,7 @@ def read_header(lines: Iterator[str]) -> Header:
 
 
 def _columns(text: str, settings: Mapping[str, str], number: int) -> Header:
-    delimiter = max(DELIMITERS, key=text.count)
-    names = [name.strip(' "').lower() for name in text.split(delimiter)]
+    names, delimiter = split_header(text.lower())
     columns: dict[str, int] = {}
     for place, name in enumerate(names):
         if name in ALIASES and ALIASES[name] in columns:
@@ -113,84 +111,50 @@ def _columns(text: str, settings: Mapping[str, str], number: int) -> Header:
     return Header(settings, columns, len(names), delimiter, ignored, number)
 
 
-def _lines(path: Path) -> Iterator[str]:
-    size = path.stat().st_size
-    if size > MAX_ARRAY_BYTES:
-        raise InvalidInput("file", f"{size} bytes", f"at most {MAX_ARRAY_BYTES} bytes")
-    with path.open("rb") as stream:
-        for number, line in enumerate(stream, start=1):
-            try:
-                yield line.decode("utf-8")
-            except UnicodeDecodeError as error:
-                raise InvalidInput(f"line {number}", f"not UTF-8 ({error.reason})", "UTF-8 text") from error
-
-
 def _tracks(header: Header, lines: Iterator[str], settings: Mapping[str, str]) -> Tracks:
     """All rows, sorted into frames and markers."""
-    rows, names = _rows(header, lines)
-    moment, number = rows[:, 0], rows[:, -1]
+    table, names = _table(header, lines)
+    moment, line = table[:, 0], table[:, -1]
     if "time" not in header.columns:
         moment = moment / _setting("frame_rate", settings, FRAME_RATE, "1/s, because the file counts frames")
     time, frame = np.unique(moment, return_inverse=True)
-    marker = rows[:, 1].astype(np.intp)
+    marker = table[:, 1].astype(np.intp)
     _check_size(len(time), len(names))
-    _check_once(frame * len(names) + marker, number, names, marker)
+    _check_once(frame * len(names) + marker, line, names, marker)
     place = np.full((len(time), len(names), 3), np.nan)
-    place[frame, marker] = rows[:, 2:5]
+    place[frame, marker] = table[:, 2:5]
     contact = None
     if "contact" in header.columns:
-        contact = _held(frame, marker, rows[:, 5], place.shape[:2])
+        contact = _held(frame, marker, table[:, 5], place.shape[:2])
     return Tracks(time, place, contact, "z" in header.columns)
 
 
-def _rows(header: Header, lines: Iterator[str]) -> tuple[FloatArray, dict[str, int]]:
+def _table(header: Header, lines: Iterator[str]) -> tuple[FloatArray, dict[str, int]]:
     """Rows [r, 7] of moment, marker (its number), x, y, z, contact and line; and the markers by name."""
     names: dict[str, int] = {}
     values = array("d")  # a list of tuples would take five times the memory
-    reader = csv.reader(lines, delimiter=header.delimiter)
-    try:
-        for cells in reader:
-            if not cells or cells[0].lstrip().startswith("#"):
-                continue
-            if len(values) >= MAX_ROWS * ROW:
-                raise InvalidInput("file", f"more than {MAX_ROWS} rows", f"at most {MAX_ROWS} rows")
-            values.extend(_row(header, cells, header.lines + reader.line_num, names))
-    except csv.Error as error:
-        line = header.lines + reader.line_num
-        raise InvalidInput(f"line {line}", f"not a row of text ({error})", "delimited text") from error
+    for line, cells in rows(lines, header.delimiter, header.width, header.lines, MAX_ROWS):
+        values.extend(_row(header, cells, line, names))
     if not values:
         raise InvalidInput("file", "a header without rows", "one row a marker and frame")
     return np.frombuffer(values).reshape(-1, ROW), names
 
 
 def _row(header: Header, cells: list[str], line: int, names: dict[str, int]) -> tuple[float, ...]:
-    if len(cells) != header.width:
-        raise InvalidInput(f"line {line}", f"of {len(cells)} cells", f"{header.width}, as in the header")
     text = {name: cells[place].strip() for name, place in header.columns.items()}
     key = "time" if "time" in text else "frame"
-    moment = _number(text[key], line, key)
+    moment = parse_number(text[key], line, key)
     if math.isnan(moment):
         raise InvalidInput(f"line {line}, {key}", repr(text[key])[:40], "a finite number")
     if not text["marker"]:
         raise InvalidInput(f"line {line}, marker", "empty", "a name or number")
     marker = names.setdefault(text["marker"], len(names))
-    x, y = _number(text["x"], line, "x"), _number(text["y"], line, "y")
-    z = _number(text["z"], line, "z") if "z" in text else 0.0
-    touching = _number(text["contact"], line, "contact") if "contact" in text else 1.0
+    x, y = parse_number(text["x"], line, "x"), parse_number(text["y"], line, "y")
+    z = parse_number(text["z"], line, "z") if "z" in text else 0.0
+    touching = parse_number(text["contact"], line, "contact") if "contact" in text else 1.0
     if touching not in (0.0, 1.0) and not math.isnan(touching):
         raise InvalidInput(f"line {line}, contact", repr(text["contact"])[:40], "0 or 1, empty where unknown")
     return moment, marker, x, y, z, touching, line
-
-
-def _number(text: str, line: int, name: str) -> float:
-    """A number; NaN where the cell is empty."""
-    try:
-        value = float(text) if text else math.nan
-    except ValueError:
-        value = math.inf
-    if math.isinf(value):
-        raise InvalidInput(f"line {line}, {name}", repr(text)[:40], "a finite number; empty or nan where it is lost")
-    return value
 
 
 def _setting(name: str, settings: Mapping[str, str], limits: tuple[float, float], unit: str) -> float:

@@ -1,5 +1,7 @@
 import gzip
 import hashlib
+import io
+import json
 import socket
 import threading
 import time
@@ -166,6 +168,29 @@ def test_the_scale_given_with_an_upload_is_kept_with_it(client: httpx.Client, up
     again = upload(client, unscaled(), "text/csv", scale="2.5e-5", frame_rate="30")
     assert again.status_code == httpx.codes.OK
     assert upload(client, unscaled(), "text/csv", scale="3e-5", frame_rate="30").json()["id"] != log["id"]
+
+
+def test_a_loggers_table_is_taken_by_its_mapping_with_its_forces(
+    client: httpx.Client, upload: Upload, wait: Wait
+) -> None:
+    """Text with a mapping is a table of frames; without one it would be refused for having no markers."""
+    names = [f"P{p}_{kind}{axis}" for p in range(4) for kind in "DF" for axis in "XYZ"]
+    rows = [[str(10_000 * k), *(f"{0.001 * k}" if "D" in name else f"{-0.5 * k}" for name in names)] for k in range(4)]
+    table = "\n".join(map(",".join, [["T_us", *names], *rows])).encode()
+    mapping = {
+        "grid": [2, 2],
+        "pitch": 7e-3,
+        "time": {"field": "T_us", "unit": "us"},
+        "displacement": {"field": [f"P*_D{axis}" for axis in "XYZ"], "unit": "mm"},
+        "force": [f"P*_F{axis}" for axis in "XYZ"],
+    }
+    accepted = upload(client, table, "text/csv", mapping=json.dumps(mapping))
+    assert accepted.status_code == httpx.codes.ACCEPTED, accepted.text
+    assert (accepted.json()["format"], accepted.json()["frames"]) == ("frame table", 4)
+    assert wait(client, accepted.json()["job"]["id"])["status"] == "done"
+    with np.load(io.BytesIO(client.get(f"{accepted.headers['location']}/file").content)) as stored:
+        np.testing.assert_allclose(stored["force"][3], np.full((2, 2, 3), -1.5), rtol=1e-12, err_msg="as in the table")
+    assert upload(client, table, "text/csv").status_code == httpx.codes.UNPROCESSABLE_ENTITY
 
 
 def test_slip_is_detected_without_a_scale_but_no_friction_found(

@@ -100,6 +100,11 @@ def test_what_is_named_goes_before_what_is_usual() -> None:
         ({"object_pose": {"field": "a", "unit": "m"}}, "unit of object_pose"),
         ({"object_pose": {"field": "a", "unit": ["m", "m"]}}, "unit of object_pose"),
         ({"object_pose": {"field": "a", "unit": ["m", "m", "m"]}}, "unit of object_pose"),
+        ({"force": {"field": "a", "unit": ["N", "N"]}}, "unit of force"),
+        ({"force": {"field": "a", "unit": ["N", "N", 1]}}, "unit of force"),
+        ({"force": {"field": "a", "unit": "--N"}}, "unit of force"),
+        ({"time": {"field": "a", "unit": "-s"}}, "unit of time"),
+        ({"time": {"field": "a", "unit": ["s"]}}, "unit of time"),
         ({"speed": "v"}, "mapping"),
     ],
 )

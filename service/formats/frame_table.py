@@ -1,0 +1,107 @@
+"""Tables with one row a frame and a column a number, as loggers of tactile arrays write them (docs/formats.md)."""
+
+import re
+from array import array
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from service.formats.assemble import MASKS, MAX_CONTENT_BYTES, assemble
+from service.formats.delimited import parse_number, rows, split_header, text_lines
+from service.formats.mapping import UNMAPPED, FieldMapping, default_origins
+from slipcore.errors import InvalidInput
+from slipcore.frames import FloatArray, GraspLog
+
+MAX_ROWS = 1_000_000
+ANY_NUMBER = "*"
+"""In a field, stands for the number of an element: ``P*_FX`` are the columns P0_FX, P1_FX, … in their order."""
+
+
+def read(path: Path, mapping: FieldMapping | None = None) -> GraspLog:
+    """Read a grasp log from a table of frames. Raises ``InvalidInput`` naming the line, column or member."""
+    table = _Table(path, (mapping or UNMAPPED).over(default_origins()))
+    return assemble(table, table.mapping)
+
+
+def looks_like(start: bytes) -> bool:
+    """Whether a file that begins so is text with a header of several columns, at least one of them a name."""
+    if b"\x00" in start:
+        return False
+    try:
+        names, _, _ = _header(iter(start.decode("utf-8", errors="ignore").splitlines()))
+    except InvalidInput:
+        return False
+    return len(names) > 1 and any(re.search("[A-Za-z]", name) for name in names)
+
+
+class _Table:
+    """The columns that a mapping names; a ``Recording``."""
+
+    def __init__(self, path: Path, mapping: FieldMapping) -> None:
+        self.mapping = mapping
+        lines = text_lines(path)
+        self._names, delimiter, before = _header(lines)
+        fields = [field for origin in mapping.origins.values() for field in origin.fields]
+        chosen = sorted({column for field in fields for column in self._columns(field)})
+        self._place = {column: k for k, column in enumerate(chosen)}
+        self._values = self._read(rows(lines, delimiter, len(self._names), before, MAX_ROWS), chosen)
+
+    def column(self, name: str, _topic: str | None, field: str, once: bool) -> NDArray[Any] | None:
+        """A column, or those of a field with a number in it side by side; None where there is none."""
+        places = [self._place[column] for column in self._columns(field)]
+        if not places:
+            return None
+        found: NDArray[Any] = self._values[:, places if ANY_NUMBER in field else places[0]]
+        if name in MASKS and np.isin(found, (0.0, 1.0)).all():
+            found = found == 1.0
+        return found[0] if once else found
+
+    def grid(self) -> None:
+        """Told by the mapping alone."""
+
+    def contents(self) -> str:
+        """The columns."""
+        return f"the columns {', '.join(self._names)}"[:300]
+
+    def _columns(self, field: str) -> list[int]:
+        if ANY_NUMBER not in field:
+            return [self._names.index(field)] if field in self._names else []
+        pattern = re.compile(r"(\d{1,6})".join(map(re.escape, field.split(ANY_NUMBER, 1))))
+        found = [(int(match[1]), k) for k, name in enumerate(self._names) if (match := pattern.fullmatch(name))]
+        return [column for _, column in sorted(found)]
+
+    def _read(self, lines: Iterator[tuple[int, list[str]]], chosen: list[int]) -> FloatArray:
+        values = array("d")
+        for line, cells in lines:
+            values.extend(
+                parse_number(cells[column].strip(), line, self._names[column], "a finite number") for column in chosen
+            )
+            if len(values) * values.itemsize > MAX_CONTENT_BYTES:
+                raise InvalidInput("file", f"more than {MAX_CONTENT_BYTES} bytes", f"at most {MAX_CONTENT_BYTES}")
+        if not values:
+            allowed = "rows, and a mapping that names columns"
+            raise InvalidInput("file", f"without rows of what is looked for; it has {self.contents()}", allowed)
+        return np.frombuffer(values).reshape(-1, len(chosen))
+
+
+def _header(lines: Iterator[str]) -> tuple[list[str], str, int]:
+    """Names, each of which is there once, what parts them, and the number of the header's line."""
+    for number, line in enumerate(lines, start=1):
+        text = line.strip("\ufeff \r\n")
+        if text and not text.startswith("#"):
+            names, delimiter = split_header(text)
+            return _distinct(names), delimiter, number
+    raise InvalidInput("file", "without a header", "a line that names the columns")
+
+
+def _distinct(names: list[str]) -> list[str]:
+    """Names that come again, as of a second sensor, get its number: ``P0_FX``, ``P0_FX.1``."""
+    seen: dict[str, int] = {}
+    found = []
+    for name in names:
+        count = seen[name] = seen.get(name, -1) + 1
+        found.append(f"{name}.{count}" if count else name)
+    return found

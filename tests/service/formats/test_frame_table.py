@@ -1,0 +1,164 @@
+import contextlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from service import formats
+from service.formats import frame_table
+from slipcore import GraspLog, InvalidInput
+
+FRAMES, PILLARS = 5, 9
+MAPPING: dict[str, Any] = {
+    "grid": [3, 3],
+    "pitch": 7e-3,
+    "time": {"field": "T_us", "unit": "us"},
+    "displacement": {"field": ["P*_DX", "P*_DY", "P*_DZ"], "unit": "mm"},
+    "force": {"field": ["P*_FX", "P*_FY", "P*_FZ"], "unit": ["N", "N", "-N"]},
+    "contact": "P*_isInContact",
+}
+
+
+def columns(rng: np.random.Generator) -> dict[str, list[str]]:
+    """One sensor of pillars as its logger writes it: numbers as text, with much that no log needs."""
+    told = {
+        f"P{p}_{kind}{axis}": [f"{value:.6f}" for value in 0.1 * rng.standard_normal(FRAMES)]
+        for kind in "DF"
+        for p in range(PILLARS)
+        for axis in "XYZ"
+    }
+    told |= {f"GG_{kind}{axis}": ["0.0"] * FRAMES for kind in "FT" for axis in "XYZ"}
+    told |= {"isSDActive": ["1"] * FRAMES, "isRefLoad": ["0"] * FRAMES}
+    told |= {f"P{p}_isInContact": [str(int(p < 3 or k > 2)) for k in range(FRAMES)] for p in range(PILLARS)}
+    told |= {f"P{p}_slipState": ["-2"] * FRAMES for p in range(PILLARS)}
+    return told | {"FrictionEst": ["nan"] * FRAMES}
+
+
+def written(path: Path, *sensors: dict[str, list[str]], delimiter: str = ",") -> Path:
+    time = [str(1_000_000 + 10_000 * k) for k in range(FRAMES)]
+    names = ["T_us", *(name for sensor in sensors for name in sensor)]
+    table = [time, *(column for sensor in sensors for column in sensor.values())]
+    lines = [delimiter.join(line) for line in [names, *zip(*table, strict=True)]]
+    path.write_text("# firmware 1.2\n\n" + "\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def field(told: dict[str, list[str]], kind: str) -> np.ndarray:
+    """Of pillars on their grid, [t, 3, 3, 3]."""
+    parts = [[told[f"P{p}_{kind}{axis}"] for axis in "XYZ"] for p in range(PILLARS)]
+    return np.asarray(parts, dtype=float).transpose(2, 0, 1).reshape(FRAMES, 3, 3, 3)
+
+
+def read(path: Path, content_type: str | None = "text/csv", **changes: Any) -> GraspLog:
+    return formats.read(path, content_type, mapping=json.dumps(MAPPING | changes))
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+@pytest.mark.parametrize("content_type", [None, "text/csv", "application/octet-stream"])
+def test_an_array_of_pillars_is_read_from_its_loggers_table(
+    tmp_path: Path, delimiter: str, content_type: str | None
+) -> None:
+    told = columns(np.random.default_rng(1))
+    log = read(written(tmp_path / "log.csv", told, delimiter=delimiter), content_type)
+    np.testing.assert_allclose(log.displacement, 1e-3 * field(told, "D"), rtol=1e-12, err_msg="mm to m")
+    assert log.force is not None
+    np.testing.assert_allclose(log.force, field(told, "F") * [1.0, 1.0, -1.0], rtol=1e-12, err_msg="z is turned")
+    np.testing.assert_allclose(np.diff(log.time), 0.01, rtol=1e-9, err_msg="µs to s")
+    np.testing.assert_allclose(log.position[2, 0, :2] - log.position[0, 0, :2], [14e-3, 0.0], rtol=0, atol=1e-12)
+    assert log.element_area == pytest.approx(49e-6, rel=1e-9)
+    assert log.contact is not None
+    assert log.contact.reshape(FRAMES, -1).sum(axis=1).tolist() == [3, 3, 3, 9, 9]
+
+
+def test_a_second_sensors_columns_have_its_number(tmp_path: Path) -> None:
+    first, second = (columns(np.random.default_rng(seed)) for seed in (1, 2))
+    path = written(tmp_path / "log.csv", first, second)
+    log = read(path, displacement={"field": [f"P*_D{axis}.1" for axis in "XYZ"], "unit": "mm"})
+    np.testing.assert_allclose(log.displacement, 1e-3 * field(second, "D"), rtol=1e-12, err_msg="the second's")
+    assert log.force is not None
+    np.testing.assert_allclose(log.force[..., 0], field(first, "F")[..., 0], rtol=1e-12, err_msg="the first's")
+
+
+def test_elements_come_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+    order = (10, 2, 1, 0, 3, 4, 5, 6, 7, 8, 9, 11)
+    lines = [["t", *(f"u{k}" for k in order)], *([t, *map(str, order)] for t in "01")]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(map(",".join, lines)))
+    mapping = {"grid": [3, 4], "pitch": 1e-2, "time": "t", "displacement": {"field": ["u*"] * 3, "unit": "um"}}
+    log = formats.read(path, "text/csv", mapping=json.dumps(mapping))
+    assert (1e6 * log.displacement[0, ..., 0]).round(9).ravel().tolist() == list(range(12))
+
+
+def test_a_log_written_as_a_table_comes_back(tmp_path: Path, log: GraspLog) -> None:
+    """Every number of a log to its last digit, by columns named after nothing but their order."""
+    n, m = log.grid
+    flat = np.concatenate([log.time[:, None], log.displacement.reshape(len(log), -1)], axis=1)
+    path = tmp_path / "log.csv"
+    np.savetxt(path, flat, "%.17g", ",", header=",".join(["t", *(f"u{k}" for k in range(3 * n * m))]), comments="")
+    mapping = {
+        "grid": [n, m],
+        "time": "t",
+        "displacement": "u*",
+        "position": {"value": log.position.tolist()},
+        "element_area": {"value": log.element_area},
+    }
+    back = formats.read(path, "text/csv", mapping=json.dumps(mapping))
+    np.testing.assert_array_equal(back.displacement, log.displacement)
+    np.testing.assert_array_equal(back.time, log.time)
+
+
+def test_only_a_mapping_makes_text_a_table_of_frames(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.csv", columns(np.random.default_rng(1)))
+    given = {"mapping": "{}"}
+    assert formats.identify(path, "text/csv", given) == "frame table"
+    assert formats.identify(path, "application/octet-stream", given) == "frame table"
+    assert formats.identify(path, "text/csv") == "tracked markers"
+    assert formats.identify(path, formats.FORMATS["frame table"].content_type) == "frame table"
+    with pytest.raises(InvalidInput, match="only beside a table of tracked markers"):
+        formats.read(path, "text/csv", mapping="{}", scale=1e-5)
+    with pytest.raises(formats.UnsupportedFormat, match="a mapping that says which columns are what"):
+        formats.read(path)
+    for content in (b"\x00\x01,\x02", b"one column\n1\n", b"1,2\n3,4\n", b""):
+        assert not frame_table.looks_like(content)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("", "file is without a header"),
+        ("t,a\n", "file is without rows of what is looked for; it has the columns t, a"),
+        ("x,y\n1,2\n", "file is without rows of what is looked for; it has the columns x, y"),
+        ("t,a\n0,1\n1,x\n", "line 3, a is 'x'; allowed: a finite number"),
+        ("t,a\n0,1\n1,inf\n", "line 3, a is 'inf'"),
+        ("t,a\n0,1\n1\n", "line 3 is of 1 cells; allowed: 2"),
+        ("t,b\n0,1\n1,2\n", r"displacement is not there \(a, a, a\); allowed: the columns t, b"),
+        ("t,a\n0,1\n,2\n", "time"),
+        ("t,a\n1,1\n0,2\n", "time"),
+        ("t,a\n0,1\n1,\n", "displacement"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path: Path, content: str, message: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(content)
+    mapping = {"time": "t", "displacement": ["a"] * 3, "grid": [1, 1], "pitch": 1e-3, "element_area": {"value": 1e-6}}
+    with pytest.raises(InvalidInput, match=message):
+        formats.read(path, "text/csv", mapping=json.dumps(mapping))
+
+
+@given(
+    st.lists(st.sampled_from(["t", "u0", "u1", "u2", "u10", "u", "", "t.1"]), max_size=8),
+    st.lists(
+        st.lists(st.sampled_from(["", "nan", "0", "1", "1e300", "-inf", "x", '"', "\x00"]), max_size=8), max_size=5
+    ),
+)
+@settings(max_examples=100, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_no_table_does_worse_than_be_refused(tmp_path: Path, names: list[str], rows: list[list[str]]) -> None:
+    path = tmp_path / "any.csv"
+    path.write_text("\n".join(",".join(cells) for cells in [names, *rows]))
+    mapping = json.dumps({"time": "t", "displacement": "u*", "grid": [1, 1], "pitch": 1e-3})
+    with contextlib.suppress(InvalidInput):
+        assert np.isfinite(formats.read(path, "text/csv", mapping=mapping).displacement).all()
