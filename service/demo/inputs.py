@@ -8,7 +8,6 @@ import numpy as np
 
 from service import formats
 from slipcore import FrictionLaw, GraspLog
-from slipcore.contact import tangential_ramp
 from stiction_client import container
 
 FRICTION = {"polished steel": 0.25, "cardboard": 0.45, "rubber": 0.8}
@@ -39,24 +38,45 @@ class DemoLog:
     truth: FrictionLaw | None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Ramp:
+    """A simulated grasp that is to be made: a Coulomb coefficient, a normal force in N, and where its noise is from."""
+
+    material: str
+    friction: float
+    normal_force: float
+    noise: np.random.Generator
+
+    def simulate(self) -> GraspLog:
+        """A closed-form tangential ramp; each call goes on with the noise."""
+        from slipcore.contact import tangential_ramp  # compiled: a server's process goes without it
+
+        return tangential_ramp(
+            friction=self.friction,
+            normal_force=self.normal_force,
+            marker_noise=MARKER_NOISE,
+            force_noise=FORCE_NOISE,
+            seed=self.noise,
+        )
+
+
+def ramps(seed: int) -> Iterator[Ramp]:
+    """Every simulated material at every normal force."""
+    wanted = [(*material, force) for material in FRICTION.items() for force in NORMAL_FORCES]
+    for each, noise in zip(wanted, np.random.default_rng(seed).spawn(len(wanted)), strict=True):
+        yield Ramp(*each, noise)
+
+
 def simulated_logs(folder: Path, seed: int) -> Iterator[DemoLog]:
     """Closed-form tangential ramps of every simulated material at every normal force, written below ``folder``."""
     folder.mkdir(parents=True, exist_ok=True)
-    generators = iter(np.random.default_rng(seed).spawn(len(FRICTION) * len(NORMAL_FORCES)))
-    for material, friction in FRICTION.items():
-        for force in NORMAL_FORCES:
-            log = tangential_ramp(
-                friction=friction,
-                normal_force=force,
-                marker_noise=MARKER_NOISE,
-                force_noise=FORCE_NOISE,
-                seed=next(generators),
-            )
-            name = f"{material} {force:g} N"
-            path = folder / f"{name.replace(' ', '-')}.npz"
-            container.write(log, path)
-            truth = None if log.truth is None else log.truth.friction
-            yield DemoLog(name, path, log, material, truth)
+    for ramp in ramps(seed):
+        log = ramp.simulate()
+        name = f"{ramp.material} {ramp.normal_force:g} N"
+        path = folder / f"{name.replace(' ', '-')}.npz"
+        container.write(log, path)
+        truth = None if log.truth is None else log.truth.friction
+        yield DemoLog(name, path, log, ramp.material, truth)
 
 
 def recorded_logs(recordings: Path | None) -> Iterator[DemoLog]:

@@ -2,8 +2,8 @@
 
 from fastapi import APIRouter
 
-from service.web.routes import api_docs, assets, jobs, login, logs, materials, planning, problems, uploads
+from service.web.routes import api_docs, assets, jobs, login, logs, materials, planning, practice, problems, uploads
 
 router = APIRouter()
-for module in (api_docs, assets, login, materials, logs, jobs, uploads, planning, problems):
+for module in (api_docs, assets, login, materials, logs, jobs, uploads, practice, planning, problems):
     router.include_router(module.router)

@@ -9,6 +9,7 @@ import pytest
 
 from db.database import Database
 from db.repositories import access_keys
+from service.demo import inputs
 from service.domain import keys
 from service.settings import Settings
 from tests.service.web import chromium
@@ -114,7 +115,11 @@ def test_what_somebody_typed_runs_nothing(page: Tab, client: httpx.Client, typed
     assert page.run("document.title").startswith(material)
 
 
-def test_a_key_logs_in_and_out(tab: Tab, serving: Any, tmp_path: Path, sqlite_template: Path) -> None:
+def test_a_key_logs_in_loads_simulated_grasps_and_logs_out(
+    tab: Tab, serving: Any, tmp_path: Path, sqlite_template: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(inputs, "FRICTION", {"rubber": 0.8})
+    monkeypatch.setattr(inputs, "NORMAL_FORCES", (4.0,))
     settings = Settings(data_folder=tmp_path, access="keys", workers=0)
     shutil.copyfile(sqlite_template, tmp_path / sqlite_template.name)
     key_id, text = keys.new_key()
@@ -130,6 +135,10 @@ def test_a_key_logs_in_and_out(tab: Tab, serving: Any, tmp_path: Path, sqlite_te
         tab.resize(390)
         tab.go(f"{base}/")
         assert "Nothing is stored here yet" in tab.run("document.body.innerText")
+        assert fits(tab)
+        tab.run("document.querySelector('[action=\"/practice\"] button').click()")
+        tab.until("location.pathname === '/jobs' && document.readyState === 'complete'")
+        assert "simulated rubber" in tab.run("document.querySelector('main').innerText")
         assert fits(tab)
         tab.run("document.querySelector('.session button').click()")
         tab.until("location.pathname === '/login' && document.readyState === 'complete'")

@@ -13,6 +13,13 @@ def test_an_empty_database_greets_with_two_next_steps(browser: Any, elements: Ca
     assert [tag for tag, _ in page.found].count("li") == 2
     assert "stiction simulate" in page.text
     assert ("a", {"class": "button", "href": "/upload"}) in page.found
+    assert ("form", {"method": "post", "action": "/practice"}) in page.found
+
+
+def test_who_may_only_read_is_offered_no_simulated_grasps(session_of: Any) -> None:
+    caller = session_of("read")
+    assert "Load simulated grasps" not in caller.get("/").text
+    assert caller.request("POST", "/practice").status_code == 403
 
 
 @pytest.mark.usefixtures("store")

@@ -97,7 +97,7 @@ def test_the_login_leads_nowhere_else(caller: Any, make: Callable[..., str], pat
 @pytest.mark.parametrize(
     "headers", [{"origin": "http://elsewhere.org"}, {"sec-fetch-site": "cross-site"}, {"origin": "null"}, {}]
 )
-@pytest.mark.parametrize("path", ["/login", "/logout", "/materials", "/jobs/0/cancel"])
+@pytest.mark.parametrize("path", ["/login", "/logout", "/materials", "/jobs/0/cancel", "/practice"])
 def test_a_form_of_another_site_changes_nothing(
     caller: Any, make: Callable[..., str], cookie: str, path: str, headers: dict[str, str]
 ) -> None:
