@@ -1,12 +1,12 @@
 """Queries on sensors and the mechanics of their gels."""
 
-from sqlalchemy import select
+from sqlalchemy import func, select
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from db.errors import NotFound
 from db.records import Gel, Sensor
-from db.tables import SensorRow
+from db.tables import GraspLogRow, SensorRow
 from db.text import is_storable
 
 
@@ -42,6 +42,12 @@ def get(session: Session, name: str) -> Sensor:
 def list_all(session: Session) -> list[Sensor]:
     """All sensors, by name."""
     return [_record(row) for row in session.scalars(select(SensorRow).order_by(SensorRow.name))]
+
+
+def count_logs(session: Session) -> dict[str, int]:
+    """How many logs, withdrawn ones too, come from each sensor that any comes from, by its name."""
+    query = select(SensorRow.name, func.count()).join(GraspLogRow, GraspLogRow.sensor_id == SensorRow.id)
+    return {str(row[0]): int(row[1]) for row in session.execute(query.group_by(SensorRow.id, SensorRow.name))}
 
 
 def describe(session: Session, name: str, gel: Gel) -> Sensor:

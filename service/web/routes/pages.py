@@ -2,8 +2,20 @@
 
 from fastapi import APIRouter
 
-from service.web.routes import api_docs, assets, jobs, login, logs, materials, planning, practice, problems, uploads
+from service.web.routes import (
+    api_docs,
+    assets,
+    jobs,
+    login,
+    logs,
+    materials,
+    planning,
+    practice,
+    problems,
+    sensors,
+    uploads,
+)
 
 router = APIRouter()
-for module in (api_docs, assets, login, materials, logs, jobs, uploads, practice, planning, problems):
+for module in (api_docs, assets, login, materials, logs, sensors, jobs, uploads, practice, planning, problems):
     router.include_router(module.router)

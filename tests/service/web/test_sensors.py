@@ -1,0 +1,134 @@
+from types import SimpleNamespace
+from typing import Any
+from urllib.parse import quote
+
+import pytest
+
+from db.database import Database
+from db.records import Gel
+from db.repositories import sensors
+from service.web.routes.sensors import count_findings
+from tests.service.web.conftest import HOSTILE, HTML, OWN
+
+ON_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+
+SENT = {"young_modulus": "2.5e5", "poisson_ratio": " 0.48 ", "thickness": "", "marker_depth": "5e-4"}
+GEL = Gel(2.5e5, 0.48, None, 5e-4)
+
+
+@pytest.fixture
+def sensor(database: Database) -> str:
+    """A sensor that a log named, with a slash in its name."""
+    with database.write() as session:
+        sensors.find_or_add(session, "tac 3/a")
+    return "tac 3/a"
+
+
+def path_of(name: str) -> str:
+    return f"/sensors/{quote(name, safe='')}"
+
+
+def gel(database: Database, name: str) -> Gel | None:
+    with database.read() as session:
+        return sensors.get(session, name).gel
+
+
+@ON_SQLITE
+def test_whoever_may_upload_describes_a_gel_once(session_of: Any, database: Database, sensor: str) -> None:
+    caller = session_of("upload")
+    assert "not described" in caller.get("/sensors").text
+    assert "Describe the gel" in caller.get(path_of(sensor)).text
+    answer = caller.request("POST", path_of(sensor), data=SENT)
+    assert answer.status_code == 303, answer.text
+    page = caller.get(answer.headers["location"]).text
+    assert "250000 Pa" in page
+    assert "thick against any contact" in page
+    assert gel(database, sensor) == GEL
+    assert "Describe the gel" not in page
+    assert caller.request("POST", path_of(sensor), data=SENT | {"marker_depth": "0"}).status_code == 403
+    assert gel(database, sensor) == GEL
+
+
+@ON_SQLITE
+def test_only_admins_change_a_gel(session_of: Any, database: Database, sensor: str) -> None:
+    with database.write() as session:
+        sensors.describe(session, sensor, GEL)
+    admin = session_of("admin")
+    assert 'value="250000"' in admin.get(path_of(sensor)).text
+    assert admin.request("POST", path_of(sensor), data=SENT | {"thickness": "4e-3"}).status_code == 303
+    assert gel(database, sensor) == Gel(2.5e5, 0.48, 4e-3, 5e-4)
+    (entry,) = admin.get("/v1/audit?action=sensor.described").json()["items"]
+    assert (entry["subject"], entry["details"]["thickness"]) == (sensor, 4e-3)
+
+
+@ON_SQLITE
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"young_modulus": ""}, "young_modulus is missing"),
+        ({"poisson_ratio": "0.6"}, "poisson_ratio is 0.6"),
+        ({"young_modulus": "<b>"}, "young_modulus is &lt;b&gt;"),
+        ({"thickness": "1e-4"}, "marker_depth below the thickness"),
+    ],
+)
+def test_a_refused_gel_stays_in_its_form(
+    browser: Any, database: Database, sensor: str, changed: dict[str, str], told: str
+) -> None:
+    answer = browser.request("POST", path_of(sensor), data=SENT | changed, headers=OWN)
+    assert answer.status_code == 422
+    assert told in answer.text
+    assert 'name="marker_depth" inputmode="decimal" value="5e-4"' in answer.text
+    assert gel(database, sensor) is None
+
+
+@ON_SQLITE
+def test_who_may_only_read_has_no_form(session_of: Any, sensor: str) -> None:
+    caller = session_of("read")
+    assert "Describe the gel" not in caller.get(path_of(sensor)).text
+    assert caller.request("POST", path_of(sensor), data=SENT).status_code == 403
+
+
+@ON_SQLITE
+def test_a_page_of_another_site_describes_nothing(browser: Any, database: Database, sensor: str) -> None:
+    answer = browser.request("POST", path_of(sensor), data=SENT, headers={"sec-fetch-site": "cross-site"})
+    assert answer.status_code == 403
+    assert gel(database, sensor) is None
+
+
+@ON_SQLITE
+def test_a_sensor_that_nobody_named_has_no_page_and_gets_none(browser: Any) -> None:
+    assert browser.get("/sensors/nobody").status_code == 404
+    assert browser.request("POST", "/sensors/nobody", data=SENT, headers=OWN).status_code == 404
+    assert "No log has named a sensor" in browser.get("/sensors").text
+
+
+@ON_SQLITE
+@pytest.mark.parametrize("typed", [text[:200] for text in HOSTILE])
+def test_what_a_sensor_is_named_is_text(browser: Any, database: Database, elements: Any, typed: str) -> None:
+    with database.write() as session:
+        sensors.find_or_add(session, typed)
+    page = elements(browser.get("/sensors").text)
+    assert page.foreign() == []
+    (link,) = [given["href"] for tag, given in page.found if tag == "a" and given["href"].startswith("/sensors/")]
+    own = elements(browser.get(link).text)
+    assert own.foreign() == []
+    assert typed in own.text
+
+
+@ON_SQLITE
+def test_a_sensor_has_its_logs_with_what_was_found_against_them(client: Any, fitted: Any, elements: Any) -> None:
+    log = elements(client.get(f"/logs/{fitted['id']}", headers=HTML).text)
+    (link,) = [given["href"] for tag, given in log.found if tag == "a" and given["href"].startswith("/sensors/")]
+    assert link == path_of(fitted["sensor"])
+    page = elements(client.get(link, headers=HTML).text)
+    assert f"/logs/{fitted['id']}" in [given.get("href") for _, given in page.found]
+    logs = client.get("/v1/grasp-logs", params={"sensor": fitted["sensor"], "limit": 1000}).json()["items"]
+    listed = client.get("/sensors", headers=HTML).text.partition(f'href="{link}"')[2].partition("</tr>")[0]
+    assert f'data-label="Logs">{len(logs)}<' in listed
+
+
+@pytest.mark.parametrize("kind", [None, (), ("weak normal forces", "few frames")])
+def test_findings_are_counted_by_the_logs_that_they_were_made_against(kind: Any) -> None:
+    found = None if kind is None else tuple(SimpleNamespace(name=name) for name in kind)
+    logs: Any = [SimpleNamespace(detection=SimpleNamespace(findings=found))] * 2 + [SimpleNamespace(detection=None)]
+    assert count_findings(logs) == [(name, 2) for name in kind or ()]
