@@ -115,7 +115,7 @@ class PatchDefaults(Options):
     still: Annotated[float, Option(1e-15, 1e-3, "-", "a weight must not overflow")] = 1e-9
     """Share of the fastest motion below which an element counts as the motion's centre."""
     rank: Annotated[float, Option(1e-16, 1e-3, "-", "rounding")] = 1e-14
-    """Least singular value of the friction matrix, as a share of the largest."""
+    """Least polar moment of the friction's weights about their centre, as a share of that about the origin."""
     free_motion: Annotated[float, Option(0.0, 0.1, "-", "far above rounding, far below any load")] = 1e-6
     """Share of a load that may be missed before some motion is taken to meet no friction."""
     rounding: Annotated[float, Option(0.0, 1e-3, "-", "rounding of times")] = 1e-9

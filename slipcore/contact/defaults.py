@@ -207,7 +207,7 @@ class LimitSurfaceDefaults(Options):
     settled: Annotated[float, Option(0.0, 1e-3, "-", "rounding")] = 1e-15
     """Relative descent at which the factor is found."""
     rank: Annotated[float, Option(1e-16, 1e-3, "-", "rounding")] = 1e-14
-    """Least singular value of the friction matrix, as a share of the largest."""
+    """Least polar moment of the friction's weights about their centre, as a share of that about the origin."""
     free_motion: Annotated[float, Option(0.0, 0.1, "-", "far above rounding, far below any load")] = 1e-6
     """Share of a load that may be missed before some motion is taken to meet no friction."""
 
