@@ -8,8 +8,7 @@ import numpy as np
 from slipcore.defaults import COLLECTION
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.patch.friction import contact_friction
-from slipcore.patch.plateau import runs
-from slipcore.patch_record import ContactFriction, Patch
+from slipcore.patch_record import ContactFriction, Patch, bounds_of, frames_of, joined
 from slipcore.samples import KIND, FrictionSamples, element_samples
 from slipcore.slip_state import SlipHistory
 
@@ -41,9 +40,9 @@ def collect_friction(log: GraspLog, history: SlipHistory, **options: float) -> C
     elements = element_samples(log, history, **options)
     contact = contact_friction(log.time, history.patches)
     left_out = None if contact is None or not len(elements) else contradiction(elements, contact, history.patches)
-    parts = [_contact_samples(log, number, patch, elements) for number, patch in enumerate(history.patches)]
     kept = elements.take(np.full(len(elements), left_out is None))
-    return Collected(FrictionSamples.concatenate([kept, *parts]), elements, contact, left_out)
+    parts = [kept, _contact_samples(log, history.patches, elements)] if history.patches else [kept]
+    return Collected(FrictionSamples.concatenate(parts), elements, contact, left_out)
 
 
 def contradiction(elements: FrictionSamples, contact: ContactFriction, patches: Sequence[Patch]) -> str | None:
@@ -69,36 +68,36 @@ def contradiction(elements: FrictionSamples, contact: ContactFriction, patches: 
 
 def _rolls(patches: Sequence[Patch]) -> bool:
     """Whether the contact rolls for most of its time."""
-    regime = np.concatenate([patch.regime for patch in patches])
+    regime = joined(patches, "regime")
     return bool(np.count_nonzero(regime == "rolling") > 0.5 * np.count_nonzero(regime != "none"))
 
 
-def _contact_samples(log: GraspLog, number: int, patch: Patch, elements: FrictionSamples) -> FrictionSamples:
+def _contact_samples(log: GraspLog, patches: Sequence[Patch], elements: FrictionSamples) -> FrictionSamples:
     """One sample a frame of a patch on a plateau.
 
     The law of friction is linear: a contact's friction is the law's at the means, weighted by force, of velocity and of
     its elements' normal force. These are taken over each plateau, for what they vary in it is mostly their noise.
     """
-    on, count = patch.plateau, int(np.count_nonzero(patch.plateau))
-    speed, force = (_means_of_runs(field, on)[on] for field in (patch.speed, patch.element_force))
-    beyond = log.grid[0] * log.grid[1] + number
+    on = np.flatnonzero(joined(patches, "plateau"))
+    patch = np.searchsorted(bounds_of(patches), on, side="right") - 1
+    begins = (np.diff(on, prepend=-2) > 1) | (np.diff(patch, prepend=-1) > 0)
+    speed, force = (_means_of_groups(joined(patches, name)[on], begins) for name in ("speed", "element_force"))
+    ratio = joined(patches, "load_ratio")[on]
     return FrictionSamples(
-        friction_coefficient=patch.load_ratio[on],
+        friction_coefficient=ratio,
         tangential_velocity=speed,
         normal_force=force,
-        tangential_force=patch.load_ratio[on] * force,
-        time=log.time[patch.frames][on],
-        element=np.full(count, beyond),
-        weight=np.ones(count),
+        tangential_force=ratio * force,
+        time=log.time[frames_of(patches)[on]],
+        element=log.grid[0] * log.grid[1] + patch,
+        weight=np.ones(len(on)),
         element_area=log.element_area,
         normal_force_noise=elements.normal_force_noise,
-        kind=np.full(count, "contact", KIND),
+        kind=np.full(len(on), "contact", KIND),
     )
 
 
-def _means_of_runs(field: FloatArray, chosen: BoolArray) -> FloatArray:
-    """The field [t] with each stretch of chosen frames levelled to its mean."""
-    level = field.copy()
-    for run in runs(chosen):
-        level[run] = field[run].mean()
-    return level
+def _means_of_groups(field: FloatArray, begins: BoolArray) -> FloatArray:
+    """The field [k] with each group, from where one ``begins`` to the next, levelled to its mean."""
+    group = np.cumsum(begins) - 1
+    return np.asarray((np.bincount(group, field) / np.bincount(group))[group])

@@ -1,7 +1,8 @@
-"""What is known of a contact patch."""
+"""What is known of contact patches."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,3 +58,19 @@ class Patch:
     def frames(self) -> slice:
         """Its frames among those of the log."""
         return slice(self.first, self.first + len(self.pose))
+
+
+def joined(patches: Sequence[Patch], field: str) -> NDArray[Any]:
+    """A field of one or more patches, end to end: [k] over the frames of all of them."""
+    return np.concatenate([getattr(patch, field) for patch in patches])
+
+
+def bounds_of(patches: Sequence[Patch]) -> NDArray[np.int64]:
+    """Where each patch begins in what is ``joined``, and where the last one ends: [p + 1]."""
+    return np.cumsum([0, *(len(patch.pose) for patch in patches)])
+
+
+def frames_of(patches: Sequence[Patch]) -> NDArray[np.int64]:
+    """Which frame of the log each entry of what is ``joined`` is of, [k]."""
+    bounds, first = bounds_of(patches), np.array([patch.first for patch in patches], np.int64)
+    return np.arange(bounds[-1]) + np.repeat(first - bounds[:-1], np.diff(bounds))

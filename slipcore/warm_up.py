@@ -4,6 +4,7 @@ import time
 
 import numpy as np
 
+from slipcore.defaults import PATCHES
 from slipcore.frames import GraspLog
 
 
@@ -15,8 +16,8 @@ def warm_up() -> float:
 
     axis = 1e-3 * np.arange(3.0)
     position = np.stack([*np.meshgrid(axis, axis, indexing="ij"), np.zeros((3, 3))], axis=-1)
-    force = np.broadcast_to([0.0, 0.0, -0.1], (2, *position.shape))
-    log = GraspLog(np.array([0.0, 0.1]), position, np.zeros(force.shape), element_area=1e-6, force=force)
+    force = np.broadcast_to([0.0, 0.0, -0.1], (PATCHES.least_frames, *position.shape))
+    log = GraspLog(np.linspace(0.0, 0.3, len(force)), position, np.zeros(force.shape), element_area=1e-6, force=force)
     for method in METHODS:
         detect_slip(log, method, lookahead=1)
     return time.perf_counter() - began

@@ -6,8 +6,7 @@ import numpy as np
 
 from slipcore.defaults import NORMAL_95, PatchOptions, choose_options
 from slipcore.frames import FloatArray
-from slipcore.patch.local_rates import moving_mean
-from slipcore.patch_record import ContactFriction, Patch
+from slipcore.patch_record import ContactFriction, Patch, bounds_of, frames_of, joined
 
 
 def contact_friction(time: FloatArray, patches: Sequence[Patch], **options: float) -> ContactFriction | None:
@@ -16,44 +15,42 @@ def contact_friction(time: FloatArray, patches: Sequence[Patch], **options: floa
     ``options``: see ``defaults.PatchOptions``; raises ``InvalidInput`` for those that do not exist or are out of range.
     """
     chosen = choose_options(PatchOptions, options)
-    at_limit = [patch.load_ratio[patch.plateau] for patch in patches]
-    ratio = np.concatenate([*at_limit, np.empty(0)])
-    if len(ratio):
-        return _at_limit(ratio, _independent(time, patches, chosen), patches, chosen)
-    bounds = [bound for patch in patches if (bound := _largest(time, patch, chosen)) > 0.0]
-    if not bounds:
+    if not patches:
         return None
-    held = max(bounds)
+    if any(patch.plateau.any() for patch in patches):
+        return _at_limit(time, patches, chosen)
+    held = _largest(time, patches, chosen)
+    if not held > 0.0:
+        return None
     return ContactFriction(held, held * (1.0 - NORMAL_95 * chosen.resultant_error), np.inf, True, _why_none(patches))
 
 
-def _at_limit(
-    ratio: FloatArray, independent: float, patches: Sequence[Patch], options: PatchOptions
-) -> ContactFriction:
+def _at_limit(time: FloatArray, patches: Sequence[Patch], options: PatchOptions) -> ContactFriction:
+    plateau, regime = joined(patches, "plateau"), joined(patches, "regime")
+    ratio = joined(patches, "load_ratio")[plateau]
     middle = float(np.median(ratio))  # where a plateau begins, the load still grows
-    scatter = float(ratio.std()) / np.sqrt(max(independent, 1.0))
+    duration = float(np.gradient(time)[frames_of(patches)[plateau]].sum())
+    independent = max(duration / options.window, 1.0)  # about one value a window
+    scatter = float(ratio.std()) / np.sqrt(independent)
     error = NORMAL_95 * float(np.hypot(scatter, options.resultant_error * middle))
-    regimes = [regime for regime in ("pivoting", "sliding") if any((patch.regime == regime).any() for patch in patches)]
+    regimes = [each for each in ("pivoting", "sliding") if (regime == each).any()]
     reason = f"the load grew no more in {len(ratio)} frames of {' and '.join(regimes)}"
     return ContactFriction(middle, middle - error, middle + error, False, reason)
 
 
-def _independent(time: FloatArray, patches: Sequence[Patch], options: PatchOptions) -> float:
-    """How many values on the plateaus are about independent: one a window."""
-    interval = np.gradient(time)
-    return float(sum(interval[patch.frames][patch.plateau].sum() for patch in patches)) / options.window
-
-
-def _largest(time: FloatArray, patch: Patch, options: PatchOptions) -> float:
+def _largest(time: FloatArray, patches: Sequence[Patch], options: PatchOptions) -> float:
     """Largest load ratio that was held for about a window."""
-    held = patch.normal_force >= options.least_force_share * np.nanmax(patch.normal_force)
-    mean = moving_mean(time[patch.frames], np.where(held, patch.load_ratio, np.nan), options.window)
-    return float(np.nanmax(mean, initial=0.0))
+    from slipcore.patch.local_rates import moving_mean  # compiled: who only holds results goes without
+
+    force, bounds = joined(patches, "normal_force"), bounds_of(patches)
+    least = options.least_force_share * np.fmax.reduceat(force, bounds[:-1])
+    held = force >= np.repeat(least, np.diff(bounds))
+    ratio = np.where(held, joined(patches, "load_ratio"), np.nan)
+    return float(np.nanmax(moving_mean(time[frames_of(patches)], ratio, bounds, options.window), initial=0.0))
 
 
 def _why_none(patches: Sequence[Patch]) -> str:
-    rolls = sum(int((patch.regime == "rolling").sum()) for patch in patches)
-    frames = sum(int((patch.regime != "none").sum()) for patch in patches)
-    if rolls > 0.5 * frames:
+    regime = joined(patches, "regime")
+    if np.count_nonzero(regime == "rolling") > 0.5 * np.count_nonzero(regime != "none"):
         return "the contact travels without a load at its limit, as of an object that rolls or rocks"
     return "the whole contact never slipped under a load that grew no more"

@@ -1,55 +1,113 @@
-"""Rates of change over a moving window of time."""
+"""Rates of change over a moving window of time, and means."""
+
+import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from slipcore.compilation import compiled
 from slipcore.defaults import PATCHES
 from slipcore.frames import FloatArray
+from slipcore.patch.spans import IntArray, for_kernels
 
-IntArray = NDArray[np.int64]
+_ROUNDING, _RATE_FRAMES = PATCHES.rounding, PATCHES.rate_frames
 
 
-def local_rates(time: FloatArray, values: FloatArray, window: float) -> tuple[FloatArray, FloatArray]:
-    """Slope [t, k] 1/s of ``values`` [t, k] over ``window`` s about each frame, and its standard error.
+def local_rates(time: FloatArray, values: FloatArray, bounds: IntArray, window: float) -> tuple[FloatArray, FloatArray]:
+    """Slope [k, c] 1/s of ``values`` [k, c] over ``window`` s about each frame, and its standard error.
 
-    By least squares; NaN in ``values`` are left out; the rate is NaN where too few are left.
+    Of several patches, one from each of the ``bounds`` up to the next; ``time`` [k] grows in each. By least squares;
+    NaN in ``values`` are left out; the rate is NaN where too few are left.
     """
-    first, last = _bounds(time, window)
-    known = np.isfinite(values)
-    t = (time - time.mean())[:, None] * np.ones_like(values)
-    y = np.where(known, values - _middle(values), 0.0)
-    n, st, sy, stt, sty, syy = (
-        _moving_sum(np.where(known, each, 0.0), first, last) for each in (np.ones_like(y), t, y, t * t, t * y, y * y)
-    )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        spread = stt - st * st / n
-        slope = (sty - st * sy / n) / spread
-        rest = np.maximum(syy - sy * sy / n - slope * slope * spread, 0.0)
-        error = np.sqrt(rest / (n - 2.0) / spread)
-    enough = (n >= PATCHES.rate_frames) & known
-    return np.where(enough, slope, np.nan), np.where(enough, error, np.nan)
+    slope, error = np.full(values.shape, np.nan), np.full(values.shape, np.nan)
+    _fill_rates(for_kernels(time), for_kernels(values), bounds, window, slope, error)
+    return slope, error
 
 
-def moving_mean(time: FloatArray, values: FloatArray, window: float) -> FloatArray:
-    """Mean [t] of ``values`` [t] over ``window`` s about each frame; NaN are left out, and stay where all are."""
-    first, last = _bounds(time, window)
-    known = np.isfinite(values)
-    count, total = (_moving_sum(np.where(known, each, 0.0)[:, None], first, last)[:, 0] for each in (1.0, values))
-    return np.asarray(np.divide(total, count, out=np.full(len(time), np.nan), where=count > 0))
+def moving_mean(time: FloatArray, values: FloatArray, bounds: IntArray, window: float) -> FloatArray:
+    """Mean [k] of ``values`` [k] over ``window`` s about each frame; NaN are left out, and stay where all are.
+
+    Of several patches, as ``local_rates``.
+    """
+    mean = np.full(len(time), np.nan)
+    _fill_means(for_kernels(time), for_kernels(values), bounds, window, mean)
+    return mean
 
 
-def _bounds(time: FloatArray, window: float) -> tuple[IntArray, IntArray]:
-    """First frame in each frame's window, and the one after its last."""
-    half = 0.5 * window * (1.0 + PATCHES.rounding)
-    return np.searchsorted(time, time - half), np.searchsorted(time, time + half, side="right")
+@compiled
+def _fill_rates(
+    time: FloatArray, values: FloatArray, bounds: IntArray, window: float, slope: FloatArray, error: FloatArray
+) -> None:
+    for p in range(len(bounds) - 1):
+        span = slice(bounds[p], bounds[p + 1])
+        for column in range(values.shape[1]):
+            series = values[span, column]
+            sums = _running_sums(time[span], series)
+            first = last = 0
+            for e in range(len(series)):
+                first, last = _window(time[span], e, window, first, last)
+                if math.isfinite(series[e]):
+                    slope[bounds[p] + e, column], error[bounds[p] + e, column] = _line(sums[first], sums[last])
 
 
-def _middle(values: FloatArray) -> FloatArray:
-    """Mean of the columns, 0 where nothing is known: sums of squares then cancel least."""
-    known = np.isfinite(values)
-    return np.asarray(np.where(known, values, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1))
+@compiled
+def _fill_means(time: FloatArray, values: FloatArray, bounds: IntArray, window: float, mean: FloatArray) -> None:
+    for p in range(len(bounds) - 1):
+        span = slice(bounds[p], bounds[p + 1])
+        sums = _running_sums(time[span], values[span])
+        middle = _middle(values[span])
+        first = last = 0
+        for e in range(bounds[p + 1] - bounds[p]):
+            first, last = _window(time[span], e, window, first, last)
+            count, total = sums[last, 0] - sums[first, 0], sums[last, 2] - sums[first, 2]
+            if count > 0.0:
+                mean[bounds[p] + e] = middle + total / count
 
 
-def _moving_sum(values: FloatArray, first: IntArray, last: IntArray) -> FloatArray:
-    sums = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
-    return np.asarray(sums[last] - sums[first])
+@compiled
+def _window(time: FloatArray, frame: int, window: float, first: int, last: int) -> tuple[int, int]:
+    """First frame in a frame's window, and the one after its last, from those of an earlier frame."""
+    half = 0.5 * window * (1.0 + _ROUNDING)
+    while time[first] < time[frame] - half:
+        first += 1
+    while last < len(time) and time[last] <= time[frame] + half:
+        last += 1
+    return first, last
+
+
+@compiled
+def _running_sums(time: FloatArray, series: FloatArray) -> FloatArray:
+    """Sums [k + 1, 6] of 1, t, y, t², ty, y² over all frames before each, of a series [k] whose NaN are left out.
+
+    Times and values are taken about their means: sums of squares then cancel least.
+    """
+    sums, began, middle = np.zeros((len(series) + 1, 6)), time.mean(), _middle(series)
+    for e in range(len(series)):
+        sums[e + 1] = sums[e]
+        if math.isfinite(series[e]):
+            t, y = time[e] - began, series[e] - middle
+            for column, each in enumerate((1.0, t, y, t * t, t * y, y * y)):
+                sums[e + 1, column] += each
+    return sums
+
+
+@compiled
+def _middle(series: FloatArray) -> float:
+    """Mean of what is known, 0 where nothing is."""
+    total, count = 0.0, 0
+    for value in series:
+        if math.isfinite(value):
+            total += value
+            count += 1
+    return total / max(count, 1)
+
+
+@compiled
+def _line(first: FloatArray, last: FloatArray) -> tuple[float, float]:
+    """Slope of the line through what is between two of the ``_running_sums``, and its standard error."""
+    n, st, sy = last[0] - first[0], last[1] - first[1], last[2] - first[2]
+    if n < _RATE_FRAMES:
+        return math.nan, math.nan
+    spread = last[3] - first[3] - st * st / n
+    slope = (last[4] - first[4] - st * sy / n) / spread
+    rest = max(last[5] - first[5] - sy * sy / n - slope * slope * spread, 0.0)
+    return slope, math.sqrt(rest / (n - 2.0) / spread)

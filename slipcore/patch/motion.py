@@ -1,30 +1,21 @@
-"""How an object moves over the markers under a contact patch."""
+"""How an object moves over the markers under its contact patches."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
+from slipcore.compilation import compiled
 from slipcore.defaults import PATCHES, PatchOptions
-from slipcore.frames import BoolArray, FloatArray
+from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.patch.local_rates import local_rates
-
-
-class PatchFrames(NamedTuple):
-    """What a log has of some frames: ``time`` [t] s, ``position`` [n, m, 3] m of markers at rest, ``displacement``
-    [t, n, m, 3] m, ``object_pose`` [t, 3] m, m, rad or None; ``pitch`` m of the lattice.
-    """
-
-    time: FloatArray
-    position: FloatArray
-    displacement: FloatArray
-    object_pose: FloatArray | None
-    pitch: float
+from slipcore.patch.spans import IntArray, Spans, elements_at, for_kernels
 
 
 class Motion(NamedTuple):
-    """Of the object over the markers: ``velocity`` [t, 2] m/s at the patch's centre, and ``turning`` [t] m/s, its
-    rotation times the patch's radius of gyration; ``travels`` and ``turns`` [t]: where they are more than their errors
-    and than can be resolved; ``wanders`` [t]: where the patch itself travels on the lattice.
+    """Of the object over the markers: ``velocity`` [k, 2] m/s at the patch's centre, and ``turning`` [k] m/s, its
+    rotation times the patch's radius of gyration; ``travels`` and ``turns`` [k]: where they are more than their errors
+    and than can be resolved; ``wanders`` [k]: where the patch itself travels on the lattice.
     """
 
     velocity: FloatArray
@@ -35,26 +26,28 @@ class Motion(NamedTuple):
 
     @property
     def speed(self) -> FloatArray:
-        """Mean of the speed over the patch, about the root of the mean square: [t] m/s."""
+        """Mean of the speed over the patch, about the root of the mean square: [k] m/s."""
         return np.asarray(np.hypot(np.hypot(*self.velocity.T), np.nan_to_num(self.turning)))
 
 
 def motion_over_markers(
-    kinematics: PatchFrames, weight: FloatArray, pose: FloatArray, gyration: FloatArray, options: PatchOptions
+    log: GraspLog, spans: Spans, weight: FloatArray, pose: FloatArray, gyration: FloatArray, options: PatchOptions
 ) -> Motion:
-    """By the object's pose where it is known; else by that of the patch on the lattice, [t, 3] m, m, rad.
+    """By the object's pose where the log has it; else by that of the patches on the lattice, [k, 3] m, m, rad.
 
-    ``weight`` [t, n, m] of the patch's elements, ``gyration`` [t] m. A patch goes with its object unless this rolls.
+    ``weight`` [t, n, m] of the elements, ``gyration`` [k] m of the patches. These go with their object unless it rolls.
     """
-    rate, error = local_rates(kinematics.time, pose, options.window)
-    of_patch = _motion(rate, error, gyration, options.least_travel * kinematics.pitch / options.window)
-    if kinematics.object_pose is None:
+    time, object_pose = log.time[spans.frame], log.object_pose
+    rate, error = local_rates(time, pose, spans.bounds, options.window)
+    of_patch = _motion(rate, error, gyration, options.least_travel * math.sqrt(log.element_area) / options.window)
+    if object_pose is None:
         return of_patch
-    markers, centre = _marker_motion(kinematics, weight)
+    markers, centre = _marker_motion(log, spans, weight)
+    object_pose = object_pose[spans.frame]
     (carried, its_error), (own, error) = (
-        local_rates(kinematics.time, each, options.window) for each in (kinematics.object_pose, markers)
+        local_rates(time, each, spans.bounds, options.window) for each in (object_pose, markers)
     )
-    arm = centre - kinematics.object_pose[:, :2]
+    arm = centre - object_pose[:, :2]
     at_centre = np.column_stack([carried[:, 0] - carried[:, 2] * arm[:, 1], carried[:, 1] + carried[:, 2] * arm[:, 0]])
     rate = np.column_stack([at_centre, carried[:, 2]]) - own
     of_object = _motion(rate, np.hypot(its_error, error), gyration, options.least_speed)
@@ -69,16 +62,42 @@ def _motion(rate: FloatArray, error: FloatArray, gyration: FloatArray, least: fl
     return Motion(velocity, turning, travels, turns, travels)
 
 
-def _marker_motion(kinematics: PatchFrames, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Rigid motion of the markers under a patch since rest, [t, 3] m, m, rad (weighted planar Procrustes problem), and
-    their centre [t, 2] m.
+def _marker_motion(log: GraspLog, spans: Spans, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rigid motion of the markers under patches since rest, [k, 3] m, m, rad (weighted planar Procrustes problem), and
+    their centre [k, 2] m.
     """
-    total = weight.sum(axis=(1, 2))
-    share = weight / np.where(total > 0.0, total, np.nan)[:, None, None]
-    rest, moved = kinematics.position[..., :2], kinematics.position[..., :2] + kinematics.displacement[..., :2]
-    middle = np.tensordot(share, rest, axes=([1, 2], [0, 1]))
-    centre = (share[..., None] * moved).sum(axis=(1, 2))
-    before, after = rest - middle[:, None, None], moved - centre[:, None, None]
-    cross = (share * (before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0])).sum(axis=(1, 2))
-    dot = (share * (before * after).sum(axis=-1)).sum(axis=(1, 2))
-    return np.column_stack([centre - middle, np.arctan2(cross, dot)]), centre
+    fit = np.full((len(spans.frame), 5), np.nan)
+    _fill_fits(spans, weight, for_kernels(log.position), for_kernels(log.displacement), fit)
+    return fit[:, :3], fit[:, 3:]
+
+
+@compiled
+def _fill_fits(
+    spans: Spans, weight: FloatArray, position: FloatArray, displacement: FloatArray, fit: FloatArray
+) -> None:
+    """Motion and centre, [k, 5], where anything has weight."""
+    for e, k in enumerate(spans.frame):
+        patch = elements_at(spans, e)
+        fit[e] = _fit(weight[k], position, displacement[k], patch)
+
+
+@compiled
+def _fit(
+    weight: FloatArray, position: FloatArray, displacement: FloatArray, patch: IntArray
+) -> tuple[float, float, float, float, float]:
+    """Of one frame: how far the centre goes, x and y, and the turn; and where it then is, x and y."""
+    total = x = y = u = v = cross = dot = 0.0
+    for i, j in patch:
+        w = weight[i, j]
+        total += w
+        x, y = x + w * position[i, j, 0], y + w * position[i, j, 1]
+        u, v = u + w * displacement[i, j, 0], v + w * displacement[i, j, 1]
+    if not total > 0.0:
+        return math.nan, math.nan, math.nan, math.nan, math.nan
+    x, y, u, v = x / total, y / total, u / total, v / total
+    for i, j in patch:
+        a, b = position[i, j, 0] - x, position[i, j, 1] - y
+        c, d = a + displacement[i, j, 0] - u, b + displacement[i, j, 1] - v
+        cross += weight[i, j] * (a * d - b * c)
+        dot += weight[i, j] * (a * c + b * d)
+    return u, v, math.atan2(cross, dot), x + u, y + v

@@ -1,33 +1,36 @@
-"""What a patch does: stick, slip in part, slide, pivot, or roll."""
+"""What patches do: stick, slip in part, slide, pivot, or roll."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slipcore.compilation import compiled
 from slipcore.defaults import PatchOptions
 from slipcore.frames import BoolArray
 from slipcore.patch.motion import Motion
 from slipcore.patch.plateau import Plateaus
-from slipcore.patch_record import MACRO_SLIP, REGIMES, Patch
+from slipcore.patch.spans import IntArray, Spans, elements_at, for_kernels
+from slipcore.patch_record import MACRO_SLIP, REGIMES, Patch, frames_of, joined
 
 
 def regimes(
-    patch: BoolArray, slip: BoolArray, motion: Motion, plateaus: Plateaus, options: PatchOptions
+    spans: Spans, slip: BoolArray, motion: Motion, plateaus: Plateaus, options: PatchOptions
 ) -> NDArray[np.str_]:
-    """One of ``REGIMES`` for each frame, [t], of elements in the ``patch`` and elements that ``slip`` [t, n, m].
+    """One of ``REGIMES`` for each frame of the patches, [k], of whose elements some ``slip`` [t, n, m].
 
     A patch that travels over the lattice without a load at its limit rolls or rocks; one that turns so, or of which
     some elements slip, slips in part.
     """
-    elements = patch.sum(axis=(1, 2))
-    some_slip = (patch & slip).sum(axis=(1, 2)) > options.slip_share * elements
+    counts = np.zeros((len(spans.frame), 2), np.int64)
+    _fill_counts(spans, for_kernels(slip), counts)
+    elements, slipping = counts.T
     cases = {
         "none": elements == 0,
         "pivoting": plateaus.pivoting,
         "sliding": plateaus.sliding,
         "rolling": motion.wanders & ~motion.turns,
-        "incipient": some_slip | motion.turns | motion.travels,
+        "incipient": (slipping > options.slip_share * elements) | motion.turns | motion.travels,
     }
     found: NDArray[np.str_] = np.select(list(cases.values()), list(cases), "stick").astype(
         f"<U{max(map(len, REGIMES))}"
@@ -35,11 +38,21 @@ def regimes(
     return found
 
 
+@compiled
+def _fill_counts(spans: Spans, slip: BoolArray, counts: IntArray) -> None:
+    """How many elements each frame [k, 2] of a patch has, and how many of them slip."""
+    for e, k in enumerate(spans.frame):
+        for i, j in elements_at(spans, e):
+            counts[e, 0] += 1
+            counts[e, 1] += slip[k, i, j]
+
+
 def slips_as_a_whole(patches: Sequence[Patch], frames: int) -> BoolArray:
     """Frames [t] in which all patches that touch slide or pivot."""
     some, others = np.zeros(frames, bool), np.zeros(frames, bool)
-    for patch in patches:
-        slips = np.isin(patch.regime, MACRO_SLIP)
-        some[patch.frames] |= slips
-        others[patch.frames] |= (patch.regime != "none") & ~slips
+    if patches:
+        regime, frame = joined(patches, "regime"), frames_of(patches)
+        slips = np.logical_or.reduce([regime == each for each in MACRO_SLIP])
+        some[frame[slips]] = True
+        others[frame[(regime != "none") & ~slips]] = True
     return some & ~others

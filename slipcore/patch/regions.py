@@ -20,11 +20,15 @@ def follow_regions(contact: BoolArray) -> tuple[NDArray[np.int64], int]:
     frames, n, m = contact.shape
     found = np.full((frames, n, m), NOWHERE)
     stack = np.empty((n * m, 2), np.int64)
-    regions = 0
+    regions, names = 0, np.empty(0, np.int64)
     for k in range(frames):
+        if k > 0 and np.array_equal(contact[k], contact[k - 1]):
+            found[k] = found[k - 1]
+            continue
+        known = np.sort(names)
         names = np.full(_label(contact[k], found[k], stack), NOWHERE)
-        if k > 0:
-            _match(found[k], found[k - 1], names, regions)
+        if len(names) > 0 and len(known) > 0:
+            _match(found[k], found[k - 1], names, known)
         for label in range(len(names)):
             if names[label] == NOWHERE:
                 names[label] = regions
@@ -84,17 +88,38 @@ def _label(contact: BoolArray, labels: NDArray[np.int64], stack: NDArray[np.int6
 
 
 @compiled
-def _match(labels: NDArray[np.int64], before: NDArray[np.int64], names: NDArray[np.int64], regions: int) -> None:
-    """Give the regions of a frame the ``names`` of those before that they have most in common with, each only once."""
-    if regions == 0:
-        return
-    shared = np.zeros((len(names), regions), np.int64)
-    for i in range(labels.shape[0]):
-        for j in range(labels.shape[1]):
-            if labels[i, j] != NOWHERE and before[i, j] != NOWHERE:
-                shared[labels[i, j], before[i, j]] += 1
-    while shared.size > 0 and shared.max() > 0:
-        label, region = np.divmod(shared.argmax(), regions)
-        names[label] = region
-        shared[label] = 0
-        shared[:, region] = 0
+def _match(
+    labels: NDArray[np.int64], before: NDArray[np.int64], names: NDArray[np.int64], known: NDArray[np.int64]
+) -> None:
+    """Give the regions of a frame the ``names`` of those before that they have most in common with, each only once.
+
+    ``known``: the names of the frame before, ascending. The largest common part comes first, of equal ones that of the
+    lowest label and name.
+    """
+    pairs, shared = _common_parts(labels, before, known)
+    taken = np.zeros(len(known), np.bool_)
+    for part in np.argsort(-shared, kind="mergesort"):
+        label, name = divmod(pairs[part], len(known))
+        if names[label] == NOWHERE and not taken[name]:
+            names[label] = known[name]
+            taken[name] = True
+
+
+@compiled
+def _common_parts(
+    labels: NDArray[np.int64], before: NDArray[np.int64], known: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of a label and a known name that share elements, ascending, as label × names + place of the name; and how
+    many elements they share.
+    """
+    both = np.empty(labels.size, np.int64)
+    count = 0
+    for label, name in zip(labels.flat, before.flat):  # noqa: B905 - compiled
+        if label != NOWHERE and name != NOWHERE:
+            both[count] = label * len(known) + np.searchsorted(known, name)
+            count += 1
+    pairs = np.unique(both[:count])
+    shared = np.zeros(len(pairs), np.int64)
+    for pair in both[:count]:
+        shared[np.searchsorted(pairs, pair)] += 1
+    return pairs, shared

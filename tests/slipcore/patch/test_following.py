@@ -6,7 +6,9 @@ import numpy as np
 
 from slipcore import GraspLog
 from slipcore.patch.following import follow_patches
+from slipcore.patch.friction import contact_friction
 from slipcore.patch.regimes import slips_as_a_whole
+from tests.slipcore.patch.grasps import PIVOT, SLIDE, grasp
 
 TOUCHES, PERIOD, TOUCHED = 400, 20, 8
 FRAMES = TOUCHES * PERIOD
@@ -29,6 +31,34 @@ def test_each_touch_is_a_patch_of_its_own_frames() -> None:
         np.testing.assert_allclose(patch.normal_force, 2.0, rtol=1e-12)  # four elements of half a newton
         np.testing.assert_allclose(patch.load_ratio, 0.1, rtol=1e-3)
     assert not slips_as_a_whole(patches, FRAMES).any()
+
+
+def test_a_touch_tells_the_same_alone_and_between_others() -> None:
+    once = grasp(PIVOT, 0.7, marker_noise=1e-6, force_noise=2e-3)
+    slide = grasp(SLIDE, 0.7, marker_noise=1e-6, force_noise=2e-3)
+    assert once.force is not None
+    assert slide.force is not None
+    parts = slide, once, slide
+    force = np.concatenate([part.force for part in parts])
+    displacement, normal = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("displacement", "normal")
+    )
+    time = np.concatenate([k * 100.0 + part.time for k, part in enumerate(parts)])
+    contact = force[..., 2] < -0.02
+    contact[[0, len(slide), len(slide) + len(once)]] = False
+    log = GraspLog(time, once.position, displacement, once.element_area, force, normal)
+    patches = follow_patches(log, contact, np.zeros_like(contact))
+    middle = contact[len(slide) : len(slide) + len(once)]
+    (alone,) = follow_patches(once, middle, np.zeros_like(middle))
+    assert len(patches) == len(parts)
+    assert alone.plateau.any()
+    for name in ("pose", "speed", "tangential_force", "moment", "load_ratio", "element_force"):
+        np.testing.assert_allclose(getattr(patches[1], name), getattr(alone, name), rtol=1e-6, atol=1e-9)
+    for name in ("regime", "plateau"):
+        np.testing.assert_array_equal(getattr(patches[1], name), getattr(alone, name))
+    found = contact_friction(time, patches)
+    assert found is not None
+    assert found.reason.endswith("pivoting and sliding")
 
 
 def test_memory_goes_with_the_length_of_the_log_alone() -> None:

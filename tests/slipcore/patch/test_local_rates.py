@@ -7,6 +7,8 @@ from slipcore.patch.local_rates import local_rates, moving_mean
 
 TIME = np.cumsum(np.random.default_rng(3).uniform(0.02, 0.08, 40)) + 1.7e9
 WINDOW = 0.5
+ALL = np.array([0, 40])
+"""One patch has all frames."""
 
 
 def window(k: int) -> np.ndarray:
@@ -15,14 +17,14 @@ def window(k: int) -> np.ndarray:
 
 
 def test_a_line_has_its_slope_at_uneven_times_and_no_error() -> None:
-    slope, error = local_rates(TIME, np.stack([3.0 * (TIME - 1.7e9) - 7.0, np.full(40, 2.0)], axis=-1), WINDOW)
+    slope, error = local_rates(TIME, np.stack([3.0 * (TIME - 1.7e9) - 7.0, np.full(40, 2.0)], axis=-1), ALL, WINDOW)
     np.testing.assert_allclose(slope, np.broadcast_to([3.0, 0.0], slope.shape), atol=1e-5)
     np.testing.assert_allclose(error, 0.0, atol=1e-4)
 
 
 def test_slope_and_error_are_those_of_least_squares() -> None:
     values = np.random.default_rng(4).standard_normal((40, 2))
-    slope, error = local_rates(TIME, values, WINDOW)
+    slope, error = local_rates(TIME, values, ALL, WINDOW)
     for k in range(40):
         near = window(k)
         x = np.column_stack([np.ones(len(near)), TIME[near] - TIME[k]])
@@ -35,19 +37,33 @@ def test_slope_and_error_are_those_of_least_squares() -> None:
 def test_what_is_not_known_is_left_out_and_too_little_gives_no_rate() -> None:
     values = np.random.default_rng(5).standard_normal((40, 1))
     values[10:31] = np.nan
-    slope, error = local_rates(TIME, values, WINDOW)
+    slope, error = local_rates(TIME, values, ALL, WINDOW)
     assert np.isnan(slope[10:31]).all()
     assert np.isnan(error[10:31]).all()
     near = window(8)[window(8) < 10]
     assert slope[8, 0] == pytest.approx(np.polyfit(TIME[near] - TIME[8], values[near, 0], 1)[0], rel=1e-4)
     few = np.full((40, 1), np.nan)
     few[[5, 6, 7]] = 1.0
-    assert np.isnan(local_rates(TIME, few, WINDOW)[0]).all()
+    assert np.isnan(local_rates(TIME, few, ALL, WINDOW)[0]).all()
 
 
 def test_a_moving_mean_is_that_of_what_each_window_knows() -> None:
     values = np.random.default_rng(6).standard_normal(40)
     values[[3, 4, 20]] = np.nan
     expected = [np.nanmean(values[window(k)]) for k in range(40)]
-    np.testing.assert_allclose(moving_mean(TIME, values, WINDOW), expected, rtol=1e-9, atol=1e-12)
-    assert np.isnan(moving_mean(TIME, np.full(40, np.nan), WINDOW)).all()
+    np.testing.assert_allclose(moving_mean(TIME, values, ALL, WINDOW), expected, rtol=1e-9, atol=1e-12)
+    assert np.isnan(moving_mean(TIME, np.full(40, np.nan), ALL, WINDOW)).all()
+
+
+def test_no_window_reaches_into_another_patch() -> None:
+    values, middle = np.random.default_rng(7).standard_normal((40, 1)), 17
+    together = (
+        *local_rates(TIME, values, np.array([0, middle, 40]), WINDOW),
+        moving_mean(TIME, values[:, 0], np.array([0, middle, 40]), WINDOW),
+    )
+    for part in (slice(middle), slice(middle, None)):
+        alone = np.array([0, len(TIME[part])])
+        slope, error = local_rates(TIME[part], values[part], alone, WINDOW)
+        mean = moving_mean(TIME[part], values[part, 0], alone, WINDOW)
+        for seen, expected in zip(together, (slope, error, mean), strict=True):
+            np.testing.assert_array_equal(seen[part], expected)

@@ -1,5 +1,7 @@
 """Connected regions keep their numbers."""
 
+import itertools
+
 import numpy as np
 
 from slipcore.patch.regions import NOWHERE, follow_regions, widened
@@ -46,3 +48,22 @@ def test_regions_grow_to_all_sides_but_not_into_each_other() -> None:
     wide = widened(labels, 2)[0]
     assert wide.tolist() == [[0, 0, 0, NOWHERE, 1, 1, 1]] * 3
     assert widened(labels, 0).tolist() == labels.tolist()
+
+
+def test_numbers_go_by_the_largest_common_part_in_any_case() -> None:
+    """Against the rule itself, on noise that drifts."""
+    rng = np.random.default_rng(8)
+    field = rng.standard_normal((60, 9, 11))
+    for k in range(1, 60):
+        field[k] = 0.9 * field[k - 1] + 0.44 * field[k] if k % 5 else field[k - 1]
+    labels, count = follow_regions(field > 0.6)
+    assert count == labels.max() + 1
+    for before, now in itertools.pairwise(labels):
+        names = follow_regions((now != NOWHERE)[None])[0][0]
+        shared = np.zeros((names.max() + 1, count), int)
+        both = (now != NOWHERE) & (before != NOWHERE)
+        np.add.at(shared, (names[both], before[both]), 1)
+        while shared.any():
+            name, number = np.unravel_index(shared.argmax(), shared.shape)
+            assert (now[names == name] == number).all()
+            shared[name], shared[:, number] = 0, 0

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from slipcore.patch.resultants import Resultants, resultants
+from tests.slipcore.patch.spans import one_patch
 
 RADIUS, FRICTION = 6e-3, 0.45
 UP = np.array([0.0, 0.0, 1.0])
@@ -24,7 +25,7 @@ def slipping(motion: tuple[float, float, float], hertz: bool, turned: np.ndarray
     force = np.concatenate([FRICTION * (pressure / speed)[..., None] * along, -pressure[..., None]], axis=-1)
     turn = np.eye(3) if turned is None else turned
     normal = np.broadcast_to(UP @ turn.T, force.shape)
-    return resultants((force @ turn.T)[None], normal[None], (place @ turn.T)[None], (pressure > 0.0)[None])
+    return resultants((force @ turn.T)[None], normal[None], (place @ turn.T)[None], one_patch(pressure[None] > 0.0))
 
 
 @pytest.mark.parametrize(("hertz", "arm"), [(True, 3.0 * np.pi / 16.0), (False, 2.0 / 3.0)])
@@ -54,18 +55,24 @@ def test_a_tilted_sensor_feels_the_same() -> None:
 def test_half_of_the_load_is_borne_by_half_of_the_friction() -> None:
     place, force = points(), np.zeros((120, 120, 3))
     force[..., 2], force[..., 0] = -1.0, 0.5 * FRICTION
-    felt = resultants(force[None], np.broadcast_to(UP, force.shape)[None], place[None], np.ones((1, 120, 120), bool))
+    felt = resultants(
+        force[None], np.broadcast_to(UP, force.shape)[None], place[None], one_patch(np.ones((1, 120, 120), bool))
+    )
     assert felt.load_ratio[0] == pytest.approx(0.5 * FRICTION, rel=1e-3)
 
 
 def test_a_single_element_has_a_ratio_of_forces_and_no_moment() -> None:
     force = np.array([0.3, 0.4, -1.0]) * np.ones((1, 1, 1, 3))
-    felt = resultants(force, np.broadcast_to(UP, force.shape), np.zeros(force.shape), np.ones((1, 1, 1), bool))
+    felt = resultants(
+        force, np.broadcast_to(UP, force.shape), np.zeros(force.shape), one_patch(np.ones((1, 1, 1), bool))
+    )
     assert (felt.load_ratio[0], felt.moment[0]) == (pytest.approx(0.5), 0.0)
 
 
 def test_where_nothing_presses_nothing_is_known() -> None:
     force = np.array([0.1, 0.0, 0.0]) * np.ones((1, 2, 2, 3))
-    felt = resultants(force, np.broadcast_to(UP, force.shape), np.zeros(force.shape), np.ones((1, 2, 2), bool))
+    felt = resultants(
+        force, np.broadcast_to(UP, force.shape), np.zeros(force.shape), one_patch(np.ones((1, 2, 2), bool))
+    )
     assert felt.normal_force[0] == 0.0
     assert np.isnan(felt.load_ratio[0])
