@@ -3,6 +3,7 @@
 from fastapi import APIRouter
 
 from service.web.routes import (
+    administration,
     api_docs,
     assets,
     jobs,
@@ -17,5 +18,18 @@ from service.web.routes import (
 )
 
 router = APIRouter()
-for module in (api_docs, assets, login, materials, logs, sensors, jobs, uploads, practice, planning, problems):
+for module in (
+    api_docs,
+    assets,
+    login,
+    materials,
+    logs,
+    sensors,
+    jobs,
+    uploads,
+    practice,
+    planning,
+    administration,
+    problems,
+):
     router.include_router(module.router)
