@@ -2,7 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 import estimators
 import stiction_client
@@ -12,6 +15,7 @@ from estimators.errors import EstimatorError
 from service.domain.context import Context
 from service.domain.errors import InvalidSamples, InvalidValue, NoFeasibleForce, NoModel, ResultsNotReady
 from service.domain.look_up import Averaged
+from service.domain.model_cache import KnownModel
 from service.domain.stored_results import decode_samples, finite_or_none, to_client_model, to_friction_model
 from slipcore import FrictionSamples
 from stiction_client.support import Kind
@@ -71,6 +75,15 @@ class GraspForce:
     advice: str
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ForceCurve:
+    """The smallest and the largest normal force N that hold at each slip probability [n]: NaN where none does."""
+
+    slip_probability: NDArray[np.float64]
+    smallest: NDArray[np.float64]
+    largest: NDArray[np.float64]
+
+
 @dataclass(frozen=True, slots=True)
 class Candidate:
     """A material that it may be, with the version of the model that was compared, and what that rests on."""
@@ -92,21 +105,11 @@ class Recognition:
 
 def grasp_force(context: Context, task: GraspTask) -> GraspForce:
     """The smallest normal force that holds; raises ``NoFeasibleForce``, ``InvalidValue``, ``NoModel``, ``NotFound``."""
-    known = context.models.fresh(task.material, task.method)
-    known = known or context.models.read(context.database, task.material, task.method)
+    known = _model(context, task)
     model = to_client_model(known.stored)
     try:
         found = stiction_client.required_normal_force(
-            model,
-            task.tangential_load,
-            task.slip_probability,
-            contacts=stiction_client.grasp(task.contact_area, task.round_at, task.fingers, task.object_radius),
-            torque=task.torque,
-            safety_factor=task.safety_factor,
-            tangential_velocity=task.tangential_velocity,
-            normal_force_limit=task.normal_force_limit,
-            of=task.of,
-            elements=task.elements,
+            model, task.tangential_load, task.slip_probability, **_given(task)
         )
     except stiction_client.NoFeasibleForce as refusal:
         facts = {
@@ -126,6 +129,36 @@ def grasp_force(context: Context, task: GraspTask) -> GraspForce:
         "warning": "; ".join(filter(None, (found.warning, known.disagreement))) or None,
     }
     return GraspForce(model.material, model.method, model.version, known.because, **told)
+
+
+def force_curve(context: Context, task: GraspTask, probabilities: NDArray[np.float64]) -> ForceCurve:
+    """The same question for each of some slip probabilities [n]; raises ``InvalidValue``, ``NoModel``, ``NotFound``."""
+    model = to_client_model(_model(context, task).stored)
+    load = np.full_like(probabilities, task.tangential_load)
+    try:
+        found = stiction_client.required_normal_force(model, load, probabilities, **_given(task))
+    except stiction_client.InvalidArgument as error:
+        raise InvalidValue(error.name, error.value, error.allowed) from error
+    return ForceCurve(probabilities, *found.feasible_interval)
+
+
+def _model(context: Context, task: GraspTask) -> KnownModel:
+    """The model that answers; raises ``NoModel`` and ``NotFound``."""
+    known = context.models.fresh(task.material, task.method)
+    return known or context.models.read(context.database, task.material, task.method)
+
+
+def _given(task: GraspTask) -> dict[str, Any]:
+    """What a planner is told beside load and probability; raises ``InvalidArgument``."""
+    return {
+        "contacts": stiction_client.grasp(task.contact_area, task.round_at, task.fingers, task.object_radius),
+        "torque": task.torque,
+        "safety_factor": task.safety_factor,
+        "tangential_velocity": task.tangential_velocity,
+        "normal_force_limit": task.normal_force_limit,
+        "of": task.of,
+        "elements": task.elements,
+    }
 
 
 def recognise(

@@ -84,11 +84,11 @@ def draw(curve: Curve) -> Chart:
         band=f"{points(curve.x, curve.high)} {points(curve.x[::-1], curve.low[::-1])}",
         seen=(across(curve.seen[0]), across(curve.seen[1])),
         marked=across(curve.marked),
-        x_ticks=[Tick(across(x), f"{x:g}") for x in _rounded(ticks(0.0, x_most))],
-        y_ticks=[Tick(up(y), f"{y:g}") for y in _rounded(ticks(0.0, y_most))],
+        x_ticks=[Tick(across(x), f"{x:g}") for x in rounded(ticks(0.0, x_most))],
+        y_ticks=[Tick(up(y), f"{y:g}") for y in rounded(ticks(0.0, y_most))],
     )
 
 
-def _rounded(values: Sequence[float]) -> list[float]:
+def rounded(values: Sequence[float]) -> list[float]:
     """Without what binary fractions leave behind."""
     return [float(f"{value:.10g}") for value in values]

@@ -8,6 +8,7 @@ from service.domain import plan
 from service.http.access import READ
 from service.http.dependencies import CurrentContext
 from service.http.schemas.planning import NewGraspForce
+from service.web.force_curve import draw_forces, probabilities
 from service.web.forms import checked
 from service.web.materials import names
 from service.web.rendering import on_problem, render
@@ -19,9 +20,14 @@ FIELDS = frozenset(NewGraspForce.model_fields)
 
 @router.get("/plan", dependencies=[READ])
 def show_plan(context: CurrentContext, request: Request) -> Response:
-    """The form, and what it was last asked; raises as the API's route does."""
+    """The form, what it was last asked, and forces for other probabilities of slip; raises as the API's route does."""
     fields = {name: text for name, text in request.query_params.items() if name in FIELDS}
-    given: dict[str, Any] = {"fields": fields, "names": names(context), "answer": None}
+    given: dict[str, Any] = {"fields": fields, "names": names(context), "answer": None, "chart": None}
     on_problem(request, "plan.html", **given)
-    answer = plan.grasp_force(context, checked(NewGraspForce, fields).task()) if fields.get("tangential_load") else None
-    return render(request, "plan.html", **given | {"answer": answer}, problem=None)
+    if not fields.get("tangential_load"):
+        return render(request, "plan.html", **given, problem=None)
+    task = checked(NewGraspForce, fields).task()
+    curve = plan.force_curve(context, task, probabilities(task.slip_probability))
+    given |= {"chart": draw_forces(curve, task.slip_probability)}
+    on_problem(request, "plan.html", **given)
+    return render(request, "plan.html", **given | {"answer": plan.grasp_force(context, task)}, problem=None)

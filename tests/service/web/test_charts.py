@@ -1,8 +1,11 @@
 import re
 
+import numpy as np
 import pytest
 
+from service.domain.plan import ForceCurve
 from service.web.charts import HEIGHT, WIDTH, Curve, draw, ticks
+from service.web.force_curve import draw_forces, probabilities
 
 
 def curve(high: float = 0.5, marked: float = 0.5) -> Curve:
@@ -35,3 +38,33 @@ def test_a_line_stands_where_its_axis_says() -> None:
     height = {tick.text: tick.place for tick in chart.y_ticks}
     drawn = [float(y) for y in re.findall(r",([\d.]+)", chart.line)]
     assert drawn == pytest.approx([height["0.4"]] * 2, abs=0.06)
+
+
+def forces(asked: float, from_probability: float) -> ForceCurve:
+    """Forces 1/p^¼ that hold, up to any, from a probability on."""
+    grid = probabilities(asked)
+    smallest = np.where(grid >= from_probability, grid**-0.25, np.nan)
+    return ForceCurve(grid, smallest, np.where(np.isnan(smallest), np.nan, np.inf))
+
+
+@pytest.mark.parametrize("asked", [1e-12, 1e-3, 0.5])
+@pytest.mark.parametrize("start", [0.0, 1e-4, 0.4, 1.0])
+def test_forces_are_drawn_inside_of_the_picture(asked: float, start: float) -> None:
+    chart = draw_forces(forces(asked, start), asked)
+    drawn = [tuple(map(float, point.split(","))) for point in f"{chart.line} {chart.band}".split()]
+    assert bool(drawn) == (start < 0.5)
+    assert all(chart.left <= x <= chart.right and chart.top <= y <= chart.bottom for x, y in drawn)
+    assert chart.left <= chart.marked <= chart.right
+    assert (chart.marked_force is None) == (asked < start)
+    assert (chart.without is None) == (start == 0.0)
+
+
+def test_where_no_force_holds_ends_where_the_line_begins_and_what_was_asked_is_on_it() -> None:
+    chart = draw_forces(forces(1e-3, 1e-4), 1e-3)
+    points = [tuple(map(float, point.split(","))) for point in chart.line.split()]
+    assert chart.without == pytest.approx((chart.left, points[0][0]), abs=0.06)
+    assert chart.marked_force is not None
+    assert min(abs(x - chart.marked) + abs(y - chart.marked_force) for x, y in points) < 0.12
+    decade = {tick.text: tick.place for tick in chart.x_ticks}
+    assert chart.marked == pytest.approx(decade["10⁻³"])
+    assert list(decade) == ["10⁻⁶", "10⁻⁵", "10⁻⁴", "10⁻³", "10⁻²", "10⁻¹"]

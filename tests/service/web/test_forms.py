@@ -137,6 +137,22 @@ def test_the_calculator_says_what_the_api_says(client: httpx.Client) -> None:
 
 
 @ON_SQLITE
+@pytest.mark.usefixtures("fitted")
+@pytest.mark.parametrize(("load", "limit", "held"), [(1.5, "", True), (9, "0.1", False)])
+def test_the_calculator_draws_the_forces_of_all_probabilities(
+    client: httpx.Client, elements: Any, load: float, limit: str, held: bool
+) -> None:
+    asked = {"material": "fitted", "tangential_load": load, "contact_area": 6e-5, "normal_force_limit": limit}
+    page = elements(client.get("/plan", params=asked, headers=HTML).text)
+    tags = [tag for tag, given in page.found if tag in {"polyline", "circle"}]
+    assert tags == ["polyline"] + ["circle"] * held
+    (line,) = [given["points"] for tag, given in page.found if tag == "polyline"]
+    assert bool(line) == held
+    assert held or "no force holds" in page.text
+    assert not [tag for tag, _ in elements(client.get("/plan", headers=HTML).text).found if tag == "svg"]
+
+
+@ON_SQLITE
 @pytest.mark.parametrize(
     ("query", "status", "told"),
     [

@@ -82,6 +82,8 @@ def test_from_an_upload_to_a_grip_force(
     page.until("location.pathname === '/plan' && document.readyState === 'complete'")
     page.run("tangential_load.value = '1.5'; contact_area.value = '6e-5'; document.querySelector('main form').submit()")
     assert page.until("document.querySelector('.answer')?.textContent").endswith("N of each finger")
+    assert page.run("document.querySelectorAll('.chart .point').length") == 1
+    assert fits(page)
     for path in ("/", "/jobs", "/sensors", "/sensors/half-space", "/keys", "/audit", "/problems", "/login"):
         page.go(f"{base}{path}")
         assert fits(page), path
