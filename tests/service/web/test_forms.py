@@ -137,6 +137,12 @@ def test_the_calculator_says_what_the_api_says(client: httpx.Client) -> None:
 
 
 @ON_SQLITE
+def test_the_calculator_asks_for_the_recommended_model_unless_told_otherwise(browser: Any) -> None:
+    assert '<select id="method" name="method"><option>auto</option>' in browser.get("/plan").text
+    assert "<option selected>robust</option>" in browser.get("/plan?method=robust").text
+
+
+@ON_SQLITE
 @pytest.mark.usefixtures("fitted")
 @pytest.mark.parametrize(("load", "limit", "held"), [(1.5, "", True), (9, "0.1", False)])
 def test_the_calculator_draws_the_forces_of_all_probabilities(
