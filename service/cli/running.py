@@ -1,4 +1,4 @@
-"""Commands that run a service: serve, worker, demo."""
+"""Commands that run a service: serve, open, worker, demo."""
 
 import logging
 import os
@@ -10,6 +10,7 @@ import typer
 
 from service.cli.exit_codes import FAILURE, exit_code
 from service.cli.output import print_table
+from service.cli.remote import DEFAULT_URL, Url
 
 if TYPE_CHECKING:
     from service.settings import Settings
@@ -40,6 +41,14 @@ def serve(
     if not server.started:  # its log says why
         error = getattr(getattr(chosen.app, "state", None), "start_error", None)
         raise typer.Exit((error and exit_code(error)) or FAILURE)
+
+
+def open_dashboard(url: Url = DEFAULT_URL) -> None:
+    """Show the dashboard of a running service in a browser; without a browser, print its address."""
+    import webbrowser
+
+    if not webbrowser.open(url):
+        typer.echo(url)
 
 
 def worker(
