@@ -1,11 +1,13 @@
 """What half and one and a half of each default does: `python -m benchmarks.sensitivity [--page docs/sensitivity.md]`.
 
-Detectors: change of the mean F1 on scenes that no default was chosen on. Contact: change of the largest error against a
-fine solution, and of the operators' applications. Estimators: change of the error of friction at working points and of
-its interval's width, over simulated grasps. Each value is kept in its range.
+Detectors: change of the mean F1 on scenes that no default was chosen on. Patches: change of the error of a contact's
+friction, and of the share of frames whose regime is right. Forces: change of the error of forces from displacement, and
+of how many intervals hold the truth. Contact: change of the largest error against a fine solution, and of the
+operators' applications. Estimators: change of the error of friction at working points and of its interval's width, over
+simulated grasps. Each value is kept in its range.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
 from functools import cache
@@ -14,12 +16,16 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import estimators
+from benchmarks import forces as of_gels
 from benchmarks.detector_accuracy import FORCE_NOISE, INPUTS, score
 from benchmarks.detector_scenes import Case, cases, observed, phases, scoring, simulated
 from benchmarks.pages import options, picture_folder, save, write
+from benchmarks.patch_grasps import PIVOT, SLIDE, Course
+from benchmarks.patch_grasps import grasp as moving_grasp
 from benchmarks.scatter import TRUTH, Kind, grasp
 from estimators import defaults as of_estimators
-from slipcore import METHODS, FrictionSamples, GraspLog, detect_slip
+from slipcore import METHODS, FrictionSamples, GraspLog, PatchOptions, detect_slip
+from slipcore import defaults as of_slipcore
 from slipcore.contact import defaults as of_contact
 from slipcore.contact.effects import FiniteLayer, LoadPath, NormalTangentialCoupling, SensorSampling, VelocityFriction
 from slipcore.contact.elasticity import bonded_layer
@@ -27,7 +33,11 @@ from slipcore.contact.scene import Scene
 from slipcore.contact.tiers.accuracy import difference, simulate_to
 from slipcore.contact.tiers.boundary_elements import Fidelity, run
 from slipcore.errors import SlipcoreError
+from slipcore.forces import defaults as of_forces
+from slipcore.frames import BoolArray
 from slipcore.options import Option, Options, describe_options
+from slipcore.patch.following import follow_patches
+from slipcore.patch.friction import contact_friction
 
 MARKER_NOISE = 1e-6
 FACTORS = (0.5, 1.5)
@@ -50,6 +60,28 @@ OF_FITS = ("AUTOMATIC", "CLUSTERS", "GRID", "LINEAR", "REFERENCE", "IDENTIFIABIL
 OF_SAMPLED = ("PRIOR", "PROPOSAL", "SAMPLING")
 KINDS = (Kind(), Kind(between_grasps=0.1, heavy=True), Kind(between_places=0.05, force_noise=5e-3))
 WORKING_POINTS = np.array([[1.0, v, f_n] for v in (5e-4, 4e-3) for f_n in (0.05, 0.2)])
+FRICTION = 0.55
+COURSES = {
+    "slides": SLIDE,
+    "pivots": PIVOT,
+    "holds": SLIDE._replace(x=np.zeros_like(SLIDE.x), share=0.6 * SLIDE.share),
+    "rolls": SLIDE._replace(share=np.full_like(SLIDE.share, 0.05)),
+}
+"""Ways of a body over markers."""
+REGIMES = {"slides": "sliding", "pivots": "pivoting", "holds": "sliding", "rolls": "rolling"}
+"""What each does while it goes; the third never does."""
+VALUED = ("slides", "pivots")
+"""Those whose friction can be told; of the others a bound."""
+OF_FORCES = ("NODES", "RESPONSE", "PRIOR", "STRENGTH", "SUPPORT", "FIT", "LATTICE", "RECONSTRUCTION")
+LOOPS = ("descents", "settled", "still", "rank", "free_motion", "least_square_arm")
+"""Of patches, what compiled loops hold fixed."""
+PRESSES = (
+    of_gels.Case("", depth_seen=True, noise=3e-6),
+    of_gels.Case("", depth_seen=True, contact="tilted edge", marker_depth=5e-4),
+    of_gels.Case("", depth_seen=False, lattice="10 × 7"),
+    of_gels.Case("", depth_seen=False, gel="half-space", contact="two contacts", given=True),
+)
+"""Of those that forces are scored on, one of each kind that they differ in."""
 LIKELIHOODS = ("student_t", "outlier", "errors_in_variables")
 
 
@@ -131,6 +163,58 @@ def f1(seen: list[tuple[Case, GraspLog]], method: str, **chosen: float) -> dict[
 
 
 @cache
+def moving(name: str) -> tuple[GraspLog, BoolArray, BoolArray]:
+    """A body that moves over markers, and what the detector says of contact and slip, which no default of patches
+    changes."""
+    noise = {"marker_noise": 3e-6, "force_noise": 2e-3, "smoothing": 0.7, "crosstalk": 0.1}
+    log = moving_grasp(COURSES[name], FRICTION, half_axes=(6.2e-3, 4e-3), seed=31, **noise)
+    found = detect_slip(log)
+    return log, found.contact, found.slip
+
+
+def followed(**chosen: float) -> dict[str, float]:
+    """Error of friction, 1 where a bound is told and a value is due or the reverse; share of frames with the regime."""
+    errors, right = [], []
+    for name, course in COURSES.items():
+        log, contact, slip = moving(name)
+        patches = follow_patches(log, contact, slip, **chosen)
+        found = contact_friction(log.time, patches, **chosen)
+        if found is None or found.is_bound is (name in VALUED):
+            errors.append(1.0)
+        else:
+            errors.append(0.0 if found.is_bound else abs(found.coefficient / FRICTION - 1.0))
+        right += [np.mean((patch.regime == REGIMES[name]) == goes(course)[patch.frames]) for patch in patches]
+    return {"friction error": float(np.mean(errors)), "right regimes": float(np.mean(right))}
+
+
+def goes(course: Course) -> BoolArray:
+    """Frames in which the body travels over the markers."""
+    way = np.abs(np.gradient(course.yaw if course.turns else course.x))
+    return np.asarray(way > 0.5 * way.max())
+
+
+def of_patches() -> list[Row]:
+    """Options of contact patches, and numbers that are none."""
+    start = followed()
+    chosen = list(rows("options", PatchOptions, lambda name, value: followed(**{name: value}), start))
+    return chosen + [row for row in of_tables(of_slipcore, ("PATCHES",), followed) if row.name not in LOOPS]
+
+
+def pressed() -> dict[str, float]:
+    """Of forces from displacement: error of resultants and of the field, in logarithms, and intervals that hold."""
+    scores = [of_gels.score(case, 1) for case in PRESSES]
+    held = np.sum([pair for each in scores for pair in each.inside.values()], axis=0)
+    of_resultants, of_fields = (np.mean([getattr(each, name) for each in scores]) for name in ("resultant", "elements"))
+    told = {"resultants": np.log(of_resultants), "fields": np.log(of_fields), "intervals": held[0] / held[1]}
+    return {name: float(value) for name, value in told.items()}
+
+
+def of_presses() -> list[Row]:
+    """Numbers of forces from displacement."""
+    return of_tables(of_forces, OF_FORCES, pressed)
+
+
+@cache
 def fine(name: str) -> GraspLog:
     """A solution that others are compared with."""
     return run(SCENES[name].plan(), FINE)
@@ -160,7 +244,7 @@ def of_solver() -> list[Row]:
     return of_tables(of_contact, OF_SOLVER, solved) + of_tables(of_contact, OF_REQUESTS, asked)
 
 
-def of_tables(module: object, names: tuple[str, ...], measure: Callable[[], dict[str, float]]) -> list[Row]:
+def of_tables(module: object, names: Sequence[str], measure: Callable[[], dict[str, float]]) -> list[Row]:
     """Rows of all entries of some tables."""
     found: list[Row] = []
     start = measure()
@@ -207,7 +291,13 @@ def of_fits() -> list[Row]:
     return of_tables(of_estimators, OF_FITS, fits) + of_tables(of_estimators, OF_SAMPLED, sampled)
 
 
-PARTS = {"detector": of_detectors, "contact": of_solver, "estimators": of_fits}
+PARTS = {
+    "detector": of_detectors,
+    "patches": of_patches,
+    "forces": of_presses,
+    "contact": of_solver,
+    "estimators": of_fits,
+}
 
 
 def table_of(found: list[Row]) -> str:

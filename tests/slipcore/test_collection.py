@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.patch_grasps import PIVOT, SLIDE, grasp
 from slipcore import GraspLog, check_log, collect_friction, collect_samples, detect_slip
 from slipcore.samples import element_samples
 from tests.slipcore.conftest import RECORDINGS, read_recording
-from tests.slipcore.patch.grasps import PIVOT, SLIDE, grasp
 
 NOISE = {"marker_noise": 1e-6, "force_noise": 2e-3}
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from benchmarks.patch_grasps import PITCH, PIVOT, SLIDE, grasp, ramp_and_go
 from slipcore import GraspLog, InvalidInput, detect_slip
 from slipcore.detection.batch import with_patches
 from slipcore.patch.following import follow_patches
 from slipcore.patch.friction import contact_friction
 from slipcore.patch_record import ContactFriction, Patch
 from tests.slipcore.conftest import RECORDINGS, read_recording
-from tests.slipcore.patch.grasps import PITCH, PIVOT, SLIDE, grasp, ramp_and_go
 
 FRICTION = 0.7
 NOISE = {"marker_noise": 1e-6, "force_noise": 2e-3}
