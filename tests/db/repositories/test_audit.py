@@ -11,6 +11,7 @@ from db.errors import AlreadyExists
 from db.paging import Window
 from db.records import Actor, AuditEntry, AuditFilter
 from db.repositories import audit, materials
+from db.repositories.audit import SERVICE
 from db.tables import AuditEntryRow, now
 
 NEWEST = Window("id", descending=True)
@@ -58,6 +59,19 @@ def test_a_change_that_is_rolled_back_leaves_no_entry(database: Database) -> Non
         audit.add(session, ROBOT, "material.created", "paper")
         materials.create(session, "paper", "")
     assert entries(database) == []
+
+
+def test_what_the_service_itself_recorded_is_counted_by_subject(database: Database) -> None:
+    with database.write() as session:
+        for actor, action, subject in (
+            (SERVICE, "blob.damaged", "a"),
+            (SERVICE, "blob.damaged", "a"),
+            (SERVICE, "blob.damaged", "b"),
+            (SERVICE, "key.created", "c"),
+            (Actor("somebody"), "blob.damaged", "d"),
+        ):
+            audit.add(session, actor, action, subject, {})
+        assert audit.count_of_service(session, "blob.damaged") == 2
 
 
 @pytest.mark.parametrize(

@@ -96,6 +96,13 @@ def scene(*effects: Effect) -> Scene:
     return Scene("test", effects, finger=Finger(poisson_ratio=0.4))
 
 
+def test_waves_are_zero_at_their_crests_and_twice_their_amplitude_deep_between() -> None:
+    (height,) = WavySurface(2e-6, 3e-3, angle=0.4).extend(scene().plan()).problem.heights[-1:]
+    along = 3e-3 * np.array([0.0, 0.5, 1.0, 1.25])
+    depth = height(along * np.cos(0.4), along * np.sin(0.4))
+    np.testing.assert_allclose(depth, [0.0, 4e-6, 0.0, 2e-6], rtol=0, atol=1e-18, err_msg="A (1 − cos 2πx/λ)")
+
+
 def identical(a: GraspLog, b: GraspLog) -> None:
     for name in ("time", "displacement", "force", "object_pose", "position"):
         np.testing.assert_array_equal(getattr(a, name), getattr(b, name), err_msg=name)

@@ -1,0 +1,68 @@
+"""The fit of the object's pose, against its own least squares in closed form."""
+
+import math
+
+import numpy as np
+import pytest
+
+from slipcore.detection.filter.pose import Anchors, Pose, fit_pose, place_of_object, place_on_object, pose_at
+
+NOTHING_GIVEN = np.empty(0)
+STIFF, LOOSE = 1e12, 1e4
+"""Weights 1/m² of markers that are known to 1 µm, and to 10 mm: far worse than the object is rigid."""
+
+
+def anchors(yaw: float, stretch: float, shift: tuple[float, float] = (0.0, 0.0)) -> Anchors:
+    """Sixteen places on an object 10 mm wide that was turned, stretched about its middle, and moved."""
+    x, y = (axis.ravel() for axis in np.meshgrid(*[np.linspace(-5e-3, 5e-3, 4)] * 2))
+    c, s = stretch * math.cos(yaw), stretch * math.sin(yaw)
+    return Anchors(x, y, np.zeros(16), c * x - s * y + shift[0], s * x + c * y + shift[1], np.ones(16))
+
+
+def spread(places: Anchors, weight: float) -> float:
+    return float(weight * np.sum(places.x**2 + places.y**2))
+
+
+def fitted(places: Anchors, weight: float, given: tuple[float, float, float] | None = None) -> Pose:
+    pose, _ = fit_pose(places, np.full(16, weight), NOTHING_GIVEN if given is None else np.array(given))
+    return pose
+
+
+@pytest.mark.parametrize("weight", [STIFF, LOOSE])
+def test_yaw_and_place_are_those_of_procrustes(weight: float) -> None:
+    pose = fitted(anchors(0.3, 1.0, (1e-3, -2e-3)), weight)
+    assert pose.yaw == pytest.approx(0.3, rel=1e-12)
+    np.testing.assert_allclose([pose.x, pose.y], [1e-3, -2e-3], rtol=0, atol=1e-15, err_msg="where the middle went")
+
+
+@pytest.mark.parametrize("weight", [STIFF, LOOSE])
+def test_the_stretch_is_believed_as_far_as_markers_tell_it_better_than_linear_theory(weight: float) -> None:
+    """Beforehand √(1 + φ²) − 1 ≈ φ²/2 of linear rotation; the fit's own variance is 1/Σw p²."""
+    places, yaw, stretch = anchors(0.3, 1.05), 0.3, 1.05
+    before = yaw**4 / 4.0
+    believed = before / (before + 1.0 / spread(places, weight))
+    assert fitted(places, weight).stretch - 1.0 == pytest.approx(believed * (stretch - 1.0), rel=1e-5)
+
+
+@pytest.mark.parametrize("weight", [STIFF, LOOSE])
+def test_a_given_yaw_is_kept_as_far_as_markers_tell_it_worse(weight: float) -> None:
+    """Beforehand atan φ of linear rotation, which errs by φ³/3."""
+    places, given = anchors(0.32, 1.0), 0.3
+    before = given**6 / 9.0
+    believed = before / (before + 1.0 / spread(places, weight))
+    pose = fitted(places, weight, (7e-3, 8e-3, given))
+    assert pose.yaw - given == pytest.approx(believed * 0.02, rel=1e-4)
+    assert (pose.x, pose.y) == (7e-3, 8e-3)
+
+
+def test_variances_are_those_of_weighted_means() -> None:
+    places = anchors(0.1, 1.0)
+    _, variance = fit_pose(places, np.full(16, LOOSE), NOTHING_GIVEN)
+    assert variance.place == pytest.approx(1.0 / (16 * LOOSE), rel=1e-12)
+    assert variance.yaw == pytest.approx(1.0 / spread(places, LOOSE), rel=1e-12)
+
+
+def test_a_place_goes_to_the_object_and_back() -> None:
+    pose = pose_at(1e-3, -2e-3, 2.5, 1.02)
+    there = place_of_object(pose, 3e-3, 4e-3)
+    np.testing.assert_allclose(place_on_object(pose, *there), [3e-3, 4e-3], rtol=1e-12, err_msg="rounding")
