@@ -3,7 +3,7 @@
 import json
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -126,6 +126,8 @@ class Database:
 
     def close(self) -> None:
         """Close every connection; one that a thread still has is closed once it gives it back."""
+        with suppress(StorageUnavailable):  # an older copy is noticed at the latest here, and gets nothing of the log
+            self._file.require()
         if not self._is_closed:  # nobody else would: the pool that gets it back is no longer this engine's
             self._is_closed = True
             event.listen(self.engine, "checkin", lambda _, record: record.invalidate())
@@ -169,6 +171,9 @@ def _parsed(url: str | URL) -> URL:
 
 
 def _engine(url: URL) -> Engine:
+    if url.get_backend_name() == "sqlite" and (url.database or "").startswith("file:"):
+        allowed = "a path, such as sqlite:////var/lib/stiction/stiction.sqlite3"
+        raise InvalidUrl(f"database URL names an SQLite file by a URI of its own ({url.database}); allowed: {allowed}")
     if "@" in (url.host or ""):  # what follows the first one would be told to everybody as a host that is not found
         raise InvalidUrl("database URL has an @ in its user or password; allowed: %40")
     options: dict[str, Any] = {"pool_size": POOL_SIZE, "max_overflow": SQLITE_POOL_OVERFLOW}

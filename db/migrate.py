@@ -24,15 +24,14 @@ def upgrade(database: Database, revision: str = "head") -> None:
 
     Raises ``SchemaMismatch`` for a newer one, and for an SQLite file of another program.
     """
-    _refuse_newer(current(database))
-    if database.is_sqlite:  # in PostgreSQL several programs may share one database
-        _refuse_foreign(database)
+    _refuse_others(database)
     with _migrating(database) as config:
         command.upgrade(config, revision)
 
 
 def downgrade(database: Database, revision: str) -> None:
-    """Bring the database down to ``revision``; ``base`` removes every table with its data."""
+    """Bring the database down to ``revision``; ``base`` removes every table with its data. Raises as ``upgrade``."""
+    _refuse_others(database)
     with _migrating(database) as config:
         command.downgrade(config, revision)
 
@@ -84,6 +83,12 @@ def _refuse_newer(found: str | None) -> None:
             f"database revision is {found}; allowed: at most {head()}, the newest that this version of the code knows "
             "(run a newer version)"
         )
+
+
+def _refuse_others(database: Database) -> None:
+    _refuse_newer(current(database))
+    if database.is_sqlite:  # in PostgreSQL several programs may share one database
+        _refuse_foreign(database)
 
 
 def _refuse_foreign(database: Database) -> None:

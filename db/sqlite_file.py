@@ -1,24 +1,31 @@
 """The files of an SQLite database, which may be deleted or replaced under the process that has them open.
 
 Whoever writes to a deleted file is told that all went well, and whoever opens its name again gets a new, empty one.
-An older copy that is written over it keeps its name and inode: it shows by what never falls otherwise, the file's size
-and the generation in its header. SQLite itself takes the header from the write-ahead log where that has a newer one,
-but for a file that is said to be immutable. Nobody here opens it past SQLite: closing it would end SQLite's locks.
+An older copy that is written over it keeps its name and inode: it shows by what never falls otherwise, the generation
+in its header. SQLite itself takes the header from the write-ahead log where that has a newer one, but for a file that
+is said to be immutable. Nobody here opens it past SQLite: closing it would end SQLite's locks.
+
+The log of a newer file would make a mixture of an older copy. SQLite writes it there when the last connection closes,
+and when the next one opens: the first is kept from happening, the second is refused.
 """
 
+import ctypes
 import os
 import sqlite3
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
 from db.errors import StorageUnavailable
+from db.write_ahead_log import first_generation
 
 SIDE_FILES = ("-wal", "-shm")
 """What is beside the file as long as any connection has read from it: commits go to the first of them."""
 
 ANY_SIZE = "PRAGMA writable_schema = ON"
 """Lets SQLite take a header that tells more pages than the file has, as it may in the middle of a checkpoint."""
+
+WITHOUT_LOG = "before a start on an older copy, move away -wal and -shm beside it, which hold nothing of it"
 
 GENERATION = "PRAGMA user_version"
 """What the file's header says of how often it was looked at; whoever looks writes one more."""
@@ -29,8 +36,10 @@ class SqliteFile:
 
     def __init__(self, path: str | None) -> None:
         self._path = None if path is None else Path(path).absolute()
+        self._beside = None if path is None else Path(path).resolve()  # of a link, SQLite's files are beside its target
         self._first: tuple[int, int] | None = None
-        self._size = self._generation = self._generation_in_file = 0
+        self._generation = self._generation_in_file = 0
+        self._log_is_kept = False
         self._open: set[int] = set()
         self._side_files: list[tuple[int, int] | None] = []
 
@@ -48,22 +57,44 @@ class SqliteFile:
 
     def require(self) -> None:
         """Make sure that they are still there; raises ``StorageUnavailable``."""
-        if self._first is not None:
-            self._require_newer(self._size, self._generation_in_file)  # other threads may note larger ones meanwhile
+        if self._first is None:
+            self._require_own_log()
+        else:
+            self._require_newer(self._generation_in_file)  # other threads may note a higher one meanwhile
         for suffix, opened in zip(SIDE_FILES, self._side_files, strict=False):
             if _identity(self._stat(suffix)) != opened and self._open:
                 raise self._lost(suffix)
 
-    def _require_newer(self, size: int, generation: int) -> None:
-        """The first file, which has never been smaller or older than that."""
-        found = self._stat()
-        if found is None or _identity(found) != self._first or found.st_size < size:
+    def _require_own_log(self) -> None:
+        """Before anything is opened: a log whose first header is two generations on follows another file."""
+        if self._path is None or self._beside is None:
+            return
+        in_log = first_generation(Path(f"{self._beside}-wal"))  # first: a file that others work on only gets newer
+        if in_log is not None and self._path.is_file() and (in_file := self._read_header()) < in_log - 1:
+            raise StorageUnavailable(
+                f"database file {self._path} is of generation {in_file}, and its write-ahead log {self._beside}-wal "
+                f"follows one of {in_log - 1} or more: an older copy was written over the file; allowed: the file of "
+                f"before, or the older one; {WITHOUT_LOG}"
+            )
+
+    def _require_newer(self, generation: int) -> None:
+        """The first file, which has never been of a lower generation than that."""
+        if _identity(self._stat()) != self._first:
             raise self._lost()
         in_file = self._read_header()
         if in_file < generation:
-            raise self._lost()
-        self._size = max(self._size, found.st_size)
+            self._keep_log()
+            raise self._overwritten(in_file, generation)
         self._generation_in_file = max(self._generation_in_file, in_file)
+
+    def _keep_log(self) -> None:
+        """Let SQLite write the log into the file at no close: one connection never is, not even as the process ends."""
+        if not self._log_is_kept and self._path is not None:
+            self._log_is_kept = True
+            connection = sqlite3.connect(f"{self._path.as_uri()}?mode=ro", uri=True, check_same_thread=False)
+            ctypes.pythonapi.Py_IncRef(ctypes.py_object(connection))
+            with suppress(sqlite3.Error):
+                connection.execute(GENERATION).fetchone()  # from now on it has the lock that others would need
 
     def _read_header(self) -> int:
         """The generation in the file, whatever is in the write-ahead log."""
@@ -80,12 +111,12 @@ class SqliteFile:
         self._ask("SELECT count(*) FROM sqlite_master")
         least, generation = self._generation, self._ask(GENERATION) or 0
         if generation < least:
-            raise self._lost()
+            raise self._overwritten(generation, least)
         self._generation = max(self._generation, generation)
 
     def check_pages(self) -> None:
         """Read every page and look whether they fit together; raises ``StorageUnavailable``, ``sqlite3.Error``."""
-        found = self._ask("PRAGMA quick_check(1)")
+        found = self._ask("PRAGMA integrity_check(1)")
         if found not in (None, "ok"):
             raise StorageUnavailable(f"database file {self._path} is damaged: {found}; allowed: restore a backup")
 
@@ -105,13 +136,17 @@ class SqliteFile:
 
     def _stat(self, suffix: str = "") -> os.stat_result | None:
         try:
-            return os.stat(f"{self._path or ''}{suffix}")
+            return os.stat(f"{self._beside}{suffix}" if suffix else self._path or "")
         except OSError:
             return None
 
     def _lost(self, suffix: str = "") -> StorageUnavailable:
         what = f"database file {self._path}{suffix} was deleted or replaced while it was in use"
         return StorageUnavailable(f"{what}; allowed: the same file put back, or a restart")
+
+    def _overwritten(self, found: int, least: int) -> StorageUnavailable:
+        what = f"{self._lost()} (it is of generation {found} and was of {least}; {WITHOUT_LOG})"
+        return StorageUnavailable(what)
 
 
 def _identity(file: os.stat_result | None) -> tuple[int, int] | None:

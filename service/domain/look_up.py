@@ -60,6 +60,7 @@ def look_up(known: KnownModel, question: Question) -> Friction:
     )
     outside = model.extrapolation(v, f_n)
     support = model.support_at(v, f_n, OUTDATED if stored.outdated else None)
+    outdated = f"the model is outdated: {OUTDATED}" if stored.outdated and support.kind != "stale" else None
     nothing = "the answer is not above 0: nothing is known of the friction there" if asked <= 0.0 else None
     return Friction(
         material=stored.material,
@@ -74,7 +75,7 @@ def look_up(known: KnownModel, question: Question) -> Friction:
         mean=mean,
         within_domain=outside is None,
         chosen_because=known.because,
-        warning=support.warning(outside, nothing, known.disagreement),
+        warning=support.warning(outside, nothing, known.disagreement, outdated),
         support=support.kind,
         advice=support.advice,
     )

@@ -218,7 +218,7 @@ def test_a_database_of_a_newer_version_is_refused_by_name(database: Database) ->
     with database.write() as session:
         migrate.require_head(session)
         session.execute(text("UPDATE alembic_version SET version_num = '9999'"))
-    for step in (migrate.check, migrate.upgrade):
+    for step in (migrate.check, migrate.upgrade, lambda database: migrate.downgrade(database, "base")):
         with pytest.raises(SchemaMismatch, match=r"9999; allowed: at most .*run a newer version"):
             step(database)
     with database.read() as session, pytest.raises(SchemaMismatch, match="run a newer version"):
@@ -248,6 +248,8 @@ def test_a_file_of_another_program_is_refused_by_name_and_left_alone(empty_datab
         connection.commit()
     with pytest.raises(SchemaMismatch, match="tables of another program, such as notes; allowed: a file of its own"):
         migrate.upgrade(empty_database)
+    with pytest.raises(SchemaMismatch, match="tables of another program"):
+        migrate.downgrade(empty_database, "base")
     with empty_database.connect() as connection:
         assert inspect(connection).get_table_names() == ["notes"]
 

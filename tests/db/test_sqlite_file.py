@@ -1,5 +1,7 @@
 import shutil
 import sqlite3
+import subprocess
+import sys
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -8,10 +10,11 @@ from typing import Any
 import pytest
 
 from db.database import Database
-from db.errors import StorageUnavailable
+from db.errors import InvalidUrl, StorageUnavailable
 from db.migrate import upgrade
 from db.repositories import stores
 from db.sqlite_file import SIDE_FILES, SqliteFile
+from db.write_ahead_log import first_generation
 
 
 @pytest.mark.parametrize("suffix", SIDE_FILES)
@@ -31,33 +34,142 @@ def test_a_look_makes_no_file_in_place_of_one_that_is_gone(tmp_path: Path, suffi
     connection.close()
 
 
-def grow(database: Database) -> None:
-    with database.write() as session:
-        session.connection().exec_driver_sql("CREATE TABLE more AS SELECT randomblob(100000)")
-
-
 def look(database: Database) -> None:
     with database.write() as session:
         stores.touch(session)
 
 
-@pytest.mark.parametrize("change", [grow, look])
-def test_an_older_copy_over_the_file_is_noticed(tmp_path: Path, change: Callable[[Database], None]) -> None:
+def empty_log(database: Database) -> None:
+    with database.connect() as connection:
+        connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
+
+
+def test_an_older_copy_over_the_file_is_noticed(tmp_path: Path) -> None:
     """With the inode of before, once the write-ahead log holds nothing that would hide it."""
     path = tmp_path / "stiction.sqlite3"
     database = Database(f"sqlite:///{path}")
     upgrade(database)
-    with database.connect() as connection:
-        connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
+    empty_log(database)
     shutil.copyfile(path, tmp_path / "older")
-    change(database)
-    with database.connect() as connection:
-        connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
+    look(database)
+    empty_log(database)
     database.ping()
     shutil.copyfile(tmp_path / "older", path)
     with pytest.raises(StorageUnavailable, match="deleted or replaced"):
         database.ping()
     database.close()
+
+
+def test_a_file_that_gives_back_room_is_the_same_file(tmp_path: Path) -> None:
+    """As VACUUM makes it do, by an operator beside the service."""
+    path = tmp_path / "stiction.sqlite3"
+    with closing(Database(f"sqlite:///{path}")) as database:
+        upgrade(database)
+        with database.write() as session:
+            session.connection().exec_driver_sql("CREATE TABLE more AS SELECT randomblob(1000000)")
+            session.connection().exec_driver_sql("DROP TABLE more")
+        database.checkpoint()
+        look(database)
+        before = path.stat().st_size
+        with closing(sqlite3.connect(path)) as operator:
+            operator.execute("VACUUM")
+        empty_log(database)
+        assert path.stat().st_size < before
+        look(database)
+        database.ping()
+
+
+OVERWRITTEN = """
+import gc, subprocess, sys
+from contextlib import suppress
+from db.database import Database
+from db.errors import StorageUnavailable
+from db.errors import InvalidUrl, StorageUnavailable
+from db.migrate import upgrade
+from db.repositories import stores
+
+path, older = sys.argv[1:]
+database = Database("sqlite:///" + path)
+upgrade(database)
+
+def look():
+    with database.write() as session:
+        stores.touch(session)
+    database.checkpoint()
+
+look()
+subprocess.run(["cp", path, older], check=True)  # a copy made here would end SQLite's locks
+for _ in range(3):
+    look()
+with database.connect() as connection:
+    connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
+with database.write() as session:
+    stores.touch(session)
+subprocess.run(["cp", older, path], check=True)
+with suppress(StorageUnavailable):
+    database.ping()
+gc.collect()
+database.close()
+"""
+
+
+def test_an_older_copy_gets_nothing_of_the_log_of_a_newer_file(tmp_path: Path) -> None:
+    """Neither when the process ends, nor from a start, which is refused until the log was moved away."""
+    path, older = tmp_path / "stiction.sqlite3", tmp_path / "older"
+    subprocess.run([sys.executable, "-c", OVERWRITTEN, str(path), str(older)], check=True, timeout=120)
+    assert path.read_bytes() == older.read_bytes()
+    for _ in range(2):
+        named = pytest.raises(StorageUnavailable, match=r"follows one of .*an older copy was written over.*move away")
+        with closing(Database(f"sqlite:///{path}")) as database, named:
+            database.ping()
+        assert path.read_bytes() == older.read_bytes()
+    for suffix in SIDE_FILES:
+        Path(f"{path}{suffix}").unlink(missing_ok=True)
+    with closing(Database(f"sqlite:///{path}")) as database:
+        database.ping()
+        database.check_pages()
+
+
+def test_a_log_that_was_not_written_to_the_file_yet_is_its_own(tmp_path: Path) -> None:
+    """However often it was looked at since, and although another process has both open."""
+    path = tmp_path / "stiction.sqlite3"
+    with closing(Database(f"sqlite:///{path}")) as database:
+        upgrade(database)
+        empty_log(database)
+        for _ in range(5):
+            look(database)
+        assert first_generation(Path(f"{path}-wal")) == 1
+        with closing(Database(f"sqlite:///{path}")) as other:
+            other.ping()
+        look(database)
+
+
+@pytest.mark.parametrize("content", [None, b"", b"\x37" * 31, b"\x37" * 33, b"\x37" * 200])
+def test_what_is_no_log_tells_no_generation(tmp_path: Path, content: bytes | None) -> None:
+    log = tmp_path / "database-wal"
+    if content is not None:
+        log.write_bytes(content)
+    assert first_generation(log) is None
+
+
+@pytest.mark.parametrize("suffix", SIDE_FILES)
+def test_files_beside_the_target_of_a_link_are_watched(tmp_path: Path, suffix: str) -> None:
+    link = tmp_path / "stiction.sqlite3"
+    (tmp_path / "disk").mkdir()
+    link.symlink_to(tmp_path / "disk" / "database")
+    with closing(Database(f"sqlite:///{link}")) as database:
+        upgrade(database)
+        look(database)
+        (tmp_path / "disk" / f"database{suffix}").rename(tmp_path / "away")
+        with pytest.raises(StorageUnavailable, match=suffix):
+            look(database)
+
+
+def test_a_file_is_named_by_its_path_alone() -> None:
+    """A URI of SQLite's own could name one that nobody here finds, or memory."""
+    for url in ("sqlite:///file:/srv/x.db?uri=true", "sqlite:///file:x?mode=memory&uri=true"):
+        with pytest.raises(InvalidUrl, match="allowed: a path"):
+            Database(url)
 
 
 def test_an_older_copy_of_the_same_size_is_noticed_before_a_write(tmp_path: Path) -> None:

@@ -119,3 +119,5 @@ def test_models_of_a_log_that_is_looked_at_again_are_outdated_meanwhile(
     with database.read() as session:
         models = materials.get(session, "paper").models
     assert [stored.outdated for stored in models] == [True, True]
+    answer = lab.request("GET", "/v1/materials/paper/friction", params={"fn": 0.05}).raise_for_status().json()
+    assert "the model is outdated" in answer["warning"]
