@@ -3,12 +3,12 @@
 import tracemalloc
 
 import numpy as np
+from tests.slipcore.patch.grasps import PIVOT, SLIDE, grasp
 
 from slipcore import GraspLog
 from slipcore.patch.following import follow_patches
 from slipcore.patch.friction import contact_friction
 from slipcore.patch.regimes import slips_as_a_whole
-from tests.slipcore.patch.grasps import PIVOT, SLIDE, grasp
 
 TOUCHES, PERIOD, TOUCHED = 400, 20, 8
 FRAMES = TOUCHES * PERIOD
