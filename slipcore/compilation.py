@@ -18,16 +18,34 @@ from pathlib import Path
 from typing import Any, TypeVar, cast, overload
 
 from numba import njit
-from numba.core import config
+from numba.core import config, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
-from numba.np.unsafe.ndarray import to_fixed_tuple
+from numba.core.errors import TypingError
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array
 
 _IMPORT = re.compile(r"^\s*(?:from\s+(\S+)\s+import\s+(\([^)]*\)|[^\n#]*)|import\s+([^\n#]*))", re.MULTILINE)
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
-unpack: Any = to_fixed_tuple
-"""``unpack(array, size)``: its values as arguments, in compiled code; ``size`` is a constant there."""
+
+@intrinsic  # type: ignore[untyped-decorator]
+def unpack(_typing: Any, array: Any, size: Any) -> Any:
+    """``unpack(array, size)``: its first values as arguments, in compiled code; ``size`` is a constant there.
+
+    As numba's own ``to_fixed_tuple``, but only what is used of the values is read, at once from where it stands: that
+    one goes through the whole tuple for each of them, 0.6 µs for the fifty settings of the filter.
+    """
+    if not isinstance(size, types.IntegerLiteral) or array.ndim != 1 or array.layout != "C":
+        raise TypingError(f"unpack of {array} by {size}; allowed: a contiguous array [k] and a constant")
+    values = types.UniTuple(array.dtype, size.literal_value)  # type: ignore[attr-defined]
+
+    def read(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        first = make_array(array)(context, builder, arguments[0]).data
+        places = [builder.gep(first, [context.get_constant(types.intp, k)]) for k in range(values.count)]
+        return context.make_tuple(builder, values, [context.unpack_value(builder, array.dtype, at) for at in places])
+
+    return values(array, size), read
 
 
 @overload
