@@ -40,27 +40,51 @@ def _fill_rates(
     for p in range(len(bounds) - 1):
         span = slice(bounds[p], bounds[p + 1])
         for column in range(values.shape[1]):
-            series = values[span, column]
-            sums = _running_sums(time[span], series)
-            first = last = 0
-            for e in range(len(series)):
-                first, last = _window(time[span], e, window, first, last)
-                if math.isfinite(series[e]):
-                    slope[bounds[p] + e, column], error[bounds[p] + e, column] = _line(sums[first], sums[last])
+            _fill_lines(time[span], values[span, column], window, slope[span, column], error[span, column])
+
+
+@compiled
+def _fill_lines(time: FloatArray, series: FloatArray, window: float, slope: FloatArray, error: FloatArray) -> None:
+    begin = first = last = 0
+    while begin < len(series):
+        first, end, reach = _stretch(time, begin, window, first, last)
+        origin, last, (sums, _) = first, end, _running_sums(time[first:reach], series[first:reach])
+        for e in range(begin, end):
+            first, last = _window(time, e, window, first, last)
+            if math.isfinite(series[e]):
+                slope[e], error[e] = _line(sums[first - origin], sums[last - origin])
+        begin = end
 
 
 @compiled
 def _fill_means(time: FloatArray, values: FloatArray, bounds: IntArray, window: float, mean: FloatArray) -> None:
     for p in range(len(bounds) - 1):
         span = slice(bounds[p], bounds[p + 1])
-        sums = _running_sums(time[span], values[span])
-        middle = _middle(values[span])
-        first = last = 0
-        for e in range(bounds[p + 1] - bounds[p]):
-            first, last = _window(time[span], e, window, first, last)
-            count, total = sums[last, 0] - sums[first, 0], sums[last, 2] - sums[first, 2]
+        _fill_mean(time[span], values[span], window, mean[span])
+
+
+@compiled
+def _fill_mean(time: FloatArray, series: FloatArray, window: float, mean: FloatArray) -> None:
+    begin = first = last = 0
+    while begin < len(series):
+        first, end, reach = _stretch(time, begin, window, first, last)
+        origin, last, (sums, middle) = first, end, _running_sums(time[first:reach], series[first:reach])
+        for e in range(begin, end):
+            first, last = _window(time, e, window, first, last)
+            count = sums[last - origin, 0] - sums[first - origin, 0]
             if count > 0.0:
-                mean[bounds[p] + e] = middle + total / count
+                mean[e] = middle + (sums[last - origin, 2] - sums[first - origin, 2]) / count
+        begin = end
+
+
+@compiled
+def _stretch(time: FloatArray, begin: int, window: float, first: int, last: int) -> tuple[int, int, int]:
+    """First frame of the window of frame ``begin``, the one after it, and the one after the window of its last frame.
+
+    Sums run anew over each such stretch: over a long log their differences would lose what a window holds.
+    """
+    first, last = _window(time, begin, window, first, last)
+    return first, last, _window(time, last - 1, window, first, last)[1]
 
 
 @compiled
@@ -75,10 +99,10 @@ def _window(time: FloatArray, frame: int, window: float, first: int, last: int) 
 
 
 @compiled
-def _running_sums(time: FloatArray, series: FloatArray) -> FloatArray:
+def _running_sums(time: FloatArray, series: FloatArray) -> tuple[FloatArray, float]:
     """Sums [k + 1, 6] of 1, t, y, t², ty, y² over all frames before each, of a series [k] whose NaN are left out.
 
-    Times and values are taken about their means: sums of squares then cancel least.
+    Times and values are taken about their means: sums of squares then cancel least. That of the values comes with them.
     """
     sums, began, middle = np.zeros((len(series) + 1, 6)), time.mean(), _middle(series)
     for e in range(len(series)):
@@ -87,7 +111,7 @@ def _running_sums(time: FloatArray, series: FloatArray) -> FloatArray:
             t, y = time[e] - began, series[e] - middle
             for column, each in enumerate((1.0, t, y, t * t, t * y, y * y)):
                 sums[e + 1, column] += each
-    return sums
+    return sums, middle
 
 
 @compiled

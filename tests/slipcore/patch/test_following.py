@@ -3,8 +3,8 @@
 import tracemalloc
 
 import numpy as np
-from tests.slipcore.patch.grasps import PIVOT, SLIDE, grasp
 
+from benchmarks.patch_grasps import PIVOT, SLIDE, grasp
 from slipcore import GraspLog
 from slipcore.patch.following import follow_patches
 from slipcore.patch.friction import contact_friction

@@ -55,6 +55,19 @@ def test_a_moving_mean_is_that_of_what_each_window_knows() -> None:
     assert np.isnan(moving_mean(TIME, np.full(40, np.nan), ALL, WINDOW)).all()
 
 
+@pytest.mark.parametrize("frames", [1_000, 1_000_000])
+def test_a_rate_in_a_log_of_nine_hours_is_as_right_as_in_one_of_half_a_minute(frames: int) -> None:
+    """A micrometre that comes and goes on a millimetre that drifts, at 30 frames a second."""
+    time = np.arange(frames) / 30.0
+    values = 1e-6 * np.sin(0.7 * time) + 1e-3 * np.sin(1e-4 * time)
+    slope, _ = local_rates(time, values[:, None], np.array([0, frames]), WINDOW)
+    expected = 0.7e-6 * np.cos(0.7 * time) + 1e-7 * np.cos(1e-4 * time)
+    inner = slice(8, -8)  # at the ends windows have one side only
+    np.testing.assert_allclose(slope[inner, 0], expected[inner], rtol=0, atol=3e-9, err_msg="curvature in a window")
+    mean = moving_mean(time, values, np.array([0, frames]), WINDOW)
+    np.testing.assert_allclose(mean[inner], values[inner], rtol=0, atol=6e-9, err_msg="curvature in a window")
+
+
 def test_no_window_reaches_into_another_patch() -> None:
     values, middle = np.random.default_rng(7).standard_normal((40, 1)), 17
     together = (
