@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from starlette.datastructures import UploadFile
 
+from estimators.method_names import METHODS
 from service.domain import upload
 from service.http.problem_meanings import MEANINGS
 from service.http.problems import PROBLEM_TYPES
@@ -138,7 +139,9 @@ def test_the_calculator_says_what_the_api_says(client: httpx.Client) -> None:
 
 @ON_SQLITE
 def test_the_calculator_asks_for_the_recommended_model_unless_told_otherwise(browser: Any) -> None:
-    assert '<select id="method" name="method"><option>auto</option>' in browser.get("/plan").text
+    form = browser.get("/plan").text
+    assert [method for method in METHODS if f">{method}</option>" not in form] == []
+    assert re.findall("<option selected>(.*?)</option>", form)[-1:] == ["auto"]
     assert "<option selected>robust</option>" in browser.get("/plan?method=robust").text
 
 
