@@ -19,6 +19,7 @@ from db.errors import BlobDamaged, NotEmpty, NotFound
 from db.quarantine import sync_folder
 from db.records import Actor
 from db.repositories import audit, stores
+from db.sqlite_file import GENERATION, OLDEST
 from db.tables import Base, BrowserSessionRow, IdempotencyKeyRow, RunnerRow, StoreRow
 
 FILE = "stiction.sqlite3"
@@ -49,6 +50,9 @@ def backup(database: Database, blobs: BlobStore, folder: Path, report: Report) -
         migrate.upgrade(copy)
         _copy_rows(database, copy, report)
         _copy_blobs(copy, blobs, BlobStore(folder), report)
+        with copy.connect() as connection:
+            connection.exec_driver_sql(f"{GENERATION} = {OLDEST}")
+            connection.commit()
     unfinished.replace(file)  # closing took what was ahead of it in the log into the file
     sync_folder(folder)
 

@@ -31,7 +31,7 @@ from db.defaults import (
     SQLITE_SYNCHRONOUS,
 )
 from db.errors import DriverMissing, InvalidUrl, StorageUnavailable
-from db.sqlite_file import SqliteFile
+from db.sqlite_file import GENERATION, SqliteFile, after
 
 _BEGIN = "sqlite_begin"
 _DURABLE = "durable"
@@ -171,9 +171,10 @@ def _parsed(url: str | URL) -> URL:
 
 
 def _engine(url: URL) -> Engine:
-    if url.get_backend_name() == "sqlite" and (url.database or "").startswith("file:"):
+    if url.get_backend_name() == "sqlite" and (url.database or ":memory:").startswith(("file:", ":memory:")):
         allowed = "a path, such as sqlite:////var/lib/stiction/stiction.sqlite3"
-        raise InvalidUrl(f"database URL names an SQLite file by a URI of its own ({url.database}); allowed: {allowed}")
+        found = f"{url.database or 'nothing'}, not a file by its path"
+        raise InvalidUrl(f"database URL of SQLite names {found}; allowed: {allowed}")
     if "@" in (url.host or ""):  # what follows the first one would be told to everybody as a host that is not found
         raise InvalidUrl("database URL has an @ in its user or password; allowed: %40")
     options: dict[str, Any] = {"pool_size": POOL_SIZE, "max_overflow": SQLITE_POOL_OVERFLOW}
@@ -229,3 +230,6 @@ def _prepare_sqlite(engine: Engine, busy_timeout: float, file: SqliteFile) -> No
         synchronous = SQLITE_SYNCHRONOUS if options.get(_DURABLE, True) else "NORMAL"
         connection.exec_driver_sql(f"PRAGMA synchronous = {synchronous}")  # inside a transaction it would do nothing
         connection.exec_driver_sql(options.get(_BEGIN, "BEGIN"))
+        if _BEGIN in options:  # each commit brings the header along, by which file and log are told to belong together
+            generation = connection.exec_driver_sql(GENERATION).scalar_one()
+            connection.exec_driver_sql(f"{GENERATION} = {after(generation)}")

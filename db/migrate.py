@@ -94,7 +94,8 @@ def _refuse_others(database: Database) -> None:
 def _refuse_foreign(database: Database) -> None:
     with database.connect() as connection:  # one view: another server may be making our tables
         revision = MigrationContext.configure(connection).get_current_revision()
-        tables = sorted(set(inspect(connection).get_table_names()) - {"alembic_version"})
+        schema = inspect(connection)
+        tables = sorted({*schema.get_table_names(), *schema.get_view_names()} - {"alembic_version"})
     if revision is None and tables:
         found = f"tables of another program, such as {tables[0]}"
         raise SchemaMismatch(f"{database} has {found}; allowed: a file of its own")

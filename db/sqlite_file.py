@@ -28,7 +28,13 @@ ANY_SIZE = "PRAGMA writable_schema = ON"
 WITHOUT_LOG = "before a start on an older copy, move away -wal and -shm beside it, which hold nothing of it"
 
 GENERATION = "PRAGMA user_version"
-"""What the file's header says of how often it was looked at; whoever looks writes one more."""
+"""What the file's header says of how often it was written to; each transaction writes one more."""
+
+_CYCLE = 2**32
+"""Generations after which the header's field of 32 bits begins anew."""
+
+OLDEST = -(2**30)
+"""Of a backup's file, which no log belongs to: older than any that has been in use."""
 
 
 class SqliteFile:
@@ -38,7 +44,8 @@ class SqliteFile:
         self._path = None if path is None else Path(path).absolute()
         self._beside = None if path is None else Path(path).resolve()  # of a link, SQLite's files are beside its target
         self._first: tuple[int, int] | None = None
-        self._generation = self._generation_in_file = 0
+        self._generation: int | None = None
+        self._generation_in_file: int | None = None
         self._log_is_kept = False
         self._open: set[int] = set()
         self._side_files: list[tuple[int, int] | None] = []
@@ -66,26 +73,28 @@ class SqliteFile:
                 raise self._lost(suffix)
 
     def _require_own_log(self) -> None:
-        """Before anything is opened: a log whose first header is two generations on follows another file."""
+        """At first, and at looks: a log whose first header is two generations on is another file's."""
         if self._path is None or self._beside is None:
             return
         in_log = first_generation(Path(f"{self._beside}-wal"))  # first: a file that others work on only gets newer
-        if in_log is not None and self._path.is_file() and (in_file := self._read_header()) < in_log - 1:
+        if in_log is None or not self._path.is_file():
+            return
+        if is_older(in_file := self._read_header(), in_log - 1):
             raise StorageUnavailable(
                 f"database file {self._path} is of generation {in_file}, and its write-ahead log {self._beside}-wal "
                 f"follows one of {in_log - 1} or more: an older copy was written over the file; allowed: the file of "
                 f"before, or the older one; {WITHOUT_LOG}"
             )
 
-    def _require_newer(self, generation: int) -> None:
+    def _require_newer(self, generation: int | None) -> None:
         """The first file, which has never been of a lower generation than that."""
         if _identity(self._stat()) != self._first:
             raise self._lost()
         in_file = self._read_header()
-        if in_file < generation:
+        if generation is not None and is_older(in_file, generation):
             self._keep_log()
             raise self._overwritten(in_file, generation)
-        self._generation_in_file = max(self._generation_in_file, in_file)
+        self._generation_in_file = in_file
 
     def _keep_log(self) -> None:
         """Let SQLite write the log into the file at no close: one connection never is, not even as the process ends."""
@@ -109,10 +118,13 @@ class SqliteFile:
         Raises ``StorageUnavailable``, ``sqlite3.Error``.
         """
         self._ask("SELECT count(*) FROM sqlite_master")
-        least, generation = self._generation, self._ask(GENERATION) or 0
-        if generation < least:
+        least, generation = self._generation, self._ask(GENERATION)
+        if generation is None:
+            return
+        if least is not None and is_older(generation, least):
             raise self._overwritten(generation, least)
-        self._generation = max(self._generation, generation)
+        self._generation = generation
+        self._require_own_log()
 
     def check_pages(self) -> None:
         """Read every page and look whether they fit together; raises ``StorageUnavailable``, ``sqlite3.Error``."""
@@ -147,6 +159,16 @@ class SqliteFile:
     def _overwritten(self, found: int, least: int) -> StorageUnavailable:
         what = f"{self._lost()} (it is of generation {found} and was of {least}; {WITHOUT_LOG})"
         return StorageUnavailable(what)
+
+
+def after(generation: int) -> int:
+    """The next one; beyond 2³¹ − 1 the field goes on at its other end."""
+    return (generation + 1 + _CYCLE // 2) % _CYCLE - _CYCLE // 2
+
+
+def is_older(generation: int, other: int) -> bool:
+    """By serial numbers (RFC 1982), of which the one that is less than half a cycle behind is older."""
+    return (generation - other) % _CYCLE > _CYCLE // 2
 
 
 def _identity(file: os.stat_result | None) -> tuple[int, int] | None:

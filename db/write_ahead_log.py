@@ -6,7 +6,7 @@ The format is SQLite's own (https://sqlite.org/fileformat2.html, section 4).
 import struct
 from pathlib import Path
 
-_HEADER, _FRAME, _GENERATION = struct.Struct(">8I"), struct.Struct(">6I"), struct.Struct(">60xI")
+_HEADER, _FRAME, _GENERATION = struct.Struct(">8I"), struct.Struct(">6I"), struct.Struct(">60xi")
 """Of the log, of each frame before its page, and of the database in page 1, which tells ``PRAGMA user_version``."""
 
 _LARGEST_PAGE = 65536
@@ -31,6 +31,8 @@ def first_generation(log: Path) -> int | None:
                 return None
             if number == 1:
                 page = stream.read(_GENERATION.size)
-                return int(_GENERATION.unpack(page)[0]) if len(page) == _GENERATION.size else None
+                stream.seek(0)
+                is_whole = len(page) == _GENERATION.size and stream.read(_HEADER.size) == head
+                return int(_GENERATION.unpack(page)[0]) if is_whole else None  # somebody may just begin it anew
             stream.seek(page_size, 1)
     return None

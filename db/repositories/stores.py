@@ -4,7 +4,6 @@ from sqlalchemy import inspect, select, text, update
 from sqlalchemy.orm import Session
 
 from db.errors import StorageUnavailable
-from db.sqlite_file import GENERATION
 from db.tables import StoreRow
 
 
@@ -30,11 +29,8 @@ def set_id(session: Session, store_id: str) -> None:
 
 
 def touch(session: Session) -> None:
-    """Write the row anew: it shows whether the database takes anything. SQLite's header gets a higher generation."""
+    """Write the row anew: it shows whether the database takes anything."""
     session.execute(update(StoreRow).values(number=1))
-    connection = session.connection()
-    if connection.dialect.name == "sqlite":
-        connection.exec_driver_sql(f"{GENERATION} = {connection.exec_driver_sql(GENERATION).scalar_one() + 1}")
 
 
 def require(session: Session, store_id: str | None) -> None:

@@ -59,6 +59,6 @@ def parse_number(
         value = float(text) if text else math.nan
     except ValueError:
         value = math.inf
-    if math.isinf(value):
+    if math.isinf(value) or "_" in text or not text.isascii():  # which Python takes in numbers, and nobody else
         raise InvalidInput(f"line {line}, {name}", repr(text)[:40], allowed)
     return value

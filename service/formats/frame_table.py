@@ -2,7 +2,7 @@
 
 import re
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +44,8 @@ class _Table:
         self.mapping = mapping
         lines = text_lines(path)
         self._names, delimiter, before = _header(lines)
+        for name, origin in mapping.origins.items():
+            self._check_same_elements(name, origin.fields)
         fields = [field for origin in mapping.origins.values() for field in origin.fields]
         chosen = sorted({column for field in fields for column in self._columns(field)})
         self._place = {column: k for k, column in enumerate(chosen)}
@@ -69,9 +71,20 @@ class _Table:
     def _columns(self, field: str) -> list[int]:
         if ANY_NUMBER not in field:
             return [self._names.index(field)] if field in self._names else []
-        pattern = re.compile(r"(\d{1,6})".join(map(re.escape, field.split(ANY_NUMBER, 1))))
+        return [column for _, column in self._numbered(field)]
+
+    def _numbered(self, field: str) -> list[tuple[int, int]]:
+        """Numbers of elements, and their columns, in order."""
+        pattern = re.compile(r"(\d{1,6})".join(map(re.escape, field.split(ANY_NUMBER, 1))), re.ASCII)
         found = [(int(match[1]), k) for k, name in enumerate(self._names) if (match := pattern.fullmatch(name))]
-        return [column for _, column in sorted(found)]
+        return sorted(found)
+
+    def _check_same_elements(self, name: str, fields: Sequence[str]) -> None:
+        """Components side by side must be of the same elements, each there once."""
+        numbers = [[number for number, _ in self._numbered(field)] for field in fields if ANY_NUMBER in field]
+        if any(each != numbers[0] or len(set(each)) < len(each) for each in numbers):
+            found = "; ".join(f"{', '.join(map(str, each[:9]))}" for each in numbers)
+            raise InvalidInput(name, f"of the elements {found}"[:200], "the same in each component, each once")
 
     def _read(self, lines: Iterator[tuple[int, list[str]]], chosen: list[int]) -> FloatArray:
         values = array("d")
@@ -104,4 +117,7 @@ def _distinct(names: list[str]) -> list[str]:
     for name in names:
         count = seen[name] = seen.get(name, -1) + 1
         found.append(f"{name}.{count}" if count else name)
+    if len(set(found)) < len(found):
+        twice = next(name for name in found if found.count(name) > 1)
+        raise InvalidInput("file", f"with two columns {twice[:40]!r}", "names that stay distinct with their number")
     return found

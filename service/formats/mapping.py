@@ -29,6 +29,9 @@ COMPONENTS = {
 }
 """Those of what may have a unit a component; one that begins with a minus turns that axis."""
 
+LARGEST = 1e300
+"""Of any number: a whole one may have more digits than a float can hold."""
+
 _ORIGIN_KEYS = {"field", "topic", "unit", "value"}
 _ALLOWED_ORIGIN = "a field, a list of fields, or an object of field or value, topic and unit"
 _SETTINGS = ("topic", "grid", "pitch", "tolerance", "episode")
@@ -149,7 +152,7 @@ def _grid(value: Any) -> tuple[int, int]:
 
 
 def _positive(name: str, value: Any) -> float:
-    if type(value) not in (int, float) or not 0.0 < value < math.inf:
+    if type(value) not in (int, float) or not 0.0 < value <= LARGEST:
         raise InvalidInput(name, repr(value)[:60], "a number above 0")
     return float(value)
 

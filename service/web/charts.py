@@ -55,7 +55,7 @@ class Chart:
 
 def ticks(low: float, high: float, most: int = MOST_TICKS) -> list[float]:
     """Round numbers from ``low`` to ``high``, 1, 2 or 5 times a power of ten apart, at most so many."""
-    raw = (high - low) / max(most - 1, 1)
+    raw = max((high - low) / max(most - 1, 1), 1e-300)
     power = 10.0 ** math.floor(math.log10(raw))
     step = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= raw * (1.0 - 1e-9))
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)

@@ -242,16 +242,18 @@ def test_servers_that_start_at_once_upgrade_once(empty_database: Database) -> No
 
 
 @ONLY_SQLITE
-def test_a_file_of_another_program_is_refused_by_name_and_left_alone(empty_database: Database) -> None:
+@pytest.mark.parametrize("made", ["CREATE TABLE notes (line TEXT)", "CREATE VIEW notes AS SELECT 1 AS line"])
+def test_a_file_of_another_program_is_refused_by_name_and_left_alone(empty_database: Database, made: str) -> None:
     with empty_database.connect() as connection:
-        connection.exec_driver_sql("CREATE TABLE notes (line TEXT)")
+        connection.exec_driver_sql(made)
         connection.commit()
     with pytest.raises(SchemaMismatch, match="tables of another program, such as notes; allowed: a file of its own"):
         migrate.upgrade(empty_database)
     with pytest.raises(SchemaMismatch, match="tables of another program"):
         migrate.downgrade(empty_database, "base")
     with empty_database.connect() as connection:
-        assert inspect(connection).get_table_names() == ["notes"]
+        found = inspect(connection)
+        assert [*found.get_table_names(), *found.get_view_names()] == ["notes"]
 
 
 @ONLY_SQLITE

@@ -1,5 +1,6 @@
 import shutil
 import sqlite3
+import struct
 import subprocess
 import sys
 from collections.abc import Callable
@@ -9,11 +10,13 @@ from typing import Any
 
 import pytest
 
+from db.backup import backup
+from db.blobs import BlobStore
 from db.database import Database
 from db.errors import InvalidUrl, StorageUnavailable
 from db.migrate import upgrade
 from db.repositories import stores
-from db.sqlite_file import SIDE_FILES, SqliteFile
+from db.sqlite_file import OLDEST, SIDE_FILES, SqliteFile, after, is_older
 from db.write_ahead_log import first_generation
 
 
@@ -144,6 +147,47 @@ def test_a_log_that_was_not_written_to_the_file_yet_is_its_own(tmp_path: Path) -
         look(database)
 
 
+def test_each_log_says_which_file_it_follows(tmp_path: Path) -> None:
+    """Also one that begins with a write that does not change the file's size, as a runner's lease does."""
+    path = tmp_path / "stiction.sqlite3"
+    with closing(Database(f"sqlite:///{path}")) as database:
+        upgrade(database)
+        look(database)
+        for _ in range(3):
+            empty_log(database)
+            with database.write() as session:
+                session.connection().exec_driver_sql("UPDATE store SET id = id")
+            header = struct.unpack(">60xi", path.read_bytes()[:64])[0]
+            assert first_generation(Path(f"{path}-wal")) == header + 1
+
+
+def test_the_file_of_a_backup_belongs_to_no_log(tmp_path: Path) -> None:
+    """It is a copy of rows, whose pages lie elsewhere; its own count could be anything."""
+    path = tmp_path / "stiction.sqlite3"
+    with closing(Database(f"sqlite:///{path}")) as database:
+        upgrade(database)
+        backup(database, BlobStore(tmp_path / "blobs"), tmp_path / "backup", lambda *_: None)
+        look(database)
+        file = (tmp_path / "backup" / "stiction.sqlite3").read_bytes()
+        with path.open("r+b") as stream:  # the name and inode stay
+            stream.write(file)
+            stream.truncate()
+        with pytest.raises(StorageUnavailable, match="deleted or replaced"):
+            look(database)
+    with closing(Database(f"sqlite:///{path}")) as database, pytest.raises(StorageUnavailable, match="older copy"):
+        database.ping()
+    assert path.read_bytes() == file
+
+
+def test_generations_go_on_at_the_other_end_of_their_field() -> None:
+    most = 2**31 - 1
+    assert (after(0), after(most - 1), after(most), after(-1)) == (1, most, -most - 1, 0)
+    assert is_older(most, after(most))
+    assert not is_older(after(most), most)
+    assert not is_older(5, 5)
+    assert is_older(OLDEST, 0)
+
+
 @pytest.mark.parametrize("content", [None, b"", b"\x37" * 31, b"\x37" * 33, b"\x37" * 200])
 def test_what_is_no_log_tells_no_generation(tmp_path: Path, content: bytes | None) -> None:
     log = tmp_path / "database-wal"
@@ -167,7 +211,7 @@ def test_files_beside_the_target_of_a_link_are_watched(tmp_path: Path, suffix: s
 
 def test_a_file_is_named_by_its_path_alone() -> None:
     """A URI of SQLite's own could name one that nobody here finds, or memory."""
-    for url in ("sqlite:///file:/srv/x.db?uri=true", "sqlite:///file:x?mode=memory&uri=true"):
+    for url in ("sqlite:///file:/srv/x.db?uri=true", "sqlite:///file:x?mode=memory&uri=true", "sqlite://"):
         with pytest.raises(InvalidUrl, match="allowed: a path"):
             Database(url)
 

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 from typing import Annotated, Any
+from urllib.parse import quote
 
 from fastapi import APIRouter, Request, Response
 from fastapi.params import Form
@@ -61,7 +62,7 @@ def describe_sensor(
     sensors.describe(
         context, name, checked(GelIn, {each: text.strip() for each, text in fields.items()}).record(), principal
     )
-    return RedirectResponse(request.url.path, 303)
+    return RedirectResponse(f"/sensors/{quote(name, safe='')}", 303)
 
 
 def _shown(context: Context, request: Request, sensor: Sensor, cursor: str | None) -> dict[str, Any]:

@@ -134,6 +134,9 @@ def test_only_a_mapping_makes_text_a_table_of_frames(tmp_path: Path) -> None:
         ("x,y\n1,2\n", "file is without rows of what is looked for; it has the columns x, y"),
         ("t,a\n0,1\n1,x\n", "line 3, a is 'x'; allowed: a finite number"),
         ("t,a\n0,1\n1,inf\n", "line 3, a is 'inf'"),
+        ("t,a\n0,1\n1,1_0\n", "line 3, a is '1_0'"),
+        ("t,a\n0,1\n1,١\n", "line 3, a is '١'"),
+        ("t,t.1,t\n0,1,1\n", r"file is with two columns 't\.1'"),
         ("t,a\n0,1\n1\n", "line 3 is of 1 cells; allowed: 2"),
         ("t,b\n0,1\n1,2\n", r"displacement is not there \(a, a, a\); allowed: the columns t, b"),
         ("t,a\n0,1\n,2\n", "time"),
@@ -146,6 +149,17 @@ def test_what_is_wrong_is_named(tmp_path: Path, content: str, message: str) -> N
     path.write_text(content)
     mapping = {"time": "t", "displacement": ["a"] * 3, "grid": [1, 1], "pitch": 1e-3, "element_area": {"value": 1e-6}}
     with pytest.raises(InvalidInput, match=message):
+        formats.read(path, "text/csv", mapping=json.dumps(mapping))
+
+
+@pytest.mark.parametrize(
+    "names", [["P0_X", "P1_X", "P1_Y", "P2_Y"], ["P0_X", "P00_X", "P0_Y", "P1_Y"], ["P0_X", "P1_X", "P0_Y"]]
+)
+def test_components_of_different_elements_are_refused(tmp_path: Path, names: list[str]) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([",".join(["t", *names]), *(",".join([t, *"0" * len(names)]) for t in "01")]))
+    mapping = {"time": "t", "displacement": ["P*_X", "P*_Y", "P*_Y"], "grid": [1, 2], "pitch": 1e-3}
+    with pytest.raises(InvalidInput, match=r"displacement is of the elements .*; allowed: the same in each component"):
         formats.read(path, "text/csv", mapping=json.dumps(mapping))
 
 

@@ -81,6 +81,8 @@ def test_what_is_named_goes_before_what_is_usual() -> None:
         ({"grid": "5x5"}, "grid"),
         ({"pitch": 0}, "pitch"),
         ({"pitch": math.inf}, "pitch"),
+        ({"pitch": 10**400}, "pitch"),
+        ({"tolerance": 10**400}, "tolerance"),
         ({"pitch": "1"}, "pitch"),
         ({"tolerance": -1.0}, "tolerance"),
         ({"episode": -1}, "episode"),

@@ -25,6 +25,10 @@ def test_ticks_are_round_numbers(low: float, high: float, expected: list[float])
     assert ticks(low, high) == pytest.approx(expected)
 
 
+def test_ticks_of_next_to_nothing_are_at_its_beginning() -> None:
+    assert ticks(0.0, 5e-324) == [0.0]
+
+
 @pytest.mark.parametrize("high", [0.5, 1e-9, 1e9])
 def test_everything_is_drawn_inside_of_the_picture(high: float) -> None:
     chart = draw(curve(high, marked=3.0))

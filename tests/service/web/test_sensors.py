@@ -50,6 +50,14 @@ def test_whoever_may_upload_describes_a_gel_once(session_of: Any, database: Data
 
 
 @ON_SQLITE
+def test_a_form_leads_back_to_its_sensor_whatever_that_is_named(session_of: Any, database: Database) -> None:
+    with database.write() as session:
+        sensors.find_or_add(session, "100%25")
+    answer = session_of("upload").request("POST", path_of("100%25"), data=SENT)
+    assert (answer.status_code, answer.headers["location"]) == (303, path_of("100%25"))
+
+
+@ON_SQLITE
 def test_only_admins_change_a_gel(session_of: Any, database: Database, sensor: str) -> None:
     with database.write() as session:
         sensors.describe(session, sensor, GEL)
