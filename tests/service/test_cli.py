@@ -475,6 +475,7 @@ def test_a_sensor_is_described_and_listed_from_the_command_line(run: Run, url: s
     listed = run("sensors", "list", "--url", url)[1]
     assert re.search(r"Young's modulus \[Pa\].*marker depth \[m\]", listed)
     assert re.search(r"GelSight Mini +250000 +0\.480 +0\.00400 +0", listed)
-    (told,) = json.loads(run("sensors", "list", "--json", "--url", url)[1])["sensors"]
+    every = json.loads(run("sensors", "list", "--json", "--url", url)[1])["sensors"]
+    (told,) = (each for each in every if each["name"] == "GelSight Mini")
     assert told["gel"] == {"young_modulus": 2.5e5, "poisson_ratio": 0.48, "thickness": 0.004, "marker_depth": 0.0}
     assert run("sensors", "describe", "GelSight Mini", *gel[:-1], "-1", "--url", url)[0] == SERVICE_REFUSED

@@ -113,19 +113,19 @@ def test_a_truncated_file_is_refused(client: httpx.Client, upload: Upload, conte
 
 
 @pytest.mark.parametrize(
-    ("content", "content_type"),
+    ("content", "content_type", "allowed"),
     [
-        (b"time,x,y\n0,1,2\n", "application/octet-stream"),
-        (b"", "application/octet-stream"),
-        (b"PK\x03\x04", "text/html"),
+        (b"time,x,y\n0,1,2\n", "application/octet-stream", "a mapping that says which columns are what"),
+        (b"", "application/octet-stream", NPZ),
+        (b"PK\x03\x04", "text/html", NPZ),
     ],
 )
 def test_what_is_no_log_at_all_is_refused(
-    client: httpx.Client, upload: Upload, content: bytes, content_type: str
+    client: httpx.Client, upload: Upload, content: bytes, content_type: str, allowed: str
 ) -> None:
     problem = refusal(client, upload, content, 415, content_type)
     assert problem["type"] == "/problems/unsupported-format"
-    assert NPZ in problem["allowed"]
+    assert allowed in problem["allowed"]
 
 
 def test_an_empty_body_said_to_be_a_log_is_refused(client: httpx.Client, upload: Upload) -> None:
