@@ -3,7 +3,7 @@
 import json
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -126,8 +126,7 @@ class Database:
 
     def close(self) -> None:
         """Close every connection; one that a thread still has is closed once it gives it back."""
-        with suppress(StorageUnavailable):  # an older copy is noticed at the latest here, and gets nothing of the log
-            self._file.require()
+        self._file.check_before_close()
         if not self._is_closed:  # nobody else would: the pool that gets it back is no longer this engine's
             self._is_closed = True
             event.listen(self.engine, "checkin", lambda _, record: record.invalidate())

@@ -6,7 +6,8 @@ in its header. SQLite itself takes the header from the write-ahead log where tha
 is said to be immutable. Nobody here opens it past SQLite: closing it would end SQLite's locks.
 
 The log of a newer file would make a mixture of an older copy. SQLite writes it there when the last connection closes,
-and when the next one opens: the first is kept from happening, the second is refused.
+and when the next one opens: where generations tell, the first is kept from happening and the second is refused. They
+do not tell a copy from before a VACUUM, a migration or a restore, nor a file that is newer than the log beside it.
 """
 
 import ctypes
@@ -34,7 +35,7 @@ _CYCLE = 2**32
 """Generations after which the header's field of 32 bits begins anew."""
 
 OLDEST = -(2**30)
-"""Of a backup's file, which no log belongs to: older than any that has been in use."""
+"""Of a backup's file as it was written: older than any database that has been in use since it was made."""
 
 
 class SqliteFile:
@@ -72,14 +73,25 @@ class SqliteFile:
             if _identity(self._stat(suffix)) != opened and self._open:
                 raise self._lost(suffix)
 
+    def check_before_close(self) -> None:
+        """An older copy is noticed at the latest here, and gets nothing of the log."""
+        with suppress(StorageUnavailable):
+            self.require()
+            self._require_own_log()
+
     def _require_own_log(self) -> None:
         """At first, and at looks: a log whose first header is two generations on is another file's."""
         if self._path is None or self._beside is None:
             return
         in_log = first_generation(Path(f"{self._beside}-wal"))  # first: a file that others work on only gets newer
-        if in_log is None or not self._path.is_file():
+        if in_log is None:
             return
+        if not self._path.is_file():  # SQLite would make a new one, and delete the log
+            what = f"database file {self._path} is not there, and its write-ahead log {self._beside}-wal is"
+            raise StorageUnavailable(f"{what}; allowed: the file put back, or a new one once -wal was moved away")
         if is_older(in_file := self._read_header(), in_log - 1):
+            if self._open:
+                self._keep_log()
             raise StorageUnavailable(
                 f"database file {self._path} is of generation {in_file}, and its write-ahead log {self._beside}-wal "
                 f"follows one of {in_log - 1} or more: an older copy was written over the file; allowed: the file of "

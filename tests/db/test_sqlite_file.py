@@ -133,6 +133,51 @@ def test_an_older_copy_gets_nothing_of_the_log_of_a_newer_file(tmp_path: Path) -
         database.check_pages()
 
 
+IDLE = """
+import subprocess, sys
+from db.database import Database
+from db.migrate import upgrade
+from db.repositories import stores
+
+path, older = sys.argv[1:]
+idle, busy = Database("sqlite:///" + path), Database("sqlite:///" + path)
+upgrade(idle)
+for _ in range(3):
+    with busy.write() as session:
+        stores.touch(session)
+    busy.checkpoint()
+    if not _:
+        subprocess.run(["cp", path, older], check=True)
+with busy.write() as session:
+    stores.touch(session)
+busy.close()
+subprocess.run(["cp", older, path], check=True)
+idle.close()
+"""
+
+
+def test_who_looked_last_before_the_copy_writes_no_log_into_it_either(tmp_path: Path) -> None:
+    """What it knows is older than the copy: the log tells that this follows another file."""
+    path, older = tmp_path / "stiction.sqlite3", tmp_path / "older"
+    subprocess.run([sys.executable, "-c", IDLE, str(path), str(older)], check=True, timeout=120)
+    assert path.read_bytes() == older.read_bytes()
+
+
+def test_no_database_is_made_beside_the_log_of_one_that_is_gone(tmp_path: Path) -> None:
+    """As after a slip with mv: SQLite would delete the log, and with it what was accepted last."""
+    path, log = tmp_path / "stiction.sqlite3", tmp_path / "stiction.sqlite3-wal"
+    with closing(Database(f"sqlite:///{path}")) as database:
+        upgrade(database)
+        look(database)
+        content = log.read_bytes()
+    log.write_bytes(content)
+    path.rename(tmp_path / "away")
+    named = pytest.raises(StorageUnavailable, match="is not there, and its write-ahead log")
+    with closing(Database(f"sqlite:///{path}")) as database, named:
+        upgrade(database)
+    assert (path.exists(), log.read_bytes()) == (False, content)
+
+
 def test_a_log_that_was_not_written_to_the_file_yet_is_its_own(tmp_path: Path) -> None:
     """However often it was looked at since, and although another process has both open."""
     path = tmp_path / "stiction.sqlite3"
