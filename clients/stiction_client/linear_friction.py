@@ -81,6 +81,8 @@ class LinearFriction:
 
     refusal: ClassVar[type[ValueError]] = InvalidArgument
 
+    method: str
+    n: int
     coefficients: FloatArray
     covariance: FloatArray
     scale: float
@@ -103,6 +105,18 @@ class LinearFriction:
         self._check_probability("level", level)
         half = special.stdtrit(self.degrees_of_freedom, 0.5 * (1.0 + level)) * self.standard_errors
         return np.stack([self.coefficients - half, self.coefficients + half], axis=1)
+
+    def scale_interval(self, level: float = 0.95) -> tuple[float, float]:
+        """Central interval of σ at ``level``, by the χ² distribution of its estimate."""
+        from scipy import special
+
+        self._check_probability("level", level)
+        freedom = self.scatter_degrees_of_freedom
+        if math.isinf(freedom):
+            return self.scale, self.scale
+        tails = 0.5 * (1.0 - level), 0.5 * (1.0 + level)
+        low, high = (self.scale * math.sqrt(freedom / special.chdtri(freedom, tail)) for tail in tails)
+        return low, high
 
     def predict(
         self,

@@ -18,6 +18,7 @@ from service.cli import (
     materials,
     owners,
     remote,
+    reporting,
     running,
     sensors,
     simulation,
@@ -62,6 +63,7 @@ for command in (
     remote.upload,
     remote.lookup,
     remote.plan,
+    reporting.report,
     audit.audit,
 ):
     app.command()(command)

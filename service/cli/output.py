@@ -33,8 +33,11 @@ def print_lines(title: str, lines: Iterable[tuple[str, str | None]]) -> None:
     typer.echo("\n".join(printable(line) for line in (title, *(f"  {name:<{width}}  {text}" for name, text in told))))
 
 
-def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
-    """Print a table that is readable in a terminal, a log file and a pipe; a cell of None is empty."""
+def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], width: int = LINE_WIDTH) -> None:
+    """Print a table that is readable in a terminal, a log file and a pipe; a cell of None is empty.
+
+    ``width``: columns in a file or a pipe.
+    """
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.markup import escape
@@ -46,7 +49,7 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[obje
         table.add_column(escape(column), overflow="fold")
     for row in rows:  # units are in brackets, as markup
         table.add_row(*("" if cell is None else escape(printable(str(cell))) for cell in row))
-    Console(width=None if sys.stdout.isatty() else LINE_WIDTH).print(table)
+    Console(width=None if sys.stdout.isatty() else width).print(table)
 
 
 def when(text: str) -> str:

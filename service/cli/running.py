@@ -3,6 +3,7 @@
 import logging
 import os
 import signal
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -94,7 +95,7 @@ def demo(
     """Run the whole path on real input: recordings in, friction of each material, a planner's answer, a report."""
     from service.demo.run import run_demo
 
-    run_demo(output, recordings, seed, print_table)
+    run_demo(output, recordings, seed, partial(print_table, width=100))
 
 
 def _prepare(settings: "Settings") -> None:

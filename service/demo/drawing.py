@@ -2,15 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from rich.progress import Progress
 
-from estimators import EstimatorError, fit
 from service.demo.inputs import DemoLog
+from service.demo.tables import METHODS, Answer
 from service.report.page import Picture
-from service.report.pictures import posterior, samples_and_model, save, slip_over_time
+from service.report.pictures import friction_sections, marginals, slip_over_time
 from slipcore import LOOKAHEAD, FrictionSamples, SlipHistory, collect_samples, detect_slip
+from stiction_client import FrictionModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,42 +31,32 @@ def see(logs: Sequence[DemoLog], progress: Progress) -> list[Seen]:
     return seen
 
 
-def draw_grasps(seen: Sequence[Seen], folder: Path) -> list[Picture]:
+def draw_grasps(seen: Sequence[Seen]) -> list[Picture]:
     """Stick-slip maps and stick ratio of every real recording and of one simulated grasp a material."""
     simulated = {grasp.entry.material: grasp for grasp in seen if grasp.entry.truth is not None}
     shown = [*(grasp for grasp in seen if grasp.entry.truth is None), *simulated.values()]
-    return [_draw_grasp(grasp, folder) for grasp in shown]
+    return [_draw_grasp(grasp) for grasp in shown]
 
 
-def draw_materials(seen: Sequence[Seen], folder: Path, seed: int, progress: Progress) -> list[Picture]:
-    """Samples with the fitted plane, and the posterior, of every material that could be fitted."""
-    pictures: list[Picture] = []
-    materials = list(dict.fromkeys(grasp.entry.material for grasp in seen))
-    for material in progress.track(materials, description="fit again, for the pictures"):
-        grasps = [grasp for grasp in seen if grasp.entry.material == material]
-        try:
-            pictures += _draw_material(material, grasps, folder, seed)
-        except EstimatorError:
-            continue  # the table says why this material has no model
+def draw_models(answers: Sequence[Answer], seen: Sequence[Seen]) -> list[Picture]:
+    """The models that the tables tell of: by the first method over the samples, by the last one as what it believes."""
+    pictures = []
+    for answer in answers:
+        if answer.model is not None:
+            grasps = [grasp for grasp in seen if grasp.entry.material == answer.material]
+            pictures.append(_draw_model(answer.method, answer.model, grasps))
     return pictures
 
 
-def _draw_grasp(grasp: Seen, folder: Path) -> Picture:
-    name = grasp.entry.name
-    path = save(slip_over_time(grasp.entry.log, grasp.history, name), folder / f"slip-{_slug(name)}.png")
-    return Picture(f"{name}: contact, stick and slip over time, and the stick ratio.", path)
+def _draw_grasp(grasp: Seen) -> Picture:
+    figure = slip_over_time(grasp.entry.log, grasp.history, "")
+    return Picture(f"{grasp.entry.name}: contact, stick and slip over time, and the stick ratio.", figure)
 
 
-def _draw_material(material: str, grasps: Sequence[Seen], folder: Path, seed: int) -> list[Picture]:
-    slug, truth = _slug(material), grasps[0].entry.truth
-    samples = [grasp.samples for grasp in grasps]
-    plane = samples_and_model(FrictionSamples.concatenate(samples), fit(samples, method="ols"), material, truth)
-    bayes = posterior(fit(samples, method="bayes", seed=seed), f"{material}: posterior", truth)
-    return [
-        Picture(f"{material}: friction samples, the fitted plane and its band.", save(plane, folder / f"{slug}.png")),
-        Picture(f"{material}: posterior (dotted: 95 %).", save(bayes, folder / f"{slug}-posterior.png")),
-    ]
-
-
-def _slug(name: str) -> str:
-    return "".join(c if c.isalnum() else "-" for c in name.lower())
+def _draw_model(method: str, model: FrictionModel, grasps: Sequence[Seen]) -> Picture:
+    material, truth = grasps[0].entry.material, grasps[0].entry.truth
+    if method == METHODS[0]:
+        samples = FrictionSamples.concatenate([grasp.samples for grasp in grasps])
+        caption = f"{material}: friction samples, and the plane and band fitted by {method}."
+        return Picture(caption, friction_sections(model, samples, truth=truth))
+    return Picture(f"{material}: posterior by {method}; dotted: its 95 % interval.", marginals(model, truth=truth))

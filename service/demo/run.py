@@ -8,11 +8,12 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from service.demo import tables
-from service.demo.drawing import draw_grasps, draw_materials, see
+from service.demo.drawing import draw_grasps, draw_models, see
 from service.demo.inputs import DemoLog, recorded_logs, simulated_logs
 from service.demo.server import running_server
-from service.demo.tables import Answer, Upload
-from service.report.page import Section, write_report
+from service.demo.tables import METHODS, Answer, Upload
+from service.report import wording
+from service.report.page import Report, Section, write_report
 from stiction_client import (
     FrictionClient,
     FrictionModel,
@@ -20,8 +21,6 @@ from stiction_client import (
     RequiredForce,
     required_normal_force,
 )
-
-METHODS = ("ols", "bayes")
 
 TANGENTIAL_LOAD = 1.5
 """N; about the weight of a 150 g object on one of two fingers, doubled for a brisk lift."""
@@ -31,6 +30,11 @@ SLIP_PROBABILITY = 1e-3
 CONTACT_AREA = 6e-5
 """m²; a fingertip of 15 mm radius and 1 MPa pressed with about 10 N."""
 
+
+STEPS = (
+    "See the same in a browser: stiction serve, then stiction open; its first page loads simulated grasps.",
+    "Go the whole way with a sensor of yours: docs/tutorial.md takes 15 minutes.",
+)
 
 Show = Callable[[str, Sequence[str], Sequence[Sequence[object]]], None]
 """Prints a table: its caption, columns and rows."""
@@ -46,12 +50,12 @@ def run_demo(output: Path, recordings: Path | None, seed: int, show: Show) -> No
         with running_server(output / "service") as url, FrictionClient(url) as client:
             uploads = _upload(client, logs, progress)
             answers = _ask(client, list(dict.fromkeys(log.material for log in logs)), seed, progress)
-        sections = _sections(uploads, answers, output, seed, progress)
+        sections = _sections(uploads, answers, progress)
     for section in sections:
         for table in section.tables:
             show(table.caption, table.columns, table.rows)
-    page = write_report("Stiction: from tactile recordings to a planner's answer", _lead(logs), sections, output)
-    console.print(f"Report and pictures: {page}")
+    report = Report("Stiction: from tactile recordings to a planner's answer", _lead(logs), (), STEPS, sections)
+    console.print(f"Report: {write_report(report, output / 'report.html')}")
 
 
 def _inputs(output: Path, recordings: Path | None, seed: int, console: Console) -> list[DemoLog]:
@@ -95,19 +99,16 @@ def _grip(model: FrictionModel) -> RequiredForce | NoFeasibleForce:
 def _sections(
     uploads: Sequence[Upload],
     answers: Sequence[Answer],
-    output: Path,
-    seed: int,
     progress: Progress,
 ) -> list[Section]:
-    logs, pictures = [upload.log for upload in uploads], output / "pictures"
+    logs = [upload.log for upload in uploads]
     seen = see(logs, progress)
     return [
         Section(
             "Friction of each material",
-            "Estimate with its 95 % interval. Simulated grasps follow Coulomb's law, so β₁ and β₂ are truly 0; "
-            "of the real recordings no truth is known.",
+            f"{wording.MODEL} Simulated grasps follow Coulomb's law, so β₁ and β₂ are truly 0; of the real recordings "
+            "no truth is known.",
             [tables.friction(answers, {log.material: log.truth for log in logs})],
-            draw_materials(seen, pictures, seed, progress),
         ),
         Section(
             "The planner's answer",
@@ -117,10 +118,12 @@ def _sections(
         ),
         Section(
             "The grasps",
-            "What the detector said of each grasp, as it is. The real recordings carry no labels.",
+            f"What the detector said of each grasp. {wording.STICK_RATIO} The real recordings carry no labels.",
             [tables.grasps(uploads), tables.stages(uploads)],
-            draw_grasps(seen, pictures),
+            draw_grasps(seen),
+            folded=True,
         ),
+        Section("The models", "As fitted by the service.", pictures=draw_models(answers, seen), folded=True),
     ]
 
 

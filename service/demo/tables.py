@@ -5,12 +5,15 @@ from dataclasses import dataclass
 from statistics import median
 
 import numpy as np
-from scipy import special
 
 from service.demo.inputs import DemoLog
+from service.formatting import number
 from service.report.page import Table
 from slipcore import FrictionLaw
 from stiction_client import FrictionModel, GraspLogReceipt, Job, NoFeasibleForce, RequiredForce
+
+METHODS = ("ols", "bayes")
+"""By which each material is fitted."""
 
 COEFFICIENTS = ("β₀ [-]", "β₁ [s/m]", "β₂ [1/N]")
 
@@ -35,16 +38,16 @@ class Answer:
 
 
 def friction(answers: Iterable[Answer], truths: Mapping[str, FrictionLaw | None]) -> Table:
-    """Coefficients and σ with 95 % intervals, and the truth where known; a refusal with its reason."""
-    columns = ("material", "method", *COEFFICIENTS, "σ [-]", "true β₀", "samples", "fit")
+    """Coefficients with 95 % intervals, σ, and the truth where known; a refusal with its reason."""
+    columns = ("material", "method", *COEFFICIENTS, "σ [-]", "true β₀")
     rows = []
     for answer in answers:
         if answer.model is None:
-            outcome = [f"{answer.job.status}: {answer.job.reason}", *[""] * 6]
+            outcome = [f"{answer.job.status}: {answer.job.reason}", *[""] * 4]
         else:
-            outcome = _fitted(answer.model, truths[answer.material], sum(answer.job.seconds.values()))
+            outcome = _fitted(answer.model, truths[answer.material])
         rows.append([answer.material, answer.method, *outcome])
-    caption = "Friction models: estimate and 95 % interval; † marks what the data do not identify"
+    caption = "Friction models: estimate ± half of the 95 % interval; † marks what the data do not tell"
     return Table(caption, columns, rows)
 
 
@@ -57,9 +60,16 @@ def grips(answers: Iterable[Answer]) -> Table:
 def grasps(uploads: Sequence[Upload]) -> Table:
     """Each uploaded grasp: what was detected, its outcome, and the time from upload to stored fit."""
     columns = (
-        "grasp", "material", "frames", "duration", "in contact", "least stick ratio", "macro slip", "onsets",
-        "noise", "samples", "outcome", "work",
-    )  # fmt: skip
+        "grasp",
+        "in contact",
+        "least stick ratio",
+        "gross slip",
+        "onsets",
+        "noise",
+        "samples",
+        "outcome",
+        "work",
+    )
     return Table("Grasps uploaded", columns, [_grasp(upload) for upload in uploads])
 
 
@@ -71,23 +81,13 @@ def stages(uploads: Sequence[Upload]) -> Table:
     return Table("Time per stage (median over the uploads)", ("stage", "time"), rows)
 
 
-def _fitted(model: FrictionModel, truth: FrictionLaw | None, seconds: float) -> list[str]:
+def _fitted(model: FrictionModel, truth: FrictionLaw | None) -> list[str]:
+    halves = 0.5 * np.diff(model.interval(0.95), axis=1).ravel()
     cells = [
-        f"{value:.4g} ({low:.3g} … {high:.3g})" + ("" if known else " †")
-        for value, (low, high), known in zip(model.coefficients, model.interval(0.95), model.identifiable, strict=True)
+        f"{number(value)} ± {number(half, 2)}{'' if told else ' †'}"
+        for value, half, told in zip(model.coefficients, halves, model.identifiable, strict=True)
     ]
-    low, high = _scale_interval(model)
-    known = "unknown" if truth is None else f"{truth.coefficients[0]:g}"
-    return [*cells, f"{model.scale:.3g} ({low:.3g} … {high:.3g})", known, str(model.n), _milliseconds(seconds)]
-
-
-def _scale_interval(model: FrictionModel) -> tuple[float, float]:
-    """95 % interval of σ, by the χ² distribution of its estimate."""
-    freedom = model.scatter_degrees_of_freedom
-    if np.isinf(freedom):
-        return model.scale, model.scale
-    high, low = (model.scale * np.sqrt(freedom / special.chdtri(freedom, tail)) for tail in (0.975, 0.025))
-    return float(low), float(high)
+    return [*cells, number(model.scale), "unknown" if truth is None else f"{truth.coefficients[0]:g}"]
 
 
 def _grip(grip: RequiredForce | NoFeasibleForce | None) -> list[str]:
@@ -102,7 +102,7 @@ def _grasp(upload: Upload) -> list[str]:
     detected = [""] * 6
     if seen is not None:
         detected = [
-            str(seen.contact_frames),
+            f"{seen.contact_frames} of {receipt.frames}",
             "" if seen.stick_ratio_min is None else f"{seen.stick_ratio_min:.2f}",
             str(seen.macro_slip_frames),
             str(seen.events["onset"]),
@@ -110,8 +110,7 @@ def _grasp(upload: Upload) -> list[str]:
             str(seen.samples),
         ]
     work = _milliseconds(sum(receipt.job.seconds.values()))
-    head = [upload.log.name, upload.log.material, str(receipt.frames), f"{receipt.duration:.2f} s"]
-    return [*head, *detected, outcome, work]
+    return [upload.log.name, *detected, outcome, work]
 
 
 def _milliseconds(seconds: float) -> str:

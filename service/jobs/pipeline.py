@@ -136,7 +136,7 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
     with run.stage("slip_state"):
         history = slipcore.detect_slip(log, method=stored.detector, lookahead=slipcore.LOOKAHEAD)
     with run.stage("samples"):
-        found, none_because = _collect(log, history, reconstruction)
+        found, none_because = collect(log, history, reconstruction)
         samples, findings = found.samples, slipcore.check_log(log, history, found.elements)
         findings = [*_said(reconstruction), *findings]
         blob = run.blobs.put(encode_history(history))
@@ -212,7 +212,7 @@ def _said(reconstruction: "Reconstruction | None") -> list[Finding]:
     return [Finding(RECONSTRUCTED, evidence, "friction is as sure as the description of the sensor's gel")]
 
 
-def _collect(
+def collect(
     log: GraspLog, history: SlipHistory, reconstruction: "Reconstruction | None"
 ) -> tuple[Collected, str | None]:
     """What is known of friction, and if there are no samples, why; noise of reconstructed forces is theirs."""

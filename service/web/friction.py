@@ -10,23 +10,15 @@ from db.records import Material, StoredModel
 from service.domain.recommended import disagreeing, recommended
 from service.domain.record_next import RecordNext, record_next
 from service.domain.stored_results import to_friction_model
+from service.report.wording import COEFFICIENTS, LEVELS
 from service.web.charts import Chart, Curve, draw
 from stiction_client.support import OUTDATED, Support
-
-LEVELS = (0.05, 0.95)
-"""Quantiles between which 90 % of new observations are expected."""
 
 POINTS = 61
 """At which a section is computed."""
 
 BEYOND = 1.25
 """How far past the data a section is drawn, as a factor."""
-
-COEFFICIENTS = (
-    ("β₀", "friction at rest and without load", "no unit"),
-    ("β₁", "change of friction with velocity", "per metre a second (s/m)"),
-    ("β₂", "change of friction with the normal force on an element", "per newton (1/N)"),
-)
 
 
 @dataclass(frozen=True, slots=True)

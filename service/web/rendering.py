@@ -11,6 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from service import formatting
 from service.http.access import EVERYTHING, Access
 from service.http.sessions import sent_token
+from service.report.wording import record_next
 from service.web.assets import path_of
 
 POLICY = (
@@ -49,6 +50,7 @@ def _environment() -> Environment:
     for filter_ in (formatting.number, formatting.interval, formatting.age, formatting.moment, formatting.size):
         environment.filters[filter_.__name__] = filter_
     environment.filters |= {"grouped": formatting.grouped, "at_least": formatting.at_least}
+    environment.filters["record_next"] = record_next
     environment.filters["segment"] = lambda text: quote(str(text), safe="")
     environment.globals["asset"] = path_of
     return environment

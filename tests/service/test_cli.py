@@ -93,6 +93,20 @@ def test_detect_tells_a_program_what_was_seen(run: Run, ramps: list[Path], tmp_p
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_report_of_a_log_is_one_file_and_its_pictures_are_written_beside_on_request(
+    run: Run, ramps: list[Path], tmp_path: Path
+) -> None:
+    page = tmp_path / "report.html"
+    code, out, _ = run("report", ramps[0], "-o", page, "--pictures", "svg")
+    assert code == 0
+    assert page.read_text(encoding="utf-8").count("<svg") == 3
+    assert {each.name for each in tmp_path.iterdir()} == {
+        "report.html", "report-1.svg", "report-2.svg", "report-3.svg"
+    }  # fmt: skip
+    assert [Path(line).name for line in out.splitlines()][-1] == "report.html"
+    assert run("report", tmp_path / "absent.npz", "-o", page)[0] == 2
+
+
 def test_check_says_what_is_doubtful_and_fit_says_it_beside_its_model(
     run: Run, ramps: list[Path], tmp_path: Path
 ) -> None:
@@ -349,6 +363,19 @@ def test_materials_and_logs_are_looked_at_and_looked_after(run: Run, ramps: list
     assert re.search(r"withdrawn +\d{4}-.* UTC: mislabelled\n", run("logs", "show", sent[0]["grasp_log"], *told)[1])
     withdrawn = json.loads(run("logs", "list", "--material", "felt", *told, "--json")[1])["grasp_logs"]
     assert len(withdrawn) == 3
+
+
+def test_a_report_of_a_material_is_made_of_what_the_service_tells(
+    run: Run, ramps: list[Path], url: str, tmp_path: Path
+) -> None:
+    run("upload", ramps[0], "--material", "reported", "--create", "--url", url)
+    code, out, _ = run("report", "reported", "-o", tmp_path / "reported.html", "--url", url)
+    page = (tmp_path / "reported.html").read_text(encoding="utf-8")
+    assert (code, out.strip()) == (0, str(tmp_path / "reported.html"))
+    assert "Record next: press with" in page
+    code, _, err = run("report", "reportd", "-o", tmp_path / "none.html", "--url", url)
+    assert (code, "did you mean reported?" in err) == (SERVICE_REFUSED, True)
+    assert not (tmp_path / "none.html").exists()
 
 
 def test_what_others_typed_moves_no_terminal(run: Run, url: str) -> None:

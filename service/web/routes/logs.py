@@ -6,7 +6,7 @@ from functools import partial
 
 from fastapi import APIRouter, Request, Response
 
-from db.records import StoredGraspLog
+from db.records import Detection, StoredGraspLog
 from db.repositories import grasp_logs
 from service.domain.context import Context
 from service.domain.errors import ResultsNotReady
@@ -14,6 +14,7 @@ from service.http.access import READ, CurrentPrincipal
 from service.http.conditional import KEEP_AND_ASK, is_one_of, unchanged
 from service.http.dependencies import CurrentContext
 from service.http.download import Download
+from service.web import reports
 from service.web.frames import write_frames
 from service.web.rendering import render
 
@@ -31,13 +32,11 @@ def show_log(context: CurrentContext, request: Request, id: str) -> Response:  #
 @router.get("/logs/{id}/frames", dependencies=[READ])
 async def read_frames(context: CurrentContext, request: Request, principal: CurrentPrincipal, id: str) -> Response:  # noqa: A002
     """What the player shows (``service.web.frames``), made in a reader's process; raises ``ResultsNotReady``."""
-    log = await asyncio.to_thread(_find, context, id)
-    if log.detection is None:
-        raise ResultsNotReady(log.job.id, log.job.status)
-    tag = f'"{log.detection.history_blob[:32]}{"" if log.has_file else "-"}"'
+    log, detection = await asyncio.to_thread(_find_results, context, id)
+    tag = f'"{detection.history_blob[:32]}{"" if log.has_file else "-"}"'
     if is_one_of(tag, request.headers.get("if-none-match", "")):
         return unchanged(tag)
-    history = await asyncio.to_thread(context.blobs.path, log.detection.history_blob)
+    history = await asyncio.to_thread(context.blobs.path, detection.history_blob)
     upload = await asyncio.to_thread(context.blobs.path, log.sha256) if log.has_file else None
     with ExitStack() as spools:
         spool = spools.enter_context(context.blobs.spool())
@@ -45,6 +44,26 @@ async def read_frames(context: CurrentContext, request: Request, principal: Curr
         close = spools.pop_all().close
     headers = {"ETag": tag, "Cache-Control": KEEP_AND_ASK}
     return Download(spool.path, close, headers=headers, media_type="application/octet-stream")
+
+
+@router.get("/logs/{id}/report", dependencies=[READ])
+async def read_report(context: CurrentContext, principal: CurrentPrincipal, id: str) -> Response:  # noqa: A002
+    """The log's report, as one file; raises ``ResultsNotReady``."""
+    log, detection = await asyncio.to_thread(_find_results, context, id)
+    if log.samples is None:
+        raise ResultsNotReady(log.job.id, log.job.status)
+    wanted = [detection.history_blob, log.samples.samples_blob, *([log.sha256] if log.has_file else [])]
+    history, samples, *upload = [await asyncio.to_thread(context.blobs.path, each) for each in wanted]
+    write = partial(reports.write_log, log, history, samples, upload[0] if upload else None)
+    return await reports.show(context, principal, log.format, write)
+
+
+def _find_results(context: Context, log_id: str) -> tuple[StoredGraspLog, Detection]:
+    """A log and what was detected in it."""
+    log = _find(context, log_id)
+    if log.detection is None:
+        raise ResultsNotReady(log.job.id, log.job.status)
+    return log, log.detection
 
 
 def _find(context: Context, log_id: str) -> StoredGraspLog:

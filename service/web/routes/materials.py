@@ -1,5 +1,7 @@
 """Materials: all of them, and one."""
 
+import asyncio
+from functools import partial
 from typing import Annotated, Literal
 from urllib.parse import quote
 
@@ -12,14 +14,19 @@ from db.records import LogFilter
 from db.repositories import friction_models, grasp_logs, materials
 from estimators.method_names import ModelMethod
 from service.domain import curate
+from service.domain.context import Context
 from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.dependencies import CurrentContext
 from service.http.paging import CursorText, Page
 from service.http.schemas.common import Force, Velocity
-from service.http.schemas.materials import NewMaterial
+from service.http.schemas.grasp_logs import GraspLogOut
+from service.http.schemas.materials import MaterialOut, NewMaterial
+from service.report.wording import NEWEST_LOGS
+from service.web import reports
 from service.web.forms import EMPTY_IS_NONE, FormRoute, checked
 from service.web.friction import coefficients, friction_at, listed, next_of, sections, usual_model
 from service.web.rendering import render
+from stiction_client.records import GraspLogReceipt, Material
 
 router = APIRouter(include_in_schema=False, route_class=FormRoute)
 
@@ -97,3 +104,23 @@ def show_material(
         logs=logs,
         after=after,
     )
+
+
+@router.get("/materials/{name}/report", dependencies=[READ])
+async def read_report(context: CurrentContext, principal: CurrentPrincipal, name: str) -> Response:
+    """The material's report, as one file; raises ``NotFound``."""
+    write = await asyncio.to_thread(_report_of, context, name)
+    return await reports.show(context, principal, "stored", write)
+
+
+def _report_of(context: Context, name: str) -> partial[None]:
+    """What writes the report, of the records that a client would have."""
+    newest = Window("created_at", descending=True, limit=NEWEST_LOGS)
+    with context.database.read() as session:
+        found = materials.get(session, name)
+        logs = grasp_logs.list_all(session, newest, LogFilter(material_id=found.id))
+    stored = usual_model(found.models)
+    probe = None if stored is None else next_of(stored, friction_at(stored, None))
+    told = [GraspLogReceipt.from_json(GraspLogOut.of(log).model_dump(mode="json")) for log in logs]
+    material = Material.from_json(MaterialOut.of(found).model_dump(mode="json"))
+    return partial(reports.write_material, material, told, probe)

@@ -44,6 +44,23 @@ def test_a_log_that_went_all_the_way_has_a_player_with_frames(
 
 
 @ON_SQLITE
+def test_a_log_and_its_material_have_a_report_that_loads_nothing(
+    client: httpx.Client, fitted: Any, elements: Callable[..., Any], page_of: Callable[[str], Any]
+) -> None:
+    for path in (f"/logs/{fitted['id']}", "/materials/fitted"):
+        assert f"{path}/report" in [given.get("href") for _, given in page_of(path).found]
+        answer = client.get(f"{path}/report")
+        assert answer.status_code == 200, answer.text
+        assert answer.headers["content-type"] == "text/html; charset=utf-8"
+        assert answer.headers["content-security-policy"].startswith("default-src 'none'; style-src 'unsafe-inline'")
+        page = elements(answer.text)
+        assert [tag for tag, _ in page.found if tag in {"script", "img", "link"}] == []
+        assert "What to do next" in page.text
+        assert "svg" in {tag for tag, _ in page.found}
+    assert not list((Path(client.headers["x-data-folder"]) / "spool").iterdir())
+
+
+@ON_SQLITE
 @pytest.mark.parametrize(
     "path", ["/logs/{id}/frames", "/v1/grasp-logs/{id}/file", "/v1/grasp-logs/{id}/file?format=parquet"]
 )

@@ -1,0 +1,76 @@
+"""The command that writes a report: of a grasp log, or of a material of a running service."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from service.cli.local import DETECTOR_HELP, FrameRate, Mapping, Scale, mapping_text
+from service.cli.remote import DEFAULT_URL, Key, Url, connected
+
+if TYPE_CHECKING:
+    from service.report.page import Report
+
+
+class PictureFormat(StrEnum):
+    """Of pictures beside a report."""
+
+    png = "png"
+    svg = "svg"
+
+
+def report(
+    what: Annotated[str, typer.Argument(metavar="LOG|MATERIAL", help="A file of a grasp log, or a material's name.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The HTML file to write; everything is inside of it.")],
+    pictures: Annotated[
+        PictureFormat | None, typer.Option(help="Write its pictures as files of this kind beside it, too.")
+    ] = None,
+    method: Annotated[str | None, typer.Option(help=DETECTOR_HELP)] = None,
+    scale: Scale = None,
+    frame_rate: FrameRate = None,
+    mapping: Mapping = None,
+    url: Url = DEFAULT_URL,
+    key: Key = None,
+) -> None:
+    """Write a report of a grasp log, or of a material of a service: one HTML file, to be read anywhere."""
+    from service.report.page import write_report
+
+    path = Path(what)
+    if path.exists():
+        made = _of_log(path, method, scale, frame_rate, mapping)
+    elif len(path.parts) > 1:
+        raise typer.BadParameter(f"there is no file {what}; allowed: a grasp log, or the name of a material")
+    else:
+        made = _of_material(what, url, key)
+    if pictures is not None:
+        _write_pictures(made, output, pictures.value)
+    typer.echo(f"{write_report(made, output)}")
+
+
+def _of_log(
+    path: Path, method: str | None, scale: float | None, frame_rate: float | None, mapping: Path | None
+) -> "Report":
+    from service import formats
+    from service.report.grasp import grasp_report, see
+
+    log = formats.read(path, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
+    return grasp_report(see(log, path.name, method))
+
+
+def _of_material(name: str, url: str, key: str | None) -> "Report":
+    from service.report.material import material_report
+    from service.report.wording import NEWEST_LOGS
+
+    with connected(url, key) as client:
+        material = client.material(name)
+        logs = client.grasp_logs(material.name, NEWEST_LOGS)
+        probe = client.next_grasp(material.name) if material.recommended else None
+    return material_report(material, logs, probe)
+
+
+def _write_pictures(made: "Report", beside: Path, kind: str) -> None:
+    from service.report.pictures import save
+
+    for number, picture in enumerate(made.pictures, 1):
+        typer.echo(f"{save(picture.figure, beside.with_name(f'{beside.stem}-{number}.{kind}'))}")

@@ -1,0 +1,88 @@
+"""Sentences and tables that tell of a model, the same on every page."""
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from service.formatting import interval, number
+from service.report.page import Fact, Table
+from stiction_client.linear_friction import LinearFriction
+from stiction_client.support import Support
+
+COEFFICIENTS = (
+    ("β₀", "friction at rest and without load", "no unit"),
+    ("β₁", "change of friction with velocity", "per metre a second (s/m)"),
+    ("β₂", "change of friction with the normal force on an element", "per newton (1/N)"),
+)
+
+LEVELS = (0.05, 0.95)
+"""Quantiles between which 90 % of new observations are expected."""
+
+NEWEST_LOGS = 100
+"""Of a material listed in its report, at most."""
+
+STICK_RATIO = (
+    "The stick ratio is the share of the elements in contact that stick: 1 while all of them do, 0 in gross slip."
+)
+
+MODEL = (
+    "μ = β₀ + β₁ v + β₂ fₙ + ε. β₀ is friction at rest and without load, β₁ [s/m] its change with the velocity v of "
+    "the slip, β₂ [1/N] that with the normal force fₙ on an element, and σ the standard deviation of the scatter ε. "
+    "† marks a coefficient that the data do not tell; what it says counts for nothing outside of them."
+)
+
+
+class Probe(Protocol):
+    """A grasp that is worth recording."""
+
+    @property
+    def normal_force(self) -> float:
+        """N an element."""
+
+    @property
+    def slip_length(self) -> float:
+        """In m."""
+
+    @property
+    def speed(self) -> float:
+        """In m/s."""
+
+    @property
+    def uncertainty(self) -> float:
+        """Half-width of the 95 % interval of friction now."""
+
+    @property
+    def after(self) -> float:
+        """The same with this grasp."""
+
+
+def record_next(told: Probe) -> str:
+    """What to record next, and what that is good for."""
+    return (
+        f"Record next: press with {number(told.normal_force)} N on an element and let it slip by "
+        f"{number(told.slip_length)} m at {number(told.speed)} m/s. The expected friction, known to "
+        f"± {number(told.uncertainty)}, is then known to ± {number(told.after)}."
+    )
+
+
+def friction_facts(model: LinearFriction) -> tuple[list[Fact], Support]:
+    """Friction of an element at rest, in the middle of the normal forces observed, and what that rests on."""
+    force = 0.5 * sum(model.domain.normal_force)
+    band = [float(model.predict(0.0, force, quantile=level)) for level in LEVELS]
+    facts = [
+        Fact(f"Friction coefficient μ, at {number(force)} N an element", number(float(model.predict(0.0, force)))),
+        Fact("90 % of new observations", interval(band)),
+    ]
+    return facts, model.support_at(0.0, force)
+
+
+def coefficient_table(models: Mapping[str, LinearFriction]) -> Table:
+    """Coefficients and σ of each model with 95 % intervals."""
+    rows = [[name, *estimates(model), str(model.n)] for name, model in models.items()]
+    return Table("Estimates and 95 % intervals", ("method", "β₀ [-]", "β₁ [s/m]", "β₂ [1/N]", "σ [-]", "samples"), rows)
+
+
+def estimates(model: LinearFriction) -> list[str]:
+    """Each coefficient and σ with its 95 % interval."""
+    bounds = zip(model.coefficients, model.interval(0.95), model.identifiable, strict=True)
+    cells = [f"{number(value)} ({interval(ends)}){'' if told else ' †'}" for value, ends, told in bounds]
+    return [*cells, f"{number(model.scale)} ({interval(model.scale_interval(0.95))})"]

@@ -1,0 +1,42 @@
+"""Reports of a log and of a material, made in a reader's process, which alone loads what draws their pictures."""
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+
+from db.records import StoredGraspLog
+from service.domain.context import Context
+from service.domain.principal import Principal
+from service.domain.record_next import RecordNext
+from service.http.download import Download
+from stiction_client.records import GraspLogReceipt, Material
+
+HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'",
+    "Cache-Control": "no-cache",
+}
+"""A report loads nothing; its style and pictures stand in it, for it is one file."""
+
+
+async def show(context: Context, principal: Principal, kind: str, write: Callable[[Path], None]) -> Download:
+    """The report that ``write``, which can be pickled, writes to a path."""
+    with ExitStack() as spools:
+        spool = spools.enter_context(context.blobs.spool())
+        await context.readers.derive(partial(write, spool.path), kind, principal.share)
+        close = spools.pop_all().close
+    return Download(spool.path, close, headers=HEADERS, media_type="text/html; charset=utf-8")
+
+
+def write_log(log: StoredGraspLog, history: Path, samples: Path, upload: Path | None, target: Path) -> None:
+    """Write the report of a stored log; ``upload`` is None where it was deleted."""
+    from service.report.grasp import write_stored
+
+    write_stored(log, history, samples, upload, target)
+
+
+def write_material(material: Material, logs: Sequence[GraspLogReceipt], probe: RecordNext | None, target: Path) -> None:
+    """Write the report of a material with the newest of its logs."""
+    from service.report import material as report
+
+    report.write_material(material, logs, probe, target)
