@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,9 @@ from estimators.errors import InvalidSamples
 from slipcore.references import ESTIMATION, LIKELIHOODS, cited
 from stiction_client.linear_friction import Domain, FloatArray, LinearFriction, Scale, Scales
 from stiction_client.model import Cost
+
+if TYPE_CHECKING:
+    from estimators.inference_data import InferenceData
 
 __all__ = ["Cost", "Domain", "FrictionModel", "Scale", "Scales"]
 
@@ -49,6 +52,18 @@ class FrictionModel(LinearFriction):
         """The papers behind the method and its likelihood."""
         likelihood = str(self.diagnostics.get("likelihood", ""))
         return cited(ESTIMATION.get(self.method, ()), LIKELIHOODS.get(likelihood, ()))
+
+    def to_inference_data(self) -> "InferenceData":
+        """The draws of the posterior as ArviZ takes them: one chain, each parameter by its name.
+
+        Raises ``InvalidSamples`` for a model without draws, ``ModuleNotFoundError`` where ArviZ is not installed.
+        """
+        from estimators.inference_data import inference_data
+
+        if self.draws is None:
+            raise InvalidSamples("draws", f"none of a model by {self.method}", "a sampled posterior: fit by bayes")
+        names = str(self.diagnostics["draws"]).split(", ")
+        return inference_data(dict(zip(names, self.draws.T, strict=True)))
 
     def interval(self, level: float = IDENTIFIABILITY.interval) -> FloatArray:
         """Central interval of each coefficient at ``level``: [3, 2]; from the draws where there are any."""

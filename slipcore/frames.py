@@ -3,13 +3,16 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from slipcore.defaults import LIMITS
 from slipcore.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from slipcore.labelled import Dataset, Variables
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -148,6 +151,35 @@ class GraspLog:
         known = {name: array[frames] for name in over_time if (array := getattr(self, name)) is not None}
         truth = None if self.truth is None else self.truth.take(frames)
         return replace(self, time=self.time[frames], displacement=self.displacement[frames], truth=truth, **known)
+
+    def to_xarray(self) -> "Dataset":
+        """The log as labelled arrays with units; raises ``ModuleNotFoundError`` where xarray is not installed."""
+        from slipcore.labelled import dataset
+
+        cells = ("time", "row", "column")
+        variables: Variables = {
+            "displacement": ((*cells, "axis"), self.displacement, "m"),
+            "force": ((*cells, "axis"), self.force, "N"),
+            "normal": ((*cells, "axis"), self.normal, "1"),
+            "object_pose": (("time", "pose"), self.object_pose, "m, m, rad"),
+            "contact": (cells, self.contact, "1"),
+            "observed": (cells, self.observed, "1"),
+            "position": (("row", "column", "axis"), self.position, "m"),
+        }
+        about = {"sensor": self.sensor, "element_area_m2": self.element_area}
+        return dataset(variables, {"time": (("time",), self.time, "s")}, **about)
+
+    def _repr_html_(self) -> str:
+        from slipcore.notebook import summary
+
+        rows = {
+            "sensor": self.sensor,
+            "frames": f"{len(self)} in {self.time[-1] - self.time[0]:.3g} s",
+            "elements": f"{self.grid[0]} × {self.grid[1]} of {1e6 * self.element_area:.3g} mm²",
+            "forces": "none" if self.force is None else "of each element",
+            "truth": "none" if self.truth is None else "simulated",
+        }
+        return summary("Grasp log", rows.items())
 
     def frames(self) -> Iterator[Frame]:
         """Walk through the log as a detector would see it live."""

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,15 @@ from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.slip_state import SlipHistory
 from slipcore.surface.log_normals import normals_of
 
+if TYPE_CHECKING:
+    from slipcore.labelled import DataFrame, Dataset
+
 Scalar = TypeVar("Scalar", bound=np.generic)
 KIND = "<U7"
 """Of the names of kinds."""
+
+UNITS = {"tangential_velocity": "m/s", "normal_force": "N", "tangential_force": "N", "time": "s"}
+"""Of the arrays that have one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,6 +69,29 @@ class FrictionSamples:
     def take(self, rows: NDArray[np.bool_]) -> "FrictionSamples":
         """Some of the samples."""
         return replace(self, **{name: getattr(self, name)[rows] for name in self.arrays()})
+
+    def to_dataframe(self) -> "DataFrame":
+        """One row a sample; raises ``ModuleNotFoundError`` where pandas is not installed."""
+        from slipcore.labelled import table
+
+        columns = {name: getattr(self, name) for name in self.arrays()}
+        return table(columns, element_area=self.element_area, normal_force_noise=self.normal_force_noise)
+
+    def to_xarray(self) -> "Dataset":
+        """Labelled arrays with units; raises ``ModuleNotFoundError`` where xarray is not installed."""
+        from slipcore.labelled import dataset
+
+        variables = {name: (("sample",), getattr(self, name), UNITS.get(name, "1")) for name in self.arrays()}
+        return dataset(variables, {}, element_area_m2=self.element_area, normal_force_noise_N=self.normal_force_noise)
+
+    def _repr_html_(self) -> str:
+        from slipcore.notebook import summary
+
+        rows: dict[str, object] = {"samples": len(self), "element": f"{1e6 * self.element_area:.3g} mm²"}
+        for name in ("friction_coefficient", "tangential_velocity", "normal_force") if len(self) else ():
+            low, middle, high = np.quantile(getattr(self, name), (0.05, 0.5, 0.95))
+            rows[f"{name} [{UNITS.get(name, '-')}]"] = f"{middle:.3g} ({low:.3g} … {high:.3g})"
+        return summary("Friction samples: median and 90 % range", rows.items())
 
     def at_element_area(self, element_area: float) -> "FrictionSamples":
         """The same pressures on elements of another area, m²: forces scale with it, friction and velocity do not."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,9 @@ from slipcore.element_forces import stick_ratio
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.patch_record import Patch
 from slipcore.references import DETECTION, cited
+
+if TYPE_CHECKING:
+    from slipcore.labelled import DataFrame, Dataset, Variables
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,6 +97,53 @@ class SlipHistory:
     def references(self) -> tuple[str, ...]:
         """The papers behind the method; none of one that this package does not know."""
         return cited(DETECTION.get(self.method, ()))
+
+    def to_dataframe(self) -> "DataFrame":
+        """One row a frame, by time: stick ratio, whether all of it slips, elements in contact and in slip.
+
+        Raises ``ModuleNotFoundError`` where pandas is not installed.
+        """
+        from slipcore.labelled import table
+
+        over_elements = (1, 2)
+        columns = {
+            "time": self.time,
+            "stick_ratio": self.stick_ratio,
+            "macro_slip": self.macro_slip,
+            "elements_in_contact": self.contact.sum(axis=over_elements),
+            "elements_in_slip": self.slip.sum(axis=over_elements),
+        }
+        return table(columns, method=self.method, noise=self.noise).set_index("time")
+
+    def to_xarray(self) -> "Dataset":
+        """All of it over time and elements, with units; raises ``ModuleNotFoundError`` where xarray is missing."""
+        from slipcore.labelled import dataset
+
+        cells = ("time", "row", "column")
+        variables: Variables = {
+            "contact": (cells, self.contact, "1"),
+            "slip": (cells, self.slip, "1"),
+            "probability": (cells, self.probability, "1"),
+            "velocity": ((*cells, "plane_axis"), self.velocity, "m/s"),
+            "observed": (cells, self.observed, "1"),
+            "stick_ratio": (("time",), self.stick_ratio, "1"),
+            "macro_slip": (("time",), self.macro_slip, "1"),
+        }
+        return dataset(variables, {"time": (("time",), self.time, "s")}, method=self.method, noise_m=self.noise)
+
+    def _repr_html_(self) -> str:
+        from slipcore.notebook import curve, summary
+
+        touched = ~np.isnan(self.stick_ratio)
+        least = f"{self.stick_ratio[touched].min():.3g}" if touched.any() else "never in contact"
+        rows = {
+            "detector": self.method,
+            "in contact": f"{np.count_nonzero(touched)} of {len(self.time)} frames",
+            "least stick ratio": least,
+            "gross slip": f"{np.count_nonzero(self.macro_slip)} frames",
+            "onsets of slip": len(self.events.onset),
+        }
+        return summary("Slip history", rows.items(), curve(self.stick_ratio, "stick ratio over time"))
 
 
 def observed_over_time(slip_states: Sequence[SlipState]) -> BoolArray | None:

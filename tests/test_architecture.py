@@ -33,7 +33,11 @@ ALLOWED = {
     CLIENT: {"stiction_client", "httpx", "numpy", "scipy"},
 }
 
-OPTIONAL = {f"{CLIENT}/stream.py": {"websockets", "msgspec"}}
+OPTIONAL = {
+    f"{CLIENT}/stream.py": {"websockets", "msgspec"},
+    f"{CLIENT}/labelled.py": {"pandas", "xarray"},
+    "slipcore/labelled.py": {"pandas", "xarray"},
+}
 """What a module needs that nothing else imports: an extra brings it."""
 
 

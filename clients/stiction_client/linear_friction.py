@@ -3,13 +3,16 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiction_client.errors import InvalidArgument
 from stiction_client.support import Kind, Support, extrapolation, support, widening
+
+if TYPE_CHECKING:
+    from stiction_client.labelled import DataFrame, Dataset, Row
 
 FloatArray = NDArray[np.float64]
 
@@ -195,6 +198,35 @@ class LinearFriction:
     def advice(self) -> str:
         """What to do about it."""
         return self.support_at(0.0, 0.5 * sum(self.domain.normal_force)).advice
+
+    def to_dataframe(self) -> "DataFrame":
+        """A row for each coefficient and σ: unit, estimate, standard error, 95 % interval, whether the data tell it.
+
+        Raises ``ModuleNotFoundError`` where pandas is not installed.
+        """
+        from stiction_client.labelled import coefficient_table
+
+        return coefficient_table(self._rows(), method=self.method, samples=self.n)
+
+    def to_xarray(self) -> "Dataset":
+        """Coefficients and covariance with their names; raises ``ModuleNotFoundError`` where xarray is missing."""
+        from stiction_client.labelled import coefficient_dataset
+
+        told = self.coefficients, self.covariance, self.identifiable, self.scale
+        return coefficient_dataset(*told, method=self.method, samples=self.n)
+
+    def _repr_html_(self) -> str:
+        from stiction_client.labelled import coefficient_html
+
+        title = f"Friction model by {self.method}, of {self.n} samples"
+        return coefficient_html(title, self._rows(), f"{self.support}: {self.advice}")
+
+    def _rows(self) -> "list[Row]":
+        """What a table shows of each coefficient and of σ."""
+        bounds = [*self.interval(0.95).tolist(), list(self.scale_interval(0.95))]
+        values, told = [*self.coefficients.tolist(), self.scale], [*self.identifiable.tolist(), True]
+        errors = [*self.standard_errors.tolist(), self.scale / math.sqrt(2.0 * self.scatter_degrees_of_freedom)]
+        return [(*each[:2], *each[2], each[3]) for each in zip(values, errors, bounds, told, strict=True)]
 
     def _check_probability(self, name: str, value: float) -> None:
         if not 0.0 < value < 1.0:

@@ -1,8 +1,10 @@
 """Every example runs, and prints what its grasp's true friction calls for."""
 
+import json
 import re
 import runpy
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -47,6 +49,18 @@ def test_a_detector_is_added(capsys: pytest.CaptureFixture[str]) -> None:
         assert number(r"far_from_mean: right for (\d+) %", printed("add_a_detector", capsys)) > 60.0
     finally:
         slipcore.METHODS.pop("far_from_mean", None)
+
+
+@pytest.mark.filterwarnings("ignore:.*ArviZ is undergoing:FutureWarning")
+def test_the_cells_of_the_notebook_run_one_after_the_other() -> None:
+    names: dict[str, Any] = {}
+    notebook = json.loads((EXAMPLES["use_a_service"].parent / "friction_in_a_notebook.ipynb").read_text("utf-8"))
+    for cell in notebook["cells"]:
+        if cell["cell_type"] == "code":
+            exec(compile("".join(cell["source"]), cell["id"], "exec"), names)
+            assert cell["outputs"] == []  # what it prints is not kept: it would go stale
+    assert names["model"].predict(0.0, 0.1) == pytest.approx(0.45, abs=0.02)
+    assert 1.5 / 0.5 < names["grip"].normal_force < 1.5 / 0.3
 
 
 def test_every_example_is_run_here() -> None:
