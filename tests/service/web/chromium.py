@@ -15,6 +15,12 @@ from websockets.sync.client import ClientConnection, connect
 
 PROGRAM = shutil.which("chromium")
 SECONDS = 30.0
+KEY_CODES = {"Tab": 9}
+"""Of keys that the browser itself acts upon."""
+
+AXE = Path(__file__).parent / "axe" / "axe.min.js"
+"""axe-core 4.14.1 as its authors published it, under the MPL 2.0 (the licence is beside it)."""
+
 OPTIONS = (
     "--headless=new",
     "--no-sandbox",  # tests run as root, too
@@ -78,6 +84,20 @@ class Tab:
             "Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=width < 500
         )
 
+    def prefer(self, scheme: str) -> None:
+        """Ask pages for "light" or "dark"."""
+        self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+
+    def barriers(self) -> list[str]:
+        """What axe-core finds on the page that may keep people from using it: rule, impact and the elements."""
+        if not self.run("'axe' in window"):
+            self.call("Runtime.evaluate", expression=AXE.read_text(encoding="utf-8"))
+        found = self.run("axe.run(document, {resultTypes: ['violations']}).then(found => found.violations)")
+        return [
+            f"{each['id']} ({each['impact']}): {'; '.join(node['html'][:120] for node in each['nodes'])}"
+            for each in found
+        ]
+
     def choose(self, selector: str, path: Path) -> None:
         """Choose a file, as in the browser's own dialogue."""
         root = self.call("DOM.getDocument")["root"]["nodeId"]
@@ -87,7 +107,7 @@ class Tab:
     def press(self, key: str) -> None:
         """Press a key and let it go."""
         for kind in ("keyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=kind, key=key)
+            self.call("Input.dispatchKeyEvent", type=kind, key=key, windowsVirtualKeyCode=KEY_CODES.get(key, 0))
 
     def _note(self, method: str, params: Any) -> None:
         if method == "Runtime.exceptionThrown":

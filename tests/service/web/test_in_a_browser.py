@@ -18,6 +18,13 @@ from tests.service.web.chromium import Tab
 pytestmark = pytest.mark.skipif(chromium.PROGRAM is None, reason="chromium is not installed: apt-get install chromium")
 ON_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
 
+CONTROLS = "a[href], button:enabled, input:enabled:not([type=hidden]), select, textarea, summary, [tabindex='0']"
+SEE_FOCUS = """(() => {
+  const focused = document.activeElement;
+  focused.seen = getComputedStyle(focused).outlineStyle !== "none";
+})()"""
+"""Marks the element that has the focus, where that shows."""
+
 DROP = """(() => {
   const held = new DataTransfer();
   held.items.add(new File(["no log at all"], "grasp.npz"));
@@ -39,7 +46,7 @@ def page(tab: Tab, client: httpx.Client) -> Iterator[Tab]:
     tab.requests.clear()
     yield tab
     assert tab.errors == []
-    assert [url for url in tab.requests if not url.startswith((str(client.base_url), "about:", "blob:"))] == []
+    assert [url for url in tab.requests if not url.startswith((str(client.base_url), "about:", "blob:", "data:"))] == []
 
 
 def fits(tab: Tab) -> bool:
@@ -87,6 +94,54 @@ def test_from_an_upload_to_a_grip_force(
     for path in ("/", "/jobs", "/sensors", "/sensors/half-space", "/keys", "/audit", "/problems", "/login"):
         page.go(f"{base}{path}")
         assert fits(page), path
+
+
+@ON_SQLITE
+@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (390, "dark")])
+def test_nobody_is_kept_out_of_a_page(page: Tab, client: httpx.Client, fitted: Any, width: int, scheme: str) -> None:
+    base = str(client.base_url).rstrip("/")
+    asked = "material=fitted&tangential_load=1.5&contact_area=6e-5"
+    log, material = f"/logs/{fitted['id']}", f"/materials/{fitted['material']}"
+    paths = ["/", "/?search=nothing", material, log, "/upload", "/jobs", "/sensors", "/sensors/half-space", "/plan"]
+    paths += [f"/plan?{asked}", "/keys", "/audit", "/problems", "/login", f"{material}/report", f"{log}/report"]
+    page.resize(width)
+    page.prefer(scheme)
+    found = {}
+    for path in paths:
+        page.go(f"{base}{path}")
+        page.run("document.querySelectorAll('details').forEach(each => each.open = true)")
+        if path == log:
+            page.until("document.querySelector('.player[data-ready]') !== null")
+        if barriers := page.barriers():
+            found[path] = barriers
+        assert fits(page), path
+    page.prefer("light")
+    assert found == {}
+
+
+@ON_SQLITE
+@pytest.mark.parametrize("path", ["/", "/logs/{id}", "/materials/{material}", "/upload", "/plan", "/logs/{id}/report"])
+def test_the_tab_key_reaches_every_control_and_shows_where_it_is(
+    page: Tab, client: httpx.Client, fitted: Any, path: str
+) -> None:
+    page.go(f"{str(client.base_url).rstrip('/')}{path.format(**fitted)}")
+    page.run("document.querySelectorAll('details').forEach(each => each.open = true)")
+    if path == "/logs/{id}":
+        page.until("document.querySelector('.player[data-ready]') !== null")
+    controls = page.run(f"document.querySelectorAll({CONTROLS!r}).length")
+    assert controls
+    for _ in range(controls):
+        page.press("Tab")
+        page.run(SEE_FOCUS)
+    assert page.run(f"[...document.querySelectorAll({CONTROLS!r})].filter(e => !e.seen).map(e => e.outerHTML)") == []
+
+
+@ON_SQLITE
+def test_a_field_without_a_label_is_found(page: Tab, client: httpx.Client) -> None:
+    page.go(f"{str(client.base_url).rstrip('/')}/upload")
+    page.run("document.querySelectorAll('label').forEach(each => each.remove())")
+    barriers = page.barriers()
+    assert [each for each in barriers if each.startswith("label (critical): <input")]
 
 
 @ON_SQLITE
