@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast, overload
 
 from numba import njit
-from numba.core import config, types
+from numba.core import cgutils, config, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.errors import TypingError
 from numba.extending import intrinsic
@@ -46,6 +46,36 @@ def unpack(_typing: Any, array: Any, size: Any) -> Any:
         return context.make_tuple(builder, values, [context.unpack_value(builder, array.dtype, at) for at in places])
 
     return values(array, size), read
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def borrowed(_typing: Any, value: Any) -> Any:
+    """``borrowed(value)``: an array, or a tuple with arrays at any depth, whose references are not counted.
+
+    Counting is an atomic operation wherever an array is taken from a tuple or handed on, hundreds for a frame. Without
+    it the array must outlive all uses of what is borrowed, and nothing of that may be returned to Python: so borrow
+    what the caller holds, as Python does the arguments of a kernel, and nothing that was allocated in compiled code.
+    """
+
+    def borrow(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return _uncounted(context, builder, signature.return_type, arguments[0])
+
+    return value(value), borrow
+
+
+def _uncounted(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    """The value of this type with no owner of its memory named, in LLVM."""
+    if isinstance(kind, types.BaseTuple):  # type: ignore[attr-defined]
+        parts = cgutils.unpack_tuple(builder, value)
+        return context.make_tuple(
+            builder, kind, [_uncounted(context, builder, *part) for part in zip(kind, parts, strict=True)]
+        )
+    if isinstance(kind, types.Array):
+        array = make_array(kind)(context, builder, value)
+        array.meminfo = cgutils.get_null_value(array.meminfo.type)
+        array.parent = cgutils.get_null_value(array.parent.type)
+        return array._getvalue()
+    return value
 
 
 @overload

@@ -40,15 +40,16 @@ def median(values: FloatArray) -> float:
 
 
 @compiled
-def noise_of_three(first: FloatArray, middle: FloatArray, last: FloatArray, share: float) -> float:
+def noise_of_three(
+    first: FloatArray, middle: FloatArray, last: FloatArray, share: float, residual: FloatArray
+) -> float:
     """Standard deviation of one value of the series [axes, k], the middle ``share`` of the time from first to last.
 
     The middle is compared with the line through its neighbours. Each axis gives a median absolute deviation about its
     own median over the k series (a common jerk drops out), leaving out series that did not change at all. NaN where
-    fewer than ``NOISE.least_series`` changed.
+    fewer than ``NOISE.least_series`` changed. ``residual``: room for [axes, k] or more.
     """
     axes, k = first.shape
-    residual = np.empty((axes, k))
     count = 0
     for s in range(k):
         changed = True
@@ -80,27 +81,30 @@ def remember(recent: FloatArray, estimate: float) -> None:
 
 
 @compiled
-def recent_median(recent: FloatArray) -> float:
+def recent_median(recent: FloatArray, ordered: FloatArray) -> float:
     """Median of the estimates in a ring (a moment of fast change drops out); NaN while there is none.
 
-    Rounded up, to double at first, while there are few: too little noise does more harm than too much.
+    Rounded up, to double at first, while there are few: too little noise does more harm than too much. ``ordered``:
+    room for all of them.
     """
     count = min(int(recent[0]), _MEMORY)
     if count == 0:
         return math.nan
-    return median(recent[1 : 1 + count].copy()) * (1.0 + 1.0 / count - 1.0 / _MEMORY)
+    for k in range(count):
+        ordered[k] = recent[1 + k]
+    return median(ordered[:count]) * (1.0 + 1.0 / count - 1.0 / _MEMORY)
 
 
 @compiled
 def noise_of_series(time: FloatArray, series: FloatArray) -> float:
     """Noise of recorded series [t, axes, k]: the median of the last estimates; NaN for fewer than 3 frames."""
-    recent = np.zeros(1 + _MEMORY)
+    recent, residual = np.zeros(1 + _MEMORY), np.empty(series.shape[1:])
     for t in range(len(time) - 1, 1, -1):
         if recent[0] == _MEMORY:
             break
         share = (time[t - 1] - time[t - 2]) / (time[t] - time[t - 2])
-        remember(recent, noise_of_three(series[t - 2], series[t - 1], series[t], share))
-    return recent_median(recent)
+        remember(recent, noise_of_three(series[t - 2], series[t - 1], series[t], share, residual))
+    return recent_median(recent, np.empty(_MEMORY))
 
 
 def estimate_noise(time: FloatArray, series: FloatArray) -> float:

@@ -88,8 +88,8 @@ class FixedLagSmoother:
         revised = after.memory._replace(slip=np.empty_like(contact), probability=np.empty(contact.shape))
         velocity = np.empty((*contact.shape, 2))
         touching, slipping = apply_decision(
-            before.setup.lattice.position, before.frame, after.frame, contact & before.memory.contact, decision,
-            self._revised, revised, velocity,
+            before.setup.lattice.position, before.frame, after.frame, decision, self._revised, revised,
+            np.empty(contact.shape), velocity,
         )  # fmt: skip
         self._revised = revised
         settled = slip_state(after.frame.time, revised, velocity, touching, slipping)

@@ -16,7 +16,7 @@ from slipcore.detection.shared.contact import Touch
 from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.interface import CompiledMethod, Observation, Start
 from slipcore.detection.shared.observe import observe
-from slipcore.detection.shared.records import FrameArrays, Memory, Sensor
+from slipcore.detection.shared.records import FrameArrays, Memory, Sensor, workspace
 from slipcore.errors import InvalidInput
 from slipcore.frames import (
     BoolArray,
@@ -133,13 +133,14 @@ def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
         arguments = sensor, last, seen, memory, after
         noise, touching, slipping = method.run(*map(tuple, arguments), velocity)  # numba is slow at named tuples
     else:
-        surface = observe(sensor, seen, memory, after)
-        observation = Observation(seen.time - last.time, seen.displacement, seen.force, after.contact, *surface[:5])
-        of_method, decision = method.step(state.of_method, setup.lattice, observation, setup.options)
-        noise = surface.marker_noise
-        touching, slipping = apply_decision(
-            sensor.position, last, seen, surface.stays, decision, memory, after, velocity
+        room = workspace(*memory.probability.shape)
+        observe(sensor, seen, memory, after, room)
+        noise = float(room.surface.noise[0])
+        observation = Observation(
+            seen.time - last.time, seen.displacement, seen.force, after.contact, *room.surface[:4], noise
         )
+        of_method, decision = method.step(state.of_method, setup.lattice, observation, setup.options)
+        touching, slipping = apply_decision(sensor.position, last, seen, decision, memory, after, room.weight, velocity)
     now = slip_state(frame.time, after, velocity, touching, slipping)
     return DetectorState(setup, seen, frame.observed, after, of_method, noise), masked(
         now, frame.observed, state.observed

@@ -5,14 +5,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slipcore.compilation import compiled
-from slipcore.detection.filter.run import run_filter
+from slipcore.compilation import borrowed, compiled
+from slipcore.detection.filter.run import filter_frame
 from slipcore.detection.filter.smoothing import look_back
 from slipcore.detection.filter.state import PROBABILITY
 from slipcore.detection.filter.step import decide
 from slipcore.detection.filter.tuning import LEAST_TRANSITION, THRESHOLD
 from slipcore.detection.shared.decision import apply_decision
-from slipcore.detection.shared.records import Decision, FrameArrays, Memory, Sensor
+from slipcore.detection.shared.records import FrameArrays, Memory, Sensor, Workspace
 from slipcore.detection.strain_rate.run import run_strain_rate
 from slipcore.frames import BoolArray, FloatArray
 
@@ -49,34 +49,41 @@ class Rings(NamedTuple):
 
 @compiled
 def fold(
-    is_filter: bool, sensor: Sensor, log: Recording, start: Memory, lookahead: int, results: FrameResults
+    is_filter: bool,
+    sensor: Sensor,
+    log: Recording,
+    rings: Rings,
+    lookahead: int,
+    room: Workspace,
+    results: FrameResults,
 ) -> float:
     """Fill ``results`` from the second frame on, by method "filter" or else "strain_rate"; marker noise at the end, m.
 
-    ``start`` is the memory after the first frame. With a ``lookahead`` each frame is decided in the light of that many
-    after it, for which the filter alone remembers enough.
+    ``rings`` hold the memory after the first frame. With a ``lookahead`` each frame is decided in the light of that
+    many after it, for which the filter alone remembers enough.
     """
+    sensor, log, rings, room, results = borrowed((sensor, log, rings, room, results))
     frames, sigma = len(log.time), np.nan
-    rings = Rings(
-        ring_buffer(2, start.noise), ring_buffer(max(lookahead + 1, 2), start.elements), ring_buffer(2, start.common)
-    )
     for k in range(1, frames):
         last, frame = frame_at(log, k - 1), frame_at(log, k)
         before, after = memory_at(results, rings, k - 1), memory_at(results, rings, k)
-        given = sensor, last, frame, before, after
-        step = run_filter(*given, results.velocity[k]) if is_filter else run_strain_rate(*given, results.velocity[k])
-        sigma, results.touching[k], results.slipping[k] = step
+        given, velocity = (sensor, last, frame, before, after), results.velocity[k]
+        found = filter_frame(*given, room, velocity) if is_filter else run_strain_rate(*given, velocity)
+        sigma, results.touching[k], results.slipping[k] = found
         if 0 < lookahead < k:
-            revise(sensor, log, rings, k - lookahead, k, results)
+            revise(sensor, log, rings, k - lookahead, k, room, results)
     if lookahead > 0:
         for k in range(max(frames - lookahead, 1), frames):
-            revise(sensor, log, rings, k, frames - 1, results)
+            revise(sensor, log, rings, k, frames - 1, room, results)
     return sigma
 
 
-@compiled
-def ring_buffer(size: int, first: FloatArray) -> FloatArray:
-    """An array for as many frames, with the first one in it."""
+def rings_from(start: Memory, lookahead: int) -> Rings:
+    """What is remembered of the first frame, with room for as many as are looked back at."""
+    return Rings(_ring(2, start.noise), _ring(max(lookahead + 1, 2), start.elements), _ring(2, start.common))
+
+
+def _ring(size: int, first: FloatArray) -> FloatArray:
     ring = np.empty((size, *first.shape))
     ring[0] = first
     return ring
@@ -99,18 +106,18 @@ def memory_at(results: FrameResults, rings: Rings, k: int) -> Memory:
 
 
 @compiled
-def revise(sensor: Sensor, log: Recording, rings: Rings, k: int, last: int, results: FrameResults) -> None:
+def revise(
+    sensor: Sensor, log: Recording, rings: Rings, k: int, last: int, room: Workspace, results: FrameResults
+) -> None:
     """Decide frame ``k`` again, in the light of what the filter remembers up to frame ``last``."""
-    elements, shape = rings.elements, results.contact[k].shape
+    elements, posterior = rings.elements, room.decision.probability
     kept, least = len(elements), sensor.settings[LEAST_TRANSITION]
-    posterior, earlier = elements[last % kept, PROBABILITY].copy(), np.empty(shape)
+    posterior[:] = elements[last % kept, PROBABILITY]
     for i in range(last - 1, k - 1, -1):
-        look_back(elements[i % kept], elements[(i + 1) % kept], posterior, least, earlier)
-        posterior, earlier = earlier, posterior
-    decision = Decision(np.empty(shape, np.bool_), np.empty(shape))
-    decide(posterior, sensor.settings[THRESHOLD], decision)
+        look_back(elements[i % kept], elements[(i + 1) % kept], posterior, least, posterior)
+    decide(posterior, sensor.settings[THRESHOLD], room.decision)
     before, after = memory_at(results, rings, k - 1), memory_at(results, rings, k)
-    stays, frames = after.contact & before.contact, (frame_at(log, k - 1), frame_at(log, k))
+    frames = frame_at(log, k - 1), frame_at(log, k)
     results.touching[k], results.slipping[k] = apply_decision(
-        sensor.position, *frames, stays, decision, before, after, results.velocity[k]
+        sensor.position, *frames, room.decision, before, after, room.weight, results.velocity[k]
     )

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipcore.detection.detector import NO_FIELD, NO_MASK, NO_POSE, DetectorState, step
-from slipcore.detection.fold import FrameResults, Recording, fold
+from slipcore.detection.fold import FrameResults, Recording, fold, rings_from
+from slipcore.detection.shared.records import workspace
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.slip_state import SlipHistory, slip_events
 
@@ -21,7 +22,9 @@ def history_of(log: GraspLog, state: DetectorState, lookahead: int) -> SlipHisto
     results.touching[0], results.slipping[0] = memory.contact.sum(), memory.slip.sum()
     is_filter = setup.method == "filter"
     sensor = setup.by_shape if log.force is None else setup.by_force
-    noise = fold(is_filter, sensor, _recording(log), memory, lookahead if is_filter else 0, results)
+    ahead = lookahead if is_filter else 0
+    room = workspace(*memory.probability.shape)
+    noise = fold(is_filter, sensor, _recording(log), rings_from(memory, ahead), ahead, room, results)
     return _history(log, setup.method, noise, results)
 
 

@@ -5,10 +5,12 @@ import os
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
-from numba import config
+from numba import config, njit
 
 from slipcore import compilation
+from slipcore.compilation import borrowed
 
 KERNEL = """
 from slipcore.compilation import compiled
@@ -110,3 +112,17 @@ def test_the_fingerprint_covers_imports_of_imports(package: Path) -> None:
     compilation.fingerprint.cache_clear()
     (package / "other.py").write_text("changed = True\n")
     assert compilation.fingerprint(package / "kernel.py") != before
+
+
+@njit  # type: ignore[untyped-decorator]
+def sum_of_borrowed(arrays: tuple[np.ndarray, tuple[np.ndarray, float]]) -> float:
+    first, (second, number) = borrowed(arrays)
+    return first[1:].sum() + second.sum() + number
+
+
+def test_what_is_borrowed_is_the_same_and_still_belongs_to_who_lent_it() -> None:
+    first, second = np.arange(3.0), np.ones((2, 2))
+    second.flags.writeable = False
+    owners = sys.getrefcount(first), sys.getrefcount(second)
+    assert [sum_of_borrowed((first, (second, 0.5))) for _ in range(3)] == [7.5] * 3
+    assert (sys.getrefcount(first), sys.getrefcount(second)) == owners

@@ -78,10 +78,10 @@ def test_compiled_medians_are_those_of_numpy(count: int) -> None:
 def test_an_online_estimate_looks_at_few_elements_and_skips_repeated_frames() -> None:
     rng = np.random.default_rng(14)
     frames = 1e-6 * rng.standard_normal((60, 20, 20, 3))
-    noise = np.zeros((9, 64))
+    noise, series = np.zeros((9, 64)), np.empty((2, 64))
     for k, frame in enumerate(np.repeat(frames, 2, axis=0)):
         after = np.full_like(noise, np.nan)
-        marker, pressing = step_noise(noise, k / 60.0, frame, -frame[..., 2].copy(), after)
+        marker, pressing = step_noise(noise, k / 60.0, frame, -frame[..., 2].copy(), after, series)
         noise = after
     assert marker == pytest.approx(1e-6, rel=0.1)  # 64 of 400 elements: 2 %, and uneven thirds of a second
     assert pressing == pytest.approx(1e-6, rel=0.1)

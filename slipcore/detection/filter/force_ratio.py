@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slipcore.compilation import compiled
 from slipcore.detection.filter.loading import low_pass
@@ -62,18 +63,21 @@ def follow_forces(elements: FloatArray, surface: Surface, has_force: bool, gain:
 @compiled
 def weigh_forces(
     elements: FloatArray,
-    places: FloatArray,
+    places: NDArray[np.int64],
     noise: float,
     interval: float,
     tuning: Tuning,
     after: FloatArray,
     common: FloatArray,
-) -> FloatArray:
-    """Learn the force ratio at which elements slip, each its own and the mean of all; log-odds of slip of each, [k].
+    told: FloatArray,
+) -> None:
+    """Learn the force ratio at which elements slip, each its own and the mean of all; fill ``told`` [2, k] by the
+    log-odds of slip of each and the variance of its ratio.
 
     ``noise`` of an element's normal force, N.
     """
-    log_odds, variance = np.zeros(len(places)), np.zeros(len(places))
+    log_odds, variance = told
+    told[:] = 0.0
     gain, memory = low_pass(interval, tuning.force_smoothing), -math.expm1(-interval / tuning.ratio_memory)
     left = gain / (2.0 - gain)
     least = max(tuning.force_to_noise * noise * math.sqrt(left), tuning.ratio_least_force)
@@ -85,7 +89,7 @@ def weigh_forces(
             variance[e] = noise * noise * left * (1.0 + ratio * ratio) / (normal * normal)
     learn_ratios(elements, places, variance, least, memory, tuning, after, common)
     if not common[FRICTION + 1] > 0.0:
-        return log_odds
+        return
     friction = common[FRICTION] / common[FRICTION + 1]
     for e in range(len(places)):
         i, j = places[e]
@@ -95,13 +99,12 @@ def weigh_forces(
             gained = ratio_log_odds(ratio, variance[e], own, known, friction, memory, tuning)
             limited = min(max(gained, -tuning.ratio_limit), tuning.ratio_limit)
             log_odds[e] = limited * tuning.ratio_weight * gain
-    return log_odds
 
 
 @compiled
 def learn_ratios(
     elements: FloatArray,
-    places: FloatArray,
+    places: NDArray[np.int64],
     variance: FloatArray,
     least: float,
     memory: float,

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from slipcore.compilation import compiled, unpack
 from slipcore.defaults import NUMERICS
-from slipcore.detection.filter.pose import Anchors
+from slipcore.detection.filter.pose import Anchors, Motion
 from slipcore.detection.filter.state import FRICTION, LOADING
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.frames import FloatArray
@@ -34,7 +34,7 @@ def low_pass(interval: float, time_constant: float) -> float:
 def step_loading(
     loading: Loading,
     places: tuple[FloatArray, FloatArray],
-    motion: tuple[FloatArray, FloatArray],
+    motion: Motion,
     deeper: FloatArray,
     force: FloatArray,
     interval: float,
@@ -50,7 +50,7 @@ def step_loading(
     cx, cy = x.mean(), y.mean()
     moved = moment = lever = 0.0
     for e in range(count):
-        moved += motion[0][e] ** 2 + motion[1][e] ** 2
+        moved += motion.x[e] ** 2 + motion.y[e] ** 2
         lever += (x[e] - cx) ** 2 + (y[e] - cy) ** 2
         if force.size:
             moment += (x[e] - cx) * force[1, e] - (y[e] - cy) * force[0, e]
@@ -73,7 +73,7 @@ def restick_under_load(
     before: FloatArray,
     after: FloatArray,
     anchors: Anchors,
-    motion: tuple[FloatArray, FloatArray],
+    motion: Motion,
     indentation: FloatArray,
     force: FloatArray,
     noise: tuple[float, float, float],

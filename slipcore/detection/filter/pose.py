@@ -3,8 +3,6 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from slipcore.compilation import compiled
 from slipcore.defaults import NUMERICS
 from slipcore.detection.filter.tuning import Tuning
@@ -41,7 +39,8 @@ class PoseVariance(NamedTuple):
 
 class Anchors(NamedTuple):
     """Elements that stay in contact, [k]: place on the object if they stuck, x, y m and its variance m²; where their
-    markers are, m; and how likely they stuck.
+    markers are, m; how likely they stuck; and what ``find_pose`` fills: the weight that each has in a fit, 1/m², by how
+    likely it stuck, and by how well it then fits, too.
     """
 
     x: FloatArray
@@ -50,6 +49,16 @@ class Anchors(NamedTuple):
     marker_x: FloatArray
     marker_y: FloatArray
     stick: FloatArray
+    base: FloatArray
+    weight: FloatArray
+
+
+class Motion(NamedTuple):
+    """How far the object carried each anchor, x and y in its own frame, m, and the variance of that, m²: [k] each."""
+
+    x: FloatArray
+    y: FloatArray
+    variance: FloatArray
 
 
 @compiled
@@ -132,9 +141,10 @@ def find_pose(
     if len(anchors.x) < 2:
         known = pose_at(given[0], given[1], given[2], 1.0) if given.size else before
         return known, PoseVariance(0.0, _LEAST_SPREAD, 0.0, 0.0)
-    base = np.maximum(anchors.stick * anchors.stick, tuning.least_weight) / (variance + anchors.variance)
+    base, weight = anchors.base, anchors.weight
+    for e in range(len(base)):
+        base[e] = max(anchors.stick[e] * anchors.stick[e], tuning.least_weight) / (variance + anchors.variance[e])
     pose, spread = fit_pose(anchors, base, given)
-    weight = np.empty(len(base))
     for _ in range(2):
         for e in range(len(base)):
             px, py = place_of_object(pose, anchors.x[e], anchors.y[e])
@@ -148,10 +158,9 @@ def find_pose(
 
 @compiled
 def object_motion(
-    anchors: Anchors, reference: Pose, pose: Pose, spread: PoseVariance, play: float
-) -> tuple[FloatArray, FloatArray, FloatArray, Pose]:
-    """How far the object carried each anchor, x and y in its own frame, m, and the variance of that, m²: [k] each; and
-    the reference of the next step.
+    anchors: Anchors, reference: Pose, pose: Pose, spread: PoseVariance, play: float, motion: Motion
+) -> Pose:
+    """Fill the ``motion`` of each anchor; the reference of the next step.
 
     A fitted pose jitters though nothing moves. What it strays from the ``reference`` by less than ``play`` standard
     deviations (root mean square over the anchors) is no motion; the rest is, and takes the reference with it: motion
@@ -159,24 +168,23 @@ def object_motion(
     counts, however many frames it is cut into, and of a jitter nothing.
     """
     count = len(anchors.x)
-    motion_x, motion_y, variance = np.zeros(count), np.zeros(count), np.empty(count)
     cosine, sine = pose.cosine, pose.sine
     strayed = jitter = 0.0
     for e in range(count):
         px, py = place_of_object(pose, anchors.x[e], anchors.y[e])
         rx, ry = place_of_object(reference, anchors.x[e], anchors.y[e])
-        variance[e] = spread.place + spread.yaw * ((px - spread.x) ** 2 + (py - spread.y) ** 2)
+        motion.variance[e] = spread.place + spread.yaw * ((px - spread.x) ** 2 + (py - spread.y) ** 2)
         dx, dy = px - rx, py - ry
-        motion_x[e], motion_y[e] = cosine * dx + sine * dy, cosine * dy - sine * dx
+        motion.x[e], motion.y[e] = cosine * dx + sine * dy, cosine * dy - sine * dx
         strayed += dx * dx + dy * dy
-        jitter += variance[e]
+        jitter += motion.variance[e]
     share = max(0.0, 1.0 - play * math.sqrt(jitter / strayed)) if strayed > 0.0 else 0.0
     for e in range(count):
-        motion_x[e] *= share
-        motion_y[e] *= share
+        motion.x[e] *= share
+        motion.y[e] *= share
     if count == 0:  # what moves without touching carries nothing
-        return motion_x, motion_y, variance, pose
-    return motion_x, motion_y, variance, between(reference, pose, share)
+        return pose
+    return between(reference, pose, share)
 
 
 @compiled

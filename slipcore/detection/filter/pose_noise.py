@@ -69,4 +69,5 @@ def _noise(offset: FloatArray, common: FloatArray) -> tuple[float, float]:
     common[OFFSET_FRAMES] += 1.0
     if places[0] < LEAST:
         return 0.0, 0.0
-    return recent_median(places), recent_median(yaws)
+    ordered = np.empty(_RING)
+    return recent_median(places, ordered), recent_median(yaws, ordered)

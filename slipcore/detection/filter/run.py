@@ -1,12 +1,10 @@
 """A whole step of method ``filter`` in one call: observe, decide, and what follows."""
 
-import numpy as np
-
 from slipcore.compilation import compiled
 from slipcore.detection.filter.step import step_filter
 from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.observe import observe
-from slipcore.detection.shared.records import Decision, FrameArrays, Memory, Sensor, named
+from slipcore.detection.shared.records import FrameArrays, Memory, Sensor, Workspace, named, workspace
 from slipcore.frames import FloatArray
 
 
@@ -18,9 +16,24 @@ def run_filter(
     slip. What it is given may be plain tuples of the same entries.
     """
     sensor, last, frame, before, after = named(sensor, last, frame, before, after)
-    shape = after.probability.shape
-    surface = observe(sensor, frame, before, after)
-    decision = Decision(np.empty(shape, np.bool_), np.empty(shape))
-    step_filter(sensor, last, frame, surface, before, after, decision)
-    touching, slipping = apply_decision(sensor.position, last, frame, surface.stays, decision, before, after, velocity)
-    return surface.marker_noise, touching, slipping
+    n, m = after.probability.shape
+    return filter_frame(sensor, last, frame, before, after, workspace(n, m), velocity)
+
+
+@compiled
+def filter_frame(
+    sensor: Sensor,
+    last: FrameArrays,
+    frame: FrameArrays,
+    before: Memory,
+    after: Memory,
+    room: Workspace,
+    velocity: FloatArray,
+) -> tuple[float, int, int]:
+    """The same in a ``room`` that is there already."""
+    observe(sensor, frame, before, after, room)
+    step_filter(sensor, last, frame, before, after, room)
+    touching, slipping = apply_decision(
+        sensor.position, last, frame, room.decision, before, after, room.weight, velocity
+    )
+    return room.surface.noise[0], touching, slipping

@@ -12,8 +12,9 @@ def look_back(
 ) -> None:
     """Fill ``revised`` [n, m], slip probabilities one frame earlier, from ``later`` ones that know more.
 
-    ``before`` and ``elements`` are the memories of the earlier and the later frame. Backward pass of a two-state
-    chain (Kim, J. Econometrics 60 (1994) 1): p ((1 − b) q/p' + b (1 − q)/(1 − p')) with the later q.
+    ``before`` and ``elements`` are the memories of the earlier and the later frame; ``revised`` may be the same array
+    as ``later``. Backward pass of a two-state chain (Kim, J. Econometrics 60 (1994) 1): p ((1 − b) q/p' +
+    b (1 − q)/(1 − p')) with the later q.
     """
     n, m = later.shape
     for i in range(n):

@@ -3,12 +3,13 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slipcore.compilation import compiled
 from slipcore.detection.filter.element import Increment, Measurement, update_element
 from slipcore.detection.filter.force_ratio import follow_forces, weigh_forces
 from slipcore.detection.filter.loading import low_pass, restick_under_load
-from slipcore.detection.filter.pose import Anchors, Pose, object_motion, place_on_object
+from slipcore.detection.filter.pose import Anchors, Motion, Pose, object_motion, place_on_object
 from slipcore.detection.filter.state import (
     END,
     ONSET,
@@ -26,29 +27,23 @@ from slipcore.detection.filter.state import (
 from slipcore.detection.filter.surface_motion import step_pose, store_pose, stored_pose
 from slipcore.detection.filter.tuning import Tuning, tuning_of
 from slipcore.detection.shared.observe import same
-from slipcore.detection.shared.records import Decision, FrameArrays, Memory, Sensor, Surface
+from slipcore.detection.shared.records import Decision, FrameArrays, Memory, Sensor, Workspace
 from slipcore.frames import BoolArray, FloatArray
 
 
 @compiled
 def step_filter(
-    sensor: Sensor,
-    last: FrameArrays,
-    frame: FrameArrays,
-    surface: Surface,
-    before: Memory,
-    after: Memory,
-    decision: Decision,
+    sensor: Sensor, last: FrameArrays, frame: FrameArrays, before: Memory, after: Memory, room: Workspace
 ) -> None:
-    """Fill ``elements`` and ``common`` of the memory ``after``, and the decision."""
+    """Fill ``elements`` and ``common`` of the memory ``after``, and the decision, from the surface in the ``room``."""
     tuning = tuning_of(sensor.settings)
     after.common[:] = before.common
-    if same(last.displacement, frame.displacement) and not touches_anew(after.contact, surface.stays):
+    if same(last.displacement, frame.displacement) and not touches_anew(after.contact, room.surface.stays):
         after.elements[:] = before.elements  # a frame that repeats the last tells nothing
         after.elements[ONSET] = after.elements[END] = 0.0
     else:
-        step_elements(sensor.position, last, frame, surface, before, after, tuning)
-    decide(after.elements[PROBABILITY], tuning.threshold, decision)
+        step_elements(sensor.position, last, frame, before, after, room, tuning)
+    decide(after.elements[PROBABILITY], tuning.threshold, room.decision)
 
 
 @compiled
@@ -56,43 +51,47 @@ def step_elements(
     position: FloatArray,
     last: FrameArrays,
     frame: FrameArrays,
-    surface: Surface,
     before: Memory,
     after: Memory,
+    room: Workspace,
     tuning: Tuning,
 ) -> None:
     """The object's motion, the load's change and the forces' log-odds; then each element that stays in contact."""
-    marker_noise = tuning.unknown_noise if math.isnan(surface.marker_noise) else surface.marker_noise
-    variance = (tuning.noise_margin * marker_noise) ** 2 + tuning.displacement_floor**2
-    pressing_noise = 0.0 if math.isnan(surface.pressing_noise) else surface.pressing_noise
-    force_noise = tuning.force_noise_margin * pressing_noise
+    surface = room.surface
+    marker_noise, pressing_noise = surface.noise
+    variance = (tuning.noise_margin * known_or(marker_noise, tuning.unknown_noise)) ** 2 + tuning.displacement_floor**2
+    force_noise = tuning.force_noise_margin * known_or(pressing_noise, 0.0)
     interval, has_force = frame.time - last.time, frame.force.size > 0
     common, elements = before.common, before.elements
     last_pose = stored_pose(common, POSE)
-    places = places_of(elements, surface.stays)
-    anchors = anchors_of(elements, places, position, frame.displacement)
+    places = room.places[: find_places(elements, surface.stays, room.places)]
+    anchors, motion, deeper, change, told = rooms_of(room.rows, len(places))
+    find_anchors(elements, places, position, frame.displacement, anchors)
     pose, spread = step_pose(anchors, last_pose, last, frame, variance, tuning, after.common)
     reference = stored_pose(common, REFERENCE)
-    motion_x, motion_y, motion_variance, reference = object_motion(anchors, reference, pose, spread, tuning.motion_play)
+    reference = object_motion(anchors, reference, pose, spread, tuning.motion_play, motion)
     store_pose(after.common, REFERENCE, reference)
-    moves = motion_x.any() or motion_y.any()
+    moves = motion.x.any() or motion.y.any()
     after.common[STILL] = 0.0 if moves else common[STILL] + interval
-    change = force_change(places, last.force, frame.force)
-    deeper = indentation_change(places, last.displacement, frame.displacement)
+    if not (has_force and last.force.size):
+        change = change[:, :0]
+    force_change(places, last.force, frame.force, change)
+    indentation_change(places, last.displacement, frame.displacement, deeper)
     noise = interval, variance, force_noise
-    restick = restick_under_load(common, after.common, anchors, (motion_x, motion_y), deeper, change, noise, tuning)
-    readiness = 0.0 if restick or math.isnan(surface.marker_noise) else 1.0  # nor does it begin before noise is known
-    log_odds = np.zeros(len(places))
+    restick = restick_under_load(common, after.common, anchors, motion, deeper, change, noise, tuning)
+    readiness = 0.0 if restick or math.isnan(marker_noise) else 1.0  # nor does it begin before noise is known
     follow_forces(elements, surface, has_force, low_pass(interval, tuning.force_smoothing), after.elements)
     if change.size:
-        log_odds = weigh_forces(elements, places, force_noise, interval, tuning, after.elements, after.common)
+        weigh_forces(elements, places, force_noise, interval, tuning, after.elements, after.common, told)
+    else:
+        told[:] = 0.0
     start_elements(position, frame.displacement, after.contact, surface.stays, pose, variance, after.elements)
     increment = Increment(interval, variance, restick, after.common[STILL] > tuning.hold_time)
     for e in range(len(places)):
         i, j = places[e]
         near = tuning.onset_inside + tuning.onset_at_front * slip_of_neighbours(elements, after.contact, i, j)
         x, y = place_on_object(pose, anchors.marker_x[e], anchors.marker_y[e])
-        seen = Measurement(motion_x[e], motion_y[e], motion_variance[e], readiness * near, log_odds[e], x, y)
+        seen = Measurement(motion.x[e], motion.y[e], motion.variance[e], readiness * near, told[0, e], x, y)
         update_element(elements, after.elements, i, j, seen, increment, tuning)
 
 
@@ -103,53 +102,63 @@ def touches_anew(contact: BoolArray, stays: BoolArray) -> bool:
 
 
 @compiled
-def places_of(elements: FloatArray, stays: BoolArray) -> FloatArray:
-    """Rows and columns [k, 2] of the elements that were and are in contact."""
+def known_or(noise: float, otherwise: float) -> float:
+    """The noise, or what stands for it while it is unknown."""
+    return otherwise if math.isnan(noise) else noise
+
+
+@compiled
+def rooms_of(rows: FloatArray, count: int) -> tuple[Anchors, Motion, FloatArray, FloatArray, FloatArray]:
+    """Where ``rows`` take what is worked out of so many anchors: themselves, how they move, how much deeper they are,
+    change of force [3, k], and what this tells [2, k].
+    """
+    r = rows[:, :count]
+    anchors = Anchors(r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7])
+    return anchors, Motion(r[8], r[9], r[10]), r[11], r[12:15], r[15:17]
+
+
+@compiled
+def find_places(elements: FloatArray, stays: BoolArray, places: NDArray[np.int64]) -> int:
+    """Put rows and columns of the elements that were and are in contact into ``places`` [n·m, 2]; their number."""
     n, m = stays.shape
-    places = np.empty((n * m, 2), np.int64)
     count = 0
     for i in range(n):
         for j in range(m):
             if stays[i, j] and math.isfinite(elements[STICK_VARIANCE, i, j]):
                 places[count, 0], places[count, 1] = i, j
                 count += 1
-    return places[:count]
+    return count
 
 
 @compiled
-def anchors_of(elements: FloatArray, places: FloatArray, position: FloatArray, displacement: FloatArray) -> Anchors:
-    """What the fit of the pose needs, at these places."""
-    rows = np.empty((6, len(places)))
+def find_anchors(
+    elements: FloatArray, places: NDArray[np.int64], position: FloatArray, displacement: FloatArray, anchors: Anchors
+) -> None:
+    """Fill what the fit of the pose needs, at these places."""
     for e in range(len(places)):
         i, j = places[e]
-        rows[0, e], rows[1, e] = elements[STICK_X, i, j], elements[STICK_Y, i, j]
-        rows[2, e] = elements[STICK_VARIANCE, i, j]
-        rows[3, e], rows[4, e] = position[i, j, 0] + displacement[i, j, 0], position[i, j, 1] + displacement[i, j, 1]
-        rows[5, e] = 1.0 - elements[PROBABILITY, i, j]
-    return Anchors(rows[0], rows[1], rows[2], rows[3], rows[4], rows[5])
+        anchors.x[e], anchors.y[e] = elements[STICK_X, i, j], elements[STICK_Y, i, j]
+        anchors.variance[e] = elements[STICK_VARIANCE, i, j]
+        anchors.marker_x[e] = position[i, j, 0] + displacement[i, j, 0]
+        anchors.marker_y[e] = position[i, j, 1] + displacement[i, j, 1]
+        anchors.stick[e] = 1.0 - elements[PROBABILITY, i, j]
 
 
 @compiled
-def indentation_change(places: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """How much deeper these places are at the end than at the start, [k] m."""
-    deeper = np.empty(len(places))
+def indentation_change(places: NDArray[np.int64], start: FloatArray, end: FloatArray, deeper: FloatArray) -> None:
+    """Fill how much deeper these places are at the end than at the start, [k] m."""
     for e in range(len(places)):
         i, j = places[e]
         deeper[e] = start[i, j, 2] - end[i, j, 2]
-    return deeper
 
 
 @compiled
-def force_change(places: FloatArray, before: FloatArray, now: FloatArray) -> FloatArray:
-    """Change of force [3, k] N at these places; empty where a force is missing."""
-    if before.size == 0 or now.size == 0:
-        return np.empty((3, 0))
-    change = np.empty((3, len(places)))
-    for e in range(len(places)):
+def force_change(places: NDArray[np.int64], before: FloatArray, now: FloatArray, change: FloatArray) -> None:
+    """Fill the change of force [3, k] N at these places; ``change`` is empty where a force is missing."""
+    for e in range(change.shape[1]):
         i, j = places[e]
         for a in range(3):
             change[a, e] = now[i, j, a] - before[i, j, a]
-    return change
 
 
 @compiled

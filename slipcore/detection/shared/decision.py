@@ -2,12 +2,10 @@
 
 import math
 
-import numpy as np
-
 from slipcore.compilation import compiled
 from slipcore.detection.shared.records import Decision, FrameArrays, Memory
 from slipcore.detection.shared.rigid_motion import RigidMotion, fit_motion
-from slipcore.frames import BoolArray, FloatArray
+from slipcore.frames import FloatArray
 
 
 @compiled
@@ -15,35 +13,35 @@ def apply_decision(
     position: FloatArray,
     last: FrameArrays,
     frame: FrameArrays,
-    stays: BoolArray,
     decision: Decision,
     before: Memory,
     after: Memory,
+    weight: FloatArray,
     velocity: FloatArray,
 ) -> tuple[int, int]:
-    """Fill slip and ``probability`` of the memory ``after``, and ``velocity`` [n, m, 2]; how many elements touch and
-    how many of them slip.
+    """Fill slip and ``probability`` of the memory ``after``, ``velocity`` [n, m, 2], and on the way to it ``weight``
+    [n, m]; how many elements touch and how many of them slip.
 
     What was not in contact before has not slipped. The velocity is that over the interval from the ``last`` frame, of
     what was in contact all through it, relative to the object: this moves as its poses say, or if one is missing as the
     elements do that stick before and after, the more surely the more. NaN where it is unobservable.
     """
-    contact, slip = after.contact, after.slip
+    contact, was, slip = after.contact, before.contact, after.slip
     start, end, pose_before, pose = last.displacement, frame.displacement, last.object_pose, frame.object_pose
     interval = frame.time - last.time
     n, m = contact.shape
     touching = slipping = 0
     known = pose_before.size > 0 and pose.size > 0
-    weight = np.zeros((n, m))
     for i in range(n):
         for j in range(m):
-            s = decision.slip[i, j] and stays[i, j]
-            p = decision.probability[i, j] if stays[i, j] else 0.0
+            stays = contact[i, j] and was[i, j]
+            s = decision.slip[i, j] and stays
+            p = decision.probability[i, j] if stays else 0.0
             slip[i, j], after.probability[i, j] = s, p
             touching += contact[i, j]
             slipping += s
-            if stays[i, j] and not s and not before.slip[i, j]:
-                weight[i, j] = (1.0 - p) * (1.0 - before.probability[i, j])
+            sticks = stays and not s and not before.slip[i, j]
+            weight[i, j] = (1.0 - p) * (1.0 - before.probability[i, j]) if sticks else 0.0
     if known:
         dx, dy, turn = pose[0] - pose_before[0], pose[1] - pose_before[1], pose[2] - pose_before[2]
         motion = RigidMotion(pose_before[0], pose_before[1], dx, dy, turn)
@@ -53,7 +51,7 @@ def apply_decision(
     for i in range(n):
         for j in range(m):
             u = v = math.nan
-            if stays[i, j]:
+            if contact[i, j] and was[i, j]:
                 rx, ry = position[i, j, 0] + start[i, j, 0] - motion.x, position[i, j, 1] + start[i, j, 1] - motion.y
                 u = (end[i, j, 0] - start[i, j, 0] - (motion.dx - versine * rx - sine * ry)) / interval
                 v = (end[i, j, 1] - start[i, j, 1] - (motion.dy + sine * rx - versine * ry)) / interval

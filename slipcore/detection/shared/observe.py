@@ -1,11 +1,9 @@
 """What all methods share of a frame: noise, normals, split forces, contact."""
 
-import numpy as np
-
 from slipcore.compilation import compiled, unpack
 from slipcore.defaults import NOISE
 from slipcore.detection.shared.contact import TOUCH, Touch, find_contact
-from slipcore.detection.shared.records import FrameArrays, Memory, Sensor, Surface
+from slipcore.detection.shared.records import FrameArrays, Memory, Sensor, Workspace
 from slipcore.frames import FloatArray
 from slipcore.noise import noise_of_three, recent_median, remember
 from slipcore.surface.normals import split_forces, surface_normals
@@ -14,10 +12,11 @@ SERIES = NOISE.series
 
 
 @compiled
-def observe(sensor: Sensor, frame: FrameArrays, before: Memory, after: Memory) -> Surface:
-    """What all methods see of a frame; fills contact and the state of the noise estimate in the memory ``after``."""
-    n, m = after.probability.shape
-    normal, pressing, tangential = np.empty(frame.displacement.shape), np.empty((n, m)), np.zeros((n, m))
+def observe(sensor: Sensor, frame: FrameArrays, before: Memory, after: Memory, room: Workspace) -> None:
+    """Fill ``room.surface``, what all methods see of a frame, and in the memory ``after`` contact and the state of the
+    noise estimate.
+    """
+    normal, pressing, tangential, stays, noise = room.surface
     if frame.normal.size:
         normal[:] = frame.normal
     else:
@@ -25,25 +24,39 @@ def observe(sensor: Sensor, frame: FrameArrays, before: Memory, after: Memory) -
     if frame.force.size:
         split_forces(frame.force, normal, pressing, tangential)
     else:
-        pressing[:] = -frame.displacement[..., 2]
-    noise = step_noise(before.noise, frame.time, frame.displacement, pressing, after.noise)
+        split_depth(frame.displacement, pressing, tangential)
+    noise[0], noise[1] = step_noise(before.noise, frame.time, frame.displacement, pressing, after.noise, room.series)
     contact, was = after.contact, before.contact
     if frame.contact.size:
         contact[:] = frame.contact
     else:
         find_contact(pressing, noise[1], was, Touch(*unpack(sensor.touch, TOUCH)), contact)
-    stays = np.empty((n, m), np.bool_)
+    n, m = contact.shape
     for i in range(n):
         for j in range(m):
             stays[i, j] = contact[i, j] and was[i, j]
-    return Surface(normal, pressing, tangential, stays, noise[0], noise[1])
+
+
+@compiled
+def split_depth(displacement: FloatArray, pressing: FloatArray, tangential: FloatArray) -> None:
+    """Without forces the indentation, m, stands for the pressing one, and there is no tangential one."""
+    n, m = pressing.shape
+    for i in range(n):
+        for j in range(m):
+            pressing[i, j], tangential[i, j] = -displacement[i, j, 2], 0.0
 
 
 @compiled
 def step_noise(
-    noise: FloatArray, time: float, displacement: FloatArray, pressing: FloatArray, after: FloatArray
+    noise: FloatArray,
+    time: float,
+    displacement: FloatArray,
+    pressing: FloatArray,
+    after: FloatArray,
+    series: FloatArray,
 ) -> tuple[float, float]:
-    """Learn from one more frame, unless it repeats the last (that would make the noise look smaller).
+    """Learn from one more frame, unless it repeats the last (that would make the noise look smaller); the noise of a
+    marker coordinate, m, and of ``pressing``, NaN while unknown. ``series`` [2, k]: room for medians.
 
     Remembered in rows of [9, columns]: recent estimates of markers and of pressing; a clock (times of the last two
     frames, and how many there were); then x, y and pressing of evenly chosen elements in each of these two frames.
@@ -62,10 +75,10 @@ def step_noise(
     else:
         if clock[2] >= 2.0:
             share = (clock[1] - clock[0]) / (time - clock[0])
-            remember(after[0], noise_of_three(first[:2], middle[:2], last[:2], share))
-            remember(after[1], noise_of_three(first[2:], middle[2:], last[2:], share))
+            remember(after[0], noise_of_three(first[:2], middle[:2], last[:2], share, series))
+            remember(after[1], noise_of_three(first[2:], middle[2:], last[2:], share, series))
         after[2, 0], after[2, 1], after[2, 2] = clock[1], time, clock[2] + 1.0
-    return recent_median(after[0]), recent_median(after[1])
+    return recent_median(after[0], series[0]), recent_median(after[1], series[0])
 
 
 @compiled

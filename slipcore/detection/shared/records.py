@@ -2,8 +2,14 @@
 
 from typing import NamedTuple
 
-from slipcore.compilation import compiled
+import numpy as np
+from numpy.typing import NDArray
+
+from slipcore.compilation import borrowed, compiled
+from slipcore.defaults import NOISE
 from slipcore.frames import BoolArray, FloatArray
+
+_SERIES, _ROWS = max(NOISE.series, NOISE.memory), 17
 
 
 class Sensor(NamedTuple):
@@ -50,15 +56,14 @@ class Memory(NamedTuple):
 class Surface(NamedTuple):
     """What all methods see in a frame: outward ``normal`` [n, m, 3]; ``pressing`` force inwards and ``tangential``
     force, N, [n, m] (without forces: indentation, m, and zero); which elements ``stay`` in contact, now and before,
-    [n, m]; noise of a marker coordinate, m, and of ``pressing``, NaN while unknown.
+    [n, m]; ``noise`` [2] of a marker coordinate, m, and of ``pressing``, NaN while unknown.
     """
 
     normal: FloatArray
     pressing: FloatArray
     tangential: FloatArray
     stays: BoolArray
-    marker_noise: float
-    pressing_noise: float
+    noise: FloatArray
 
 
 class Decision(NamedTuple):
@@ -68,9 +73,38 @@ class Decision(NamedTuple):
     probability: FloatArray
 
 
+class Workspace(NamedTuple):
+    """Arrays that a step fills on its way, the same for every frame of a log; nothing in them outlasts a frame.
+
+    An array that is allocated for a frame costs more than what is done to it where elements are few, and the counting
+    of references to all others in the same function as much again: numba only leaves that out where it frees nothing.
+    ``weight`` [n, m]: how surely each element sticks before and after. ``series`` [2, k]: values to take medians of.
+    Of the elements that a method looks at one by one: their ``places`` [n·m, 2] and ``rows`` [17, n·m] of numbers.
+    """
+
+    surface: Surface
+    decision: Decision
+    weight: FloatArray
+    series: FloatArray
+    places: NDArray[np.int64]
+    rows: FloatArray
+
+
+@compiled
+def workspace(n: int, m: int) -> Workspace:
+    """Room for frames of n × m elements."""
+    stays, slip, shape = np.empty((n, m), np.bool_), np.empty((n, m), np.bool_), (n, m)
+    surface = Surface(np.empty((n, m, 3)), np.empty(shape), np.empty(shape), stays, np.empty(2))
+    decision, series = Decision(slip, np.empty(shape)), np.empty((2, _SERIES))
+    return Workspace(
+        surface, decision, np.empty(shape), series, np.empty((n * m, 2), np.int64), np.empty((_ROWS, n * m))
+    )
+
+
 @compiled
 def named(
     sensor: Sensor, last: FrameArrays, frame: FrameArrays, before: Memory, after: Memory
 ) -> tuple[Sensor, FrameArrays, FrameArrays, Memory, Memory]:
     """The same with names: from Python, plain tuples reach a kernel four times as fast as named ones."""
-    return Sensor(*sensor), FrameArrays(*last), FrameArrays(*frame), Memory(*before), Memory(*after)
+    frames = FrameArrays(*borrowed(last)), FrameArrays(*borrowed(frame))
+    return Sensor(*borrowed(sensor)), *frames, Memory(*borrowed(before)), Memory(*borrowed(after))

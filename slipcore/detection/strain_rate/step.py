@@ -64,7 +64,7 @@ def step_strain_rate(
     decision: Decision,
 ) -> None:
     """Fill the last two: the memory of the ``elements`` [11, n, m] after the step, and the decision."""
-    chosen, noise = StrainRateSettings(*unpack(sensor.settings, SETTINGS)), surface.marker_noise
+    chosen, noise = StrainRateSettings(*unpack(sensor.settings, SETTINGS)), surface.noise[0]
     strain = surface_strains(sensor.inverse_jacobian, displacement, surface.normal)
     if math.isnan(noise):  # a rate that may be noise alone would live on in the low-pass
         after[:] = elements

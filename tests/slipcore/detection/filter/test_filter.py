@@ -68,7 +68,7 @@ def test_a_fitted_pose_is_the_motion_of_what_sticks_though_a_third_slips() -> No
     true = pose_at(2e-4, -1e-4, 0.02, 1.0)
     moved_x, moved_y = np.array([place_of_object(true, *p) for p in zip(x, y, strict=True)]).T.copy()
     moved_x[:12], moved_y[:12] = x[:12], y[:12]  # these stand still
-    anchors = Anchors(x.copy(), y.copy(), np.zeros(36), moved_x, moved_y, np.ones(36))
+    anchors = Anchors(x.copy(), y.copy(), np.zeros(36), moved_x, moved_y, np.ones(36), *np.empty((2, 36)))
     before = pose_at(0.0, 0.0, 0.0, 1.0)
     fitted, variance = find_pose(anchors, before, np.zeros(0), 1e-14, TUNING)
     np.testing.assert_allclose(fitted[:3], true[:3], rtol=0.0, atol=1e-5)  # 5 % of the motion

@@ -16,7 +16,9 @@ def anchors(yaw: float, stretch: float, shift: tuple[float, float] = (0.0, 0.0))
     """Sixteen places on an object 10 mm wide that was turned, stretched about its middle, and moved."""
     x, y = (axis.ravel() for axis in np.meshgrid(*[np.linspace(-5e-3, 5e-3, 4)] * 2))
     c, s = stretch * math.cos(yaw), stretch * math.sin(yaw)
-    return Anchors(x, y, np.zeros(16), c * x - s * y + shift[0], s * x + c * y + shift[1], np.ones(16))
+    return Anchors(
+        x, y, np.zeros(16), c * x - s * y + shift[0], s * x + c * y + shift[1], np.ones(16), *np.empty((2, 16))
+    )
 
 
 def spread(places: Anchors, weight: float) -> float:

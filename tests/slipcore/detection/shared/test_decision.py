@@ -25,16 +25,16 @@ def carried(displacement: np.ndarray, angle: float, shift: tuple[float, float]) 
 def said(end: np.ndarray, slips: np.ndarray, poses: tuple[np.ndarray, np.ndarray] = (NO_POSE, NO_POSE)) -> tuple:
     contact, nothing, likely = np.ones(SHAPE, bool), np.zeros(SHAPE, bool), slips.astype(float)
     contact[0, 0] = False
-    stays = contact.copy()
-    stays[1, 1] = False
+    was = contact.copy()
+    was[1, 1] = False
     last, frame = (
         FrameArrays(time, displacement, NO_FIELD, pose, NO_FIELD, NO_MASK)
         for time, displacement, pose in ((0.0, START, poses[0]), (0.1, end, poses[1]))
     )
-    before = Memory(contact, nothing, likely * 0.0, *NO_MEMORY)
+    before = Memory(was, nothing, likely * 0.0, *NO_MEMORY)
     after = Memory(contact, np.empty(SHAPE, bool), np.empty(SHAPE), *NO_MEMORY)
     velocity = np.empty((*SHAPE, 2))
-    counts = apply_decision(POSITION, last, frame, stays, Decision(slips, likely), before, after, velocity)
+    counts = apply_decision(POSITION, last, frame, Decision(slips, likely), before, after, np.empty(SHAPE), velocity)
     return *counts, after.slip, after.probability, velocity
 
 
