@@ -272,6 +272,7 @@ class SampleSummaryRow(Base):
     normal_force_max: Mapped[float | None]
     samples_blob: Mapped[str] = mapped_column(String(64), index=True)
     moments: Mapped[bytes | None] = mapped_column(LargeBinary)
+    velocity_is_relative: Mapped[bool | None]
     created_at: Mapped[datetime] = mapped_column(default=now)
 
 

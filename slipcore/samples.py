@@ -35,7 +35,8 @@ class FrictionSamples:
     ``weight`` probability that the element did slip, ``element_area`` m², ``normal_force_noise`` N: standard deviation
     of the noise that is still in ``normal_force``. ``kind``: "element", or "contact" where the whole of a patch slid or
     pivoted: its ``normal_force`` is then the mean of its elements, weighted by force, and its ``element`` lies beyond
-    the lattice.
+    the lattice. ``velocity_is_relative``: whether the velocity is that relative to what seems to stick, for want of the
+    object's motion; once all of the contact slides evenly that is far too small.
     """
 
     friction_coefficient: FloatArray
@@ -48,11 +49,14 @@ class FrictionSamples:
     element_area: float
     normal_force_noise: float = 0.0
     kind: NDArray[np.str_] = field(default_factory=lambda: np.empty(0, KIND))
+    velocity_is_relative: BoolArray = field(default_factory=lambda: np.empty(0, bool))
 
     def __post_init__(self) -> None:
         count = len(self.friction_coefficient)
         if len(self.kind) == 0:
             object.__setattr__(self, "kind", np.full(count, "element", KIND))  # the record is frozen
+        if len(self.velocity_is_relative) == 0:
+            object.__setattr__(self, "velocity_is_relative", np.zeros(count, bool))
         for name in self.arrays():
             shape = np.shape(getattr(self, name))
             if shape != (count,):
@@ -162,6 +166,7 @@ def element_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
         weight=weight[keep],
         element_area=log.element_area,
         normal_force_noise=noise.normal / math.sqrt(2.0),  # the mean of two frames
+        velocity_is_relative=np.full(len(friction), log.object_pose is None),
     )
 
 

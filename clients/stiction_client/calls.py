@@ -450,6 +450,9 @@ def _grasp(grasp: Any) -> dict[str, Any]:
         if not np.isfinite(array).all():
             raise InvalidArgument(name, "not finite", "finite numbers")
     lists = {name: array.tolist() for name, array in arrays.items()}
+    relative = getattr(grasp, "velocity_is_relative", None)
+    if relative is not None and np.any(relative):
+        lists["velocity_is_relative"] = np.asarray(relative, dtype=bool).tolist()
     return {"samples": lists | {"element_area": float(grasp.element_area)}}
 
 

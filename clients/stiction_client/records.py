@@ -104,6 +104,8 @@ class ContactFriction:
 class Detection:
     """What was seen in a grasp log: events of each kind, friction samples, frames, smallest stick ratio, and findings
     against it (None where the service did not look for any), and what the contact as a whole tells of friction.
+    ``velocity_is_relative``: whether the samples' velocities are relative to what seems to stick, for the log has no
+    motion of the object (None where nobody noted it).
     """
 
     method: str
@@ -116,6 +118,7 @@ class Detection:
     seconds: float
     findings: tuple[Finding, ...] | None = None
     contact_friction: ContactFriction | None = None
+    velocity_is_relative: bool | None = None
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "Detection":

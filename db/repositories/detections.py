@@ -26,6 +26,7 @@ def add(session: Session, log_id: str, detection: Detection, samples: SampleSumm
             normal_force_max=force[1],
             samples_blob=samples.samples_blob,
             moments=samples.moments,
+            velocity_is_relative=samples.velocity_is_relative,
         )
     )
     session.flush()
@@ -123,6 +124,7 @@ def samples_record(row: SampleSummaryRow | None) -> SampleSummary | None:
         normal_force=_range(row.normal_force_min, row.normal_force_max),
         samples_blob=row.samples_blob,
         moments=row.moments,
+        velocity_is_relative=row.velocity_is_relative,
     )
 
 

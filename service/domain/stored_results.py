@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 EVENT_KINDS = ("onset", "end", "touch", "release")
 SAMPLE_ARRAYS = FrictionSamples.arrays()
-"""Of these the last, the kind, is stored as whether it is "contact"; older versions stored none."""
+"""Of these the last but one, the kind, is stored as whether it is "contact"; older versions stored none. Whether
+velocities are relative is the same for all elements of a log, and one number."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,19 +63,23 @@ def decode_history(path: Path, *, with_maps: bool = True) -> StoredHistory:
 
 def encode_samples(samples: FrictionSamples) -> bytes:
     """Samples as bytes, the same for the same samples."""
-    common = np.array([samples.element_area, samples.normal_force_noise])
-    numbers = [getattr(samples, name) for name in SAMPLE_ARRAYS[:-1]]
+    common = np.array([samples.element_area, samples.normal_force_noise, samples.velocity_is_relative.any()])
+    numbers = [getattr(samples, name) for name in SAMPLE_ARRAYS[:-2]]
     return _pack([*numbers, samples.kind == "contact", common])
 
 
 def decode_samples(path: Path) -> FrictionSamples:
-    """The samples in a blob; those stored by older versions tell no noise of f_n, and are all of elements."""
+    """The samples in a blob; those stored by older versions tell no noise of f_n, and are all of elements whose
+    velocities count as the object's own: nobody noted whether its motion was known.
+    """
     *arrays, common = _unpack(path)
-    of_contact = arrays.pop() if len(arrays) == len(SAMPLE_ARRAYS) else np.zeros(len(arrays[0]), bool)
-    kind = np.where(of_contact, "contact", "element")
-    element_area, noise = (*np.atleast_1d(common).tolist(), 0.0)[:2]
+    of_contact = arrays.pop() if len(arrays) == len(SAMPLE_ARRAYS) - 1 else np.zeros(len(arrays[0]), bool)
+    element_area, noise, is_relative = (*np.atleast_1d(common).tolist(), 0.0, 0.0)[:3]
+    derived = [np.where(of_contact, "contact", "element"), ~of_contact & bool(is_relative)]
     return FrictionSamples(
-        **dict(zip(SAMPLE_ARRAYS, [*arrays, kind], strict=True)), element_area=element_area, normal_force_noise=noise
+        **dict(zip(SAMPLE_ARRAYS, [*arrays, *derived], strict=True)),
+        element_area=element_area,
+        normal_force_noise=noise,
     )
 
 
@@ -126,6 +131,7 @@ def summarise_samples(samples: FrictionSamples, none_because: str | None, blob: 
         normal_force=_range(samples.normal_force),
         samples_blob=blob,
         moments=estimators.Moments.from_samples(samples).to_bytes() if len(samples) else None,
+        velocity_is_relative=bool(samples.velocity_is_relative.any()) if len(samples) else None,
     )
 
 

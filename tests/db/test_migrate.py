@@ -214,6 +214,26 @@ def test_models_of_one_job_get_jobs_of_their_own_on_the_way_back(
         assert set(found.all()) == {("ingest", "ols"), ("fit", "hierarchical")}
 
 
+def test_moments_of_unknown_velocities_are_not_left_to_a_version_that_cannot_read_them(
+    database: Database, new_log: Callable[..., NewGraspLog], detection: Detection, samples: SampleSummary
+) -> None:
+    told = {b"SMo2 of known velocities": False, b"SMo3 of unknown ones": True}
+    with database.write() as session:
+        material = materials.create(session, "paper", "").id
+        for moments, relative in told.items():
+            log_id = grasp_logs.add(session, new_log(material_id=material))
+            jobs.add(session, "ingest", "ols", material_id=material, grasp_log_id=log_id)
+            summary = replace(samples, moments=moments, velocity_is_relative=relative)
+            detections.add(session, log_id, detection, summary)
+    migrate.downgrade(database, "0020")
+    migrate.upgrade(database)
+    with database.read() as session:
+        found = detections.samples_of_material(session, material)
+        assert {each.moments for each in found} == {b"SMo2 of known velocities", None}
+        stored = [grasp_logs.get(session, each.grasp_log_id).samples for each in found]
+        assert [None if each is None else each.velocity_is_relative for each in stored] == [None, None]
+
+
 def test_a_database_of_a_newer_version_is_refused_by_name(database: Database) -> None:
     with database.write() as session:
         migrate.require_head(session)

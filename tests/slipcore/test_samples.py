@@ -52,7 +52,8 @@ def test_elements_that_slip_in_part_do_not_lower_friction() -> None:
 
 def check_samples(samples: FrictionSamples, log: GraspLog, history: SlipHistory) -> None:
     assert (samples.kind == "element").all()
-    for name in sorted(set(samples.arrays()) - {"kind"}):
+    assert (samples.velocity_is_relative == (log.object_pose is None)).all()
+    for name in sorted(set(samples.arrays()) - {"kind", "velocity_is_relative"}):
         values = getattr(samples, name)
         assert values.shape == (len(samples),)
         assert values.dtype == (np.int64 if name == "element" else np.float64)
@@ -196,3 +197,14 @@ def test_joined_samples_carry_the_noise_of_all() -> None:
     joined = FrictionSamples.concatenate([first, second])
     assert joined.normal_force_noise == pytest.approx(np.sqrt(12.5) * 1e-3)
     assert joined.at_element_area(2e-6).normal_force_noise == pytest.approx(2.0 * joined.normal_force_noise)
+
+
+def test_without_the_object_s_motion_velocities_are_relative(ramp: tuple[GraspLog, SlipHistory]) -> None:
+    log = replace(ramp[0], object_pose=None)
+    unposed = element_samples(log, detect_slip(log))
+    assert len(unposed) > 0
+    assert unposed.velocity_is_relative.all()
+    posed = element_samples(*ramp)
+    both = FrictionSamples.concatenate([unposed, posed])
+    assert both.velocity_is_relative.tolist() == [True] * len(unposed) + [False] * len(posed)
+    assert both.take(both.velocity_is_relative).velocity_is_relative.all()

@@ -63,7 +63,14 @@ def recognise_material(context: CurrentContext, asked: NewRecognition) -> Recogn
 
 def _samples(given: SamplesIn) -> FrictionSamples:
     arrays: dict[str, Any] = {
-        name: np.array(value, float) for name, value in given if name not in {"element", "element_area", "kind"}
+        name: np.array(value, float)
+        for name, value in given
+        if name not in {"element", "element_area", "kind", "velocity_is_relative"}
     }
-    kind = np.array(given.kind or [], KIND)
-    return FrictionSamples(**arrays, element=np.array(given.element), element_area=given.element_area, kind=kind)
+    return FrictionSamples(
+        **arrays,
+        element=np.array(given.element),
+        element_area=given.element_area,
+        kind=np.array(given.kind or [], KIND),
+        velocity_is_relative=np.array(given.velocity_is_relative or [], bool),
+    )

@@ -31,6 +31,7 @@ DETECTION_EXAMPLE: JsonDict = {
     "macro_slip_frames": 0,
     "events": {"onset": 181, "end": 40, "touch": 203, "release": 0},
     "samples": 1932,
+    "velocity_is_relative": False,
     "seconds": 0.06,
     "findings": [FINDING_EXAMPLE],
     "contact_friction": CONTACT_FRICTION_EXAMPLE,
@@ -118,6 +119,13 @@ class DetectionOut(BaseModel):
     macro_slip_frames: Annotated[int, Field(description="Frames in which the whole contact slips")]
     events: EventCounts
     samples: Annotated[int, Field(description="Number of friction samples")]
+    velocity_is_relative: Annotated[
+        bool | None,
+        Field(
+            description="Whether the samples' velocities are relative to what seems to stick, for want of the object's "
+            "motion: they tell nothing of β₁; null without samples, or from an older version"
+        ),
+    ]
     seconds: Annotated[float, Field(description="What the detection took")]
     findings: Annotated[
         list[FindingOut] | None, Field(description="Against the log; null where an older version did not look for any")
@@ -186,6 +194,7 @@ def _detection_out(log: StoredGraspLog) -> DetectionOut | None:
         macro_slip_frames=found.macro_slip_frames,
         events=EventCounts(onset=found.onsets, end=found.ends, touch=found.touches, release=found.releases),
         samples=log.samples.count,
+        velocity_is_relative=log.samples.velocity_is_relative,
         seconds=found.seconds,
         findings=None if found.findings is None else [FindingOut(**asdict(each)) for each in found.findings],
         contact_friction=_contact_friction_out(found),

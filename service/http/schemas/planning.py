@@ -117,6 +117,7 @@ class SamplesIn(Body):
     element: list[Annotated[int, Field(ge=0, lt=2**31)]]
     weight: list[Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]]
     kind: Annotated[list[Literal["element", "contact"]] | None, Field(description="Without, all of elements")] = None
+    velocity_is_relative: Annotated[list[bool] | None, Field(description="Without, of none")] = None
     element_area: Area
 
     @model_validator(mode="after")

@@ -14,6 +14,7 @@ SAMPLES_EXAMPLE: JsonDict = {
     "element": [190],
     "weight": [0.97],
     "kind": ["element"],
+    "velocity_is_relative": [False],
     "element_area": 1.0e-6,
 }
 
@@ -71,4 +72,8 @@ class SamplesOut(BaseModel):
     element: Annotated[list[int], Field(description="Row-major index on the lattice")]
     weight: Annotated[list[float], Field(description="Probability that the element did slip")]
     kind: Annotated[list[str], Field(description="`element`, or `contact` of a patch that slid or pivoted as a whole")]
+    velocity_is_relative: Annotated[
+        list[bool],
+        Field(description="Whether the velocity is relative to what seems to stick: the object's is unknown"),
+    ]
     element_area: Annotated[float, Field(description="m²")]

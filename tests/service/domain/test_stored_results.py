@@ -113,13 +113,23 @@ def test_samples_keep_their_kind(samples: FrictionSamples, tmp_path: Path) -> No
     assert stored_results.decode_samples(path).kind.tolist() == kind.tolist()
 
 
+def test_samples_keep_that_their_velocities_are_relative(samples: FrictionSamples, tmp_path: Path) -> None:
+    path, contact = tmp_path / "samples", np.arange(len(samples)) % 3 == 0
+    relative = replace(samples, kind=np.where(contact, "contact", "element"), velocity_is_relative=~contact)
+    path.write_bytes(stored_results.encode_samples(relative))
+    np.testing.assert_array_equal(stored_results.decode_samples(path).velocity_is_relative, ~contact)
+    for grasp, told in ((samples, False), (relative, True), (samples.take(np.zeros(len(samples), bool)), None)):
+        assert stored_results.summarise_samples(grasp, None, "0" * 64).velocity_is_relative is told
+
+
 def test_samples_stored_without_their_noise_are_still_read(samples: FrictionSamples, tmp_path: Path) -> None:
     path = tmp_path / "samples"
-    arrays = [getattr(samples, name) for name in stored_results.SAMPLE_ARRAYS if name != "kind"]
+    arrays = [getattr(samples, name) for name in stored_results.SAMPLE_ARRAYS[:-2]]
     path.write_bytes(stored_results._pack([*arrays, np.array(samples.element_area)]))
     found = stored_results.decode_samples(path)
     assert (found.element_area, found.normal_force_noise) == (samples.element_area, 0.0)
     assert set(found.kind) == {"element"}
+    assert not found.velocity_is_relative.any()
     np.testing.assert_array_equal(found.normal_force, samples.normal_force)
 
 

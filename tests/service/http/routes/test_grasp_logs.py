@@ -35,6 +35,7 @@ def test_what_was_found_is_what_the_numerics_find(client: httpx.Client, fitted: 
     assert found["stick_ratio_min"] == np.nanmin(history.stick_ratio)
     assert found["contact_frames"] == int(history.contact.any(axis=(1, 2)).sum())
     assert found["findings"] == []
+    assert found["velocity_is_relative"] is False
     contact = contact_friction(history.time, history.patches)
     assert contact is not None
     assert found["contact_friction"] == asdict(contact) | {"high": None}
