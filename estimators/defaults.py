@@ -75,6 +75,11 @@ class Prior(Options):
     """Of that prior. Three leave a single grasp without any model at a slip probability of 1e-3."""
     least_span: Annotated[float, Option(1e-9, 1.0, "-", "where all are equal, any prior of a slope is one")] = 1e-3
     """Least part of the largest value of v or f_n that counts as the range seen."""
+    velocity_effect: Annotated[float, Option(1e-4, 10.0, "-", "a usual margin, as of what is identifiable")] = 0.1
+    """Standard deviation of what velocity changes over its reference span, as a part of friction, where the size of
+    β₁ matters and no sample tells it."""
+    unknown_velocity: Annotated[float, Option(1e-6, 1.0, "m/s", "incipient slip: 0.1 to 10 mm/s")] = 1e-3
+    """Root mean square of those unknown: then 2 % of friction; of rocks it is 1 to 3 % a decade (Marone, 1998)."""
     nu_shape: Annotated[float, Option(0.1, 100.0, "-", "Juárez & Steel, J. Bus. Econ. Stat. 28 (2010) 52")] = 2.0
     """Shape of the gamma prior of the degrees of freedom of Student-t errors."""
     nu_rate: Annotated[float, Option(1e-4, 10.0, "-", "Juárez & Steel (2010): mean 20, any tails")] = 0.1

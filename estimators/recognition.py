@@ -11,6 +11,7 @@ from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.linear.fit_data import FitData, GraspData, gather
 from estimators.linear.least_squares import upper_triangle, whole_triangle
+from estimators.linear.unknown_velocity import offset_variance
 
 FloatArray = NDArray[np.float64]
 
@@ -26,9 +27,10 @@ def recognise(
     """Probability of each material, and of "unknown", for the samples of one grasp (or several of one thing).
 
     The likelihood is exact for Gaussian errors: β of a material is normal with its model's covariance (and, where the
-    model knows of grasps, the scatter between them), σ² inverse-gamma with its degrees of freedom, both integrated
-    out. "unknown" is the same for a surface of which only a population of materials is known. ``prior``: weights of
-    the materials, alike where None; ``unknown``: prior probability that it is none of them.
+    model knows of grasps, the scatter between them; where the samples' velocities are unknown, what those change), σ²
+    inverse-gamma with its degrees of freedom, both integrated out. "unknown" is the same for a surface of which only a
+    population of materials is known. ``prior``: weights of the materials, alike where None; ``unknown``: prior
+    probability that it is none of them.
 
     Raises ``InvalidSamples`` for no materials, one called "unknown", and a prior that does not fit them.
     """
@@ -81,6 +83,9 @@ def _of_material(data: FitData, model: FrictionModel) -> float:
     if model.scales is not None:
         scale = float(np.hypot(model.scales.between_places.value, model.scales.within.value))
         covariance += model.scales.between_grasps.value**2 * np.outer(model.coefficients, model.coefficients)
+    if data.unknown_velocity > 0.0:
+        slope, variance = float(model.coefficients[1]), float(model.covariance[1, 1])
+        covariance[0, 0] += offset_variance(data.mean_friction, slope, variance)
     freedom = model.n - 3.0 if model.scatter_degrees_of_freedom is None else model.scatter_degrees_of_freedom
     floor = RECOGNITION.least_scatter * max(
         abs(float(data.mean_friction)), RECOGNITION.least_scatter

@@ -65,7 +65,7 @@ class Model(Protocol):
     @property
     def diagnostics(self) -> Mapping[str, Any]:
         """``doubtful_logs``, where there is one: which findings speak against its logs; ``surface_change``: by how much
-        the newest of them differ from those before.
+        the newest of them differ from those before; ``unknown_velocity``: that the object's motion was not recorded.
         """
 
 
@@ -98,6 +98,8 @@ def support(model: Model, tangential_velocity: float, normal_force: float, stale
     if stale is not None:
         return Support("stale", f"the model is outdated: {stale}")
     part = float(uncertainty(model, *within(model.domain, tangential_velocity, normal_force)))
+    if tangential_velocity > 0.0 and _knows_no_velocity(model):
+        return Support("not identified", f"{model.diagnostics['unknown_velocity']}: record a grasp with its motion")
     if not part <= UNCERTAIN or not model.identifiable.any():
         return Support("not identified", _ignorance(part))
     outside = extrapolation(model.domain, tangential_velocity, normal_force)
@@ -116,6 +118,7 @@ def kinds(
     if stale is not None or model.diagnostics.get("surface_change"):
         return np.full(v.shape, "stale")
     unknown = ~(uncertainty(model, *within(model.domain, v, f_n)) <= UNCERTAIN) | ~model.identifiable.any()
+    unknown |= (v > 0.0) & _knows_no_velocity(model)
     (low, high), fastest = model.domain.normal_force, model.domain.tangential_velocity[1]
     outside = (f_n < low) | (f_n > high) | (v > fastest)
     return np.select([unknown, outside], ["not identified", "extrapolated"], "supported")
@@ -202,6 +205,11 @@ def _interval(model: Model, tangential_velocity: ArrayLike, normal_force: ArrayL
     x = np.stack([np.ones_like(v), v, f_n], axis=-1)
     variance = np.maximum(np.einsum("...i,ij,...j->...", x, model.covariance, x), 0.0)
     return x @ model.coefficients, np.asarray(special.stdtrit(model.degrees_of_freedom, 0.975) * np.sqrt(variance))
+
+
+def _knows_no_velocity(model: Model) -> bool:
+    """Whether the model's samples tell nothing of velocity, for none of their objects' motion was recorded."""
+    return "unknown_velocity" in model.diagnostics and not model.domain.tangential_velocity[1] > 0.0
 
 
 def _inverse(bound: float) -> float:

@@ -54,9 +54,11 @@ class HierarchicalPosterior:
         columns = len(self.grid.log_rho)
         node = (first[:, :, None] * columns + second[:, None, :]).reshape(len(first), -1)
         weight = (left[:, :, None] * right[:, None, :]).reshape(len(first), -1)
-        square, log_determinant = self.grid.products
+        square, log_determinant, unknown = self.grid.products
         return Products(
-            np.einsum("kt,kti->ki", weight, square[node]), np.einsum("kt,kt->k", weight, log_determinant[node])
+            np.einsum("kt,kti->ki", weight, square[node]),
+            np.einsum("kt,kt->k", weight, log_determinant[node]),
+            np.einsum("kt,kti->ki", weight, unknown[node]),
         )
 
     def nodes(self, whitened: FloatArray) -> Nodes:

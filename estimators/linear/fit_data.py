@@ -30,7 +30,8 @@ class FitData:
     """Data behind a fit: ``factor`` of (v, f_n, μ) whose weight is the effective number of samples.
 
     ``clusters``: how many groups of samples share errors, of ``cluster_kind``; ``observations``: the samples, or None
-    where only moments are known; ``blocks``: the moments, one a grasp, where they came so.
+    where only moments are known; ``blocks``: the moments, one a grasp, where they came so. ``unknown`` [3]: sums over
+    the samples of unknown velocity, for which v counts as 0, of their weights times (1, v, f_n).
     """
 
     factor: Factor
@@ -41,6 +42,12 @@ class FitData:
     cluster_kind: str
     observations: Observations | None
     blocks: tuple[SufficientStatistics, ...]
+    unknown: FloatArray
+
+    @property
+    def unknown_velocity(self) -> float:
+        """The part of the samples, by weight, whose velocity is unknown."""
+        return float(self.unknown[0]) / self.effective_n
 
     @property
     def effective_n(self) -> float:
@@ -98,16 +105,19 @@ def gather(
 
 
 def _from_samples(observations: Observations) -> FitData:
-    v, f_n = observations.tangential_velocity, observations.normal_force
+    relative, weight = observations.velocity_is_relative, observations.weight
+    v, f_n = observations.tangential_velocity[~relative], observations.normal_force
+    unknown = weight[relative]
     return FitData(
         factor=factorise(observations.columns(), observations.weight),
         n=len(observations),
-        domain=Domain((float(v.min()), float(v.max())), (float(f_n.min()), float(f_n.max()))),
+        domain=Domain(_range(v), _range(f_n)),
         element_area=observations.element_area,
         clusters=observations.clusters,
         cluster_kind=observations.cluster_kind,
         observations=observations,
         blocks=(),
+        unknown=np.array([unknown.sum(), 0.0, unknown @ f_n[relative]]),
     )
 
 
@@ -117,22 +127,33 @@ def _from_moments(moments: list[SufficientStatistics]) -> FitData:
         value = f"{whole.n}, worth {whole.effective_n:.3g} by their weights"
         raise TooFewSamples("samples", value, f"at least {LINEAR.min_samples}")
     blocks = tuple(part.at_element_area(whole.element_area) for part in moments if part.n)
+    v = np.array(whole.domain.tangential_velocity)
     return FitData(
         factor=relative(whole.factor, whole),
         n=whole.n,
-        domain=whole.domain,
+        domain=Domain(_range(v[np.isfinite(v)]), whole.domain.normal_force),
         element_area=whole.element_area,
         clusters=len(blocks),
         cluster_kind="grasp" if len(blocks) > 1 else "none",
         observations=None,
         blocks=blocks,
+        unknown=_unit(whole) * np.array([whole.unknown_weight, 0.0, whole.unknown_force]),
     )
 
 
 def relative(factor: Factor, whole: SufficientStatistics) -> Factor:
     """A factor with its weights in units that make those of ``whole`` sum to their effective number."""
-    unit = whole.factor.weight / whole.weight_square
+    unit = _unit(whole)
     return Factor(factor.weight * unit, factor.mean, factor.triangle * np.sqrt(unit))
+
+
+def _range(values: FloatArray) -> tuple[float, float]:
+    """Least and greatest; at rest where no velocity is known: what is told then holds for the limit v → 0."""
+    return (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
+
+
+def _unit(whole: SufficientStatistics) -> float:
+    return whole.factor.weight / whole.weight_square
 
 
 def _statistics_of_samples(observations: Observations) -> tuple[GraspStatistics, ...]:
@@ -143,6 +164,7 @@ def _statistics_of_samples(observations: Observations) -> tuple[GraspStatistics,
         GraspStatistics.from_columns(
             Columns(values[rows], observations.weight[rows], codes_of(place[rows])),
             float(observations.normal_force_noise[observations.grasp[rows[0]]]),
+            bool(observations.velocity_is_relative[rows[0]]),
         )
         for rows in np.split(order, ends)
     )
@@ -158,4 +180,5 @@ def _of_one_place(block: SufficientStatistics) -> GraspStatistics:
         within=factor.triangle.astype(float),
         total_weight=factor.weight,
         weight_square=block.weight_square,
+        velocity_unknown=block.unknown_weight > 0.0,
     )

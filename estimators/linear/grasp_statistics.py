@@ -16,6 +16,8 @@ IntArray = NDArray[np.int64]
 
 
 HEADER = struct.Struct("<2I8d")
+POOLED, UNKNOWN = 1, 2
+"""Flags in its second number: places in groups, velocity unknown."""
 UPPER = np.triu_indices(3)
 
 
@@ -34,7 +36,8 @@ class GraspStatistics:
     Groups [g] of places: ``count`` places of about the same ``weight`` Σw each, the weighted ``mean`` [g, 3] of
     (v, f_n, μ), and the triangular factor ``spread`` [g, 3, 3] of the places' means about it, which is zero where a
     group is one place. ``within`` [3, 3]: triangular factor of all samples about the means of their places.
-    ``total_weight`` Σw and ``weight_square`` Σw² give the effective number of samples.
+    ``total_weight`` Σw and ``weight_square`` Σw² give the effective number of samples. ``velocity_unknown``: v is
+    that relative to what seems to stick, and counts as 0.
 
     Exact up to ``most_places`` places; beyond, places whose weights differ by a few per cent count as alike.
     """
@@ -46,9 +49,12 @@ class GraspStatistics:
     within: FloatArray
     total_weight: float
     weight_square: float
+    velocity_unknown: bool = False
 
     @classmethod
-    def from_columns(cls, columns: Columns, normal_force_noise: float = 0.0) -> "GraspStatistics":
+    def from_columns(
+        cls, columns: Columns, normal_force_noise: float = 0.0, velocity_unknown: bool = False
+    ) -> "GraspStatistics":
         """Statistics of samples whose f_n carries noise of the standard deviation given, N.
 
         The places' means average that noise away; the deviations from them are regressed towards what v says of f_n
@@ -70,6 +76,7 @@ class GraspStatistics:
             within=calibrated(within, float(weight.sum()) * freedom, normal_force_noise),
             total_weight=float(weight.sum()),
             weight_square=float(weight @ weight),
+            velocity_unknown=velocity_unknown,
         )
 
     def scaled(self, normal_force: float) -> "GraspStatistics":
@@ -80,8 +87,9 @@ class GraspStatistics:
     def to_bytes(self) -> bytes:
         """These statistics in little-endian doubles, less than 16 kB."""
         pooled = bool((self.count > 1.0).any())
+        flags = POOLED * pooled | UNKNOWN * self.velocity_unknown
         header = HEADER.pack(
-            len(self.count), pooled, self.total_weight, self.weight_square, *(float(x) for x in self.within[UPPER])
+            len(self.count), flags, self.total_weight, self.weight_square, *(float(x) for x in self.within[UPPER])
         )
         columns = [self.weight[:, None], self.mean]
         if pooled:
@@ -93,10 +101,11 @@ class GraspStatistics:
         """Statistics from the start of ``content``, and the rest; raises ``InvalidSamples`` for anything else."""
         if len(content) < HEADER.size:
             raise InvalidSamples("moments of a grasp", f"{len(content)} bytes", f"at least {HEADER.size} bytes")
-        groups, pooled, total, square, *within = HEADER.unpack_from(content)
+        groups, flags, total, square, *within = HEADER.unpack_from(content)
+        pooled, unknown = bool(flags & POOLED), bool(flags & UNKNOWN)
         width = 11 if pooled else 4
         end = HEADER.size + 8 * width * groups
-        if pooled > 1 or len(content) < end:
+        if flags > POOLED | UNKNOWN or len(content) < end:
             raise InvalidSamples("moments of a grasp", f"{len(content)} bytes", f"{end} bytes for {groups} groups")
         table = np.frombuffer(content[HEADER.size : end], "<f8").reshape(groups, width).astype(float)
         _check(table, total, square, within)
@@ -105,7 +114,7 @@ class GraspStatistics:
         count = table[:, 4] if pooled else np.ones(groups)
         if pooled:
             spread[:, UPPER[0], UPPER[1]] = table[:, 5:]
-        return cls(count, table[:, 0], table[:, 1:4], spread, triangle, total, square), content[end:]
+        return cls(count, table[:, 0], table[:, 1:4], spread, triangle, total, square, unknown), content[end:]
 
 
 def calibrated(within: FloatArray, weight: float, noise: float) -> FloatArray:

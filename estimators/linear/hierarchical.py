@@ -20,6 +20,7 @@ from estimators.defaults import PRIOR, REFERENCE, ROUNDING
 from estimators.linear.grasp_statistics import GraspStatistics
 from estimators.linear.normal_inverse_gamma import NormalInverseGamma
 from estimators.linear.priors import log_half_student
+from estimators.linear.unknown_velocity import offset_variance
 
 FloatArray = NDArray[np.float64]
 
@@ -38,10 +39,14 @@ class Conditional(NamedTuple):
 
 
 class Products(NamedTuple):
-    """Sums over all grasps at points [k]: the ``square`` [k, 10] of the rows (γ | residual), and a log determinant."""
+    """Sums over all grasps at points [k]: the ``square`` [k, 10] of the rows (γ | residual), and a log determinant.
+
+    ``unknown`` [k, 10]: the part of the grasps of unknown velocity.
+    """
 
     square: FloatArray
     log_determinant: FloatArray
+    unknown: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +55,9 @@ class Hierarchical:
 
     β = ``pooled.mean`` + ``pooled.root`` γ. Groups of places [m] in the order of their grasps: ``group`` [10, m] sums
     of squares of (γ | residual), ``count`` and ``weight`` [m] as in ``GraspStatistics``; ``start`` [g]: where those of
-    each grasp begin; ``within`` [g, 10]; ``prior`` [10] the same of the prior; ``direction`` [3]: the γ of b̂.
+    each grasp begin; ``within`` [g, 10]; ``prior`` [10] the same of the prior; ``direction`` [3]: the γ of b̂;
+    ``unknown`` [g]: grasps of unknown velocity, which share an offset N(0, ``offset``); ``ones`` [3]: the γ of β = (1,
+    0, 0), which all are off by.
     """
 
     group: FloatArray
@@ -62,13 +69,15 @@ class Hierarchical:
     direction: FloatArray
     effective_n: float
     pooled: NormalInverseGamma
+    unknown: NDArray[np.bool_]
+    offset: float
+    ones: FloatArray
 
     def products(self, log_lambda: FloatArray, log_rho: FloatArray) -> Products:
         """Sums at all pairs of λ [l] and ρ [r], as [l · r] points of which ρ varies fastest."""
         cells = [self._given_rho(np.exp(log_lambda), rho) for rho in np.exp(log_rho)]
-        square = np.stack([cell.square for cell in cells], axis=1)
-        log_determinant = np.stack([cell.log_determinant for cell in cells], axis=1)
-        return Products(square.reshape(-1, 10), log_determinant.reshape(-1))
+        square, log_determinant, unknown = (np.stack(part, axis=1) for part in zip(*cells, strict=True))
+        return Products(square.reshape(-1, 10), log_determinant.reshape(-1), unknown.reshape(-1, 10))
 
     def _given_rho(self, ratio: FloatArray, rho: float) -> Products:
         """Sums for all λ [l]: what a grasp says across h stays, what it says along h shrinks by 1/(1 + λ h'h)."""
@@ -78,24 +87,41 @@ class Hierarchical:
         size = np.maximum(along[:, :3] @ self.direction, np.finfo(float).tiny)
         outer = along[:, FIRST] * along[:, SECOND] / size[:, None]
         growth = 1.0 + ratio[:, None] * size
-        square = (grasp - outer).sum(axis=0) + (1.0 / growth) @ outer
+        square, unknown = (
+            (grasp - outer)[chosen].sum(axis=0) + (1.0 / growth[:, chosen]) @ outer[chosen]
+            for chosen in (np.ones_like(self.unknown), self.unknown)
+        )
         places = float(self.count @ np.log1p(rho * self.weight))
-        return Products(square, places + np.log(growth).sum(axis=1))
+        return Products(square, places + np.log(growth).sum(axis=1), unknown)
 
     def conditional(
         self, products: Products, log_lambda: FloatArray, log_rho: FloatArray, log_sigma: FloatArray
     ) -> Conditional:
         """Density of (log σ, log λ, log ρ) at points [k] with all else integrated out, and β given them."""
-        square = products.square * np.exp(-2.0 * log_sigma)[:, None] + self.prior
+        told, determinant = self._without_offset(products, log_sigma)
+        square = told + self.prior
         precision = square[:, WHOLE[:3, :3]]
         covariance = np.linalg.inv(precision)
         gamma = np.einsum("kij,kj->ki", covariance, square[:, WHOLE[:3, 3]])
         misfit = square[:, WHOLE[3, 3]] - np.einsum("ki,ki->k", gamma, square[:, WHOLE[:3, 3]])
         log_tau, log_omega = log_sigma + 0.5 * log_lambda, log_sigma + 0.5 * log_rho
-        log = -0.5 * (misfit + products.log_determinant + np.linalg.slogdet(precision)[1])
+        log = -0.5 * (misfit + determinant + np.linalg.slogdet(precision)[1])
         log += -self.effective_n * log_sigma + log_prior(log_sigma, log_tau, log_omega)
         root = self.pooled.root
         return Conditional(log, self.pooled.mean + gamma @ root.T, root @ covariance @ root.T)
+
+    def _without_offset(self, products: Products, log_sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The sums over σ², [k, 10], and their log determinant [k], with the offset of unknown velocities integrated
+        out: a rank-one update as that of a grasp, along a column of ones.
+        """
+        square, determinant = products.square * np.exp(-2.0 * log_sigma)[:, None], products.log_determinant
+        if not self.unknown.any():
+            return square, determinant
+        told = products.unknown * np.exp(-2.0 * log_sigma)[:, None]
+        along = told[:, WHOLE[:, :3]] @ self.ones  # [k, 4]
+        growth = 1.0 + self.offset * (along[:, :3] @ self.ones)
+        lost = self.offset / growth[:, None] * along[:, FIRST] * along[:, SECOND]
+        return square - lost, determinant + np.log(growth)
 
     def log_sigma(self, products: Products) -> tuple[FloatArray, float]:
         """Mean [k] and spread of log σ at points [k], the priors of β, τ and ω left aside: σ² is inverse-gamma then."""
@@ -139,6 +165,9 @@ def hierarchical(
         direction=_direction(pooled, pooled.mean),
         effective_n=unit * total,
         pooled=pooled,
+        unknown=np.array([grasp.velocity_unknown for grasp in grasps]),
+        offset=offset_variance(float(centre @ pooled.mean), float(pooled.mean[1]), float(pooled.covariance[1, 1])),
+        ones=_direction(pooled, np.array([1.0, 0.0, 0.0])),
     )
 
 

@@ -28,10 +28,8 @@ class MixtureSummary(NamedTuple):
 
 def summarise(nodes: Nodes, at: FloatArray) -> MixtureSummary:
     """Summary of nodes; the degrees of freedom are those of friction expected ``at`` (1, v, f_n), [3]."""
-    mean = nodes.weight @ nodes.mean
+    mean, covariance = nodes.moments()
     away = nodes.mean - mean
-    covariance = np.einsum("k,kij->ij", nodes.weight, nodes.covariance)
-    covariance += np.einsum("k,ki,kj->ij", nodes.weight, away, away)
     expected = matched_student(nodes.weight, away @ at, np.sqrt(np.einsum("kij,i,j->k", nodes.covariance, at, at)))
     sigma, tau, omega = nodes.scatter.T
     zero = np.zeros(len(sigma))

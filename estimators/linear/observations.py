@@ -24,7 +24,8 @@ class Observations:
     ``friction`` μ [-], ``tangential_velocity`` m/s, ``normal_force`` N, ``tangential_force`` N; ``weight`` relative,
     scaled so that it sums to the effective number of samples (Kish); ``element`` as labelled in its grasp; ``grasp``
     and ``cluster``: codes from 0, where a cluster is what errors are taken to be shared in (``cluster_kind``);
-    ``element_area`` m²; ``normal_force_noise`` [grasps] N, that still in the normal forces of each.
+    ``element_area`` m²; ``normal_force_noise`` [grasps] N, that still in the normal forces of each;
+    ``velocity_is_relative``: where the velocity is unknown, and 0 in ``tangential_velocity`` (``known_velocity``).
     """
 
     friction: FloatArray
@@ -38,6 +39,7 @@ class Observations:
     cluster_kind: str
     element_area: float
     normal_force_noise: FloatArray
+    velocity_is_relative: NDArray[np.bool_]
 
     def __len__(self) -> int:
         return len(self.friction)
@@ -64,6 +66,7 @@ class Observations:
             element=self.element[rows],
             grasp=self.grasp[rows],
             cluster=self.cluster[rows],
+            velocity_is_relative=self.velocity_is_relative[rows],
         )
 
     def place(self) -> IntArray:
@@ -95,6 +98,7 @@ def observe(samples: "FrictionSamples | Sequence[FrictionSamples]") -> Observati
     grasp = np.repeat(np.arange(len(parts)), [len(part) for part in parts])[used]
     element = _labels([part.element for part in parts])[used]
     cluster, kind = _clusters(parts, element, grasp, used)
+    relative = np.repeat([velocity_unknown(part) for part in parts], [len(part) for part in parts])[used]
     names = {"friction_coefficient": "friction"}
     columns = {names.get(name, name): value[used] for name, value in values.items()}
     return Observations(
@@ -106,6 +110,7 @@ def observe(samples: "FrictionSamples | Sequence[FrictionSamples]") -> Observati
         cluster_kind=kind,
         element_area=area,
         normal_force_noise=np.array([part.normal_force_noise for part in parts]),
+        velocity_is_relative=relative,
     )
 
 
@@ -131,7 +136,22 @@ def check_columns(parts: "Sequence[FrictionSamples]") -> dict[str, FloatArray]:
     values = {name: joined([getattr(part, name) for part in parts]) for name in _LOWEST}
     for name, lowest in _LOWEST.items():
         _check_column(name, values[name], lowest)
+    if any(map(velocity_unknown, parts)):
+        values["tangential_velocity"] = joined([known_velocity(part) for part in parts])
     return values
+
+
+def velocity_unknown(grasp: "FrictionSamples") -> bool:
+    """Whether no velocity of the grasp is used, for some of its samples know only that relative to what seems to stick.
+
+    What both kinds differ by would pass for an effect of velocity.
+    """
+    return bool(grasp.velocity_is_relative.any())
+
+
+def known_velocity(grasp: "FrictionSamples") -> FloatArray:
+    """Velocity [k] m/s of a grasp's samples, 0 where it is not known: β₁ is then not told by them."""
+    return np.zeros(len(grasp)) if velocity_unknown(grasp) else np.asarray(grasp.tangential_velocity, dtype=float)
 
 
 def joined(arrays: Sequence[NDArray[np.generic]]) -> FloatArray:

@@ -13,6 +13,7 @@ from estimators.linear.fit_data import FitData
 from estimators.linear.hierarchical import Hierarchical, Products, hierarchical
 from estimators.linear.normal_inverse_gamma import exact_posterior
 from estimators.linear.priors import weak_spans
+from estimators.linear.unknown_velocity import offset_variance
 
 FloatArray = NDArray[np.float64]
 
@@ -28,6 +29,13 @@ class Nodes(NamedTuple):
     scatter: FloatArray
     mean: FloatArray
     covariance: FloatArray
+
+    def moments(self) -> tuple[FloatArray, FloatArray]:
+        """Mean [3] and covariance [3, 3] of β."""
+        mean = self.weight @ self.mean
+        away = self.mean - mean
+        covariance = np.einsum("k,kij->ij", self.weight, self.covariance)
+        return mean, covariance + np.einsum("k,ki,kj->ij", self.weight, away, away)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,9 +53,9 @@ class PosteriorGrid:
         """Move of each coefficient, in standard deviations, were the prior of β twice as wide; at the scales' mode."""
         best = int(np.argmax(self.log_marginal))
         row, column = np.unravel_index(best, self.log_marginal.shape)
-        products = Products(self.products.square[[best]], self.products.log_determinant[[best]])
+        products = Products(*(part[[best]] for part in self.products))
         point = products, self.log_lambda[[row]], self.log_rho[[column]], self.model.log_sigma(products)[0]
-        wide = replace(self.model, prior=0.25 * self.model.prior)
+        wide = replace(self.model, prior=0.25 * self.model.prior, offset=4.0 * self.model.offset)
         narrow, other = self.model.conditional(*point), wide.conditional(*point)
         return np.asarray(np.abs(other.mean - narrow.mean)[0] / np.sqrt(np.diag(narrow.covariance[0])))
 
@@ -55,7 +63,8 @@ class PosteriorGrid:
 def posterior_grid(data: FitData) -> PosteriorGrid:
     """Posterior of the hierarchical model for these data, on a grid that closes in on where its mass lies.
 
-    b̂, along which a grasp scales the law, is the posterior mean of the grid before.
+    b̂, along which a grasp scales the law, is the posterior mean of the grid before, of which also follows by how much
+    unknown velocities put friction off.
     """
     grasps = data.grasp_statistics()
     pooled = exact_posterior(data)
@@ -68,7 +77,9 @@ def posterior_grid(data: FitData) -> PosteriorGrid:
         if settled:
             break
         box = closer
-        model = model.about(grid.nodes.weight @ grid.nodes.mean)
+        mean, covariance = grid.nodes.moments()
+        offset = offset_variance(data.mean_friction, float(mean[1]), float(covariance[1, 1]))
+        model = replace(model.about(mean), offset=offset)
     return grid
 
 

@@ -11,15 +11,18 @@ from estimators.errors import InvalidSamples
 from estimators.friction_model import Domain
 from estimators.linear.grasp_statistics import Columns, GraspStatistics
 from estimators.linear.least_squares import Factor, factorise, merge
-from estimators.linear.observations import check_columns, codes_of, common_element_area, positive
+from estimators.linear.observations import check_columns, codes_of, common_element_area, positive, velocity_unknown
 
 if TYPE_CHECKING:
     from slipcore.samples import FrictionSamples
 
-MAGIC, WITH_GRASPS = b"SMo1", b"SMo2"
+MAGIC, WITH_GRASPS, WITH_UNKNOWN = b"SMo1", b"SMo2", b"SMo3"
 NUMBERS = struct.Struct("<17d")
+UNKNOWN = struct.Struct("<2d")
 GRASPS = struct.Struct("<I")
 UPPER = np.triu_indices(3)
+NOTHING = (np.inf, -np.inf)
+"""Range of no values."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,7 +31,8 @@ class SufficientStatistics:
 
     ``factor`` carries Σw; ``weight_square`` is Σw², so that the effective number of samples survives a merge; ``n``
     counts samples of positive weight; ``domain`` is the range of v and f_n; ``element_area`` in m². ``grasps``: what
-    each grasp says place by place, or none where some sample was added without its place.
+    each grasp says place by place, or none where some sample was added without its place. Velocities that are not known
+    count as 0 and are in no range: ``unknown_weight`` is Σw of their samples, and ``unknown_force`` Σw f_n, N.
     """
 
     factor: Factor
@@ -37,6 +41,8 @@ class SufficientStatistics:
     domain: Domain
     element_area: float
     grasps: tuple[GraspStatistics, ...] = ()
+    unknown_weight: float = 0.0
+    unknown_force: float = 0.0
 
     @classmethod
     def from_samples(cls, samples: "FrictionSamples", places: bool = True) -> Self:
@@ -52,18 +58,25 @@ class SufficientStatistics:
         )
         if len(weight) == 0:
             return cls.empty(area)
-        domain = Domain((float(v.min()), float(v.max())), (float(f_n.min()), float(f_n.max())))
-        values = np.stack([v, f_n, mu]).T
-        place = codes_of(samples.element[used])
-        grasp = (GraspStatistics.from_columns(Columns(values, weight, place), samples.normal_force_noise),)
-        factor = factorise(values, weight)
-        return cls(factor, float(weight @ weight), len(weight), domain, area, grasp if places else ())
+        unknown = velocity_unknown(samples)
+        domain = Domain(NOTHING if unknown else (float(v.min()), float(v.max())), (float(f_n.min()), float(f_n.max())))
+        columns_of_grasp = Columns(np.stack([v, f_n, mu]).T, weight, codes_of(samples.element[used]))
+        grasp = GraspStatistics.from_columns(columns_of_grasp, samples.normal_force_noise, unknown)
+        return cls(
+            factorise(columns_of_grasp.values, weight),
+            float(weight @ weight),
+            len(weight),
+            domain,
+            area,
+            (grasp,) if places else (),
+            float(weight.sum()) if unknown else 0.0,
+            float(weight @ f_n) if unknown else 0.0,
+        )
 
     @classmethod
     def empty(cls, element_area: float) -> Self:
         """Moments of no samples: merging them changes nothing."""
-        nothing = (np.inf, -np.inf)
-        return cls(Factor(0.0, np.zeros(3), np.zeros((3, 3))), 0.0, 0, Domain(nothing, nothing), element_area)
+        return cls(Factor(0.0, np.zeros(3), np.zeros((3, 3))), 0.0, 0, Domain(NOTHING, NOTHING), element_area)
 
     @property
     def effective_n(self) -> float:
@@ -79,7 +92,10 @@ class SufficientStatistics:
         low, high = self.domain.normal_force
         domain = Domain(self.domain.tangential_velocity, (low * scale[1], high * scale[1]))
         grasps = tuple(grasp.scaled(scale[1]) for grasp in self.grasps)
-        return replace(self, factor=factor, domain=domain, element_area=element_area, grasps=grasps)
+        force = self.unknown_force * float(scale[1])
+        return replace(
+            self, factor=factor, domain=domain, element_area=element_area, grasps=grasps, unknown_force=force
+        )
 
     def merge(self, *others: Self) -> Self:
         """Moments of all samples behind these; any order and any grouping agree to rounding."""
@@ -92,6 +108,8 @@ class SufficientStatistics:
             union([part.domain for part in parts]),
             area,
             _joined([part for part in parts if part.n]),
+            sum(part.unknown_weight for part in parts),
+            sum(part.unknown_force for part in parts),
         )
 
     def add(
@@ -110,23 +128,31 @@ class SufficientStatistics:
             raise InvalidSamples("factor", factor, "above 0 and at most 1")
         kept = self.factor
         faded = Factor(kept.weight * factor, kept.mean, kept.triangle * np.sqrt(factor))
-        return replace(self, factor=faded, weight_square=self.weight_square * factor**2, grasps=())
+        return replace(
+            self,
+            factor=faded,
+            weight_square=self.weight_square * factor**2,
+            grasps=(),
+            unknown_weight=self.unknown_weight * factor,
+            unknown_force=self.unknown_force * factor,
+        )
 
     def to_bytes(self) -> bytes:
         """These moments in little-endian doubles: 140 bytes, and less than 16 kB for each grasp."""
         numbers = [self.n, self.factor.weight, self.weight_square, self.element_area, *self.factor.mean]
         numbers += [*self.domain.tangential_velocity, *self.domain.normal_force, *self.factor.triangle[UPPER]]
         content = NUMBERS.pack(*(float(number) for number in numbers))
-        if not self.grasps:
-            return MAGIC + content
-        grasps = b"".join(grasp.to_bytes() for grasp in self.grasps)
-        return WITH_GRASPS + content + GRASPS.pack(len(self.grasps)) + grasps
+        grasps = GRASPS.pack(len(self.grasps)) + b"".join(grasp.to_bytes() for grasp in self.grasps)
+        if self.unknown_weight > 0.0:
+            return WITH_UNKNOWN + content + UNKNOWN.pack(self.unknown_weight, self.unknown_force) + grasps
+        return WITH_GRASPS + content + grasps if self.grasps else MAGIC + content
 
     @classmethod
     def from_bytes(cls, content: bytes) -> Self:
-        """Moments from ``to_bytes``, of this version or the one before; raises ``InvalidSamples`` for anything else."""
+        """Moments from ``to_bytes``, of this version or those before; raises ``InvalidSamples`` for anything else."""
         magic, numbers, rest = content[:4], content[4 : 4 + NUMBERS.size], content[4 + NUMBERS.size :]
-        if magic not in (MAGIC, WITH_GRASPS) or len(numbers) < NUMBERS.size or (magic == MAGIC and rest):
+        known = magic in (MAGIC, WITH_GRASPS, WITH_UNKNOWN)
+        if not known or len(numbers) < NUMBERS.size or (magic == MAGIC and rest):
             raise InvalidSamples("moments", f"{len(content)} bytes from {magic!r}", "bytes made by to_bytes")
         n, weight, square, area, *values = NUMBERS.unpack(numbers)
         triangle = np.zeros((3, 3))
@@ -137,7 +163,8 @@ class SufficientStatistics:
             )
         factor = Factor(weight, np.array(values[:3]), triangle)
         domain = Domain((values[3], values[4]), (values[5], values[6]))
-        return cls(factor, square, int(n), domain, area, _read_grasps(rest) if magic == WITH_GRASPS else ())
+        unknown, rest = _read_unknown(rest) if magic == WITH_UNKNOWN else ((0.0, 0.0), rest)
+        return cls(factor, square, int(n), domain, area, () if magic == MAGIC else _read_grasps(rest), *unknown)
 
 
 def _joined(parts: "list[SufficientStatistics]") -> tuple[GraspStatistics, ...]:
@@ -145,6 +172,16 @@ def _joined(parts: "list[SufficientStatistics]") -> tuple[GraspStatistics, ...]:
     if all(part.grasps for part in parts):
         return tuple(grasp for part in parts for grasp in part.grasps)
     return ()
+
+
+def _read_unknown(content: bytes) -> tuple[tuple[float, float], bytes]:
+    """Weight and force of the samples of unknown velocity, and the bytes after them."""
+    if len(content) < UNKNOWN.size:
+        raise InvalidSamples("moments", "cut short", "bytes made by to_bytes")
+    weight, force = UNKNOWN.unpack_from(content)
+    if not (np.isfinite([weight, force]).all() and weight > 0.0):
+        raise InvalidSamples("weight of unknown velocities", weight, "finite and above 0")
+    return (weight, force), content[UNKNOWN.size :]
 
 
 def _read_grasps(content: bytes) -> tuple[GraspStatistics, ...]:

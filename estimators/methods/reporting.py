@@ -11,6 +11,7 @@ from estimators.likelihoods.posterior import Summary
 from estimators.linear.fit_data import FitData
 from estimators.linear.least_squares import LinearFit, solve
 from estimators.methods.identifiability import effects, identifiable
+from estimators.methods.unknown_velocity import in_words, slope_inflation, widened
 
 FloatArray = NDArray[np.float64]
 Diagnostics = dict[str, float | str]
@@ -21,10 +22,10 @@ def by_coefficient(name: str, values: FloatArray) -> Diagnostics:
     return {f"{name}_beta{k}": float(value) for k, value in enumerate(values)}
 
 
-def describe(data: FitData, linear: LinearFit | None = None) -> Diagnostics:
+def describe(data: FitData, linear: LinearFit) -> Diagnostics:
     """The data: how many, in how many clusters, and how well they spread over v and f_n."""
-    linear = solve(data.factor, REFERENCE.spans(data.element_area)) if linear is None else linear
-    return {
+    unknown: Diagnostics = {"unknown_velocity": in_words(data)} if data.unknown_velocity > 0.0 else {}
+    return unknown | {
         "effective_n": data.effective_n,
         "clusters": float(data.clusters),
         "cluster_kind": data.cluster_kind,
@@ -43,10 +44,17 @@ def report(
     diagnostics: Diagnostics,
     linear: LinearFit | None = None,
 ) -> FrictionModel:
-    """The friction model, with what its uncertainty does to friction; ``begin``: when the fit began."""
+    """The friction model, with what its uncertainty does to friction; ``begin``: when the fit began.
+
+    A method that tells ``scales`` allows for unknown velocities by itself; the errors of all others are widened here.
+    """
+    linear = solve(data.factor, REFERENCE.spans(data.element_area)) if linear is None else linear
+    if found.scales is None and data.unknown_velocity > 0.0:
+        found = widened(found, data, linear)
     if found.scales is not None:
         diagnostics = diagnostics | _told(found.scales)
     effect = effects(found.covariance, found.degrees_of_freedom, data)
+    effect[1] *= slope_inflation(data, linear)
     prior_shift = np.array([float(diagnostics.get(f"prior_sensitivity_beta{k}", 0.0)) for k in range(3)])
     return FrictionModel(
         method=method,

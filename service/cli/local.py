@@ -189,6 +189,8 @@ def print_model(model: "FrictionModel", title: str) -> None:
     rows.append(("σ [-]", number(model.scale), "", ""))
     print_table(title, ("", "estimate", "95 % interval", "identifiable"), rows)
     typer.echo(f"{model.support}: {model.advice}")
+    if "unknown_velocity" in model.diagnostics:
+        typer.echo(str(model.diagnostics["unknown_velocity"]))
 
 
 def _detection_summary(log: "GraspLog", history: "SlipHistory", seconds: float) -> dict[str, Any]:

@@ -158,7 +158,7 @@ def _scale_density(model: LinearFriction) -> "tuple[NDArray[np.float64], NDArray
 def _middle(model: LinearFriction, samples: FrictionSamples | None) -> tuple[float, float]:
     """Velocity, m/s, and normal force, N, through which the sections run."""
     if samples is not None:
-        return float(np.median(samples.tangential_velocity)), float(np.median(samples.normal_force))
+        return float(np.median(_known_velocity(samples))), float(np.median(samples.normal_force))
     return float(np.mean(model.domain.tangential_velocity)), float(np.mean(model.domain.normal_force))
 
 
@@ -166,8 +166,13 @@ def _scatter(over_force: Axes, over_velocity: Axes, samples: FrictionSamples) ->
     """The samples as a picture within the picture, for thousands of marks would make it large."""
     shown = _thin(len(samples), MOST_SAMPLES)
     mu = samples.friction_coefficient[shown]
-    for axes, abscissa in ((over_force, samples.normal_force), (over_velocity, samples.tangential_velocity)):
+    for axes, abscissa in ((over_force, samples.normal_force), (over_velocity, _known_velocity(samples))):
         axes.scatter(abscissa[shown] * 1e3, mu, s=5, alpha=0.5, color=STICK, linewidths=0, rasterized=True)
+
+
+def _known_velocity(samples: FrictionSamples) -> "NDArray[np.float64]":
+    """Velocity [k] m/s, 0 where the object's motion is unknown, as the fit takes it."""
+    return np.where(samples.velocity_is_relative, 0.0, samples.tangential_velocity)
 
 
 def _maps_above_axes(seen: SlipOverTime, title: str) -> tuple[Figure, Axes]:

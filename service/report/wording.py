@@ -76,9 +76,11 @@ def friction_facts(model: LinearFriction) -> tuple[list[Fact], Support]:
 
 
 def coefficient_table(models: Mapping[str, LinearFriction]) -> Table:
-    """Coefficients and σ of each model with 95 % intervals."""
+    """Coefficients and σ of each model with 95 % intervals, and which velocities are unknown."""
     rows = [[name, *estimates(model), str(model.n)] for name, model in models.items()]
-    return Table("Estimates and 95 % intervals", ("method", "β₀ [-]", "β₁ [s/m]", "β₂ [1/N]", "σ [-]", "samples"), rows)
+    unknown = {str(model.diagnostics.get("unknown_velocity") or "") for model in models.values()} - {""}
+    caption = "; ".join(["Estimates and 95 % intervals", *sorted(unknown)])
+    return Table(caption, ("method", "β₀ [-]", "β₁ [s/m]", "β₂ [1/N]", "σ [-]", "samples"), rows)
 
 
 def estimates(model: LinearFriction) -> list[str]:

@@ -116,16 +116,18 @@ def coefficients(stored: StoredModel) -> list[Coefficient]:
 
 
 def sections(stored: StoredModel, at: Friction) -> list[Chart]:
-    """Friction over normal force and over velocity, each through the working point ``at``."""
+    """Friction over normal force and, where any is known or asked for, over velocity, through the point ``at``."""
     forces, velocities = stored.model.normal_force, stored.model.tangential_velocity
     f_n = np.linspace(0.0, max(BEYOND * forces[1], at.normal_force), POINTS)
     v = np.linspace(0.0, max(BEYOND * velocities[1], at.tangential_velocity), POINTS)
     over_force = _Section(f_n, forces, at.normal_force, "normal force on an element, N")
     over_velocity = _Section(v, velocities, at.tangential_velocity, "tangential velocity, m/s")
-    return [
-        _chart(stored, over_force, at.tangential_velocity, f_n, f"At velocity {at.tangential_velocity:g} m/s"),
-        _chart(stored, over_velocity, v, at.normal_force, f"At a normal force of {at.normal_force:.3g} N"),
-    ]
+    charts = [_chart(stored, over_force, at.tangential_velocity, f_n, f"At velocity {at.tangential_velocity:g} m/s")]
+    if v[-1] > 0.0:
+        charts.append(
+            _chart(stored, over_velocity, v, at.normal_force, f"At a normal force of {at.normal_force:.3g} N")
+        )
+    return charts
 
 
 @dataclass(frozen=True, slots=True, eq=False)

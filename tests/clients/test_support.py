@@ -52,6 +52,17 @@ def test_each_kind_of_support_and_what_to_do(make_model: Make) -> None:
         assert kinds(model, v, f_n, model.stale) == kind
 
 
+def test_velocities_that_nobody_knows_are_no_support(make_model: Make) -> None:
+    told = "the object's motion is unknown"
+    model = replace(make_model((0.4, 0.0, 0.0), EXACT), diagnostics={"unknown_velocity": told})
+    still = replace(model, domain=replace(model.domain, tangential_velocity=(0.0, 0.0)))
+    found = still.support_at(1e-3, 0.1)
+    assert (found.kind, found.advice) == ("not identified", f"{told}: record a grasp with its motion")
+    assert still.support_at(0.0, 0.1).kind == "supported"
+    assert kinds(still, [0.0, 1e-3], 0.1).tolist() == ["supported", "not identified"]
+    assert model.support_at(1e-3, 0.1).kind == "supported"  # other grasps tell of velocity
+
+
 def test_a_model_tells_what_it_rests_on_in_the_middle_of_its_data(make_model: Make) -> None:
     known, unknown = make_model((0.4, 0.0, 0.0), EXACT), make_model((0.4, 0.0, 0.0), np.diag([1e-3, 0, 0]))
     assert (known.support, unknown.support) == ("supported", "not identified")

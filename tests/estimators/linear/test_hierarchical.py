@@ -32,7 +32,7 @@ def grasp(seed: int, tau: float = 0.06, omega: float = 0.02, sigma: float = 0.03
 
 
 def dense(
-    data: FitData, about: np.ndarray, sigma: float, tau: float, omega: float
+    data: FitData, about: np.ndarray, offset: float, sigma: float, tau: float, omega: float
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """Log density of μ, and mean and covariance of β, from covariance matrices of all samples."""
     seen = data.observations
@@ -41,6 +41,7 @@ def dense(
     place, expected = seen.place(), x @ about
     noise = np.diag(sigma**2 / seen.weight)
     noise += omega**2 * (place[:, None] == place)
+    noise += offset * np.outer(seen.velocity_is_relative, seen.velocity_is_relative)
     noise += tau**2 * (seen.grasp[:, None] == seen.grasp) * np.outer(expected, expected)
     rows = np.diag(np.concatenate([[1.0], weak_spans(data.domain, data.element_area)]))
     rows[0] = data.mean_row()
@@ -53,9 +54,9 @@ def dense(
     return float(marginal.logpdf(seen.friction)), mean, covariance
 
 
-@pytest.mark.parametrize("count", [1, 3])
-def test_density_and_coefficients_are_those_of_the_dense_model(count: int) -> None:
-    data = gather([grasp(k) for k in range(count)])
+@pytest.mark.parametrize(("count", "unknown"), [(1, 0), (3, 0), (3, 2), (2, 2)])
+def test_density_and_coefficients_are_those_of_the_dense_model(count: int, unknown: int) -> None:
+    data = gather([replace(grasp(k), velocity_is_relative=np.full(60, k < unknown)) for k in range(count)])
     pooled = exact_posterior(data)
     about = np.array([0.42, 6.0, -0.5])
     spans = weak_spans(data.domain, data.element_area)
@@ -65,7 +66,7 @@ def test_density_and_coefficients_are_those_of_the_dense_model(count: int) -> No
     for sigma, tau, omega in points:
         ratios = np.log([tau**2 / sigma**2]), np.log([omega**2 / sigma**2])
         given = model.conditional(model.products(*ratios), *ratios, np.log([sigma]))
-        log, mean, covariance = dense(data, about, sigma, tau, omega)
+        log, mean, covariance = dense(data, about, model.offset, sigma, tau, omega)
         np.testing.assert_allclose(given.mean[0], mean, rtol=1e-8)
         np.testing.assert_allclose(given.covariance[0], covariance, rtol=1e-7, atol=1e-12)
         ours.append(given.log_density[0] - log_prior(*np.log([[sigma], [tau], [omega]]))[0])

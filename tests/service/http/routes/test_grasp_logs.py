@@ -49,6 +49,29 @@ def test_what_was_found_is_what_the_numerics_find(client: httpx.Client, fitted: 
         np.testing.assert_array_equal(listed["time"], getattr(history.events, kind).time)
 
 
+def test_a_log_without_the_objects_motion_tells_nothing_of_velocity(
+    client: httpx.Client, ramp: GraspLog, upload: Upload, wait: Wait
+) -> None:
+    client.post("/v1/materials", json={"name": "unposed"}).raise_for_status()
+    accepted = upload(client, encode(replace(ramp, object_pose=None)), material="unposed")
+    assert wait(client, accepted.json()["job"]["id"])["status"] == "done"
+    stored = client.get(accepted.headers["location"]).json()
+    assert stored["detection"]["velocity_is_relative"] is True
+    samples = client.get(f"/v1/grasp-logs/{stored['id']}/samples").json()
+    assert set(samples["velocity_is_relative"]) == {True}
+    models = client.get("/v1/materials/unposed").json()["models"]
+    assert not any(model["identifiable"][1] for model in models.values())
+    asked = {v: client.get(f"/v1/materials/unposed/friction?v={v}&fn=0.05").json() for v in ("0", "0.001")}
+    assert asked["0.001"]["support"] == "not identified"
+    assert "the object's motion is unknown" in asked["0.001"]["advice"]
+    assert "motion" not in asked["0"]["advice"]
+    page = client.get("/materials/unposed", headers={"accept": "text/html"}).text
+    assert "Velocities: the object&#39;s motion is unknown" in page
+    assert "relative to what seems to stick" in client.get(f"/logs/{stored['id']}").text
+    answer = client.post("/v1/recognise", json={"samples": samples, "materials": ["unposed"]})
+    assert answer.json()["candidates"][0]["probability"] > 0.5
+
+
 def test_what_makes_a_log_doubtful_is_kept_with_it(
     client: httpx.Client, ramp: GraspLog, upload: Upload, wait: Wait
 ) -> None:
