@@ -16,10 +16,10 @@ from db import identity, migrate
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import BlobDamaged, NotEmpty, NotFound
+from db.file_header import GENERATION, OLDEST
 from db.quarantine import sync_folder
 from db.records import Actor
 from db.repositories import audit, stores
-from db.sqlite_file import GENERATION, OLDEST
 from db.tables import Base, BrowserSessionRow, IdempotencyKeyRow, RunnerRow, StoreRow
 
 FILE = "stiction.sqlite3"

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
@@ -31,7 +31,8 @@ from db.defaults import (
     SQLITE_SYNCHRONOUS,
 )
 from db.errors import DriverMissing, InvalidUrl, StorageUnavailable
-from db.sqlite_file import GENERATION, SqliteFile, after
+from db.file_header import renew
+from db.sqlite_file import SqliteFile
 
 _BEGIN = "sqlite_begin"
 _DURABLE = "durable"
@@ -79,9 +80,10 @@ class Database:
         return self.is_sqlite and not Path(self.engine.url.database or "").is_file()
 
     @contextmanager
-    def connect(self) -> Iterator[Connection]:
+    def connect(self, *, to_write: bool = False) -> Iterator[Connection]:
         """A connection below the transactions of the stores: for migrations, whose errors tell the URL too."""
-        with _unavailable_named(str(self)), self.engine.connect() as connection:
+        engine = self._writing if to_write else self.engine
+        with _unavailable_named(str(self)), engine.connect() as connection:
             yield connection
 
     @contextmanager
@@ -230,5 +232,4 @@ def _prepare_sqlite(engine: Engine, busy_timeout: float, file: SqliteFile) -> No
         connection.exec_driver_sql(f"PRAGMA synchronous = {synchronous}")  # inside a transaction it would do nothing
         connection.exec_driver_sql(options.get(_BEGIN, "BEGIN"))
         if _BEGIN in options:  # each commit brings the header along, by which file and log are told to belong together
-            generation = connection.exec_driver_sql(GENERATION).scalar_one()
-            connection.exec_driver_sql(f"{GENERATION} = {after(generation)}")
+            renew(cast(sqlite3.Connection, connection.connection.driver_connection))

@@ -116,7 +116,7 @@ def _config() -> Config:
 @contextmanager
 def _migrating(database: Database) -> Iterator[Config]:
     config = _config()
-    with database.connect() as connection, _foreign_keys_off(database, connection):
+    with database.connect(to_write=True) as connection, _foreign_keys_off(database, connection):
         config.attributes["connection"] = connection
         yield config
 

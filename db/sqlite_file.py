@@ -1,24 +1,25 @@
 """The files of an SQLite database, which may be deleted or replaced under the process that has them open.
 
 Whoever writes to a deleted file is told that all went well, and whoever opens its name again gets a new, empty one.
-An older copy that is written over it keeps its name and inode: it shows by what never falls otherwise, the generation
-in its header. SQLite itself takes the header from the write-ahead log where that has a newer one, but for a file that
-is said to be immutable. Nobody here opens it past SQLite: closing it would end SQLite's locks.
+Another copy that is written over it keeps its name and inode: it shows by its header, which each transaction renews.
+SQLite itself takes the header from the write-ahead log where that has a newer one, but for a file that is said to be
+immutable. Nobody here opens it past SQLite: closing it would end SQLite's locks.
 
-The log of a newer file would make a mixture of an older copy. SQLite writes it there when the last connection closes,
-and when the next one opens: where generations tell, the first is kept from happening and the second is refused. They
-do not tell a copy from before a VACUUM, a migration or a restore, nor a file that is newer than the log beside it.
+The log of another file would make a mixture of the copy. SQLite writes it there when the last connection closes, and
+when the next one opens: the first is kept from happening, the second is refused.
 """
 
 import ctypes
 import os
 import sqlite3
+import time
 from contextlib import closing, suppress
 from pathlib import Path
 from typing import Any
 
 from db.errors import StorageUnavailable
-from db.write_ahead_log import first_generation
+from db.file_header import GENERATION, FileHeader, is_older
+from db.write_ahead_log import headers
 
 SIDE_FILES = ("-wal", "-shm")
 """What is beside the file as long as any connection has read from it: commits go to the first of them."""
@@ -26,16 +27,13 @@ SIDE_FILES = ("-wal", "-shm")
 ANY_SIZE = "PRAGMA writable_schema = ON"
 """Lets SQLite take a header that tells more pages than the file has, as it may in the middle of a checkpoint."""
 
-WITHOUT_LOG = "before a start on an older copy, move away -wal and -shm beside it, which hold nothing of it"
+WITHOUT_LOG = "before a start on another copy, move away -wal and -shm beside it, which hold nothing of it"
 
-GENERATION = "PRAGMA user_version"
-"""What the file's header says of how often it was written to; each transaction writes one more."""
+LOOKS = 6
+"""At file and log, which cannot be read in one moment, before they are said not to belong together."""
 
-_CYCLE = 2**32
-"""Generations after which the header's field of 32 bits begins anew."""
-
-OLDEST = -(2**30)
-"""Of a backup's file as it was written: older than any database that has been in use since it was made."""
+BETWEEN_LOOKS = 6e-3
+"""Seconds, doubled each time; another process may be writing a checkpoint or beginning the log anew."""
 
 
 class SqliteFile:
@@ -46,7 +44,7 @@ class SqliteFile:
         self._beside = None if path is None else Path(path).resolve()  # of a link, SQLite's files are beside its target
         self._first: tuple[int, int] | None = None
         self._generation: int | None = None
-        self._generation_in_file: int | None = None
+        self._header: FileHeader | None = None
         self._log_is_kept = False
         self._open: set[int] = set()
         self._side_files: list[tuple[int, int] | None] = []
@@ -65,48 +63,47 @@ class SqliteFile:
 
     def require(self) -> None:
         """Make sure that they are still there; raises ``StorageUnavailable``."""
-        if self._first is None:
-            self._require_own_log()
-        else:
-            self._require_newer(self._generation_in_file)  # other threads may note a higher one meanwhile
+        if self._first is not None and _identity(self._stat()) != self._first:
+            raise self._lost()
+        known = self._header
+        if known is None or known != self._read_header():
+            self._require_own_log(known)  # other threads may note a newer one meanwhile
         for suffix, opened in zip(SIDE_FILES, self._side_files, strict=False):
             if _identity(self._stat(suffix)) != opened and self._open:
                 raise self._lost(suffix)
 
     def check_before_close(self) -> None:
-        """An older copy is noticed at the latest here, and gets nothing of the log."""
+        """Another copy is noticed at the latest here, and gets nothing of the log."""
         with suppress(StorageUnavailable):
             self.require()
-            self._require_own_log()
+            self._require_own_log(self._header)
 
-    def _require_own_log(self) -> None:
-        """At first, and at looks: a log whose first header is two generations on is another file's."""
-        if self._path is None or self._beside is None:
+    def _require_own_log(self, known: FileHeader | None) -> None:
+        """The log follows this file, which has been no newer one than it is."""
+        if self._path is None or not self._is_there():
             return
-        in_log = first_generation(Path(f"{self._beside}-wal"))  # first: a file that others work on only gets newer
-        if in_log is None:
-            return
-        if not self._path.is_file():  # SQLite would make a new one, and delete the log
-            what = f"database file {self._path} is not there, and its write-ahead log {self._beside}-wal is"
-            raise StorageUnavailable(f"{what}; allowed: the file put back, or a new one once -wal was moved away")
-        if is_older(in_file := self._read_header(), in_log - 1):
-            if self._open:
-                self._keep_log()
-            raise StorageUnavailable(
-                f"database file {self._path} is of generation {in_file}, and its write-ahead log {self._beside}-wal "
-                f"follows one of {in_log - 1} or more: an older copy was written over the file; allowed: the file of "
-                f"before, or the older one; {WITHOUT_LOG}"
-            )
-
-    def _require_newer(self, generation: int | None) -> None:
-        """The first file, which has never been of a lower generation than that."""
-        if _identity(self._stat()) != self._first:
-            raise self._lost()
-        in_file = self._read_header()
-        if generation is not None and is_older(in_file, generation):
+        log = Path(f"{self._beside}-wal")
+        for look in range(LOOKS):
+            found = self._read_header()
+            if _belongs(found, headers(log), known):
+                self._header = found
+                return
+            time.sleep(BETWEEN_LOOKS * 2**look)
+        if self._open:
             self._keep_log()
-            raise self._overwritten(in_file, generation)
-        self._generation_in_file = in_file
+        if self._first is not None:
+            raise self._lost()
+        what = f"database file {self._path} is not the one that its write-ahead log {log} follows"
+        allowed = f"allowed: the file of before, or the other copy; {WITHOUT_LOG}"
+        raise StorageUnavailable(f"{what}: another copy was put in its place; {allowed}")
+
+    def _is_there(self) -> bool:
+        """Or nothing is, of which SQLite makes a new database; it would delete a log that is there alone."""
+        log = self._stat("-wal")  # first: SQLite makes the file before it
+        if self._stat() is not None or log is None or log.st_size == 0:
+            return self._stat() is not None
+        what = f"database file {self._path} is not there, and its write-ahead log {self._beside}-wal is"
+        raise StorageUnavailable(f"{what}; allowed: the file put back, or a new one once -wal was moved away")
 
     def _keep_log(self) -> None:
         """Let SQLite write the log into the file at no close: one connection never is, not even as the process ends."""
@@ -117,10 +114,12 @@ class SqliteFile:
             with suppress(sqlite3.Error):
                 connection.execute(GENERATION).fetchone()  # from now on it has the lock that others would need
 
-    def _read_header(self) -> int:
-        """The generation in the file, whatever is in the write-ahead log."""
+    def _read_header(self) -> FileHeader:
+        """The header in the file, whatever is in the write-ahead log."""
         try:
-            return int(self._first_cell(GENERATION, "immutable=1", ANY_SIZE))
+            with self._connection("immutable=1") as connection:
+                connection.execute(ANY_SIZE)
+                return FileHeader.of_connection(connection)
         except sqlite3.Error as error:
             raise StorageUnavailable(f"database file {self._path}: {error}; allowed: restore a backup") from error
 
@@ -134,9 +133,9 @@ class SqliteFile:
         if generation is None:
             return
         if least is not None and is_older(generation, least):
-            raise self._overwritten(generation, least)
+            raise self._lost()
         self._generation = generation
-        self._require_own_log()
+        self._require_own_log(self._header)
 
     def check_pages(self) -> None:
         """Read every page and look whether they fit together; raises ``StorageUnavailable``, ``sqlite3.Error``."""
@@ -149,14 +148,12 @@ class SqliteFile:
         if self._first is None or self._path is None:
             return None
         self.require()  # where a file beside it is gone, even who only reads would make an empty one
-        return self._first_cell(statement, "mode=ro")
-
-    def _first_cell(self, statement: str, options: str, *before: str) -> Any:
-        assert self._path is not None
-        with closing(sqlite3.connect(f"{self._path.as_uri()}?{options}", uri=True)) as connection:
-            for each in before:
-                connection.execute(each)
+        with self._connection("mode=ro") as connection:
             return connection.execute(statement).fetchone()[0]
+
+    def _connection(self, options: str) -> closing[sqlite3.Connection]:
+        assert self._path is not None
+        return closing(sqlite3.connect(f"{self._path.as_uri()}?{options}", uri=True))
 
     def _stat(self, suffix: str = "") -> os.stat_result | None:
         try:
@@ -166,21 +163,25 @@ class SqliteFile:
 
     def _lost(self, suffix: str = "") -> StorageUnavailable:
         what = f"database file {self._path}{suffix} was deleted or replaced while it was in use"
-        return StorageUnavailable(f"{what}; allowed: the same file put back, or a restart")
-
-    def _overwritten(self, found: int, least: int) -> StorageUnavailable:
-        what = f"{self._lost()} (it is of generation {found} and was of {least}; {WITHOUT_LOG})"
-        return StorageUnavailable(what)
+        return StorageUnavailable(f"{what}; allowed: the same file put back, or a restart ({WITHOUT_LOG})")
 
 
-def after(generation: int) -> int:
-    """The next one; beyond 2³¹ − 1 the field goes on at its other end."""
-    return (generation + 1 + _CYCLE // 2) % _CYCLE - _CYCLE // 2
+def _belongs(found: FileHeader, log: list[FileHeader], known: FileHeader | None) -> bool:
+    """Whether the ``found`` header of the file is one that the ``log`` holds or follows, none before the ``known`` one.
+
+    A log that holds none may have been emptied, which tells no more than the count.
+    """
+    if not log:
+        return known is None or not found.is_older(known)
+    place, before = _place(found, log), None if known is None else _place(known, log)
+    return place is not None and (before is None or before <= place)
 
 
-def is_older(generation: int, other: int) -> bool:
-    """By serial numbers (RFC 1982), of which the one that is less than half a cycle behind is older."""
-    return (generation - other) % _CYCLE > _CYCLE // 2
+def _place(header: FileHeader, log: list[FileHeader]) -> int | None:
+    """How many headers of the ``log`` the file has already; None where the log is of another file."""
+    if header in log:
+        return len(log) - log[::-1].index(header)
+    return 0 if log[0].follows(header) else None
 
 
 def _identity(file: os.stat_result | None) -> tuple[int, int] | None:

@@ -1,6 +1,5 @@
 import shutil
 import sqlite3
-import struct
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,10 +13,11 @@ from db.backup import backup
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import InvalidUrl, StorageUnavailable
+from db.file_header import OLDEST, PAGE_BYTES, FileHeader, after, is_older
 from db.migrate import upgrade
 from db.repositories import stores
-from db.sqlite_file import OLDEST, SIDE_FILES, SqliteFile, after, is_older
-from db.write_ahead_log import first_generation
+from db.sqlite_file import SIDE_FILES, SqliteFile
+from db.write_ahead_log import headers
 
 
 @pytest.mark.parametrize("suffix", SIDE_FILES)
@@ -40,6 +40,10 @@ def test_a_look_makes_no_file_in_place_of_one_that_is_gone(tmp_path: Path, suffi
 def look(database: Database) -> None:
     with database.write() as session:
         stores.touch(session)
+
+
+def header_of(path: Path) -> FileHeader:
+    return FileHeader.of_page(path.read_bytes()[:PAGE_BYTES])
 
 
 def empty_log(database: Database) -> None:
@@ -122,7 +126,7 @@ def test_an_older_copy_gets_nothing_of_the_log_of_a_newer_file(tmp_path: Path) -
     subprocess.run([sys.executable, "-c", OVERWRITTEN, str(path), str(older)], check=True, timeout=120)
     assert path.read_bytes() == older.read_bytes()
     for _ in range(2):
-        named = pytest.raises(StorageUnavailable, match=r"follows one of .*an older copy was written over.*move away")
+        named = pytest.raises(StorageUnavailable, match=r"-wal follows: another copy was put in its place.*move away")
         with closing(Database(f"sqlite:///{path}")) as database, named:
             database.ping()
         assert path.read_bytes() == older.read_bytes()
@@ -186,7 +190,7 @@ def test_a_log_that_was_not_written_to_the_file_yet_is_its_own(tmp_path: Path) -
         empty_log(database)
         for _ in range(5):
             look(database)
-        assert first_generation(Path(f"{path}-wal")) == 1
+        assert headers(Path(f"{path}-wal"))[0].follows(header_of(path))
         with closing(Database(f"sqlite:///{path}")) as other:
             other.ping()
         look(database)
@@ -199,11 +203,12 @@ def test_each_log_says_which_file_it_follows(tmp_path: Path) -> None:
         upgrade(database)
         look(database)
         for _ in range(3):
+            before = header_of(path)
             empty_log(database)
             with database.write() as session:
                 session.connection().exec_driver_sql("UPDATE store SET id = id")
-            header = struct.unpack(">60xi", path.read_bytes()[:64])[0]
-            assert first_generation(Path(f"{path}-wal")) == header + 1
+            log = headers(Path(f"{path}-wal"))
+            assert (len(log), log[0].follows(header_of(path)), log[0].follows(before)) == (1, True, False)
 
 
 def test_the_file_of_a_backup_belongs_to_no_log(tmp_path: Path) -> None:
@@ -219,7 +224,7 @@ def test_the_file_of_a_backup_belongs_to_no_log(tmp_path: Path) -> None:
             stream.truncate()
         with pytest.raises(StorageUnavailable, match="deleted or replaced"):
             look(database)
-    with closing(Database(f"sqlite:///{path}")) as database, pytest.raises(StorageUnavailable, match="older copy"):
+    with closing(Database(f"sqlite:///{path}")) as database, pytest.raises(StorageUnavailable, match="another copy"):
         database.ping()
     assert path.read_bytes() == file
 
@@ -238,7 +243,7 @@ def test_what_is_no_log_tells_no_generation(tmp_path: Path, content: bytes | Non
     log = tmp_path / "database-wal"
     if content is not None:
         log.write_bytes(content)
-    assert first_generation(log) is None
+    assert headers(log) == []
 
 
 @pytest.mark.parametrize("suffix", SIDE_FILES)
@@ -252,6 +257,20 @@ def test_files_beside_the_target_of_a_link_are_watched(tmp_path: Path, suffix: s
         (tmp_path / "disk" / f"database{suffix}").rename(tmp_path / "away")
         with pytest.raises(StorageUnavailable, match=suffix):
             look(database)
+
+
+def test_a_log_that_is_begun_anew_between_two_looks_is_looked_at_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """File and log are not read in one moment: what was the file's last header may be in no log any more."""
+    path, found = tmp_path / "stiction.sqlite3", iter([[FileHeader(7, 7 << 16 | 7, 7, 7)]] * 2)
+    with closing(Database(f"sqlite:///{path}")) as database:
+        upgrade(database)
+        look(database)
+        database.checkpoint()
+        monkeypatch.setattr("db.sqlite_file.headers", lambda log: next(found, None) or headers(log))
+        database.ping()
+        assert next(found, None) is None
 
 
 def test_a_file_is_named_by_its_path_alone() -> None:
