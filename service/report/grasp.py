@@ -18,6 +18,7 @@ from service.report import wording
 from service.report.page import Fact, Picture, Report, Section, Table, write_report
 from service.report.pictures import SlipOverTime, detected, draw_slip, friction_sections, marginals
 from slipcore import LOOKAHEAD, FrictionSamples, GraspLog, check_log, detect_slip
+from slipcore.checks import AGAINST_FRICTION
 from slipcore.defaults import DEFAULT_METHOD
 
 MAP = (
@@ -90,17 +91,23 @@ def grasp_report(seen: SeenGrasp) -> Report:
     """The report of a grasp, with the model that its samples alone allow."""
     model, refusal = _fitted(seen)
     facts, support = ([], None) if model is None else wording.friction_facts(model)
-    steps = [f"{finding.name}: {finding.remedy}." for finding in seen.detection.findings or ()]
-    if refusal is not None:
+    if model is None or support is None:
         lead = f"This grasp alone tells no friction: {refusal}."
-        steps.append("Record another grasp of the same material, or load this one further, until parts of it slip.")
     else:
-        assert model is not None
-        assert support is not None
         lead = f"Friction, as far as this grasp alone tells it, is {support.kind}: {support.advice}."
-        told = next_grasp(model, WorkingPoint(0.5 * sum(model.domain.normal_force)), grasps=1)
-        steps += [wording.record_next(told), "Upload it with others of its material, and ask how hard to grip that."]
-    return Report(seen.name, lead, [*facts, *_seen_facts(seen)], steps, _sections(seen, model))
+    return Report(seen.name, lead, [*facts, *_seen_facts(seen)], _steps(seen, model), _sections(seen, model))
+
+
+def _steps(seen: SeenGrasp, model: FrictionModel | None) -> list[str]:
+    """What to do next: first what was found against the log, which more grasps of the kind do not mend."""
+    found = seen.detection.findings or ()
+    steps = [f"{finding.name}: {finding.remedy}." for finding in found]
+    if model is None:
+        return [*steps, "Record another grasp of the same material, or load this one further, until parts of it slip."]
+    if AGAINST_FRICTION.intersection(finding.name for finding in found):
+        return [*steps, "Record the grasp again once that is mended."]
+    told = next_grasp(model, WorkingPoint(0.5 * sum(model.domain.normal_force)), grasps=1)
+    return [*steps, wording.record_next(told), "Upload it with others of its material, and ask how hard to grip that."]
 
 
 def _fitted(seen: SeenGrasp) -> tuple[FrictionModel | None, str | None]:

@@ -1,12 +1,19 @@
 from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from service.report.grasp import SeenGrasp, grasp_report, see
+from db.records import Finding
+from service.domain.stored_results import encode_history, encode_samples
+from service.report.grasp import SeenGrasp, grasp_report, see, write_stored
 from service.report.page import render
-from slipcore import GraspLog
+from slipcore import GraspLog, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
+from stiction_client.container import encode
 
 SHORT = RampSchedule(rest=0.1, press=0.3, settle=0.1, shear=0.6, hold=0.1)
 
@@ -52,6 +59,34 @@ def test_what_makes_friction_doubtful_is_told_with_what_to_do(log: GraspLog) -> 
     report = grasp_report(see(replace(log, force=force), "pulled"))
     assert "What makes its friction doubtful" in [section.heading for section in report.sections]
     assert any(step.startswith("force pulls: ") for step in report.steps[:-1])
+    assert "Upload" not in report.steps[-1]
+
+
+def test_what_speaks_against_friction_is_mended_before_more_is_recorded(seen: SeenGrasp) -> None:
+    doubt = Finding("friction follows force", "seen", "believe the whole contact")
+    report = grasp_report(replace(seen, detection=replace(seen.detection, findings=(doubt,))))
+    assert report.steps == [
+        "friction follows force: believe the whole contact.",
+        "Record the grasp again once that is mended.",
+    ]
+    assert "implausible" in report.lead
+
+
+def test_of_a_deleted_upload_the_maps_are_drawn_on_the_lattice(seen: SeenGrasp, log: GraspLog, tmp_path: Path) -> None:
+    history = detect_slip(log)
+    (tmp_path / "history").write_bytes(encode_history(history))
+    (tmp_path / "samples").write_bytes(encode_samples(seen.samples))
+    (tmp_path / "log.npz").write_bytes(encode(log))
+    for upload in (None, tmp_path / "log.npz"):
+        stored = SimpleNamespace(
+            material="<i>", sensor="s", frames=len(log), duration=1.2, grid=log.grid, created_at=datetime(2026, 1, 2),
+            detection=seen.detection, samples=SimpleNamespace(none_because=None),
+        )  # fmt: skip
+        write_stored(cast(Any, stored), tmp_path / "history", tmp_path / "samples", upload, tmp_path / "report.html")
+        page = (tmp_path / "report.html").read_text(encoding="utf-8")
+        assert "Grasp log of 2026-01-02 00:00:00 UTC" in page
+        assert page.count("<svg") == 3
+        assert "&lt;i&gt;" in page
 
 
 def test_without_a_map_the_rest_is_told(seen: SeenGrasp) -> None:
