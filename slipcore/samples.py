@@ -93,9 +93,9 @@ class FrictionSamples:
 
         rows: dict[str, object] = {"samples": len(self), "element": f"{1e6 * self.element_area:.3g} mm²"}
         for name in ("friction_coefficient", "tangential_velocity", "normal_force") if len(self) else ():
-            low, middle, high = np.quantile(getattr(self, name), (0.05, 0.5, 0.95))
+            low, middle, high = np.quantile(getattr(self, name), (0.25, 0.5, 0.75))
             rows[f"{name} [{UNITS.get(name, '-')}]"] = f"{middle:.3g} ({low:.3g} … {high:.3g})"
-        return summary("Friction samples: median and 90 % range", rows.items())
+        return summary("Friction samples: median and quartiles", rows.items())
 
     def at_element_area(self, element_area: float) -> "FrictionSamples":
         """The same pressures on elements of another area, m²: forces scale with it, friction and velocity do not."""

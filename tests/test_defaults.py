@@ -30,6 +30,7 @@ NOT_TUNED = {
 """Files whose numbers are mathematics."""
 
 LAYOUT = {
+    "slipcore/notebook.py": {"WIDTH", "HEIGHT"},
     "slipcore/detection/filter/state.py": {
         "ROWS",
         "POSE",

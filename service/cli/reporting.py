@@ -52,10 +52,10 @@ def _of_log(
     path: Path, method: str | None, scale: float | None, frame_rate: float | None, mapping: Path | None
 ) -> "Report":
     from service import formats
-    from service.report.grasp import grasp_report, see
+    from service.domain.grasp_report import report_of_log
 
     log = formats.read(path, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
-    return grasp_report(see(log, path.name, method))
+    return report_of_log(log, path.name, method)
 
 
 def _of_material(name: str, url: str, key: str | None) -> "Report":

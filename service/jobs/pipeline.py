@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-import numpy as np
 from sqlalchemy.orm import Session
 
 import estimators
@@ -24,6 +23,7 @@ from db.records import Claim, Job, SamplesOfLog, SampleSummary
 from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, sensors
 from estimators import EstimatorError, FrictionModel, Moments
 from service import formats
+from service.domain.collect_friction import collect
 from service.domain.doubtful_logs import with_doubts
 from service.domain.queueing import INGEST_METHODS, queue_cheap_refits
 from service.domain.sensors import RECONSTRUCTED
@@ -37,7 +37,7 @@ from service.domain.stored_results import (
 )
 from service.domain.surface_change import MARK, with_change
 from service.observability import logs, traces
-from slipcore import Collected, ContactFriction, Finding, FrictionSamples, GraspLog, SlipcoreError, SlipHistory
+from slipcore import Finding, FrictionSamples, GraspLog, SlipcoreError
 
 if TYPE_CHECKING:
     from slipcore.forces import Reconstruction
@@ -210,39 +210,6 @@ def _said(reconstruction: "Reconstruction | None") -> list[Finding]:
         f"{1e3 * reconstruction.kernel_width:.2g} mm; share of the resultant that data tell: {told}"
     )
     return [Finding(RECONSTRUCTED, evidence, "friction is as sure as the description of the sensor's gel")]
-
-
-def collect(
-    log: GraspLog, history: SlipHistory, reconstruction: "Reconstruction | None"
-) -> tuple[Collected, str | None]:
-    """What is known of friction, and if there are no samples, why; noise of reconstructed forces is theirs."""
-    if not log.is_scaled:
-        return _no_samples(log), "the log's scale is unknown; friction needs velocities in m/s, not pixels a second"
-    if log.force is None:
-        return _no_samples(log), (
-            "the log has no forces; friction is tangential over normal force. If a sensor sees only its markers move, "
-            f"describe the gel of sensor {log.sensor!r}, from which forces follow, and send the log again"
-        )
-    if not history.contact.any():
-        return _no_samples(log), f"no element was in contact in any of the {len(log)} frames"
-    options = {} if reconstruction is None else {"force_noise": reconstruction.force_noise}
-    found = slipcore.collect_friction(log, history, **options)
-    if len(found.samples) == 0:
-        slipping = int(history.slip.sum())
-        seen = f"no slip gave a friction sample ({slipping} slipping elements in {len(log)} frames)"
-        because = f"{seen}; an element counts once all around it slips: load it further, or press less"
-        return found, "; ".join(filter(None, (found.elements_left_out or because, _bound(found.contact))))
-    return found, None
-
-
-def _bound(contact: ContactFriction | None) -> str | None:
-    return None if contact is None else f"by the load that the contact bore, friction is at least {contact.low:.2g}"
-
-
-def _no_samples(log: GraspLog) -> Collected:
-    none = np.empty(0)
-    samples = FrictionSamples(none, none, none, none, none, none.astype(int), none, log.element_area)
-    return Collected(samples, samples, None, None)
 
 
 def _fit(run: Run, parts: Sequence[SamplesOfLog]) -> list[FrictionModel]:

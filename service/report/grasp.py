@@ -2,36 +2,26 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from time import perf_counter
 
-import numpy as np
-
-from db.records import ContactFriction, Detection, StoredGraspLog
-from estimators import EstimatorError, FrictionModel, WorkingPoint, fit, next_grasp
-from service import formats
-from service.domain.doubtful_logs import with_doubts
-from service.domain.stored_results import StoredHistory, decode_history, decode_samples, summarise_history
+from db.records import ContactFriction, Detection
+from estimators import FrictionModel, WorkingPoint, next_grasp
 from service.formatting import NOTHING, interval, number
-from service.jobs.pipeline import collect
 from service.report import wording
-from service.report.page import Fact, Picture, Report, Section, Table, write_report
-from service.report.pictures import SlipOverTime, detected, draw_slip, friction_sections, marginals
-from slipcore import LOOKAHEAD, FrictionSamples, GraspLog, check_log, detect_slip
+from service.report.page import Fact, Picture, Report, Section, Table
+from service.report.pictures import SlipOverTime, draw_slip, friction_sections, marginals
 from slipcore.checks import AGAINST_FRICTION
-from slipcore.defaults import DEFAULT_METHOD
+from slipcore.samples import FrictionSamples
 
 MAP = (
     "Maps of the contact at eight moments: blue elements stick, orange ones slip, grey ones do not touch. Below, the "
     "stick ratio over time; thin lines are the moments of the maps."
 )
-METHOD = "auto"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SeenGrasp:
-    """A grasp log with what was found in it: ``about`` it, the ``detection``, its ``samples`` of friction, and if there
-    are none, ``none_because``; ``slip`` is None where no map of it was kept.
+    """A grasp log with what was found in it: ``about`` it, the ``detection``, its ``samples`` of friction, the
+    ``model`` that these alone allow, and where there is none, why (``refusal``); ``slip``: None where no map was kept.
     """
 
     name: str
@@ -39,33 +29,8 @@ class SeenGrasp:
     detection: Detection
     slip: SlipOverTime | None
     samples: FrictionSamples
-    none_because: str | None
-
-
-def see(log: GraspLog, name: str, method: str | None = None) -> SeenGrasp:
-    """What is found in a log, as a service would find it; ``method``: of detection, the best one where None is named.
-
-    Raises what ``detect_slip`` raises.
-    """
-    begin = perf_counter()
-    history = detect_slip(log, method=method or DEFAULT_METHOD, lookahead=LOOKAHEAD)
-    seconds = perf_counter() - begin
-    found, none_because = collect(log, history, None)
-    findings = check_log(log, history, found.elements)
-    detection = summarise_history(history, seconds, "", findings, found.contact, is_scaled=log.is_scaled)
-    said = about(log.sensor, len(log), float(log.time[-1] - log.time[0]), log.grid)
-    return SeenGrasp(name, said, detection, detected(log, history), found.samples, none_because)
-
-
-def write_stored(log: StoredGraspLog, history: Path, samples: Path, upload: Path | None, target: Path) -> None:
-    """Write the report of a stored log with these results; ``upload`` is the log itself, None where it was deleted."""
-    assert log.detection is not None
-    assert log.samples is not None
-    said = Fact("Material", log.material or "none"), *about(log.sensor, log.frames, log.duration, log.grid)
-    slip = _stored_slip(decode_history(history), upload, log.detection.method)
-    name = f"Grasp log of {log.created_at:%Y-%m-%d %H:%M:%S} UTC"
-    seen = SeenGrasp(name, said, log.detection, slip, decode_samples(samples), log.samples.none_because)
-    write_report(grasp_report(seen), target)
+    model: FrictionModel | None
+    refusal: str | None
 
 
 def about(sensor: str, frames: int, duration: float, grid: tuple[int, int]) -> list[Fact]:
@@ -74,51 +39,27 @@ def about(sensor: str, frames: int, duration: float, grid: tuple[int, int]) -> l
     return [Fact("Sensor", sensor or NOTHING), Fact("Frames", held)]
 
 
-def _stored_slip(history: StoredHistory, upload: Path | None, method: str) -> SlipOverTime | None:
-    """What the pictures show; without the upload places on the lattice stand for positions in m."""
-    if history.contact is None or history.slip is None or not len(history.time):
-        return None
-    if upload is None:
-        rows, columns = history.contact.shape[1:]
-        position = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), axis=-1).astype(np.float64)
-    else:
-        position = formats.read(upload).position[..., :2]
-    since = history.time - history.time[0]
-    return SlipOverTime(since, position, history.contact, history.slip, history.stick_ratio, method)
-
-
 def grasp_report(seen: SeenGrasp) -> Report:
-    """The report of a grasp, with the model that its samples alone allow."""
-    model, refusal = _fitted(seen)
+    """The report of a grasp."""
+    model = seen.model
     facts, support = ([], None) if model is None else wording.friction_facts(model)
-    if model is None or support is None:
-        lead = f"This grasp alone tells no friction: {refusal}."
+    if support is None:
+        lead = f"This grasp alone tells no friction: {seen.refusal}."
     else:
         lead = f"Friction, as far as this grasp alone tells it, is {support.kind}: {support.advice}."
-    return Report(seen.name, lead, [*facts, *_seen_facts(seen)], _steps(seen, model), _sections(seen, model))
+    return Report(seen.name, lead, [*facts, *_seen_facts(seen)], _steps(seen), _sections(seen))
 
 
-def _steps(seen: SeenGrasp, model: FrictionModel | None) -> list[str]:
+def _steps(seen: SeenGrasp) -> list[str]:
     """What to do next: first what was found against the log, which more grasps of the kind do not mend."""
     found = seen.detection.findings or ()
     steps = [f"{finding.name}: {finding.remedy}." for finding in found]
-    if model is None:
+    if seen.model is None:
         return [*steps, "Record another grasp of the same material, or load this one further, until parts of it slip."]
     if AGAINST_FRICTION.intersection(finding.name for finding in found):
         return [*steps, "Record the grasp again once that is mended."]
-    told = next_grasp(model, WorkingPoint(0.5 * sum(model.domain.normal_force)), grasps=1)
+    told = next_grasp(seen.model, WorkingPoint(0.5 * sum(seen.model.domain.normal_force)), grasps=1)
     return [*steps, wording.record_next(told), "Upload it with others of its material, and ask how hard to grip that."]
-
-
-def _fitted(seen: SeenGrasp) -> tuple[FrictionModel | None, str | None]:
-    """The model, or why there is none."""
-    if seen.none_because is not None:
-        return None, seen.none_because
-    names = [finding.name for finding in seen.detection.findings or ()]
-    try:
-        return with_doubts(fit([seen.samples], method=METHOD), [names]), None
-    except EstimatorError as error:
-        return None, str(error)
 
 
 def _seen_facts(seen: SeenGrasp) -> list[Fact]:
@@ -132,7 +73,7 @@ def _seen_facts(seen: SeenGrasp) -> list[Fact]:
     return [*facts, *seen.about]
 
 
-def _sections(seen: SeenGrasp, model: FrictionModel | None) -> list[Section]:
+def _sections(seen: SeenGrasp) -> list[Section]:
     sections = []
     if seen.slip is not None:
         picture = Picture(MAP, draw_slip(seen.slip))
@@ -141,15 +82,15 @@ def _sections(seen: SeenGrasp, model: FrictionModel | None) -> list[Section]:
         rows = [[each.name, each.evidence, each.remedy] for each in seen.detection.findings]
         doubts = Table("Findings", ("finding", "evidence", "what to do"), rows)
         sections.append(Section("What makes its friction doubtful", tables=[doubts]))
-    if model is not None:
-        sections.append(_model_section(seen, model))
+    if seen.model is not None:
+        sections.append(_model_section(seen.samples, seen.model))
     return [*sections, _detection_section(seen.detection)]
 
 
-def _model_section(seen: SeenGrasp, model: FrictionModel) -> Section:
+def _model_section(samples: FrictionSamples, model: FrictionModel) -> Section:
     plane = Picture(
         "A dot: friction at a slipping element. Line: fitted. Band: where 90 % of new observations are expected.",
-        friction_sections(model, seen.samples),
+        friction_sections(model, samples),
     )
     spread = Picture("How probable each value of each coefficient is. Dotted: its 95 % interval.", marginals(model))
     table = wording.coefficient_table({model.method: model})

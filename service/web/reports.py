@@ -30,9 +30,10 @@ async def show(context: Context, principal: Principal, kind: str, write: Callabl
 
 def write_log(log: StoredGraspLog, history: Path, samples: Path, upload: Path | None, target: Path) -> None:
     """Write the report of a stored log; ``upload`` is None where it was deleted."""
-    from service.report.grasp import write_stored
+    from service.domain.grasp_report import report_of_stored
+    from service.report.page import write_report
 
-    write_stored(log, history, samples, upload, target)
+    write_report(report_of_stored(log, history, samples, upload), target)
 
 
 def write_material(material: Material, logs: Sequence[GraspLogReceipt], probe: RecordNext | None, target: Path) -> None:

@@ -16,6 +16,7 @@ from db.records import Claim, Detection, Gel, Job, Material, NewGraspLog, Stored
 from db.repositories import detections, friction_models, grasp_logs, jobs, materials, runners, sensors
 from db.tables import JobRow, SampleSummaryRow
 from estimators import InvalidSamples, Moments
+from service.domain.collect_friction import collect
 from service.domain.recommended import recommended
 from service.domain.stored_results import SAMPLE_ARRAYS, encode_samples, summarise_samples
 from service.jobs import pipeline
@@ -373,5 +374,5 @@ def test_without_a_description_a_log_without_forces_is_refused_with_advice(shop:
 def test_samples_carry_the_noise_of_reconstructed_forces(blind: GraspLog) -> None:
     found = reconstruct(blind, forces.Gel(1e6, 0.49))
     log = found.apply(blind)
-    collected, _ = pipeline._collect(log, slipcore.detect_slip(log), found)
+    collected, _ = collect(log, slipcore.detect_slip(log), found)
     assert collected.elements.normal_force_noise == pytest.approx(found.force_noise / np.sqrt(2.0))

@@ -186,6 +186,7 @@ def test_a_key_logs_in_loads_simulated_grasps_and_logs_out(
         base = str(client.base_url).rstrip("/")
         tab.call("Page.navigate", url=f"{base}/jobs")
         tab.until("location.pathname === '/login' && document.readyState === 'complete'")
+        assert tab.barriers() == []
         tab.run(f"key.value = '{text}'; document.querySelector('main form').submit()")
         tab.until("location.pathname === '/jobs' && document.readyState === 'complete'")
         assert tab.run("document.cookie") == ""  # no script reads it
@@ -193,6 +194,7 @@ def test_a_key_logs_in_loads_simulated_grasps_and_logs_out(
         tab.go(f"{base}/")
         assert "Nothing is stored here yet" in tab.run("document.body.innerText")
         assert fits(tab)
+        assert tab.barriers() == []
         tab.run("document.querySelector('[action=\"/practice\"] button').click()")
         tab.until("location.pathname === '/jobs' && document.readyState === 'complete'")
         assert "simulated rubber" in tab.run("document.querySelector('main').innerText")

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from db.records import Finding
+from service.domain.doubtful_logs import with_doubts
+from service.domain.grasp_report import report_of_stored, see
 from service.domain.stored_results import encode_history, encode_samples
-from service.report.grasp import SeenGrasp, grasp_report, see, write_stored
+from service.report.grasp import SeenGrasp, grasp_report
 from service.report.page import render
 from slipcore import GraspLog, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
@@ -64,7 +66,9 @@ def test_what_makes_friction_doubtful_is_told_with_what_to_do(log: GraspLog) -> 
 
 def test_what_speaks_against_friction_is_mended_before_more_is_recorded(seen: SeenGrasp) -> None:
     doubt = Finding("friction follows force", "seen", "believe the whole contact")
-    report = grasp_report(replace(seen, detection=replace(seen.detection, findings=(doubt,))))
+    assert seen.model is not None
+    doubted = with_doubts(seen.model, [[doubt.name]])
+    report = grasp_report(replace(seen, model=doubted, detection=replace(seen.detection, findings=(doubt,))))
     assert report.steps == [
         "friction follows force: believe the whole contact.",
         "Record the grasp again once that is mended.",
@@ -82,8 +86,7 @@ def test_of_a_deleted_upload_the_maps_are_drawn_on_the_lattice(seen: SeenGrasp, 
             material="<i>", sensor="s", frames=len(log), duration=1.2, grid=log.grid, created_at=datetime(2026, 1, 2),
             detection=seen.detection, samples=SimpleNamespace(none_because=None),
         )  # fmt: skip
-        write_stored(cast(Any, stored), tmp_path / "history", tmp_path / "samples", upload, tmp_path / "report.html")
-        page = (tmp_path / "report.html").read_text(encoding="utf-8")
+        page = render(report_of_stored(cast(Any, stored), tmp_path / "history", tmp_path / "samples", upload))
         assert "Grasp log of 2026-01-02 00:00:00 UTC" in page
         assert page.count("<svg") == 3
         assert "&lt;i&gt;" in page

@@ -1,0 +1,44 @@
+"""What a log tells of friction, and where that is nothing, why."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import slipcore
+from slipcore import Collected, ContactFriction, FrictionSamples, GraspLog, SlipHistory
+
+if TYPE_CHECKING:
+    from slipcore.forces import Reconstruction
+
+
+def collect(
+    log: GraspLog, history: SlipHistory, reconstruction: "Reconstruction | None"
+) -> tuple[Collected, str | None]:
+    """What is known of friction, and if there are no samples, why; noise of reconstructed forces is theirs."""
+    if not log.is_scaled:
+        return _no_samples(log), "the log's scale is unknown; friction needs velocities in m/s, not pixels a second"
+    if log.force is None:
+        return _no_samples(log), (
+            "the log has no forces; friction is tangential over normal force. If a sensor sees only its markers move, "
+            f"describe the gel of sensor {log.sensor!r}, from which forces follow, and send the log again"
+        )
+    if not history.contact.any():
+        return _no_samples(log), f"no element was in contact in any of the {len(log)} frames"
+    options = {} if reconstruction is None else {"force_noise": reconstruction.force_noise}
+    found = slipcore.collect_friction(log, history, **options)
+    if len(found.samples) == 0:
+        slipping = int(history.slip.sum())
+        seen = f"no slip gave a friction sample ({slipping} slipping elements in {len(log)} frames)"
+        because = f"{seen}; an element counts once all around it slips: load it further, or press less"
+        return found, "; ".join(filter(None, (found.elements_left_out or because, _bound(found.contact))))
+    return found, None
+
+
+def _bound(contact: ContactFriction | None) -> str | None:
+    return None if contact is None else f"by the load that the contact bore, friction is at least {contact.low:.2g}"
+
+
+def _no_samples(log: GraspLog) -> Collected:
+    none = np.empty(0)
+    samples = FrictionSamples(none, none, none, none, none, none.astype(int), none, log.element_area)
+    return Collected(samples, samples, None, None)
