@@ -80,6 +80,8 @@ class Prior(Options):
     β₁ matters and no sample tells it."""
     unknown_velocity: Annotated[float, Option(1e-6, 1.0, "m/s", "incipient slip: 0.1 to 10 mm/s")] = 1e-3
     """Root mean square of those unknown: then 2 % of friction; of rocks it is 1 to 3 % a decade (Marone, 1998)."""
+    velocity_tilt: Annotated[float, Option(0.0, 10.0, "-", "a third slower or faster at half the force")] = 0.5
+    """Standard deviation of the power k with which unknown velocities go with f_n."""
     nu_shape: Annotated[float, Option(0.1, 100.0, "-", "Juárez & Steel, J. Bus. Econ. Stat. 28 (2010) 52")] = 2.0
     """Shape of the gamma prior of the degrees of freedom of Student-t errors."""
     nu_rate: Annotated[float, Option(1e-4, 10.0, "-", "Juárez & Steel (2010): mean 20, any tails")] = 0.1

@@ -20,7 +20,7 @@ from estimators.defaults import PRIOR, REFERENCE, ROUNDING
 from estimators.linear.grasp_statistics import GraspStatistics
 from estimators.linear.normal_inverse_gamma import NormalInverseGamma
 from estimators.linear.priors import log_half_student
-from estimators.linear.unknown_velocity import offset_variance
+from estimators.linear.unknown_velocity import columns_off, offset_variance
 
 FloatArray = NDArray[np.float64]
 
@@ -56,8 +56,8 @@ class Hierarchical:
     β = ``pooled.mean`` + ``pooled.root`` γ. Groups of places [m] in the order of their grasps: ``group`` [10, m] sums
     of squares of (γ | residual), ``count`` and ``weight`` [m] as in ``GraspStatistics``; ``start`` [g]: where those of
     each grasp begin; ``within`` [g, 10]; ``prior`` [10] the same of the prior; ``direction`` [3]: the γ of b̂;
-    ``unknown`` [g]: grasps of unknown velocity, which share an offset N(0, ``offset``); ``ones`` [3]: the γ of β = (1,
-    0, 0), which all are off by.
+    ``unknown`` [g]: grasps of unknown velocity, whose friction is off, all alike, by N(0, ``offset``) times each of the
+    columns that ``off_by`` [2, 3] are the γ of.
     """
 
     group: FloatArray
@@ -71,7 +71,7 @@ class Hierarchical:
     pooled: NormalInverseGamma
     unknown: NDArray[np.bool_]
     offset: float
-    ones: FloatArray
+    off_by: FloatArray
 
     def products(self, log_lambda: FloatArray, log_rho: FloatArray) -> Products:
         """Sums at all pairs of λ [l] and ρ [r], as [l · r] points of which ρ varies fastest."""
@@ -111,17 +111,19 @@ class Hierarchical:
         return Conditional(log, self.pooled.mean + gamma @ root.T, root @ covariance @ root.T)
 
     def _without_offset(self, products: Products, log_sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The sums over σ², [k, 10], and their log determinant [k], with the offset of unknown velocities integrated
-        out: a rank-one update as that of a grasp, along a column of ones.
+        """The sums over σ², [k, 10], and their log determinant [k], with what unknown velocities are off by integrated
+        out: rank-one updates as that of a grasp.
         """
         square, determinant = products.square * np.exp(-2.0 * log_sigma)[:, None], products.log_determinant
         if not self.unknown.any():
             return square, determinant
         told = products.unknown * np.exp(-2.0 * log_sigma)[:, None]
-        along = told[:, WHOLE[:, :3]] @ self.ones  # [k, 4]
-        growth = 1.0 + self.offset * (along[:, :3] @ self.ones)
-        lost = self.offset / growth[:, None] * along[:, FIRST] * along[:, SECOND]
-        return square - lost, determinant + np.log(growth)
+        for column in self.off_by:
+            along = told[:, WHOLE[:, :3]] @ column  # [k, 4]
+            growth = 1.0 + self.offset * (along[:, :3] @ column)
+            lost = self.offset / growth[:, None] * along[:, FIRST] * along[:, SECOND]
+            told, square, determinant = told - lost, square - lost, determinant + np.log(growth)
+        return square, determinant
 
     def log_sigma(self, products: Products) -> tuple[FloatArray, float]:
         """Mean [k] and spread of log σ at points [k], the priors of β, τ and ω left aside: σ² is inverse-gamma then."""
@@ -167,7 +169,7 @@ def hierarchical(
         pooled=pooled,
         unknown=np.array([grasp.velocity_unknown for grasp in grasps]),
         offset=offset_variance(float(centre @ pooled.mean), float(pooled.mean[1]), float(pooled.covariance[1, 1])),
-        ones=_direction(pooled, np.array([1.0, 0.0, 0.0])),
+        off_by=np.stack([_direction(pooled, each) for each in columns_off(float(centre[2]))]),
     )
 
 

@@ -117,15 +117,22 @@ def test_where_all_motions_are_known_nothing_changes() -> None:
 
 
 @pytest.mark.parametrize("method", ["hierarchical", "conjugate", "ols"])
-def test_grasps_of_known_motion_tell_of_velocity_and_the_others_add_to_the_rest(method: str) -> None:
+def test_only_grasps_of_known_motion_tell_of_velocity(method: str) -> None:
     posed, mixed = grasps(1, 8.0, known=6)[:3], grasps(1, 8.0, known=3)
     alone, together = fit(posed, method=method), fit(mixed, method=method)
     assert "to 50% of the samples" in str(together.diagnostics["unknown_velocity"])
     assert together.domain.tangential_velocity == alone.domain.tangential_velocity
     assert together.domain.normal_force[0] <= alone.domain.normal_force[0]
-    if method == "hierarchical":  # of the forces' slope more places tell more
-        assert together.standard_errors[2] < alone.standard_errors[2]
-        assert abs(together.coefficients[1] - alone.coefficients[1]) < 2.0 * alone.standard_errors[1]
+
+
+def test_grasps_of_unknown_motion_add_to_what_is_known_of_the_force_s_slope() -> None:
+    """On average over eight materials: how much grasps differ, which widens all, comes out otherwise with each."""
+    ratio = [
+        fit(grasps(seed, 8.0, known=3), method="hierarchical").standard_errors[2]
+        / fit(grasps(seed, 8.0, known=6)[:3], method="hierarchical").standard_errors[2]
+        for seed in range(8)
+    ]
+    assert np.mean(ratio) < 0.95
 
 
 def test_what_grasps_of_unknown_motion_differ_by_does_not_make_velocity_known() -> None:

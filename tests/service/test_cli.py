@@ -209,6 +209,14 @@ def test_fit_finds_the_friction_that_the_ramps_were_made_with(run: Run, ramps: l
     assert "β₁ [s/m]" in out
 
 
+def test_fit_says_that_velocities_are_unknown(run: Run, ramps: list[Path], tmp_path: Path) -> None:
+    path = tmp_path / "unposed.npz"
+    container.write(replace(formats.read(ramps[-1]), object_pose=None), path)
+    code, out, _ = run("fit", path)
+    assert code == 0
+    assert "the object's motion is unknown" in out
+
+
 def test_a_file_that_is_no_log_is_refused_by_name(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "noise.npz"
     path.write_bytes(b"not a log at all")

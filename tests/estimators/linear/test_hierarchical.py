@@ -16,6 +16,7 @@ from estimators.linear.normal_inverse_gamma import exact_posterior
 from estimators.linear.normal_mixture import matched_student, mixture_quantile
 from estimators.linear.posterior_grid import posterior_grid
 from estimators.linear.priors import weak_spans
+from estimators.linear.unknown_velocity import columns_off
 from slipcore.samples import FrictionSamples
 
 TRUTH = np.array([0.45, 8.0, -0.8])
@@ -41,7 +42,9 @@ def dense(
     place, expected = seen.place(), x @ about
     noise = np.diag(sigma**2 / seen.weight)
     noise += omega**2 * (place[:, None] == place)
-    noise += offset * np.outer(seen.velocity_is_relative, seen.velocity_is_relative)
+    for column in columns_off(float(data.mean_row()[2])):
+        off = np.where(seen.velocity_is_relative, x @ column, 0.0)
+        noise += offset * np.outer(off, off)
     noise += tau**2 * (seen.grasp[:, None] == seen.grasp) * np.outer(expected, expected)
     rows = np.diag(np.concatenate([[1.0], weak_spans(data.domain, data.element_area)]))
     rows[0] = data.mean_row()
