@@ -10,6 +10,7 @@ from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
+from alembic.util import CommandError
 from sqlalchemy import Connection, inspect, text
 from sqlalchemy.orm import Session
 
@@ -96,7 +97,7 @@ def _refuse_foreign(database: Database) -> None:
         revision = MigrationContext.configure(connection).get_current_revision()
         schema = inspect(connection)
         tables = sorted({*schema.get_table_names(), *schema.get_view_names()} - {"alembic_version"})
-    if revision is None and tables:
+    if tables and (revision is None or not Base.metadata.tables.keys() & {*tables}):
         found = f"tables of another program, such as {tables[0]}"
         raise SchemaMismatch(f"{database} has {found}; allowed: a file of its own")
 
@@ -118,7 +119,11 @@ def _migrating(database: Database) -> Iterator[Config]:
     config = _config()
     with database.connect(to_write=True) as connection, _foreign_keys_off(database, connection):
         config.attributes["connection"] = connection
-        yield config
+        try:
+            yield config
+        except CommandError as error:
+            known = ", ".join(script.revision for script in _scripts().walk_revisions())
+            raise SchemaMismatch(f"migration refused: {error}; allowed: head, base, {known}") from error
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import asdict, replace
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -274,6 +275,24 @@ def test_a_file_of_another_program_is_refused_by_name_and_left_alone(empty_datab
     with empty_database.connect() as connection:
         found = inspect(connection)
         assert [*found.get_table_names(), *found.get_view_names()] == ["notes"]
+
+
+@ONLY_SQLITE
+def test_a_file_of_another_program_with_a_revision_of_our_names_is_refused_too(empty_database: Database) -> None:
+    with empty_database.connect() as connection:
+        for line in ("alembic_version (version_num TEXT)", "users (name TEXT)"):
+            connection.exec_driver_sql(f"CREATE TABLE {line}")
+        connection.exec_driver_sql("INSERT INTO alembic_version VALUES ('0005')")
+        connection.commit()
+    for change in (migrate.upgrade, partial(migrate.downgrade, revision="0003")):
+        with pytest.raises(SchemaMismatch, match="tables of another program, such as users"):
+            change(empty_database)
+
+
+def test_a_revision_that_there_is_not_is_refused_by_name(database: Database) -> None:
+    with pytest.raises(SchemaMismatch, match=r"nonsense.*allowed: head, base, .*0001"):
+        migrate.downgrade(database, "nonsense")
+    assert migrate.current(database) == migrate.head()
 
 
 @ONLY_SQLITE

@@ -34,7 +34,7 @@ def list_sensors(context: CurrentContext) -> SensorsOut:
 
 
 @router.get(
-    "/{name}",
+    "/{name:path}",
     dependencies=[READ],
     summary="Look at a sensor",
     responses=problems(UNKNOWN_SENSOR, INVALID_REQUEST, STORAGE_UNAVAILABLE),
@@ -45,7 +45,7 @@ def read_sensor(context: CurrentContext, name: SensorName) -> SensorOut:
 
 
 @router.put(
-    "/{name}",
+    "/{name:path}",
     dependencies=[UPLOAD],
     summary="Describe a sensor's gel",
     responses=problems(UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILABLE),

@@ -1,5 +1,6 @@
 from collections.abc import Callable
 from typing import Any
+from urllib.parse import quote
 
 import httpx
 import pytest
@@ -18,8 +19,9 @@ NPZ = "application/vnd.stiction.grasp-log+npz"
 GEL = {"young_modulus": 2.5e5, "poisson_ratio": 0.48, "thickness": 4e-3, "marker_depth": 5e-4}
 
 
-def test_a_sensor_is_described_before_or_after_its_first_log(client: httpx.Client) -> None:
-    path = "/v1/sensors/Gel%20Sight"
+@pytest.mark.parametrize("name", ["Gel Sight", "a/b", "hand/left/", "?#%2F"])
+def test_a_sensor_is_described_before_or_after_its_first_log(client: httpx.Client, name: str) -> None:
+    path = f"/v1/sensors/{quote(name, safe='')}"
     unknown = client.get(path)
     assert (unknown.status_code, unknown.json()["type"]) == (404, "/problems/unknown-sensor")
     thick = client.put(path, json={"young_modulus": 1e6, "poisson_ratio": 0.49})
@@ -29,10 +31,10 @@ def test_a_sensor_is_described_before_or_after_its_first_log(client: httpx.Clien
         "thickness": None,
         "marker_depth": 0.0,
     }
-    assert client.put(path, json=GEL).json() == {"name": "Gel Sight", "gel": GEL}
+    assert client.put(path, json=GEL).json() == {"name": name, "gel": GEL}
     assert client.get(path).json()["gel"] == GEL
-    assert {"name": "Gel Sight", "gel": GEL} in client.get("/v1/sensors").json()["items"]
-    told = client.get("/v1/audit?subject=Gel%20Sight").json()["items"]
+    assert {"name": name, "gel": GEL} in client.get("/v1/sensors").json()["items"]
+    told = client.get("/v1/audit", params={"subject": name}).json()["items"]
     assert [entry["action"] for entry in told] == ["sensor.described"] * 2
     assert told[0]["details"] == GEL
 
