@@ -30,9 +30,10 @@ def element_forces(force: FloatArray, normal: FloatArray) -> ElementForces:
 
     f_n = |f·n| and f_t = |f − (f·n) n| (paper, eq. 38–39 as magnitudes).
     """
-    along = np.vecdot(force, normal)
-    rest = force - along[..., None] * normal
-    return ElementForces(np.abs(along), np.sqrt(np.vecdot(rest, rest)), along < 0.0)
+    (x, y, z), (a, b, c) = np.moveaxis(force, -1, 0), np.moveaxis(normal, -1, 0)
+    along = x * a + y * b + z * c
+    x, y, z = x - along * a, y - along * b, z - along * c
+    return ElementForces(np.abs(along), np.sqrt(x * x + y * y + z * z), along < 0.0)
 
 
 def contact_factor(tangential_force: ArrayLike, normal_force: ArrayLike, friction_coefficient: ArrayLike) -> FloatArray:

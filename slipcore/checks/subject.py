@@ -1,9 +1,7 @@
 """What the checks look at, and what they find."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-
-import numpy as np
+from dataclasses import dataclass, field
 
 from slipcore.defaults import CheckOptions
 from slipcore.element_forces import ElementForces
@@ -25,7 +23,10 @@ class Finding:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Subject:
-    """What the checks look at; ``forces``, with pressing parts [t, n, m] N, and ``samples`` where there are any."""
+    """What the checks look at; ``forces``, with pressing parts [t, n, m] N, and ``samples`` where there are any.
+
+    ``total``: normal force of all elements, [t] N; ``held``: frames with at least half of the largest, [t].
+    """
 
     log: GraspLog
     history: SlipHistory
@@ -33,16 +34,13 @@ class Subject:
     pressing: FloatArray
     samples: FrictionSamples | None
     limits: CheckOptions
+    total: FloatArray = field(init=False)
+    held: BoolArray = field(init=False)
 
-    @property
-    def total(self) -> FloatArray:
-        """Normal force of all elements, [t] N."""
-        return np.asarray(self.pressing.sum(axis=(1, 2)))
-
-    @property
-    def held(self) -> BoolArray:
-        """Frames with at least half of the largest normal force, [t]."""
-        return np.asarray(self.total > 0.5 * self.total.max(initial=0.0))
+    def __post_init__(self) -> None:
+        total = self.pressing.sum(axis=(1, 2))
+        object.__setattr__(self, "total", total)
+        object.__setattr__(self, "held", total > 0.5 * total.max(initial=0.0))
 
 
 Check = Callable[[Subject], Iterator[Finding]]
