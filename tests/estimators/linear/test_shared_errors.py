@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 
 import estimators
+from estimators.defaults import REFERENCE
 from estimators.linear.fit_data import gather
-from estimators.linear.shared_errors import shared_by_elements
+from estimators.linear.least_squares import solve
+from estimators.linear.shared_errors import plane, shared_by_elements
 from estimators.methods.automatic import choose
 from slipcore.samples import FrictionSamples
 
@@ -42,6 +44,13 @@ def test_independent_errors_are_hardly_ever_taken_for_shared_ones(samples: Make)
     one_each = samples(15, seed=3)
     alone = gather(replace(one_each, element=np.arange(15)))
     assert shared_by_elements(alone) == 0.0
+
+
+def test_the_plane_of_friction_without_scatter_is_friction(samples: Make) -> None:
+    data = gather(samples(50, scale=0.0))
+    assert data.observations is not None
+    found = plane(solve(data.factor, REFERENCE.spans(data.element_area)), data.observations)
+    np.testing.assert_allclose(found, data.observations.friction, rtol=1e-10)
 
 
 def test_labels_of_elements_may_be_any_whole_numbers(samples: Make) -> None:

@@ -64,3 +64,10 @@ def test_more_accuracy_takes_more_steps_and_is_reached() -> None:
     assert len(fine.flat()) > 4 * len(rough.flat())
     assert fine.monte_carlo_error <= 0.007
     assert abs(fine.flat().mean()) < 5 * 0.007
+
+
+def test_an_error_three_times_too_large_takes_nine_times_the_steps() -> None:
+    chain = sampling.Chain(np.zeros((400, 2, 1)), np.ones(1), np.full(1, 800.0), 0.03, 1.0, 1.0, "independence", "", "")
+    steps = sampling._missing(chain, goal=0.01)
+    assert steps % SAMPLING.batch == 0
+    assert steps == pytest.approx(SAMPLING.more_steps * 9 * 400 - 400, abs=1.01 * SAMPLING.batch)

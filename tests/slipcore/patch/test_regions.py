@@ -50,6 +50,13 @@ def test_regions_grow_to_all_sides_but_not_into_each_other() -> None:
     assert widened(labels, 0).tolist() == labels.tolist()
 
 
+def test_a_region_grows_alike_upwards_and_downwards() -> None:
+    labels, _ = follow_regions(frames("....... ....... ....... ...#... ....... ....... ......."))
+    for margin in (1, 2):
+        square = np.pad(np.zeros((1 + 2 * margin,) * 2, int), 3 - margin, constant_values=NOWHERE)
+        assert widened(labels, margin)[0].tolist() == square.tolist()
+
+
 def test_numbers_go_by_the_largest_common_part_in_any_case() -> None:
     """Against the rule itself, on noise that drifts."""
     rng = np.random.default_rng(8)

@@ -69,6 +69,15 @@ def test_a_single_element_has_a_ratio_of_forces_and_no_moment() -> None:
     assert (felt.load_ratio[0], felt.moment[0]) == (pytest.approx(0.5), 0.0)
 
 
+def test_normal_forces_are_felt_along_their_own_resultant() -> None:
+    """Without friction the mean normal, weighted by what presses, is that of the whole force."""
+    normal = np.array([[[0.6, 0.0, 0.8], [0.0, -0.6, 0.8]], [[-0.48, 0.64, 0.6], [0.0, 0.0, 1.0]]])
+    force = -np.array([[3.0, 1.0], [2.0, 0.5]])[..., None] * normal
+    felt = resultants(force[None], normal[None], np.zeros((1, 2, 2, 3)), one_patch(np.ones((1, 2, 2), bool)))
+    assert felt.normal_force[0] == pytest.approx(np.linalg.norm(force.sum(axis=(0, 1))), rel=1e-12)
+    np.testing.assert_allclose(felt.tangential_force[0], 0.0, rtol=0, atol=1e-12, err_msg="of 6 N")
+
+
 def test_where_nothing_presses_nothing_is_known() -> None:
     force = np.array([0.1, 0.0, 0.0]) * np.ones((1, 2, 2, 3))
     felt = resultants(

@@ -62,3 +62,17 @@ def test_holding_on_to_deformation_they_miss_that_pressing_ends_slip(ramp: Grasp
         assert history.slip[-1].sum() >= 0.9 * history.slip[len(ramp) - 1].sum() > 0
     filtered = detect_slip(log, "filter")
     assert filtered.slip[-1].sum() < 0.2 * filtered.slip[len(ramp) - 1].sum()
+
+
+@pytest.mark.parametrize("pitch", [0.5e-3, 4e-3])
+@pytest.mark.parametrize(("stretch", "slips"), [(0.019, False), (0.021, True)])
+def test_local_deformation_compares_the_stretch_since_touch_with_its_threshold(
+    pitch: float, stretch: float, slips: bool
+) -> None:
+    """A stretch alike in all directions moves neighbours apart by that share of their distance, whatever this is."""
+    x, y = np.meshgrid(*[pitch * np.arange(5.0)] * 2, indexing="ij")
+    rest, pressing = np.stack([x, y, 0.0 * x], axis=-1), np.array([0.0, 0.0, -0.5]) * np.ones((2, 5, 5, 3))
+    log = GraspLog(np.array([0.0, 0.1]), rest, np.stack([0.0 * rest, stretch * rest]), pitch**2, pressing)
+    slip = detect_slip(log, "local_deformation", threshold=0.02).slip
+    assert not slip[0].any()
+    assert (slip[1] == slips).all()

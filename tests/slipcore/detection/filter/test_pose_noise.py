@@ -2,12 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from inspect import unwrap
 
 import numpy as np
 import pytest
 
 from slipcore import GraspLog, SlipHistory, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
+from slipcore.detection.filter import pose_noise
+from slipcore.detection.filter.state import COMMON
 
 Score = Callable[[GraspLog, SlipHistory], float]
 
@@ -53,3 +56,10 @@ def test_a_shake_while_nothing_moves_is_no_slip() -> None:
 
 def test_without_noise_the_pose_is_believed(ramp: GraspLog, f1_score: Score) -> None:
     assert f1_score(ramp, detect_slip(ramp)) > 0.93
+
+
+def test_the_deviation_of_white_noise_is_found_in_each_coordinate() -> None:
+    noise = unwrap(pose_noise._noise)  # compiling it would take seconds
+    rng, common, sizes = np.random.default_rng(5), np.zeros(COMMON), np.array([2e-6, 2e-6, 7e-4])
+    found = np.array([noise(sizes * rng.standard_normal(3), common) for _ in range(3000)])
+    np.testing.assert_allclose(found[100:].mean(axis=0), sizes[1:], rtol=0.05)  # 3000 frames, 31 at a time: 2 %
