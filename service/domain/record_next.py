@@ -32,7 +32,7 @@ class RecordNext:
 def record_next(
     stored: StoredModel,
     normal_force: float,
-    tangential_velocity: float = 0.0,
+    tangential_velocity: float,
     quantile: float = 1e-2,
     elements: int = 60,
     load: float = 0.0,

@@ -42,6 +42,16 @@ def test_a_blob_is_not_there_before_the_store_has_it(s3: Any, tmp_path: Path, mo
     assert s3.objects == {}
 
 
+@pytest.mark.usefixtures("s3")
+def test_a_removed_blob_is_gone_from_its_place_alone(tmp_path: Path) -> None:
+    blobs = open_blobs(tmp_path, URL, MIB)
+    kept, aside, gone = (blobs.put(content) for content in (b"kept", b"aside", b"gone"))
+    blobs.quarantine.put(aside)
+    blobs.remove([gone, aside])
+    assert [blobs.has(each) for each in (kept, aside, gone)] == [True, False, False]
+    assert list(blobs.quarantine.hashes()) == [aside]
+
+
 def test_what_comes_back_changed_is_not_taken(s3: Any, tmp_path: Path) -> None:
     sha256 = open_blobs(tmp_path / "one", URL, MIB).put(b"tactile")
     s3.objects[f"lab/{sha256[:2]}/{sha256}"] = b"tactilE"

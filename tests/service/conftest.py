@@ -257,7 +257,7 @@ def blobs(tmp_path: Path) -> BlobStore:
 def new_model() -> NewModel:
     zero = ((1e-4, 0.0, 0.0), (0.0, 1e-4, 0.0), (0.0, 0.0, 1e-4))
     numbers: dict[str, Any] = {"degrees_of_freedom": 9.0, "scatter_degrees_of_freedom": None, "element_area": 1e-6}
-    ranges: dict[str, Any] = {"tangential_velocity": (0.0, 0.01), "normal_force": (0.0, 0.1)}
+    ranges: dict[str, Any] = {"tangential_velocity": (0.0, 0.01), "normal_force": (0.01, 0.1)}
     costs: dict[str, Any] = {"diagnostics": {}, "cost_seconds": 0.0, "monte_carlo_error": 0.0}
     return NewModel("ols", (0.4, 0.0, 0.0), zero, 0.02, 9, identifiable=(True,) * 3, **numbers, **ranges, **costs)
 

@@ -9,7 +9,7 @@ from backports import zstd
 
 from db.blobs import BlobStore, Spool
 from service.domain import receive
-from service.domain.errors import InvalidValue, TooLarge
+from service.domain.errors import InvalidValue, TooLarge, UnsupportedFormat
 
 PACKERS: dict[str, Callable[[bytes], bytes]] = {"gzip": gzip.compress, "zstd": zstd.compress}
 
@@ -22,6 +22,16 @@ def spools(tmp_path: Path) -> BlobStore:
 def filled(spool: Spool, content: bytes) -> Spool:
     spool.write(content)
     return spool
+
+
+@pytest.mark.parametrize(("told", "undone"), [("", ""), ("identity", ""), (" GZip ", "gzip"), ("zstd", "zstd")])
+def test_an_encoding_is_known_however_it_is_spelled(told: str, undone: str) -> None:
+    assert receive.check_encoding(told) == undone
+
+
+def test_an_unknown_encoding_is_refused_with_those_that_are_known() -> None:
+    with pytest.raises(UnsupportedFormat, match="gzip, zstd or none"):
+        receive.check_encoding("br")
 
 
 @pytest.mark.parametrize("encoding", PACKERS)

@@ -37,6 +37,16 @@ def test_a_working_point_outside_the_data_is_marked(browser: Any) -> None:
     assert "outside the data" in browser.get("/?fn=5").text
 
 
+@pytest.mark.usefixtures("store")
+def test_a_material_shows_friction_where_it_has_a_model_and_says_where_it_has_none(
+    browser: Any, add: Callable[..., int]
+) -> None:
+    add("cardboard")
+    page = browser.get("/materials/paper").text
+    assert "<dt>Friction coefficient μ</dt><dd>0.400</dd>" in page  # β₀ of the stored model
+    assert "There is no model yet." in browser.get("/materials/cardboard").text
+
+
 def test_a_search_finds_parts_of_names_and_says_when_there_are_none(browser: Any, add: Callable[..., int]) -> None:
     for name in ("paper", "cardboard"):
         add(name)
