@@ -20,6 +20,7 @@ from db.file_header import GENERATION, OLDEST
 from db.quarantine import sync_folder
 from db.records import Actor
 from db.repositories import audit, stores
+from db.sqlite_file import SIDE_FILES
 from db.tables import Base, BrowserSessionRow, IdempotencyKeyRow, RunnerRow, StoreRow
 
 FILE = "stiction.sqlite3"
@@ -45,7 +46,8 @@ def backup(database: Database, blobs: BlobStore, folder: Path, report: Report) -
         raise NotEmpty(f"backup {file}", "a folder without one; blobs of an earlier backup may be in it")
     folder.mkdir(parents=True, exist_ok=True)
     unfinished = file.with_suffix(".part")
-    unfinished.unlink(missing_ok=True)
+    for left in (unfinished, *(Path(f"{unfinished}{suffix}") for suffix in SIDE_FILES)):
+        left.unlink(missing_ok=True)
     with closing(_opened(unfinished)) as copy:
         migrate.upgrade(copy)
         _copy_rows(database, copy, report)

@@ -31,28 +31,41 @@ def headers(log: Path) -> list[FileHeader]:
 
 
 def _headers(file: int, head: bytes) -> Iterator[FileHeader]:
-    _, _, told_size, _, *salts = _HEAD.unpack(head)[:6]
+    """The first one only if its frame is whole: its page is written after its head, over one of an earlier log."""
+    told_size = _HEAD.unpack(head)[2]
     page_size = _LARGEST_PAGE if told_size == 1 else told_size
+    is_first = True
+    for place, frame, checksum in _frames_of_page_1(file, head, page_size):
+        page = os.pread(file, page_size if is_first else PAGE_BYTES, place)
+        if len(page) < PAGE_BYTES or (is_first and not _is_whole(head, frame, page, checksum)):
+            return
+        is_first = False
+        yield FileHeader.of_page(page[:PAGE_BYTES])
+
+
+def _frames_of_page_1(file: int, head: bytes, page_size: int) -> Iterator[tuple[int, bytes, tuple[int, int]]]:
+    """Where page 1 begins, the head of its frame, and the checksum that this one goes on from."""
+    *_, salt, other_salt, first, second = _HEAD.unpack(head)
     place = _HEAD.size
     while len(frame := os.pread(file, _FRAME.size, place)) == _FRAME.size:
-        number, _, *own_salts = _FRAME.unpack(frame)[:4]
-        if own_salts != salts:  # left over from before the log began anew
+        number, _, *own_salts, next_first, next_second = _FRAME.unpack(frame)
+        if own_salts != [salt, other_salt]:  # left over from before the log began anew
             return
         if number == 1:
-            page = os.pread(file, page_size, place + _FRAME.size)
-            if len(page) < max(page_size, PAGE_BYTES) or (place == _HEAD.size and not _is_whole(head, frame, page)):
-                return
-            yield FileHeader.of_page(page[:PAGE_BYTES])
+            yield place + _FRAME.size, frame, (first, second)
+        first, second = next_first, next_second
         place += _FRAME.size + page_size
 
 
-def _is_whole(head: bytes, frame: bytes, page: bytes) -> bool:
-    """Whether the first frame has its checksum: its page is written after it, over one of before."""
-    magic, *_, first, second = _HEAD.unpack(head)
-    order = "><"[magic % 2 == 0]
+def _is_whole(head: bytes, frame: bytes, page: bytes, checksum: tuple[int, int]) -> bool:
+    """Whether a frame has the checksum that its head tells, which goes on from that of the frame before."""
     covered = frame[:8] + page
+    if len(covered) % 8:
+        return False
+    order = "><"[_HEAD.unpack(head)[0] % 2 == 0]
     words = struct.unpack(f"{order}{len(covered) // 4}I", covered)
+    first, second = checksum
     for even, odd in zip(words[::2], words[1::2], strict=True):
         first = (first + even + second) % 2**32
         second = (second + odd + first) % 2**32
-    return [first, second] == list(_FRAME.unpack(frame)[4:])
+    return (first, second) == _FRAME.unpack(frame)[4:]

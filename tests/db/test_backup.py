@@ -1,3 +1,4 @@
+import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
@@ -13,6 +14,7 @@ from db.database import Database
 from db.errors import BlobDamaged, NotEmpty, NotFound, SchemaMismatch
 from db.records import Claim, Detection, NewGraspLog, NewModel, SampleSummary
 from db.repositories import access_keys, detections, friction_models, grasp_logs, jobs, materials, runners
+from db.sqlite_file import SIDE_FILES
 from db.tables import Base, MaterialRow
 
 Rows = dict[str, list[dict[str, object]]]
@@ -109,6 +111,26 @@ def test_the_next_backup_copies_new_blobs_only(filled: Database, blobs: BlobStor
     (tmp_path / "copy" / FILE).unlink()
     backup(filled, blobs, tmp_path / "copy", told.__setitem__)
     assert told["blobs"] == 0
+
+
+def test_a_backup_that_was_killed_is_made_anew_in_the_same_folder(
+    filled: Database, blobs: BlobStore, tmp_path: Path
+) -> None:
+    """What it leaves is a file that was begun, and its write-ahead log."""
+    backup(filled, blobs, tmp_path / "copy", nothing)
+    file = tmp_path / "copy" / FILE
+    begun = file.with_suffix(".part")
+    file.rename(begun)
+    with closing(sqlite3.connect(begun)) as connection:
+        connection.execute("UPDATE materials SET description = 'begun'")
+        connection.commit()
+        left = {suffix: Path(f"{begun}{suffix}").read_bytes() for suffix in SIDE_FILES}
+    for suffix, content in left.items():
+        Path(f"{begun}{suffix}").write_bytes(content)
+    for _ in range(2):
+        backup(filled, blobs, tmp_path / "copy", nothing)
+        assert [path.name for path in (tmp_path / "copy").glob("*.*")] == [FILE]
+        file.unlink()
 
 
 def test_a_blob_that_changed_or_went_stops_a_restore_before_any_row(

@@ -236,6 +236,24 @@ def test_a_first_frame_whose_page_was_not_written_yet_tells_nothing(tmp_path: Pa
     assert headers(log) == []
 
 
+def test_a_first_header_behind_other_frames_is_none_until_its_page_was_written(tmp_path: Path) -> None:
+    """Behind what another program changed, or in a transaction larger than SQLite's cache, which writes that first."""
+    path = tmp_path / NAME
+    with closing(opened(path)) as database, closing(sqlite3.connect(path, isolation_level=None)) as other:
+        empty_log(database)
+        other.execute("UPDATE alembic_version SET version_num = version_num")
+        look(database)
+        log = copy(Path(f"{path}-wal"), tmp_path / "log")
+        in_file = header_of(path)
+    content = bytearray(log.read_bytes())
+    pages = [struct.unpack(">I", content[at : at + 4])[0] for at in range(32, len(content), 4096 + 24)]
+    assert pages.index(1) > 0
+    assert [header.follows(in_file) for header in headers(log)] == [True]
+    content[32 + pages.index(1) * (4096 + 24) + 24 + 4000] ^= 1
+    log.write_bytes(content)
+    assert headers(log) == []
+
+
 HAMMER = """
 import random, sys
 from contextlib import closing
