@@ -188,10 +188,8 @@ def scatter(model: FrictionModel) -> tuple[float, float, float]:
 
 def _forces(model: FrictionModel, working_point: WorkingPoint, probing: Probing) -> list[float]:
     """Mean normal forces of an element, N, at which a grasp bears the load."""
-    low, high = probing.normal_force or (
-        min(0.5 * model.domain.normal_force[0], working_point.normal_force),
-        max(2.0 * model.domain.normal_force[1], working_point.normal_force),
-    )
+    asked, (least, most) = working_point.normal_force, model.domain.normal_force
+    low, high = probing.normal_force or (min(0.5 * least if least > 0.0 else asked, asked), max(2.0 * most, asked))
     if not 0.0 < low <= high < math.inf:
         raise InvalidSamples("normal_force", (low, high), "N an element, above 0, the least first")
     forces = np.append(np.geomspace(low, high, DESIGN.forces), np.clip(working_point.normal_force, low, high))

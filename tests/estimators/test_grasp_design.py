@@ -107,8 +107,9 @@ def test_the_choice_does_not_depend_on_the_unit_of_force(unit: float) -> None:
         replace(model(), coefficients=np.zeros(3)),
         replace(model(), scales=None),
         replace(model(), domain=Domain((1e-3, 1e-3), (0.1, 0.1))),
+        replace(model(), domain=Domain((0.0, 4e-3), (0.0, 0.2))),
     ],
-    ids=["all known", "no scatter", "no friction", "no scales", "one point"],
+    ids=["all known", "no scatter", "no friction", "no scales", "one point", "from no force on"],
 )
 def test_hard_cases_have_an_answer(known: FrictionModel) -> None:
     found = next_grasp(known, POINT)
