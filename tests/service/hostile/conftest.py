@@ -116,14 +116,23 @@ def faulty_connection(layer: FaultyLayer) -> type[sqlite3.Connection]:
 
 @pytest.fixture
 def layer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FaultyLayer]:
-    """Under everything in the test's own folder. Ask for it before anything that opens a database."""
+    """Under everything but the folders of other tests, whose servers may be at work in other threads.
+
+    Ask for it before anything that opens a database.
+    """
     made = FaultyLayer()
 
-    def before(owner: Any, name: str, point: str | None = None) -> None:
+    def is_own(place: object) -> bool:
+        if isinstance(place, int):
+            place = os.readlink(f"/proc/self/fd/{place}")
+        return str(tmp_path.parent) not in str(place) or str(tmp_path) in str(place)
+
+    def before(owner: Any, name: str) -> None:
         original: Callable[..., Any] = getattr(owner, name)
 
         def faulty(*given: Any, **options: Any) -> Any:
-            made.file_point(point or name)
+            if is_own(given[0]):
+                made.file_point(name)
             return original(*given, **options)
 
         monkeypatch.setattr(owner, name, faulty)
@@ -134,7 +143,7 @@ def layer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FaultyLay
         if tmp_path in path.parents:  # what the system tells of a process is no storage
             made.file_point(f"open {mode}")
         file: io.IOBase = opening(path, mode, *given, **options)
-        return FaultyFile(made, file) if mode in ("xb", "wb") else file
+        return FaultyFile(made, file) if mode in ("xb", "wb") and is_own(path) else file
 
     monkeypatch.setattr(Path, "open", open_faulty)
     before(os, "fsync")
@@ -145,6 +154,8 @@ def layer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FaultyLay
     factory = faulty_connection(made)
 
     def connect(*given: Any, **options: Any) -> Any:
+        if not is_own(given[0]):
+            return connecting(*given, **options)
         made.statement_point("connect")
         return connecting(*given, factory=factory, **options)
 
