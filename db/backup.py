@@ -16,7 +16,6 @@ from db import identity, migrate
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import BlobDamaged, NotEmpty, NotFound
-from db.file_header import GENERATION, OLDEST
 from db.quarantine import sync_folder
 from db.records import Actor
 from db.repositories import audit, stores
@@ -52,10 +51,8 @@ def backup(database: Database, blobs: BlobStore, folder: Path, report: Report) -
         migrate.upgrade(copy)
         _copy_rows(database, copy, report)
         _copy_blobs(copy, blobs, BlobStore(folder), report)
-        with copy.connect() as connection:
-            connection.exec_driver_sql(f"{GENERATION} = {OLDEST}")
-            connection.commit()
-    unfinished.replace(file)  # closing took what was ahead of it in the log into the file
+        copy.empty_log()
+    unfinished.replace(file)
     sync_folder(folder)
 
 

@@ -121,6 +121,17 @@ class Database:
                 connection.exec_driver_sql("PRAGMA wal_checkpoint(PASSIVE)")
             self._file.require()
 
+    def empty_log(self) -> None:
+        """Bring all of SQLite's write-ahead log into the file, which is whole then, without the files beside it.
+
+        Closing does so, too, but says nothing where the disk is full. Raises ``StorageUnavailable``.
+        """
+        with self.connect() as connection:
+            is_busy, *_ = connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)").one()
+        self._file.require()
+        if is_busy:
+            raise StorageUnavailable(f"{self} is open elsewhere; allowed: one process alone")
+
     def check_pages(self) -> None:
         """Read the whole of an SQLite file; raises ``StorageUnavailable`` where it is damaged."""
         with sqlite_errors_named():

@@ -27,9 +27,6 @@ _IN_PAGE = struct.Struct(">36xii16xi4xi")
 _CYCLE = 2**32
 """Generations after which the field of 32 bits begins anew."""
 
-OLDEST = -(2**30)
-"""Of a backup's file as it was written: older than any database that has been in use since it was made."""
-
 PAGE_BYTES = _IN_PAGE.size
 """Of page 1, as far as it is read."""
 

@@ -11,7 +11,7 @@ from db import migrate
 from db.backup import FILE, LEFT_OUT, backup, restore
 from db.blobs import BlobStore
 from db.database import Database
-from db.errors import BlobDamaged, NotEmpty, NotFound, SchemaMismatch
+from db.errors import BlobDamaged, NotEmpty, NotFound, SchemaMismatch, StorageUnavailable
 from db.records import Claim, Detection, NewGraspLog, NewModel, SampleSummary
 from db.repositories import access_keys, detections, friction_models, grasp_logs, jobs, materials, runners
 from db.sqlite_file import SIDE_FILES
@@ -131,6 +131,26 @@ def test_a_backup_that_was_killed_is_made_anew_in_the_same_folder(
         backup(filled, blobs, tmp_path / "copy", nothing)
         assert [path.name for path in (tmp_path / "copy").glob("*.*")] == [FILE]
         file.unlink()
+
+
+def test_a_backup_whose_log_cannot_be_brought_into_its_file_is_none(
+    filled: Database, blobs: BlobStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on a disk that is full by then, of which SQLite says nothing when it closes; here somebody reads the file."""
+    file = tmp_path / "copy" / FILE
+    monkeypatch.setattr("db.backup._opened", lambda path: Database(f"sqlite:///{path}", lock_timeout=0.01))
+    with closing(sqlite3.connect(tmp_path / "reader", isolation_level=None)) as reader:
+
+        def read_meanwhile(what: str, _: int) -> None:
+            if what == "materials":
+                reader.execute(f"ATTACH '{file.with_suffix('.part')}' AS copy")
+                reader.execute("BEGIN")
+                reader.execute("SELECT count(*) FROM copy.materials").fetchone()
+
+        with pytest.raises(StorageUnavailable, match="open elsewhere"):
+            backup(filled, blobs, tmp_path / "copy", read_meanwhile)
+    assert not file.exists()
+    backup(filled, blobs, tmp_path / "copy", nothing)
 
 
 def test_a_blob_that_changed_or_went_stops_a_restore_before_any_row(
