@@ -36,8 +36,8 @@ Report = Callable[[str, int], None]
 def backup(database: Database, blobs: BlobStore, folder: Path, report: Report) -> None:
     """Copy everything into a folder, as of one moment of the database; blobs that are there already are kept.
 
-    May run beside the service. Running jobs are copied as queued ones. Raises ``SchemaMismatch``, and ``NotEmpty`` if
-    the folder has another backup.
+    May run beside the service. Running jobs are copied as queued ones. Raises ``SchemaMismatch``, ``NotEmpty`` if the
+    folder has another backup, and ``StorageUnavailable`` on a full disk.
     """
     migrate.check(database)
     file = folder / FILE

@@ -81,7 +81,10 @@ class Database:
 
     @contextmanager
     def connect(self, *, to_write: bool = False) -> Iterator[Connection]:
-        """A connection below the transactions of the stores: for migrations, whose errors tell the URL too."""
+        """A connection below the transactions of the stores: for migrations, whose errors tell the URL too.
+
+        One that is opened ``to_write`` takes SQLite's write lock with each transaction, and renews the file's header.
+        """
         engine = self._writing if to_write else self.engine
         with _unavailable_named(str(self)), engine.connect() as connection:
             yield connection
@@ -122,7 +125,7 @@ class Database:
             self._file.require()
 
     def empty_log(self) -> None:
-        """Bring all of SQLite's write-ahead log into the file, which is whole then, without the files beside it.
+        """Bring all of an SQLite database's write-ahead log into its file, which is whole then without those beside it.
 
         Closing does so, too, but says nothing where the disk is full. Raises ``StorageUnavailable``.
         """

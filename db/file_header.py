@@ -63,10 +63,6 @@ class FileHeader:
         """Whether the transaction that wrote this header found the ``other`` one; unmarked ones change no signature."""
         return self.signature >> 16 & 0xFFFF == other._checksum() or self.mark == other.mark
 
-    def is_older(self, other: Self) -> bool:
-        """By the count alone."""
-        return is_older(self.generation, other.generation)
-
     def _checksum(self) -> int:
         return zlib.crc32(struct.pack(">4i", *astuple(self))) & 0xFFFF
 

@@ -79,7 +79,7 @@ class SqliteFile:
             self._require_own_log(self._header)
 
     def _require_own_log(self, known: FileHeader | None) -> None:
-        """The log follows this file, which has been no newer one than it is."""
+        """Make sure that the log is this file's, and the file no older than its ``known`` header."""
         if self._path is None or not self._is_there():
             return
         log = Path(f"{self._beside}-wal")
@@ -100,10 +100,11 @@ class SqliteFile:
     def _is_there(self) -> bool:
         """Or nothing is, of which SQLite makes a new database; it would delete a log that is there alone."""
         log = self._stat("-wal")  # first: SQLite makes the file before it
-        if self._stat() is not None or log is None or log.st_size == 0:
-            return self._stat() is not None
-        what = f"database file {self._path} is not there, and its write-ahead log {self._beside}-wal is"
-        raise StorageUnavailable(f"{what}; allowed: the file put back, or a new one once -wal was moved away")
+        is_there = self._stat() is not None
+        if not is_there and log is not None and log.st_size > 0:
+            what = f"database file {self._path} is not there, and its write-ahead log {self._beside}-wal is"
+            raise StorageUnavailable(f"{what}; allowed: the file put back, or a new one once -wal was moved away")
+        return is_there
 
     def _keep_log(self) -> None:
         """Let SQLite write the log into the file at no close: one connection never is, not even as the process ends."""
@@ -172,7 +173,7 @@ def _belongs(found: FileHeader, log: list[FileHeader], known: FileHeader | None)
     A log that holds none may have been emptied, which tells no more than the count.
     """
     if not log:
-        return known is None or not found.is_older(known)
+        return known is None or not is_older(found.generation, known.generation)
     place, before = _place(found, log), None if known is None else _place(known, log)
     return place is not None and (before is None or before <= place)
 

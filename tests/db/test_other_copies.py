@@ -14,10 +14,9 @@ from db.backup import backup
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import StorageUnavailable
-from db.file_header import PAGE_BYTES, FileHeader
 from db.migrate import upgrade
-from db.repositories import stores
 from db.write_ahead_log import headers
+from tests.db.looks import header_of, look
 
 NAME = "stiction.sqlite3"
 
@@ -27,17 +26,6 @@ def opened(path: Path) -> Database:
     database = Database(f"sqlite:///{path}")
     upgrade(database)
     return database
-
-
-def look(database: Database, times: int = 1) -> None:
-    for _ in range(times):
-        with database.write() as session:
-            stores.touch(session)
-
-
-def empty_log(database: Database) -> None:
-    with database.connect() as connection:
-        connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
 
 
 def copy(path: Path, target: Path) -> Path:
@@ -54,10 +42,6 @@ def killed(path: Path) -> Path:
     return copy(path, left)
 
 
-def header_of(path: Path) -> FileHeader:
-    return FileHeader.of_page(path.read_bytes()[:PAGE_BYTES])
-
-
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
     with closing(sqlite3.connect(path, isolation_level=None)) as connection:
@@ -70,7 +54,7 @@ def older(path: Path) -> tuple[Path, Path]:
     with closing(opened(path)) as database:
         other = copy(path, path.parent / "other")
         look(database, 2)
-        empty_log(database)
+        database.empty_log()
         look(database)
         return other, killed(path)
 
@@ -79,11 +63,11 @@ def before_vacuum(path: Path) -> tuple[Path, Path]:
     """It changes nothing of what our transactions write into the header."""
     with closing(opened(path)) as database:
         look(database)
-        empty_log(database)
+        database.empty_log()
         other = copy(path, path.parent / "other")
         with closing(sqlite3.connect(path)) as operator:
             operator.execute("VACUUM")
-        empty_log(database)
+        database.empty_log()
         look(database)
         return other, killed(path)
 
@@ -91,10 +75,10 @@ def before_vacuum(path: Path) -> tuple[Path, Path]:
 def before_migration(path: Path) -> tuple[Path, Path]:
     with closing(Database(f"sqlite:///{path}")) as database:
         upgrade(database, "0019")
-        empty_log(database)
+        database.empty_log()
         other = copy(path, path.parent / "other")
         upgrade(database)
-        empty_log(database)
+        database.empty_log()
         look(database)
         return other, killed(path)
 
@@ -102,21 +86,21 @@ def before_migration(path: Path) -> tuple[Path, Path]:
 def newer(path: Path) -> tuple[Path, Path]:
     """The service went on elsewhere, and its file came back to where it had been killed."""
     with closing(opened(path)) as database:
-        empty_log(database)
+        database.empty_log()
         look(database)
         left = killed(path)
         look(database, 2)
-        empty_log(database)
+        database.empty_log()
         return copy(path, path.parent / "other"), left
 
 
 def of_another_store(path: Path, looks: int) -> tuple[Path, Path]:
     with closing(opened(path.parent / "another" / NAME)) as another:
         look(another, looks)
-        empty_log(another)
+        another.empty_log()
         other = copy(path.parent / "another" / NAME, path.parent / "other")
     with closing(opened(path)) as database:
-        empty_log(database)
+        database.empty_log()
         look(database, 5)
         return other, killed(path)
 
@@ -132,7 +116,7 @@ def of_another_store_with_a_higher_count(path: Path) -> tuple[Path, Path]:
 def of_a_backup(path: Path) -> tuple[Path, Path]:
     with closing(opened(path)) as database:
         backup(database, BlobStore(path.parent / "blobs"), path.parent / "backup", lambda *_: None)
-        empty_log(database)
+        database.empty_log()
         look(database)
         return copy(path.parent / "backup" / NAME, path.parent / "other"), killed(path)
 
@@ -175,10 +159,10 @@ def test_another_file_under_a_running_process_is_noticed_before_the_next_write(t
     path = tmp_path / NAME
     with closing(opened(tmp_path / "another" / NAME)) as another:
         look(another, looks)
-        empty_log(another)
+        another.empty_log()
     other = copy(tmp_path / "another" / NAME, tmp_path / "other").read_bytes()
     with closing(opened(path)) as database:
-        empty_log(database)
+        database.empty_log()
         look(database, 3)
         copy(tmp_path / "other", path)
         with pytest.raises(StorageUnavailable, match="deleted or replaced"):
@@ -191,7 +175,7 @@ def test_a_file_at_any_stage_belongs_to_the_log(tmp_path: Path) -> None:
     path = tmp_path / NAME
     with closing(opened(path)) as database, ExitStack() as reader:
         look(database)
-        empty_log(database)
+        database.empty_log()
         stages = [copy(path, tmp_path / "stage")]
         for number in range(3):
             look(database)
@@ -213,7 +197,7 @@ def test_the_log_of_an_older_version_which_only_counted_is_taken(tmp_path: Path)
     path = tmp_path / NAME
     with closing(opened(path)) as database, closing(sqlite3.connect(path, isolation_level=None)) as before:
         before.execute("PRAGMA application_id = 0")
-        empty_log(database)
+        database.empty_log()
         for count in range(7, 10):
             before.execute(f"PRAGMA user_version = {count}")
         left = killed(path)
@@ -226,7 +210,7 @@ def test_a_first_frame_whose_page_was_not_written_yet_tells_nothing(tmp_path: Pa
     """Its place has the page of an earlier log, or what a power cut left."""
     path = tmp_path / NAME
     with closing(opened(path)) as database:
-        empty_log(database)
+        database.empty_log()
         look(database)
         log = copy(Path(f"{path}-wal"), tmp_path / "log")
     assert len(headers(log)) == 1
@@ -240,7 +224,7 @@ def test_a_first_header_behind_other_frames_is_none_until_its_page_was_written(t
     """Behind what another program changed, or in a transaction larger than SQLite's cache, which writes that first."""
     path = tmp_path / NAME
     with closing(opened(path)) as database, closing(sqlite3.connect(path, isolation_level=None)) as other:
-        empty_log(database)
+        database.empty_log()
         other.execute("UPDATE alembic_version SET version_num = version_num")
         look(database)
         log = copy(Path(f"{path}-wal"), tmp_path / "log")
@@ -291,7 +275,7 @@ def test_processes_that_work_on_one_file_find_no_fault_with_each_other(tmp_path:
 def test_a_log_that_ends_in_the_middle_of_a_frame_is_read_up_to_there(tmp_path: Path) -> None:
     path = tmp_path / NAME
     with closing(opened(path)) as database:
-        empty_log(database)
+        database.empty_log()
         look(database, 2)
         log = copy(Path(f"{path}-wal"), tmp_path / "log")
     whole = log.read_bytes()

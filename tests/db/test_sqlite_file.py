@@ -13,11 +13,11 @@ from db.backup import backup
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import InvalidUrl, StorageUnavailable
-from db.file_header import PAGE_BYTES, FileHeader, after, is_older
+from db.file_header import FileHeader, after, is_older
 from db.migrate import upgrade
-from db.repositories import stores
 from db.sqlite_file import SIDE_FILES, SqliteFile
 from db.write_ahead_log import headers
+from tests.db.looks import header_of, look
 
 
 @pytest.mark.parametrize("suffix", SIDE_FILES)
@@ -37,29 +37,15 @@ def test_a_look_makes_no_file_in_place_of_one_that_is_gone(tmp_path: Path, suffi
     connection.close()
 
 
-def look(database: Database) -> None:
-    with database.write() as session:
-        stores.touch(session)
-
-
-def header_of(path: Path) -> FileHeader:
-    return FileHeader.of_page(path.read_bytes()[:PAGE_BYTES])
-
-
-def empty_log(database: Database) -> None:
-    with database.connect() as connection:
-        connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
-
-
 def test_an_older_copy_over_the_file_is_noticed(tmp_path: Path) -> None:
     """With the inode of before, once the write-ahead log holds nothing that would hide it."""
     path = tmp_path / "stiction.sqlite3"
     database = Database(f"sqlite:///{path}")
     upgrade(database)
-    empty_log(database)
+    database.empty_log()
     shutil.copyfile(path, tmp_path / "older")
     look(database)
-    empty_log(database)
+    database.empty_log()
     database.ping()
     shutil.copyfile(tmp_path / "older", path)
     with pytest.raises(StorageUnavailable, match="deleted or replaced"):
@@ -80,7 +66,7 @@ def test_a_file_that_gives_back_room_is_the_same_file(tmp_path: Path) -> None:
         before = path.stat().st_size
         with closing(sqlite3.connect(path)) as operator:
             operator.execute("VACUUM")
-        empty_log(database)
+        database.empty_log()
         assert path.stat().st_size < before
         look(database)
         database.ping()
@@ -187,7 +173,7 @@ def test_a_log_that_was_not_written_to_the_file_yet_is_its_own(tmp_path: Path) -
     path = tmp_path / "stiction.sqlite3"
     with closing(Database(f"sqlite:///{path}")) as database:
         upgrade(database)
-        empty_log(database)
+        database.empty_log()
         for _ in range(5):
             look(database)
         assert headers(Path(f"{path}-wal"))[0].follows(header_of(path))
@@ -204,7 +190,7 @@ def test_each_log_says_which_file_it_follows(tmp_path: Path) -> None:
         look(database)
         for _ in range(3):
             before = header_of(path)
-            empty_log(database)
+            database.empty_log()
             with database.write() as session:
                 session.connection().exec_driver_sql("UPDATE store SET id = id")
             log = headers(Path(f"{path}-wal"))
