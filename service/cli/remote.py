@@ -248,7 +248,8 @@ def _friction_lines(answer: "FrictionAnswer") -> list[tuple[str, str | None]]:
 
 
 def _probe_lines(told: "NextGrasp") -> list[tuple[str, str | None]]:
-    slip = f"{number(told.slip_length)} m at {number(told.speed)} m/s, towards {number(told.direction)} rad"
+    length, speed = number(told.slip_length * 1e3), number(told.speed * 1e3)
+    slip = f"{length} mm at {speed} mm/s, towards {number(told.direction)} rad"
     return [
         ("press with", f"{number(told.normal_force)} N an element"),
         ("slip by", slip),

@@ -59,7 +59,7 @@ def record_next(told: Probe) -> str:
     """What to record next, and what that is good for."""
     return (
         f"Record next: press with {number(told.normal_force)} N on an element and let it slip by "
-        f"{number(told.slip_length)} m at {number(told.speed)} m/s. The expected friction, known to "
+        f"{number(told.slip_length * 1e3)} mm at {number(told.speed * 1e3)} mm/s. The expected friction, known to "
         f"± {number(told.uncertainty)}, is then known to ± {number(told.after)}."
     )
 

@@ -253,6 +253,7 @@ def test_upload_lookup_and_plan_go_through_a_real_service(run: Run, ramps: list[
     code, out, _ = run("next", "paper", "--normal-force", 0.2, "--url", url)
     assert code == 0
     assert out.startswith("Record next of paper\n  press with")
+    assert " mm/s, towards " in out
 
     grip = ("plan", "paper", "--contact-area", 6e-5, "--url", url, "--json")
     code, out, _ = run(*grip, "--load", 1.0)

@@ -36,7 +36,8 @@ def material() -> Material:
 def test_a_material_is_told_with_its_model_and_what_to_record_next(material: Material) -> None:
     report = material_report(material, [], PROBE)
     assert {fact.value for fact in report.facts} >= {"0.449", "3", "hierarchical version 3, of 200 samples"}
-    assert report.steps[0].startswith("Record next: press with 0.0800 N")
+    probe = "Record next: press with 0.0800 N on an element and let it slip by 0.500 mm at 4.00 mm/s."
+    assert report.steps[0].startswith(probe)
     page = render(report)
     assert "<b>paper</b>" not in page
     assert "80 g/m²" in page
