@@ -31,6 +31,7 @@ from service.settings import Settings
 from slipcore import GraspLog
 from slipcore.contact.tiers.ramp import RampSchedule, tangential_ramp
 from stiction_client.container import encode
+from tests.waiting import wait_until
 
 NPZ = "application/vnd.stiction.grasp-log+npz"
 SHORT = RampSchedule(rest=0.2, press=0.5, settle=0.3, shear=1.5, hold=0.2)
@@ -162,8 +163,7 @@ def client(served: Settings) -> Iterator[httpx.Client]:
     """A client of one server that all tests share: each makes materials of its own."""
     with serve(served) as client:
         client.headers["x-data-folder"] = str(served.data_folder)
-        while client.get("/readyz").status_code != httpx.codes.OK:
-            time.sleep(0.01)
+        wait_until(lambda: client.get("/readyz").status_code == httpx.codes.OK, "the server to be ready")
         yield client
 
 

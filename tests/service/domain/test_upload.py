@@ -4,7 +4,6 @@ import io
 import json
 import socket
 import threading
-import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -20,17 +19,14 @@ from service.formats import parquet
 from slipcore import GraspLog
 from slipcore.contact.tiers.ramp import tangential_ramp
 from stiction_client.container import encode
+from tests.service.stored import spool, stored_files, wait_for_empty_spool
+from tests.waiting import wait_until
 
 Upload = Callable[..., httpx.Response]
 Wait = Callable[[httpx.Client, str], dict[str, Any]]
 Repack = Callable[[dict[str, Any]], bytes]
 
 NPZ = "application/vnd.stiction.grasp-log+npz"
-
-
-def stored_files(client: httpx.Client) -> set[str]:
-    folder = Path(client.headers["x-data-folder"])
-    return {str(path) for part in ("blobs", "spool") for path in (folder / part).rglob("*") if path.is_file()}
 
 
 def refusal(
@@ -251,15 +247,8 @@ def test_an_upload_that_breaks_off_leaves_nothing(client: httpx.Client, content:
     with socket.create_connection((client.base_url.host, client.base_url.port or 0)) as connection:
         head = f"POST /v1/grasp-logs HTTP/1.1\r\nHost: localhost\r\nContent-Type: {NPZ}\r\n"
         connection.sendall(f"{head}Content-Length: {len(content)}\r\n\r\n".encode() + content[: len(content) // 2])
-        wait_until(lambda: len(stored_files(client)) == len(before) + 1)
-    wait_until(lambda: stored_files(client) == before)
-
-
-def wait_until(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 20.0
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
+        wait_until(lambda: len(spool(client)) == 1, "the bytes to arrive")
+    assert stored_files(client) == before
 
 
 def still(frames: int = 30) -> dict[str, Any]:
@@ -331,7 +320,6 @@ def test_identical_uploads_at_once_are_one_log_and_one_blob(
     assert client.get(f"/v1/materials/{material}").json()["grasp_logs"] == 1
     sha256 = hashlib.sha256(content).hexdigest()
     assert len([path for path in stored_files(client) if path.endswith(sha256)]) == 1
-    assert not [path for path in stored_files(client) if "/spool/" in path]
 
 
 def test_different_uploads_at_once_all_count(
@@ -373,10 +361,7 @@ def test_a_compression_bomb_is_refused(client: httpx.Client) -> None:
     refused = client.post("/v1/grasp-logs", content=zstd.compress(bytes(10**9)), headers=headers)
     assert (refused.status_code, refused.json()["type"]) == (413, "/problems/upload-too-large")
     assert refused.json()["allowed"] == "at most 2097152 bytes"
-    deadline = time.monotonic() + 10.0  # the answer does not wait for the file to go
-    while left := [path for path in stored_files(client) if "/spool/" in path]:
-        assert time.monotonic() < deadline, left
-        time.sleep(0.01)
+    wait_for_empty_spool(client)
 
 
 def test_a_recording_is_kept_as_the_log_in_it(

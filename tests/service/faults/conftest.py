@@ -8,12 +8,12 @@ import site
 import socket
 import sys
 import threading
-import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 from datetime import timedelta
+from functools import partial
 from multiprocessing import resource_tracker
 from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
@@ -33,6 +33,7 @@ from service.jobs import garbage
 from slipcore import GraspLog
 from slipcore.contact.tiers.ramp import RampSchedule, tangential_ramp
 from stiction_client.container import encode
+from tests import waiting
 
 NPZ = "application/vnd.stiction.grasp-log+npz"
 SHORT = RampSchedule(rest=0.2, press=0.5, settle=0.3, shear=1.5, hold=0.2)
@@ -40,11 +41,7 @@ PATIENCE = 600.0
 """s; only against waiting for ever: a busy machine may take a minute to start a process."""
 
 
-def wait_until(condition: Callable[[], bool], what: str) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline, f"waited in vain for {what}"
-        time.sleep(0.03)
+wait_until = partial(waiting.wait_until, seconds=PATIENCE)
 
 
 def worker_processes(pid: int) -> list[int]:

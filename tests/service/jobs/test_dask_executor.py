@@ -24,6 +24,7 @@ from service.jobs.worker import StoreConfig
 from service.settings import Settings
 from slipcore.contact import Scene
 from slipcore.errors import InvalidInput
+from tests.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]
 Serving = Callable[[Settings], AbstractContextManager[httpx.Client]]
@@ -81,13 +82,6 @@ def settings(cluster: Cluster, tmp_path: Path) -> Settings:
     return Settings(data_folder=tmp_path / "data", dask_address=cluster.address, shutdown_seconds=0.0)
 
 
-def wait_until(condition: Callable[[], object], seconds: float = 120.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.02)
-
-
 def deaths(settings: Settings, job: str) -> int:
     with closing(Database(settings.resolved_database_url)) as database, database.read() as session:
         return jobs.get(session, job).deaths
@@ -99,28 +93,28 @@ def test_jobs_are_done_on_a_cluster_whose_workers_and_whose_scheduler_die(
     scheduler, first = cluster.start_scheduler(), cluster.start_worker()
     with ExitStack() as running:
         client = running.enter_context(serving(settings))
-        wait_until(lambda: client.get("/readyz").status_code == httpx.codes.OK)
+        wait_until(lambda: client.get("/readyz").status_code == httpx.codes.OK, "the server to be ready")
         client.post("/v1/materials", json={"name": "paper"}).raise_for_status()
 
         job = upload(client, content, material="paper").json()["job"]["id"]
         assert wait(client, job)["model_version"] == 1
 
-        wait_until(cluster.is_idle)
+        wait_until(cluster.is_idle, "the job to end")
         first.send_signal(signal.SIGSTOP)  # so that it dies with the job and not after it
         job = client.post("/v1/materials/paper/fits", json={"method": "ols"}).json()["id"]
-        wait_until(cluster.has_work)
+        wait_until(cluster.has_work, "the job to begin")
         second = cluster.start_worker()
         first.kill()
         assert wait(client, job)["status"] == "done"
         assert deaths(settings, job) == 0
 
-        wait_until(cluster.is_idle)
+        wait_until(cluster.is_idle, "the job to end")
         second.send_signal(signal.SIGSTOP)
         job = client.post("/v1/materials/paper/fits", json={"method": "ols"}).json()["id"]
-        wait_until(cluster.has_work)
+        wait_until(cluster.has_work, "the job to begin")
         scheduler.kill()
-        wait_until(lambda: client.get(f"/v1/jobs/{job}").json()["status"] == "queued")
-        wait_until(lambda: client.get("/readyz").status_code == httpx.codes.SERVICE_UNAVAILABLE)
+        wait_until(lambda: client.get(f"/v1/jobs/{job}").json()["status"] == "queued", "the job to wait again")
+        wait_until(lambda: client.get("/readyz").status_code == httpx.codes.SERVICE_UNAVAILABLE, "the server to say so")
         began = time.monotonic()
         running.close()
         assert time.monotonic() - began < 30.0  # not for ever
@@ -150,7 +144,10 @@ def test_a_scheduler_that_is_not_there_is_named_and_holds_no_stop_up(
     monkeypatch.setattr("service.jobs.dask_executor.CONNECT_SECONDS", 0.5)
     with ExitStack() as running:
         client = running.enter_context(serving(settings.model_copy(update={"shutdown_seconds": 60.0})))
-        wait_until(lambda: f"{cluster.address} does not answer" in client.get("/readyz").json()["detail"])
+        wait_until(
+            lambda: f"{cluster.address} does not answer" in client.get("/readyz").json()["detail"],
+            "the server to say so",
+        )
         began = time.monotonic()
         running.close()
         assert time.monotonic() - began < 30.0  # not for ever

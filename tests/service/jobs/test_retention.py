@@ -1,4 +1,3 @@
-import time
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
@@ -24,6 +23,7 @@ from service.jobs.retention import Retention, prune
 from service.settings import Settings
 from slipcore import GraspLog
 from stiction_client.container import encode
+from tests.waiting import wait_until
 
 NPZ = {"content-type": "application/vnd.stiction.grasp-log+npz"}
 AGE = timedelta(days=90)
@@ -234,10 +234,7 @@ def test_a_server_deletes_old_uploads_by_itself(
             session.execute(update(GraspLogRow).values(file_since=now() - 2 * AGE))
             done = update(JobRow).values(status="done", finished_at=now(), runner_id=None)
             session.execute(done)
-        deadline = time.monotonic() + 30.0
-        while client.get(f"/v1/grasp-logs/{log}/file").status_code != httpx.codes.GONE:
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
+        wait_until(lambda: client.get(f"/v1/grasp-logs/{log}/file").status_code == httpx.codes.GONE, "the file to go")
 
 
 @ONLY_SQLITE

@@ -15,6 +15,7 @@ from db.repositories import jobs, materials, runners
 from db.tables import JobRow
 from service.jobs.executor import WorkerDied
 from service.jobs.runner import LOOKS, JobRunner, Watch
+from tests.waiting import wait_until
 
 Do = Callable[[Claim], None]
 ATTEMPTS = 3
@@ -87,15 +88,8 @@ def finish(database: Database, claim: Claim) -> None:
         jobs.finish(session, claim, "done")
 
 
-def wait_until(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 30.0
-    while not condition():
-        assert time.monotonic() < deadline, "waited in vain"
-        time.sleep(0.005)
-
-
 def until_finished(database: Database, ids: list[str]) -> Callable[..., None]:
-    return lambda *_: wait_until(lambda: all(get(database, job_id).finished_at for job_id in ids))
+    return lambda *_: wait_until(lambda: all(get(database, job_id).finished_at for job_id in ids), "the jobs to end")
 
 
 def test_jobs_are_taken_up_oldest_first(database: Database, queued: list[str], working: Callable[..., None]) -> None:
@@ -209,7 +203,10 @@ def test_a_job_is_not_begun_twice_at_once_by_a_runner_whose_claim_the_database_h
             return
         with database.write() as session:
             session.execute(update(JobRow).where(JobRow.id == claim.job_id).values(status="queued", runner_id=None))
-        wait_until(lambda: all(get(database, other).finished_at for other in queued if other != claim.job_id))
+        wait_until(
+            lambda: all(get(database, other).finished_at for other in queued if other != claim.job_id),
+            "the others to end",
+        )
         time.sleep(0.1)
         tries_meanwhile.append(tries[claim.job_id])
         with database.write() as session, pytest.raises(ClaimLost):
@@ -264,7 +261,7 @@ def test_stopping_leaves_what_has_not_begun_to_others(
         time.sleep(0.3)
         finish(database, claim)
 
-    working(do, lambda _: wait_until(lambda: len(begun) == 2), lease_seconds=10.0)
+    working(do, lambda _: wait_until(lambda: len(begun) == 2, "two to begin"), lease_seconds=10.0)
     assert sorted(begun) == sorted(queued[:2])
     assert [get(database, job_id).status for job_id in queued] == ["done", "done", "queued", "queued"]
 
@@ -278,7 +275,7 @@ def test_a_job_that_does_not_end_in_time_is_left_to_others_by_a_stopping_runner(
         begun.append(claim.job_id)
         time.sleep(0.3)
 
-    working(do, lambda _: wait_until(lambda: len(begun) == 1), workers=1, shutdown_seconds=0.05)
+    working(do, lambda _: wait_until(lambda: len(begun) == 1, "one to begin"), workers=1, shutdown_seconds=0.05)
     assert {get(database, job_id).status for job_id in queued} == {"queued"}
     assert {get(database, job_id).deaths for job_id in queued} == {0}
 
@@ -304,7 +301,7 @@ def test_a_runner_takes_no_jobs_of_a_newer_schema_and_says_so(
     said: list[str | None] = []
 
     def note(*runners: JobRunner) -> None:
-        wait_until(lambda: all("newer" in (runner.missing or "") for runner in runners))
+        wait_until(lambda: all("newer" in (runner.missing or "") for runner in runners), "the runners to see it")
         said.extend(runner.missing for runner in runners)
 
     working(lambda claim: finish(database, claim), note)
@@ -379,12 +376,12 @@ def test_short_jobs_do_not_wait_for_long_ones_that_hold_all_executors(
     long = [held.add(is_long=True) for _ in range(3)]
 
     def meanwhile(_: JobRunner) -> None:
-        wait_until(lambda: len(held.begun) == 2)
+        wait_until(lambda: len(held.begun) == 2, "two to begin")
         for _ in range(2):  # a worker that was idle ends, and there is another one when it is needed again
             short = [held.add(is_long=False) for _ in range(3)]
             closed = held.short_executor.closed
             held.until_done(*short)
-            wait_until(lambda closed=closed: held.short_executor.closed > closed)  # type: ignore[misc]
+            wait_until(lambda closed=closed: held.short_executor.closed > closed, "its closing")  # type: ignore[misc]
         assert held.begun & set(long) == set(long[:2])
         held.may_end.set()
         held.until_done(*long)

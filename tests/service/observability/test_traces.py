@@ -1,7 +1,6 @@
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
@@ -14,6 +13,7 @@ from opentelemetry.proto.collector.trace.v1.trace_service_pb2 import ExportTrace
 from db.errors import DriverMissing
 from service.demo.server import running_server
 from service.observability import traces
+from tests.waiting import wait_until
 
 STAGES = ["frames", "slip_state", "samples", "friction_model"]
 CALLER = "00-0af7651916cd43dd8448eb211c80319c-b7ad6b7169203331-01"
@@ -74,10 +74,7 @@ def test_an_upload_is_one_trace_from_its_request_to_its_model(
         assert wait(client, job)["status"] == "done"
         for _ in range(2):  # from the database, and from memory
             client.get("/v1/materials/paper/friction", params={"fn": 0.05}).raise_for_status()
-    deadline = time.monotonic() + 10.0
-    while "ingest" not in [span.name for span in spans]:
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_until(lambda: "ingest" in [span.name for span in spans], "the trace")
 
     assert {span.trace_id.hex() for span in spans} == {CALLER[3:35]}
     by_name = {span.name: span for span in spans}

@@ -13,6 +13,8 @@ from typing import Any
 import httpx
 from websockets.sync.client import ClientConnection, connect
 
+from tests.waiting import wait_until
+
 PROGRAM = shutil.which("chromium")
 SECONDS = 30.0
 KEY_CODES = {"Tab": 9}
@@ -135,8 +137,6 @@ def running(folder: Path) -> Iterator[Tab]:
 
 def _address(folder: Path) -> str:
     """Where the browser lists its pages, once it has said so."""
-    file, deadline = folder / "DevToolsActivePort", time.monotonic() + SECONDS
-    while not file.exists() or "\n" not in file.read_text():
-        assert time.monotonic() < deadline, "the browser did not start"
-        time.sleep(0.02)
+    file = folder / "DevToolsActivePort"
+    wait_until(lambda: file.exists() and "\n" in file.read_text(), "the browser to start", SECONDS)
     return f"http://127.0.0.1:{file.read_text().splitlines()[0]}/json"

@@ -9,6 +9,7 @@ import pytest
 
 from slipcore import GraspLog
 from stiction_client.container import encode
+from tests.service.stored import wait_for_empty_spool
 from tests.service.web.conftest import HTML
 
 ON_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -57,7 +58,7 @@ def test_a_log_and_its_material_have_a_report_that_loads_nothing(
         assert [tag for tag, _ in page.found if tag in {"script", "img", "link"}] == []
         assert "What to do next" in page.text
         assert "svg" in {tag for tag, _ in page.found}
-    assert not list((Path(client.headers["x-data-folder"]) / "spool").iterdir())
+    wait_for_empty_spool(client)
 
 
 @ON_SQLITE
@@ -72,7 +73,7 @@ def test_a_range_that_a_file_does_not_have_is_a_problem_and_leaves_no_file(
     assert (answer.status_code, answer.headers["content-type"]) == (status, "application/problem+json")
     assert answer.json()["status"] == status
     assert (status == 416) == answer.headers.get("content-range", "").startswith("bytes */")
-    assert not list((Path(client.headers["x-data-folder"]) / "spool").iterdir())
+    wait_for_empty_spool(client)
 
 
 @ON_SQLITE

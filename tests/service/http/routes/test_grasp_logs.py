@@ -11,6 +11,7 @@ import pytest
 from service import formats
 from slipcore import LOOKAHEAD, GraspLog, collect_samples, contact_friction, detect_slip
 from stiction_client.container import encode
+from tests.service.stored import wait_for_empty_spool
 
 Upload = Callable[..., httpx.Response]
 Wait = Callable[[httpx.Client, str], dict[str, Any]]
@@ -159,7 +160,7 @@ def test_a_log_is_downloaded_in_each_format_bit_for_bit(
     (tmp_path / "log").write_bytes(answer.content)
     assert formats.identify(tmp_path / "log") == name
     assert encode(formats.read(tmp_path / "log")) == content
-    assert not list((Path(client.headers["x-data-folder"]) / "spool").iterdir())
+    wait_for_empty_spool(client)
 
 
 def test_a_format_that_is_not_written_is_refused(client: httpx.Client, fitted: dict[str, Any]) -> None:
