@@ -148,8 +148,8 @@ class LoadedContact:
         for _ in range(MOST_STEPS):
             growth, slope = self._growth(x)
             below, above = (x, above) if growth > 0.0 else (below, x)
-            guess = x - growth / slope if slope < 0.0 else below
-            guess = guess if below < guess < above else 0.5 * (below + above)
+            guess = x - growth / slope if slope < 0.0 else math.inf
+            guess = guess if below <= guess <= above else 0.5 * (below + above)
             if abs(guess - x) <= ROUNDING * x:
                 break
             x = guess

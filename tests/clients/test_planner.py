@@ -205,6 +205,16 @@ def test_the_peak_itself_is_still_held(make_model: Make) -> None:
     assert answer.margin == pytest.approx(0.0, abs=1e-5)
 
 
+def test_the_most_that_is_held_takes_few_steps(make_model: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    slopes, bend = [], FrictionQuantile.bend
+    monkeypatch.setattr(FrictionQuantile, "bend", lambda q, force: slopes.append(force) or bend(q, force))
+    model = make_model()
+    held = required_normal_force(model, 1.0, 1e-3, contact_area=AREA).largest_load
+    assert 2 < len(slopes) < 12  # Newton's method; to halve a bracket until it is known takes fifty
+    forces = ELEMENTS * slopes[-1] * np.linspace(0.5, 1.5, 10**5)
+    assert held == pytest.approx(np.max(capacity(model, forces, 1e-3)), rel=1e-9)  # so flat is a peak
+
+
 def test_a_limit_on_the_force_bounds_answer_and_interval(make_model: Make) -> None:
     model = make_model((0.5, 0.0, -1.0), ZERO, scale=0.0)
     answer = required_normal_force(model, 3.0, contact_area=AREA, normal_force_limit=10.0)
