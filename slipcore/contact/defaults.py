@@ -214,7 +214,9 @@ class LimitSurfaceDefaults(Options):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepDefaults(Options):
-    """A load step (``solver/quasi_static.py``, ``step_equations.py``, ``extrapolation.py``, ``resolution.py``)."""
+    """A load step (``solver/quasi_static.py``, ``step_equations.py``, ``touching.py``, ``extrapolation.py``,
+    ``resolution.py``).
+    """
 
     tolerance: Annotated[float, Option(1e-12, 0.5, "-", "of a solution that others are compared with")] = 1e-5
     """Of tractions, relative to what a step can change, where none is asked."""
@@ -244,6 +246,8 @@ class StepDefaults(Options):
     """Changes of the lift must be so much smaller than the tolerance."""
     longest_extrapolation: Annotated[float, Option(0.0, 10.0, "-", "loads seldom grow twice as fast as before")] = 2.0
     """Most of the last step's change that the next one's start repeats."""
+    barred_tolerance: Annotated[float, Option(1.0, 1e4, "-", "trials: 1 to 1000 made no difference")] = 10.0
+    """Tolerances of the motion of cells before they touch, in units of the step's own."""
     contact_cells: Annotated[float, Option(1.0, 100.0, "cells", "pressures are off by 2 to 6 % below")] = 6.0
     """Radius of a contact that the grid resolves."""
     slip_cells: Annotated[float, Option(0.1, 100.0, "cells", "tractions are off by 6 to 14 % below")] = 1.0

@@ -20,6 +20,7 @@ from slipcore.contact.solver.normal import NormalContact
 from slipcore.contact.solver.problem import Problem, StepLoad
 from slipcore.contact.solver.resolution import unresolved
 from slipcore.contact.solver.step_equations import StepEquations, StepSolution
+from slipcore.contact.solver.touching import from_touch
 from slipcore.frames import BoolArray, FloatArray
 
 
@@ -137,7 +138,10 @@ class QuasiStatic:
             self.normal_tolerance,
             state.normal if self._pressed_alike(state, load) else None,
         )
-        solution = equations.solve(extrapolated(state.stress, state.before, continuation(state.drive, drive)))
+        guess = extrapolated(state.stress, state.before, continuation(state.drive, drive))
+        if state.normal is not None and self._moves_sideways(drive):
+            equations = from_touch(equations, state.normal, guess)
+        solution = equations.solve(guess)
         after = self._advance(equations, state, load, drive, solution, recalled)
         result = self._result(equations, state, after, solution)
         seconds = time.perf_counter() - began
@@ -147,6 +151,10 @@ class QuasiStatic:
         """Whether nothing that pressure depends on has changed since the last step."""
         pressed = (load.normal_force, load.approach) == (state.load.normal_force, state.load.approach)
         return pressed and not self.problem.coupled and not self.problem.creep
+
+    def _moves_sideways(self, drive: FloatArray) -> bool:
+        """Whether cells that do not touch may move against the object in a step."""
+        return bool(drive.any() or self.problem.coupled or self.problem.spread or self.problem.creep)
 
     def _operators(self, duration: float) -> Operators:
         """Compliance of both bodies together within a step of this duration."""

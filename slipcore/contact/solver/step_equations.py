@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.contact.defaults import STEP, TINY
-from slipcore.contact.elasticity.fields import inner
+from slipcore.contact.elasticity.fields import inner, rigid_displacement
 from slipcore.contact.elasticity.grid import Box, Grid, bounding_box
 from slipcore.contact.elasticity.operator import Operators
 from slipcore.contact.errors import NotConverged
@@ -92,6 +92,27 @@ class StepEquations:
             lift = mixing.next(lift, mapped)
         raise NotConverged("normal-tangential coupling", change, self.tolerance, STEP.outer_iterations)
 
+    def pressed(self, guess: Stress) -> NormalContact:
+        """Normal contact under a guess of the traction: where cells touch, and all of it where nothing is coupled."""
+        if not self.problem.coupled:
+            return self._normal(guess.pressure, self.height, self.tolerance)
+        goal = max(self.tolerance, STEP.inexact * STEP.coupling_start)
+        return self._normal(guess.pressure, self.height + self._lift(guess.traction), goal)
+
+    def gap(self, solution: StepSolution) -> FloatArray:
+        """Gap [ny, nx] m that a solution of these equations leaves, or of equations with less contact."""
+        normal = solution.normal
+        lift = self._lift(self._whole(solution)) if self.problem.coupled else 0.0
+        return self.height + lift + normal.displacement - normal.approach
+
+    def slip(self, solution: StepSolution) -> FloatArray:
+        """Motion [2, ny, nx] m against the object in this step of all cells, whether they touch or not."""
+        operator, points = self.operators.on(self.grid), np.stack(self.grid.points())
+        moved = self.offset + operator.tangential(self._whole(solution))
+        if self.problem.coupled or self.problem.spread:
+            moved = moved + operator.tangential_by_pressure(solution.normal.pressure)
+        return moved - rigid_displacement(points, solution.tangential.motion)
+
     def _lift(self, traction: FloatArray) -> FloatArray:
         return self.operators.on(self.grid).normal_by_traction(traction)
 
@@ -100,9 +121,8 @@ class StepEquations:
         whole[:, *solution.box] = solution.tangential.traction
         return whole
 
-    def _once(self, pressure: FloatArray, traction: FloatArray, height: FloatArray, tolerance: float) -> StepSolution:
-        """Normal contact, then tangential contact under its pressure."""
-        normal = self.known or solve_normal(
+    def _normal(self, pressure: FloatArray, height: FloatArray, tolerance: float) -> NormalContact:
+        return self.known or solve_normal(
             self.operators,
             self.grid,
             height,
@@ -111,6 +131,10 @@ class StepEquations:
             self.normal_tolerance * tolerance / self.tolerance,
             pressure,
         )
+
+    def _once(self, pressure: FloatArray, traction: FloatArray, height: FloatArray, tolerance: float) -> StepSolution:
+        """Normal contact, then tangential contact under its pressure."""
+        normal = self._normal(pressure, height, tolerance)
         touching = normal.pressure > 0.0
         box = bounding_box(touching if touching.any() else ~touching, STEP.box_multiple)
         offset = self.offset

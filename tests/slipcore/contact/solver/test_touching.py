@@ -1,0 +1,74 @@
+"""Cells that touch within a load step: loads that grow together against their closed form, pressing by convergence."""
+
+import numpy as np
+import pytest
+
+from slipcore.contact.elasticity.bonded_layer import LayerBase
+from slipcore.contact.elasticity.grid import Grid
+from slipcore.contact.elasticity.influence import HalfSpace
+from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.quasi_static import QuasiStatic
+from slipcore.frames import FloatArray
+
+FRICTION, FORCE = 0.4, 10.0
+
+
+def ball(x: FloatArray, y: FloatArray) -> FloatArray:
+    return np.asarray((x**2 + y**2) / (2.0 * 15e-3))
+
+
+def half_space() -> QuasiStatic:
+    return QuasiStatic(Problem((HalfSpace.from_young(1e6, 0.0),), FRICTION, heights=(ball,)), Grid.square(24, 11.5e-3))
+
+
+def layer(cells: int) -> QuasiStatic:
+    bodies = (HalfSpace.from_young(1e6, 0.49), LayerBase(5e-3, 1e6, 0.49))
+    problem = Problem(bodies, FRICTION, heights=(ball,), coupled=True)
+    return QuasiStatic(problem, Grid.square(cells, 8.5e-3))
+
+
+def load(normal: float, x: float = 0.0, y: float = 0.0, moment: float = 0.0) -> StepLoad:
+    return StepLoad(normal, tangential=np.array([x, y, moment]))
+
+
+@pytest.mark.parametrize("steps", [3, 12])
+def test_loads_that_grow_in_proportion_leave_traction_in_proportion_to_pressure(steps: int) -> None:
+    """Nothing slips as long as F_T < μF_N (Mindlin and Deresiewicz 1953); on any grid and in any number of steps."""
+    forces = FORCE * np.linspace(1e-4, 1.0, steps + 1)
+    for result in half_space().run([load(force, 0.2 * force, 0.1 * force) for force in forces]):
+        for axis, share in ((0, 0.2), (1, 0.1)):
+            rounding = 1e-5 * result.force[2].max()
+            np.testing.assert_allclose(result.force[axis], share * result.force[2], rtol=0.0, atol=rounding)
+        assert result.stick_ratio == 1.0
+        assert not result.moved.any()
+
+
+def test_shear_that_begins_and_turns_while_pressing_goes_on_shares_out_as_pressure_does() -> None:
+    """q = Σ (dF_T/dF_N) Δp as long as nothing slips (Jäger, Arch. Appl. Mech. 68 (1998) 91)."""
+    path = [(3.0, 0.0, 0.0), (5.0, 0.0, 0.0), (6.0, 0.3, 0.0), (8.0, 0.9, 0.0), (9.0, 0.9, 0.2), (12.0, 0.9, 0.8)]
+    results = list(half_space().run([load(*now) for now in path]))
+    pressed = [result.force[2] for result in results]
+    rounding = 1e-5 * pressed[-1].max()
+    np.testing.assert_allclose(results[-1].force[0], 0.3 * (pressed[3] - pressed[1]), rtol=0.0, atol=rounding)
+    np.testing.assert_allclose(results[-1].force[1], 0.2 * (pressed[5] - pressed[3]), rtol=0.0, atol=rounding)
+
+
+def test_pressing_a_bonded_layer_is_of_second_order_in_steps_of_radius() -> None:
+    """Against more steps, on another way through the loads; of first order they would end 3e-2 off."""
+
+    def pressed(steps: int, power: int) -> FloatArray:
+        loads = FORCE * (np.arange(1, steps + 1) / steps) ** power
+        return list(layer(16).run(map(load, loads)))[-1].force[:2]
+
+    fine = pressed(160, power=2)
+    errors = [np.linalg.norm(pressed(steps, power=3) - fine) / np.linalg.norm(fine) for steps in (15, 60)]
+    assert errors[1] <= 1e-3
+    assert np.log2(errors[0] / errors[1]) / 2.0 >= 1.5
+
+
+def test_a_load_that_only_the_new_cells_make_bearable_is_borne() -> None:
+    solver = half_space()
+    state, first = solver.step(solver.start(), load(1e-4))
+    assert first.contact.sum() <= 4
+    _, result = solver.step(state, load(FORCE, 0.0, 0.0, 2e-3))
+    assert result.imbalance <= 1e-10
