@@ -27,11 +27,16 @@ from slipcore.slip_state import EventList, SlipEvents, SlipHistory, SlipState
 from slipcore.warm_up import warm_up
 
 if TYPE_CHECKING:
+    from slipcore.calibration import Estimate, ImpurePress, SensorModel, calibrate_sensor
     from slipcore.detection.batch import FixedLagSmoother, collect_history, detect_slip
     from slipcore.detection.detector import DetectorState, SlipDetector
     from slipcore.detection.methods import METHODS
 
 _LAZY = {
+    "Estimate": "slipcore.calibration",
+    "ImpurePress": "slipcore.calibration",
+    "SensorModel": "slipcore.calibration",
+    "calibrate_sensor": "slipcore.calibration",
     "FixedLagSmoother": "slipcore.detection.batch",
     "collect_history": "slipcore.detection.batch",
     "detect_slip": "slipcore.detection.batch",
@@ -53,6 +58,7 @@ __all__ = [
     "ContactFriction",
     "DetectorState",
     "ElementForces",
+    "Estimate",
     "EventList",
     "FilterOptions",
     "Finding",
@@ -62,12 +68,14 @@ __all__ = [
     "FrictionSamples",
     "GraspLog",
     "GroundTruth",
+    "ImpurePress",
     "InvalidInput",
     "NoForces",
     "Option",
     "Patch",
     "PatchOptions",
     "SampleOptions",
+    "SensorModel",
     "SlipDetector",
     "SlipEvents",
     "SlipHistory",
@@ -76,6 +84,7 @@ __all__ = [
     "StrainRateLiteralOptions",
     "StrainRateOptions",
     "UnknownScale",
+    "calibrate_sensor",
     "check_log",
     "collect_friction",
     "collect_history",

@@ -9,6 +9,7 @@ from types import ModuleType
 import pytest
 
 import estimators.defaults
+import slipcore.calibration.defaults
 import slipcore.contact.defaults
 import slipcore.defaults
 import slipcore.forces.defaults
@@ -16,7 +17,13 @@ from slipcore import METHODS, CheckOptions, SampleOptions
 from slipcore.options import Options, describe_options
 
 ROOT = Path(__file__).parents[1]
-MODULES = (slipcore.defaults, slipcore.contact.defaults, slipcore.forces.defaults, estimators.defaults)
+MODULES = (
+    slipcore.defaults,
+    slipcore.calibration.defaults,
+    slipcore.contact.defaults,
+    slipcore.forces.defaults,
+    estimators.defaults,
+)
 PACKAGES = ("slipcore", "estimators")
 BASES = {Options, slipcore.defaults.ContactOptions}
 KINDS = [SampleOptions, CheckOptions, slipcore.defaults.PatchOptions, *(method.options for method in METHODS.values())]

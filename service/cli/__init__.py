@@ -74,6 +74,7 @@ app.add_typer(logs.app, name="logs")
 app.add_typer(jobs.app, name="jobs")
 app.add_typer(owners.app, name="owners")
 app.add_typer(sensors.app, name="sensors")
+app.add_typer(sensors.app, name="sensor", hidden=True)  # as people say it of one
 app.add_typer(database.app, name="db")
 app.add_typer(blobs.app, name="blobs")
 app.add_typer(keys.app, name="keys")

@@ -37,6 +37,10 @@ Mapping = Annotated[
     Path | None,
     typer.Option("--mapping", help="A JSON file that says which topic, field or column of the log is what."),
 ]
+SensorModelFile = Annotated[
+    Path | None,
+    typer.Option("--sensor-model", help="Correct the log by this JSON, which `stiction sensors calibrate` writes."),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
 
 
@@ -46,6 +50,7 @@ def detect(
     scale: Scale = None,
     frame_rate: FrameRate = None,
     mapping: Mapping = None,
+    sensor_model: SensorModelFile = None,
     json: Json = False,
     picture: Picture = None,
 ) -> None:
@@ -55,6 +60,7 @@ def detect(
     from slipcore.defaults import DEFAULT_METHOD
 
     grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
+    grasp = corrected(grasp, sensor_model)
     start = perf_counter()
     history = detect_slip(grasp, method=method or DEFAULT_METHOD, lookahead=LOOKAHEAD)
     seconds = perf_counter() - start
@@ -75,6 +81,7 @@ def check(
     scale: Scale = None,
     frame_rate: FrameRate = None,
     mapping: Mapping = None,
+    sensor_model: SensorModelFile = None,
     json: Json = False,
 ) -> None:
     """Look for what makes the friction of a grasp log doubtful, and say what to do (docs/checks.md)."""
@@ -83,6 +90,7 @@ def check(
     from slipcore.defaults import DEFAULT_METHOD
 
     grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
+    grasp = corrected(grasp, sensor_model)
     history = detect_slip(grasp, method=method or DEFAULT_METHOD, lookahead=LOOKAHEAD)
     findings, contact = check_log(grasp, history), _contact_record(grasp, history)
     if json:
@@ -104,6 +112,7 @@ def fit(
     detector: Annotated[str | None, typer.Option(help=DETECTOR_HELP)] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the sampler.")] = 0,
     mapping: Mapping = None,
+    sensor_model: SensorModelFile = None,
     json: Json = False,
 ) -> None:
     """Fit the stochastic linear friction model to the slip seen in one or more grasp logs."""
@@ -115,7 +124,7 @@ def fit(
 
     grasps, found = [], []
     for path in logs:
-        grasp = formats.read(path, mapping=mapping_text(mapping))
+        grasp = corrected(formats.read(path, mapping=mapping_text(mapping)), sensor_model)
         history = detect_slip(grasp, method=detector or DEFAULT_METHOD, lookahead=LOOKAHEAD)
         found.append(check_log(grasp, history))
         for finding in found[-1]:
@@ -149,6 +158,23 @@ def convert(
 def mapping_text(path: Path | None) -> str | None:
     """What a mapping's file says, where there is one."""
     return None if path is None else path.read_text(encoding="utf-8")
+
+
+def corrected(grasp: "GraspLog", sensor_model: Path | None) -> "GraspLog":
+    """The log as a calibration of its sensor corrects it; what that changed goes to standard error."""
+    if sensor_model is None:
+        return grasp
+    from json import loads
+
+    from slipcore import InvalidInput, SensorModel
+
+    try:
+        told = loads(sensor_model.read_bytes())
+    except ValueError as error:
+        raise InvalidInput("sensor model", f"{sensor_model.name}, no JSON ({error})", "a JSON file") from error
+    log, changed = SensorModel.from_json(told).apply(grasp)
+    typer.echo(f"{sensor_model.name}: {'; '.join(changed) or 'nothing to correct'}", err=True)
+    return log
 
 
 def model_record(model: "FrictionModel") -> dict[str, Any]:

@@ -1,15 +1,22 @@
-"""Commands on a service's sensors: list, describe."""
+"""Commands on sensors: list, describe, calibrate."""
 
 from collections.abc import Mapping
-from typing import Annotated
+from json import dumps
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from service.cli.local import Mapping as MappingFile
+from service.cli.local import mapping_text
 from service.cli.output import print_json, print_table
 from service.cli.remote import DEFAULT_URL, Json, Key, Url, connected
-from service.formatting import number
+from service.formatting import interval, number
 
-app = typer.Typer(help="Show sensors, and describe their gels.", no_args_is_help=True)
+if TYPE_CHECKING:
+    from slipcore import Estimate
+
+app = typer.Typer(help="Show sensors, describe their gels, and learn their faults.", no_args_is_help=True)
 
 
 @app.command("list")
@@ -49,3 +56,46 @@ def describe(
     with connected(url, key) as client:
         client.describe_sensor(sensor, young_modulus, poisson_ratio, thickness, marker_depth)
     typer.echo(f"{sensor} is described: logs of it without forces get reconstructed ones from now on")
+
+
+@app.command()
+def calibrate(
+    logs: Annotated[list[Path], typer.Argument(help="Logs of a body pressed straight down on the sensor, and lifted.")],
+    known_force: Annotated[
+        list[float] | None,
+        typer.Option(help="Normal force with which the body pressed, N: one of all logs, or given once for each."),
+    ] = None,
+    mapping: MappingFile = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the sensor model to this JSON.")] = None,
+    json: Json = False,
+) -> None:
+    """Learn a sensor's faults from pure presses: zero, drift, crosstalk, smoothing, noise and gain."""
+    from service import formats
+    from slipcore import calibrate_sensor
+
+    grasps = [formats.read(path, mapping=mapping_text(mapping)) for path in logs]
+    model = calibrate_sensor(grasps, _known_forces(known_force, len(logs)))
+    told = model.to_json()
+    if output is not None:
+        output.write_text(dumps(told), encoding="utf-8")
+    if json:
+        print_json(told)
+    else:
+        rows = [_estimate_cells(each) for each in model.estimates]
+        print_table(f"{model.sensor}, from {model.presses} presses", ("", "estimate", "95 % interval", ""), rows)
+
+
+def _known_forces(given: list[float] | None, logs: int) -> list[float] | None:
+    """One force a log."""
+    if given is None or len(given) == logs:
+        return given
+    if len(given) == 1:
+        return given * logs
+    raise typer.BadParameter(f"{len(given)} known forces for {logs} logs; allowed: one, or one for each log")
+
+
+def _estimate_cells(estimate: "Estimate") -> tuple[str, str, str, str]:
+    named = f"{estimate.name} [{estimate.unit}]"
+    if estimate.not_identified is not None:
+        return named, "not identified", "", estimate.not_identified
+    return named, number(estimate.value), interval((estimate.low, estimate.high)), ""

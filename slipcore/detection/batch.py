@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from slipcore.calibration.model import SensorModel
 from slipcore.defaults import DEFAULT_METHOD, MOST_LOOKAHEAD
 from slipcore.detection.detector import DetectorState, init, masked, slip_state, step
 from slipcore.detection.methods import find_method
@@ -19,12 +20,22 @@ from slipcore.patch.regimes import slips_as_a_whole
 from slipcore.slip_state import SlipHistory, SlipState, observed_over_time, slip_events
 
 
-def detect_slip(log: GraspLog, method: str = DEFAULT_METHOD, *, lookahead: int = 0, **options: float) -> SlipHistory:
+def detect_slip(
+    log: GraspLog,
+    method: str = DEFAULT_METHOD,
+    *,
+    lookahead: int = 0,
+    sensor_model: SensorModel | None = None,
+    **options: float,
+) -> SlipHistory:
     """Detect local slip in a whole log: the fold of ``step`` over its frames.
 
-    With a ``lookahead`` each frame is decided in the light of that many frames after it (see ``FixedLagSmoother``).
-    Raises ``InvalidInput`` as ``init`` does.
+    With a ``lookahead`` each frame is decided in the light of that many frames after it (see ``FixedLagSmoother``);
+    with a ``sensor_model`` the log is first corrected by it (``SensorModel.apply``).
+    Raises ``InvalidInput`` as ``init`` does, and for a log of another lattice than the sensor model's.
     """
+    if sensor_model is not None:
+        log = sensor_model.apply(log).log
     state = init(log.position, log.element_area, method, **options)
     if isinstance(find_method(method), CompiledMethod):
         return with_patches(log, history_of(log, state, checked_lookahead(lookahead)))

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from benchmarks.presses import Faults, pressed
 from db.blobs import BlobStore
 from db.database import Database
 from db.records import NewGraspLog
@@ -53,6 +54,17 @@ def ramps(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
         log = tangential_ramp(friction=0.5, normal_force=force, marker_noise=1e-6, force_noise=2e-3, seed=seed)
         paths.append(folder / f"{force:g}.npz")
         container.write(log, paths[-1])
+    return paths
+
+
+@pytest.fixture(scope="module")
+def presses(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Logs of a ball pressed with 2 N on a sensor with crosstalk of 8 %, whose forces are 10 % too large."""
+    folder = tmp_path_factory.mktemp("presses")
+    faults = Faults(crosstalk=(0.08, 0.0), gain=1.1, marker_noise=1e-6, force_noise=2e-3)
+    paths = [folder / f"{seed}.npz" for seed in range(2)]
+    for seed, path in enumerate(paths):
+        container.write(faults.put_into(pressed(), seed), path)
     return paths
 
 
@@ -503,6 +515,29 @@ def test_owners_and_the_audit_trail_from_the_command_line(run: Run, url: str) ->
     entries = json.loads(run("audit", "--subject", "owned", "--json", "--url", url)[1])["entries"]
     assert [entry["action"] for entry in entries] == ["owner.removed", "owner.added", "material.created"]
     assert "owner.added" in run("audit", "--action", "owner.added", "--url", url)[1]
+
+
+def test_a_sensor_is_calibrated_and_its_logs_are_corrected(run: Run, presses: list[Path], tmp_path: Path) -> None:
+    model = tmp_path / "model.json"
+    code, out, _ = run("sensors", "calibrate", *presses, "--known-force", 2.0, "--output", model)
+    assert code == 0
+    assert re.search(r"crosstalk_x \[-\] +0\.[01]", out)
+    code, out, _ = run("sensor", "calibrate", presses[0], "--json")
+    told = {each["name"]: each for each in json.loads(out)["estimates"]}
+    assert told["crosstalk_x"]["low"] < 0.08 < told["crosstalk_x"]["high"]
+    assert "no total force" in told["gain"]["not_identified"]
+    code, _, err = run("check", presses[1], "--sensor-model", model)
+    assert code == 0
+    assert "crosstalk of 0.0" in err
+    assert "forces multiplied with" in err
+
+
+def test_what_no_sensor_can_be_calibrated_by_is_refused(run: Run, presses: list[Path], ramps: list[Path]) -> None:
+    code, _, err = run("sensors", "calibrate", ramps[0])
+    assert code == INPUT_REFUSED
+    assert "log 1: the load sideways" in err
+    assert run("sensors", "calibrate", presses[0], *["--known-force", 1.0] * 2)[0] == WRONG_USAGE
+    assert run("detect", presses[0], "--sensor-model", presses[0])[0] == INPUT_REFUSED
 
 
 def test_a_sensor_is_described_and_listed_from_the_command_line(run: Run, url: str) -> None:

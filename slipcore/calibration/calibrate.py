@@ -1,0 +1,88 @@
+"""A sensor's faults from pure presses."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from slipcore.calibration.crosstalk import crosstalk, inward_share
+from slipcore.calibration.defaults import ESTIMATE
+from slipcore.calibration.estimate import Estimate, Observation, joined
+from slipcore.calibration.gain import gain
+from slipcore.calibration.kernel import kernel_width, squared_width
+from slipcore.calibration.marker_noise import marker_noise
+from slipcore.calibration.model import AXES, SensorModel
+from slipcore.calibration.press import ImpurePress, Press, find_press, impurity
+from slipcore.calibration.zero import drifts, offsets
+from slipcore.errors import InvalidInput, UnknownScale
+from slipcore.frames import FloatArray, GraspLog
+
+
+def calibrate_sensor(logs: Sequence[GraspLog], known_force: Sequence[float | None] | None = None) -> SensorModel:
+    """What is wrong with a sensor, from logs of a body pressed straight down on it and lifted.
+
+    ``known_force``: for each log the total normal force of its hold, N, or None. Each quantity has its interval, or
+    says why it is not identified. Raises ``InvalidInput`` for logs of several sensors or lattices, ``UnknownScale`` for
+    lengths that are not in metres, ``ImpurePress`` for logs that are not pure presses, with what was seen in each.
+    """
+    known = _checked(logs, known_force)
+    presses = [find_press(log) for log in logs]
+    impure = {number: seen for number, press in enumerate(presses) if (seen := impurity(press)) is not None}
+    if impure:
+        raise ImpurePress(impure)
+    first = logs[0]
+    return SensorModel(
+        sensor=first.sensor,
+        grid=first.grid,
+        element_area=first.element_area,
+        frame_interval=float(np.median(np.concatenate([np.diff(log.time) for log in logs]))),
+        presses=len(logs),
+        estimates=tuple(_estimates(presses, known)),
+        offset=_offset(presses),
+    )
+
+
+def _checked(logs: Sequence[GraspLog], known_force: Sequence[float | None] | None) -> Sequence[float | None]:
+    if not logs:
+        raise InvalidInput("logs", "none", "at least one press")
+    known = [None] * len(logs) if known_force is None else known_force
+    if len(known) != len(logs):
+        raise InvalidInput("known_force", f"{len(known)} forces", f"one for each of {len(logs)} logs, or None")
+    for force in known:
+        if force is not None and not 0.0 < force < np.inf:
+            raise InvalidInput("known_force", force, "above 0 N and finite")
+    for name in ("sensor", "grid"):
+        values = sorted({str(getattr(log, name)) for log in logs})
+        if len(values) > 1:
+            raise InvalidInput("logs", f"of several {name}s: {', '.join(values)}", "one sensor at a time")
+    if not all(log.is_scaled for log in logs):
+        raise UnknownScale("a sensor is calibrated in metres, and the scale of a log is unknown")
+    return known
+
+
+def _estimates(presses: list[Press], known_force: Sequence[float | None]) -> list[Estimate]:
+    tables = {
+        "force_offset": ("N", AXES, [offsets(press.zero) for press in presses]),
+        "force_drift": ("N/s", AXES, [drifts(press.zero) for press in presses]),
+        "crosstalk": ("-", AXES[:2], [crosstalk(press) for press in presses]),
+    }
+    vectors = [
+        joined(f"{name}_{axis}", unit, [row[number] for row in rows])
+        for name, (unit, axes, rows) in tables.items()
+        for number, axis in enumerate(axes)
+    ]
+    gains: list[Observation] = [gain(press, force) for press, force in zip(presses, known_force, strict=True)]
+    return [
+        *vectors,
+        joined("inward_share", "-", [inward_share(press) for press in presses]),
+        kernel_width([squared_width(press) for press in presses]),
+        *marker_noise(presses),
+        joined("gain", "-", gains),
+    ]
+
+
+def _offset(presses: list[Press]) -> FloatArray | None:
+    """Of each element [n, m, 3] N: the mean over presses, weighted by their free frames."""
+    known = [zero for press in presses if (zero := press.zero) is not None and zero.frames >= ESTIMATE.free_frames]
+    if not known:
+        return None
+    return np.asarray(np.average([zero.offset for zero in known], axis=0, weights=[zero.frames for zero in known]))

@@ -1,0 +1,59 @@
+"""Tangential force that a sensor tells of a body that is pressed straight down."""
+
+import numpy as np
+
+from slipcore.calibration.defaults import ESTIMATE
+from slipcore.calibration.estimate import Observation, Observed, error_of_mean
+from slipcore.calibration.press import Press, load_terms, marker_motion
+from slipcore.frames import FloatArray
+
+
+def crosstalk(press: Press) -> list[Observation]:
+    """Along x and along y, the share of the normal force that appears as tangential force.
+
+    Of the sums over the footprint, in which parts that point inwards all around cancel. Its error holds that of noise,
+    and the load sideways that the motion of markers leaves room for.
+    """
+    if press.split is None:
+        return ["the log has no forces"] * 2
+    shares, errors = _proportional(press)
+    leaning = np.zeros(2)
+    if press.depth > 0.0:
+        leaning = np.abs(marker_motion(press)[0].mean(axis=0)) * ESTIMATE.sideways_stiffness / press.depth
+    errors = np.hypot(errors, leaning)
+    return [Observed(float(share), float(error)) for share, error in zip(shares, errors, strict=True)]
+
+
+def _proportional(press: Press) -> tuple[FloatArray, FloatArray]:
+    """Slopes of tangential over normal force [2] beside an offset and, where it is known, a drift; their errors."""
+    terms, load = load_terms(press)
+    found = np.linalg.lstsq(terms, load)[0]
+    residual = load - terms @ found
+    spread = np.linalg.inv(terms.T @ terms)[0, 0]
+    errors = np.array([error_of_mean(axis) * np.sqrt(len(axis) * spread) for axis in residual.T])
+    return found[0], errors
+
+
+def inward_share(press: Press) -> Observation:
+    """Tangential force that points to the middle of the contact, over normal force, summed up over the footprint.
+
+    It goes with the contact, so that no property of single elements makes it: the body's and the gel's own elasticity
+    does, or a reconstruction of forces.
+    """
+    if press.split is None:
+        return "the log has no forces"
+    force = press.split[press.pressed][:, press.footprint]
+    place, normal = press.log.position[press.footprint][:, :2], np.maximum(force[..., 2:], 0.0)
+    arm = (normal * place).sum(axis=1, keepdims=True) / normal.sum(axis=1, keepdims=True) - place
+    direction = arm / np.maximum(np.linalg.norm(arm, axis=-1, keepdims=True), np.finfo(float).tiny)
+    share = (force[..., :2] * direction).sum(axis=(1, 2)) / normal.sum(axis=(1, 2))
+    error = np.hypot(error_of_mean(share - share.mean()), _zero_error(press) / normal.sum(axis=(1, 2)).mean())
+    return Observed(float(share.mean()), float(error))
+
+
+def _zero_error(press: Press) -> float:
+    """Standard error of a component's sum over the footprint that single elements' zeros make, N."""
+    if press.split is None or not press.free.any():
+        return 0.0
+    still = press.split[press.free][:, press.footprint, :2]
+    return float(still.std() * np.sqrt(np.count_nonzero(press.footprint) / len(still)))

@@ -1,0 +1,25 @@
+"""What a sensor's normal force must be multiplied with, where the force on the body is known."""
+
+import math
+
+import numpy as np
+
+from slipcore.calibration.estimate import Observation, Observed, error_of_mean
+from slipcore.calibration.press import Press
+
+
+def gain(press: Press, known_force: float | None) -> Observation:
+    """Known force over the sum of normal forces in the hold; ``known_force`` N."""
+    if known_force is None:
+        return "no total force is given: hold a known weight, or press by a scale, and say with how much"
+    if press.split is None:
+        return "the log has no forces"
+    if press.zero is None:
+        return "no frames without contact tell its zero: begin before the touch"
+    if press.reaches_edge:
+        return "the contact reaches the lattice's edge: press in its middle"
+    held = press.split[press.held, ..., 2].sum(axis=(1, 2))
+    elements = math.prod(press.log.grid)
+    error = math.hypot(error_of_mean(held - held.mean()), elements * float(press.zero.offset_error[2]))
+    value = known_force / float(held.mean())
+    return Observed(value, value * error / float(np.abs(held.mean())))

@@ -1,0 +1,95 @@
+"""Noise of markers while nothing touches, and how long it remembers.
+
+By the variogram, the mean square of a coordinate's change over a lag, which no mean or trend of few frames biases:
+D(k) = 2 σ_w² + 2 σ_c² (1 − φᵏ) for white noise beside a first-order autoregressive process.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar, nnls
+from scipy.stats import norm
+
+from slipcore.calibration.defaults import ESTIMATE
+from slipcore.calibration.estimate import Estimate, unknown
+from slipcore.calibration.press import Press
+from slipcore.frames import BoolArray, FloatArray
+
+
+def marker_noise(presses: list[Press]) -> tuple[Estimate, Estimate]:
+    """Standard deviation of a marker's coordinate in the plane, m, and its correlation from frame to frame.
+
+    Motion that all markers have in common is not in it. Intervals are those of a jackknife over groups of elements.
+    """
+    names = ("marker_noise", "m"), ("marker_noise_correlation", "-")
+    usable = [press for press in presses if np.count_nonzero(press.free) >= ESTIMATE.free_frames]
+    if not usable:
+        reason = f"fewer than {ESTIMATE.free_frames} frames without contact: begin before the touch"
+        return unknown(*names[0], reason), unknown(*names[1], reason)
+    count = usable[0].log.grid[0] * usable[0].log.grid[1]
+    if count < ESTIMATE.noise_series:
+        reason = f"{count} elements; {ESTIMATE.noise_series} are needed"
+        return unknown(*names[0], reason), unknown(*names[1], reason)
+    squares = _mean_squares(usable)
+    whole = np.array(_fit(squares.mean(axis=1)))
+    blocks = min(ESTIMATE.noise_blocks, count)
+    parts = np.array([_fit(np.delete(squares, np.s_[k::blocks], axis=1).mean(axis=1)) for k in range(blocks)])
+    error = np.sqrt((blocks - 1) / blocks * ((parts - parts.mean(axis=0)) ** 2).sum(axis=0))
+    half = float(norm.ppf(0.5 + 0.5 * ESTIMATE.confidence)) * error
+    return _bounded(names[0], whole[0], half[0], math.inf), _bounded(names[1], whole[1], half[1], 1.0)
+
+
+def _bounded(name: tuple[str, str], value: float, half: float, most: float) -> Estimate:
+    return Estimate(*name, float(value), float(max(value - half, 0.0)), float(min(value + half, most)))
+
+
+def _mean_squares(presses: list[Press]) -> FloatArray:
+    """Mean square of each element's change over 1 … lags frames, [lags, k] m², of all presses."""
+    lags = max(1, min(ESTIMATE.noise_lags, *(_longest_lag(press) for press in presses)))
+    elements = presses[0].log.grid[0] * presses[0].log.grid[1]
+    sums, pairs = np.zeros((lags, elements)), np.zeros(lags)
+    for press in presses:
+        plane = press.log.displacement[..., :2].reshape(len(press.log), -1, 2)
+        still = plane - plane.mean(axis=1, keepdims=True)
+        each = [_change(still, press.free, lag) for lag in range(1, lags + 1)]
+        sums += [total for total, _ in each]
+        pairs += [count for _, count in each]
+    shared: FloatArray = sums / np.maximum(pairs, 1.0)[:, None]
+    return shared
+
+
+def _longest_lag(press: Press) -> int:
+    return int(ESTIMATE.noise_share_of_frames * np.count_nonzero(press.free))
+
+
+def _change(plane: FloatArray, free: BoolArray, lag: int) -> tuple[FloatArray, int]:
+    """Sum of squares of each element's change [k] over a lag between free frames, and how many pairs there are."""
+    pairs = free[lag:] & free[:-lag]
+    change = (plane[lag:] - plane[:-lag])[pairs]
+    return 0.5 * (change**2).sum(axis=(0, 2)), int(np.count_nonzero(pairs))
+
+
+def _fit(variogram: FloatArray) -> tuple[float, float]:
+    """Standard deviation, and correlation from frame to frame, of the process that fits best to D(1 …) [lags]."""
+    lag = np.arange(1, len(variogram) + 1)
+
+    def misfit(memory: float) -> float:
+        return _parts(variogram, 1.0 - memory**lag)[2]
+
+    tried = np.linspace(0.0, 1.0, ESTIMATE.noise_memories + 2)[:-1]
+    near = int(np.argmin([misfit(memory) for memory in tried]))
+    low, high = tried[max(near - 1, 0)], tried[min(near + 1, len(tried) - 1)]
+    memory = float(minimize_scalar(misfit, bounds=(low, high), method="bounded").x)
+    white, correlated, _ = _parts(variogram, 1.0 - memory**lag)
+    variance = white + correlated
+    return math.sqrt(variance), memory * correlated / variance if variance > 0.0 else 0.0
+
+
+def _parts(variogram: FloatArray, rise: NDArray[np.floating[Any]]) -> tuple[float, float, float]:
+    """White and correlated variance, neither below 0, that fit best, and the sum of relative squares."""
+    weight = 1.0 / np.maximum(variogram, np.finfo(float).tiny)
+    terms = 2.0 * np.stack([np.ones_like(rise), rise], axis=1) * weight[:, None]
+    found, misfit = nnls(terms, variogram * weight)
+    return float(found[0]), float(found[1]), float(misfit)
