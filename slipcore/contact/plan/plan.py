@@ -107,6 +107,10 @@ class Plan:
         times = np.unique([t for history in self.histories for t in history.time])
         return np.asarray(times[(times > 0.0) & (times < self.duration)])
 
+    def largest_force(self) -> float:
+        """Largest normal force N."""
+        return max(self.value("normal_force", float(time)) for time in (*self.corners(), self.duration))
+
     def load(self, before: float, now: float) -> StepLoad:
         """The load at the end of the step from ``before`` to ``now`` s."""
         moved = [self.value(channel, now) - self.value(channel, before) for channel in MOTIONS]

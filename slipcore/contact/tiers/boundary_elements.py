@@ -14,6 +14,7 @@ from slipcore.contact.plan.plan import Plan
 from slipcore.contact.solver.normal import solve_normal
 from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
 from slipcore.contact.solver.resolution import summary
+from slipcore.contact.tiers.load_steps import load_steps
 from slipcore.contact.tiers.sampling import (
     FrameRecord,
     SensorGrid,
@@ -29,7 +30,11 @@ from slipcore.frames import FloatArray, GraspLog
 
 @dataclass(frozen=True, slots=True)
 class Fidelity:
-    """``cells`` across the largest contact, load steps a frame (``substeps``), ``tolerance`` of the solver."""
+    """``cells`` across the largest contact, load steps a frame (``substeps``), ``tolerance`` of the solver.
+
+    Where pressing moves the surface sideways there are more load steps: none lets the contact grow by more than a ring
+    of such cells, a ring in as many steps as a frame has.
+    """
 
     cells: int = FIDELITY.cells
     substeps: int = FIDELITY.substeps
@@ -50,7 +55,7 @@ def run(plan: Plan, fidelity: Fidelity | None = None) -> GraspLog:
     where = sensor_grid(plan.sampling, PROBE.room * contact_reach(plan), fidelity.cells)
     solver = QuasiStatic(plan.problem, where.grid, fidelity.tolerance, FIDELITY.normal_share * fidelity.tolerance)
     times = frame_times(plan)
-    frames, warnings = _frames(plan, solver, where, times, fidelity.substeps)
+    frames, warnings = _frames(plan, solver, where, times, fidelity)
     metadata = {
         "tier": "boundary elements",
         "grid": f"{where.grid.shape[1]} x {where.grid.shape[0]} cells of {where.grid.pitch[0]:.6g} m",
@@ -64,14 +69,13 @@ def run(plan: Plan, fidelity: Fidelity | None = None) -> GraspLog:
 
 
 def _frames(
-    plan: Plan, solver: QuasiStatic, where: SensorGrid, times: FloatArray, substeps: int
+    plan: Plan, solver: QuasiStatic, where: SensorGrid, times: FloatArray, fidelity: Fidelity
 ) -> tuple[list[FrameRecord], list[tuple[str, ...]]]:
     """Records of all frames, and of each load step what the grid does not resolve."""
-    corners, state = plan.corners(), solver.start()
+    state, growth = solver.start(), 2.0 / (fidelity.cells * fidelity.substeps)
     frames, warnings = [untouched(where)], list[tuple[str, ...]]()
     for begin, end in pairwise(times):
-        bends = corners[(corners > begin) & (corners < end)]
-        instants = np.union1d(np.linspace(begin, end, substeps + 1), bends)
+        instants = load_steps(plan, begin, end, fidelity.substeps, growth)
         results: list[StepResult] = []
         for before, now in pairwise(instants):
             state, result = solver.step(state, plan.load(float(before), float(now)))
@@ -86,8 +90,7 @@ def contact_reach(plan: Plan) -> float:
     grid.
     """
     problem = plan.problem
-    knots = np.append(plan.corners(), plan.duration)
-    force = max(plan.value("normal_force", float(t)) for t in knots)
+    force = plan.largest_force()
     softening = 1.0 + sum(branch.strength for branch in problem.creep)
     operators = Operators((*(Scaled(body, softening) for body in problem.finger), *problem.obstacle))
     reach = PROBE.first_reach

@@ -332,7 +332,8 @@ def test_spread_is_the_coupling_without_its_way_back() -> None:
     plain = simulate(scene(SENSOR), fidelity=COARSE)
     spread = simulate(scene(PressingSpread(), SENSOR), fidelity=COARSE)
     coupled = simulate(scene(NormalTangentialCoupling(), SENSOR), fidelity=COARSE)
-    np.testing.assert_array_equal(spread.force[..., 2], plain.force[..., 2])
+    rounding = 1e-5 * np.abs(plain.force).max()  # the solver's: where pressing spreads there are more load steps
+    np.testing.assert_allclose(spread.force[..., 2], plain.force[..., 2], rtol=0.0, atol=rounding)
     assert np.abs(spread.displacement[-1, ..., :2]).max() > 1e-7
     assert np.abs(coupled.force[-1, ..., 2] - plain.force[-1, ..., 2]).max() > 0.0
     difference = np.abs(coupled.displacement - spread.displacement).max()
