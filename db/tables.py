@@ -384,7 +384,10 @@ class AuditEntryRow(Base):
 
 
 class StoreRow(Base):
-    """The id that the database shares with the blob store of its files (``db.identity``): one row, or none yet."""
+    """The id that the database shares with the blob store of its files (``db.identity``): one row, or none yet.
+
+    ``webhook_entry_id``: the newest entry of the audit trail that the webhook has had or is never to have.
+    """
 
     __tablename__ = "store"
     __table_args__ = (CheckConstraint("number = 1", name="number"),)
@@ -392,3 +395,4 @@ class StoreRow(Base):
     number: Mapped[int] = mapped_column(primary_key=True, autoincrement=False, default=1)
     id: Mapped[str] = mapped_column(String(32))
     created_at: Mapped[datetime] = mapped_column(default=now)
+    webhook_entry_id: Mapped[int | None]

@@ -37,6 +37,7 @@ from service.jobs.executors import executor_for_short_jobs, executors
 from service.jobs.retention import Retention
 from service.jobs.runner import JobRunner
 from service.jobs.scrub import Scrub
+from service.jobs.webhook import Webhook
 from service.jobs.worker import StoreConfig
 from service.observability import traces
 from service.observability.access_log import AccessLog
@@ -154,7 +155,9 @@ async def running(
             )
             scrub = Scrub(database, blobs, settings.scrub_bytes_per_second, lambda: runner.leads)
             watch = StoreWatch(database, blobs)
-            for thread in (retention, scrub, watch):
+            webhook = Webhook(database, settings.webhook_url, settings.webhook_secret, lambda: runner.leads)
+            threads = (retention, scrub, watch, webhook)
+            for thread in threads:
                 thread.start()
             try:
                 models = ModelCache(settings.lookup_seconds)
@@ -162,7 +165,7 @@ async def running(
                     settings, database, blobs, runner, readers, models, streams=streams, scrub=scrub, watch=watch
                 )
             finally:
-                for thread in (retention, scrub, watch):
+                for thread in threads:
                     await thread.stop()
                 await streams.stop()
                 await runner.stop()

@@ -4,6 +4,7 @@ import ipaddress
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Literal
+from urllib.parse import urlsplit
 
 from pydantic import Field, ValidationError, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -50,6 +51,14 @@ class Settings(BaseSettings):
     )
     keep_audit_days: Annotated[float, Field(ge=30.0, le=36500.0)] | None = Field(
         default=None, description="Days after which entries of the audit trail are deleted. Default: never."
+    )
+    webhook_url: str | None = Field(
+        default=None,
+        repr=False,  # it may hold a password
+        description="URL that is sent a POST when the service finds a changed surface or a damaged file.",
+    )
+    webhook_secret: Annotated[str, Field(min_length=16)] | None = Field(
+        default=None, repr=False, description="Key of the signature (HMAC-SHA256) of what is sent to the webhook."
     )
     scrub_bytes_per_second: Annotated[float, Field(ge=0.0, le=1e12)] = Field(
         default=float(MIB), description="Pace at which stored files are read and compared with their hashes; 0: not."
@@ -165,6 +174,13 @@ class Settings(BaseSettings):
     def _shared_by_processes(cls, url: str | None) -> str | None:
         if url is not None and (":memory:" in url or url in {"sqlite://", "sqlite:///"}):
             raise ValueError("a file or a server: a database in memory is not seen by the worker processes")
+        return url
+
+    @field_validator("webhook_url")
+    @classmethod
+    def _web_address(cls, url: str | None) -> str | None:
+        if url is not None and not (url.startswith(("http://", "https://")) and urlsplit(url).hostname):
+            raise ValueError("an http or https URL, such as https://hooks.example/friction")
         return url
 
     @field_validator("blob_url")

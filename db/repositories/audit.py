@@ -1,6 +1,6 @@
 """The audit trail: entries are added in the transaction of the change that they tell of, and never changed."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from datetime import datetime
 from typing import Any
 
@@ -32,6 +32,20 @@ def list_all(session: Session, window: Window, wanted: AuditFilter) -> list[Audi
     return [
         _record(row) for row in session.scalars(windowed(query, window, {"id": AuditEntryRow.id}, AuditEntryRow.id))
     ]
+
+
+def newest_id(session: Session) -> int:
+    """Id of the newest entry; 0 where there is none."""
+    return session.scalar(select(func.max(AuditEntryRow.id))) or 0
+
+
+def list_after(
+    session: Session, entry_id: int, actions: Collection[AuditAction], before: datetime, limit: int
+) -> list[AuditEntry]:
+    """The first entries of some actions after one, from ``before`` a moment, in their order."""
+    query = select(AuditEntryRow).where(AuditEntryRow.id > entry_id, AuditEntryRow.action.in_(actions))
+    query = query.where(AuditEntryRow.at < before).order_by(AuditEntryRow.id).limit(limit)
+    return [_record(row) for row in session.scalars(query)]
 
 
 def is_recorded(session: Session, action: AuditAction, subject: str, since: datetime) -> bool:

@@ -28,6 +28,16 @@ def set_id(session: Session, store_id: str) -> None:
     session.merge(StoreRow(number=1, id=store_id))
 
 
+def webhook_entry(session: Session) -> int | None:
+    """Id of the newest entry of the audit trail that the webhook has had; None where there never was a webhook."""
+    return session.scalar(select(StoreRow.webhook_entry_id))
+
+
+def set_webhook_entry(session: Session, entry_id: int) -> None:
+    """Note that the webhook has had the entries up to this one."""
+    session.execute(update(StoreRow).values(webhook_entry_id=entry_id))
+
+
 def touch(session: Session) -> None:
     """Write the row anew: it shows whether the database takes anything."""
     session.execute(update(StoreRow).values(number=1))

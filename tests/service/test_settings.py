@@ -25,6 +25,8 @@ UNSET = {
     "key_queued_jobs": "none",
     "key_logs_a_day": "none",
     "key_stored_bytes": "none",
+    "webhook_url": "none",
+    "webhook_secret": "none",
 }
 """What holds in place of a setting without a default."""
 
@@ -72,6 +74,8 @@ def test_the_databases_password_is_not_shown() -> None:
         ("max_upload_bytes", 0),
         ("access", "none"),
         ("idempotency_hours", 0.0),
+        ("webhook_url", "http://"),
+        ("webhook_url", "http://[::1"),
         ("lookup_seconds", 61.0),
         ("rate_limit", -1.0),
         ("max_connections", 0),
@@ -119,6 +123,8 @@ def test_a_variable_that_is_no_setting_is_noticed() -> None:
 def test_a_wrong_setting_is_told_by_its_name_and_without_secrets(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("STICTION_READERS", "0")
     monkeypatch.setenv("STICTION_DATABASE_URL", "sqlite:///:memory:?password=hush")
+    monkeypatch.setenv("STICTION_WEBHOOK_URL", "ftp://hooks.example/hush")
+    monkeypatch.setenv("STICTION_WEBHOOK_SECRET", "hush")
     with pytest.raises(ValidationError) as refusal:
         Settings()
     lines = sorted(complaints(refusal.value).splitlines())
@@ -126,4 +132,10 @@ def test_a_wrong_setting_is_told_by_its_name_and_without_secrets(monkeypatch: py
         "STICTION_DATABASE_URL is not one that is allowed; allowed: a file or a server: a database in memory"
     )
     assert lines[1] == "STICTION_READERS is '0'; allowed: greater than or equal to 1 (docs/settings.md)"
+    assert lines[2].startswith(
+        "STICTION_WEBHOOK_SECRET is not one that is allowed; allowed: String should have at least"
+    )
+    assert lines[3].startswith(
+        "STICTION_WEBHOOK_URL is not one that is allowed; allowed: an http or https URL, such as"
+    )
     assert "hush" not in "".join(lines)
