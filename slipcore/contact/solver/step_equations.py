@@ -94,10 +94,8 @@ class StepEquations:
 
     def pressed(self, guess: Stress) -> NormalContact:
         """Normal contact under a guess of the traction: where cells touch, and all of it where nothing is coupled."""
-        if not self.problem.coupled:
-            return self._normal(guess.pressure, self.height, self.tolerance)
-        goal = max(self.tolerance, STEP.inexact * STEP.coupling_start)
-        return self._normal(guess.pressure, self.height + self._lift(guess.traction), goal)
+        lift = self._lift(guess.traction) if self.problem.coupled else 0.0
+        return self._normal(guess.pressure, self.height + lift, self.tolerance)
 
     def gap(self, solution: StepSolution) -> FloatArray:
         """Gap [ny, nx] m that a solution of these equations leaves, or of equations with less contact."""

@@ -1,13 +1,20 @@
 """Cells that touch within a load step: loads that grow together against their closed form, pressing by convergence."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from slipcore.contact.elasticity.bonded_layer import LayerBase
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import HalfSpace
+from slipcore.contact.solver import quasi_static
+from slipcore.contact.solver.extrapolation import Stress
+from slipcore.contact.solver.normal import NormalContact
 from slipcore.contact.solver.problem import Problem, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
+from slipcore.contact.solver.step_equations import StepEquations
+from slipcore.contact.solver.touching import from_touch
 from slipcore.frames import FloatArray
 
 FRICTION, FORCE = 0.4, 10.0
@@ -64,6 +71,20 @@ def test_pressing_a_bonded_layer_is_of_second_order_in_steps_of_radius() -> None
     errors = [np.linalg.norm(pressed(steps, power=3) - fine) / np.linalg.norm(fine) for steps in (15, 60)]
     assert errors[1] <= 1e-3
     assert np.log2(errors[0] / errors[1]) / 2.0 >= 1.5
+
+
+def test_no_cell_that_touches_is_missed_in_fine_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A solution that is too coarse to show that a cell touches leaves it with an error that the steps do not cure."""
+    counted: list[bool] = []
+
+    def noted(equations: StepEquations, last: NormalContact, guess: Stress) -> StepEquations:
+        counted.append((corrected := from_touch(equations, last, guess)).offset is not equations.offset)
+        return corrected
+
+    monkeypatch.setattr(quasi_static, "from_touch", noted)
+    contacts = [result.contact for result in layer(16).run(map(load, FORCE * (np.arange(1, 161) / 160) ** 3))]
+    touches = [bool((now & ~before).any()) for before, now in pairwise(contacts)]
+    assert [needed for needed, done in zip(touches, counted, strict=True) if needed and not done] == []
 
 
 def test_a_load_that_only_the_new_cells_make_bearable_is_borne() -> None:
