@@ -18,6 +18,7 @@ AuditAction = Literal[
     "owner.added",
     "owner.removed",
     "sensor.described",
+    "sensor.calibrated",
     "grasp_log.uploaded",
     "grasp_log.withdrawn",
     "grasp_log.restored",
@@ -165,10 +166,43 @@ class Gel:
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """A sensor that logs come from; ``gel`` is None where it was not described."""
+    """A sensor that logs come from; ``gel`` is None where it was not described, ``calibration`` the newest version."""
 
     name: str
     gel: Gel | None
+    calibration: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationPress:
+    """A log that a sensor was calibrated by; ``known_force`` N, with which the body pressed, None where unknown."""
+
+    grasp_log: str
+    known_force: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class NewCalibration:
+    """What was found of a sensor's faults: the sensor ``model`` as its package tells it, without the zero of each
+    element, and that ``offset``, float64 N row by row, None where it is unknown.
+
+    ``created_by``: the access key with which it was asked for, None without one.
+    """
+
+    presses: tuple[CalibrationPress, ...]
+    model: Mapping[str, Any]
+    offset: bytes | None
+    created_by: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """A version of a sensor's calibration."""
+
+    id: int
+    version: int
+    created_at: datetime
+    new: NewCalibration
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,6 +234,8 @@ class Detection:
 
     ``noise`` m; ``seconds`` that the detection took; ``onsets`` … ``releases`` count events; ``findings`` against the
     log, None where an older version did not look for any; ``contact_friction``: None where nothing is known of it.
+    ``calibration``: the version of its sensor's by which the log was corrected, and in ``corrections`` how; None where
+    there was none.
     """
 
     method: str
@@ -215,6 +251,8 @@ class Detection:
     history_blob: str
     findings: tuple[Finding, ...] | None = None
     contact_friction: ContactFriction | None = None
+    calibration: int | None = None
+    corrections: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,7 +330,8 @@ class Withdrawal:
 class StoredGraspLog:
     """A grasp log with its ingest job and, once there, what detection and sampling found.
 
-    ``has_file``: whether its bytes are still there; ``uploaded_by``: the access key with which it was first sent.
+    ``has_file``: whether its bytes are still there; ``uploaded_by``: the access key with which it was first sent;
+    ``calibration``: the version of its sensor's that corrects it.
     """
 
     id: str
@@ -312,6 +351,7 @@ class StoredGraspLog:
     job: Job
     detection: Detection | None
     samples: SampleSummary | None
+    calibration: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

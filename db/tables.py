@@ -122,9 +122,30 @@ class SensorRow(Base):
     marker_depth: Mapped[float | None]
 
 
+class SensorCalibrationRow(Base):
+    """One version of what is known of a sensor's faults; the newest corrects the logs that come in from then on.
+
+    ``presses``: logs that it was made from, with the force where it was known; ``model``: the sensor model as
+    ``slipcore`` tells it, without the zero of each element, which is ``offset``: float64 N, row by row.
+    """
+
+    __tablename__ = "sensor_calibrations"
+    __table_args__ = (UniqueConstraint("sensor_id", "version"), CheckConstraint("version > 0", name="version"))
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    sensor_id: Mapped[int] = mapped_column(ForeignKey("sensors.id"))
+    version: Mapped[int]
+    created_at: Mapped[datetime] = mapped_column(default=now)
+    created_by: Mapped[str | None] = mapped_column(ForeignKey("access_keys.id"))
+    presses: Mapped[list[Any]]
+    model: Mapped[dict[str, Any]]
+    offset: Mapped[bytes | None] = mapped_column(LargeBinary)
+
+
 class GraspLogRow(Base):
     """A grasp log; its bytes are the blob of hash ``sha256``. The same content, material and detector is one log.
 
+    ``calibration``: the version of its sensor's that was the newest when it was sent, and corrects it.
     ``file_state`` is NULL while the blob is there, since ``file_since``; ``uploaded_by`` is NULL where no key was sent.
     """
 
@@ -169,6 +190,7 @@ class GraspLogRow(Base):
     file_since: Mapped[datetime] = mapped_column(default=now)
     uploaded_by: Mapped[str | None] = mapped_column(ForeignKey("access_keys.id"))
     withdrawn_by: Mapped[str | None] = mapped_column(ForeignKey("access_keys.id"))
+    calibration: Mapped[int | None]
 
 
 class RunnerRow(Base):
@@ -249,6 +271,8 @@ class DetectionRow(Base):
     history_blob: Mapped[str] = mapped_column(String(64), index=True)
     findings: Mapped[list[Any] | None] = mapped_column(JSON(none_as_null=True))
     contact_friction: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+    calibration: Mapped[int | None]
+    corrections: Mapped[list[Any] | None] = mapped_column(JSON(none_as_null=True))
     created_at: Mapped[datetime] = mapped_column(default=now)
 
 

@@ -324,6 +324,19 @@ def describe_sensor(name: str, gel: Mapping[str, float | None]) -> Call[dict[str
     return _record(dict, (yield from _ask(Request("PUT", f"/v1/sensors/{_part(name)}", json=dict(gel)))))
 
 
+def calibrate_sensor(name: str, presses: Mapping[str, float | None]) -> Call[dict[str, Any]]:
+    """Calibrate a sensor by stored logs, each with its known force."""
+    pressed = [{"grasp_log": log, "known_force": force} for log, force in presses.items()]
+    request = Request("POST", f"/v1/sensors/{_part(name)}/calibrations", json={"presses": pressed})
+    return _record(dict, (yield from _ask(request)))
+
+
+def calibrations(name: str) -> Call[list[dict[str, Any]]]:
+    """Ask for the newest calibrations of a sensor."""
+    path = f"/v1/sensors/{_part(name)}/calibrations"
+    return _record(lambda record: [dict(each) for each in record["items"]], (yield from _get(path)))
+
+
 def audit(actor: str | None, action: str | None, subject: str | None, limit: int) -> Call[list[AuditEntry]]:
     """Ask for the newest entries of the audit trail, page after page up to ``limit``."""
     found: list[AuditEntry] = []

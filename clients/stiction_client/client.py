@@ -218,6 +218,16 @@ class FrictionClient:
         """Describe a sensor's gel (Pa, m; thickness None: a half-space), from which forces of its logs then follow."""
         return self._run(calls.describe_sensor(name, _gel(young_modulus, poisson_ratio, thickness, marker_depth)))
 
+    def calibrate_sensor(self, name: str, presses: Mapping[str, float | None]) -> dict[str, Any]:
+        """Learn a sensor's faults from stored logs of a body pressed straight down, by which its later logs are then
+        corrected; ``presses``: by the id of each log the normal force of the press, N, or None where it is unknown.
+        """
+        return self._run(calls.calibrate_sensor(name, presses))
+
+    def calibrations(self, name: str) -> list[dict[str, Any]]:
+        """The newest calibrations of a sensor, the last first."""
+        return self._run(calls.calibrations(name))
+
     def audit(
         self, actor: str | None = None, action: str | None = None, subject: str | None = None, limit: int = 100
     ) -> list[AuditEntry]:
@@ -406,6 +416,14 @@ class AsyncFrictionClient:
     ) -> dict[str, Any]:
         """As ``FrictionClient.describe_sensor``."""
         return await self._run(calls.describe_sensor(name, _gel(young_modulus, poisson_ratio, thickness, marker_depth)))
+
+    async def calibrate_sensor(self, name: str, presses: Mapping[str, float | None]) -> dict[str, Any]:
+        """As ``FrictionClient.calibrate_sensor``."""
+        return await self._run(calls.calibrate_sensor(name, presses))
+
+    async def calibrations(self, name: str) -> list[dict[str, Any]]:
+        """As ``FrictionClient.calibrations``."""
+        return await self._run(calls.calibrations(name))
 
     async def audit(
         self, actor: str | None = None, action: str | None = None, subject: str | None = None, limit: int = 100

@@ -61,6 +61,10 @@ class UnknownSensor(ProblemError):
     """No sensor of this name is known."""
 
 
+class UnknownCalibration(ProblemError):
+    """The sensor has no calibration of this version."""
+
+
 class UnknownJob(ProblemError):
     """No job has this id."""
 

@@ -105,7 +105,8 @@ class Detection:
     """What was seen in a grasp log: events of each kind, friction samples, frames, smallest stick ratio, and findings
     against it (None where the service did not look for any), and what the contact as a whole tells of friction.
     ``velocity_is_relative``: whether the samples' velocities are relative to what seems to stick, for the log has no
-    motion of the object (None where nobody noted it).
+    motion of the object (None where nobody noted it). ``calibration``: the version of its sensor's by which the log was
+    corrected, and in ``corrections`` what that changed (None without).
     """
 
     method: str
@@ -119,11 +120,15 @@ class Detection:
     findings: tuple[Finding, ...] | None = None
     contact_friction: ContactFriction | None = None
     velocity_is_relative: bool | None = None
+    calibration: int | None = None
+    corrections: tuple[str, ...] | None = None
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "Detection":
         """The detection in the service's answer."""
         values = _values(cls, record)
+        if values.get("corrections") is not None:
+            values["corrections"] = tuple(values["corrections"])
         if values.get("findings") is not None:
             values["findings"] = tuple(Finding(**_values(Finding, each)) for each in values["findings"])
         if values.get("contact_friction") is not None:

@@ -108,7 +108,8 @@ def detection_record(row: DetectionRow | None) -> Detection | None:
     found = {entry.name: getattr(row, entry.name) for entry in fields(Detection)}
     findings = None if row.findings is None else tuple(Finding(**each) for each in row.findings)
     contact = None if row.contact_friction is None else ContactFriction(**row.contact_friction)
-    return Detection(**found | {"findings": findings, "contact_friction": contact})
+    corrections = None if row.corrections is None else tuple(row.corrections)
+    return Detection(**found | {"findings": findings, "contact_friction": contact, "corrections": corrections})
 
 
 def samples_record(row: SampleSummaryRow | None) -> SampleSummary | None:

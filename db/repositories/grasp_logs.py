@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session, aliased
 from db.errors import AlreadyExists, NotFound
 from db.paging import Window, windowed
 from db.records import LogFilter, NewGraspLog, StoredGraspLog, Withdrawal
-from db.repositories import detections, jobs, sensors
+from db.repositories import calibrations, detections, jobs, sensors
 from db.tables import DetectionRow, GraspLogRow, JobRow, MaterialRow, SampleSummaryRow, SensorRow, now
 
 _WHOLE = (
@@ -25,6 +25,7 @@ _WHOLE = (
 
 def add(session: Session, log: NewGraspLog) -> str:
     """Store a new log and return its id; raises ``AlreadyExists`` for the same content, material and detector."""
+    sensor_id = sensors.find_or_add(session, log.sensor)
     row = GraspLogRow(
         id=uuid.uuid4().hex,
         sha256=log.sha256,
@@ -32,12 +33,13 @@ def add(session: Session, log: NewGraspLog) -> str:
         format=log.format,
         detector=log.detector,
         material_id=log.material_id,
-        sensor_id=sensors.find_or_add(session, log.sensor),
+        sensor_id=sensor_id,
         frames=log.frames,
         duration=log.duration,
         grid_rows=log.grid[0],
         grid_columns=log.grid[1],
         uploaded_by=log.uploaded_by,
+        calibration=calibrations.newest_version(session, sensor_id),
     )
     try:
         with session.begin_nested():
@@ -156,6 +158,7 @@ def _record(
         job=jobs.record(job, material),
         detection=detections.detection_record(detection),
         samples=detections.samples_record(samples),
+        calibration=row.calibration,
     )
 
 

@@ -6,8 +6,16 @@ from sqlalchemy.orm import Session
 
 from db.errors import NotFound
 from db.records import Gel, Sensor
-from db.tables import GraspLogRow, SensorRow
+from db.tables import GraspLogRow, SensorCalibrationRow, SensorRow
 from db.text import is_storable
+
+_NEWEST = (
+    select(func.max(SensorCalibrationRow.version))
+    .where(SensorCalibrationRow.sensor_id == SensorRow.id)
+    .scalar_subquery()
+)
+_WHOLE = select(SensorRow, _NEWEST)
+"""Sensors with the newest version of their calibrations."""
 
 
 def find_or_add(session: Session, name: str) -> int:
@@ -27,8 +35,8 @@ def find_or_add(session: Session, name: str) -> int:
 
 def find(session: Session, name: str) -> Sensor | None:
     """A sensor with what is known of its gel; None of which nothing was heard yet."""
-    row = session.scalar(select(SensorRow).where(SensorRow.name == name)) if is_storable(name) else None
-    return None if row is None else _record(row)
+    found = session.execute(_WHOLE.where(SensorRow.name == name)).one_or_none() if is_storable(name) else None
+    return None if found is None else _record(*found)
 
 
 def get(session: Session, name: str) -> Sensor:
@@ -41,7 +49,7 @@ def get(session: Session, name: str) -> Sensor:
 
 def list_all(session: Session) -> list[Sensor]:
     """All sensors, by name."""
-    return [_record(row) for row in session.scalars(select(SensorRow).order_by(SensorRow.name))]
+    return [_record(*row) for row in session.execute(_WHOLE.order_by(SensorRow.name))]
 
 
 def count_logs(session: Session) -> dict[str, int]:
@@ -56,10 +64,11 @@ def describe(session: Session, name: str, gel: Gel) -> Sensor:
     row.young_modulus, row.poisson_ratio = gel.young_modulus, gel.poisson_ratio
     row.thickness, row.marker_depth = gel.thickness, gel.marker_depth
     session.flush()
-    return _record(row)
+    return get(session, name)
 
 
-def _record(row: SensorRow) -> Sensor:
+def _record(row: SensorRow, calibration: int | None) -> Sensor:
     if row.young_modulus is None or row.poisson_ratio is None:
-        return Sensor(row.name, None)
-    return Sensor(row.name, Gel(row.young_modulus, row.poisson_ratio, row.thickness, row.marker_depth or 0.0))
+        return Sensor(row.name, None, calibration)
+    gel = Gel(row.young_modulus, row.poisson_ratio, row.thickness, row.marker_depth or 0.0)
+    return Sensor(row.name, gel, calibration)

@@ -1,9 +1,9 @@
 """Commands on sensors: list, describe, calibrate."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from json import dumps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -12,9 +12,6 @@ from service.cli.local import mapping_text
 from service.cli.output import print_json, print_table
 from service.cli.remote import DEFAULT_URL, Json, Key, Url, connected
 from service.formatting import interval, number
-
-if TYPE_CHECKING:
-    from slipcore import Estimate
 
 app = typer.Typer(help="Show sensors, describe their gels, and learn their faults.", no_args_is_help=True)
 
@@ -67,22 +64,50 @@ def calibrate(
     ] = None,
     mapping: MappingFile = None,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write the sensor model to this JSON.")] = None,
+    store: Annotated[
+        bool,
+        typer.Option("--store", help="Send the logs to a service, which corrects the sensor's later logs by them."),
+    ] = False,
+    sensor: Annotated[
+        str | None, typer.Option(help="With --store: name of the sensor, where its logs do not give it.")
+    ] = None,
+    url: Url = DEFAULT_URL,
+    key: Key = None,
     json: Json = False,
 ) -> None:
     """Learn a sensor's faults from pure presses: zero, drift, crosstalk, smoothing, noise and gain."""
-    from service import formats
-    from slipcore import calibrate_sensor
-
-    grasps = [formats.read(path, mapping=mapping_text(mapping)) for path in logs]
-    model = calibrate_sensor(grasps, _known_forces(known_force, len(logs)))
-    told = model.to_json()
+    if store and (output is not None or mapping is not None):
+        raise typer.BadParameter("--store with --output or --mapping; allowed: one of them")
+    forces = _known_forces(known_force, len(logs))
+    told = _stored(logs, forces, sensor, url, key) if store else _learnt(logs, forces, mapping)
     if output is not None:
         output.write_text(dumps(told), encoding="utf-8")
     if json:
         print_json(told)
     else:
-        rows = [_estimate_cells(each) for each in model.estimates]
-        print_table(f"{model.sensor}, from {model.presses} presses", ("", "estimate", "95 % interval", ""), rows)
+        rows = [_estimate_cells(each) for each in told["estimates"]]
+        version = f", version {told['version']}" if store else ""
+        print_table(f"Calibration by {len(logs)} logs{version}", ("", "estimate", "95 % interval", ""), rows)
+
+
+def _learnt(logs: list[Path], forces: list[float] | None, mapping: Path | None) -> dict[str, Any]:
+    """The sensor model of presses on this machine, as JSON has it."""
+    from service import formats
+    from slipcore import calibrate_sensor
+
+    return calibrate_sensor([formats.read(path, mapping=mapping_text(mapping)) for path in logs], forces).to_json()
+
+
+def _stored(
+    logs: list[Path], forces: list[float] | None, sensor: str | None, url: str, key: str | None
+) -> dict[str, Any]:
+    """The calibration that a service makes of these logs, as it tells it."""
+    with connected(url, key) as client:
+        receipts = [client.upload(path, sensor=sensor) for path in logs]
+        known: Sequence[float | None] = forces or [None] * len(logs)
+        return client.calibrate_sensor(
+            receipts[0].sensor, {receipt.id: force for receipt, force in zip(receipts, known, strict=True)}
+        )
 
 
 def _known_forces(given: list[float] | None, logs: int) -> list[float] | None:
@@ -94,8 +119,8 @@ def _known_forces(given: list[float] | None, logs: int) -> list[float] | None:
     raise typer.BadParameter(f"{len(given)} known forces for {logs} logs; allowed: one, or one for each log")
 
 
-def _estimate_cells(estimate: "Estimate") -> tuple[str, str, str, str]:
-    named = f"{estimate.name} [{estimate.unit}]"
-    if estimate.not_identified is not None:
-        return named, "not identified", "", estimate.not_identified
-    return named, number(estimate.value), interval((estimate.low, estimate.high)), ""
+def _estimate_cells(estimate: Mapping[str, Any]) -> tuple[str, str, str, str]:
+    named = f"{estimate['name']} [{estimate['unit']}]"
+    if estimate["not_identified"] is not None:
+        return named, "not identified", "", estimate["not_identified"]
+    return named, number(estimate["value"]), interval((estimate["low"], estimate["high"])), ""

@@ -109,9 +109,9 @@ class Readers:
         """Write a stored log to ``target`` in the format ``name``; raises ``UnsupportedFormat``."""
         await self._do(partial(rewrite, source, target, name), name, self._seconds, owner)
 
-    async def derive(self, do: Callable[[], None], name: str, owner: str = "") -> None:
-        """Do something with a stored log of format ``name``; what is done can be pickled, as can what it raises."""
-        await self._do(do, name, self._seconds, owner)
+    async def derive(self, do: Callable[[], Result], name: str, owner: str = "") -> Result:
+        """Do something with a stored log of format ``name``; that, its result and what it raises can be pickled."""
+        return await self._do(do, name, self._seconds, owner)
 
     async def stop(self) -> None:
         """End the processes that nobody uses; any other ends with the request that uses it."""

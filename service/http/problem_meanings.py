@@ -56,6 +56,10 @@ MEANINGS: dict[str, Meaning] = {
         "The material has no such owner.",
         "",
     ),
+    "unknown-calibration": Meaning(
+        "The sensor has no calibration of this version.",
+        "`GET /v1/sensors/{name}/calibrations` lists them.",
+    ),
     "unknown-sensor": Meaning(
         "No sensor has this name: no log came from it, and nobody described it.",
         "",

@@ -9,7 +9,7 @@ import logging
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -23,6 +23,7 @@ from db.records import Claim, Job, SamplesOfLog, SampleSummary
 from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, sensors
 from estimators import EstimatorError, FrictionModel, Moments
 from service import formats
+from service.domain.calibrate import corrected
 from service.domain.collect_friction import collect
 from service.domain.doubtful_logs import with_doubts
 from service.domain.queueing import INGEST_METHODS, queue_cheap_refits
@@ -132,7 +133,9 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         return stored.samples
     with run.stage("frames"), disk_errors_named():
         log = formats.read(run.blobs.path(stored.sha256))
-    log, reconstruction = _with_forces(run, log, stored.sensor)
+    with run.database.read() as session:
+        correction = corrected(session, log, stored.sensor, stored.calibration)
+    log, reconstruction = _with_forces(run, correction.log, stored.sensor)
     with run.stage("slip_state"):
         history = slipcore.detect_slip(log, method=stored.detector, lookahead=slipcore.LOOKAHEAD)
     with run.stage("samples"):
@@ -143,6 +146,7 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         detection = summarise_history(
             history, run.seconds["slip_state"], blob, findings, found.contact, is_scaled=log.is_scaled
         )
+        detection = replace(detection, calibration=correction.version, corrections=correction.changed)
         summary = summarise_samples(samples, none_because, run.blobs.put(encode_samples(samples)))
     with run.database.write() as session:
         jobs.start_stage(session, run.claim, "samples", run.seconds)  # nobody else has stored them meanwhile

@@ -15,11 +15,12 @@ from db import migrate
 from db.database import Database
 from db.errors import SchemaMismatch, StorageUnavailable
 from db.paging import Window
-from db.records import Claim, Detection, NewGraspLog, NewModel, SampleSummary, Scales
+from db.records import CalibrationPress, Claim, Detection, NewCalibration, NewGraspLog, NewModel, SampleSummary, Scales
 from db.repositories import (
     access_keys,
     audit,
     browser_sessions,
+    calibrations,
     detections,
     friction_models,
     grasp_logs,
@@ -44,6 +45,7 @@ def fill(database: Database, log: NewGraspLog, detection: Detection, samples: Sa
         job = jobs.add(session, "ingest", "ols", material_id=material.id, grasp_log_id=log_id)
         detections.add(session, log_id, detection, samples)
         friction_models.add(session, material.id, job, model)
+        calibrations.add(session, log.sensor, NewCalibration((CalibrationPress(log_id, 2.0),), {}, b"", None))
         stores.set_id(session, "0" * 32)
         idempotency_keys.claim(session, "", "once", log.sha256, timedelta(hours=1))
         access_keys.add(session, "0" * 12, "robot", "read", log.sha256)

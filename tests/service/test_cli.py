@@ -532,6 +532,22 @@ def test_a_sensor_is_calibrated_and_its_logs_are_corrected(run: Run, presses: li
     assert "forces multiplied with" in err
 
 
+def test_a_service_keeps_the_calibration_of_a_sensor(run: Run, presses: list[Path], url: str) -> None:
+    about = ("--known-force", 2.0, "--store", "--sensor", "pressed", "--url", url)
+    code, out, _ = run("sensors", "calibrate", *presses, *about)
+    assert code == 0
+    assert "version 1" in out
+    with FrictionClient(url) as client:
+        (stored,) = client.calibrations("pressed")
+        assert stored["version"] == 1
+        assert [each["known_force"] for each in stored["presses"]] == [2.0, 2.0]
+        receipt = client.wait(client.upload(presses[0], sensor="pressed"))
+    assert receipt is not None
+    code, out, _ = run("sensors", "calibrate", presses[0], *about, "--json")
+    assert json.loads(out)["version"] == 2
+    assert run("sensors", "calibrate", presses[0], *about, "--output", "model.json")[0] == WRONG_USAGE
+
+
 def test_what_no_sensor_can_be_calibrated_by_is_refused(run: Run, presses: list[Path], ramps: list[Path]) -> None:
     code, _, err = run("sensors", "calibrate", ramps[0])
     assert code == INPUT_REFUSED

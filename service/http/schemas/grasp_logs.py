@@ -35,6 +35,8 @@ DETECTION_EXAMPLE: JsonDict = {
     "seconds": 0.06,
     "findings": [FINDING_EXAMPLE],
     "contact_friction": CONTACT_FRICTION_EXAMPLE,
+    "calibration": 1,
+    "corrections": ["crosstalk of 0.08, 0 of the normal force taken off"],
 }
 GRASP_LOG_EXAMPLE: JsonDict = {
     "id": "7c9e6679742540de944be07fc1f90ae7",
@@ -133,6 +135,10 @@ class DetectionOut(BaseModel):
     contact_friction: Annotated[
         ContactFrictionOut | None, Field(description="Of the whole contact; null without forces or contact")
     ]
+    calibration: Annotated[
+        int | None, Field(description="Version of the sensor's calibration by which the log was corrected; null: none")
+    ]
+    corrections: Annotated[list[str] | None, Field(description="What that changed; null without a calibration")]
 
 
 class GraspLogOut(BaseModel):
@@ -198,6 +204,8 @@ def _detection_out(log: StoredGraspLog) -> DetectionOut | None:
         seconds=found.seconds,
         findings=None if found.findings is None else [FindingOut(**asdict(each)) for each in found.findings],
         contact_friction=_contact_friction_out(found),
+        calibration=found.calibration,
+        corrections=None if found.corrections is None else list(found.corrections),
     )
 
 

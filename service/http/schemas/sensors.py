@@ -1,16 +1,36 @@
-"""Sensors and the mechanics of their gels."""
+"""Sensors, the mechanics of their gels, and their calibrations."""
 
 from dataclasses import asdict
+from datetime import datetime
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.config import JsonDict
 
-from db.records import Gel, Sensor
-from service.http.schemas.common import Body
+from db.records import Calibration, CalibrationPress, Gel, Sensor
+from service.http.schemas.common import LARGEST_FORCE, MOMENT_EXAMPLE, Body, Next, Reference
 
 GEL_EXAMPLE: JsonDict = {"young_modulus": 2.5e5, "poisson_ratio": 0.48, "thickness": 4e-3, "marker_depth": 5e-4}
-SENSOR_EXAMPLE: JsonDict = {"name": "GelSight Mini", "gel": GEL_EXAMPLE}
+SENSOR_EXAMPLE: JsonDict = {"name": "GelSight Mini", "gel": GEL_EXAMPLE, "calibration": None}
+PRESS_EXAMPLE: JsonDict = {"grasp_log": "7c9e6679742540de944be07fc1f90ae7", "known_force": 2.0}
+ESTIMATE_EXAMPLE: JsonDict = {
+    "name": "crosstalk_x",
+    "unit": "-",
+    "value": 0.08,
+    "low": 0.077,
+    "high": 0.083,
+    "not_identified": None,
+}
+CALIBRATION_EXAMPLE: JsonDict = {
+    "version": 1,
+    "created_at": MOMENT_EXAMPLE,
+    "created_by": None,
+    "presses": [PRESS_EXAMPLE],
+    "grid": [20, 20],
+    "element_area": 1e-6,
+    "frame_interval": 0.033,
+    "estimates": [ESTIMATE_EXAMPLE],
+}
 
 
 class GelIn(Body):
@@ -55,12 +75,13 @@ class SensorOut(BaseModel):
 
     name: str
     gel: Annotated[GelOut | None, Field(description="null where it was not described: no forces follow from it")]
+    calibration: Annotated[int | None, Field(description="Newest version; null where it was never calibrated")]
 
     @classmethod
     def of(cls, sensor: Sensor) -> "SensorOut":
         """The stored sensor as an answer."""
         gel = None if sensor.gel is None else GelOut.model_validate(asdict(sensor.gel))
-        return cls(name=sensor.name, gel=gel)
+        return cls(name=sensor.name, gel=gel, calibration=sensor.calibration)
 
 
 class SensorsOut(BaseModel):
@@ -69,3 +90,86 @@ class SensorsOut(BaseModel):
     model_config = ConfigDict(json_schema_extra={"examples": [{"items": [SENSOR_EXAMPLE]}]})
 
     items: list[SensorOut]
+
+
+class PressIn(Body):
+    """A stored log of a body that was pressed straight down on the sensor, and lifted."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [PRESS_EXAMPLE]})
+
+    grasp_log: Annotated[Reference, Field(max_length=100, description="Its id; it is of this sensor")]
+    known_force: Annotated[
+        float | None,
+        Field(gt=0.0, le=LARGEST_FORCE, allow_inf_nan=False, description="Normal force with which it pressed, N"),
+    ] = None
+
+    def record(self) -> CalibrationPress:
+        """As it is stored."""
+        return CalibrationPress(self.grasp_log, self.known_force)
+
+
+class NewCalibrationIn(Body):
+    """By which presses a sensor is to be calibrated."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"presses": [PRESS_EXAMPLE]}]})
+
+    presses: Annotated[list[PressIn], Field(min_length=1, max_length=32)]
+
+
+class PressOut(BaseModel):
+    """A log that a sensor was calibrated by."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [PRESS_EXAMPLE]})
+
+    grasp_log: str
+    known_force: Annotated[float | None, Field(description="N")]
+
+
+class EstimateOut(BaseModel):
+    """A quantity of a sensor with its 95 % interval; all null where it is not identified."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [ESTIMATE_EXAMPLE]})
+
+    name: Annotated[str, Field(description="As docs/sensors.md explains it")]
+    unit: str
+    value: float | None
+    low: float | None
+    high: float | None
+    not_identified: Annotated[str | None, Field(description="Why these presses do not tell it; null where they do")]
+
+
+class CalibrationOut(BaseModel):
+    """A version of what is known of a sensor's faults."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [CALIBRATION_EXAMPLE]})
+
+    version: int
+    created_at: datetime
+    created_by: Annotated[str | None, Field(description="Id of the access key with which it was asked for")]
+    presses: list[PressOut]
+    grid: Annotated[tuple[int, int], Field(description="Elements along the two axes")]
+    element_area: Annotated[float, Field(description="m²")]
+    frame_interval: Annotated[float, Field(description="s, to which the noise's correlation belongs")]
+    estimates: list[EstimateOut]
+
+    @classmethod
+    def of(cls, stored: Calibration) -> "CalibrationOut":
+        """The stored version as an answer."""
+        model = stored.new.model
+        return cls(
+            version=stored.version,
+            created_at=stored.created_at,
+            created_by=stored.new.created_by,
+            presses=[PressOut(**asdict(press)) for press in stored.new.presses],
+            estimates=[EstimateOut(**each) for each in model["estimates"]],
+            **{name: model[name] for name in ("grid", "element_area", "frame_interval")},
+        )
+
+
+class CalibrationsOut(BaseModel):
+    """Versions of a sensor's calibration, newest first."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"items": [CALIBRATION_EXAMPLE], "next": None}]})
+
+    items: list[CalibrationOut]
+    next: Next

@@ -1,18 +1,23 @@
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 from urllib.parse import quote
 
 import httpx
+import numpy as np
 import pytest
 from sqlalchemy import update
 
+from benchmarks.presses import Faults, pressed
 from db.blobs import BlobStore
 from db.database import Database
-from db.repositories import jobs, materials, runners
+from db.records import NewCalibration
+from db.repositories import calibrations, jobs, materials, runners, sensors
 from db.tables import DetectionRow
+from service.domain.calibrate import OFFSET, corrected
 from service.domain.sensors import RECONSTRUCTED
 from service.jobs import pipeline
-from slipcore import GraspLog
+from slipcore import GraspLog, calibrate_sensor
 from stiction_client.container import encode
 
 NPZ = "application/vnd.stiction.grasp-log+npz"
@@ -31,9 +36,9 @@ def test_a_sensor_is_described_before_or_after_its_first_log(client: httpx.Clien
         "thickness": None,
         "marker_depth": 0.0,
     }
-    assert client.put(path, json=GEL).json() == {"name": name, "gel": GEL}
+    assert client.put(path, json=GEL).json() == {"name": name, "gel": GEL, "calibration": None}
     assert client.get(path).json()["gel"] == GEL
-    assert {"name": name, "gel": GEL} in client.get("/v1/sensors").json()["items"]
+    assert {"name": name, "gel": GEL, "calibration": None} in client.get("/v1/sensors").json()["items"]
     told = client.get("/v1/audit", params={"subject": name}).json()["items"]
     assert [entry["action"] for entry in told] == ["sensor.described"] * 2
     assert told[0]["details"] == GEL
@@ -123,3 +128,121 @@ def test_models_of_a_log_that_is_looked_at_again_are_outdated_meanwhile(
     assert [stored.outdated for stored in models] == [True, True]
     answer = lab.request("GET", "/v1/materials/paper/friction", params={"fn": 0.05}).raise_for_status().json()
     assert "the model is outdated" in answer["warning"]
+
+
+FAULTS = Faults(crosstalk=(0.08, 0.0), gain=1.1, marker_noise=1e-6, force_noise=2e-3)
+
+
+def small(log: GraspLog) -> GraspLog:
+    """Every other frame of the middle, so that a log is no large upload."""
+    middle = np.s_[::2, 4:16, 4:16]
+    fields = {name: getattr(log, name)[middle] for name in ("displacement", "force", "normal")}
+    return replace(log, time=log.time[::2], position=log.position[middle[1:]], **fields)
+
+
+@pytest.fixture(scope="module")
+def ball() -> GraspLog:
+    """A press of 2 N without fault."""
+    return small(pressed())
+
+
+def test_logs_are_corrected_by_the_calibration_that_was_there_when_they_came(
+    client: httpx.Client, material: str, ball: GraspLog, upload: Any, wait: Any
+) -> None:
+    sensor = f"ball/{material}"
+
+    def sent(seed: int) -> Any:
+        log = upload(client, encode(FAULTS.put_into(ball, seed)), sensor=sensor).raise_for_status().json()
+        wait(client, log["job"]["id"])
+        return client.get(f"/v1/grasp-logs/{log['id']}").json()
+
+    path = f"/v1/sensors/{quote(sensor, safe='')}/calibrations"
+    before = sent(1)
+    assert (before["detection"]["calibration"], before["detection"]["corrections"]) == (None, None)
+    presses = [{"grasp_log": before["id"], "known_force": 2.0}]
+    made = client.post(path, json={"presses": presses})
+    assert made.status_code == httpx.codes.CREATED
+    told = {each["name"]: each for each in made.json()["estimates"]}
+    assert told["crosstalk_x"]["low"] < 0.08 < told["crosstalk_x"]["high"]
+    assert told["gain"]["low"] < 1.0 / 1.1 < told["gain"]["high"]
+    assert told["force_drift_x"]["not_identified"] is None
+    assert made.json()["presses"] == presses
+    after = sent(2)["detection"]
+    assert after["calibration"] == 1
+    assert any(text.startswith("crosstalk of 0.0") for text in after["corrections"])
+    again = client.post(path, json={"presses": presses}).json()
+    assert again["version"] == 2
+    assert [each["version"] for each in client.get(path).json()["items"]] == [2, 1]
+    assert client.get(f"{path}/1").json() == made.json()
+    assert client.get(f"{path}/3").json()["type"] == "/problems/unknown-calibration"
+    assert client.get(f"/v1/sensors/{quote(sensor, safe='')}").json()["calibration"] == 2
+    entries = client.get("/v1/audit", params={"subject": sensor}).json()["items"]
+    assert [entry["details"]["version"] for entry in entries if entry["action"] == "sensor.calibrated"] == [2, 1]
+    assert sent(2)["detection"] == after  # as it was corrected first
+
+
+def test_logs_that_are_no_pure_presses_are_refused_with_what_was_seen(
+    client: httpx.Client, ball: GraspLog, upload: Any
+) -> None:
+    def sent(log: GraspLog, sensor: str) -> str:
+        return str(upload(client, encode(log), sensor=sensor).raise_for_status().json()["id"])
+
+    pure, sheared = (
+        sent(FAULTS.put_into(ball, 11), "pushed"),
+        sent(FAULTS.put_into(small(pressed(sideways=0.9)), 12), "pushed"),
+    )
+    elsewhere = sent(FAULTS.put_into(ball, 13), "another")
+    path = "/v1/sensors/pushed/calibrations"
+
+    def refusal(*logs: str) -> Any:
+        answer = client.post(path, json={"presses": [{"grasp_log": log} for log in logs]})
+        return answer.status_code, answer.json()["type"], answer.json()["detail"]
+
+    status, kind, detail = refusal(pure, sheared)
+    assert (status, kind) == (422, "/problems/invalid-request")
+    assert f"{sheared}: the load sideways changes by" in detail
+    assert pure not in detail
+    assert f"{elsewhere}, of sensor another" in refusal(elsewhere)[2]
+    assert refusal("0" * 32)[1] == "/problems/unknown-grasp-log"
+    assert client.post(path, json={"presses": []}).status_code == httpx.codes.UNPROCESSABLE_ENTITY
+    unheard = client.post("/v1/sensors/unheard of/calibrations", json={"presses": [{"grasp_log": pure}]})
+    assert unheard.json()["type"] == client.get("/v1/sensors/unheard of/calibrations").json()["type"]
+    assert client.get(path).json() == {"items": [], "next": None}
+
+
+def test_a_sensor_is_calibrated_again_by_admins_only(
+    database: Database, reach: Callable[..., Any], make: Callable[..., str]
+) -> None:
+    with database.write() as session:
+        sensors.find_or_add(session, "shared")
+    first, admin = (reach(key=make(scope)) for scope in ("upload", "admin"))
+    path, body = "/v1/sensors/shared/calibrations", {"presses": [{"grasp_log": "0" * 32}]}
+    allowed = (404, "/problems/unknown-grasp-log")
+
+    def answered(caller: Any) -> tuple[int, str]:
+        answer = caller.request("POST", path, json=body)
+        return answer.status_code, answer.json()["type"]
+
+    assert answered(first) == allowed
+    with database.write() as session:
+        calibrations.add(session, "shared", NewCalibration((), {}, None, None))
+    assert answered(first) == (403, "/problems/insufficient-scope")
+    assert answered(admin) == allowed
+    assert answered(reach(key=make("read"))) == (403, "/problems/insufficient-scope")
+
+
+def test_a_log_of_another_lattice_stays_as_it_is_and_says_so(database: Database, ball: GraspLog) -> None:
+    model = calibrate_sensor([FAULTS.put_into(ball, 1)])
+    assert model.offset is not None
+    new = NewCalibration((), replace(model, offset=None).to_json(), model.offset.astype(OFFSET).tobytes(), None)
+    with database.write() as session:
+        sensors.find_or_add(session, "cut")
+        calibrations.add(session, "cut", new)
+        whole = corrected(session, ball, "cut", 1)
+        assert np.array_equal(np.asarray(whole.log.force), np.asarray(model.apply(ball).log.force))
+        fields = {name: getattr(ball, name)[:, :10] for name in ("displacement", "force", "normal")}
+        part = replace(ball, position=ball.position[:10], **fields)
+        left = corrected(session, part, "cut", 1)
+        assert (left.log, left.version) == (part, 1)
+        assert left.changed == ("nothing: calibrated on 12 × 12 elements, and the log has 10 × 12",)
+        assert corrected(session, part, "cut", None) == (part, None, None)

@@ -1,0 +1,137 @@
+"""What is wrong with a sensor, from stored logs of presses, and the correction of its later logs by that."""
+
+import asyncio
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from sqlalchemy.orm import Session
+
+from db.blobs import disk_errors_named
+from db.records import Calibration, CalibrationPress, NewCalibration
+from db.repositories import audit, calibrations, grasp_logs, sensors
+from service import formats
+from service.domain.context import Context
+from service.domain.errors import FileDeleted, InsufficientScope, InvalidValue
+from service.domain.principal import Principal
+from slipcore.errors import SlipcoreError
+
+if TYPE_CHECKING:
+    from slipcore import GraspLog, SensorModel
+
+MOST_ELEMENTS = 20_000_000
+"""Frames times elements of all logs of a calibration: half a minute, and a gigabyte of memory."""
+
+OFFSET = "<f8"
+"""Numbers of a stored zero."""
+
+
+class Correction(NamedTuple):
+    """A log as its sensor's calibration corrects it: of which ``version``, and what it ``changed``, in words."""
+
+    log: "GraspLog"
+    version: int | None
+    changed: tuple[str, ...] | None
+
+
+async def calibrate(
+    context: Context, sensor: str, presses: Sequence[CalibrationPress], principal: Principal
+) -> Calibration:
+    """Store what presses tell of a sensor's faults; its logs that come in from then on are corrected by it.
+
+    All keys' logs are: whoever may upload may calibrate it once, and only admins again. Raises ``NotFound`` for a
+    sensor or a log, ``FileDeleted``, ``InsufficientScope``, and ``InvalidValue`` for logs that are another sensor's or
+    no pure presses, with what was seen in each.
+    """
+    paths = await asyncio.to_thread(_files, context, sensor, presses, principal)
+    forces = [press.known_force for press in presses]
+    try:
+        model, offset = await context.readers.derive(partial(learn, sensor, paths, forces), "press", principal.share)
+    except SlipcoreError as error:
+        raise InvalidValue("grasp_logs", _with_ids(error, presses), "pure presses of one sensor") from error
+    new = NewCalibration(tuple(presses), model, offset, principal.key_id)
+    return await asyncio.to_thread(_store, context, sensor, new, principal)
+
+
+def _store(context: Context, sensor: str, new: NewCalibration, principal: Principal) -> Calibration:
+    with context.database.write() as session:
+        _check_right(session, sensor, principal)
+        stored = calibrations.add(session, sensor, new)
+        details = {"version": stored.version, "grasp_logs": [press.grasp_log for press in new.presses]}
+        audit.add(session, principal.actor, "sensor.calibrated", sensor, details)
+    return stored
+
+
+def learn(
+    sensor: str, paths: Sequence[Path], known_force: Sequence[float | None]
+) -> tuple[dict[str, Any], bytes | None]:
+    """In a reader's process: the sensor model of stored presses without its offset, and that; raises ``SlipcoreError``.
+
+    The logs themselves may name their sensor otherwise.
+    """
+    from dataclasses import replace
+
+    from slipcore import calibrate_sensor
+
+    with disk_errors_named():
+        logs = [replace(formats.read(path), sensor=sensor) for path in paths]
+    model = calibrate_sensor(logs, known_force)
+    offset = None if model.offset is None else model.offset.astype(OFFSET).tobytes()
+    return replace(model, offset=None).to_json(), offset
+
+
+def corrected(session: Session, log: "GraspLog", sensor: str, version: int | None) -> Correction:
+    """A log by this version of its sensor's calibration, None for none; not where its lattice is another."""
+    if version is None:
+        return Correction(log, None, None)
+    model = sensor_model(calibrations.get(session, sensor, version))
+    if model.grid != log.grid:
+        theirs, own = (" × ".join(map(str, grid)) for grid in (model.grid, log.grid))
+        return Correction(log, version, (f"nothing: calibrated on {theirs} elements, and the log has {own}",))
+    return Correction(model.apply(log).log, version, model.apply(log).changed)
+
+
+def sensor_model(stored: Calibration) -> "SensorModel":
+    """As it was learnt."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from slipcore import SensorModel
+
+    model = SensorModel.from_json(stored.new.model)
+    if stored.new.offset is None:
+        return model
+    return replace(model, offset=np.frombuffer(stored.new.offset, OFFSET).reshape(*model.grid, 3))
+
+
+def _check_right(session: Session, sensor: str, principal: Principal) -> None:
+    known = sensors.get(session, sensor)
+    if known.calibration is not None and not principal.is_admin:
+        raise InsufficientScope("upload", "admin")
+
+
+def _files(context: Context, sensor: str, presses: Sequence[CalibrationPress], principal: Principal) -> list[Path]:
+    """Where the logs are; each must be of this sensor, and they must not be too much together."""
+    with context.database.read() as session:
+        _check_right(session, sensor, principal)
+        logs = [grasp_logs.get(session, press.grasp_log) for press in presses]
+    for log in logs:
+        if log.sensor != sensor:
+            raise InvalidValue("grasp_log", f"{log.id}, of sensor {log.sensor}", f"a log of sensor {sensor}")
+        if not log.has_file:
+            raise FileDeleted(f"the file of grasp log {log.id} was deleted, as old uploads are here")
+    elements = sum(log.frames * log.grid[0] * log.grid[1] for log in logs)
+    if elements > MOST_ELEMENTS:
+        raise InvalidValue("grasp_logs", f"{elements} elements in all frames", f"at most {MOST_ELEMENTS}")
+    return [context.blobs.path(log.sha256) for log in logs]
+
+
+def _with_ids(error: SlipcoreError, presses: Sequence[CalibrationPress]) -> str:
+    """What was wrong, with the ids of the logs in which it was seen."""
+    from slipcore import ImpurePress
+
+    if not isinstance(error, ImpurePress):
+        return str(error)
+    return "; ".join(f"{presses[number].grasp_log}: {seen}" for number, seen in error.evidence.items())
