@@ -13,6 +13,7 @@ AuditAction = Literal[
     "material.changed",
     "material.merged",
     "material.surface_changed",
+    "material.epoch_begun",
     "alias.added",
     "alias.removed",
     "owner.added",

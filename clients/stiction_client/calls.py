@@ -238,6 +238,13 @@ def merge_materials(name: str, source: str) -> Call[Material]:
     return _record(lambda record: Material.from_json(record["material"]), answer)
 
 
+def begin_epoch(name: str, reason: str, first_log: str | None) -> Call[Material]:
+    """Begin a new epoch of a material."""
+    body = {"reason": reason, "first_grasp_log": first_log}
+    answer = yield from _ask(Request("POST", f"/v1/materials/{_part(name)}/epochs", json=body))
+    return _record(lambda record: Material.from_json(record["material"]), answer)
+
+
 def withdraw(log_id: str, reason: str) -> Call[GraspLogReceipt]:
     """Withdraw a log."""
     request = Request("PUT", f"/v1/grasp-logs/{_part(log_id)}/withdrawal", json={"reason": reason})

@@ -118,9 +118,13 @@ class FrictionClient:
         """Move the logs and names of ``source`` to the material ``name``, for good; its models are fitted again."""
         return self._run(calls.merge_materials(name, source))
 
+    def begin_epoch(self, name: str, reason: str, first: GraspLogReceipt | str | None = None) -> Material:
+        """Let all logs of a material before its ``first`` of a changed surface, or all until now, count no more."""
+        return self._run(calls.begin_epoch(name, reason, None if first is None else _id(first)))
+
     def withdraw(self, log: GraspLogReceipt | str, reason: str) -> GraspLogReceipt:
         """Let a log count in no fit any more; it is kept, with the reason."""
-        return self._run(calls.withdraw(log if isinstance(log, str) else log.id, reason))
+        return self._run(calls.withdraw(_id(log), reason))
 
     def model(self, name: str, method: str = "auto") -> FrictionModel:
         """The current model of a material, to be kept and evaluated here: of one method, or the recommended one.
@@ -331,9 +335,13 @@ class AsyncFrictionClient:
         """As ``FrictionClient.merge_materials``."""
         return await self._run(calls.merge_materials(name, source))
 
+    async def begin_epoch(self, name: str, reason: str, first: GraspLogReceipt | str | None = None) -> Material:
+        """As ``FrictionClient.begin_epoch``."""
+        return await self._run(calls.begin_epoch(name, reason, None if first is None else _id(first)))
+
     async def withdraw(self, log: GraspLogReceipt | str, reason: str) -> GraspLogReceipt:
         """As ``FrictionClient.withdraw``."""
-        return await self._run(calls.withdraw(log if isinstance(log, str) else log.id, reason))
+        return await self._run(calls.withdraw(_id(log), reason))
 
     async def model(self, name: str, method: str = "auto") -> FrictionModel:
         """As ``FrictionClient.model``."""
@@ -485,6 +493,10 @@ def _broken(request: Request, error: httpx.RequestError) -> ConnectionFailed:
     failure = ConnectionFailed(f"{request.method} {request.path}: {type(error).__name__}: {error}")
     failure.__cause__ = error
     return failure
+
+
+def _id(log: GraspLogReceipt | str) -> str:
+    return log if isinstance(log, str) else log.id
 
 
 def _job_id(job: Job | GraspLogReceipt | str) -> str:

@@ -12,7 +12,10 @@ ENDED = frozenset({"done", "failed", "refused", "cancelled"})
 
 @dataclass(frozen=True, slots=True)
 class Material:
-    """A material and its current models, one a method; ``recommended``: which of them answers who names no method."""
+    """A material and its current models, one a method; ``recommended``: which of them answers who names no method.
+
+    ``withdrawn_grasp_logs``: how many of its ``grasp_logs`` count in no fit.
+    """
 
     name: str
     description: str
@@ -20,6 +23,7 @@ class Material:
     grasp_logs: int
     models: Mapping[str, FrictionModel] = field(default_factory=dict)
     recommended: str | None = None
+    withdrawn_grasp_logs: int = 0
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "Material":
@@ -33,6 +37,7 @@ class Material:
             grasp_logs=int(record["grasp_logs"]),
             models=models,
             recommended=None if best is None else str(best["method"]),
+            withdrawn_grasp_logs=int(record.get("withdrawn_grasp_logs", 0)),
         )
 
 

@@ -94,7 +94,7 @@ def support(model: Model, tangential_velocity: float, normal_force: float, stale
         return Support("implausible", doubt)
     changed = model.diagnostics.get("surface_change")
     if changed:
-        return Support("stale", f"{changed}: clean the surface; if it stays so, withdraw the logs before")
+        return Support("stale", f"{changed}: clean the surface; if it stays so, begin a new epoch")
     if stale is not None:
         return Support("stale", f"the model is outdated: {stale}")
     part = float(uncertainty(model, *within(model.domain, tangential_velocity, normal_force)))

@@ -2,7 +2,7 @@
 
 import uuid
 
-from sqlalchemy import exists, func, inspect, select, update
+from sqlalchemy import exists, func, inspect, select, tuple_, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, aliased
 
@@ -112,6 +112,26 @@ def withdraw(session: Session, log_id: str, because: str, by: str | None = None)
         row.withdrawn_at, row.withdrawn_because, row.withdrawn_by = row.withdrawn_at or now(), because, by
         session.flush()
     return before
+
+
+def withdraw_before(
+    session: Session, material_id: int, first_id: str | None, because: str, by: str | None = None
+) -> list[str]:
+    """Take all logs of a material that came before one, or all there are, out of the fits; returns which.
+
+    Raises ``NotFound`` where the one is no log of the material.
+    """
+    query = select(GraspLogRow).where(GraspLogRow.material_id == material_id)
+    if first_id is not None:
+        first = session.scalar(query.where(GraspLogRow.id == first_id))
+        if first is None:
+            raise NotFound("grasp log", first_id)
+        query = query.where(tuple_(GraspLogRow.created_at, GraspLogRow.id) < (first.created_at, first.id))
+    rows = session.scalars(query.where(GraspLogRow.withdrawn_at.is_(None)).with_for_update()).all()
+    for row in rows:
+        row.withdrawn_at, row.withdrawn_because, row.withdrawn_by = now(), because, by
+    session.flush()
+    return [row.id for row in rows]
 
 
 def restore(session: Session, log_id: str) -> bool:

@@ -1,4 +1,4 @@
-"""Commands on the materials of a running service: list, show, fit, rename, merge."""
+"""Commands on the materials of a running service: list, show, fit, rename, merge, begin an epoch."""
 
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
@@ -85,6 +85,23 @@ def merge(
     """Move all logs of another material here: two names of one thing."""
     with connected(url, key) as client:
         typer.echo(f"{source} is part of {client.merge_materials(material, source).name} now")
+
+
+@app.command()
+def begin_epoch(
+    material: MaterialName,
+    reason: Annotated[str, typer.Option(help="What is different now; kept with each log that is withdrawn.")],
+    first: Annotated[
+        str | None, typer.Option(help="Id of the first log that counts; without it none until now does.")
+    ] = None,
+    url: Url = DEFAULT_URL,
+    key: Key = None,
+) -> None:
+    """Withdraw all logs from before a material's surface changed; they stay as history."""
+    with connected(url, key) as client:
+        found = client.begin_epoch(material, reason, first)
+    left = found.grasp_logs - found.withdrawn_grasp_logs
+    typer.echo(f"{left} of the {found.grasp_logs} logs of {found.name} count")
 
 
 def _row(material: "Material") -> list[str | None]:

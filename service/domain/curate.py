@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 from sqlalchemy.orm import Session
 
+from db.errors import NotFound
 from db.records import Job, Material, StoredGraspLog
 from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, owners
 from service.domain.context import Context
@@ -80,6 +81,28 @@ def merge(context: Context, material: str, source: str, principal: Principal = A
         queued = _queue_refits(session, target_id, methods, principal.key_id)
         merged = materials.get(session, material)
     return merged, _follow_up(context, queued)
+
+
+def begin_epoch(
+    context: Context, material: str, because: str, first_log: str | None, principal: Principal = ANONYMOUS
+) -> tuple[Material, int, list[Job]]:
+    """Let what was recorded of a material before ``first_log``, or until now, count in no fit, as its surface changed.
+
+    Returns the material, how many logs were withdrawn, and the fits that follow. Raises as ``change``, and
+    ``InvalidValue`` where ``first_log`` is no log of the material.
+    """
+    with context.database.write() as session:
+        material_id = _changeable(session, material, principal)
+        try:
+            withdrawn = grasp_logs.withdraw_before(session, material_id, first_log, because, principal.key_id)
+        except NotFound as error:
+            raise InvalidValue("first_grasp_log", first_log, f"a log of {material}, or null") from error
+        if withdrawn:
+            told = {"reason": because, "first_grasp_log": first_log, "withdrawn": len(withdrawn)}
+            audit.add(session, principal.actor, "material.epoch_begun", materials.get(session, material).name, told)
+        queued = _refit_without(session, material_id, principal.key_id) if withdrawn else []
+        found = materials.get(session, material)
+    return found, len(withdrawn), _follow_up(context, queued)
 
 
 def withdraw(

@@ -460,6 +460,11 @@ def test_materials_are_renamed_and_merged_and_logs_withdrawn(
     server = service({"material": answers.material, "jobs": []})
     assert ask(server, "merge_materials", "paper", "papre").name == "paper"
     assert server.requests[0].url.path == "/v1/materials/paper/merges"
+    server = service({"material": answers.material, "withdrawn": 3, "jobs": []})
+    assert ask(server, "begin_epoch", "paper", "coated", answers.grasp_log["id"]).name == "paper"
+    assert server.requests[0].url.path == "/v1/materials/paper/epochs"
+    sent = {"reason": "coated", "first_grasp_log": answers.grasp_log["id"]}
+    assert json.loads(server.requests[0].content) == sent
     server = service({"grasp_log": answers.grasp_log, "jobs": []})
     assert ask(server, "withdraw", answers.grasp_log["id"], "mislabelled").id == answers.grasp_log["id"]
     assert json.loads(server.requests[0].content) == {"reason": "mislabelled"}

@@ -384,6 +384,10 @@ def test_materials_and_logs_are_looked_at_and_looked_after(run: Run, ramps: list
     assert re.search(r"withdrawn +\d{4}-.* UTC: mislabelled\n", run("logs", "show", sent[0]["grasp_log"], *told)[1])
     withdrawn = json.loads(run("logs", "list", "--material", "felt", *told, "--json")[1])["grasp_logs"]
     assert len(withdrawn) == 3
+    newest = ("--reason", "coated", "--first", withdrawn[0]["id"])
+    assert run("materials", "begin-epoch", "felt", *newest, *told)[1] == "1 of the 3 logs of grey felt count\n"
+    code, _, err = run("materials", "begin-epoch", "felt", "--reason", "coated", "--first", "0", *told)
+    assert (code, "first_grasp_log is 0; allowed: a log of felt" in err) == (SERVICE_REFUSED, True)
 
 
 def test_a_report_of_a_material_is_made_of_what_the_service_tells(

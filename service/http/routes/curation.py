@@ -23,7 +23,7 @@ from service.http.problems import (
 from service.http.schemas.common import NAME_PATTERN
 from service.http.schemas.grasp_logs import GraspLogOut, NewWithdrawal, WithdrawnOut
 from service.http.schemas.jobs import JobOut
-from service.http.schemas.materials import MaterialChange, MaterialOut, MergedOut, NewMerge
+from service.http.schemas.materials import EpochOut, MaterialChange, MaterialOut, MergedOut, NewEpoch, NewMerge
 
 router = APIRouter(prefix="/v1", route_class=JsonRoute)
 
@@ -85,6 +85,22 @@ def merge_materials(context: CurrentContext, name: str, merge: NewMerge, princip
     """
     material, jobs = curate.merge(context, name, merge.source, principal)
     return MergedOut(material=MaterialOut.of(material), jobs=[JobOut.of(job) for job in jobs])
+
+
+@router.post(
+    "/materials/{name}/epochs",
+    tags=["materials"],
+    dependencies=[UPLOAD],
+    summary="Begin a new epoch of a material",
+    responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, *_BODY),
+)
+def begin_epoch(context: CurrentContext, name: str, new: NewEpoch, principal: CurrentPrincipal) -> EpochOut:
+    """Its surface is another from a log on: all logs before that are withdrawn at once, and the fits made again.
+
+    Logs and models stay as history. Where no log is left the material has no model until the next.
+    """
+    material, withdrawn, jobs = curate.begin_epoch(context, name, new.reason, new.first_grasp_log, principal)
+    return EpochOut(material=MaterialOut.of(material), withdrawn=withdrawn, jobs=[JobOut.of(job) for job in jobs])
 
 
 @router.put(

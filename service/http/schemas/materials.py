@@ -53,6 +53,21 @@ class NewMerge(Body):
     source: Annotated[Reference, Field(max_length=100, description="The material whose logs and names move here")]
 
 
+class NewEpoch(Body):
+    """An epoch that is to begin: what was recorded before counts in no fit."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"reason": "new lot, coated", "first_grasp_log": "7c9e6679742540de944be07fc1f90ae7"}]
+        }
+    )
+
+    reason: Annotated[Text, Field(min_length=1)]
+    first_grasp_log: Annotated[
+        Reference | None, Field(description="Id of the first log of the epoch; null: the next that comes")
+    ] = None
+
+
 class RecommendedOut(BaseModel):
     """The recommended one of a material's models."""
 
@@ -101,6 +116,18 @@ class MaterialsOut(BaseModel):
 
     items: list[MaterialOut]
     next: Next
+
+
+class EpochOut(BaseModel):
+    """A material whose epoch began: how many of its logs were withdrawn, and the fits that follow from it."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"material": MATERIAL_EXAMPLE, "withdrawn": 12, "jobs": [JOB_EXAMPLE]}]}
+    )
+
+    material: MaterialOut
+    withdrawn: int
+    jobs: list[JobOut]
 
 
 class MergedOut(BaseModel):

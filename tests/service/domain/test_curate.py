@@ -207,6 +207,54 @@ def test_a_doubtful_log_makes_friction_implausible_until_it_is_withdrawn(
     assert shop.friction("paper").support != "implausible"
 
 
+def test_an_epoch_begins_with_a_log_and_those_before_stay_as_history(shop: Shop) -> None:
+    before, first, last = (shop.ingest("paper", number) for number in range(3))
+    all_samples = shop.model("paper")[1]
+    material, withdrawn, queued = curate.begin_epoch(shop.context, "paper", "coated", first)
+    assert (withdrawn, material.withdrawn_grasp_logs, material.grasp_logs) == (1, 1, 3)
+    assert [job.method for job in queued] == ["hierarchical", "ols"]
+    assert "outdated" in str(shop.friction("paper").warning)
+    assert [job.status for job in shop.work()] == ["done"] * 2
+    assert shop.model("paper") == (4, all_samples // 3 * 2, False)
+    with shop.database.read() as session:
+        told = {log_id: grasp_logs.get(session, log_id).withdrawal for log_id in (before, first, last)}
+        (entry,) = audit.list_all(session, Window("id"), AuditFilter(action="material.epoch_begun"))
+    assert [each and each.because for each in told.values()] == ["coated", None, None]
+    assert (entry.subject, entry.details["withdrawn"], entry.details["first_grasp_log"]) == ("paper", 1, first)
+
+    assert curate.begin_epoch(shop.context, "paper", "coated", first)[1:] == (0, [])  # again: nothing is left to do
+    curate.restore(shop.context, before)  # each log can come back
+    shop.work()
+    assert shop.model("paper")[1] == all_samples
+
+
+def test_an_epoch_from_now_on_has_a_model_with_its_first_log(shop: Shop) -> None:
+    shop.ingest("paper", 0)
+    waiting = shop.store("paper", 1)
+    material, withdrawn, queued = curate.begin_epoch(shop.context, "paper", "another lot", None)
+    assert (withdrawn, material.models, queued) == (2, (), [])
+    (done,) = shop.work()
+    assert (done.status, done.reason) == ("refused", "no grasp log of this material has friction samples yet")
+    with pytest.raises(NoModel):
+        shop.friction("paper")
+    shop.ingest("paper", 2)
+    version, samples, outdated = shop.model("paper")
+    with shop.database.read() as session:
+        withdrawal = grasp_logs.get(session, waiting).withdrawal
+    assert (version, outdated) == (2, False)
+    assert samples > 0
+    assert withdrawal is not None
+
+
+def test_an_epoch_begins_with_a_log_of_its_material(shop: Shop) -> None:
+    shop.ingest("paper", 0)
+    foreign = shop.ingest("felt", 1)
+    with pytest.raises(InvalidValue, match=r"first_grasp_log is .*; allowed: a log of paper, or null"):
+        curate.begin_epoch(shop.context, "paper", "coated", foreign)
+    with shop.database.read() as session:
+        assert materials.get(session, "paper").withdrawn_grasp_logs == 0
+
+
 def test_a_material_without_its_only_log_has_no_model(shop: Shop) -> None:
     log = shop.ingest("paper", 0)
     assert curate.withdraw(shop.context, log, "wrong material")[1] == []

@@ -67,6 +67,7 @@ def test_text_that_no_database_takes_is_no_name(local: Any, name: str) -> None:
         ("POST", "/v1/materials", {"name": "felt", "description": name}),
         ("PATCH", "/v1/materials/paper", {"name": name}),
         ("POST", "/v1/materials/paper/merges", {"source": name}),
+        ("POST", "/v1/materials/paper/epochs", {"reason": "coated", "first_grasp_log": name}),
         ("POST", "/v1/grasp-force", ASKED | {"material": name}),
         ("POST", "/v1/recognise", {"samples": SAMPLES, "materials": [name]}),
         ("POST", "/v1/recognise", {"grasp_log": name}),

@@ -58,6 +58,7 @@ def changes(caller: Any, lab: Lab, content: bytes) -> list[int]:
         ("DELETE", f"{lab.log}/withdrawal", None),
         ("PUT", f"{paper}/owners/group:guests", None),
         ("DELETE", f"{paper}/owners/group:guests", None),
+        ("POST", f"{paper}/epochs", {"reason": "coated"}),
     ]
     answers = [caller.request(method, path, json=body).status_code for method, path, body in wishes]
     return [*answers, upload(caller, content, "strain_rate").status_code]
@@ -147,6 +148,7 @@ def test_the_trail_tells_each_change_and_from_where(lab: Lab, content: bytes) ->
         "grasp_log.restored",
         "owner.added",
         "owner.removed",
+        "material.epoch_begun",
         "grasp_log.uploaded",
         "job.cancelled",
     ]

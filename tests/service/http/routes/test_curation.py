@@ -52,6 +52,9 @@ def test_an_alias_comes_and_goes(client: httpx.Client, material: str) -> None:
         ("POST", "materials/{}/merges", {"source": "felt"}, 404, "unknown-material"),
         ("POST", "materials/{0}/merges", {"source": "{0}"}, 422, "invalid-request"),
         ("POST", "materials/{}/merges", {}, 422, "invalid-request"),
+        ("POST", "materials/felt/epochs", {"reason": "coated"}, 404, "unknown-material"),
+        ("POST", "materials/{}/epochs", {"reason": "coated", "first_grasp_log": "0"}, 422, "invalid-request"),
+        ("POST", "materials/{}/epochs", {"reason": ""}, 422, "invalid-request"),
         ("PUT", "grasp-logs/nothing/withdrawal", {"reason": "wet"}, 404, "unknown-grasp-log"),
         ("PUT", "grasp-logs/nothing/withdrawal", {"reason": ""}, 422, "invalid-request"),
         ("DELETE", "grasp-logs/nothing/withdrawal", None, 404, "unknown-grasp-log"),
@@ -87,3 +90,19 @@ def test_a_log_is_withdrawn_and_the_model_follows(
     for job in restored["jobs"]:
         wait(client, job["id"])
     assert client.get(f"/v1/materials/{material}").json()["models"]["ols"]["n"] == 2 * samples
+
+
+def test_an_epoch_begins_and_the_model_follows(
+    client: httpx.Client, material: str, members: dict[str, Any], repack: Callable[..., bytes], upload: Upload,
+    wait: Wait,
+) -> None:  # fmt: skip
+    logs = [upload(client, repack(members | {"sensor": np.str_(name)}), material=material).json() for name in "ab"]
+    for log in logs:
+        wait(client, log["job"]["id"])
+    body = {"reason": "coated", "first_grasp_log": logs[1]["id"]}
+    answer = client.post(f"/v1/materials/{material}/epochs", json=body).json()
+    assert (answer["withdrawn"], answer["material"]["withdrawn_grasp_logs"]) == (1, 1)
+    assert [wait(client, job["id"])["status"] for job in answer["jobs"]] == ["done", "done"]
+    first = client.get(f"/v1/grasp-logs/{logs[0]['id']}").json()
+    assert first["withdrawal"]["reason"] == "coated"
+    assert client.get(f"/v1/materials/{material}").json()["models"]["ols"]["n"] == first["detection"]["samples"]

@@ -71,6 +71,7 @@ def test_fits_tell_who_asked_for_them(newcomer: Callable[[], Principal], databas
     assert asked["requested_by"] == curator_id
     for method, path, body in (
         ("POST", "/v1/materials/paper/merges", {"source": "papre"}),
+        ("POST", "/v1/materials/paper/epochs", {"reason": "coated"}),
         ("PUT", f"/v1/grasp-logs/{log_id}/withdrawal", {"reason": "wet"}),
         ("DELETE", f"/v1/grasp-logs/{log_id}/withdrawal", None),
     ):
