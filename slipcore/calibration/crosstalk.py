@@ -29,7 +29,7 @@ def _proportional(press: Press) -> tuple[FloatArray, FloatArray]:
     terms, load = load_terms(press)
     found = np.linalg.lstsq(terms, load)[0]
     residual = load - terms @ found
-    spread = np.linalg.inv(terms.T @ terms)[0, 0]
+    spread = float((np.linalg.inv(np.linalg.qr(terms, mode="r"))[0] ** 2).sum())  # of (AᵀA)⁻¹, not by way of AᵀA
     errors = np.array([error_of_mean(axis) * np.sqrt(len(axis) * spread) for axis in residual.T])
     return found[0], errors
 

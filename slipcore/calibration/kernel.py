@@ -132,7 +132,9 @@ class _Line(NamedTuple):
 def _line(growth: _Growth, exponent: float, weight: FloatArray) -> _Line:
     largest = float(growth.force.max())
     terms = np.stack([np.ones_like(growth.force), (growth.force / largest) ** exponent], axis=1)
-    inverse = np.linalg.inv((weight[:, None] * terms).T @ terms)
-    found = inverse @ (terms.T @ (weight * growth.moment))
+    root = np.sqrt(weight)
+    q, r = np.linalg.qr(root[:, None] * terms)
+    inverse = np.linalg.inv(r)
+    found = inverse @ (q.T @ (root * growth.moment))
     misfit = float(weight @ (growth.moment - terms @ found) ** 2)
-    return _Line(float(found[0]), float(inverse[0, 0]), misfit, float(found[1]), largest, exponent)
+    return _Line(float(found[0]), float(inverse[0] @ inverse[0]), misfit, float(found[1]), largest, exponent)
