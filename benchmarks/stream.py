@@ -1,13 +1,16 @@
 """End-to-end latency of the live stream: many sensors at once against a real server.
 
     python -m benchmarks.stream --connections 20 --rate 30 --seconds 20
+    python -m benchmarks.stream --connections 1 --watchers 0 10
 
 Each connection sends frames of a simulated grasp (20×20 markers with forces) at its rate, all out of step, and notes
-how long after its sending a frame is answered. Server, its detectors and these clients share the machine.
+how long after its sending a frame is answered. Watchers read what the dashboard shows of the first connection. Server,
+its detectors and these clients share the machine.
 """
 
 import argparse
 import asyncio
+import itertools
 import json
 import os
 import socket
@@ -15,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -22,18 +26,24 @@ import httpx
 import msgspec
 import numpy as np
 from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosedOK
 
+from service.stream.watching import READ_TOGETHER
 from slipcore import GraspLog
 from slipcore.contact import tangential_ramp
 
 
-async def sensor(url: str, log: GraspLog, rate: float, seconds: float, late: float) -> list[float]:
-    """Latencies of one connection, s."""
+async def sensor(
+    url: str, log: GraspLog, rate: float, seconds: float, late: float, opened: asyncio.Future[str]
+) -> list[float]:
+    """Latencies of one connection, s; the first that is open says its session to who waits for it (``opened``)."""
     await asyncio.sleep(late)
     async with connect(url, compression=None) as stream:
         opening = {"type": "open", "position": log.position.tobytes(), "grid": log.grid, "element_area": 1e-6}
         await stream.send(msgspec.msgpack.encode(opening))
-        await stream.recv()
+        session = msgspec.msgpack.decode(await stream.recv(decode=False))["session"]
+        if not opened.done():
+            opened.set_result(session)
         sent: dict[int, float] = {}
         latencies: list[float] = []
         frames = int(rate * seconds)
@@ -58,14 +68,31 @@ async def sensor(url: str, log: GraspLog, rate: float, seconds: float, late: flo
     return latencies[int(2 * rate) :]  # the first two seconds compile and warm up
 
 
-async def measure(port: int, connections: int, rate: float, seconds: float) -> dict[str, Any]:
-    """Quantiles of all latencies, ms."""
+async def watch(port: int, opened: asyncio.Future[str]) -> int:
+    """How many frames one watcher gets, who reads as the dashboard's page does."""
+    frames = 0
+    url = f"ws://127.0.0.1:{port}/live/{await opened}/frames"
+    async with connect(url, compression=None) as stream:
+        with suppress(ConnectionClosedOK):  # the session has ended
+            while await stream.recv(decode=False):
+                frames += 1
+                if frames % READ_TOGETHER == 0:
+                    await stream.send("")
+    return frames
+
+
+async def measure(port: int, connections: int, watchers: int, rate: float, seconds: float) -> dict[str, Any]:
+    """Quantiles of all latencies, ms, and how many frames a second each watcher saw."""
     log = tangential_ramp(points=20, pitch=1e-3, marker_noise=1e-6, force_noise=1e-3, seed=1)
     url = f"ws://127.0.0.1:{port}/v1/stream"
     lateness = np.linspace(0.0, 1.0 / rate, connections, endpoint=False)
-    parts = await asyncio.gather(*(sensor(url, log, rate, seconds, late) for late in lateness))
+    opened: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+    watching = [asyncio.create_task(watch(port, opened)) for _ in range(watchers)]
+    parts = await asyncio.gather(*(sensor(url, log, rate, seconds, late, opened) for late in lateness))
     latencies = 1e3 * np.concatenate(parts)
+    shown = [await each / seconds for each in watching]
     found = {f"p{q:g}_ms": round(float(np.percentile(latencies, q)), 2) for q in (50, 90, 99, 99.9)}
+    found |= {"watchers": watchers, "shown_a_second": [round(min(shown), 1), round(max(shown), 1)] if shown else []}
     return {"connections": connections, "rate": rate, "frames": len(latencies), **found}
 
 
@@ -86,6 +113,7 @@ def main() -> None:
     """Start a server, load it and print what was measured as JSON."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--connections", type=int, nargs="+", default=[20])
+    parser.add_argument("--watchers", type=int, nargs="+", default=[0])
     parser.add_argument("--rate", type=float, default=30.0)
     parser.add_argument("--seconds", type=float, default=20.0)
     chosen = parser.parse_args()
@@ -100,9 +128,9 @@ def main() -> None:
             with httpx.Client(base_url=f"http://127.0.0.1:{port}") as client:
                 while not _is_up(client):
                     time.sleep(0.1)
-            for connections in chosen.connections:
+            for connections, watchers in itertools.product(chosen.connections, chosen.watchers):
                 before = cpu_seconds(server.pid)
-                found = asyncio.run(measure(port, connections, chosen.rate, chosen.seconds))
+                found = asyncio.run(measure(port, connections, watchers, chosen.rate, chosen.seconds))
                 used = (cpu_seconds(server.pid) - before) / chosen.seconds
                 load = os.getloadavg()[0] / (os.cpu_count() or 1)
                 print(json.dumps(found | {"cores_of_the_service": round(used, 2), "load_per_core": round(load, 2)}))

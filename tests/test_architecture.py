@@ -208,7 +208,12 @@ SERVES = ("service.http", "service.web", "service.app", "service.serving")
 WITHOUT_HTTP = ("domain", "formats", "jobs", "observability", "processes", "report", "settings", "stream")
 """What does not, in ``service``, nor imports what does; ``cli`` and ``demo`` start it."""
 
-SOCKETS = {"service.stream.connection", "service.observability.metrics"}
+SOCKETS = {
+    "service.stream.connection",
+    "service.stream.sockets",
+    "service.stream.watching",
+    "service.observability.metrics",
+}
 """Modules that serve a socket or measure who does: they know the framework's types, and no more."""
 
 

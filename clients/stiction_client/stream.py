@@ -59,6 +59,11 @@ class SlipStream:
     ) -> None:
         self.close()
 
+    @property
+    def session(self) -> str:
+        """The session's name; the service shows it to people at ``/live/`` and this."""
+        return self._session
+
     def close(self) -> None:
         """End the connection; the session waits a minute for another."""
         self._open.close()
@@ -70,13 +75,19 @@ class SlipStream:
         force: ArrayLike | None = None,
         object_pose: ArrayLike | None = None,
         normal: ArrayLike | None = None,
+        command: float | None = None,
     ) -> int:
-        """Send a frame (s, m, N; m, m, rad; outward unit normals) and return its number."""
+        """Send a frame (s, m, N; m, m, rad; outward unit normals) and return its number.
+
+        ``command``: the normal force that the gripper is told, N; those who watch the stream see it.
+        """
         frame: dict[str, Any] = {"type": "frame", "number": self._number, "time": float(time)}
         given = {"displacement": displacement, "force": force, "object_pose": object_pose, "normal": normal}
         for name, value in given.items():
             if value is not None:
                 frame[name] = np.asarray(value, dtype="<f8").tobytes()
+        if command is not None:
+            frame["command"] = float(command)
         self._waiting.append((self._number, msgspec.msgpack.encode(frame)))
         self._number += 1
         self._try(lambda: self._connection.send(self._waiting[-1][1]))
@@ -97,9 +108,10 @@ class SlipStream:
         force: ArrayLike | None = None,
         object_pose: ArrayLike | None = None,
         normal: ArrayLike | None = None,
+        command: float | None = None,
     ) -> dict[str, Any]:
         """Send a frame and wait for its answer."""
-        number = self.send(time, displacement, force, object_pose, normal)
+        number = self.send(time, displacement, force, object_pose, normal, command)
         while (answer := self.receive())["number"] != number:
             pass
         return answer

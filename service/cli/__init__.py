@@ -22,6 +22,7 @@ from service.cli import (
     running,
     sensors,
     simulation,
+    streaming,
 )
 from service.cli.exit_codes import exit_code, message
 
@@ -63,6 +64,7 @@ for command in (
     remote.upload,
     remote.lookup,
     remote.plan,
+    streaming.stream,
     reporting.report,
     audit.audit,
 ):

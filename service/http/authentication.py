@@ -19,7 +19,14 @@ from service.domain.context import Context
 from service.domain.keys import NO_KEY, is_loopback
 from service.http import origin, problems, sessions
 from service.http.access import CHALLENGE, CHALLENGE_OF_INVALID_KEY, EVERYTHING, Access, is_public
-from service.http.problems import INVALID_KEY, KEY_REQUIRED, MISDIRECTED_REQUEST, TOO_MANY_REQUESTS, Problem
+from service.http.problems import (
+    INVALID_KEY,
+    KEY_REQUIRED,
+    MISDIRECTED_REQUEST,
+    STORAGE_UNAVAILABLE,
+    TOO_MANY_REQUESTS,
+    Problem,
+)
 from service.http.rate_limit import RateLimit
 from service.settings import Settings
 
@@ -112,6 +119,14 @@ class Authenticator:
             raise
         self._count(_counted_as(admitted, connection))
         return admitted
+
+    async def still_admits(self, connection: HTTPConnection) -> bool:
+        """Whether who was let in still may be here; while the database is away, that is believed."""
+        try:
+            await self._identify(connection)
+        except Problem as problem:
+            return problem.kind is STORAGE_UNAVAILABLE
+        return True
 
     def allows_at_once(self, connection: HTTPConnection) -> bool:
         """Whether somebody may ask who is known without waiting; for all others ``admit`` has to say."""

@@ -18,6 +18,7 @@ from service.domain.principal import Principal
 from service.domain.upload import UploadRequest, check_target
 from service.formats.reading import Description
 from service.stream import detectors
+from service.stream.errors import FINISHED, KEY_ENDED, NOT_UNDERSTOOD, REFUSED, SLOW_READER, STORAGE_AWAY, End
 from service.stream.messages import (
     DECODE_BINARY,
     DECODE_TEXT,
@@ -29,18 +30,8 @@ from service.stream.messages import (
     packed,
     packed_or_none,
 )
-from service.stream.sessions import (
-    FINISHED,
-    KEY_ENDED,
-    NOT_UNDERSTOOD,
-    PATIENCE,
-    REFUSED,
-    SLOW_READER,
-    STORAGE_AWAY,
-    End,
-    Session,
-    Streams,
-)
+from service.stream.sessions import PATIENCE, Session, Streams
+from service.stream.sockets import KEY_SECONDS, close, until_one_ends
 from slipcore.errors import InvalidInput
 
 logger = logging.getLogger(__name__)
@@ -50,9 +41,6 @@ Store = Callable[[Spool, Description, UploadRequest], dict[str, Any]]
 
 Sent = tuple[Callable[[bytes], Incoming], bytes]
 """A message as it came, and its decoder: in lists, 1 MiB of it may take 50 times as much."""
-
-KEY_SECONDS = 2.0
-"""s between looks at the key of a connection: so long one that has ended may still be used."""
 
 MOST_WAITING_IN, MOST_WAITING_OUT = 8, 64
 """Messages of one connection between network and detector: beyond the first the client waits, beyond the second it is
@@ -65,24 +53,17 @@ async def serve(socket: WebSocket, context: Context, streams: Streams, principal
     try:
         await connection.run()
     except End as end:
-        await _close(socket, end.code, end.reason)
+        await close(socket, end.code, end.reason)
     except InvalidInput as error:
-        await _close(socket, REFUSED, f"{error.name} is {error.value}; allowed: {error.allowed}")
+        await close(socket, REFUSED, f"{error.name} is {error.value}; allowed: {error.allowed}")
     except KeyEnded as error:
-        await _close(socket, KEY_ENDED, str(error))
+        await close(socket, KEY_ENDED, str(error))
     except (DomainError, NotFound) as error:
-        await _close(socket, REFUSED, str(error))
+        await close(socket, REFUSED, str(error))
     except StorageUnavailable as error:
         logger.warning("a stream waits: %s", error)
-        await _close(socket, STORAGE_AWAY, str(error))
+        await close(socket, STORAGE_AWAY, str(error))
     except WebSocketDisconnect:
-        return
-
-
-async def _close(socket: WebSocket, code: int, reason: str) -> None:
-    try:
-        await socket.close(code, reason.encode()[:120].decode(errors="ignore"))  # what a close frame holds
-    except (RuntimeError, WebSocketDisconnect):  # it is closed already
         return
 
 
@@ -134,15 +115,7 @@ class _Connection:
 
     async def _carry(self, session: Session) -> None:
         """Read, work and write at once, while the key is valid, until one of them ends."""
-        parts = self._read(), self._work(session), self._write(), self._watch_key()
-        tasks = [asyncio.create_task(part) for part in parts]
-        try:
-            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-            done.pop().result()
-        finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+        await until_one_ends(self._read(), self._work(session), self._write(), self._watch_key())
 
     async def _read(self) -> None:
         while True:
@@ -173,7 +146,8 @@ class _Connection:
                 while not self._outgoing.empty():
                     await self._send(self._outgoing.get_nowait())
                 await self._send(answer)
-                await self._streams.end(session)
+                stored = answer["grasp_log"]
+                await self._streams.end(session, None if stored is None else stored["id"])
                 raise End(FINISHED, "finished")
             else:
                 raise End(NOT_UNDERSTOOD, "the session is open already")
@@ -184,7 +158,9 @@ class _Connection:
         try:
             if frame.number < 0:
                 raise InvalidInput("number", frame.number, "0 or more")
-            answer = await self._detect(session, frame)
+            answer, shown = await self._detect(session, frame)
+            if shown is not None:
+                session.broadcast.publish(shown)
         except InvalidInput as error:
             answer = {"type": "error", "number": frame.number}
             answer |= {"name": error.name, "value": str(error.value), "allowed": error.allowed}
@@ -196,16 +172,18 @@ class _Connection:
         except asyncio.QueueFull:
             raise End(SLOW_READER, f"{MOST_WAITING_OUT} answers wait to be read") from None
 
-    async def _detect(self, session: Session, frame: FrameIn) -> dict[str, Any]:
-        return await self._streams.call(
-            detectors.step,
-            session.id,
+    async def _detect(self, session: Session, frame: FrameIn) -> tuple[dict[str, Any], bytes | None]:
+        given = detectors.PackedFrame(
             frame.number,
             frame.time,
             packed("displacement", frame.displacement),
             packed_or_none("force", frame.force),
             packed_or_none("object_pose", frame.object_pose),
             packed_or_none("normal", frame.normal),
+            frame.command,
+        )
+        return await self._streams.call(
+            detectors.step, session.id, given, session.broadcast.wants(asyncio.get_running_loop().time())
         )
 
     async def _finish(self, session: Session, message: Finish) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,13 @@ import slipcore
 from db.blobs import disk_errors_named
 from estimators.errors import EstimatorError
 from service.formats.reading import Description, describe
+from service.report.wording import LEVELS
+from service.stream.live_frame import pack_frame
 from slipcore import Frame, FrictionSamples, GraspLog, InvalidInput, SlipState, collect_samples
 from stiction_client import container
 
 if TYPE_CHECKING:
-    from estimators import Moments
+    from estimators import FrictionModel, Moments
     from slipcore import DetectorState, SlipDetector
 
 logger = logging.getLogger(__name__)
@@ -37,9 +39,24 @@ Numbers = bytes | Sequence[float]
 """Numbers in a row, row-major: bytes of little-endian float32 or float64, or flat."""
 
 
+class PackedFrame(NamedTuple):
+    """A frame as it comes from the server's process; ``command`` is the normal force that the gripper is told, N."""
+
+    number: int
+    time: float
+    displacement: Numbers
+    force: Numbers | None = None
+    object_pose: Numbers | None = None
+    normal: Numbers | None = None
+    command: float | None = None
+
+
 @dataclass(slots=True)
 class Session:
-    """A running detector with what it saw: the last frames and answers, all frames if they are ``kept``."""
+    """A running detector with what it saw: the last frames and answers, all frames if they are ``kept``.
+
+    ``friction`` is what its client is told, ``expected`` what those are who watch it.
+    """
 
     detector: "SlipDetector"
     position: NDArray[np.float64]
@@ -53,6 +70,7 @@ class Session:
     looked_until: float = -math.inf
     last: tuple[int, dict[str, Any]] = (-1, {})
     friction: dict[str, Any] | None = None
+    expected: dict[str, float] | None = None
     held_bytes: int = 0
     most_bytes: int = 0
 
@@ -81,35 +99,37 @@ def open_session(
     _SESSIONS[name] = Session(detector, at_rest, area, moments, kept, held_bytes=held, most_bytes=most_bytes)
 
 
-def step(
-    name: str,
-    number: int,
-    time: float,
-    displacement: Numbers,
-    force: Numbers | None,
-    object_pose: Numbers | None,
-    normal: Numbers | None,
-) -> dict[str, Any]:
-    """Take a frame and answer; the same frame again is answered as before. Raises ``InvalidInput``."""
+def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[str, Any], bytes | None]:
+    """Take a frame; the answer, and what those who watch see of it if it ``is_shown``. Raises ``InvalidInput``.
+
+    The same frame again is answered as before.
+    """
     session = _SESSIONS[name]
-    if number == session.last[0]:
-        return session.last[1]
-    shape = session.position.shape
-    frame = Frame(
-        time,
-        _array("displacement", displacement, shape),
-        None if force is None else _array("force", force, shape),
-        None if object_pose is None else _array("object_pose", object_pose, (3,)),
-        None if normal is None else _array("normal", normal, shape),
-    )
+    if given.number == session.last[0]:
+        return session.last[1], None
+    frame = _frame(session, given)
     size = 0 if session.kept is None else _kept_bytes(session, frame)
     state = session.detector.step(*frame)
     if session.kept is not None:
         session.kept.append(frame)
         session.held_bytes += size
     _plan_look(session, frame, state)
-    session.last = (number, _answer(session, number, state))
-    return session.last[1]
+    session.last = (given.number, _answer(session, given.number, state))
+    shown = pack_frame(given.number, state, frame.force, given.command, session.expected) if is_shown else None
+    return session.last[1], shown
+
+
+def _frame(session: Session, given: PackedFrame) -> Frame:
+    shape, command = session.position.shape, given.command
+    if command is not None and not 0.0 <= command < math.inf:
+        raise InvalidInput("command", command, "a normal force of 0 N or more")
+    return Frame(
+        given.time,
+        _array("displacement", given.displacement, shape),
+        None if given.force is None else _array("force", given.force, shape),
+        None if given.object_pose is None else _array("object_pose", given.object_pose, (3,)),
+        None if given.normal is None else _array("normal", given.normal, shape),
+    )
 
 
 def write(name: str, target: Path, sensor: str) -> Description:
@@ -177,20 +197,28 @@ def _find_friction(session: Session, frames: list[Frame], answers: list[SlipStat
     part = {name: getattr(samples, name)[new] for name in samples.arrays()}
     found = FrictionSamples(**part, element_area=samples.element_area)
     session.moments = session.moments.merge(estimators.Moments.from_samples(found, places=False))
-    session.friction = _fitted(session.moments)
-
-
-def _fitted(moments: "Moments") -> dict[str, Any] | None:
     try:
-        model = moments.fit()
+        model = session.moments.fit()
     except EstimatorError:  # too few samples yet
-        return None
+        return
+    session.friction, session.expected = _told(model), _expected(model)
+
+
+def _told(model: "FrictionModel") -> dict[str, Any]:
     return {
         "coefficients": model.coefficients.tolist(),
         "standard_errors": [value if math.isfinite(value) else None for value in model.standard_errors.tolist()],
         "scale": float(model.scale),
-        "samples": moments.n,
+        "samples": model.n,
     }
+
+
+def _expected(model: "FrictionModel") -> dict[str, float] | None:
+    """Friction of an element that begins to slip under the middle of the forces seen, with 90 % of new observations."""
+    force = 0.5 * sum(model.domain.normal_force)
+    low, high = (float(model.predict(0.0, force, quantile=level)) for level in LEVELS)
+    found = {"mean": float(model.predict(0.0, force)), "low": low, "high": high, "normal_force": force}
+    return found if all(map(math.isfinite, found.values())) else None
 
 
 def _answer(session: Session, number: int, state: SlipState) -> dict[str, Any]:

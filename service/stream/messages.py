@@ -38,7 +38,7 @@ class Resume(msgspec.Struct, tag="resume", tag_field="type", forbid_unknown_fiel
 
 
 class FrameIn(msgspec.Struct, tag="frame", tag_field="type", forbid_unknown_fields=True):
-    """A frame; numbers grow from 0."""
+    """A frame; numbers grow from 0. ``command``: the normal force that the gripper is told, N, for those who watch."""
 
     number: Number
     time: float
@@ -46,6 +46,7 @@ class FrameIn(msgspec.Struct, tag="frame", tag_field="type", forbid_unknown_fiel
     force: Numbers | None = None
     object_pose: Numbers | None = None
     normal: Numbers | None = None
+    command: float | None = None
 
 
 class Finish(msgspec.Struct, tag="finish", tag_field="type", forbid_unknown_fields=True):

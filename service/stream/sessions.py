@@ -3,15 +3,19 @@
 import asyncio
 import uuid
 from collections import deque
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from typing import Any, TypeVar
 
 import msgspec
 
 from service.processes.side_process import ProcessEnded, SideProcess
 from service.stream import detectors
+from service.stream.broadcast import Broadcast, Watchers
+from service.stream.errors import DETECTOR_LOST, IN_USE, TOO_MANY, UNKNOWN_SESSION, End
+from service.stream.live_frame import pack_end
 from service.stream.messages import Open, packed
 
 MOST_SESSIONS = 200
@@ -21,19 +25,7 @@ PATIENCE = 60.0
 ANSWERS_KEPT, ANSWER_BYTES_KEPT = 256, 256 * 1024
 """Answers that a client who comes back may have missed; fewer where many elements slip."""
 
-FINISHED, NOT_UNDERSTOOD, DETECTOR_LOST = 1000, 1003, 1011
-KEY_ENDED, UNKNOWN_SESSION, SLOW_READER, IN_USE = 4401, 4404, 4408, 4409
-REFUSED, TOO_MANY, STORAGE_AWAY = 4422, 4429, 4503
-
 Result = TypeVar("Result")
-
-
-class End(Exception):
-    """The connection is to be closed, with this code and reason."""
-
-    def __init__(self, code: int, reason: str) -> None:
-        super().__init__(reason)
-        self.code, self.reason = code, reason
 
 
 class RecentAnswers:
@@ -58,7 +50,10 @@ class RecentAnswers:
 
 @dataclass(slots=True)
 class Session:
-    """What the server knows of a session; the detector is in the worker. ``owner`` is whose quota it counts in."""
+    """What the server knows of a session; the detector is in the worker.
+
+    ``owner`` is whose quota it counts in, ``next`` the number of the frame that is waited for.
+    """
 
     id: str
     opening: Open
@@ -68,6 +63,8 @@ class Session:
     recent: RecentAnswers = field(default_factory=RecentAnswers)
     connected: bool = False
     expiry: asyncio.TimerHandle | None = None
+    begun_at: datetime = field(default_factory=lambda: datetime.now(UTC))
+    broadcast: Broadcast = field(default_factory=Broadcast)
 
 
 class Streams:
@@ -83,6 +80,7 @@ class Streams:
         self._starting = asyncio.Lock()
         self._sessions: dict[str, Session] = {}
         self._dropping: set[asyncio.Task[None]] = set()
+        self._watchers = Watchers()
 
     async def open(self, opening: Open, key_id: str | None, address: str) -> Session:
         """A new session; raises ``InvalidInput`` for what cannot be a sensor, ``End`` where there are too many."""
@@ -128,14 +126,35 @@ class Streams:
             raise End(IN_USE, "the session has a connection already")
         return session
 
-    async def end(self, session: Session) -> None:
-        """Forget a session."""
+    def list_all(self) -> list[Session]:
+        """All of them, the newest first."""
+        return [*reversed(self._sessions.values())]
+
+    def get(self, name: str) -> Session | None:
+        """A session to look at, whoever's it is."""
+        return self._sessions.get(name)
+
+    @contextmanager
+    def watched(self, name: str, owner: str) -> Iterator[Broadcast]:
+        """What is shown of a session, while it is counted that somebody watches it; raises ``End``."""
+        session = self.get(name)
+        if session is None:
+            raise End(UNKNOWN_SESSION, "no such session, or it has ended")
+        with self._watchers.one_more(owner, session.broadcast):
+            yield session.broadcast
+
+    async def end(self, session: Session, grasp_log: str | None = None) -> None:
+        """Forget a session, which may have become a log."""
         if self._sessions.pop(session.id, None) is not None:
+            session.broadcast.end(pack_end("The stream has ended.", grasp_log))
             await self.call(detectors.drop, session.id)
 
     def _forget(self, session: Session) -> None:
         """The same at once, with the detector dropped soon after."""
-        if self._sessions.pop(session.id, None) is not None and self._process is not None:
+        if self._sessions.pop(session.id, None) is None:
+            return
+        session.broadcast.end(pack_end(f"The sensor has not come back for {PATIENCE:g} s.", None))
+        if self._process is not None:
             task = asyncio.create_task(self._drop(session.id))
             self._dropping.add(task)
             task.add_done_callback(self._dropping.discard)
@@ -152,8 +171,14 @@ class Streams:
         except (ProcessEnded, KeyError) as error:
             if isinstance(error, ProcessEnded) and process is self._process:  # and not the next one, which others began
                 self._process = None
-                self._sessions.clear()
+                self._lose_all()
             raise End(DETECTOR_LOST, "the detector's process ended; open a new session") from error
+
+    def _lose_all(self) -> None:
+        """Forget all sessions, whose detectors are gone."""
+        for session in self._sessions.values():
+            session.broadcast.end(pack_end("The detector's process ended.", None))
+        self._sessions.clear()
 
     async def _started(self) -> SideProcess:
         async with self._starting:

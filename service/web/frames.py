@@ -1,14 +1,10 @@
-"""What the player shows of one log, in one compact file: a JSON header and plain arrays behind it.
+"""What the player shows of one log, in one compact file (``service.packed_arrays``).
 
-The first four bytes are the header's length (little-endian). It tells ``rows`` and ``columns`` of the lattice, how many
-frames of the log one frame shown stands for (``step``), what 127 means in ``displacement`` (m) and ``force`` (N), and
-of each array its ``name``, ``type`` (of a JavaScript array), ``offset`` behind the header, and ``length``. What is not
-known, because the upload was deleted or the log has no forces, is left out.
+Its header tells ``rows`` and ``columns`` of the lattice, how many frames of the log one frame shown stands for
+(``step``), and what 127 means in ``displacement`` (m) and ``force`` (N). What is not known, because the upload was
+deleted or the log has no forces, is left out.
 """
 
-import json
-import struct
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +13,7 @@ from numpy.typing import NDArray
 
 from service import formats
 from service.domain.stored_results import StoredHistory, decode_history
+from service.packed_arrays import Arrays, pack_arrays
 from slipcore.frames import GraspLog
 
 MOST_CELLS = 1_500_000
@@ -26,10 +23,6 @@ MOST_EVENTS = 100_000
 """Onsets marked on the time axis, at most."""
 
 FULL_SCALE = 127
-ALIGNMENT = 4
-TYPES = {"float32": "Float32Array", "uint8": "Uint8Array", "int8": "Int8Array"}
-
-Arrays = dict[str, NDArray[Any]]
 
 
 def write_frames(history: Path, upload: Path | None, target: Path) -> None:
@@ -52,7 +45,7 @@ def pack(history: StoredHistory, log: GraspLog | None) -> bytes:
         arrays["state"] = (history.contact[shown].astype(np.uint8) + (history.contact & history.slip)[shown]).ravel()
     if log is not None:
         _add_vectors(arrays, header, log, shown)
-    return _packed(header, arrays)
+    return pack_arrays(header, arrays)
 
 
 def _add_vectors(arrays: Arrays, header: dict[str, Any], log: GraspLog, shown: slice) -> None:
@@ -82,14 +75,3 @@ def _scaled(vectors: NDArray[Any]) -> tuple[NDArray[np.int8], float]:
     known = np.nan_to_num(vectors)
     largest = float(np.abs(known).max(initial=0.0)) or 1.0
     return np.rint(known * (FULL_SCALE / largest)).astype(np.int8).ravel(), largest
-
-
-def _packed(header: Mapping[str, Any], arrays: Arrays) -> bytes:
-    listed, offset = [], 0
-    for name, array in arrays.items():
-        listed.append({"name": name, "type": TYPES[array.dtype.name], "offset": offset, "length": array.size})
-        offset += -(-array.nbytes // ALIGNMENT) * ALIGNMENT
-    text = json.dumps({**header, "arrays": listed}).encode()
-    text += b" " * (-len(text) % ALIGNMENT)
-    padded = (array.tobytes() + bytes(-array.nbytes % ALIGNMENT) for array in arrays.values())
-    return struct.pack("<I", len(text)) + text + b"".join(padded)

@@ -8,6 +8,7 @@ from contextlib import closing
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -18,7 +19,7 @@ from db.database import Database
 from db.records import NewGraspLog
 from db.repositories import grasp_logs
 from service import formats
-from service.cli import app, main
+from service.cli import app, main, streaming
 from service.cli.exit_codes import INPUT_REFUSED, NOT_FEASIBLE, SERVICE_REFUSED
 from service.cli.output import plain
 from service.demo.server import running_server
@@ -272,6 +273,40 @@ def test_upload_lookup_and_plan_go_through_a_real_service(run: Run, ramps: list[
     assert code == 0
     assert json.loads(out)["normal_force"] > 2.0  # more than load/μ: the planner gets a quantile, not a mean
     assert run(*grip, "--load", 1e6, "--limit", 50.0)[0] == NOT_FEASIBLE
+
+
+def test_a_log_is_replayed_as_a_live_stream_and_stored(
+    run: Run, ramps: list[Path], url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arguments = ("--url", url, "--speed", 1e6, "--json")
+    code, out, err = run("stream", ramps[0], "--store", *arguments)
+    told = json.loads(out)
+    assert code == 0
+    assert f"{url}/live/" in err
+    log = formats.read(ramps[0])
+    assert (told["frames"], told["refused_frames"]) == (len(log), 0)
+    assert told["stick_ratio_min"] < 0.5
+    with FrictionClient(url) as client:
+        assert client.grasp_log(told["grasp_log"]).frames == len(log)
+    with ramps[0].open("rb") as file:
+        monkeypatch.setattr("sys.stdin", SimpleNamespace(buffer=file))
+        assert json.loads(run("stream", "-", *arguments)[1])["frames"] == len(log)
+    code, out, _ = run("stream", ramps[0], "--url", url, "--speed", 1e6)
+    assert code == 0
+    assert f"frames             {len(log)}\n" in out
+
+
+def test_a_frame_is_sent_when_it_is_due(ramps: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    log, now, due = formats.read(ramps[0]), [100.0], []
+
+    def pass_time(seconds: float) -> None:
+        now[0] += seconds
+
+    monkeypatch.setattr(streaming, "perf_counter", lambda: now[0])
+    monkeypatch.setattr(streaming, "sleep", pass_time)
+    live: Any = SimpleNamespace(step=lambda *_: due.append(now[0]))
+    assert len(list(streaming._replay(live, log, speed=2.0))) == len(log)
+    assert due == pytest.approx((100.0 + (log.time - log.time[0]) / 2.0).tolist(), rel=1e-12)
 
 
 def test_what_becomes_of_an_upload_shows_in_the_exit_code(

@@ -6,64 +6,16 @@ const root = document.querySelector(".player");
 const find = (selector) => root.querySelector(selector);
 const map = find(".map"), times = find(".times"), slider = find("input"), play = find(".play");
 const arrows = find(".arrows"), speed = find(".speed"), told = find(".now");
-const FULL_SCALE = 127, LEFT = 48, RIGHT = 12, GAP = 26;
+const FULL_SCALE = 127, GAP = 26;
 
 let log = null, frame = 0, playing = false, started = 0, startTime = 0;
 
-function unpack(buffer) {
-  const length = new DataView(buffer).getUint32(0, true);
-  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
-  const kinds = { Float32Array, Uint8Array, Int8Array };
-  for (const { name, type, offset, length: count } of header.arrays) {
-    header[`${name}Values`] = new kinds[type](buffer, 4 + length + offset, count);
-  }
-  return header;
-}
-
-const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-
-// The canvas in device pixels, with a context that draws in CSS pixels.
-function prepared(canvas, height) {
-  const ratio = devicePixelRatio || 1, width = canvas.clientWidth;
-  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
-    canvas.width = Math.round(width * ratio);
-    canvas.height = Math.round(height * ratio);
-  }
-  const context = canvas.getContext("2d");
-  context.setTransform(ratio, 0, 0, ratio, 0, 0);
-  context.clearRect(0, 0, width, height);
-  return [context, width];
-}
-
 function drawMap() {
-  const { rows, columns, stateValues: states } = log;
-  const [context, width] = prepared(map, map.clientWidth * (rows / columns || 1));
-  map.style.aspectRatio = `${columns} / ${rows}`;
-  const size = width / columns, first = frame * rows * columns;
-  const palette = [colour("none"), colour("stick"), colour("slip")];
-  for (let state = 0; state < 3; state += 1) {
-    context.fillStyle = palette[state];
-    for (let cell = 0; cell < rows * columns; cell += 1) {
-      if ((states ? states[first + cell] : 0) !== state) continue;
-      const x = (cell % columns) * size, y = Math.floor(cell / columns) * size;
-      context.fillRect(x + 0.5, y + 0.5, size - 1, size - 1);
-      if (state === 2 && size > 8) drawSlash(context, x, y, size);
-    }
-  }
+  const { rows, columns, stateValues: states } = log, cells = rows * columns, first = frame * cells;
+  const shown = states ? states.subarray(first, first + cells) : new Uint8Array(cells);
+  const [context, size] = drawElements(map, rows, columns, shown);
   const values = log[`${arrows.value}Values`];
   if (arrows.value && values) drawArrows(context, values, first, size);
-}
-
-// Slipping elements are told by a shape, too, not by colour alone.
-function drawSlash(context, x, y, size) {
-  context.save();
-  context.strokeStyle = colour("ground");
-  context.lineWidth = Math.max(1, size / 10);
-  context.beginPath();
-  context.moveTo(x + size * 0.3, y + size * 0.7);
-  context.lineTo(x + size * 0.7, y + size * 0.3);
-  context.stroke();
-  context.restore();
 }
 
 function drawArrows(context, values, first, size) {
@@ -118,65 +70,22 @@ function drawCurves(context, width, height) {
   const half = hasForce ? (height - GAP) / 2 : height - GAP;
   drawAxes(context, width, 10, half - GAP, 1, "stick ratio (1: all sticks)");
   drawOnsets(context, width, 10, half - GAP);
-  drawLine(context, width, log.stick_ratioValues, 10, half - GAP, 1, colour("stick"), []);
+  drawCurve(context, width, log.stick_ratioValues, 10, half - GAP, 1, "stick", []);
   if (hasForce) {
     const most = roundUp(Math.max(largest(log.normal_forceValues), largest(log.tangential_forceValues)));
     drawAxes(context, width, half + 10, height - 2 * GAP + 10, most, "force, N: normal ——  tangential - -");
-    drawLine(context, width, log.normal_forceValues, half + 10, height - 2 * GAP + 10, most, colour("stick"), []);
-    drawLine(context, width, log.tangential_forceValues, half + 10, height - 2 * GAP + 10, most, colour("slip"), [5, 4]);
+    drawCurve(context, width, log.normal_forceValues, half + 10, height - 2 * GAP + 10, most, "stick", []);
+    drawCurve(context, width, log.tangential_forceValues, half + 10, height - 2 * GAP + 10, most, "slip", [5, 4]);
   }
-  context.fillStyle = colour("faint");
-  context.textAlign = "center";
-  for (let k = 0; k <= 4; k += 1) {
-    const time = begin() + ((end() - begin()) * k) / 4;
-    context.fillText(`${time.toFixed(2)} s`, Math.min(place(time, width), width - 22), height - 6);
-  }
+  drawSeconds(context, width, height, begin(), end(), (time) => place(time, width));
+}
+
+function drawCurve(context, width, values, top, bottom, most, stroke, dash) {
+  const up = (value) => bottom - ((bottom - top) * value) / most;
+  drawLine(context, log.timeValues, values, (time) => place(time, width), up, colour(stroke), dash);
 }
 
 const largest = (values) => values.reduce((most, value) => Math.max(most, value), 0);
-
-function roundUp(value) {
-  const power = 10 ** Math.floor(Math.log10(value || 1));
-  return [1, 2, 4, 6, 8, 10].map((factor) => factor * power).find((round) => round >= value) || 1;
-}
-
-function drawAxes(context, width, top, bottom, most, label) {
-  context.font = "13px system-ui, sans-serif";
-  context.fillStyle = colour("faint");
-  context.strokeStyle = colour("line");
-  context.lineWidth = 1;
-  context.textAlign = "right";
-  context.beginPath();
-  for (const part of [0, 0.5, 1]) {
-    const y = bottom - (bottom - top) * part;
-    context.fillText(Number((most * part).toPrecision(2)).toString(), LEFT - 6, y + 4);
-    context.moveTo(LEFT, y);
-    context.lineTo(width - RIGHT, y);
-  }
-  context.stroke();
-  context.textAlign = "left";
-  context.fillText(label, LEFT + 4, bottom + 15);
-}
-
-function drawLine(context, width, values, top, bottom, most, stroke, dash) {
-  context.strokeStyle = stroke;
-  context.lineWidth = 2;
-  context.setLineDash(dash);
-  context.beginPath();
-  let pen = false;
-  values.forEach((value, k) => {
-    if (Number.isNaN(value)) {
-      pen = false;
-      return;
-    }
-    const x = place(log.timeValues[k], width), y = bottom - ((bottom - top) * value) / most;
-    if (pen) context.lineTo(x, y);
-    else context.moveTo(x, y);
-    pen = true;
-  });
-  context.stroke();
-  context.setLineDash([]);
-}
 
 // Onsets of slip as marks below the stick ratio, the darker the more there are.
 function drawOnsets(context, width, top, bottom) {
@@ -192,8 +101,6 @@ function drawOnsets(context, width, top, bottom) {
   context.stroke();
   context.globalAlpha = 1;
 }
-
-const three = (value) => (Number.isNaN(value) ? "–" : Number(value.toPrecision(3)).toString());
 
 function tell() {
   const parts = [`frame ${frame * log.step + 1} of ${log.frames}`, `${log.timeValues[frame].toFixed(3)} s`];

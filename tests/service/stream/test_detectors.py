@@ -1,10 +1,24 @@
 """Live detectors, without the process and the network around them."""
 
+import json
+import struct
+from typing import Any
+
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from service.stream import detectors
-from slipcore import GraspLog, collect_samples, detect_slip
+from service.stream.detectors import PackedFrame
+from slipcore import GraspLog, InvalidInput, collect_samples, detect_slip
+
+
+def unpacked(content: bytes) -> tuple[dict[str, Any], NDArray[np.uint8]]:
+    """The header of a frame as it is shown, and the state of its elements."""
+    (length,) = struct.unpack_from("<I", content)
+    header = json.loads(content[4 : 4 + length])
+    (state,) = header["arrays"]
+    return header, np.frombuffer(content, np.uint8, state["length"], 4 + length + state["offset"])
 
 
 def feed(log: GraspLog, *, wait: bool) -> dict[str, object] | None:
@@ -14,7 +28,7 @@ def feed(log: GraspLog, *, wait: bool) -> dict[str, object] | None:
     detectors.open_session("one", position, log.grid, log.element_area, "filter", keep=False, most_bytes=2**30)
     session = detectors._SESSIONS["one"]
     for k, time in enumerate(log.time.tolist()):
-        detectors.step("one", k, time, log.displacement[k].tobytes(), log.force[k].tobytes(), None, None)
+        detectors.step("one", PackedFrame(k, time, log.displacement[k].tobytes(), log.force[k].tobytes()))
         if wait and session.look is not None:
             session.look.result()
     assert session.look is not None
@@ -48,3 +62,41 @@ def test_a_look_that_fails_costs_the_stream_nothing_but_its_friction(
     monkeypatch.setattr(detectors, "collect_samples", fail)
     assert feed(ramp, wait=True) is None
     assert "a look for friction failed" in caplog.text
+
+
+def test_who_watches_sees_each_element_the_forces_and_the_command(ramp: GraspLog) -> None:
+    assert ramp.force is not None
+    history = detect_slip(ramp)
+    position = ramp.position.tobytes()
+    detectors.open_session("one", position, ramp.grid, ramp.element_area, "filter", keep=False, most_bytes=2**30)
+    for k, time in enumerate(ramp.time.tolist()):
+        arrays = (ramp.displacement, ramp.force, ramp.object_pose, ramp.normal)
+        given = [None if array is None else array[k].tobytes() for array in arrays]
+        frame = PackedFrame(k, time, *given, command=2.5)  # type: ignore[arg-type]
+        answer, content = detectors.step("one", frame, is_shown=True)
+        assert content is not None
+        header, state = unpacked(content)
+        np.testing.assert_array_equal(state.reshape(ramp.grid) == 2, (history.slip & history.contact)[k])
+        np.testing.assert_array_equal(state.reshape(ramp.grid) > 0, history.contact[k])
+        assert (header["number"], header["stick_ratio"], header["command"]) == (k, answer["stick_ratio"], 2.5)
+        assert header["normal_force"] == pytest.approx(abs(ramp.force[k, ..., 2].sum()), rel=1e-9)
+    assert detectors.step("one", frame, is_shown=True) == (answer, None)  # it comes twice and is shown once
+    session = detectors._SESSIONS["one"]
+    assert session.look is not None
+    session.look.result()
+    expected = session.expected
+    assert expected is not None
+    assert expected["low"] < expected["mean"] < expected["high"]
+    assert expected["mean"] == pytest.approx(0.4, abs=0.1)
+    detectors.drop("one")
+
+
+@pytest.mark.parametrize("command", [-1.0, float("nan"), float("inf")])
+def test_a_command_that_is_no_force_is_refused_before_the_frame_is_taken(ramp: GraspLog, command: float) -> None:
+    position = ramp.position.tobytes()
+    detectors.open_session("one", position, ramp.grid, ramp.element_area, "filter", keep=False, most_bytes=2**30)
+    frame = PackedFrame(0, 0.0, ramp.displacement[0].tobytes(), command=command)
+    with pytest.raises(InvalidInput, match="command"):
+        detectors.step("one", frame)
+    assert detectors.step("one", frame._replace(command=None))[0]["type"] == "state"
+    detectors.drop("one")

@@ -12,6 +12,8 @@ from db.repositories import access_keys
 from service.demo import inputs
 from service.domain import keys
 from service.settings import Settings
+from slipcore import GraspLog
+from stiction_client.stream import SlipStream
 from tests.service.web import chromium
 from tests.service.web.chromium import Tab
 
@@ -143,6 +145,35 @@ def test_a_field_without_a_label_is_found(page: Tab, client: httpx.Client) -> No
     page.run("document.querySelectorAll('label').forEach(each => each.remove())")
     barriers = page.barriers()
     assert [each for each in barriers if each.startswith("label (critical): <input")]
+
+
+@ON_SQLITE
+@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (390, "dark")])
+def test_a_live_stream_is_watched_until_it_is_a_log(
+    page: Tab, client: httpx.Client, ramp: GraspLog, material: str, width: int, scheme: str
+) -> None:
+    assert ramp.force is not None
+    base = str(client.base_url).rstrip("/")
+    page.resize(width)
+    page.prefer(scheme)
+    with SlipStream(base, ramp.position, ramp.element_area, sensor="left finger", material=material, keep=True) as live:
+        page.go(f"{base}/live")
+        page.run(f"document.querySelector('a[href=\"/live/{live.session}\"]').click()")
+        page.until("document.querySelector('.player') !== null && document.readyState === 'complete'")
+        watchers = "fetch('/live').then(a => a.text()).then(t => />1<\\/td>\\s*<\\/tr>/.test(t))"
+        page.until(watchers)
+        for k, time in enumerate(ramp.time):
+            live.step(time, ramp.displacement[k], ramp.force[k], command=1.25)
+        page.until("document.querySelector('.player').dataset.frame > 40")
+        told = page.run("document.querySelector('.player').innerText")
+        assert "1.25 N" in told
+        assert fits(page)
+        assert page.barriers() == []
+        stored = live.finish(store=True)
+    assert stored is not None
+    assert page.until("document.querySelector('.connection a')?.pathname") == f"/logs/{stored['id']}"
+    assert page.run("document.querySelector('.connection').textContent") == "The stream has ended. Its grasp log"
+    page.prefer("light")
 
 
 @ON_SQLITE

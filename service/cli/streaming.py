@@ -1,0 +1,117 @@
+"""The command that replays a grasp log to a service as if it happened now."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import inf
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+from time import perf_counter, sleep
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from service.cli.local import DETECTOR_HELP, FrameRate, Json, Mapping, Scale, mapping_text
+from service.cli.output import print_json, print_lines
+from service.cli.remote import DEFAULT_URL, Key, Url
+from service.formatting import number
+
+if TYPE_CHECKING:
+    from slipcore import GraspLog
+    from stiction_client.stream import SlipStream
+
+STANDARD_INPUT = Path("-")
+
+
+def stream(
+    log: Annotated[
+        Path, typer.Argument(metavar="LOG|-", help="A grasp log in any format of docs/formats.md; -: standard input.")
+    ],
+    material: Annotated[str | None, typer.Option(help="Material that is held.")] = None,
+    store: Annotated[bool, typer.Option("--store", help="At the end, store the frames as a grasp log.")] = False,
+    speed: Annotated[float, typer.Option(min=1e-3, help="How many times as fast as it was recorded.")] = 1.0,
+    method: Annotated[str | None, typer.Option(help=DETECTOR_HELP)] = None,
+    scale: Scale = None,
+    frame_rate: FrameRate = None,
+    mapping: Mapping = None,
+    url: Url = DEFAULT_URL,
+    key: Key = None,
+    json: Json = False,
+) -> None:
+    """Replay a grasp log to a service in real time, as a live stream that can be watched in the dashboard."""
+    from service import formats
+    from slipcore.defaults import DEFAULT_METHOD
+    from slipcore.errors import InvalidInput
+    from stiction_client.stream import SlipStream
+
+    with _file(log) as path:
+        grasp = formats.read(path, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
+    if grasp.displacement is None:
+        raise InvalidInput("displacement", "missing", "a log with displacements: a live stream needs them")
+    said: dict[str, Any] = {"sensor": grasp.sensor, "material": material, "keep": store}
+    with SlipStream(
+        url, grasp.position, grasp.element_area, key=key, detector=method or DEFAULT_METHOD, **said
+    ) as live:
+        page = f"{url.rstrip('/')}/live/{live.session}"
+        typer.echo(f"to be watched at {page}", err=True)
+        try:
+            answers = list(_replay(live, grasp, speed))
+        except KeyboardInterrupt:
+            live.finish()
+            raise
+        stored = live.finish(store)
+    summary = _summary(answers) | {"page": page, "grasp_log": None if stored is None else stored["id"]}
+    if json:
+        print_json(summary)
+    else:
+        print_lines(f"{log.name}: replayed to {url}", _lines(summary))
+
+
+@contextmanager
+def _file(log: Path) -> Iterator[Path]:
+    """The log as a file, with what comes on standard input written to one for a while."""
+    if log != STANDARD_INPUT:
+        yield log
+        return
+    with NamedTemporaryFile() as copy:
+        copy.write(sys.stdin.buffer.read())
+        copy.flush()
+        yield Path(copy.name)
+
+
+def _replay(live: "SlipStream", log: "GraspLog", speed: float) -> Iterator[dict[str, Any]]:
+    """Each frame when it is due, and its answer."""
+    began, first = perf_counter(), float(log.time[0])
+    arrays = (log.displacement, log.force, log.object_pose, log.normal)
+    for k, time in enumerate(log.time.tolist()):
+        sleep(max(began + (time - first) / speed - perf_counter(), 0.0))
+        yield live.step(time, *(None if array is None else array[k] for array in arrays))  # type: ignore[arg-type]
+
+
+def _summary(answers: list[dict[str, Any]]) -> dict[str, Any]:
+    states = [answer for answer in answers if answer["type"] == "state"]
+    ratios = [state["stick_ratio"] for state in states if state["stick_ratio"] is not None]
+    return {
+        "frames": len(states),
+        "refused_frames": len(answers) - len(states),
+        "stick_ratio_min": min(ratios, default=None),
+        "macro_slip_frames": sum(state["macro_slip"] for state in states),
+        "friction": states[-1]["friction"] if states else None,
+    }
+
+
+def _lines(summary: dict[str, Any]) -> list[tuple[str, str | None]]:
+    refused, friction = summary["refused_frames"], summary["friction"]
+    return [
+        ("frames", f"{summary['frames']}{f', and {refused} refused' if refused else ''}"),
+        ("least stick ratio", number(summary["stick_ratio_min"])),
+        ("gross slip", f"in {summary['macro_slip_frames']} frames"),
+        ("friction", _friction(friction) if friction else "no samples: nothing slipped, or there are no forces"),
+        ("grasp log", summary["grasp_log"]),
+    ]
+
+
+def _friction(found: dict[str, Any]) -> str:
+    error = found["standard_errors"][0]
+    told = f" ± {number(error)}" if (inf if error is None else error) < inf else ""
+    return f"β₀ = {number(found['coefficients'][0])}{told} (standard error), from {found['samples']} samples"

@@ -1,0 +1,58 @@
+"""Pages of live streams, in process."""
+
+from typing import Any
+
+import pytest
+
+from service.stream.messages import Open
+from service.stream.sessions import Session
+from tests.service.web.conftest import HOSTILE
+
+
+@pytest.fixture
+def streaming(browser: Any) -> Any:
+    """Make a session with this sensor and material known, whose frames nobody sends."""
+
+    def begin(sensor: str, material: str | None = None) -> str:
+        session = Session("ab12", Open(b"", (8, 9), 1e-6, sensor=sensor, material=material), None, "somebody", 1234)
+        browser.app.state.context.streams._sessions[session.id] = session
+        return f"/live/{session.id}"
+
+    return begin
+
+
+def test_without_streams_the_page_says_how_to_begin_one(browser: Any) -> None:
+    page = browser.get("/live")
+    assert page.status_code == 200
+    assert "stiction stream LOG" in page.text
+
+
+def test_a_stream_is_listed_with_its_sensor_and_has_a_page(browser: Any, streaming: Any, elements: Any) -> None:
+    path = streaming("gripper 7", "paper")
+    listed = elements(browser.get("/live").text)
+    assert path in [given.get("href") for _, given in listed.found]
+    assert "gripper 7" in listed.text
+    assert "1,234" in listed.text.replace("\u202f", ",").replace(" ", ",")
+    shown = elements(browser.get(path).text)
+    assert f"{path}/frames" in [given.get("data-frames") for _, given in shown.found]
+    assert "/materials/paper" in [given.get("href") for _, given in shown.found]
+
+
+@pytest.mark.parametrize("typed", HOSTILE)
+def test_what_a_sensor_is_called_is_text(browser: Any, streaming: Any, elements: Any, typed: str) -> None:
+    path = streaming(typed, typed)
+    for page in (browser.get("/live"), browser.get(path)):
+        assert page.status_code == 200
+        assert elements(page.text).foreign() == []
+
+
+def test_a_stream_that_has_ended_is_told_of_by_a_page(browser: Any) -> None:
+    page = browser.get("/live/nothing")
+    assert page.status_code == 404
+    assert "may have ended" in page.text
+
+
+def test_nobody_watches_without_a_key(reach: Any, make: Any) -> None:
+    path = "/live/nothing/frames"
+    assert reach("keys").open_stream(path).status_code == 401
+    assert reach("keys", key=make("read")).open_stream(path).status_code == 101
