@@ -60,9 +60,9 @@ def detect(
     from slipcore.defaults import DEFAULT_METHOD
 
     grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
-    grasp = corrected(grasp, sensor_model)
+    grasp, options = corrected(grasp, sensor_model, method)
     start = perf_counter()
-    history = detect_slip(grasp, method=method or DEFAULT_METHOD, lookahead=LOOKAHEAD)
+    history = detect_slip(grasp, method=method or DEFAULT_METHOD, lookahead=LOOKAHEAD, sensor_model=None, **options)
     seconds = perf_counter() - start
     if picture is not None:
         from service.report.pictures import save, slip_over_time
@@ -90,8 +90,8 @@ def check(
     from slipcore.defaults import DEFAULT_METHOD
 
     grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
-    grasp = corrected(grasp, sensor_model)
-    history = detect_slip(grasp, method=method or DEFAULT_METHOD, lookahead=LOOKAHEAD)
+    grasp, options = corrected(grasp, sensor_model, method)
+    history = detect_slip(grasp, method=method or DEFAULT_METHOD, lookahead=LOOKAHEAD, sensor_model=None, **options)
     findings, contact = check_log(grasp, history), _contact_record(grasp, history)
     if json:
         print_json(
@@ -124,8 +124,10 @@ def fit(
 
     grasps, found = [], []
     for path in logs:
-        grasp = corrected(formats.read(path, mapping=mapping_text(mapping)), sensor_model)
-        history = detect_slip(grasp, method=detector or DEFAULT_METHOD, lookahead=LOOKAHEAD)
+        grasp, options = corrected(formats.read(path, mapping=mapping_text(mapping)), sensor_model, detector)
+        history = detect_slip(
+            grasp, method=detector or DEFAULT_METHOD, lookahead=LOOKAHEAD, sensor_model=None, **options
+        )
         found.append(check_log(grasp, history))
         for finding in found[-1]:
             typer.echo(f"{path.name}: {finding.name}: {finding.evidence}", err=True)
@@ -160,21 +162,24 @@ def mapping_text(path: Path | None) -> str | None:
     return None if path is None else path.read_text(encoding="utf-8")
 
 
-def corrected(grasp: "GraspLog", sensor_model: Path | None) -> "GraspLog":
-    """The log as a calibration of its sensor corrects it; what that changed goes to standard error."""
+def corrected(grasp: "GraspLog", sensor_model: Path | None, method: str | None) -> "tuple[GraspLog, dict[str, float]]":
+    """The log as a calibration of its sensor corrects it, and options of detection; what that changed goes to standard
+    error.
+    """
     if sensor_model is None:
-        return grasp
+        return grasp, {}
     from json import loads
 
     from slipcore import InvalidInput, SensorModel
+    from slipcore.defaults import DEFAULT_METHOD
 
     try:
         told = loads(sensor_model.read_bytes())
     except ValueError as error:
         raise InvalidInput("sensor model", f"{sensor_model.name}, no JSON ({error})", "a JSON file") from error
-    log, changed = SensorModel.from_json(told).apply(grasp)
+    log, changed, options = SensorModel.from_json(told).apply(grasp, method or DEFAULT_METHOD)
     typer.echo(f"{sensor_model.name}: {'; '.join(changed) or 'nothing to correct'}", err=True)
-    return log
+    return log, dict(options)
 
 
 def model_record(model: "FrictionModel") -> dict[str, Any]:

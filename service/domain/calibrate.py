@@ -1,7 +1,7 @@
 """What is wrong with a sensor, from stored logs of presses, and the correction of its later logs by that."""
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -28,11 +28,14 @@ OFFSET = "<f8"
 
 
 class Correction(NamedTuple):
-    """A log as its sensor's calibration corrects it: of which ``version``, and what it ``changed``, in words."""
+    """A log as its sensor's calibration corrects it: of which ``version``, what it ``changed``, in words, and the
+    ``options`` of detection.
+    """
 
     log: "GraspLog"
     version: int | None
     changed: tuple[str, ...] | None
+    options: Mapping[str, float]
 
 
 async def calibrate(
@@ -81,15 +84,16 @@ def learn(
     return replace(model, offset=None).to_json(), offset
 
 
-def corrected(session: Session, log: "GraspLog", sensor: str, version: int | None) -> Correction:
+def corrected(session: Session, log: "GraspLog", sensor: str, version: int | None, method: str) -> Correction:
     """A log by this version of its sensor's calibration, None for none; not where its lattice is another."""
     if version is None:
-        return Correction(log, None, None)
+        return Correction(log, None, None, {})
     model = sensor_model(calibrations.get(session, sensor, version))
     if model.grid != log.grid:
         theirs, own = (" × ".join(map(str, grid)) for grid in (model.grid, log.grid))
-        return Correction(log, version, (f"nothing: calibrated on {theirs} elements, and the log has {own}",))
-    return Correction(model.apply(log).log, version, model.apply(log).changed)
+        return Correction(log, version, (f"nothing: calibrated on {theirs} elements, and the log has {own}",), {})
+    found = model.apply(log, method)
+    return Correction(found.log, version, found.changed, found.options)
 
 
 def sensor_model(stored: Calibration) -> "SensorModel":

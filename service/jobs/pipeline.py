@@ -134,10 +134,12 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
     with run.stage("frames"), disk_errors_named():
         log = formats.read(run.blobs.path(stored.sha256))
     with run.database.read() as session:
-        correction = corrected(session, log, stored.sensor, stored.calibration)
+        correction = corrected(session, log, stored.sensor, stored.calibration, stored.detector)
     log, reconstruction = _with_forces(run, correction.log, stored.sensor)
     with run.stage("slip_state"):
-        history = slipcore.detect_slip(log, method=stored.detector, lookahead=slipcore.LOOKAHEAD)
+        history = slipcore.detect_slip(
+            log, method=stored.detector, lookahead=slipcore.LOOKAHEAD, sensor_model=None, **correction.options
+        )
     with run.stage("samples"):
         found, none_because = collect(log, history, reconstruction)
         samples, findings = found.samples, slipcore.check_log(log, history, found.elements)

@@ -7,8 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from slipcore.calibration.defaults import ESTIMATE
 from slipcore.calibration.estimate import Estimate
 from slipcore.calibration.zero import elapsed
+from slipcore.defaults import DEFAULT_METHOD
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray, GraspLog
 from slipcore.surface.log_normals import normals_of
@@ -17,10 +19,13 @@ AXES = ("x", "y", "z")
 
 
 class Corrected(NamedTuple):
-    """A log with its sensor's faults taken out as far as they are known, and what was ``changed``, in words."""
+    """A log with its sensor's faults taken out as far as they are known, what was ``changed``, in words, and the
+    ``options`` that tell a detector of faults that stay in it.
+    """
 
     log: GraspLog
     changed: tuple[str, ...]
+    options: Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,15 +58,27 @@ class SensorModel:
                 return estimate
         raise InvalidInput("estimate", name, ", ".join(each.name for each in self.estimates))
 
-    def apply(self, log: GraspLog) -> Corrected:
+    def apply(self, log: GraspLog, method: str = DEFAULT_METHOD) -> Corrected:
         """Forces of a log without what is identified and differs from 0: offset, drift, gain, crosstalk.
 
-        Raises ``InvalidInput`` for a log of another lattice.
+        What ``method`` of detection should know of the markers' noise is in the options. Raises ``InvalidInput`` for a
+        log of another lattice.
         """
         if log.grid != self.grid:
             raise InvalidInput("grid", f"{log.grid[0]} × {log.grid[1]}", f"{self.grid[0]} × {self.grid[1]}, calibrated")
         changed = tuple(self._changes()) if log.force is not None else ()
-        return Corrected(replace(log, force=self._force(log)) if changed else log, changed)
+        corrected = replace(log, force=self._force(log)) if changed else log
+        options = self._noise_options() if method == "filter" else {}
+        told = tuple(
+            f"noise of markers taken for {1e6 * noise:.3g} µm, for it is correlated" for noise in options.values()
+        )
+        return Corrected(corrected, changed + told, options)
+
+    def _noise_options(self) -> dict[str, float]:
+        """How noisy markers are, where a detector's own estimate from three frames would be too low."""
+        noise, memory = self["marker_noise"], self["marker_noise_correlation"]
+        lasting = memory.is_identified and memory.value >= ESTIMATE.least_memory
+        return {"displacement_floor": noise.value} if lasting and noise.is_significant else {}
 
     def _force(self, log: GraspLog) -> FloatArray:
         assert log.force is not None

@@ -35,7 +35,8 @@ def detect_slip(
     Raises ``InvalidInput`` as ``init`` does, and for a log of another lattice than the sensor model's.
     """
     if sensor_model is not None:
-        log = sensor_model.apply(log).log
+        log, _, known = sensor_model.apply(log, method)
+        options = {**known, **options}
     state = init(log.position, log.element_area, method, **options)
     if isinstance(find_method(method), CompiledMethod):
         return with_patches(log, history_of(log, state, checked_lookahead(lookahead)))

@@ -238,11 +238,11 @@ def test_a_log_of_another_lattice_stays_as_it_is_and_says_so(database: Database,
     with database.write() as session:
         sensors.find_or_add(session, "cut")
         calibrations.add(session, "cut", new)
-        whole = corrected(session, ball, "cut", 1)
+        whole = corrected(session, ball, "cut", 1, "filter")
         assert np.array_equal(np.asarray(whole.log.force), np.asarray(model.apply(ball).log.force))
         fields = {name: getattr(ball, name)[:, :10] for name in ("displacement", "force", "normal")}
         part = replace(ball, position=ball.position[:10], **fields)
-        left = corrected(session, part, "cut", 1)
+        left = corrected(session, part, "cut", 1, "filter")
         assert (left.log, left.version) == (part, 1)
         assert left.changed == ("nothing: calibrated on 12 × 12 elements, and the log has 10 × 12",)
-        assert corrected(session, part, "cut", None) == (part, None, None)
+        assert corrected(session, part, "cut", None, "filter") == (part, None, None, {})

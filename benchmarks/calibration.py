@@ -1,0 +1,142 @@
+"""What a calibration mends: `python -m benchmarks.calibration [--seeds N] [--page docs/sensors.md]`.
+
+Each fault is put into four grasps of friction 0.5 (a ball pressed with 4 to 14 N and sheared, closed form) and into
+three presses of another ball, by which the sensor is calibrated. Error of the friction that the grasps' fit predicts at
+the working load, β₂, and F1 of slip, before and after. Writes calibration.json and calibration.png.
+"""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from benchmarks.pages import options, picture_folder, save, table, write
+from benchmarks.presses import Faults, pressed
+from estimators import fit
+from slipcore import GraspLog, SensorModel, calibrate_sensor, collect_friction, detect_slip
+from slipcore.contact import RampSchedule, tangential_ramp
+
+FRICTION = 0.5
+FORCES = (4.0, 7.0, 10.0, 14.0)
+WORKING_LOAD = (2e-4, 0.06)
+"""m/s and N of an element: in the middle of what the grasps have."""
+SCHEDULE = RampSchedule(rest=0.5, press=0.7, settle=0.3, shear=3.0, hold=0.5)
+PRESSED_WITH = 2.0
+WHITE = Faults(marker_noise=1e-6, force_noise=2e-3)
+FAULTS = {
+    "none": WHITE,
+    "offset of 5 mN": replace(WHITE, offset=5e-3),
+    "drift of 1 mN/s": replace(WHITE, drift=(0.0, 5e-4, 1e-3)),
+    "crosstalk of 8, −5 %": replace(WHITE, crosstalk=(0.08, -0.05)),
+    "gain of 1.2": replace(WHITE, gain=1.2),
+    "smoothing over 1 element": replace(WHITE, smoothing=1.0),
+    "correlated noise (0.9), 3 µm": replace(WHITE, marker_noise=3e-6, memory=0.9),
+    "correlated noise (0.9), 10 µm": replace(WHITE, marker_noise=1e-5, memory=0.9),
+    "all but 10 µm": Faults(5e-3, (0.0, 5e-4, 1e-3), (0.08, -0.05), 1.0, 1.2, 3e-6, 0.9, 2e-3),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """Root mean square over the seeds of the error of friction and of β₂ 1/N, and mean F1; NaN where no fit was."""
+
+    friction: float
+    slope: float
+    f1: float
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Of one fault, without and with the calibration."""
+
+    fault: str
+    before: Result
+    after: Result
+
+
+def grasps() -> list[GraspLog]:
+    """Without fault."""
+    return [
+        tangential_ramp(
+            friction=FRICTION, normal_force=force, points=20, pitch=1e-3, sphere_radius=40e-3, schedule=SCHEDULE
+        )
+        for force in FORCES
+    ]
+
+
+def measure(seeds: int) -> Iterator[Row]:
+    """Each fault."""
+    clean, ball = grasps(), pressed(PRESSED_WITH)
+    for name, faults in FAULTS.items():
+        found = []
+        for seed in range(seeds):
+            presses = [faults.put_into(ball, 1000 * seed + number) for number in range(3)]
+            model = calibrate_sensor(presses, [PRESSED_WITH] * 3)
+            logs = [faults.put_into(log, 1000 * seed + 100 + number) for number, log in enumerate(clean)]
+            found.append([outcome(logs, None), outcome(logs, model)])
+        before, after = (_over_seeds(np.array(part)) for part in zip(*found, strict=True))
+        yield Row(name, before, after)
+
+
+def outcome(logs: list[GraspLog], model: SensorModel | None) -> tuple[float, float, float]:
+    """Error of friction at the working load, that of β₂, and F1; by the elements, whether they are believed or not."""
+    histories = [detect_slip(log, lookahead=2, sensor_model=model) for log in logs]
+    used = logs if model is None else [model.apply(log).log for log in logs]
+    samples = [collect_friction(log, history).elements for log, history in zip(used, histories, strict=True)]
+    found = fit(samples, method="ols")
+    scores = [f1(log, history.slip) for log, history in zip(logs, histories, strict=True)]
+    return float(found.predict(*WORKING_LOAD)) - FRICTION, float(found.coefficients[2]), float(np.mean(scores))
+
+
+def f1(log: GraspLog, slip: np.ndarray) -> float:
+    """Of slip at the points in true contact."""
+    assert log.truth is not None
+    true, found = log.truth.slip_contact_factor & log.truth.contact, slip & log.truth.contact
+    return float(2.0 * np.count_nonzero(true & found) / (np.count_nonzero(true) + np.count_nonzero(found)))
+
+
+def _over_seeds(found: np.ndarray) -> Result:
+    error, slope = np.sqrt((found[:, :2] ** 2).mean(axis=0))
+    return Result(float(error), float(slope), float(found[:, 2].mean()))
+
+
+def draw(rows: list[Row]) -> Figure:
+    """Error of friction, and F1, before and after."""
+    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
+    left, right = figure.subplots(1, 2, sharey=True)
+    places = np.arange(len(rows))[::-1]
+    for shift, name, colour in ((0.2, "before", "tab:orange"), (-0.2, "after", "tab:blue")):
+        results = [getattr(row, name) for row in rows]
+        left.barh(places + shift, [100.0 * result.friction / FRICTION for result in results], 0.38, color=colour)
+        right.barh(places + shift, [result.f1 for result in results], 0.38, color=colour, label=name)
+    left.set_yticks(places, [row.fault for row in rows])
+    left.set_xlabel("error of friction at the working load, %")
+    right.set_xlabel("F1 of slip")
+    figure.legend(loc="outside upper center", ncols=2)
+    return figure
+
+
+COLUMNS = ("fault", "error of μ", "calibrated", "error of β₂, 1/N", "calibrated", "F1", "calibrated")
+
+
+def main() -> None:
+    """Measure, print and store."""
+    parser = options(__doc__)
+    parser.add_argument("--seeds", type=int, default=5)
+    arguments = parser.parse_args()
+    pictures = picture_folder(arguments)
+    rows = list(measure(arguments.seeds))
+    pairs = [[(getattr(row.before, n), getattr(row.after, n)) for n in ("friction", "slope", "f1")] for row in rows]
+    cells = [
+        [row.fault, *(value for pair in row_pairs for value in pair)]
+        for row, row_pairs in zip(rows, pairs, strict=True)
+    ]
+    made = {"calibration": table(COLUMNS, cells)}
+    print(made["calibration"])
+    save(draw(rows), pictures / "calibration.png")
+    write([asdict(row) for row in rows], made, arguments, "calibration.json")
+
+
+if __name__ == "__main__":
+    main()
