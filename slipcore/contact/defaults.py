@@ -214,8 +214,8 @@ class LimitSurfaceDefaults(Options):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepDefaults(Options):
-    """A load step (``solver/quasi_static.py``, ``step_equations.py``, ``touching.py``, ``extrapolation.py``,
-    ``resolution.py``).
+    """A load step (``solver/quasi_static.py``, ``step_equations.py``, ``touching.py``, ``slip_rate.py``,
+    ``extrapolation.py``, ``resolution.py``).
     """
 
     tolerance: Annotated[float, Option(1e-12, 0.5, "-", "of a solution that others are compared with")] = 1e-5
@@ -248,6 +248,12 @@ class StepDefaults(Options):
     """Most of the last step's change that the next one's start repeats."""
     barred_tolerance: Annotated[float, Option(1.0, 1e4, "-", "trials: 1 to 1000 made no difference")] = 10.0
     """Tolerances of the motion of cells before they touch, in units of the step's own."""
+    steady: Annotated[float, Option(0.0, 1.0, "-", "a load in ten steps a quarter of its period is")] = 0.3
+    """Change of a load's rate, as a share of it, up to which the rate of slip goes on, too."""
+    rounding: Annotated[float, Option(0.0, 1e-3, "-", "rounding")] = 1e-12
+    """Change of a load, as a share of it, that is none."""
+    longest_step: Annotated[float, Option(1.0, 2.4, "-", "backward differences are stable up to 1 + √2")] = 2.0
+    """Longest step, in units of the one before, to which its rate of slip goes on."""
     contact_cells: Annotated[float, Option(1.0, 100.0, "cells", "pressures are off by 2 to 6 % below")] = 6.0
     """Radius of a contact that the grid resolves."""
     slip_cells: Annotated[float, Option(0.1, 100.0, "cells", "tractions are off by 6 to 14 % below")] = 1.0

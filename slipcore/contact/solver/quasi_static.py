@@ -19,6 +19,7 @@ from slipcore.contact.solver.extrapolation import Stress, continuation, extrapol
 from slipcore.contact.solver.normal import NormalContact
 from slipcore.contact.solver.problem import Problem, StepLoad
 from slipcore.contact.solver.resolution import unresolved
+from slipcore.contact.solver.slip_rate import carried_share, solve_carrying
 from slipcore.contact.solver.step_equations import StepEquations, StepSolution
 from slipcore.contact.solver.touching import from_touch
 from slipcore.frames import BoolArray, FloatArray
@@ -31,7 +32,8 @@ class State:
     ``normal`` contact, ``stress`` and that of the step ``before``; ``displacement`` [2, ny, nx] m of the finger against
     the object's own surface; ``elastic`` [3, ny, nx] m, the finger's displacement without creep; ``creep`` m, one
     [3, ny, nx] a branch; ``pose`` [3] of the object (m, m, rad); ``speed`` [ny, nx] m/s of slip, where friction depends
-    on it; ``load``: the last; ``drive`` [3]: how it differed from the one before.
+    on it; ``slip`` [2, ny, nx] m within the last step of cells that slid in all of it, zero elsewhere; ``load``: the
+    last; ``drive`` [3]: how it differed from the one before; ``rate`` [4] at which it and the pressing changed, 1/s.
     """
 
     normal: NormalContact | None
@@ -42,8 +44,10 @@ class State:
     creep: tuple[FloatArray, ...]
     pose: FloatArray
     speed: FloatArray
+    slip: FloatArray
     load: StepLoad
     drive: FloatArray
+    rate: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,7 +93,8 @@ class QuasiStatic:
     """A contact problem on a grid. Steps change nothing but the kept operators.
 
     ``tolerance`` on tractions is relative to what the step can change, so that slip rates hold too;
-    ``normal_tolerance`` on the gap is relative to the indentation.
+    ``normal_tolerance`` on the gap is relative to the indentation. ``second_order`` takes rates of slip from two steps
+    where loads go on at the same rate, by the steps' durations; without it each step is one of backward Euler.
     """
 
     def __init__(
@@ -98,8 +103,12 @@ class QuasiStatic:
         grid: Grid,
         tolerance: float = STEP.tolerance,
         normal_tolerance: float = STEP.normal_tolerance,
+        *,
+        second_order: bool = False,
     ) -> None:
         self.problem, self.grid = problem, grid
+        # Friction that depends on velocity takes the mean velocity of a step.
+        self.second_order = second_order and not problem.velocity_laws
         self.tolerance, self.normal_tolerance = tolerance, normal_tolerance
         self.height, self.friction = problem.height(grid), problem.static_friction(grid)
         self.count = Count()
@@ -110,8 +119,8 @@ class QuasiStatic:
         """Bodies apart."""
         zero = np.zeros((3, *self.grid.shape))
         creep = tuple(zero for _ in self.problem.creep)
-        apart, still = Stress(zero[0], zero[:2], zero[0]), np.zeros(3)
-        return State(None, apart, apart, zero[:2], zero, creep, still, zero[0], StepLoad(0.0), still)
+        apart, still, at_rest = Stress(zero[0], zero[:2], zero[0]), np.zeros(3), np.zeros(4)
+        return State(None, apart, apart, zero[:2], zero, creep, still, zero[0], zero[:2], StepLoad(0.0), still, at_rest)
 
     def run(self, loads: Iterable[StepLoad]) -> Iterator[StepResult]:
         """Results of loads one after the other, from bodies apart."""
@@ -141,7 +150,7 @@ class QuasiStatic:
         guess = extrapolated(state.stress, state.before, continuation(state.drive, drive))
         if state.normal is not None and self._moves_sideways(drive):
             equations = from_touch(equations, state.normal, guess)
-        solution = equations.solve(guess)
+        solution = solve_carrying(equations, self._carried(state, load, drive), guess)
         after = self._advance(equations, state, load, drive, solution, recalled)
         result = self._result(equations, state, after, solution)
         seconds = time.perf_counter() - began
@@ -151,6 +160,13 @@ class QuasiStatic:
         """Whether nothing that pressure depends on has changed since the last step."""
         pressed = (load.normal_force, load.approach) == (state.load.normal_force, state.load.approach)
         return pressed and not self.problem.coupled and not self.problem.creep
+
+    def _carried(self, state: State, load: StepLoad, drive: FloatArray) -> FloatArray:
+        """Slip [2, ny, nx] m of the last step that goes on in this one, for rates of slip of second order."""
+        if not self.second_order:
+            return np.zeros_like(state.slip)
+        share = carried_share(state.rate, _rate(state.load, load, drive), load.duration / state.load.duration)
+        return share * state.slip
 
     def _moves_sideways(self, drive: FloatArray) -> bool:
         """Whether cells that do not touch may move against the object in a step."""
@@ -185,8 +201,8 @@ class QuasiStatic:
         recalled: FloatArray | None,
     ) -> State:
         """The state at the end of the step."""
-        pressure, traction, limit = solution.normal.pressure, np.zeros((2, *self.grid.shape)), np.zeros(self.grid.shape)
-        traction[:, *solution.box], limit[solution.box] = solution.tangential.traction, solution.limit
+        stress = equations.stress(solution)
+        pressure, traction, _ = stress
         both = self._displacement(equations.operators, pressure, traction, solution)
         alone = equations.operators.bodies == self.finger.bodies
         elastic = both if alone else self._displacement(self.finger, pressure, traction)
@@ -200,16 +216,25 @@ class QuasiStatic:
             speed[solution.box] = np.hypot(*solution.tangential.slip) / load.duration
         return State(
             normal=solution.normal,
-            stress=Stress(pressure, traction, limit),
+            stress=stress,
             before=state.stress,
             displacement=displacement,
             elastic=elastic,
             creep=creep,
             pose=state.pose + solution.tangential.motion,
             speed=speed,
+            slip=self._slid(state, solution),
             load=load,
             drive=drive,
+            rate=_rate(state.load, load, drive),
         )
+
+    def _slid(self, state: State, solution: StepSolution) -> FloatArray:
+        """Slip [2, ny, nx] m of the cells that touched at the step's begin and slide at its end."""
+        slip, tangential, box = np.zeros_like(state.slip), solution.tangential, solution.box
+        sliding = tangential.slides & (solution.limit > 0.0) & (state.stress.pressure[box] > 0.0)
+        slip[:, *box] = np.where(sliding, tangential.slip, 0.0)
+        return slip
 
     def _displacement(
         self, operators: Operators, pressure: FloatArray, traction: FloatArray, known: StepSolution | None = None
@@ -269,6 +294,18 @@ class QuasiStatic:
 def _drive(before: StepLoad, load: StepLoad) -> FloatArray:
     """By how much the step changes what drives the object: load where that is given, otherwise motion [3]."""
     return np.where(load.given, load.tangential - before.tangential, load.motion)
+
+
+def _rate(before: StepLoad, load: StepLoad, drive: FloatArray) -> FloatArray:
+    """Rates [4] 1/s at which the step changes pressing (force or approach) and what drives the object; none by
+    rounding.
+    """
+    if before.normal_force is not None and load.normal_force is not None:
+        pressed, change = load.normal_force, load.normal_force - before.normal_force
+    else:
+        pressed, change = load.approach or 0.0, (load.approach or 0.0) - (before.approach or 0.0)
+    changes, sizes = np.append(change, drive), np.abs(np.append(pressed, load.tangential))
+    return np.where(np.abs(changes) <= STEP.rounding * sizes, 0.0, changes) / load.duration
 
 
 def _lever(pressure: FloatArray, grid: Grid) -> float:

@@ -111,6 +111,12 @@ class StepEquations:
             moved = moved + operator.tangential_by_pressure(solution.normal.pressure)
         return moved - rigid_displacement(points, solution.tangential.motion)
 
+    def stress(self, solution: StepSolution) -> Stress:
+        """Stresses of a solution on the whole grid."""
+        limit = np.zeros(self.grid.shape)
+        limit[solution.box] = solution.limit
+        return Stress(solution.normal.pressure, self._whole(solution), limit)
+
     def _lift(self, traction: FloatArray) -> FloatArray:
         return self.operators.on(self.grid).normal_by_traction(traction)
 

@@ -49,8 +49,9 @@ class Control:
 class TangentialContact(NamedTuple):
     """``traction`` on the finger and its ``displacement`` Cq [2, ny, nx]; ``slip`` of the finger against the object in
     this step; ``motion`` [3] of the object in this step (m, m, rad); ``residual`` of the natural map as a share of the
-    largest limit; ``imbalance`` as a share of the summed limits; ``iterations``: Newton steps; ``sliding``: all cells
-    slide. On the limit surface no motion is too large; the one given is the least with which all slide.
+    largest limit; ``imbalance`` as a share of the summed limits; ``iterations``: Newton steps; ``slides`` [ny, nx]:
+    cells that slide; ``sliding``: all cells slide. On the limit surface no motion is too large; the one given is the
+    least with which all slide.
     """
 
     traction: FloatArray
@@ -60,6 +61,7 @@ class TangentialContact(NamedTuple):
     residual: float
     imbalance: float
     iterations: int
+    slides: BoolArray
     sliding: bool
 
 
@@ -199,7 +201,7 @@ class _TangentialStep:
         imbalance = float(np.abs(lacking).max()) / self.capacity
         if imbalance > TANGENTIAL.balance:
             raise NotConverged("balance of the tangential load", imbalance, TANGENTIAL.balance, iterations)
-        point = np.hypot(*(traction - self.stiffness * slip))
+        slides = np.hypot(*(traction - self.stiffness * slip)) > self.limit
         return TangentialContact(
             traction,
             displacement,
@@ -208,7 +210,8 @@ class _TangentialStep:
             residual,
             imbalance,
             iterations,
-            bool((point > self.limit)[self.limit > 0.0].all()),
+            slides,
+            bool(slides[self.limit > 0.0].all()),
         )
 
     def _at_the_limit(self, balanced: TangentialContact | None = None) -> TangentialContact:
@@ -235,4 +238,5 @@ def _frictionless(offset: FloatArray, control: Control) -> TangentialContact:
     if (np.abs(control.load) * control.given).any():
         raise InfeasibleLoad(control.load, 0.0)
     nothing, motion = np.zeros_like(offset), np.where(control.given, 0.0, control.motion)
-    return TangentialContact(nothing, nothing.copy(), offset.copy(), motion, 0.0, 0.0, 0, True)
+    slides = np.ones(offset.shape[1:], dtype=bool)
+    return TangentialContact(nothing, nothing.copy(), offset.copy(), motion, 0.0, 0.0, 0, slides, True)

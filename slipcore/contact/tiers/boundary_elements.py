@@ -53,7 +53,8 @@ def run(plan: Plan, fidelity: Fidelity | None = None) -> GraspLog:
     fidelity = Fidelity() if fidelity is None else fidelity
     began = time.perf_counter()
     where = sensor_grid(plan.sampling, PROBE.room * contact_reach(plan), fidelity.cells)
-    solver = QuasiStatic(plan.problem, where.grid, fidelity.tolerance, FIDELITY.normal_share * fidelity.tolerance)
+    gap_tolerance = FIDELITY.normal_share * fidelity.tolerance
+    solver = QuasiStatic(plan.problem, where.grid, fidelity.tolerance, gap_tolerance, second_order=True)
     times = frame_times(plan)
     frames, warnings = _frames(plan, solver, where, times, fidelity)
     metadata = {
