@@ -1,4 +1,4 @@
-"""Sensors: the mechanics of their gels, their logs, and what was found against these."""
+"""Sensors: the mechanics of their gels, their calibrations, their logs, and what was found against these."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -9,8 +9,9 @@ from fastapi import APIRouter, Request, Response
 from fastapi.params import Form
 from fastapi.responses import RedirectResponse
 
+from db.paging import Window
 from db.records import Gel, LogFilter, Sensor, StoredGraspLog
-from db.repositories import grasp_logs
+from db.repositories import calibrations, grasp_logs
 from db.repositories import sensors as stored_sensors
 from service.domain import sensors
 from service.domain.context import Context
@@ -24,6 +25,9 @@ from service.web.rendering import on_problem, render
 from service.web.routes.materials import LOGS_ON_A_PAGE
 
 router = APIRouter(include_in_schema=False, route_class=FormRoute)
+
+SHOWN_CALIBRATIONS = 5
+"""The newest of a sensor; the API has all."""
 
 FIELDS = tuple(GelIn.model_fields)
 FieldText = Annotated[str, Form(max_length=40)]
@@ -70,10 +74,12 @@ def _shown(context: Context, request: Request, sensor: Sensor, cursor: str | Non
     page = Page("-created_at", LOGS_ON_A_PAGE, cursor, identity="hex")
     with context.database.read() as session:
         logs, after = page.cut(grasp_logs.list_all(session, page.window(), LogFilter(sensor=sensor.name)))
+        newest = calibrations.list_all(session, sensor.name, Window("id", descending=True, limit=SHOWN_CALIBRATIONS))
     access: Access = request.state.access
     may_describe = access.allows("admin" if sensor.gel is not None else "upload")
     return {
         "sensor": sensor,
+        "calibrations": newest,
         "logs": logs,
         "after": after,
         "findings": count_findings(logs),

@@ -5,8 +5,8 @@ from urllib.parse import quote
 import pytest
 
 from db.database import Database
-from db.records import Gel
-from db.repositories import sensors
+from db.records import CalibrationPress, Gel, NewCalibration
+from db.repositories import calibrations, sensors
 from service.web.routes.sensors import count_findings
 from tests.service.web.conftest import HOSTILE, HTML, OWN
 
@@ -55,6 +55,26 @@ def test_a_form_leads_back_to_its_sensor_whatever_that_is_named(session_of: Any,
         sensors.find_or_add(session, "100%25")
     answer = session_of("upload").request("POST", path_of("100%25"), data=SENT)
     assert (answer.status_code, answer.headers["location"]) == (303, path_of("100%25"))
+
+
+@ON_SQLITE
+def test_a_sensor_shows_its_newest_calibration(session_of: Any, database: Database, sensor: str) -> None:
+    caller = session_of("read")
+    assert "Never calibrated" in caller.get(path_of(sensor)).text
+    known = {"name": "crosstalk_x", "unit": "-", "value": 0.08, "low": 0.077, "high": 0.083, "not_identified": None}
+    unknown = {"name": "gain", "unit": "-", "value": None, "low": None, "high": None, "not_identified": "no <force>"}
+    with database.write() as session:
+        for value in (0.01, 0.08):
+            model = {"estimates": [known | {"value": value}, unknown]}
+            new = NewCalibration((CalibrationPress("a" * 32, 2.0),), model, None, None)
+            calibrations.add(session, sensor, new)
+    page = caller.get(path_of(sensor)).text
+    assert "Version 2 corrects" in page
+    assert "by 1 press:" in page
+    assert "Earlier: version 1" in page
+    assert "0.0770 to 0.0830" in page
+    assert "not identified: no &lt;force&gt;" in page
+    assert "0.0100" not in page
 
 
 @ON_SQLITE

@@ -167,7 +167,11 @@ def test_logs_are_corrected_by_the_calibration_that_was_there_when_they_came(
     assert told["gain"]["low"] < 1.0 / 1.1 < told["gain"]["high"]
     assert told["force_drift_x"]["not_identified"] is None
     assert made.json()["presses"] == presses
-    after = sent(2)["detection"]
+    log = sent(2)
+    after = log["detection"]
+    assert (
+        "Corrected by the sensor's calibration</dt><dd>version 1: zero of each" in client.get(f"/logs/{log['id']}").text
+    )
     assert after["calibration"] == 1
     assert any(text.startswith("crosstalk of 0.0") for text in after["corrections"])
     again = client.post(path, json={"presses": presses}).json()
