@@ -2,7 +2,8 @@
 
 Each fault is put into four grasps of friction 0.5 (a ball pressed with 4 to 14 N and sheared, closed form) and into
 three presses of another ball, by which the sensor is calibrated. Error of the friction that the grasps' fit predicts at
-the working load, β₂, and F1 of slip, before and after. Writes calibration.json and calibration.png.
+the working load, β₂, and F1 of slip, before and after. The
+friction of a contact that pivots on a sensor that smooths, too. Writes calibration.json and calibration.png.
 """
 
 from collections.abc import Iterator
@@ -12,12 +13,21 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.pages import options, picture_folder, save, table, write
+from benchmarks.patch_grasps import PIVOT, grasp
 from benchmarks.presses import Faults, pressed
 from estimators import fit
-from slipcore import GraspLog, SensorModel, calibrate_sensor, collect_friction, detect_slip
+from slipcore import (
+    ContactFriction,
+    GraspLog,
+    SensorModel,
+    calibrate_sensor,
+    collect_friction,
+    contact_friction,
+    detect_slip,
+)
 from slipcore.contact import RampSchedule, tangential_ramp
 
-FRICTION = 0.5
+FRICTION, PIVOT_FRICTION = 0.5, 0.7
 FORCES = (4.0, 7.0, 10.0, 14.0)
 WORKING_LOAD = (2e-4, 0.06)
 """m/s and N of an element: in the middle of what the grasps have."""
@@ -117,6 +127,26 @@ def draw(rows: list[Row]) -> Figure:
     return figure
 
 
+def pivots(width: float) -> tuple[float, ContactFriction, ContactFriction]:
+    """Friction of a contact that pivots, without and with the kernel that three presses tell; ``width`` elements."""
+    faults = replace(WHITE, smoothing=width)
+    model = calibrate_sensor([faults.put_into(pressed(5.0), seed) for seed in range(3)])
+    log = grasp(PIVOT, PIVOT_FRICTION, smoothing=width, marker_noise=WHITE.marker_noise, force_noise=WHITE.force_noise)
+    histories = [detect_slip(log, lookahead=2, sensor_model=each) for each in (None, model)]
+    before, after = (contact_friction(log.time, history.patches) for history in histories)
+    assert before is not None
+    assert after is not None
+    return model["kernel_width"].value, before, after
+
+
+def pivot_cells(width: float) -> list[object]:
+    """A row of the table of pivots."""
+    kernel, *found = pivots(width)
+    told = [f"{each.coefficient:.3f} ({each.low:.3f} to {each.high:.3f})" for each in found]
+    return [width, 1e3 * kernel, *told]
+
+
+PIVOT_COLUMNS = ("smoothing, elements", "found, mm", "friction of the pivot (0.7)", "calibrated")
 COLUMNS = ("fault", "error of μ", "calibrated", "error of β₂, 1/N", "calibrated", "F1", "calibrated")
 
 
@@ -133,7 +163,8 @@ def main() -> None:
         for row, row_pairs in zip(rows, pairs, strict=True)
     ]
     made = {"calibration": table(COLUMNS, cells)}
-    print(made["calibration"])
+    made["pivots"] = table(PIVOT_COLUMNS, [pivot_cells(width) for width in (0.5, 1.0, 1.5, 2.0)])
+    print(made["calibration"], made["pivots"], sep="\n\n")
     save(draw(rows), pictures / "calibration.png")
     write([asdict(row) for row in rows], made, arguments, "calibration.json")
 

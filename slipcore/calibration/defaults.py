@@ -87,6 +87,9 @@ class EstimateDefaults(Options):
     least_memory: Annotated[float, Option(0.0, 1.0, "-", "shorter noise is seen as well in three frames")] = 0.3
     """Correlation of marker noise from frame to frame above which a detector is told how much there is."""
 
+    wide_kernel: Annotated[float, Option(0.0, 100.0, "elements", "turns a pivot's friction by 2 %")] = 0.5
+    """Least width of a kernel that a detection is told of."""
+
 
 PRESS = PressDefaults()
 ESTIMATE = EstimateDefaults()

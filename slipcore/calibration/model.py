@@ -16,6 +16,11 @@ from slipcore.frames import FloatArray, GraspLog
 from slipcore.surface.log_normals import normals_of
 
 AXES = ("x", "y", "z")
+_TOLD = {
+    "displacement_floor": "noise of markers taken for {:.3g} µm, for it is correlated",
+    "kernel_width": "moments of contacts reckoned with forces that are smoothed over {:.3g} µm",
+}
+"""What is said of options, with their values in micrometres."""
 
 
 class Corrected(NamedTuple):
@@ -61,17 +66,17 @@ class SensorModel:
     def apply(self, log: GraspLog, method: str = DEFAULT_METHOD) -> Corrected:
         """Forces of a log without what is identified and differs from 0: offset, drift, gain, crosstalk.
 
-        What ``method`` of detection should know of the markers' noise is in the options. Raises ``InvalidInput`` for a
-        log of another lattice.
+        What ``method`` of detection should know of the markers' noise, and of smoothing, is in the options. Raises
+        ``InvalidInput`` for a log of another lattice.
         """
         if log.grid != self.grid:
             raise InvalidInput("grid", f"{log.grid[0]} × {log.grid[1]}", f"{self.grid[0]} × {self.grid[1]}, calibrated")
         changed = tuple(self._changes()) if log.force is not None else ()
         corrected = replace(log, force=self._force(log)) if changed else log
         options = self._noise_options() if method == "filter" else {}
-        told = tuple(
-            f"noise of markers taken for {1e6 * noise:.3g} µm, for it is correlated" for noise in options.values()
-        )
+        if log.force is not None:
+            options |= self._kernel_options()
+        told = tuple(_TOLD[name].format(1e6 * value) for name, value in options.items())
         return Corrected(corrected, changed + told, options)
 
     def _noise_options(self) -> dict[str, float]:
@@ -79,6 +84,12 @@ class SensorModel:
         noise, memory = self["marker_noise"], self["marker_noise_correlation"]
         lasting = memory.is_identified and memory.value >= ESTIMATE.least_memory
         return {"displacement_floor": noise.value} if lasting and noise.is_significant else {}
+
+    def _kernel_options(self) -> dict[str, float]:
+        """How widely forces are smoothed, where that reaches beyond an element and its neighbours."""
+        kernel = self["kernel_width"]
+        wide = kernel.is_significant and kernel.value >= ESTIMATE.wide_kernel * math.sqrt(self.element_area)
+        return {"kernel_width": kernel.value} if wide else {}
 
     def _force(self, log: GraspLog) -> FloatArray:
         assert log.force is not None

@@ -31,21 +31,25 @@ def detect_slip(
     """Detect local slip in a whole log: the fold of ``step`` over its frames.
 
     With a ``lookahead`` each frame is decided in the light of that many frames after it (see ``FixedLagSmoother``);
-    with a ``sensor_model`` the log is first corrected by it (``SensorModel.apply``).
-    Raises ``InvalidInput`` as ``init`` does, and for a log of another lattice than the sensor model's.
+    with a ``sensor_model`` the log is first corrected by it (``SensorModel.apply``). ``options`` are the method's, and
+    ``kernel_width`` of ``defaults.PatchOptions``; what the sensor model knows of noise and smoothing goes before their
+    defaults. Raises ``InvalidInput`` as ``init`` does, and for a log of another lattice than the sensor model's.
     """
     if sensor_model is not None:
         log, _, known = sensor_model.apply(log, method)
         options = {**known, **options}
+    kernel_width = options.pop("kernel_width", 0.0)
     state = init(log.position, log.element_area, method, **options)
     if isinstance(find_method(method), CompiledMethod):
-        return with_patches(log, history_of(log, state, checked_lookahead(lookahead)))
+        history = history_of(log, state, checked_lookahead(lookahead))
+        return with_patches(log, history, kernel_width=kernel_width)
     smoother, settled_states = FixedLagSmoother(state, lookahead), []
     for frame in log.frames():
         state, now = step(state, frame)
         if (settled := smoother.take(state, now)) is not None:
             settled_states.append(settled)
-    return with_patches(log, collect_history([*settled_states, *smoother.rest()], state))
+    history = collect_history([*settled_states, *smoother.rest()], state)
+    return with_patches(log, history, kernel_width=kernel_width)
 
 
 def with_patches(log: GraspLog, history: SlipHistory, **options: float) -> SlipHistory:

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.patch_grasps import PIVOT, grasp
 from benchmarks.presses import Faults, pressed
 from slipcore import (
     GraspLog,
@@ -18,6 +19,7 @@ from slipcore import (
     SlipHistory,
     UnknownScale,
     calibrate_sensor,
+    contact_friction,
     detect_slip,
 )
 from slipcore.calibration.estimate import Observed, error_of_mean, joined
@@ -191,7 +193,7 @@ def test_a_later_log_is_freed_of_the_faults(ball: GraspLog) -> None:
     log, changed, _ = model.apply(later)
     true, before, after = (np.asarray(each.force).sum(axis=(1, 2)) for each in (ball, later, log))
     assert (np.abs(after - true).max(axis=0) < 0.15 * np.abs(before - true).max(axis=0)).all()
-    assert [text.split()[0] for text in changed] == ["zero", "drift", "forces", "crosstalk", "noise"]
+    assert [text.split()[0] for text in changed] == ["zero", "drift", "forces", "crosstalk", "noise", "moments"]
 
 
 def test_only_logs_of_the_same_lattice_are_corrected(ball: GraspLog, models: list[SensorModel]) -> None:
@@ -256,3 +258,20 @@ def test_a_detector_is_told_of_noise_that_it_would_not_see(
         with_model = f1_score(log, detect_slip(log, lookahead=2, sensor_model=model))
         assert with_model > least
         assert not told or with_model > f1_score(log, detect_slip(log, lookahead=2)) + 0.05
+
+
+def test_the_friction_of_a_pivot_is_freed_of_the_forces_smoothing() -> None:
+    """A rigid body of known friction pivots on a sensor that smooths; the forces' arms seem too long."""
+    for width in (1.0, 2.0):
+        faults = Faults(smoothing=width, force_noise=2e-3, marker_noise=1e-6)
+        model = calibrate_sensor([faults.put_into(pressed(5.0), seed) for seed in range(3)])
+        pivot = grasp(PIVOT, 0.7, smoothing=width, marker_noise=1e-6, force_noise=2e-3)
+        before, after = (
+            contact_friction(pivot.time, detect_slip(pivot, lookahead=2, sensor_model=each).patches)
+            for each in (None, model)
+        )
+        assert before is not None
+        assert after is not None
+        assert before.high < 0.7
+        assert after.low < 0.7 < after.high
+        assert after.coefficient == pytest.approx(0.7, abs=0.03)
