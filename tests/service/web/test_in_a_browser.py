@@ -105,6 +105,7 @@ def test_nobody_is_kept_out_of_a_page(page: Tab, client: httpx.Client, fitted: A
     asked = "material=fitted&tangential_load=1.5&contact_area=6e-5"
     log, material = f"/logs/{fitted['id']}", f"/materials/{fitted['material']}"
     paths = ["/", "/?search=nothing", material, log, "/upload", "/jobs", "/sensors", "/sensors/half-space", "/plan"]
+    paths += ["/live"]
     paths += [f"/plan?{asked}", "/keys", "/audit", "/problems", "/login", f"{material}/report", f"{log}/report"]
     page.resize(width)
     page.prefer(scheme)
@@ -183,6 +184,24 @@ def test_the_api_is_described_without_a_network(page: Tab, client: httpx.Client)
     page.until("document.querySelectorAll('.opblock').length > 20")
     page.call("Page.navigate", url=f"{base}/redoc")
     page.until("location.pathname === '/docs'")
+
+
+@ON_SQLITE
+@pytest.mark.parametrize("width", [1400, 390])
+def test_nobody_is_kept_out_of_the_api_and_of_a_page_that_is_not_there(
+    tab: Tab, client: httpx.Client, width: int
+) -> None:
+    base = str(client.base_url).rstrip("/")
+    tab.resize(width)
+    tab.go(f"{base}/docs")
+    tab.until("document.querySelectorAll('.opblock').length > 20")
+    assert [each for each in tab.barriers() if not each.startswith("heading-order (moderate)")] == []
+    assert fits(tab)
+    for path in ("/nothing", "/live/ended", "/materials/unknown"):
+        tab.go(f"{base}{path}")
+        assert tab.run("document.querySelector('.problem') !== null"), path
+        assert tab.barriers() == []
+        assert fits(tab), path
 
 
 @ON_SQLITE
