@@ -109,6 +109,13 @@ def versions(
     return [_record(row, material) for row, material in found]
 
 
+def with_ids(session: Session, ids: Sequence[int]) -> list[StoredModel]:
+    """Versions by their keys, in this order; those that are not stored are left out."""
+    rows = session.execute(_models().where(FrictionModelRow.id.in_(ids)))
+    found = {row.id: _record(row, material) for row, material in rows}
+    return [found[each] for each in ids if each in found]
+
+
 def _models() -> Select[FrictionModelRow, str]:
     return select(FrictionModelRow, MaterialRow.name).join(MaterialRow)
 

@@ -53,6 +53,22 @@ class Chart:
     width, height, left, right, top, bottom = WIDTH, HEIGHT, LEFT, WIDTH - RIGHT, TOP, HEIGHT - BOTTOM
 
 
+@dataclass(frozen=True, slots=True)
+class ManyChart:
+    """The same of several curves, each with its line and band."""
+
+    title: str
+    x_label: str
+    y_label: str
+    lines: Sequence[str]
+    bands: Sequence[str]
+    marked: float
+    x_ticks: Sequence[Tick]
+    y_ticks: Sequence[Tick]
+
+    width, height, left, right, top, bottom = WIDTH, HEIGHT, LEFT, WIDTH - RIGHT, TOP, HEIGHT - BOTTOM
+
+
 def ticks(low: float, high: float, most: int = MOST_TICKS) -> list[float]:
     """Round numbers from ``low`` to ``high``, 1, 2 or 5 times a power of ten apart, at most so many."""
     raw = max((high - low) / max(most - 1, 1), 1e-300)
@@ -62,30 +78,63 @@ def ticks(low: float, high: float, most: int = MOST_TICKS) -> list[float]:
     return [count * step for count in range(first, last + 1)]
 
 
+class _Axes:
+    """From 0 up to what has to be seen on both axes; what lies below 0, no friction does, is cut off."""
+
+    def __init__(self, curves: Sequence[Curve]) -> None:
+        self._x_most = max(1e-12, *(x for curve in curves for x in curve.x))
+        self._y_most = 1.05 * max(1e-12, *(y for curve in curves for y in (*curve.high, *curve.y)))
+
+    def across(self, x: float) -> float:
+        return LEFT + (WIDTH - LEFT - RIGHT) * min(max(x / self._x_most, 0.0), 1.0)
+
+    def _up(self, y: float) -> float:
+        return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * min(max(y / self._y_most, 0.0), 1.0)
+
+    def _points(self, xs: Sequence[float], ys: Sequence[float]) -> str:
+        return " ".join(f"{self.across(x):.1f},{self._up(y):.1f}" for x, y in zip(xs, ys, strict=True))
+
+    def line(self, curve: Curve) -> str:
+        return self._points(curve.x, curve.y)
+
+    def band(self, curve: Curve) -> str:
+        return f"{self._points(curve.x, curve.high)} {self._points(curve.x[::-1], curve.low[::-1])}"
+
+    def x_ticks(self) -> list[Tick]:
+        return [Tick(self.across(x), f"{x:g}") for x in rounded(ticks(0.0, self._x_most))]
+
+    def y_ticks(self) -> list[Tick]:
+        return [Tick(self._up(y), f"{y:g}") for y in rounded(ticks(0.0, self._y_most))]
+
+
 def draw(curve: Curve) -> Chart:
-    """A chart from 0 up to what has to be seen on both axes; what lies below 0, no friction does, is cut off."""
-    x_most = max(*curve.x, 1e-12)
-    y_most = 1.05 * max(*curve.high, *curve.y, 1e-12)
-
-    def across(x: float) -> float:
-        return LEFT + (WIDTH - LEFT - RIGHT) * min(max(x / x_most, 0.0), 1.0)
-
-    def up(y: float) -> float:
-        return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * min(max(y / y_most, 0.0), 1.0)
-
-    def points(xs: Sequence[float], ys: Sequence[float]) -> str:
-        return " ".join(f"{across(x):.1f},{up(y):.1f}" for x, y in zip(xs, ys, strict=True))
-
+    """A chart of one curve."""
+    axes = _Axes([curve])
     return Chart(
         title=curve.title,
         x_label=curve.x_label,
         y_label=curve.y_label,
-        line=points(curve.x, curve.y),
-        band=f"{points(curve.x, curve.high)} {points(curve.x[::-1], curve.low[::-1])}",
-        seen=(across(curve.seen[0]), across(curve.seen[1])),
-        marked=across(curve.marked),
-        x_ticks=[Tick(across(x), f"{x:g}") for x in rounded(ticks(0.0, x_most))],
-        y_ticks=[Tick(up(y), f"{y:g}") for y in rounded(ticks(0.0, y_most))],
+        line=axes.line(curve),
+        band=axes.band(curve),
+        seen=(axes.across(curve.seen[0]), axes.across(curve.seen[1])),
+        marked=axes.across(curve.marked),
+        x_ticks=axes.x_ticks(),
+        y_ticks=axes.y_ticks(),
+    )
+
+
+def draw_together(curves: Sequence[Curve]) -> ManyChart:
+    """A chart of one or more curves over the same axes, marked at the same value; the first one's labels count."""
+    axes, first = _Axes(curves), curves[0]
+    return ManyChart(
+        title=first.title,
+        x_label=first.x_label,
+        y_label=first.y_label,
+        lines=[axes.line(curve) for curve in curves],
+        bands=[axes.band(curve) for curve in curves],
+        marked=axes.across(first.marked),
+        x_ticks=axes.x_ticks(),
+        y_ticks=axes.y_ticks(),
     )
 
 

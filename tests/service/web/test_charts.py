@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from service.domain.plan import ForceCurve
-from service.web.charts import HEIGHT, WIDTH, Curve, draw, ticks
+from service.web.charts import HEIGHT, WIDTH, Curve, draw, draw_together, ticks
 from service.web.force_curve import draw_forces, probabilities
 
 
@@ -42,6 +42,17 @@ def test_a_line_stands_where_its_axis_says() -> None:
     height = {tick.text: tick.place for tick in chart.y_ticks}
     drawn = [float(y) for y in re.findall(r",([\d.]+)", chart.line)]
     assert drawn == pytest.approx([height["0.4"]] * 2, abs=0.06)
+
+
+def test_curves_drawn_together_share_their_axes() -> None:
+    higher = Curve([0.0, 2.0], [0.8, 0.8], [0.7, 0.7], [0.9, 0.9], (0.0, 2.0), 0.5, "x", "y", "title")
+    chart = draw_together([curve(), higher])
+    place = {tick.text: tick.place for tick in (*chart.y_ticks, *chart.x_ticks)}
+    first, second = ([tuple(map(float, p.split(","))) for p in line.split()] for line in chart.lines)
+    assert [y for _, y in first] == pytest.approx([place["0.4"]] * 2, abs=0.06)
+    assert [y for _, y in second] == pytest.approx([place["0.8"]] * 2, abs=0.06)
+    assert (first[-1][0], second[-1][0]) == pytest.approx((place["1"], place["2"]), abs=0.06)
+    assert chart.marked == pytest.approx(place["0.5"], abs=0.06)
 
 
 def forces(asked: float, from_probability: float) -> ForceCurve:

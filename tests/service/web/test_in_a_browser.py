@@ -105,7 +105,7 @@ def test_nobody_is_kept_out_of_a_page(page: Tab, client: httpx.Client, fitted: A
     asked = "material=fitted&tangential_load=1.5&contact_area=6e-5"
     log, material = f"/logs/{fitted['id']}", f"/materials/{fitted['material']}"
     paths = ["/", "/?search=nothing", material, log, "/upload", "/jobs", "/sensors", "/sensors/half-space", "/plan"]
-    paths += ["/live"]
+    paths += ["/live", f"/compare?material={fitted['material']}&fn=0.05"]
     paths += [f"/plan?{asked}", "/keys", "/audit", "/problems", "/login", f"{material}/report", f"{log}/report"]
     page.resize(width)
     page.prefer(scheme)
