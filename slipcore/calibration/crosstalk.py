@@ -16,10 +16,10 @@ def crosstalk(press: Press) -> list[Observation]:
     """
     if press.split is None:
         return ["the log has no forces"] * 2
+    if press.depth == 0.0:
+        return ["no marker is pressed in, against which its motion sideways would tell of a load that leans"] * 2
     shares, errors = _proportional(press)
-    leaning = np.zeros(2)
-    if press.depth > 0.0:
-        leaning = np.abs(marker_motion(press)[0].mean(axis=0)) * ESTIMATE.sideways_stiffness / press.depth
+    leaning = np.abs(marker_motion(press)[0].mean(axis=0)) * ESTIMATE.sideways_stiffness / press.depth
     errors = np.hypot(errors, leaning)
     return [Observed(float(share), float(error)) for share, error in zip(shares, errors, strict=True)]
 

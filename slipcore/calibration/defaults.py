@@ -35,7 +35,7 @@ class PressDefaults(Options):
     """Most that the markers of the footprint may go sideways, or turn at its rim, as a share of the indentation."""
     load_change: Annotated[float, Option(0.0, 10.0, "-", "less shifts a friction coefficient of 0.5 by 10 %")] = 0.05
     """Most by which tangential load may stray from being proportional to the normal load, as a share of its largest."""
-    stray_noise: Annotated[float, Option(0.0, 100.0, "standard deviations", "3 σ")] = 3.0
+    stray_noise: Annotated[float, Option(0.0, 100.0, "standard deviations", "one press in 1000 of 300 frames")] = 5.0
     """The same, above its noise."""
 
 

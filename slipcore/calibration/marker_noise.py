@@ -33,6 +33,9 @@ def marker_noise(presses: list[Press]) -> tuple[Estimate, Estimate]:
         reason = f"{count} elements; {ESTIMATE.noise_series} are needed"
         return unknown(*names[0], reason), unknown(*names[1], reason)
     squares = _mean_squares(usable)
+    if not squares.any():
+        reason = "no marker's reading changes while nothing touches: it is rounded, or held back"
+        return unknown(*names[0], reason), unknown(*names[1], reason)
     whole = np.array(_fit(squares.mean(axis=1)))
     blocks = min(ESTIMATE.noise_blocks, count)
     parts = np.array([_fit(np.delete(squares, np.s_[k::blocks], axis=1).mean(axis=1)) for k in range(blocks)])

@@ -12,7 +12,7 @@ from benchmarks.presses import Faults, pressed
 from db.blobs import BlobStore
 from db.database import Database
 from db.records import NewCalibration
-from db.repositories import calibrations, jobs, materials, runners, sensors
+from db.repositories import calibrations, detections, jobs, materials, runners, sensors
 from db.tables import DetectionRow
 from service.domain.calibrate import OFFSET, corrected
 from service.domain.sensors import RECONSTRUCTED
@@ -250,3 +250,34 @@ def test_a_log_of_another_lattice_stays_as_it_is_and_says_so(database: Database,
         assert (left.log, left.version) == (part, 1)
         assert left.changed == ("nothing: calibrated on 12 × 12 elements, and the log has 10 × 12",)
         assert corrected(session, part, "cut", None, "filter") == (part, None, None, {})
+
+
+def test_a_log_that_is_looked_at_again_is_corrected_as_it_was(
+    reach: Callable[..., Any], database: Database, blobs: BlobStore, ball: GraspLog
+) -> None:
+    def calibrate(seed: int) -> None:
+        model = calibrate_sensor([FAULTS.put_into(ball, seed)])
+        with database.write() as session:
+            sensors.find_or_add(session, "kept")
+            calibrations.add(session, "kept", NewCalibration((), replace(model, offset=None).to_json(), None, None))
+
+    def detected() -> Any:
+        with database.write() as session:
+            claim = jobs.claim(session, runners.add(session, "host:1"))
+        assert claim is not None
+        pipeline.run_job(database, blobs, claim)
+        found = lab.request("GET", f"/v1/grasp-logs/{log['id']}").json()
+        assert found["job"]["status"] == "done"
+        return {name: value for name, value in found["detection"].items() if name != "seconds"}
+
+    calibrate(1)
+    lab, content = reach("open"), encode(FAULTS.put_into(ball, 2))
+    sent = lab.request("POST", "/v1/grasp-logs?sensor=kept", content=content, headers={"content-type": NPZ})
+    log = sent.raise_for_status().json()
+    first = detected()
+    assert first["calibration"] == 1
+    calibrate(3)
+    with database.write() as session:
+        detections.remove(session, log["id"])
+        jobs.requeue(session, log["job"]["id"])
+    assert detected() == first
