@@ -2,8 +2,8 @@
 
 Each fault is put into four grasps of friction 0.5 (a ball pressed with 4 to 14 N and sheared, closed form) and into
 three presses of another ball, by which the sensor is calibrated. Error of the friction that the grasps' fit predicts at
-the working load, β₂, and F1 of slip, before and after. The
-friction of a contact that pivots on a sensor that smooths, too. Writes calibration.json and calibration.png.
+the working load, β₂, and F1 of slip, before and after. Friction of a contact that pivots on a sensor that smooths, and
+what single presses tell of all faults at once, too. Writes calibration.json and calibration.png.
 """
 
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from benchmarks.pages import options, picture_folder, save, table, write
 from benchmarks.patch_grasps import PIVOT, grasp
-from benchmarks.presses import Faults, pressed
+from benchmarks.presses import WHITE_SHARE, Faults, pressed
 from estimators import fit
 from slipcore import (
     ContactFriction,
@@ -34,6 +34,9 @@ WORKING_LOAD = (2e-4, 0.06)
 SCHEDULE = RampSchedule(rest=0.5, press=0.7, settle=0.3, shear=3.0, hold=0.5)
 PRESSED_WITH = 2.0
 WHITE = Faults(marker_noise=1e-6, force_noise=2e-3)
+RECOVERED = Faults(5e-3, (2e-5, 0.0, -1e-4), (0.08, -0.05), 1.0, 1.1, 3e-6, 0.9, 2e-3)
+"""All at once, at sizes that real sensors have."""
+RECOVERED_SEEDS = 40
 FAULTS = {
     "none": WHITE,
     "offset of 5 mN": replace(WHITE, offset=5e-3),
@@ -127,6 +130,36 @@ def draw(rows: list[Row]) -> Figure:
     return figure
 
 
+def truth(faults: Faults) -> dict[str, float]:
+    """What a calibration should find of the faults."""
+    offset = faults.offsets((20, 20)).mean(axis=(0, 1))
+    vectors = {"force_offset": offset, "force_drift": faults.drift, "crosstalk": faults.crosstalk}
+    known = {
+        f"{name}_{axis}": float(value)
+        for name, given in vectors.items()
+        for axis, value in zip("xyz", given, strict=False)
+    }
+    noise = 1.0 + WHITE_SHARE**2
+    return known | {
+        "inward_share": 0.0,
+        "kernel_width": 1e-3 * faults.smoothing,
+        "marker_noise": faults.marker_noise * np.sqrt(noise),
+        "marker_noise_correlation": faults.memory / noise,
+        "gain": 1.0 / faults.gain,
+    }
+
+
+def recovered(seeds: int) -> Iterator[tuple[object, ...]]:
+    """Of each quantity what was put in, mean and scatter of what one press tells, and how many intervals hold it."""
+    ball = pressed(PRESSED_WITH)
+    models = [calibrate_sensor([RECOVERED.put_into(ball, 20_000 + seed)], [PRESSED_WITH]) for seed in range(seeds)]
+    for name, true in truth(RECOVERED).items():
+        found = [model[name] for model in models]
+        values = [each.value for each in found]
+        covered = sum(each.low <= true <= each.high for each in found)
+        yield f"{name}, {found[0].unit}", true, float(np.mean(values)), float(np.std(values)), f"{covered} of {seeds}"
+
+
 def pivots(width: float) -> tuple[float, ContactFriction, ContactFriction]:
     """Friction of a contact that pivots, without and with the kernel that three presses tell; ``width`` elements."""
     faults = replace(WHITE, smoothing=width)
@@ -146,6 +179,7 @@ def pivot_cells(width: float) -> list[object]:
     return [width, 1e3 * kernel, *told]
 
 
+RECOVERED_COLUMNS = ("quantity", "put in", "mean estimate", "standard deviation", "95 % intervals that hold it")
 PIVOT_COLUMNS = ("smoothing, elements", "found, mm", "friction of the pivot (0.7)", "calibrated")
 COLUMNS = ("fault", "error of μ", "calibrated", "error of β₂, 1/N", "calibrated", "F1", "calibrated")
 
@@ -164,7 +198,8 @@ def main() -> None:
     ]
     made = {"calibration": table(COLUMNS, cells)}
     made["pivots"] = table(PIVOT_COLUMNS, [pivot_cells(width) for width in (0.5, 1.0, 1.5, 2.0)])
-    print(made["calibration"], made["pivots"], sep="\n\n")
+    made["recovered"] = table(RECOVERED_COLUMNS, recovered(RECOVERED_SEEDS))
+    print(*made.values(), sep="\n\n")
     save(draw(rows), pictures / "calibration.png")
     write([asdict(row) for row in rows], made, arguments, "calibration.json")
 

@@ -10,6 +10,8 @@ from slipcore.contact import RampSchedule, tangential_ramp
 
 FINE = 5
 """Points along each side of an element."""
+WHITE_SHARE = 0.1
+"""Standard deviation of white marker noise beside the one with memory, as a share of it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +46,7 @@ class Faults:
         noise = rng.standard_normal(log.displacement.shape)
         for k in range(1, len(noise)):
             noise[k] = self.memory * noise[k - 1] + np.sqrt(1.0 - self.memory**2) * noise[k]
-        noise = self.marker_noise * (noise + 0.1 * rng.standard_normal(noise.shape))
+        noise = self.marker_noise * (noise + WHITE_SHARE * rng.standard_normal(noise.shape))
         return replace(log, force=force, displacement=log.displacement + noise)
 
 
