@@ -44,7 +44,7 @@ const ofFriction = (name) => seen.map((frame) => frame.friction?.[name] ?? NaN);
 const most = (...columns) => roundUp(Math.max(...columns.flat().filter((value) => !Number.isNaN(value)), 0));
 
 function drawTimes() {
-  const height = 400, [context, width] = prepared(times, height);
+  const height = times.clientHeight, [context, width] = prepared(times, height);
   const last = seen[seen.length - 1].time, first = Math.max(seen[0].time, last - SHOWN_SECONDS);
   const seconds = seen.map((frame) => frame.time), third = (height - GAP) / 3;
   const across = (time) => LEFT + ((width - LEFT - RIGHT) * (time - first)) / (last - first || 1);

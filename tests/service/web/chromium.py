@@ -1,5 +1,6 @@
 """Debian's Chromium without a window, driven by the protocol of its developer tools."""
 
+import base64
 import itertools
 import json
 import shutil
@@ -89,6 +90,10 @@ class Tab:
     def prefer(self, scheme: str) -> None:
         """Ask pages for "light" or "dark"."""
         self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+
+    def picture(self) -> bytes:
+        """A PNG of the part of the page that is seen."""
+        return base64.b64decode(self.call("Page.captureScreenshot", format="png")["data"])
 
     def barriers(self) -> list[str]:
         """What axe-core finds on the page that may keep people from using it: rule, impact and the elements."""
