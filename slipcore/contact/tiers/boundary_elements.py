@@ -32,8 +32,8 @@ from slipcore.frames import FloatArray, GraspLog
 class Fidelity:
     """``cells`` across the largest contact, load steps a frame (``substeps``), ``tolerance`` of the solver.
 
-    Where pressing moves the surface sideways there are more load steps: none lets the contact grow by more than a ring
-    of such cells, a ring in as many steps as a frame has.
+    Where pressing moves the surface sideways there are more load steps: in none the contact becomes wider by more than
+    such a cell, or than a ``substeps``-th of it.
     """
 
     cells: int = FIDELITY.cells
@@ -73,7 +73,7 @@ def _frames(
     plan: Plan, solver: QuasiStatic, where: SensorGrid, times: FloatArray, fidelity: Fidelity
 ) -> tuple[list[FrameRecord], list[tuple[str, ...]]]:
     """Records of all frames, and of each load step what the grid does not resolve."""
-    state, growth = solver.start(), 2.0 / (fidelity.cells * fidelity.substeps)
+    state, growth = solver.start(), 1.0 / (fidelity.cells * fidelity.substeps)
     frames, warnings = [untouched(where)], list[tuple[str, ...]]()
     for begin, end in pairwise(times):
         instants = load_steps(plan, begin, end, fidelity.substeps, growth)
