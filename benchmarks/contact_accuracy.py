@@ -1,8 +1,8 @@
 """What accuracy costs in time: `python -m benchmarks.contact_accuracy [--output FOLDER] [--cells ...] [--scenes ...]`.
 
 Error against processor time over grids and tolerances, for each contact problem with a closed form and for whole
-scenes against a fine run; then what `simulate(scene, accuracy=...)` was asked and what it kept. Writes JSON and
-pictures, prints Markdown tables.
+scenes against a fine run; then what `simulate(scene, accuracy=...)` was asked and what it kept; and the error of load
+steps alone. `--parts steps` measures only the last. Writes JSON and pictures, prints Markdown tables.
 """
 
 import argparse
@@ -47,6 +47,11 @@ SCENES = (
 )
 ASKED = (0.1, 0.05, 0.02)
 FINE = Fidelity(cells=110, substeps=2, tolerance=1e-6)
+STEPPED = ("table1_condition1_layer", "bottle_cap_twist", "cup_filling", "lifting_07N")
+STEPS = (1, 2, 4, 8)
+FINEST_STEPS = 32
+"""Load steps a frame that those of ``STEPS`` are compared with, on the same grid."""
+PARTS = ("cells", "steps")
 
 Errors = Callable[[int, float], float]
 
@@ -70,6 +75,22 @@ class Kept:
     asked: float
     estimated: float
     true: float
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Stepped:
+    """What load steps alone leave of error in a scene: ``substeps`` a frame, ``steps`` in all, the largest absolute
+    error of the stick ratio and its mean over time, relative L2 of displacement and force, processor seconds.
+    """
+
+    scene: str
+    substeps: int
+    steps: int
+    stick_ratio: float
+    mean_stick_ratio: float
+    displacement: float
+    force: float
     seconds: float
 
 
@@ -203,6 +224,56 @@ def scenes(names: list[str]) -> Iterator[Point | Kept]:
         print(f"{name}: done", flush=True)
 
 
+def load_steps(names: list[str]) -> Iterator[Stepped]:
+    """Scenes on the default grid in ever more load steps, against the finest."""
+    for name in names:
+        plan = Scene.from_toml(name).plan()
+        fine = run(plan, Fidelity(substeps=FINEST_STEPS, tolerance=1e-5))
+        for substeps in STEPS:
+            began = time.process_time()
+            log = run(plan, Fidelity(substeps=substeps))
+            seconds, error = time.process_time() - began, difference(log, fine)
+            assert log.truth is not None
+            assert fine.truth is not None
+            mean = float(np.nanmean(np.abs(log.truth.stick_ratio - fine.truth.stick_ratio)))
+            steps = int(log.metadata["steps"])
+            yield Stepped(name, substeps, steps, error.stick_ratio, mean, error.displacement, error.force, seconds)
+        print(f"{name}: steps done", flush=True)
+
+
+def step_curves(stepped: list[Stepped]) -> Figure:
+    """Error of load steps against their number, with lines of first and second order."""
+    figure = Figure(figsize=(11.0, 4.2), layout="constrained")
+    panels = figure.subplots(1, 2)
+    for axes, measure in zip(panels, ("displacement", "mean_stick_ratio"), strict=True):
+        for name in dict.fromkeys(entry.scene for entry in stepped):
+            own = [entry for entry in stepped if entry.scene == name]
+            axes.loglog([e.steps for e in own], [getattr(e, measure) or np.nan for e in own], "o-", ms=4, label=name)
+        first = [entry for entry in stepped if entry.scene == stepped[0].scene]
+        for order, style in ((1, ":"), (2, "--")):
+            falls = [getattr(first[0], measure) * (first[0].steps / entry.steps) ** order for entry in first]
+            axes.loglog([entry.steps for entry in first], falls, style, color="0.5", label=f"order {order}")
+        axes.set(title=measure.replace("_", " "), xlabel="load steps", ylabel="error")
+        axes.xaxis.set_minor_formatter(NullFormatter())
+        axes.grid(visible=True, which="both", alpha=0.3)
+    panels[0].legend(fontsize=8)
+    return figure
+
+
+def step_table(stepped: list[Stepped]) -> str:
+    """Errors of load steps and times."""
+    lines = [
+        "| scene | steps | stick ratio | its mean | displacement | force | seconds |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    lines += [
+        f"| {e.scene} | {e.steps} | {e.stick_ratio:.4f} | {e.mean_stick_ratio:.5f} | {e.displacement:.1e} "
+        f"| {e.force:.1e} | {e.seconds:.2f} |"
+        for e in stepped
+    ]
+    return "\n".join(lines)
+
+
 def curves(points: list[Point]) -> Figure:
     """Error against time, a panel for each case."""
     cases = list(dict.fromkeys(point.case for point in points))
@@ -253,15 +324,24 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("benchmark-output"))
     parser.add_argument("--cells", type=int, nargs="+", default=[16, 32, 64, 128])
     parser.add_argument("--scenes", nargs="*", default=list(SCENES), help="the layered one takes minutes")
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS), help="what to measure")
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
-    measured = [*closed_forms(options.cells), *scenes(options.scenes)]
-    points = [entry for entry in measured if isinstance(entry, Point)]
-    kept = [entry for entry in measured if isinstance(entry, Kept)]
-    records = {"points": [asdict(point) for point in points], "on_request": [asdict(entry) for entry in kept]}
-    (options.output / "contact_accuracy.json").write_text(json.dumps(records, indent=1))
-    curves(points).savefig(options.output / "contact_accuracy.png", dpi=100)
-    print(table(points), request_table(kept), sep="\n\n")
+    if "cells" in options.parts:
+        measured = [*closed_forms(options.cells), *scenes(options.scenes)]
+        points = [entry for entry in measured if isinstance(entry, Point)]
+        kept = [entry for entry in measured if isinstance(entry, Kept)]
+        records = {"points": [asdict(point) for point in points], "on_request": [asdict(entry) for entry in kept]}
+        (options.output / "contact_accuracy.json").write_text(json.dumps(records, indent=1))
+        curves(points).savefig(options.output / "contact_accuracy.png", dpi=100)
+        print(table(points), request_table(kept), sep="\n\n")
+    if "steps" in options.parts:
+        stepped = list(load_steps(list(STEPPED)))
+        (options.output / "contact_accuracy_steps.json").write_text(
+            json.dumps([asdict(entry) for entry in stepped], indent=1)
+        )
+        step_curves(stepped).savefig(options.output / "contact_accuracy_steps.png", dpi=100)
+        print(step_table(stepped))
 
 
 if __name__ == "__main__":
