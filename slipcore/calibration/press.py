@@ -19,7 +19,10 @@ class ImpurePress(InvalidInput):
     def __init__(self, evidence: dict[int, str]) -> None:
         self.evidence = evidence
         told = "; ".join(f"log {number + 1}: {seen}" for number, seen in evidence.items())
-        super().__init__("logs", told, "pure presses: a body pressed straight down and lifted, without load sideways")
+        super().__init__("logs", told, "a body pressed straight down and lifted, without load sideways")
+
+    def __str__(self) -> str:
+        return f"no pure press is {self.value}; allowed: {self.allowed}"
 
     def __reduce__(self) -> tuple[type["ImpurePress"], tuple[dict[int, str]]]:
         return type(self), (self.evidence,)
