@@ -20,6 +20,8 @@ from db.quarantine import FolderQuarantine, Quarantine, move, sync_folder
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 STORE_ID = "store-id"
+UNSETTLED = "first start of "
+"""What the file of the id begins with until the database has the id, too."""
 """File beside the blobs that tells which store they belong to (``db.identity``)."""
 
 
@@ -213,20 +215,32 @@ class BlobStore:
 
     def read_store_id(self) -> str | None:
         """The store that the blobs say they belong to; None where they don't say."""
-        return self._local_store_id() if self._remote is None else self._remote.read(STORE_ID)
+        told = self._told_store_id()
+        return None if told is None else told.removeprefix(UNSETTLED)
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether the blobs belong to a store whose database is known to say so, too."""
+        told = self._told_store_id()
+        return told is not None and not told.startswith(UNSETTLED)
 
     def cached_store_id(self) -> str | None:
         """The store of which the folder is no cache of an object store, but the only place; None elsewhere."""
-        return None if self._remote is None else self._local_store_id()
+        told = None if self._remote is None else self._local_store_id()
+        return None if told is None else told.removeprefix(UNSETTLED)
 
-    def write_store_id(self, store_id: str) -> None:
-        """Let the blobs say, durably, which store they belong to."""
+    def write_store_id(self, store_id: str, *, settled: bool = True) -> None:
+        """Let the blobs say, durably, which store they belong to; not ``settled``: or will, if the database agrees."""
+        told = store_id if settled else f"{UNSETTLED}{store_id}"
         if self._remote is not None:
-            self._remote.write(STORE_ID, store_id)
+            self._remote.write(STORE_ID, told)
             return
         with disk_errors_named(), Spool(self._spool / uuid.uuid4().hex, self._name_store) as spool:
-            spool.write(f"{store_id}\n".encode())
+            spool.write(f"{told}\n".encode())
             spool.keep()
+
+    def _told_store_id(self) -> str | None:
+        return self._local_store_id() if self._remote is None else self._remote.read(STORE_ID)
 
     def _name_store(self, spooled: Path, _sha256: str) -> None:
         spooled.replace(self._blobs / STORE_ID)

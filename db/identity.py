@@ -44,14 +44,17 @@ def join(database: Database, blobs: BlobStore, *, alone: bool, to_fill: bool = F
         stores.lock(session)
         known, found = stores.find_id(session), blobs.read_store_id()
         if known is None:
-            _require_same(database, blobs, known, None if alone and _is_new(session, blobs) else found)
+            has_begun = alone and not blobs.is_settled and _is_new(session, blobs)  # and died before the row was there
+            _require_same(database, blobs, known, None if has_begun else found)
             if not to_fill:
                 _require_consistent(session, database, blobs)
             known = uuid.uuid4().hex
-            blobs.write_store_id(known)  # before the row: what dies in between leaves two without content
+            blobs.write_store_id(known, settled=False)  # before the row: a start that dies in between can begin anew
             stores.set_id(session, known)
         else:
             _require_same(database, blobs, known, found)
+    if not blobs.is_settled:
+        blobs.write_store_id(known)  # no other database gets the blobs from here on, though there are none yet
     database.store_id = blobs.store_id = known
 
 
@@ -74,7 +77,7 @@ def verify_before_upgrade(database: Database, blobs: BlobStore) -> None:
             known = stores.find_id(session) if stores.has_table(session) else None
             has_logs = grasp_logs.any_in_older_schema(session)
     has_files = next(blobs.hashes(), None) is not None
-    if known is not None or has_files:
+    if known is not None or has_files or blobs.is_settled:
         _require_same(database, blobs, known, blobs.read_store_id())
     if known is None and has_files and not has_logs:
         raise _refers_to_none(database, blobs)
@@ -114,7 +117,7 @@ def wanted(session: Session) -> Iterator[str]:
 
 
 def _is_new(session: Session, blobs: BlobStore) -> bool:
-    """Whether neither has anything: one died between the two halves of its first start."""
+    """Whether neither has anything."""
     return not references.any_referenced(session) and next(blobs.hashes(), None) is None
 
 

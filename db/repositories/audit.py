@@ -39,13 +39,11 @@ def newest_id(session: Session) -> int:
     return session.scalar(select(func.max(AuditEntryRow.id))) or 0
 
 
-def list_after(
-    session: Session, entry_id: int, actions: Collection[AuditAction], before: datetime, limit: int
-) -> list[AuditEntry]:
-    """The first entries of some actions after one, from ``before`` a moment, in their order."""
-    query = select(AuditEntryRow).where(AuditEntryRow.id > entry_id, AuditEntryRow.action.in_(actions))
-    query = query.where(AuditEntryRow.at < before).order_by(AuditEntryRow.id).limit(limit)
-    return [_record(row) for row in session.scalars(query)]
+def first_between(session: Session, after: int, last: int, actions: Collection[AuditAction]) -> AuditEntry | None:
+    """The first entry of some actions behind the id ``after``, up to ``last``; None where there is none."""
+    query = select(AuditEntryRow).where(AuditEntryRow.id > after, AuditEntryRow.id <= last)
+    row = session.scalar(query.where(AuditEntryRow.action.in_(actions)).order_by(AuditEntryRow.id).limit(1))
+    return None if row is None else _record(row)
 
 
 def is_recorded(session: Session, action: AuditAction, subject: str, since: datetime) -> bool:

@@ -33,9 +33,13 @@ def webhook_entry(session: Session) -> int | None:
     return session.scalar(select(StoreRow.webhook_entry_id))
 
 
-def set_webhook_entry(session: Session, entry_id: int) -> None:
-    """Note that the webhook has had the entries up to this one."""
-    session.execute(update(StoreRow).values(webhook_entry_id=entry_id))
+def set_webhook_entry(session: Session, entry_id: int, before: int | None) -> None:
+    """Note that the webhook has had the entries up to this one; not where another process has noted more than
+    ``before`` meanwhile.
+    """
+    session.execute(
+        update(StoreRow).where(StoreRow.webhook_entry_id.is_not_distinct_from(before)).values(webhook_entry_id=entry_id)
+    )
 
 
 def touch(session: Session) -> None:

@@ -1,11 +1,12 @@
 """Tell an address of the operator's what the service itself has found, from the audit trail."""
 
+import asyncio
 import hashlib
 import hmac
 import json
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from datetime import timedelta
 
 from db.database import Database
@@ -23,8 +24,8 @@ ACTIONS: tuple[AuditAction, ...] = ("material.surface_changed", "blob.damaged")
 LOOK_SECONDS = 5.0
 """s between two looks for new entries."""
 
-SETTLED = timedelta(seconds=10.0)
-"""Age from which an entry is sent: on PostgreSQL one with a smaller id may be committed a moment after it."""
+SETTLED = 30.0
+"""s since an entry was seen, from which it is sent: on PostgreSQL one with a smaller id may be committed after it."""
 
 EXPIRED = timedelta(days=7.0)
 """Age from which an entry is not sent any more, so that one that is refused for good does not stop all others."""
@@ -33,10 +34,7 @@ LONGEST_PAUSE = 600.0
 """s between two attempts at most; the first pause is ``LOOK_SECONDS``, each further one twice as long."""
 
 TIMEOUT = 10.0
-"""s until the address must have answered."""
-
-AT_ONCE = 100
-"""Entries read at once."""
+"""s that a sending may take in all, whatever the address does: a process that ends waits for it."""
 
 
 class NotTaken(Exception):
@@ -53,6 +51,7 @@ class Webhook:
         self._database, self._url, self._leads = database, url, leads
         self._secret = None if secret is None else secret.encode()
         self._pause, self._next = 0.0, 0.0
+        self._seen: list[tuple[float, int]] = []  # when the newest entry had which id, oldest first
         self._thread = PeriodicThread("webhook", LOOK_SECONDS, self._look)
 
     def start(self) -> None:
@@ -66,21 +65,30 @@ class Webhook:
 
     def send_new(self) -> int:
         """Send what is new and settled; returns how many entries the address took. Raises ``NotTaken``."""
-        store, last = self._position()
-        with self._database.read() as session:
-            entries = audit.list_after(session, last, ACTIONS, now() - SETTLED, AT_ONCE)
-        taken = 0
-        for entry in entries:
-            if self._thread.is_stopping:
+        settled, taken = self._settled(), 0
+        while not self._thread.is_stopping and self._leads():
+            with self._database.read() as session:
+                store, before = stores.find_id(session), stores.webhook_entry(session)
+                entry = None if before is None else audit.first_between(session, before, settled, ACTIONS)
+            if before is not None and entry is None:
                 break
-            if entry.at < now() - EXPIRED:
+            if entry is not None and entry.at < now() - EXPIRED:
                 logger.error("webhook: entry %d of the audit trail is too old to be sent", entry.id)
-            else:
+            elif entry is not None:
                 self._send(store, entry)
                 taken += 1
-            with self._database.write(durable=False) as session:
-                stores.set_webhook_entry(session, entry.id)
+            with self._database.write(durable=False) as session:  # of a first webhook, what was there is not sent
+                had = audit.newest_id(session) if entry is None else entry.id
+                stores.set_webhook_entry(session, had, before)
         return taken
+
+    def _settled(self) -> int:
+        """Id up to which no entry can come any more; by when it was seen, since processes' clocks may differ."""
+        with self._database.read() as session:
+            self._seen.append((time.monotonic(), audit.newest_id(session)))
+        old = [number for at, number in self._seen if at <= time.monotonic() - SETTLED]
+        self._seen = self._seen[max(len(old) - 1, 0) :]
+        return old[-1] if old else 0
 
     def _look(self) -> None:
         if not self._leads() or time.monotonic() < self._next:
@@ -88,37 +96,36 @@ class Webhook:
         try:
             self.send_new()
             self._pause = 0.0
-        except NotTaken as reason:
+        except (NotTaken, DatabaseError) as reason:
             self._pause = min(max(2.0 * self._pause, LOOK_SECONDS), LONGEST_PAUSE)
             self._next = time.monotonic() + self._pause
             logger.warning("webhook: %s; the next attempt is in %g s", reason, self._pause)
-        except DatabaseError as error:
-            logger.warning("the webhook is told nothing: %s", error)
-
-    def _position(self) -> tuple[str | None, int]:
-        """The store's id, and the newest entry that was sent: of a first webhook, the newest of all."""
-        with self._database.read() as session:
-            store, last = stores.find_id(session), stores.webhook_entry(session)
-        if last is None:
-            with self._database.write(durable=False) as session:
-                last = audit.newest_id(session)
-                stores.set_webhook_entry(session, last)
-        return store, last
 
     def _send(self, store: str | None, entry: AuditEntry) -> None:
-        import httpx  # a server without a webhook needs none
-
         content = told(store, entry)
         headers = {"content-type": "application/json", "user-agent": "stiction"}
         if self._secret is not None:
             headers["stiction-signature"] = f"sha256={hmac.new(self._secret, content, hashlib.sha256).hexdigest()}"
-        try:
-            with httpx.stream("POST", str(self._url), content=content, headers=headers, timeout=TIMEOUT) as answer:
-                status, taken = answer.status_code, answer.is_success  # whatever else it says is not read
-        except (httpx.HTTPError, httpx.InvalidURL) as error:  # whose texts may tell the address
-            raise NotTaken(f"the address cannot be reached ({type(error).__name__})") from error
-        if not taken:
+        status = asyncio.run(_answer(str(self._url), content, headers))
+        if not 200 <= status < 300:
             raise NotTaken(f"the address answered {status} to entry {entry.id} of the audit trail")
+
+
+async def _answer(url: str, content: bytes, headers: Mapping[str, str]) -> int:
+    """The status that the address answers a POST with; whatever else it says is not read. Raises ``NotTaken``."""
+    import httpx  # a server without a webhook needs none
+
+    try:
+        async with (
+            asyncio.timeout(TIMEOUT),
+            httpx.AsyncClient(timeout=None) as client,
+            client.stream("POST", url, content=content, headers=headers) as answer,
+        ):
+            return answer.status_code
+    except TimeoutError as error:
+        raise NotTaken(f"the address took longer than {TIMEOUT:g} s") from error
+    except (httpx.HTTPError, httpx.InvalidURL) as error:  # whose texts may tell the address
+        raise NotTaken(f"the address cannot be reached ({type(error).__name__})") from error
 
 
 def told(store: str | None, entry: AuditEntry) -> bytes:

@@ -45,6 +45,14 @@ def refer(new_log: NewLog) -> Callable[[Database, BlobStore, bytes], str]:
     return store
 
 
+class Died(BaseException):
+    """The process is no more: nothing in it goes on."""
+
+
+def raising(*_: object) -> None:
+    raise Died
+
+
 def nothing(what: str, count: int) -> None:
     pass
 
@@ -115,16 +123,51 @@ def test_another_database_or_another_folder_is_refused_by_name(
     join(database, blobs)
 
 
-def test_a_new_database_is_refused_while_others_work_in_the_folder(
-    database: Database, blobs: BlobStore, other: Database
+def test_a_first_start_that_died_before_its_row_begins_anew(
+    database: Database, blobs: BlobStore, other: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Alone, it may be what is left of a first start that died half-way, for there is nothing to lose."""
-    join(database, blobs)
+    """But not while others work in the folder: one of them may be about to write its row."""
+    with monkeypatch.context() as dying:
+        dying.setattr(stores, "set_id", raising)
+        with pytest.raises(Died):
+            join(database, blobs)
     with pytest.raises(StoreMismatch, match=r"of no store yet, and .* of store"):
         identity.join(other, blobs, alone=False)
-    identity.join(other, blobs, alone=True)
+    join(other, blobs)
+    assert blobs.read_store_id() == store_id(other) is not None
     with pytest.raises(StoreMismatch):
         join(database, blobs)
+
+
+def test_a_first_start_that_died_after_its_row_goes_on(
+    database: Database, blobs: BlobStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settled, write = [], BlobStore.write_store_id
+
+    def dying_once_settled(store: BlobStore, name: str, **more: bool) -> None:
+        settled.append(more.get("settled", True))
+        if settled[-1]:
+            raise Died
+        write(store, name, **more)
+
+    with monkeypatch.context() as dying:
+        dying.setattr(BlobStore, "write_store_id", dying_once_settled)
+        with pytest.raises(Died):
+            join(database, blobs)
+    assert (settled, blobs.is_settled) == ([False, True], False)
+    known = store_id(database)
+    join(database, blobs)
+    assert (blobs.is_settled, blobs.read_store_id(), store_id(database)) == (True, known, known)
+
+
+def test_blobs_of_a_store_without_uploads_are_no_other_databases(
+    database: Database, blobs: BlobStore, other: Database
+) -> None:
+    join(database, blobs)
+    for use in (join, identity.verify_before_upgrade):
+        with pytest.raises(StoreMismatch, match=r"of no store yet, and .* of store"):
+            use(other, blobs)
+    join(database, blobs)
 
 
 def test_a_folder_of_files_becomes_no_cache_of_another_store(

@@ -76,6 +76,7 @@ def test_the_databases_password_is_not_shown() -> None:
         ("idempotency_hours", 0.0),
         ("webhook_url", "http://"),
         ("webhook_url", "http://[::1"),
+        ("webhook_url", "http://hooks.example:99999/x"),
         ("lookup_seconds", 61.0),
         ("rate_limit", -1.0),
         ("max_connections", 0),
@@ -123,7 +124,7 @@ def test_a_variable_that_is_no_setting_is_noticed() -> None:
 def test_a_wrong_setting_is_told_by_its_name_and_without_secrets(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("STICTION_READERS", "0")
     monkeypatch.setenv("STICTION_DATABASE_URL", "sqlite:///:memory:?password=hush")
-    monkeypatch.setenv("STICTION_WEBHOOK_URL", "ftp://hooks.example/hush")
+    monkeypatch.setenv("STICTION_WEBHOOK_URL", "https://user:hu℀sh@hooks.example/hush")
     monkeypatch.setenv("STICTION_WEBHOOK_SECRET", "hush")
     with pytest.raises(ValidationError) as refusal:
         Settings()
@@ -138,4 +139,4 @@ def test_a_wrong_setting_is_told_by_its_name_and_without_secrets(monkeypatch: py
     assert lines[3].startswith(
         "STICTION_WEBHOOK_URL is not one that is allowed; allowed: an http or https URL, such as"
     )
-    assert "hush" not in "".join(lines)
+    assert not {"hush", "hu℀sh"} & set(re.findall(r"[^\W_]+", "".join(lines)))

@@ -61,6 +61,19 @@ def test_a_start_with_a_wrong_database_is_refused_and_loses_nothing(
     assert not (tmp_path / "wrong.sqlite3").exists()
 
 
+def test_an_empty_database_is_not_made_beside_a_service_without_uploads(tmp_path: Path) -> None:
+    """It may have keys, owners and materials already."""
+    new = Settings(data_folder=tmp_path / "data", workers=0)
+    start(new)
+    before = files(new)
+    wrong = new.model_copy(update={"database_url": f"sqlite:///{tmp_path / 'wrong.sqlite3'}"})
+    with pytest.raises(StoreMismatch, match="of no store yet"):
+        start(wrong)
+    assert files(new) == before
+    assert not (tmp_path / "wrong.sqlite3").exists()
+    start(new)
+
+
 def test_an_empty_database_beside_files_stays_empty(right: Settings, tmp_path: Path) -> None:
     (right.data_folder / "blobs" / "store-id").unlink()
     wrong = right.model_copy(update={"database_url": f"sqlite:///{tmp_path / 'wrong.sqlite3'}"})

@@ -3,9 +3,10 @@ import hmac
 import json
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from datetime import timedelta
-from http.server import BaseHTTPRequestHandler, HTTPServer
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,8 @@ class Receiver:
     def __init__(self) -> None:
         self.got: list[tuple[dict[str, str], bytes]] = []
         self.status, self.headers = 204, dict[str, str]()
-        self.server = HTTPServer(("127.0.0.1", 0), self._handler())
+        self.overtaking: Callable[[], bool] | None = None  # what happens before the next answer
+        self.server = ThreadingHTTPServer(("127.0.0.1", 0), self._handler())
         self.url = f"http://127.0.0.1:{self.server.server_port}/hooks/friction?token=hush"
 
     @property
@@ -44,6 +46,9 @@ class Receiver:
             def do_POST(self) -> None:
                 body = self.rfile.read(int(self.headers["content-length"]))
                 receiver.got.append(({name.lower(): value for name, value in self.headers.items()}, body))
+                if (meanwhile := receiver.overtaking) is not None:
+                    receiver.overtaking = None
+                    meanwhile()
                 self.send_response(receiver.status)
                 for name, value in receiver.headers.items():
                     self.send_header(name, value)
@@ -64,6 +69,12 @@ def receiver() -> Iterator[Receiver]:
     receiver.server.shutdown()
     thread.join()
     receiver.server.server_close()
+
+
+@pytest.fixture(autouse=True)
+def settled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No entry has to wait."""
+    monkeypatch.setattr(webhook, "SETTLED", 0.0)
 
 
 @pytest.fixture
@@ -102,14 +113,27 @@ def test_what_the_service_finds_is_told_once_and_in_order(stored: Database, rece
     assert first["details"] == {"change": "friction of the newest grasp is 25 % lower", "of": "Stück"}
     assert (first["store"], first["action"], first["id"]) == ("5" * 32, "material.surface_changed", 2)
     with stored.read() as session:
-        (entry,) = audit.list_after(session, 1, ["material.surface_changed"], now(), 1)
+        entry = audit.first_between(session, 1, 2, ["material.surface_changed"])
+    assert entry is not None
     assert first["at"] == entry.at.isoformat()
 
 
-def test_an_entry_waits_until_those_before_it_are_sure_to_be_seen(stored: Database, receiver: Receiver) -> None:
+@pytest.mark.parametrize("age", [-86400.0, 60.0])
+def test_an_entry_waits_until_those_before_it_are_sure_to_be_seen(
+    stored: Database, receiver: Receiver, monkeypatch: pytest.MonkeyPatch, age: float
+) -> None:
+    """By when it was seen: the clock of the process that made it may be ahead."""
+    clock = [0.0]
+    monkeypatch.setattr(webhook, "SETTLED", 30.0)
+    monkeypatch.setattr(webhook.time, "monotonic", lambda: clock[0])
     sender = hook(stored, receiver)
-    found(stored, "paper", age=0.0)
-    assert sender.send_new() == 0
+    found(stored, "paper", age=age)
+    found(stored, "felt")
+    counts = []
+    for clock[0] in (5.0, 20.0, 35.0, 40.0):
+        counts += [sender.send_new()]
+    assert counts == [0, 0, 2, 0]
+    assert [each["subject"] for each in receiver.told] == ["paper", "felt"]
 
 
 def test_what_is_not_taken_comes_again_before_what_follows(stored: Database, receiver: Receiver) -> None:
@@ -159,6 +183,46 @@ def test_an_entry_too_old_does_not_stop_what_follows(
     assert sender.send_new() == 1
     assert [each["subject"] for each in receiver.told] == ["felt"]
     assert "entry 1 of the audit trail is too old to be sent" in caplog.text
+
+
+def test_what_another_process_has_sent_meanwhile_is_not_sent_again(stored: Database, receiver: Receiver) -> None:
+    """One that leads no more ends after the entry that it is at."""
+    first = hook(stored, receiver)
+    for subject in ("paper", "felt", "cork"):
+        found(stored, subject)
+
+    def overtaken() -> bool:
+        return second.send_new() == 3
+
+    second = Webhook(stored, receiver.url, None, lambda: True)
+    receiver.overtaking = overtaken
+    assert first.send_new() == 1
+    assert [each["subject"] for each in receiver.told] == ["paper", "paper", "felt", "cork"]
+
+
+@pytest.mark.parametrize("how", ["drips", "goes on to say"])
+def test_an_address_that_never_ends_its_answer_is_left(
+    stored: Database, monkeypatch: pytest.MonkeyPatch, how: str
+) -> None:
+    monkeypatch.setattr(webhook, "TIMEOUT", 0.5)
+    ended = threading.Event()
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+
+        def serve() -> None:
+            with listening.accept()[0] as connection, suppress(OSError):
+                connection.sendall(b"HTTP/1.1 ")
+                while not ended.wait(0.05):
+                    connection.sendall(b"2" if how == "drips" else b"103 Early Hints\r\n\r\nHTTP/1.1 ")
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        sender = Webhook(stored, f"http://127.0.0.1:{listening.getsockname()[1]}/", None, lambda: True)
+        assert sender.send_new() == 0
+        found(stored, "paper")
+        with pytest.raises(NotTaken, match=r"took longer than 0\.5 s"):
+            sender.send_new()
+        ended.set()
+        thread.join()
 
 
 @ONLY_SQLITE
