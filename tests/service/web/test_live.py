@@ -1,9 +1,16 @@
 """Pages of live streams, in process."""
 
+import asyncio
 from typing import Any
 
 import pytest
+from starlette.requests import HTTPConnection
 
+from db.database import Database
+from db.repositories import access_keys
+from service.domain import keys
+from service.http import authentication
+from service.http.problems import STORAGE_UNAVAILABLE, Problem
 from service.stream.messages import Open
 from service.stream.sessions import Session
 from tests.service.web.conftest import HOSTILE
@@ -56,3 +63,30 @@ def test_nobody_watches_without_a_key(reach: Any, make: Any) -> None:
     path = "/live/nothing/frames"
     assert reach("keys").open_stream(path).status_code == 401
     assert reach("keys", key=make("read")).open_stream(path).status_code == 101
+
+
+def test_who_watches_may_do_so_as_long_as_the_key_lasts(
+    reach: Any, make: Any, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(authentication, "KEPT_SECONDS", -1.0)  # each look asks the database
+    text = make("read")
+    app = reach("keys").app
+    headers = [(b"authorization", f"Bearer {text}".encode())]
+    scope = {"type": "websocket", "path": "/live/a/frames", "headers": headers, "client": ("10.0.0.9", 1), "app": app}
+    connection = HTTPConnection(scope)
+
+    def may() -> bool:
+        return asyncio.run(app.state.authenticator.still_admits(connection))
+
+    assert may()
+    monkeypatch.setattr(authentication.Authenticator, "_identify", unavailable)
+    assert may()  # while nobody can say otherwise
+    monkeypatch.undo()
+    monkeypatch.setattr(authentication, "KEPT_SECONDS", -1.0)
+    with database.write() as session:
+        access_keys.revoke(session, str(keys.key_id(text)))
+    assert not may()
+
+
+async def unavailable(*_: Any) -> None:
+    raise Problem(STORAGE_UNAVAILABLE, "the database is away")
