@@ -3,9 +3,12 @@
 The same from either database and into either, so that a backup is the way from SQLite to PostgreSQL, too.
 """
 
+import fcntl
+import logging
+import os
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -22,12 +25,17 @@ from db.repositories import audit, stores
 from db.sqlite_file import SIDE_FILES
 from db.tables import Base, BrowserSessionRow, IdempotencyKeyRow, RunnerRow, StoreRow
 
+logger = logging.getLogger(__name__)
+
 FILE = "stiction.sqlite3"
 LEFT_OUT = {table.__tablename__ for table in (RunnerRow, BrowserSessionRow, IdempotencyKeyRow, StoreRow)}
 """Tables of what is not copied: running processes, sessions, answers to repeated requests, and the store id: what is
 restored is a store of its own, so that two that grow apart are never taken for one."""
 
 ROWS_AT_ONCE = 500
+
+ATTEMPTS = 3
+"""How often rows are copied where files that they refer to are deleted meanwhile, as old uploads are."""
 
 Report = Callable[[str, int], None]
 """What is told what was copied, and how many of it."""
@@ -37,23 +45,51 @@ def backup(database: Database, blobs: BlobStore, folder: Path, report: Report) -
     """Copy everything into a folder, as of one moment of the database; blobs that are there already are kept.
 
     May run beside the service. Running jobs are copied as queued ones. Raises ``SchemaMismatch``, ``NotEmpty`` if the
-    folder has another backup, and ``StorageUnavailable`` on a full disk.
+    folder has another backup or is getting one, ``NotFound`` for a file that is missing, and ``StorageUnavailable`` on
+    a full disk.
     """
     migrate.check(database)
-    file = folder / FILE
-    if file.exists():
-        raise NotEmpty(f"backup {file}", "a folder without one; blobs of an earlier backup may be in it")
     folder.mkdir(parents=True, exist_ok=True)
+    file = folder / FILE
     unfinished = file.with_suffix(".part")
+    with _alone_in(folder):
+        if file.exists():
+            raise NotEmpty(f"backup {file}", "a folder without one; blobs of an earlier backup may be in it")
+        for attempt in range(1, ATTEMPTS + 1):
+            try:
+                _copy_out(database, blobs, unfinished, report)
+                break
+            except NotFound:
+                if attempt == ATTEMPTS:
+                    raise
+        unfinished.replace(file)
+        sync_folder(folder)
+
+
+def _copy_out(database: Database, blobs: BlobStore, unfinished: Path, report: Report) -> None:
     for left in (unfinished, *(Path(f"{unfinished}{suffix}") for suffix in SIDE_FILES)):
         left.unlink(missing_ok=True)
     with closing(_opened(unfinished)) as copy:
         migrate.upgrade(copy)
         _copy_rows(database, copy, report)
-        _copy_blobs(copy, blobs, BlobStore(folder), report)
+        _copy_blobs(copy, blobs, BlobStore(unfinished.parent), report)
         copy.empty_log()
-    unfinished.replace(file)
-    sync_folder(folder)
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Let no second backup begin in the folder; the lock goes with the process."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise NotEmpty(f"a backup under way in {folder}", "one at a time") from error
+        except OSError as error:
+            logger.warning("a second backup in %s would not be noticed: %s", folder, error)  # by its file system
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def restore(

@@ -1,3 +1,4 @@
+import hashlib
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import closing
@@ -15,7 +16,7 @@ from db.errors import BlobDamaged, NotEmpty, NotFound, SchemaMismatch, StorageUn
 from db.records import Claim, Detection, NewGraspLog, NewModel, SampleSummary
 from db.repositories import access_keys, detections, friction_models, grasp_logs, jobs, materials, runners
 from db.sqlite_file import SIDE_FILES
-from db.tables import Base, MaterialRow
+from db.tables import Base, GraspLogRow, MaterialRow
 
 Rows = dict[str, list[dict[str, object]]]
 
@@ -71,6 +72,10 @@ def rows(database: Database) -> Rows:
             for table in Base.metadata.sorted_tables
             if table.name not in LEFT_OUT
         }
+
+
+def blob_of(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
 
 
 def nothing(what: str, count: int) -> None:
@@ -131,6 +136,48 @@ def test_a_backup_that_was_killed_is_made_anew_in_the_same_folder(
         backup(filled, blobs, tmp_path / "copy", nothing)
         assert [path.name for path in (tmp_path / "copy").glob("*.*")] == [FILE]
         file.unlink()
+
+
+def test_a_backup_goes_on_where_an_old_upload_is_deleted_meanwhile(
+    filled: Database, blobs: BlobStore, tmp_path: Path
+) -> None:
+    told: list[str] = []
+
+    def deleting(what: str, _count: int) -> None:
+        told.append(what)
+        if what == "blobs" and told.count("blobs") == 1:  # when the rows are copied
+            with filled.write() as session:
+                session.execute(update(GraspLogRow).values(file_state="gone"))
+            blobs.remove(sha256 for sha256 in (blob_of(b"one"), blob_of(b"two")))
+
+    backup(filled, blobs, tmp_path / "backup", deleting)
+    assert told.count("grasp_logs") == 2
+    with closing(Database(f"sqlite:///{tmp_path / 'backup' / FILE}")) as copy, copy.read() as session:
+        assert set(session.scalars(select(GraspLogRow.file_state))) == {"gone"}
+
+
+def test_a_file_that_is_missing_for_good_stops_a_backup_by_name(
+    filled: Database, blobs: BlobStore, tmp_path: Path
+) -> None:
+    blobs.remove([blob_of(b"one")])
+    with pytest.raises(NotFound, match=blob_of(b"one")):
+        backup(filled, blobs, tmp_path / "backup", nothing)
+    assert not (tmp_path / "backup" / FILE).exists()
+
+
+def test_two_backups_in_one_folder_do_not_meet(filled: Database, blobs: BlobStore, tmp_path: Path) -> None:
+    refused = []
+
+    def begin_another(_what: str, _count: int) -> None:
+        with pytest.raises(NotEmpty, match=r"a backup under way in .* is there already; allowed: one at a time"):
+            backup(filled, blobs, tmp_path / "backup", nothing)
+        refused.append(True)
+
+    backup(filled, blobs, tmp_path / "backup", begin_another)
+    assert refused
+    restorable = tmp_path / "backup" / FILE
+    with closing(sqlite3.connect(restorable)) as copy:
+        assert copy.execute("PRAGMA integrity_check").fetchone() == ("ok",)
 
 
 def test_a_backup_whose_log_cannot_be_brought_into_its_file_is_none(
