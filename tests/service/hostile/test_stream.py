@@ -16,9 +16,11 @@ from starlette.websockets import WebSocketDisconnect
 
 from service.domain.principal import Principal
 from service.settings import Settings
-from service.stream import connection, detectors, sessions
+from service.stream import connection, detectors, errors, sessions
+from service.stream.detectors import PackedFrame
+from service.stream.errors import REFUSED, TOO_MANY, UNKNOWN_SESSION, End
 from service.stream.messages import Open
-from service.stream.sessions import REFUSED, TOO_MANY, UNKNOWN_SESSION, End, Streams
+from service.stream.sessions import Streams
 from slipcore.errors import InvalidInput
 
 SIDE = 4
@@ -117,11 +119,11 @@ def test_all_sessions_together_hold_a_bounded_number_of_bytes(make: Callable[...
         with suppress(InvalidInput):
             for number in range(100):
                 for session in (first, second):
-                    detectors.step(session.id, number, 0.1 * number, ZERO.tobytes(), None, None, None)
+                    detectors.step(session.id, PackedFrame(number, 0.1 * number, ZERO.tobytes()))
                     taken += 1
         assert taken == 3
         await streams.end(first)
-        detectors.step(second.id, 50, 50.0, ZERO.tobytes(), None, None, None)
+        detectors.step(second.id, PackedFrame(50, 50.0, ZERO.tobytes()))
 
     run(go)
 
@@ -208,7 +210,7 @@ def test_an_opening_without_numbers_is_refused_by_name(make: Callable[..., Strea
 def test_a_message_that_is_none_has_its_documented_code(make: Callable[..., Streams], message: str) -> None:
     closed = converse(make(), json.dumps(first()), message, raw=True).closed
     assert closed is not None
-    assert closed[0] == sessions.NOT_UNDERSTOOD
+    assert closed[0] == errors.NOT_UNDERSTOOD
 
 
 @pytest.mark.parametrize(

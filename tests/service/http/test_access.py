@@ -79,6 +79,6 @@ def test_each_route_needs_the_scope_that_is_meant_for_it() -> None:
     for route, scopes in access.scopes_of_routes(create_app(Settings())).items():
         method, _, path = route.partition(" ")
         administers = path in {"/v1/audit", "/v1/jobs/{id}/cancel", "/audit", "/keys", "/jobs/{id}/cancel"}
-        asks = method == "GET" or path in {"/v1/recognise", "/v1/grasp-force"}
+        asks = method == "GET" or path in {"/v1/recognise", "/v1/grasp-force", "/live/{id}/frames"}
         expected = "admin" if administers else "read" if asks else "upload"
         assert scopes == {expected}, route
