@@ -65,22 +65,30 @@ class Webhook:
 
     def send_new(self) -> int:
         """Send what is new and settled; returns how many entries the address took. Raises ``NotTaken``."""
+        self._begin()
         settled, taken = self._settled(), 0
         while not self._thread.is_stopping and self._leads():
-            with self._database.read() as session:
-                store, before = stores.find_id(session), stores.webhook_entry(session)
-                entry = None if before is None else audit.first_between(session, before, settled, ACTIONS)
-            if before is not None and entry is None:
+            with self._database.read() as session:  # each time, since another process may have sent it meanwhile
+                store, had = stores.find_id(session), stores.webhook_entry(session)
+                entry = audit.first_between(session, had or 0, settled, ACTIONS)
+            if entry is None:
                 break
-            if entry is not None and entry.at < now() - EXPIRED:
+            if entry.at < now() - EXPIRED:
                 logger.error("webhook: entry %d of the audit trail is too old to be sent", entry.id)
-            elif entry is not None:
+            else:
                 self._send(store, entry)
                 taken += 1
-            with self._database.write(durable=False) as session:  # of a first webhook, what was there is not sent
-                had = audit.newest_id(session) if entry is None else entry.id
-                stores.set_webhook_entry(session, had, before)
+            with self._database.write(durable=False) as session:
+                stores.set_webhook_entry(session, entry.id, had)
         return taken
+
+    def _begin(self) -> None:
+        """A first webhook is sent nothing of what is there already."""
+        with self._database.read() as session:
+            if stores.webhook_entry(session) is not None:
+                return
+        with self._database.write(durable=False) as session:
+            stores.set_webhook_entry(session, audit.newest_id(session), None)
 
     def _settled(self) -> int:
         """Id up to which no entry can come any more; by when it was seen, since processes' clocks may differ."""
