@@ -37,6 +37,7 @@ OPTIONAL = {
     f"{CLIENT}/stream.py": {"websockets", "msgspec"},
     f"{CLIENT}/labelled.py": {"pandas", "xarray"},
     "slipcore/labelled.py": {"pandas", "xarray"},
+    **{f"{CLIENT}/mujoco_scene/{name}.py": {"mujoco"} for name in ("bench", "check", "holding", "rule", "touching")},
 }
 """What a module needs that nothing else imports: an extra brings it."""
 

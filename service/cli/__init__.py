@@ -20,6 +20,7 @@ from service.cli import (
     remote,
     reporting,
     running,
+    scenes,
     sensors,
     simulation,
     streaming,
@@ -67,6 +68,7 @@ for command in (
     streaming.stream,
     reporting.report,
     audit.audit,
+    scenes.check_scene,
 ):
     app.command()(command)
 app.command("next")(remote.next_grasp)

@@ -11,7 +11,8 @@ from stiction_client.exports.coulomb import QUANTILE, Terms, conservative_fricti
 from stiction_client.model import FrictionModel
 from stiction_client.quantile import FrictionQuantile
 
-HOLDING_OPTION = '<option cone="elliptic" impratio="10" noslip_iterations="3"/>'
+IMPRATIO, NOSLIP_ITERATIONS = 10, 3
+HOLDING_OPTION = f'<option cone="elliptic" impratio="{IMPRATIO}" noslip_iterations="{NOSLIP_ITERATIONS}"/>'
 """Solver settings with which a contact holds what its friction says. With the defaults, a pyramidal cone and impratio
 1, a box held at 95 % of its cone creeps until it falls."""
 
