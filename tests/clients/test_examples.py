@@ -63,5 +63,17 @@ def test_the_cells_of_the_notebook_run_one_after_the_other() -> None:
     assert 1.5 / 0.5 < names["grip"].normal_force < 1.5 / 0.3
 
 
+def test_a_box_lifted_in_mujoco_is_held_and_slips_with_less_friction(
+    service_url: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("mujoco", reason="mujoco-core is not installed")
+    monkeypatch.setenv("STICTION_URL", service_url)
+    text = printed("lift_in_mujoco", capsys)
+    weight = 0.2 * 9.81
+    assert 1.1 * weight / 2.0 / 0.47 < number(r"with ([\d.]+) N", text) < 1.1 * weight / 2.0 / 0.3
+    assert number(r"100% of that friction the box slips (-?[\d.]+) mm", text) < 0.5
+    assert number(r"80% of that friction the box slips ([\d.]+) mm", text) > 50.0
+
+
 def test_every_example_is_run_here() -> None:
     assert set(re.findall(r'printed\("(\w+)"', Path(__file__).read_text())) == set(EXAMPLES)
