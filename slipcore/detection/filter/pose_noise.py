@@ -1,6 +1,7 @@
 """Noise that parts a given pose from the markers: of its measurement, or of a camera that shakes."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,43 +22,82 @@ LEAST = NOISE.memory // 4
 """Frames before noise counts: of fewer the median is too uncertain."""
 
 
+class PoseNoise(NamedTuple):
+    """Standard deviation of the noise of a given pose's place, m, and yaw, rad, infinite while it is not ``known``."""
+
+    place: float
+    yaw: float
+    known: bool
+
+
+@compiled
+def noise_of_pose(given: FloatArray, fitted: Pose, spread: PoseVariance, common: FloatArray) -> PoseNoise:
+    """Noise of a ``given`` pose [3], m, m, rad, from the second differences of its offset from that ``fitted`` to the
+    markers, in the median over the last frames. Keeps these in ``common``.
+
+    Slip, and a soft object's surface that stays behind, part them slowly or once: what differs from frame to frame is
+    noise, that of the fit among it.
+    """
+    return _noise(_offset(pose_at(given[0], given[1], given[2], 1.0), fitted, spread), common)
+
+
+@compiled
+def own_variance(noise: float, of_fit: float, tuning: Tuning) -> float:
+    """Variance that noise of this standard deviation has beyond what may be the fit's own."""
+    return max(noise * noise - tuning.pose_noise_least * of_fit, 0.0)
+
+
 @compiled
 def without_noise(
-    known: Pose, step: FloatArray, fitted: Pose, spread: PoseVariance, tuning: Tuning, common: FloatArray
+    known: Pose,
+    step: FloatArray,
+    fitted: Pose,
+    spread: PoseVariance,
+    noise: PoseNoise,
+    tuning: Tuning,
+    common: FloatArray,
 ) -> tuple[FloatArray, PoseVariance]:
-    """The ``known`` pose [3], m, m, rad, after a ``step`` [3], moved towards that ``fitted`` to the markers as far as
-    noise parts them; and the variance of what it then is.
+    """The ``known`` pose, after a ``step`` [3], m, m, rad, moved towards that ``fitted`` to the markers as far as its
+    ``noise`` beyond that of the fit and of slip in so large a step parts them; and the variance of what it then is.
 
-    Slip parts them slowly or once: what differs from frame to frame is noise, of the variance that second differences
-    of their offset show, in the median, beyond those of the fit and of slip in so large a step. Keeps these, and the
-    correction, in ``common``.
+    Keeps the correction in ``common``; while the noise is unknown the pose is that fitted, and goes on from there.
     """
     ax, ay = place_on_object(fitted, spread.x, spread.y)
-    kx, ky = place_of_object(known, ax, ay)
-    turn = math.atan2(math.sin(fitted.yaw - known.yaw), math.cos(fitted.yaw - known.yaw))
-    offset = np.array([spread.x - kx, spread.y - ky, turn])
-    of_place, of_yaw = _noise(offset, common)
+    offset = _offset(known, fitted, spread)
     size = step[0] * step[0] + step[1] * step[1]
-    place = _beyond(of_place, spread.place, tuning.following_variance * size, tuning)
-    yaw = _beyond(of_yaw, spread.yaw, tuning.following_variance * step[2] * step[2], tuning)
-    turned = pose_at(0.0, 0.0, known.yaw + yaw * turn, 1.0)
+    place = _share(own_variance(noise.place, spread.place, tuning), spread.place, tuning.following_variance * size)
+    yaw = _share(own_variance(noise.yaw, spread.yaw, tuning), spread.yaw, tuning.following_variance * step[2] ** 2)
+    kx, ky = spread.x - offset[0], spread.y - offset[1]
+    turned = pose_at(0.0, 0.0, known.yaw + yaw * offset[2], 1.0)
     x, y = place_of_object(turned, ax, ay)
     moved = np.array([kx + place * offset[0] - x, ky + place * offset[1] - y, turned.yaw])
-    common[CORRECTION], common[CORRECTION + 1] = moved[0] - known.x, moved[1] - known.y
-    common[CORRECTION + 2] = moved[2] - known.yaw
+    if noise.known:
+        common[CORRECTION], common[CORRECTION + 1] = moved[0] - known.x, moved[1] - known.y
+        common[CORRECTION + 2] = moved[2] - known.yaw
     return moved, PoseVariance(place * spread.place, yaw * spread.yaw, spread.x, spread.y)
 
 
 @compiled
-def _beyond(noise: float, of_fit: float, of_slip: float, tuning: Tuning) -> float:
-    """Share that noise of this standard deviation has in it and in the variance of the fit."""
-    variance = max(noise * noise - tuning.pose_noise_least * of_fit - of_slip, 0.0)
+def _offset(known: Pose, fitted: Pose, spread: PoseVariance) -> FloatArray:
+    """How far the fitted pose lies from the known one where it is known best: x, y m, yaw rad."""
+    ax, ay = place_on_object(fitted, spread.x, spread.y)
+    kx, ky = place_of_object(known, ax, ay)
+    turn = math.atan2(math.sin(fitted.yaw - known.yaw), math.cos(fitted.yaw - known.yaw))
+    return np.array([spread.x - kx, spread.y - ky, turn])
+
+
+@compiled
+def _share(of_noise: float, of_fit: float, of_slip: float) -> float:
+    """Share that the variance of noise beyond slip has in it and in the variance of the fit."""
+    variance = max(of_noise - of_slip, 0.0)
+    if variance == math.inf:
+        return 1.0
     return variance / (variance + of_fit) if variance > 0.0 else 0.0
 
 
 @compiled
-def _noise(offset: FloatArray, common: FloatArray) -> tuple[float, float]:
-    """Standard deviation of the noise of place, m, and yaw, rad, once another ``offset`` [3] is known."""
+def _noise(offset: FloatArray, common: FloatArray) -> PoseNoise:
+    """Noise of place and yaw, once another ``offset`` [3] is known."""
     last, before = common[LAST_OFFSETS : LAST_OFFSETS + 3], common[LAST_OFFSETS + 3 : LAST_OFFSETS + 6]
     places, yaws = common[NOISE_OF_PLACE : NOISE_OF_PLACE + _RING], common[NOISE_OF_YAW : NOISE_OF_YAW + _RING]
     if common[OFFSET_FRAMES] >= 2.0:
@@ -68,6 +108,6 @@ def _noise(offset: FloatArray, common: FloatArray) -> tuple[float, float]:
     last[:] = offset
     common[OFFSET_FRAMES] += 1.0
     if places[0] < LEAST:
-        return 0.0, 0.0
+        return PoseNoise(math.inf, math.inf, False)
     ordered = np.empty(_RING)
-    return recent_median(places, ordered), recent_median(yaws, ordered)
+    return PoseNoise(recent_median(places, ordered), recent_median(yaws, ordered), True)

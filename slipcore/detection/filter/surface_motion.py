@@ -15,7 +15,7 @@ from slipcore.detection.filter.pose import (
     place_on_object,
     pose_at,
 )
-from slipcore.detection.filter.pose_noise import without_noise
+from slipcore.detection.filter.pose_noise import PoseNoise, noise_of_pose, own_variance, without_noise
 from slipcore.detection.filter.state import COMMON, CORRECTION, FOLLOWING, POSE
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.detection.shared.records import FrameArrays
@@ -45,11 +45,14 @@ def step_pose(
             common[CORRECTION:COMMON] = 0.0
             known, left = frame.object_pose.copy(), spread
         else:
-            learn_following(anchors, before, pose, spread, body_motion(anchors, last.object_pose, step), tuning, common)
+            noise = noise_of_pose(frame.object_pose, pose, spread, common)
+            carried = body_motion(anchors, last.object_pose, step)
+            learn_following(anchors, before, pose, spread, carried, noise, tuning, common)
             share = following_share(common, tuning)
             was = before.x - common[CORRECTION], before.y - common[CORRECTION + 1], before.yaw - common[CORRECTION + 2]
             now = pose_at(was[0] + share * step[0], was[1] + share * step[1], was[2] + share * step[2], 1.0)
-            known, left = without_noise(now, step, pose, spread, tuning, common)
+            noise = PoseNoise(share * noise.place, share * noise.yaw, noise.known)
+            known, left = without_noise(now, step, pose, spread, noise, tuning, common)
         pose, spread = find_pose(anchors, before, known, variance, tuning)
         if len(anchors.x) >= 2:
             spread = left
@@ -84,23 +87,28 @@ def learn_following(
     fitted: Pose,
     spread: PoseVariance,
     carried: tuple[float, float, float, float],
+    noise: PoseNoise,
     tuning: Tuning,
     common: FloatArray,
 ) -> None:
     """Learn the share of the body's motion that the surface of a soft object follows, while little slips.
 
-    Least squares of the fitted motion f on the carried one d: Σw f·d/Σw d², w the inverse variance of a step.
+    Least squares of the fitted motion f on the carried one d, which has noise, too (Fuller, Measurement Error Models,
+    1987): Σw f·d/Σw(d² − σ²), w the inverse variance of a step and σ² that of d. Not before this is known.
     """
+    if not noise.known:
+        return
     x, y, dx, dy = carried
     ax, ay = place_on_object(before, x, y)
     fx, fy = place_of_object(fitted, ax, ay)
     size = dx * dx + dy * dy
-    weight = 1.0 / (spread.place + tuning.following_variance * size + _LEAST_SPREAD)
+    of_step = 4.0 * own_variance(noise.place, spread.place, tuning)  # of two places, along x and along y
+    weight = 1.0 / (spread.place + of_step + tuning.following_variance * size + _LEAST_SPREAD)
     along = (fx - x) * dx + (fy - y) * dy
     begins = common[FOLLOWING + 1] < tuning.following_learning * tuning.following_weight
     if along > 0.0 and (begins or anchors.stick.mean() > tuning.following_stick):
         common[FOLLOWING] += weight * along
-        common[FOLLOWING + 1] += weight * size
+        common[FOLLOWING + 1] += weight * (size - of_step)
 
 
 @compiled

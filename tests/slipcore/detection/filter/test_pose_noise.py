@@ -7,10 +7,12 @@ from inspect import unwrap
 import numpy as np
 import pytest
 
-from slipcore import GraspLog, SlipHistory, detect_slip
+from slipcore import FilterOptions, GraspLog, SlipHistory, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
-from slipcore.detection.filter import pose_noise
+from slipcore.detection.detector import init, step
+from slipcore.detection.filter import pose_noise, surface_motion
 from slipcore.detection.filter.state import COMMON
+from slipcore.detection.filter.tuning import Tuning, settings_of
 
 Score = Callable[[GraspLog, SlipHistory], float]
 
@@ -45,7 +47,7 @@ def test_a_noisy_pose_is_hardly_worse_than_none(
     log = fault(ramp, size)
     without = f1_score(log, detect_slip(replace(log, object_pose=None)))
     found = float(f1_score(log, detect_slip(log)))
-    assert found > without - 0.1  # 0.3 to 0.5 less where the pose is taken for exact
+    assert found > without - 0.05  # 0.3 to 0.5 less where the pose is taken for exact
 
 
 def test_a_shake_while_nothing_moves_is_no_slip() -> None:
@@ -54,12 +56,22 @@ def test_a_shake_while_nothing_moves_is_no_slip() -> None:
     assert detect_slip(log).slip[20:].mean() < 0.005
 
 
+@pytest.mark.parametrize("size", [1e-6, 1e-5])
+def test_a_surface_does_not_stay_behind_what_is_only_noise(size: float) -> None:
+    pressed = tangential_ramp(points=12, pitch=1.2e-3, tangential_force=0.0, marker_noise=1e-6, seed=2)
+    log, state = misplaced(pressed, size), init(pressed.position, pressed.element_area)
+    for frame in log.frames():
+        state, _ = step(state, frame)
+    share = unwrap(surface_motion.following_share)  # compiling it would take seconds
+    assert share(state.memory.common, Tuning(*settings_of(FilterOptions()))) == 1.0
+
+
 def test_without_noise_the_pose_is_believed(ramp: GraspLog, f1_score: Score) -> None:
     assert f1_score(ramp, detect_slip(ramp)) > 0.93
 
 
 def test_the_deviation_of_white_noise_is_found_in_each_coordinate() -> None:
-    noise = unwrap(pose_noise._noise)  # compiling it would take seconds
+    noise = unwrap(pose_noise._noise)
     rng, common, sizes = np.random.default_rng(5), np.zeros(COMMON), np.array([2e-6, 2e-6, 7e-4])
-    found = np.array([noise(sizes * rng.standard_normal(3), common) for _ in range(3000)])
+    found = np.array([noise(sizes * rng.standard_normal(3), common)[:2] for _ in range(3000)])
     np.testing.assert_allclose(found[100:].mean(axis=0), sizes[1:], rtol=0.05)  # 3000 frames, 31 at a time: 2 %
