@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.sync.client import ClientConnection, connect
 
+from stiction_client.controller import ControlSettings, gains
 from stiction_client.errors import ConnectionFailed, UnexpectedAnswer
 
 RESUMABLE = (1001, 1006, 1012, 4503)
@@ -25,7 +26,9 @@ class SlipStream:
     """One grasp, frame by frame; use it as a context manager.
 
     ``position`` [n, m, 3] m at rest, ``element_area`` m². With ``keep`` the frames can be stored as a grasp log of
-    ``material`` when they end (``finish``). A connection that breaks is taken up again, with the frames that were not
+    ``material`` when they end (``finish``). With ``control``, the settings of a grip controller, each answer has the
+    ``command`` of one that runs in the service, and begins with the ``material``'s model unless it is not to be
+    ``known``; frames then need forces. A connection that breaks is taken up again, with the frames that were not
     answered. Raises ``ConnectionFailed`` with the service's reason where it refuses.
     """
 
@@ -40,6 +43,8 @@ class SlipStream:
         sensor: str = "stream",
         material: str | None = None,
         keep: bool = False,
+        control: ControlSettings | None = None,
+        known: bool = True,
     ) -> None:
         rest = np.asarray(position, dtype="<f8")
         self._url = f"{url.rstrip('/').replace('http', 'ws', 1)}/v1/stream"
@@ -49,6 +54,8 @@ class SlipStream:
         self._waiting: deque[tuple[int, bytes]] = deque()
         opening = {"type": "open", "position": rest.tobytes(), "grid": rest.shape[:2], "element_area": element_area}
         opening |= {"detector": detector, "sensor": sensor, "material": material, "keep": keep}
+        if control is not None:
+            opening["control"] = _control(control) | {"known": known}
         self._connection = self._connect(opening)
 
     def __enter__(self) -> Self:
@@ -170,6 +177,18 @@ class SlipStream:
     def _read(self, timeout: float) -> dict[str, Any]:
         answer: dict[str, Any] = msgspec.msgpack.decode(self._connection.recv(timeout, decode=False))
         return answer
+
+
+def _control(settings: ControlSettings) -> dict[str, Any]:
+    """A controller's settings as the service takes them."""
+    contact = settings.contact
+    return {
+        "contact_area": float(contact.area),
+        "round_at": contact.reference_force,
+        "pressure_square": float(contact.pressure_square),
+        "torque_arm": float(contact.torque_arm),
+        "settings": {name: getattr(settings, name) for name in gains()},
+    }
 
 
 def _refused(error: ConnectionClosed) -> ConnectionFailed:

@@ -4,7 +4,7 @@ import asyncio
 import logging
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -12,9 +12,11 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from db.blobs import Spool
 from db.errors import NotFound, StorageUnavailable
 from service.domain.context import Context
-from service.domain.errors import DomainError, KeyEnded
+from service.domain.errors import DomainError, KeyEnded, NoModel
 from service.domain.keys import check_not_ended
 from service.domain.principal import Principal
+from service.domain.recommended import AUTO
+from service.domain.stored_results import to_client_model
 from service.domain.upload import UploadRequest, check_target
 from service.formats.reading import Description
 from service.stream import detectors
@@ -33,6 +35,9 @@ from service.stream.messages import (
 from service.stream.sessions import PATIENCE, Session, Streams
 from service.stream.sockets import KEY_SECONDS, close, until_one_ends
 from slipcore.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from stiction_client import FrictionModel
 
 logger = logging.getLogger(__name__)
 
@@ -102,11 +107,21 @@ class _Connection:
         """The session, and the answers that its client has missed."""
         if isinstance(first, Open):
             await check_target(self._context, self._upload(first))
-            return await self._streams.open(first, self._principal.key_id, self._principal.address or ""), []
+            address, model = self._principal.address or "", await self._known(first)
+            return await self._streams.open(first, self._principal.key_id, address, model), []
         if isinstance(first, Resume):
             session = self._streams.find(first.session, self._principal.key_id)
             return session, session.recent.after(first.last)
         raise End(NOT_UNDERSTOOD, "the first message must be of type open or resume")
+
+    async def _known(self, opening: Open) -> "FrictionModel | None":
+        """The model that a grip controller begins with: none without a material, or while that has none."""
+        if opening.control is None or not opening.control.known or opening.material is None:
+            return None
+        with suppress(NoModel):
+            known = await self._context.models.get(self._context.database, opening.material, AUTO)
+            return await asyncio.to_thread(to_client_model, known.stored)
+        return None
 
     async def _greet(self, session: Session, missed: list[dict[str, Any]]) -> None:
         await self._send({"type": "opened", "session": session.id, "next": session.next})

@@ -17,11 +17,14 @@ from db.blobs import disk_errors_named
 from estimators.errors import EstimatorError
 from service.formats.reading import Description, describe
 from service.report.wording import LEVELS
+from service.stream.grip import Grip
 from service.stream.live_frame import pack_frame
+from service.stream.messages import Control
 from slipcore import Frame, FrictionSamples, GraspLog, InvalidInput, SlipState, collect_samples
 from stiction_client import container
 
 if TYPE_CHECKING:
+    import stiction_client
     from estimators import FrictionModel, Moments
     from slipcore import DetectorState, SlipDetector
 
@@ -53,7 +56,8 @@ class PackedFrame(NamedTuple):
 
 @dataclass(slots=True)
 class Session:
-    """A running detector with what it saw: the last frames and answers, all frames if they are ``kept``.
+    """A running detector with what it saw: the last frames and answers, all frames if they are ``kept``; and the
+    controller of the grip, where one was asked for.
 
     ``friction`` is what its client is told, ``expected`` what those are who watch it.
     """
@@ -63,6 +67,7 @@ class Session:
     element_area: float
     moments: "Moments"
     kept: list[Frame] | None
+    grip: Grip | None = None
     frames: list[Frame] = field(default_factory=list)
     answers: list[SlipState] = field(default_factory=list)
     until_look: int = WINDOW
@@ -82,11 +87,20 @@ _LOOKS = ThreadPoolExecutor(1)
 
 
 def open_session(
-    name: str, position: Numbers, grid: tuple[int, int], area: float, method: str, keep: bool, most_bytes: int
+    name: str,
+    position: Numbers,
+    grid: tuple[int, int],
+    area: float,
+    method: str,
+    keep: bool,
+    most_bytes: int,
+    control: Control | None = None,
+    model: "stiction_client.FrictionModel | None" = None,
 ) -> None:
     """Begin a session, for which there must be room in ``most_bytes`` of all sessions together.
 
-    Raises ``InvalidInput`` for what cannot be a sensor.
+    ``control``: of a grip controller that answers its frames, and begins with ``model`` if there is one. Raises
+    ``InvalidInput`` for what cannot be a sensor or a controller.
     """
     rows, columns = grid
     if not 0 < rows * columns <= MAX_MARKERS or rows < 1:
@@ -96,7 +110,8 @@ def open_session(
     _check_room(held, most_bytes)
     detector, moments = slipcore.SlipDetector(at_rest, area, method), estimators.Moments.empty(area)
     kept: list[Frame] | None = [] if keep else None
-    _SESSIONS[name] = Session(detector, at_rest, area, moments, kept, held_bytes=held, most_bytes=most_bytes)
+    grip = None if control is None else Grip(at_rest, control, model)
+    _SESSIONS[name] = Session(detector, at_rest, area, moments, kept, grip, held_bytes=held, most_bytes=most_bytes)
 
 
 def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[str, Any], bytes | None]:
@@ -114,15 +129,22 @@ def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[st
         session.kept.append(frame)
         session.held_bytes += size
     _plan_look(session, frame, state)
-    session.last = (given.number, _answer(session, given.number, state))
-    shown = pack_frame(given.number, state, frame.force, given.command, session.expected) if is_shown else None
-    return session.last[1], shown
+    answer = _answer(session, given.number, state)
+    if session.grip is not None:
+        answer["command"] = session.grip.step(frame, state)
+    session.last = (given.number, answer)
+    if not is_shown:
+        return answer, None
+    told = answer.get("command", {}).get("normal_force") if given.command is None else given.command
+    return answer, pack_frame(given.number, state, frame.force, told, session.expected)
 
 
 def _frame(session: Session, given: PackedFrame) -> Frame:
     shape, command = session.position.shape, given.command
     if command is not None and not 0.0 <= command < math.inf:
         raise InvalidInput("command", command, "a normal force of 0 N or more")
+    if session.grip is not None and given.force is None:
+        raise InvalidInput("force", None, "the elements' forces, by which the grip is controlled")
     return Frame(
         given.time,
         _array("displacement", given.displacement, shape),

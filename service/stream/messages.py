@@ -18,8 +18,25 @@ Number = Annotated[int, msgspec.Meta(ge=-(2**53), le=2**53)]
 """An integer that every JSON library keeps as it is."""
 
 
+class Control(msgspec.Struct, forbid_unknown_fields=True):
+    """A grip controller that answers each frame: the contact of its fingertip, and its ``settings`` by name.
+
+    ``contact_area`` m² at any force, or under ``round_at`` N of a round fingertip; ``pressure_square`` and
+    ``torque_arm`` m where they are neither Hertz's nor uniform pressure's. ``known``: begin with the material's model.
+    """
+
+    contact_area: float
+    settings: dict[str, int | float]
+    round_at: float | None = None
+    pressure_square: Annotated[float, msgspec.Meta(gt=0.0)] | None = None
+    torque_arm: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] | None = None
+    known: bool = True
+
+
 class Open(msgspec.Struct, tag="open", tag_field="type", forbid_unknown_fields=True):
-    """Begin: the sensor, its detector, and whether the frames are to be kept for a log of a material."""
+    """Begin: the sensor, its detector, whether the frames are to be kept for a log of a material, and whether a grip
+    controller is to answer them.
+    """
 
     position: Numbers
     grid: tuple[Number, Number]
@@ -28,6 +45,7 @@ class Open(msgspec.Struct, tag="open", tag_field="type", forbid_unknown_fields=T
     sensor: str = "stream"
     material: str | None = None
     keep: bool = False
+    control: Control | None = None
 
 
 class Resume(msgspec.Struct, tag="resume", tag_field="type", forbid_unknown_fields=True):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 
@@ -17,6 +17,9 @@ from service.stream.broadcast import Broadcast, Watchers
 from service.stream.errors import DETECTOR_LOST, IN_USE, TOO_MANY, UNKNOWN_SESSION, End
 from service.stream.live_frame import pack_end
 from service.stream.messages import Open, packed
+
+if TYPE_CHECKING:
+    from stiction_client import FrictionModel
 
 MOST_SESSIONS = 200
 PATIENCE = 60.0
@@ -82,8 +85,13 @@ class Streams:
         self._dropping: set[asyncio.Task[None]] = set()
         self._watchers = Watchers()
 
-    async def open(self, opening: Open, key_id: str | None, address: str) -> Session:
-        """A new session; raises ``InvalidInput`` for what cannot be a sensor, ``End`` where there are too many."""
+    async def open(
+        self, opening: Open, key_id: str | None, address: str, model: "FrictionModel | None" = None
+    ) -> Session:
+        """A new session; ``model``: what a grip controller that was asked for begins with.
+
+        Raises ``InvalidInput`` for what cannot be a sensor or a controller, ``End`` where there are too many.
+        """
         session = Session(uuid.uuid4().hex, opening, key_id, key_id or f"address {address}")
         self._check_room(session.owner)
         position, opening.position = packed("position", opening.position), b""
@@ -91,7 +99,7 @@ class Streams:
         try:
             await self.call(
                 detectors.open_session, session.id, position, opening.grid, opening.element_area, opening.detector,
-                opening.keep, self._most_bytes,
+                opening.keep, self._most_bytes, opening.control, model,
             )  # fmt: skip
         except BaseException:
             self._forget(session)

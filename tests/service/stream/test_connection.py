@@ -27,8 +27,11 @@ from service.serving import configuration
 from service.settings import Settings
 from service.stream import connection as stream
 from slipcore import GraspLog, detect_slip
+from stiction_client import Contact, ControlSettings, FrictionClient
 from stiction_client.errors import ConnectionFailed
 from stiction_client.stream import SlipStream
+
+FORCES = {"least_force": 1, "most_force": 30}
 
 
 class Served:
@@ -119,6 +122,22 @@ def test_json_is_for_trials_and_a_wrong_frame_is_answered_by_name(served: Served
         assert ask(socket, {"type": "finish"}) == {"type": "finished", "grasp_log": None}
 
 
+def test_a_grip_controller_answers_and_begins_with_the_material_s_model(served: Served, ramp: GraspLog) -> None:
+    settings = ControlSettings(contact=Contact.round(6e-5, at_force=5.0), least_force=0.5, most_force=30.0)
+    with FrictionClient(served.url) as client:
+        client.ensure_material("gripped")
+        client.wait(client.upload(ramp, material="gripped").job).raise_for_status()
+    modes = {}
+    for material, known in (("gripped", True), ("gripped", False), (None, True)):
+        said = {"material": material, "control": settings, "known": known}
+        with SlipStream(served.url, ramp.position, ramp.element_area, **said) as live:
+            answers = [live.step(time_, *parts(ramp, k)) for k, time_ in enumerate(ramp.time[:5])]
+            live.finish()
+        assert all(0.5 <= answer["command"]["normal_force"] <= 30.0 for answer in answers)
+        modes[material, known] = answers[0]["command"]["mode"]
+    assert modes == {("gripped", True): "hold", ("gripped", False): "feel", (None, True): "feel"}
+
+
 def test_a_session_goes_on_after_a_reconnect(served: Served, ramp: GraspLog) -> None:
     history = detect_slip(ramp)
     live = SlipStream(served.url, ramp.position, ramp.element_area)
@@ -152,6 +171,10 @@ def test_a_session_goes_on_after_a_reconnect(served: Served, ramp: GraspLog) -> 
         ({"element_area": 1.0}, 4422, "element_area is 1 m²"),
         ({"material": "nothing"}, 4422, "no material 'nothing'"),
         ({"detector": "guess"}, 4422, "detector is guess"),
+        ({"control": {"contact_area": 6e-5}}, 1003, "missing required field `settings`"),
+        ({"control": {"contact_area": 6e-5, "settings": {"least_force": 1}}}, 4422, "control: most_force is not given"),
+        ({"control": {"contact_area": -1, "settings": FORCES}}, 4422, "control: area is -1.0"),
+        ({"control": {"contact_area": 6e-5, "settings": FORCES | {"grip": 1}}}, 4422, "control: settings is grip"),
     ],
 )
 def test_what_cannot_be_is_closed_with_a_reason(

@@ -1,0 +1,54 @@
+"""The grip controller beside a live detector: what a stream's frames command (docs/control.md)."""
+
+from dataclasses import replace
+from typing import Any
+
+from service.stream.messages import Control
+from service.stream.observing import Observer
+from slipcore import Frame, InvalidInput, SlipState
+from slipcore.frames import FloatArray
+from stiction_client import Contact, ControlSettings, FrictionModel, GraspController, InvalidArgument
+from stiction_client.controller import Gain, gains
+
+
+class Grip:
+    """A controller on one sensor's frames. Raises ``InvalidInput`` for settings and a model that it cannot take."""
+
+    def __init__(self, position: FloatArray, control: Control, model: FrictionModel | None) -> None:
+        self._observer = Observer(position)
+        try:
+            self._state = GraspController.init(settings_of(control), model)
+        except InvalidArgument as error:
+            raise InvalidInput(f"control: {error.name}", error.value, error.allowed) from error
+
+    def step(self, frame: Frame, found: SlipState) -> dict[str, Any]:
+        """The command after a frame, as it is told."""
+        self._state, command = GraspController.step(self._state, self._observer(frame, found))
+        return {"normal_force": command.normal_force, "mode": command.mode, "reason": command.reason}
+
+
+def settings_of(control: Control) -> ControlSettings:
+    """What was said in a message, as the controller takes it; raises ``InvalidArgument``."""
+    known, missing = gains(), {"least_force", "most_force"} - control.settings.keys()
+    for name in control.settings.keys() - known.keys():
+        raise InvalidArgument("settings", name, ", ".join(known))
+    for name in missing:
+        raise InvalidArgument(name, "not given", f"{known[name].low:g} to {known[name].high:g} {known[name].unit}")
+    given = {name: _value(name, value, known[name]) for name, value in control.settings.items()}
+    return ControlSettings(contact=_contact(control), **given)
+
+
+def _value(name: str, value: float, gain: Gain) -> Any:
+    """A setting, as an integer where it counts frames."""
+    if gain.unit != "frames":
+        return value
+    if not float(value).is_integer():
+        raise InvalidArgument(name, value, "a whole number of frames")
+    return int(value)
+
+
+def _contact(control: Control) -> Contact:
+    area, force = control.contact_area, control.round_at
+    contact = Contact.flat(area) if force is None else Contact.round(area, force)
+    told = {"pressure_square": control.pressure_square, "torque_arm": control.torque_arm}
+    return replace(contact, **{name: value for name, value in told.items() if value is not None})
