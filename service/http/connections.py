@@ -183,13 +183,14 @@ class BoundedConnection(asyncio.Protocol):
         if self._per_address is None or self.client is None:
             return
         same = [each for each in self.connections if each.client and each.client[0] == self.client[0]]
-        open_ones = [each for each in same if not each.transport.is_closing()]
-        if len(open_ones) <= self._per_address:
+        held = [each for each in same if not each.transport.is_closing() or _has_unsent(each)]
+        if len(held) <= self._per_address:
             return
-        idle = [each for each in open_ones if isinstance(each, BoundedConnection) and each.is_idle and each is not self]
-        self._is_beyond = not idle
-        if idle:
-            min(idle, key=lambda each: each.idle_since).transport.close()
+        unneeded = [each for each in held if each is not self and _is_unneeded(each)]
+        self._is_beyond = not unneeded
+        if unneeded:
+            least = min(unneeded, key=lambda each: (not each.transport.is_closing(), getattr(each, "idle_since", 0.0)))
+            least.transport.abort() if _has_unsent(least) else least.transport.close()
 
     def _wait_for_headers(self) -> None:
         self._header_timer = self.loop.call_later(HEADER_SECONDS, self.transport.close)
@@ -213,6 +214,16 @@ class BoundedConnection(asyncio.Protocol):
             return TOO_MANY_CONNECTIONS, "as many connections are open as may be; try again later"
         fault = ambiguity(scope)
         return None if fault is None else (BAD_REQUEST, fault)
+
+
+def _has_unsent(connection: Any) -> bool:
+    """Whether its client has not read all that it was sent, which stays in memory until then."""
+    return bool(connection.transport.get_write_buffer_size() > 0)
+
+
+def _is_unneeded(connection: Any) -> bool:
+    """Whether a connection has nothing more to do than to let its client read."""
+    return connection.transport.is_closing() or (isinstance(connection, BoundedConnection) and connection.is_idle)
 
 
 class H11Connection(BoundedConnection, H11Protocol):

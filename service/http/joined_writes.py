@@ -1,10 +1,14 @@
 """Answers that leave in one piece: their head and body reach the network together, and wake the client once."""
 
 import asyncio
+import math
 from typing import Any
 
 MOST_WAITING_BYTES = 64 * 1024
 """Written at once when there is more: a body of many parts is not to gather in memory."""
+
+CLOSING_SECONDS = 30.0
+"""s within which some of what is unsent at a close must be read; whoever reads none of it is let go."""
 
 
 class JoinedWrites:
@@ -38,9 +42,10 @@ class JoinedWrites:
         self._transport.write_eof()
 
     def close(self) -> None:
-        """Close once all is sent."""
+        """Close once all is sent, or once the client has stopped to read it."""
         self._flush()
         self._transport.close()
+        self._watch(math.inf)
 
     def abort(self) -> None:
         """Close at once."""
@@ -50,6 +55,14 @@ class JoinedWrites:
     def get_write_buffer_size(self) -> int:
         """Bytes that are not sent yet."""
         return self._size + self._transport.get_write_buffer_size()
+
+    def _watch(self, before: float) -> None:
+        """Let go who read nothing since ``before`` bytes were unsent: a peer that answers may keep them for ever."""
+        unsent = self._transport.get_write_buffer_size()
+        if unsent >= before:
+            self._transport.abort()
+        elif unsent > 0:
+            self._loop.call_later(CLOSING_SECONDS, self._watch, unsent)
 
     def _flush(self) -> None:
         if self._waiting:

@@ -3,13 +3,37 @@
 from typing import Any
 
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.frames import CloseCode, Frame
+
+MOST_UNSENT_BYTES = 2**20
+"""Of answers to pings that a client does not read; the application waits from 64 KiB on."""
+
+MOST_FRAGMENTS = 1024
+"""Of one message; the bound on its bytes does not count those that are empty."""
 
 
 class WebSocketConnection(WebSocketsSansIOProtocol):
-    """Takes a refusal for the end of the handshake: by itself the server logs it as an error of the application."""
+    """Takes a refusal for the end of the handshake: by itself the server logs it as an error of the application.
+
+    Who pings without reading is let go, and so is who sends a message in pieces without end.
+    """
 
     async def send(self, message: Any) -> None:
         """Send what the application says."""
         await super().send(message)
         is_refused = self.initial_response is not None and self.close_sent
         self.handshake_complete = self.handshake_complete or is_refused
+
+    def handle_ping(self) -> None:
+        """Answer, unless answers pile up."""
+        super().handle_ping()
+        if self.transport.get_write_buffer_size() > MOST_UNSENT_BYTES:
+            self.transport.abort()
+
+    def handle_cont(self, event: Frame) -> None:
+        """Take another piece of a message."""
+        if len(self.frames) < MOST_FRAGMENTS:
+            super().handle_cont(event)
+        else:
+            self.conn.fail(CloseCode.MESSAGE_TOO_BIG, f"more than {MOST_FRAGMENTS} fragments")
+            self.handle_parser_exception()

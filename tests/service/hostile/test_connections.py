@@ -4,7 +4,7 @@ import json
 import socket
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, ExitStack, closing, suppress
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, suppress
 
 import httpx
 import pytest
@@ -13,6 +13,7 @@ from service import serving as server
 from service.http.connections import BoundedConnection, H11Connection
 from service.http.httptools_connections import HttpToolsConnection
 from service.http.request_middleware import MOST_HEADER_BYTES
+from service.http.websockets import MOST_FRAGMENTS
 from service.settings import Settings
 
 MOST_OF_ONE = 20
@@ -221,3 +222,49 @@ def test_websockets_count_among_the_connections_of_an_address(address: Address) 
         assert b"retry-after: 1" in head
         assert json.loads(body)["type"] == "/problems/too-many-connections"
     time.sleep(0.3)
+
+
+@contextmanager
+def websocket(address: Address) -> Iterator[socket.socket]:
+    """An open one whose system keeps little of what is not read."""
+    with closing(socket.socket()) as connection:
+        connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        connection.settimeout(20.0)
+        connection.connect(address)
+        connection.sendall(HANDSHAKE + b"\r\n")
+        assert connection.recv(4096).startswith(b"HTTP/1.1 101")
+        yield connection
+
+
+def frame(opcode: int, content: bytes = b"") -> bytes:
+    """As a client sends it, masked by zeros."""
+    return bytes([opcode, 0x80 | len(content)]) + bytes(4) + content
+
+
+PING, TEXT_BEGINS, CONTINUES = 0x89, 0x01, 0x00
+
+
+def flood(connection: socket.socket, content: bytes, times: int) -> None:
+    for _ in range(times):
+        connection.sendall(content)
+
+
+def test_who_pings_without_reading_the_answers_is_let_go(address: Address) -> None:
+    with websocket(address) as connection, pytest.raises((ConnectionResetError, BrokenPipeError)):
+        flood(connection, frame(PING, b"x" * 125) * 2000, 250)  # 64 MB
+
+
+def test_who_pings_and_reads_is_answered(address: Address) -> None:
+    with websocket(address) as connection:
+        for _ in range(100):
+            connection.sendall(frame(PING, b"still there") * 50)
+            received = b""
+            while len(received) < 50 * 13:
+                received += connection.recv(4096)
+            assert received == (b"\x8a\x0bstill there") * 50
+
+
+def test_a_message_in_pieces_without_end_ends_the_connection(address: Address) -> None:
+    with websocket(address) as connection:
+        connection.sendall(frame(TEXT_BEGINS) + frame(CONTINUES) * MOST_FRAGMENTS)
+        assert everything(connection)[2:4] == (1009).to_bytes(2)  # behind the opcode and the length

@@ -21,19 +21,23 @@ from service.http.request_middleware import MOST_HEADER_BYTES
 
 PATIENCE = 0.2
 MOST, MOST_OF_ONE = 60, 100
+LARGE = bytes(2**25)
+"""More than the system keeps of what a client does not read."""
+
 Connect = Callable[[], socket.socket]
 
 
 async def hello(scope: Scope, receive: Receive, send: Send) -> None:
-    """Answers when it has the whole body, or early; the path comes back as a header."""
+    """Answers when it has the whole body, or early, and shortly or at length; the path comes back as a header."""
     assert scope["type"] == "http"
     while scope["path"] != "/early" and (await receive()).get("more_body"):
         pass
     if scope["path"] == "/slow":
         await asyncio.sleep(PATIENCE)
-    headers = [(b"content-length", b"5"), (b"path", scope["raw_path"])]
+    body = LARGE if scope["path"] == "/large" else b"hello"
+    headers = [(b"content-length", str(len(body)).encode()), (b"path", scope["raw_path"])]
     await send({"type": "http.response.start", "status": 200, "headers": headers})
-    await send({"type": "http.response.body", "body": b"hello"})
+    await send({"type": "http.response.body", "body": body})
 
 
 @pytest.fixture(params=[H11Connection, HttpToolsConnection])
@@ -44,7 +48,13 @@ def protocol(request: pytest.FixtureRequest) -> type[BoundedConnection]:
 
 
 @pytest.fixture
-def connect(monkeypatch: pytest.MonkeyPatch, protocol: type[BoundedConnection]) -> Iterator[Connect]:
+def most_of_one() -> int:
+    """Connections that an address may have."""
+    return MOST_OF_ONE
+
+
+@pytest.fixture
+def connect(monkeypatch: pytest.MonkeyPatch, protocol: type[BoundedConnection], most_of_one: int) -> Iterator[Connect]:
     monkeypatch.setattr(connections, "HEADER_SECONDS", PATIENCE)
     server = uvicorn.Server(
         uvicorn.Config(
@@ -52,7 +62,7 @@ def connect(monkeypatch: pytest.MonkeyPatch, protocol: type[BoundedConnection]) 
             port=0,
             lifespan="off",
             log_level="critical",
-            http=partial(protocol, per_address=MOST_OF_ONE),  # type: ignore[arg-type]
+            http=partial(protocol, per_address=most_of_one),  # type: ignore[arg-type]
             loop="asyncio" if protocol is H11Connection else "uvloop",
             h11_max_incomplete_event_size=MOST_HEADER_BYTES,
             limit_concurrency=MOST,
@@ -203,6 +213,22 @@ def test_whoever_comes_when_all_connections_are_taken_is_told_so(connect: Connec
     again = connect()
     again.sendall(b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n")
     assert rest(again).endswith(b"hello")
+
+
+@pytest.mark.parametrize("most_of_one", [2])
+@pytest.mark.parametrize("end", [b"Connection: close\r\n", b""], ids=["closing", "idle"])
+def test_whose_answers_are_not_read_makes_room_for_the_next(connect: Connect, end: bytes) -> None:
+    unread = []
+    for _ in range(2):
+        unread.append(connect())
+        unread[-1].sendall(b"GET /large HTTP/1.1\r\nHost: a\r\n" + end + b"\r\n")
+        assert unread[-1].recv(8).startswith(b"HTTP/1.1")
+        time.sleep(PATIENCE)
+    another = connect()
+    another.sendall(b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n")
+    assert rest(another).endswith(b"hello")
+    received = len(rest(unread[0]))
+    assert received < len(LARGE)
 
 
 KINDS = (

@@ -74,6 +74,28 @@ def test_nothing_is_sent_to_a_client_that_has_gone_since() -> None:
     assert asyncio.run(told_when_it_goes()) == []
 
 
+@pytest.mark.parametrize(
+    ("unsent", "expected"),
+    [([0], ["close"]), ([9, 7, 2, 0], ["close"]), ([9, 7, 7], ["close", "abort"])],
+    ids=["nothing", "read slowly", "read no more"],
+)
+def test_who_reads_nothing_of_the_last_bytes_is_let_go(
+    unsent: list[int], expected: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(joined_writes, "CLOSING_SECONDS", 0.0)
+
+    async def told_after_closing() -> list[bytes | str]:
+        sent, looks = Sent(), iter(unsent)
+        sent.get_write_buffer_size = lambda: next(looks)  # type: ignore[method-assign]
+        JoinedWrites(cast(asyncio.Transport, sent), asyncio.get_running_loop()).close()
+        for _ in range(2 * len(unsent)):
+            await asyncio.sleep(0.001)
+        assert next(looks, None) is None
+        return sent.told
+
+    assert asyncio.run(told_after_closing()) == expected
+
+
 def test_what_waits_counts_as_not_sent() -> None:
     async def waiting() -> list[int]:
         joined = JoinedWrites(cast(asyncio.Transport, Sent()), asyncio.get_running_loop())
