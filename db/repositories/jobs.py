@@ -59,6 +59,17 @@ def get(session: Session, job_id: str) -> Job:
     return record(*row)
 
 
+def material_id(session: Session, job_id: str) -> int:
+    """The key of the material that a job is about, whatever its name is by now; raises ``NotFound`` for a job of none.
+
+    Of a job under way it is the one that its material was merged into.
+    """
+    found = session.scalar(select(JobRow.material_id).where(JobRow.id == job_id))
+    if found is None:
+        raise NotFound("job of a material", job_id)
+    return found
+
+
 def list_all(session: Session, window: Window, status: JobStatus | None = None) -> list[Job]:
     """Jobs of one status, or all."""
     query = select(JobRow, MaterialRow.name).outerjoin(MaterialRow)

@@ -122,7 +122,7 @@ def _take_through_the_stages(run: Run) -> None:
         return
     if samples is not None and samples.none_because is not None:
         raise Refused(samples.none_because)
-    fit_material(run, job.material)
+    fit_material(run)
 
 
 def find_samples(run: Run, log_id: str) -> SampleSummary:
@@ -169,13 +169,13 @@ def _mark_outdated(session: Session, log_id: str, samples: SampleSummary) -> Non
         friction_models.mark_outdated(session, material_id, besides=FITTED_AT_INGEST)
 
 
-def fit_material(run: Run, material: str) -> None:
+def fit_material(run: Run) -> None:
     """Moments or samples of all logs of a material → friction_model → material; raises ``Refused``."""
-    _note_missing_moments(run, material)
+    _note_missing_moments(run)
     for _ in range(FITS_BESIDE_OTHERS):
         with run.stage("friction_model"):
             with run.database.read() as session:
-                material_id = materials.find_id(session, material)
+                material_id = jobs.material_id(session, run.job.id)
                 parts = detections.samples_of_material(session, material_id)
             models = _fit(run, parts)
         with run.database.write() as session:
@@ -184,6 +184,7 @@ def fit_material(run: Run, material: str) -> None:
                 _store_models(run, session, material_id, models)
                 return
     with run.database.write() as session:  # logs come in faster than they are fitted: the other fits wait for this one
+        material_id = materials.still(session, jobs.material_id(session, run.job.id))
         friction_models.lock(session, material_id)
         with run.timed("friction_model"):
             models = _fit(run, detections.samples_of_material(session, material_id))
@@ -259,10 +260,10 @@ def _moments(run: Run, part: SamplesOfLog) -> Moments:
     return Moments.from_samples(decode_samples(run.blobs.path(part.samples_blob)))
 
 
-def _note_missing_moments(run: Run, material: str) -> None:
+def _note_missing_moments(run: Run) -> None:
     """Of samples that an older version stored without, or without their places."""
     with run.database.read() as session:
-        parts = detections.samples_of_material(session, materials.find_id(session, material))
+        parts = detections.samples_of_material(session, jobs.material_id(session, run.job.id))
     for part in parts:
         if part.moments is None or not Moments.from_bytes(part.moments).grasps:
             content = _moments(run, part).to_bytes()
@@ -289,4 +290,5 @@ def _note_change(run: Run, session: Session, material_id: int, model: FrictionMo
     before = friction_models.all_current(session, [material_id]).get(material_id, [])
     if not any(MARK in stored.model.diagnostics for stored in before):
         told = {"change": model.diagnostics[MARK], "grasp_log": run.job.grasp_log_id}
-        audit.add(session, audit.SERVICE, "material.surface_changed", str(run.job.material), told)
+        name = jobs.get(session, run.job.id).material
+        audit.add(session, audit.SERVICE, "material.surface_changed", str(name), told)

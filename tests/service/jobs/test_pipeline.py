@@ -223,6 +223,44 @@ def test_a_model_leaves_no_samples_out_that_came_in_while_it_was_fitted(
     assert {(stored.version, stored.model.n) for stored in shop.material().models} == {(2, 2 * samples.count)}
 
 
+def test_a_job_stays_with_its_material_whatever_takes_its_name(
+    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, job_id = shop.ingest(content)
+    detect = slipcore.detect_slip
+
+    def detect_while_the_name_goes(*given: Any, **options: Any) -> slipcore.SlipHistory:
+        with shop.database.write() as session:
+            materials.rename(session, shop.material_id, "card")
+            materials.remove_alias(session, shop.material_id, "paper")
+            materials.create(session, "paper", "another one")
+        return detect(*given, **options)
+
+    monkeypatch.setattr(slipcore, "detect_slip", detect_while_the_name_goes)
+    job = shop.run(job_id)
+    assert (job.status, job.material) == ("done", "card")
+    with shop.database.read() as session:
+        assert [stored.version for stored in materials.get(session, "card").models] == [1, 1]
+    assert shop.material().models == ()  # of the other paper
+
+
+def test_a_log_that_is_merged_away_while_it_is_read_counts_in_the_other_material(
+    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, job_id = shop.ingest(content)
+    detect = slipcore.detect_slip
+
+    def detect_while_it_is_merged(*given: Any, **options: Any) -> slipcore.SlipHistory:
+        with shop.database.write() as session:
+            materials.merge(session, materials.create(session, "card", "").id, shop.material_id)
+        return detect(*given, **options)
+
+    monkeypatch.setattr(slipcore, "detect_slip", detect_while_it_is_merged)
+    assert shop.run(job_id).status == "done"
+    material = shop.material()  # an alias by now
+    assert (material.name, material.grasp_logs, len(material.models)) == ("card", 1, 2)
+
+
 @pytest.mark.parametrize(
     ("method", "kind"),
     [("ols", Moments), ("conjugate", Moments), ("bayes", Moments), ("robust", FrictionSamples)],
