@@ -20,9 +20,10 @@ from db.quarantine import FolderQuarantine, Quarantine, move, sync_folder
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 STORE_ID = "store-id"
-UNSETTLED = "first start of "
-"""What the file of the id begins with until the database has the id, too."""
 """File beside the blobs that tells which store they belong to (``db.identity``)."""
+
+UNSETTLED = "first start of "
+"""What that file begins with until the database has the id, too."""
 
 
 @contextmanager
@@ -264,9 +265,8 @@ class BlobStore:
             self._remote.put(sha256, spooled)
         size = spooled.stat().st_size
         move(spooled, self._place(sha256))
-        if self._remote is None:
-            self._require_own()
-        else:
+        self._require_own()
+        if self._remote is not None:
             self._make_room(size)
 
     def _fetch(self, remote: ObjectStore, sha256: str, path: Path) -> Path:

@@ -53,6 +53,7 @@ def join(database: Database, blobs: BlobStore, *, alone: bool, to_fill: bool = F
             stores.set_id(session, known)
         else:
             _require_same(database, blobs, known, found)
+    _require_same(database, blobs, known, blobs.read_store_id())  # another machine may have begun there meanwhile
     if not blobs.is_settled:
         blobs.write_store_id(known)  # no other database gets the blobs from here on, though there are none yet
     database.store_id = blobs.store_id = known

@@ -3,6 +3,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from sqlalchemy.orm import Session
 
 from db import identity, migrate
 from db.backup import backup, restore
@@ -168,6 +169,38 @@ def test_blobs_of_a_store_without_uploads_are_no_other_databases(
         with pytest.raises(StoreMismatch, match=r"of no store yet, and .* of store"):
             use(other, blobs)
     join(database, blobs)
+
+
+def test_of_two_that_begin_at_once_in_an_object_store_one_is_refused(
+    database: Database, other: Database, s3: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Machines know nothing of each other's locks."""
+    assert s3 is not None
+    first, second = (open_blobs(tmp_path / name, "s3://grasps/lab", 2**30) for name in ("first", "second"))
+    set_id = stores.set_id
+
+    def set_id_after_another_began(session: Session, store_id: str) -> None:
+        monkeypatch.setattr(stores, "set_id", set_id)
+        join(other, second)
+        set_id(session, store_id)
+
+    monkeypatch.setattr(stores, "set_id", set_id_after_another_began)
+    with pytest.raises(StoreMismatch, match=r"is of store .* of store"):
+        join(database, first)
+    join(other, second)
+    assert second.put(b"tactile")
+
+
+def test_what_another_database_took_over_takes_no_more_files(
+    database: Database, blobs: BlobStore, other: Database
+) -> None:
+    join(database, blobs)
+    assert blobs.put(b"tactile")
+    store_id = blobs.store_id
+    identity.adopt(other, blobs, OPERATOR)
+    blobs.store_id = store_id  # as another process still has it
+    with pytest.raises(StorageUnavailable, match="its store id was"):
+        blobs.put(b"lost")
 
 
 def test_a_folder_of_files_becomes_no_cache_of_another_store(
