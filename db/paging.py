@@ -23,6 +23,10 @@ class Window:
     limit: int | None = None
 
 
+BY_NAME = Window("name")
+"""All of it."""
+
+
 def windowed(
     query: Query,
     window: Window,

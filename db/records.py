@@ -169,6 +169,7 @@ class Gel:
 class Sensor:
     """A sensor that logs come from; ``gel`` is None where it was not described, ``calibration`` the newest version."""
 
+    id: int
     name: str
     gel: Gel | None
     calibration: int | None = None

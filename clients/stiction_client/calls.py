@@ -5,6 +5,7 @@ clients only carry requests out, one waiting, the other awaiting, so nothing is 
 """
 
 import json
+import math
 import time
 import warnings
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -165,18 +166,22 @@ def material(name: str) -> Call[Material]:
 
 def materials() -> Call[list[Material]]:
     """Ask for all materials, page after page."""
-    found: list[Material] = []
+    return (yield from _listed("/v1/materials", Material.from_json))
+
+
+def _listed(
+    path: str, read: Callable[[Mapping[str, Any]], T], most: float = math.inf, **asked: str | None
+) -> Call[list[T]]:
+    """Ask for a list, page after page, until there are enough."""
+    found: list[T] = []
     cursor: str | None = None
     while True:
-        answer = yield from _get("/v1/materials", _given(limit=PAGE, cursor=cursor))
-        page, cursor = _record(_page_of_materials, answer)
+        limit = int(min(PAGE, most - len(found)))
+        answer = yield from _get(path, _given(**asked, limit=limit, cursor=cursor))
+        page, cursor = _record(lambda record: ([read(item) for item in record["items"]], record.get("next")), answer)
         found += page
-        if cursor is None:
+        if cursor is None or len(found) >= most:
             return found
-
-
-def _page_of_materials(record: Mapping[str, Any]) -> tuple[list[Material], str | None]:
-    return [Material.from_json(item) for item in record["items"]], record.get("next")
 
 
 @dataclass(frozen=True, slots=True)
@@ -322,8 +327,8 @@ def _owners(record: Mapping[str, Any]) -> list[str]:
 
 
 def sensors() -> Call[list[dict[str, Any]]]:
-    """Ask for all sensors."""
-    return _record(lambda record: [dict(each) for each in record["items"]], (yield from _get("/v1/sensors")))
+    """Ask for all sensors, page after page."""
+    return (yield from _listed("/v1/sensors", dict))
 
 
 def describe_sensor(name: str, gel: Mapping[str, float | None]) -> Call[dict[str, Any]]:
@@ -346,21 +351,7 @@ def calibrations(name: str) -> Call[list[dict[str, Any]]]:
 
 def audit(actor: str | None, action: str | None, subject: str | None, limit: int) -> Call[list[AuditEntry]]:
     """Ask for the newest entries of the audit trail, page after page up to ``limit``."""
-    found: list[AuditEntry] = []
-    cursor: str | None = None
-    while True:
-        page = min(PAGE, limit - len(found))
-        answer = yield from _get(
-            "/v1/audit", _given(actor=actor, action=action, subject=subject, limit=page, cursor=cursor)
-        )
-        entries, cursor = _record(_page_of_entries, answer)
-        found += entries
-        if cursor is None or len(found) >= limit:
-            return found
-
-
-def _page_of_entries(record: Mapping[str, Any]) -> tuple[list[AuditEntry], str | None]:
-    return [AuditEntry.from_json(item) for item in record["items"]], record.get("next")
+    return (yield from _listed("/v1/audit", AuditEntry.from_json, limit, actor=actor, action=action, subject=subject))
 
 
 def wait(job_id: str, timeout: float) -> Call[Job]:

@@ -7,13 +7,11 @@ from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from db.errors import AlreadyExists, NotFound
-from db.paging import Window, windowed
+from db.paging import BY_NAME, Window, windowed
 from db.records import Material, StoredModel
 from db.repositories import friction_models, grasp_logs, jobs
 from db.tables import GraspLogRow, MaterialNameRow, MaterialRow
 from db.text import is_storable
-
-BY_NAME = Window("name")
 
 
 def create(session: Session, name: str, description: str) -> Material:

@@ -1,10 +1,13 @@
 """Queries on sensors and the mechanics of their gels."""
 
+from collections.abc import Collection
+
 from sqlalchemy import func, select
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from db.errors import NotFound
+from db.paging import BY_NAME, Window, windowed
 from db.records import Gel, Sensor
 from db.tables import GraspLogRow, SensorCalibrationRow, SensorRow
 from db.text import is_storable
@@ -47,15 +50,16 @@ def get(session: Session, name: str) -> Sensor:
     return found
 
 
-def list_all(session: Session) -> list[Sensor]:
-    """All sensors, by name."""
-    return [_record(*row) for row in session.execute(_WHOLE.order_by(SensorRow.name))]
+def list_all(session: Session, window: Window = BY_NAME) -> list[Sensor]:
+    """Sensors, by name."""
+    found = session.execute(windowed(_WHOLE, window, {"name": SensorRow.name}, SensorRow.id))
+    return [_record(*row) for row in found]
 
 
-def count_logs(session: Session) -> dict[str, int]:
-    """How many logs, withdrawn ones too, come from each sensor that any comes from, by its name."""
-    query = select(SensorRow.name, func.count()).join(GraspLogRow, GraspLogRow.sensor_id == SensorRow.id)
-    return {str(row[0]): int(row[1]) for row in session.execute(query.group_by(SensorRow.id, SensorRow.name))}
+def count_logs(session: Session, ids: Collection[int]) -> dict[int, int]:
+    """How many logs, withdrawn ones too, come from each of these sensors that any comes from, by its key."""
+    query = select(GraspLogRow.sensor_id, func.count()).where(GraspLogRow.sensor_id.in_(ids))
+    return {int(row[0]): int(row[1]) for row in session.execute(query.group_by(GraspLogRow.sensor_id))}
 
 
 def describe(session: Session, name: str, gel: Gel) -> Sensor:
@@ -69,6 +73,6 @@ def describe(session: Session, name: str, gel: Gel) -> Sensor:
 
 def _record(row: SensorRow, calibration: int | None) -> Sensor:
     if row.young_modulus is None or row.poisson_ratio is None:
-        return Sensor(row.name, None, calibration)
+        return Sensor(row.id, row.name, None, calibration)
     gel = Gel(row.young_modulus, row.poisson_ratio, row.thickness, row.marker_depth or 0.0)
-    return Sensor(row.name, gel, calibration)
+    return Sensor(row.id, row.name, gel, calibration)

@@ -18,12 +18,6 @@ def find(context: Context, name: str) -> Sensor:
         return sensors.get(session, name)
 
 
-def list_all(context: Context) -> list[Sensor]:
-    """All sensors that logs come from, or that were described."""
-    with context.database.read() as session:
-        return sensors.list_all(session)
-
-
 def describe(context: Context, name: str, gel: Gel, principal: Principal) -> Sensor:
     """Store the mechanics of a sensor's gel: forces of logs that come in from then on follow from it.
 

@@ -12,7 +12,7 @@ from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.bodies import JsonRoute
 from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
-from service.http.paging import LARGEST_ID, USUAL, CursorText, Limit, Page, link_next
+from service.http.paging import LARGEST_ID, MOST, USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import (
     FILE_DELETED,
     INVALID_REQUEST,
@@ -42,10 +42,15 @@ SensorName = Annotated[
 ]
 
 
-@router.get("", dependencies=[READ], summary="List sensors", responses=problems(STORAGE_UNAVAILABLE))
-def list_sensors(context: CurrentContext) -> SensorsOut:
-    """All that logs come from or that were described, by name."""
-    return SensorsOut(items=[SensorOut.of(each) for each in sensors.list_all(context)])
+@router.get("", dependencies=[READ], summary="List sensors", responses=problems(INVALID_REQUEST, STORAGE_UNAVAILABLE))
+def list_sensors(
+    context: CurrentContext, request: Request, response: Response, limit: Limit = MOST, cursor: CursorText = None
+) -> SensorsOut:
+    """Those that logs come from or that were described, by name."""
+    page = Page("name", limit, cursor)
+    with context.database.read() as session:
+        found, after = page.cut(stored_sensors.list_all(session, page.window()))
+    return SensorsOut(items=[SensorOut.of(each) for each in found], next=link_next(request, response, after))
 
 
 @router.post(

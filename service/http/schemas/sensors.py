@@ -85,11 +85,12 @@ class SensorOut(BaseModel):
 
 
 class SensorsOut(BaseModel):
-    """All sensors, by name."""
+    """Sensors, by name."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"items": [SENSOR_EXAMPLE]}]})
+    model_config = ConfigDict(json_schema_extra={"examples": [{"items": [SENSOR_EXAMPLE], "next": None}]})
 
     items: list[SensorOut]
+    next: Next
 
 
 class PressIn(Body):

@@ -22,7 +22,7 @@ from service.http.routes.sensors import SensorName
 from service.http.schemas.sensors import GelIn
 from service.web.forms import FormRoute, checked
 from service.web.rendering import on_problem, render
-from service.web.routes.materials import LOGS_ON_A_PAGE
+from service.web.routes.materials import LOGS_ON_A_PAGE, ON_A_PAGE
 
 router = APIRouter(include_in_schema=False, route_class=FormRoute)
 
@@ -34,11 +34,13 @@ FieldText = Annotated[str, Form(max_length=40)]
 
 
 @router.get("/sensors", dependencies=[READ])
-def list_sensors(context: CurrentContext, request: Request) -> Response:
-    """All that logs come from or that were described, by name."""
+def list_sensors(context: CurrentContext, request: Request, cursor: CursorText = None) -> Response:
+    """Those that logs come from or that were described, by name."""
+    page = Page("name", ON_A_PAGE, cursor)
     with context.database.read() as session:
-        found, logs = stored_sensors.list_all(session), stored_sensors.count_logs(session)
-    return render(request, "sensors.html", sensors=found, logs=logs)
+        found, after = page.cut(stored_sensors.list_all(session, page.window()))
+        logs = stored_sensors.count_logs(session, [each.id for each in found])
+    return render(request, "sensors.html", sensors=found, logs=logs, after=after)
 
 
 @router.get("/sensors/{name:path}", dependencies=[READ])

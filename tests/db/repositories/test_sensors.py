@@ -1,9 +1,13 @@
+from collections.abc import Callable
+from dataclasses import replace
+
 import pytest
 
 from db.database import Database
 from db.errors import NotFound
-from db.records import Gel, Sensor
-from db.repositories import sensors
+from db.paging import Window
+from db.records import Gel, NewGraspLog, Sensor
+from db.repositories import grasp_logs, sensors
 
 GEL = Gel(2.5e5, 0.48, None, 0.0)
 
@@ -12,12 +16,23 @@ def test_a_gel_is_kept_with_its_sensor_and_replaced(database: Database) -> None:
     with database.write() as session:
         key = sensors.find_or_add(session, "seen")
         assert sensors.find_or_add(session, "seen") == key
-        assert sensors.get(session, "seen") == Sensor("seen", None)
+        assert sensors.get(session, "seen") == Sensor(key, "seen", None)
         assert sensors.describe(session, "seen", Gel(1e6, 0.49, 4e-3, 1e-3)).gel == Gel(1e6, 0.49, 4e-3, 1e-3)
         sensors.describe(session, "seen", GEL)
-        sensors.describe(session, "before", GEL)
+        before = sensors.describe(session, "before", GEL)
     with database.read() as session:
-        assert sensors.list_all(session) == [Sensor("before", GEL), Sensor("seen", GEL)]
+        assert sensors.list_all(session) == [before, Sensor(key, "seen", GEL)]
+        assert sensors.list_all(session, Window("name", limit=1)) == [before]
+        assert sensors.list_all(session, Window("name", after=("before", before.id))) == [Sensor(key, "seen", GEL)]
+
+
+def test_logs_are_counted_by_sensor(database: Database, new_log: Callable[..., NewGraspLog]) -> None:
+    with database.write() as session:
+        for sensor in ("left", "left", "right"):
+            grasp_logs.add(session, replace(new_log(), sensor=sensor))
+        left, right, unused = (sensors.find_or_add(session, name) for name in ("left", "right", "unused"))
+        assert sensors.count_logs(session, [left, unused]) == {left: 2}
+        assert sensors.count_logs(session, [left, right]) == {left: 2, right: 1}
 
 
 @pytest.mark.parametrize("name", ["other", "nul\0"])

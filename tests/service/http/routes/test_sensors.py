@@ -18,6 +18,7 @@ from service.domain.calibrate import OFFSET, corrected
 from service.domain.sensors import RECONSTRUCTED
 from service.jobs import pipeline
 from slipcore import GraspLog, calibrate_sensor
+from stiction_client import FrictionClient, calls
 from stiction_client.container import encode
 
 NPZ = "application/vnd.stiction.grasp-log+npz"
@@ -42,6 +43,23 @@ def test_a_sensor_is_described_before_or_after_its_first_log(client: httpx.Clien
     told = client.get("/v1/audit", params={"subject": name}).json()["items"]
     assert [entry["action"] for entry in told] == ["sensor.described"] * 2
     assert told[0]["details"] == GEL
+
+
+def test_a_list_of_sensors_comes_in_parts(client: httpx.Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = {f"part {k}" for k in range(5)}
+    for name in names:
+        client.put(f"/v1/sensors/{name}", json=GEL).raise_for_status()
+    whole = client.get("/v1/sensors").json()
+    assert whole["next"] is None
+    first = client.get("/v1/sensors", params={"limit": 2})
+    assert first.json()["items"] == whole["items"][:2]
+    assert client.get(first.links["next"]["url"]).json()["items"] == whole["items"][2:4]
+    assert client.get("/v1/sensors", params={"limit": 0}).status_code == 422
+    monkeypatch.setattr(calls, "PAGE", 2)
+    with FrictionClient(str(client.base_url)) as caller:
+        found = caller.sensors()
+    assert found == whole["items"]
+    assert names <= {each["name"] for each in found}
 
 
 @pytest.mark.parametrize(
