@@ -1,0 +1,68 @@
+"""What the ROS 2 node computes, without ROS: stamped wrenches of a fingertip in, grip commands out."""
+
+import math
+from collections.abc import Mapping
+
+from stiction_client import Command, Contact, ControlSettings, FrictionModel, GraspController, Observation
+from stiction_client.controller import gains
+
+STALE_AFTER = 0.1
+"""s after which a stick ratio says nothing of a wrench: three frames at 30 frames/s."""
+
+REWOUND = 1.0
+"""s by which a stamp must be earlier than the last for the clock to have been set back, as a simulation's is."""
+
+
+def seconds(sec: int, nanosec: int) -> float:
+    """A stamp of ROS in s; double precision tells 0.2 µs apart today."""
+    return sec + 1e-9 * nanosec
+
+
+def settings_of(parameters: Mapping[str, float]) -> ControlSettings:
+    """The node's parameters as the controller takes them; raises ``InvalidArgument``.
+
+    They are ``contact_area`` m², under ``round_at`` N of a round fingertip (0: flat), and the settings by their names.
+    """
+    given = {name: parameters[name] for name in gains() if name in parameters}
+    area, force = parameters["contact_area"], parameters.get("round_at", 0.0)
+    contact = Contact.flat(area) if force == 0.0 else Contact.round(area, force)
+    counted = {name: int(value) if gains()[name].unit == "frames" else value for name, value in given.items()}
+    return ControlSettings(contact=contact, **counted)
+
+
+class Grip:
+    """A grip controller fed with what ROS brings, in whatever order it comes."""
+
+    def __init__(self, settings: ControlSettings, model: FrictionModel | None = None) -> None:
+        self._settings, self._model = settings, model
+        self._ratio, self._ratio_time = math.nan, -math.inf
+        self._begin()
+
+    def on_stick_ratio(self, time: float, stick_ratio: float) -> None:
+        """A detector's stick ratio, NaN where it tells none; one that comes late is left out."""
+        if time >= self._ratio_time or self._ratio_time - time > REWOUND:
+            self._ratio, self._ratio_time = stick_ratio, time
+
+    def on_wrench(
+        self, time: float, force: tuple[float, float, float], torque: tuple[float, float, float]
+    ) -> Command | None:
+        """The command after a wrench on the finger (N, N·m; z along the outward normal of the sensor's surface).
+
+        None for a wrench that is no later than the last, or that is not finite. A clock set back begins a new grasp.
+        """
+        if self._time - time > REWOUND:
+            self._begin()
+        if not time > self._time or not all(map(math.isfinite, (*force, *torque))):
+            return None
+        self._time = time
+        self._state, command = GraspController.step(self._state, self._observation(time, force, torque))
+        return command
+
+    def _begin(self) -> None:
+        self._time, self._state = -math.inf, GraspController.init(self._settings, self._model)
+
+    def _observation(
+        self, time: float, force: tuple[float, float, float], torque: tuple[float, float, float]
+    ) -> Observation:
+        ratio = self._ratio if abs(time - self._ratio_time) <= STALE_AFTER else math.nan
+        return Observation(time, max(-force[2], 0.0), math.hypot(force[0], force[1]), abs(torque[2]), ratio)
