@@ -18,13 +18,15 @@ MASS = 0.15
 class PointContact:
     """A mass under ``load`` (time → N) that a gripper of 30 ms lag presses; its stick ratio is Cattaneo and Mindlin's.
 
-    ``told`` says when the detector tells anything; ``sampled_below``: stick ratio below which elements are sampled.
+    ``told`` says when the detector tells anything; ``sampled_below``: stick ratio below which elements are sampled;
+    ``missed``: share of the slipping area that the detector takes for sticking.
     """
 
     load: Callable[[float], float]
     friction: float = 0.45
     told: Callable[[float], bool] = lambda _: True
     sampled_below: float = 0.9
+    missed: float = 0.0
     seed: int = 0
     normal: float = 0.5
     velocity: float = 0.0
@@ -55,6 +57,7 @@ class PointContact:
             return Observation(time, normal, tangential)
         samples = SlipSamples(self.friction * (1.0 + 0.02 * noise[3:]), np.full(5, 0.05))
         slips = ratio < self.sampled_below
+        ratio = 1.0 - (1.0 - self.missed) * (1.0 - ratio)
         return Observation(
             time, normal, tangential, 0.0, min(max(ratio + 0.05 * noise[2], 0.0), 1.0), samples if slips else None
         )

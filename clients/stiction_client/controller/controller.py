@@ -64,27 +64,32 @@ def _sense(state: ControllerState, observation: Observation, elapsed: float) -> 
     """What the frame tells of load and friction."""
     load = state.load.step(observation, elapsed, state.settings)
     felt = state.felt.step(observation, load.size, state.settings)
-    friction = _sampled(observation, felt, load.size, state.settings)
-    learned = state.learned if math.isnan(friction) else state.learned.with_frame(friction, state.settings)
+    sampled = _sampled(observation, felt, state.settings)
+    agrees = not math.isnan(sampled) and _agrees(sampled, observation.normal, felt, load.size, state.settings)
+    friction = sampled if agrees else math.nan
+    learned = state.learned if math.isnan(sampled) else state.learned.with_frame(sampled, agrees, state.settings)
     against = _contradicts(state, felt, observation.normal, load.size, friction)
     contradictions = state.contradictions if against is None else state.contradictions + 1 if against else 0
     return replace(state, time=observation.time, load=load, felt=felt, learned=learned, contradictions=contradictions)
 
 
-def _sampled(observation: Observation, felt: Felt, size: float, settings: ControlSettings) -> float:
-    """The contact's friction by the elements that slip; NaN without any, or where the stick ratio says otherwise.
-
-    What sticks bears less than its friction: taken for slip, it would make the contact slip more than it does.
-    """
+def _sampled(observation: Observation, felt: Felt, settings: ControlSettings) -> float:
+    """The contact's friction by the elements that slip; NaN without any."""
     if (
         observation.slip_samples is None
         or not felt.stick_ratio < settings.told_stick_ratio
         or observation.normal == 0.0
     ):
         return math.nan
-    friction = observation.slip_samples.contact_friction()
-    least = settings.agreement_share * size / (observation.normal * utilisation(felt.stick_ratio))
-    return friction if friction >= least else math.nan
+    return observation.slip_samples.contact_friction()
+
+
+def _agrees(friction: float, normal: float, felt: Felt, size: float, settings: ControlSettings) -> bool:
+    """Whether the stick ratio says no otherwise of the contact's ``friction``.
+
+    What sticks bears less than its friction: taken for slip, it would make the contact slip more than it does.
+    """
+    return friction >= settings.agreement_share * size / (normal * utilisation(felt.stick_ratio))
 
 
 def _contradicts(state: ControllerState, felt: Felt, normal: float, size: float, friction: float) -> bool | None:
@@ -149,6 +154,9 @@ def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
     load = state.load.size * growth
     target = settings.learn_stick_ratio if state.mode == "learn" else settings.feel_stick_ratio
     demands.append(_Demand(state.felt.required(load, target), "stick ratio"))
+    lowest = state.learned.lowest(settings)
+    if state.mode == "learn" and lowest > 0.0:
+        demands.append(_Demand(load / lowest, "samples of slip"))
     if state.mode != "learn":
         why = "no stick ratio" if _blind(state) else "friction unknown"
         demands += [_Demand(load / settings.unknown_friction, why), _Demand(state.normal_force, why)]

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from statistics import median
 
 from stiction_client.contacts import Contact
 from stiction_client.controller.settings import ControlSettings
@@ -57,13 +58,27 @@ class KnownFriction:
 
 @dataclass(frozen=True, slots=True)
 class LearnedFriction:
-    """The contact's friction by the elements that slipped: ``values`` of the latest frames that told it."""
+    """The contact's friction by the elements that slipped: ``values`` of the latest frames that told it.
+
+    ``sampled``: of the latest frames that had samples, those among them that the stick ratio contradicts.
+    """
 
     values: tuple[float, ...] = ()
+    sampled: tuple[float, ...] = ()
 
-    def with_frame(self, friction: float, settings: ControlSettings) -> "LearnedFriction":
+    def with_frame(self, friction: float, agrees: bool, settings: ControlSettings) -> "LearnedFriction":
         """The same after one more frame; of the older ones ``learn_frames`` are kept."""
-        return LearnedFriction((*self.values, friction)[-settings.learn_frames :])
+        values = (*self.values, friction)[-settings.learn_frames :] if agrees else self.values
+        return LearnedFriction(values, (*self.sampled, friction)[-settings.learn_frames :])
+
+    def lowest(self, settings: ControlSettings) -> float:
+        """Friction that a force may rely on which falls, by the median of all samples; NaN while they are few.
+
+        A detector that misses slip contradicts samples that are right: they are then all that is known.
+        """
+        if len(self.sampled) < settings.contradiction_frames:
+            return math.nan
+        return median(self.sampled) * (1.0 - NORMAL_DEVIATIONS * settings.learned_error)
 
     def known(self, settings: ControlSettings) -> KnownFriction | None:
         """A model of it, once ``learn_frames`` agree to within ``learn_spread``.
