@@ -54,11 +54,12 @@ def fill(client: FrictionClient) -> str:
     return receipts[-1].id
 
 
-def take(tab: Tab, name: str, folder: Path) -> None:
-    """One picture of what is on the page, in each look; 256 colours are plenty."""
+def take(tab: Tab, name: str, folder: Path, part: str = "body") -> None:
+    """One picture of the page from the beginning of a ``part``, in each look; 256 colours are plenty."""
     for look, (width, scheme) in LOOKS.items():
         tab.resize(width)
         tab.prefer(scheme)
+        tab.run(f"document.querySelector('{part}').scrollIntoView({{behavior: 'instant'}})")
         tab.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
         picture = Image.open(io.BytesIO(tab.picture())).convert("RGB")
         path = folder / f"dashboard-{name}-{look}.png"
@@ -102,6 +103,9 @@ def main() -> None:
         for name, path in pages.items():
             tab.go(f"{url}{path}")
             take(tab, name, folder)
+        tab.go(f"{url}/materials/rubber")
+        tab.until("document.querySelector('.samples[data-ready]') !== null")
+        take(tab, "samples", folder, ".samples")
         tab.go(f"{url}/logs/{log}")
         tab.until("document.querySelector('.player[data-ready]') !== null")
         take(tab, "log", folder)

@@ -291,6 +291,15 @@ class SamplesOfLog:
 
 
 @dataclass(frozen=True, slots=True)
+class SampledLog:
+    """The samples of one log, when it was sent, and the rows and columns of its sensor."""
+
+    samples: SamplesOfLog
+    created_at: datetime
+    grid: tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True)
 class NewGraspLog:
     """A grasp log about to be stored: its content's ``sha256`` and size, and what the reader found in it.
 

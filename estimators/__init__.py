@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from estimators.not_converged import NotConverged
     from estimators.online import ChangeDetector
     from estimators.recognition import recognise
+    from estimators.single_grasps import GraspEffect, grasp_effects
 
 _LAZY = {
     "ChangeAlarm": "estimators.change_alarm",
@@ -26,6 +27,8 @@ _LAZY = {
     "FrictionModel": "estimators.friction_model",
     "Scale": "estimators.friction_model",
     "Scales": "estimators.friction_model",
+    "GraspEffect": "estimators.single_grasps",
+    "grasp_effects": "estimators.single_grasps",
     "Moments": "estimators.moments",
     "NextGrasp": "estimators.grasp_design",
     "Probing": "estimators.grasp_design",
@@ -46,6 +49,7 @@ __all__ = [
     "Domain",
     "EstimatorError",
     "FrictionModel",
+    "GraspEffect",
     "InvalidSamples",
     "Moments",
     "NextGrasp",
@@ -56,6 +60,7 @@ __all__ = [
     "TooFewSamples",
     "WorkingPoint",
     "fit",
+    "grasp_effects",
     "needs_samples",
     "next_grasp",
     "recognise",

@@ -1,11 +1,12 @@
 """Queries on what was found in a log: detection and samples, stored together."""
 
 from dataclasses import asdict, fields
+from typing import Any
 
-from sqlalchemy import ColumnElement, delete, select, update
+from sqlalchemy import ColumnElement, Row, Select, delete, select, update
 from sqlalchemy.orm import Session
 
-from db.records import ContactFriction, Detection, Finding, SamplesOfLog, SampleSummary
+from db.records import ContactFriction, Detection, Finding, SampledLog, SamplesOfLog, SampleSummary
 from db.tables import DetectionRow, GraspLogRow, SampleSummaryRow
 
 
@@ -44,7 +45,23 @@ def samples_of_material(session: Session, material_id: int) -> list[SamplesOfLog
     Logs without samples, and withdrawn ones, are left out. A log that went through several detectors is one grasp
     still: its newest samples count.
     """
-    query = (
+    found = session.execute(_samples(material_id).order_by(SampleSummaryRow.created_at, GraspLogRow.id))
+    return list({row.sha256: _samples_of_log(row) for row in found}.values())
+
+
+def newest_sampled_logs(session: Session, material_id: int, most: int) -> list[SampledLog]:
+    """The same of its logs that were sampled last, newest first; of a log that went through several detectors once."""
+    newest = _samples(material_id).add_columns(GraspLogRow.created_at, GraspLogRow.grid_rows, GraspLogRow.grid_columns)
+    newest = newest.order_by(SampleSummaryRow.created_at.desc(), GraspLogRow.id.desc()).limit(most)
+    found: dict[str, SampledLog] = {}
+    for row in session.execute(newest):
+        grid = (row.grid_rows, row.grid_columns)
+        found.setdefault(row.sha256, SampledLog(_samples_of_log(row), row.created_at, grid))
+    return list(found.values())
+
+
+def _samples(material_id: int) -> Select[tuple[str, str, str, bytes | None, list[Any] | None]]:
+    return (
         select(
             GraspLogRow.sha256,
             GraspLogRow.id,
@@ -55,15 +72,12 @@ def samples_of_material(session: Session, material_id: int) -> list[SamplesOfLog
         .join(SampleSummaryRow)
         .outerjoin(DetectionRow, DetectionRow.grasp_log_id == GraspLogRow.id)
         .where(*_that_count(material_id))
-        .order_by(SampleSummaryRow.created_at, GraspLogRow.id)
     )
-    found = session.execute(query)
-    return list(
-        {
-            sha256: SamplesOfLog(log_id, blob, moments, tuple(finding["name"] for finding in findings or ()))
-            for sha256, log_id, blob, moments, findings in found
-        }.values()
-    )
+
+
+def _samples_of_log(row: Row[Any]) -> SamplesOfLog:
+    findings = tuple(finding["name"] for finding in row.findings or ())
+    return SamplesOfLog(row.id, row.samples_blob, row.moments, findings)
 
 
 def set_moments(session: Session, log_id: str, moments: bytes) -> None:

@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from service.formatting import MINUS
+
 WIDTH, HEIGHT = 480.0, 300.0
 LEFT, RIGHT, TOP, BOTTOM = 62.0, 12.0, 12.0, 48.0
 """Of the picture and of the margins around its axes, in units of the SVG."""
@@ -78,33 +80,54 @@ def ticks(low: float, high: float, most: int = MOST_TICKS) -> list[float]:
     return [count * step for count in range(first, last + 1)]
 
 
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """Values from ``low`` to ``high``, drawn from the place ``begin`` to ``end``; what lies outside is cut off."""
+
+    low: float
+    high: float
+    begin: float
+    end: float
+
+    def place(self, value: float) -> float:
+        """Where a value stands."""
+        part = (value - self.low) / (self.high - self.low)
+        return self.begin + (self.end - self.begin) * min(max(part, 0.0), 1.0)
+
+    def ticks(self, most: int = MOST_TICKS) -> list[Tick]:
+        """Marks at round values."""
+        found = rounded(ticks(self.low, self.high, most))
+        return [Tick(self.place(value), f"{value:g}".replace("-", MINUS)) for value in found]
+
+
 class _Axes:
     """From 0 up to what has to be seen on both axes; what lies below 0, no friction does, is cut off."""
 
     def __init__(self, curves: Sequence[Curve]) -> None:
-        self._x_most = max(1e-12, *(x for curve in curves for x in curve.x))
-        self._y_most = 1.05 * max(1e-12, *(y for curve in curves for y in (*curve.high, *curve.y)))
+        x_most = max(1e-12, *(x for curve in curves for x in curve.x))
+        y_most = 1.05 * max(1e-12, *(y for curve in curves for y in (*curve.high, *curve.y)))
+        self.x, self.y = Axis(0.0, x_most, LEFT, WIDTH - RIGHT), Axis(0.0, y_most, HEIGHT - BOTTOM, TOP)
 
     def across(self, x: float) -> float:
-        return LEFT + (WIDTH - LEFT - RIGHT) * min(max(x / self._x_most, 0.0), 1.0)
-
-    def _up(self, y: float) -> float:
-        return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * min(max(y / self._y_most, 0.0), 1.0)
-
-    def _points(self, xs: Sequence[float], ys: Sequence[float]) -> str:
-        return " ".join(f"{self.across(x):.1f},{self._up(y):.1f}" for x, y in zip(xs, ys, strict=True))
+        return self.x.place(x)
 
     def line(self, curve: Curve) -> str:
-        return self._points(curve.x, curve.y)
+        return points(self.x, self.y, curve.x, curve.y)
 
     def band(self, curve: Curve) -> str:
-        return f"{self._points(curve.x, curve.high)} {self._points(curve.x[::-1], curve.low[::-1])}"
+        there, back = (curve.x, curve.high), (curve.x[::-1], curve.low[::-1])
+        return f"{points(self.x, self.y, *there)} {points(self.x, self.y, *back)}"
 
     def x_ticks(self) -> list[Tick]:
-        return [Tick(self.across(x), f"{x:g}") for x in rounded(ticks(0.0, self._x_most))]
+        return self.x.ticks()
 
     def y_ticks(self) -> list[Tick]:
-        return [Tick(self._up(y), f"{y:g}") for y in rounded(ticks(0.0, self._y_most))]
+        return self.y.ticks()
+
+
+def points(x: Axis, y: Axis, xs: Sequence[float], ys: Sequence[float]) -> str:
+    """Points as lines and polygons of an SVG take them."""
+    return " ".join(f"{x.place(a):.1f},{y.place(b):.1f}" for a, b in zip(xs, ys, strict=True))
 
 
 def draw(curve: Curve) -> Chart:

@@ -1,8 +1,6 @@
 """Reports of a log and of a material, made in a reader's process, which alone loads what draws their pictures."""
 
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
 
 from db.records import StoredGraspLog
@@ -10,6 +8,7 @@ from service.domain.context import Context
 from service.domain.principal import Principal
 from service.domain.record_next import RecordNext
 from service.http.download import Download
+from service.web.derived import derive
 from stiction_client.records import GraspLogReceipt, Material
 
 HEADERS = {
@@ -21,11 +20,7 @@ HEADERS = {
 
 async def show(context: Context, principal: Principal, kind: str, write: Callable[[Path], None]) -> Download:
     """The report that ``write``, which can be pickled, writes to a path."""
-    with ExitStack() as spools:
-        spool = spools.enter_context(context.blobs.spool())
-        await context.readers.derive(partial(write, spool.path), kind, principal.share)
-        close = spools.pop_all().close
-    return Download(spool.path, close, headers=HEADERS, media_type="text/html; charset=utf-8")
+    return await derive(context, principal, kind, write, headers=HEADERS, media_type="text/html; charset=utf-8")
 
 
 def write_log(log: StoredGraspLog, history: Path, samples: Path, upload: Path | None, target: Path) -> None:

@@ -1,7 +1,6 @@
 """One grasp log: what became of it, and the frames that its player shows."""
 
 import asyncio
-from contextlib import ExitStack
 from functools import partial
 
 from fastapi import APIRouter, Request, Response
@@ -13,8 +12,8 @@ from service.domain.errors import ResultsNotReady
 from service.http.access import READ, CurrentPrincipal
 from service.http.conditional import KEEP_AND_ASK, is_one_of, unchanged
 from service.http.dependencies import CurrentContext
-from service.http.download import Download
 from service.web import reports
+from service.web.derived import derive
 from service.web.frames import write_frames
 from service.web.rendering import render
 
@@ -38,12 +37,9 @@ async def read_frames(context: CurrentContext, request: Request, principal: Curr
         return unchanged(tag)
     history = await asyncio.to_thread(context.blobs.path, detection.history_blob)
     upload = await asyncio.to_thread(context.blobs.path, log.sha256) if log.has_file else None
-    with ExitStack() as spools:
-        spool = spools.enter_context(context.blobs.spool())
-        await context.readers.derive(partial(write_frames, history, upload, spool.path), log.format, principal.share)
-        close = spools.pop_all().close
     headers = {"ETag": tag, "Cache-Control": KEEP_AND_ASK}
-    return Download(spool.path, close, headers=headers, media_type="application/octet-stream")
+    write = partial(write_frames, history, upload)
+    return await derive(context, principal, log.format, write, headers=headers, media_type="application/octet-stream")
 
 
 @router.get("/logs/{id}/report", dependencies=[READ])

@@ -2,6 +2,7 @@
 
 import asyncio
 from functools import partial
+from hashlib import sha256
 from typing import Annotated, Literal
 from urllib.parse import quote
 
@@ -10,12 +11,14 @@ from fastapi.params import Form
 from fastapi.responses import RedirectResponse
 
 from db.paging import Window
-from db.records import LogFilter
-from db.repositories import friction_models, grasp_logs, materials
+from db.records import LogFilter, SampledLog, StoredModel
+from db.repositories import detections, friction_models, grasp_logs, materials
 from estimators.method_names import ModelMethod
 from service.domain import curate
 from service.domain.context import Context
+from service.domain.errors import NoModel
 from service.http.access import READ, UPLOAD, CurrentPrincipal
+from service.http.conditional import KEEP_AND_ASK, is_one_of, unchanged
 from service.http.dependencies import CurrentContext
 from service.http.paging import CursorText, Page
 from service.http.schemas.common import Force, Velocity
@@ -23,9 +26,13 @@ from service.http.schemas.grasp_logs import GraspLogOut
 from service.http.schemas.materials import MaterialOut, NewMaterial
 from service.report.wording import NEWEST_LOGS
 from service.web import reports
+from service.web.derived import derive
 from service.web.forms import EMPTY_IS_NONE, FormRoute, checked
 from service.web.friction import coefficients, friction_at, listed, next_of, sections, usual_model
+from service.web.grasp_effects import MOST_GRASPS, differing, draw_effects
+from service.web.posterior import densities, pairs
 from service.web.rendering import render
+from service.web.samples import SampleFile, write_samples
 from stiction_client.records import GraspLogReceipt, Material
 
 router = APIRouter(include_in_schema=False, route_class=FormRoute)
@@ -88,8 +95,10 @@ def show_material(
         found = materials.get(session, name)
         versions = friction_models.versions(session, found.id, method, window=NEWEST_VERSIONS)
         logs, after = page.cut(grasp_logs.list_all(session, page.window(), LogFilter(material_id=found.id)))
+        sampled = detections.newest_sampled_logs(session, found.id, MOST_GRASPS)[::-1]
     stored = usual_model(found.models, method)
     shown = None if stored is None else friction_at(stored, fn, v or 0.0, found.models)
+    effects = [] if stored is None else differing(stored, sampled)
     return render(
         request,
         "material.html",
@@ -99,11 +108,48 @@ def show_material(
         coefficients=[] if stored is None else coefficients(stored),
         next_grasp=None if stored is None or shown is None else next_of(stored, shown),
         charts=[] if stored is None or shown is None else sections(stored, shown),
+        has_samples=bool(sampled),
+        effects=effects,
+        effect_chart=draw_effects(effects) if effects else None,
+        densities=[] if stored is None else densities(stored),
+        pairs=[] if stored is None else pairs(stored),
         asked={"fn": fn, "v": v, "method": method},
         versions=versions,
         logs=logs,
         after=after,
     )
+
+
+@router.get("/materials/{name}/samples", dependencies=[READ])
+async def read_samples(
+    context: CurrentContext,
+    request: Request,
+    principal: CurrentPrincipal,
+    name: str,
+    method: ModelMethod | None = None,
+) -> Response:
+    """The newest logs' samples beside the model (``service.web.samples``); raises ``NotFound``, ``NoModel``."""
+    model, logs = await asyncio.to_thread(_sampled, context, name, method)
+    blobs = [log.samples.samples_blob for log in logs]
+    tag = f'"{sha256(" ".join([str(model.id), *blobs]).encode()).hexdigest()[:32]}"'
+    if is_one_of(tag, request.headers.get("if-none-match", "")):
+        return unchanged(tag)
+    paths = await asyncio.to_thread(lambda: [context.blobs.path(blob) for blob in blobs])
+    files = [SampleFile(path, log.grid) for path, log in zip(paths, logs, strict=True)]
+    headers = {"ETag": tag, "Cache-Control": KEEP_AND_ASK}
+    write = partial(write_samples, model.model, files)
+    return await derive(context, principal, "stored", write, headers=headers, media_type="application/octet-stream")
+
+
+def _sampled(context: Context, name: str, method: str | None) -> tuple[StoredModel, list[SampledLog]]:
+    """The model that is shown, and the logs whose samples stand beside it, newest first."""
+    with context.database.read() as session:
+        found = materials.get(session, name)
+        logs = detections.newest_sampled_logs(session, found.id, MOST_GRASPS)
+    model = usual_model(found.models, method)
+    if model is None or not logs:
+        raise NoModel(f"{name} has no model with samples", method or "any")
+    return model, logs
 
 
 @router.get("/materials/{name}/report", dependencies=[READ])

@@ -27,6 +27,12 @@ SEE_FOCUS = """(() => {
 })()"""
 """Marks the element that has the focus, where that shows."""
 
+INKED = """(() => {{
+  const canvas = document.querySelector(".{}"), pixels = canvas.getContext("2d");
+  return pixels.getImageData(0, 0, canvas.width, canvas.height).data.some(part => part > 0);
+}})()"""
+"""Whether anything is drawn on a canvas."""
+
 DROP = """(() => {
   const held = new DataTransfer();
   held.items.add(new File(["no log at all"], "grasp.npz"));
@@ -85,7 +91,7 @@ def test_from_an_upload_to_a_grip_force(
     assert page.run("document.querySelector('.play').textContent") == "Play"
 
     page.run("document.querySelector('main a[href^=\"/materials/\"]').click()")
-    page.until("document.querySelectorAll('svg polyline').length === 2")
+    page.until("document.querySelectorAll('main > .charts svg polyline').length === 2")
     assert fits(page)
     page.run("document.querySelector('main a[href^=\"/plan\"]').click()")
     page.until("location.pathname === '/plan' && document.readyState === 'complete'")
@@ -96,6 +102,28 @@ def test_from_an_upload_to_a_grip_force(
     for path in ("/", "/jobs", "/sensors", "/sensors/half-space", "/keys", "/audit", "/problems", "/login"):
         page.go(f"{base}{path}")
         assert fits(page), path
+
+
+@ON_SQLITE
+@pytest.mark.parametrize("width", [1400, 390])
+def test_samples_are_drawn_and_turned_by_keys_and_buttons(
+    page: Tab, client: httpx.Client, fitted: Any, width: int
+) -> None:
+    page.resize(width)
+    page.go(f"{str(client.base_url).rstrip('/')}/materials/{fitted['material']}")
+    page.until("document.querySelector('.samples[data-ready]') !== null")
+    assert " samples of 1 log · " in page.run("document.querySelector('.samples .now').textContent")
+    for canvas in ("space", "places", "times"):
+        assert page.run(INKED.format(canvas)), canvas
+    before = page.run("document.querySelector('.space').toDataURL()")
+    page.run("document.querySelector('.space').focus()")
+    page.press("ArrowRight")
+    assert page.run("document.querySelector('.space').toDataURL()") != before
+    page.press("Home")
+    assert page.run("document.querySelector('.space').toDataURL()") == before
+    page.run("document.querySelector('[data-view=force]').click()")
+    assert page.run("document.querySelector('.space').toDataURL()") != before
+    assert fits(page)
 
 
 @ON_SQLITE
@@ -113,8 +141,8 @@ def test_nobody_is_kept_out_of_a_page(page: Tab, client: httpx.Client, fitted: A
     for path in paths:
         page.go(f"{base}{path}")
         page.run("document.querySelectorAll('details').forEach(each => each.open = true)")
-        if path == log:
-            page.until("document.querySelector('.player[data-ready]') !== null")
+        if path in (log, material):
+            page.until("document.querySelector('[data-ready]') !== null")
         if barriers := page.barriers():
             found[path] = barriers
         assert fits(page), path
@@ -130,8 +158,8 @@ def test_the_tab_key_reaches_every_control_and_shows_where_it_is(
     page.resize(1400)
     page.go(f"{str(client.base_url).rstrip('/')}{path.format(**fitted)}")
     page.run("document.querySelectorAll('details').forEach(each => each.open = true)")
-    if path == "/logs/{id}":
-        page.until("document.querySelector('.player[data-ready]') !== null")
+    if path in ("/logs/{id}", "/materials/{material}"):
+        page.until("document.querySelector('[data-ready]') !== null")
     controls = page.run(f"document.querySelectorAll({CONTROLS!r}).length")
     assert controls
     for _ in range(2 * controls):  # a browser may also stop at what scrolls

@@ -109,8 +109,8 @@ def test_a_material_with_a_model_shows_its_sections_coefficients_and_logs(
 ) -> None:
     page = page_of("/materials/fitted?fn=0.1&v=0.001&method=ols")
     tags = [tag for tag, _ in page.found]
-    assert tags.count("svg") == 2
-    assert tags.count("polyline") == 2
+    assert tags.count("svg") == 8  # two sections, four densities and two pairs of coefficients
+    assert tags.count("polyline") == 6
     assert "per newton (1/N)" in page.text
     assert f"/logs/{fitted['id']}" in [given.get("href") for _, given in page.found]
     assert page.foreign() == []
