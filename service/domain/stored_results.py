@@ -16,6 +16,7 @@ import stiction_client
 from db.records import ContactFriction, Detection, Finding, NewModel, SampleSummary, Scale, Scales, StoredModel
 from service.formats.npy import HEADER_LOCK
 from slipcore.frames import BoolArray, FloatArray
+from slipcore.patch_record import REGIMES, Patch, bounds_of, frames_of, joined
 from slipcore.samples import FrictionSamples
 from slipcore.slip_state import EventList, SlipEvents, SlipHistory
 
@@ -23,15 +24,29 @@ if TYPE_CHECKING:
     from estimators import FrictionModel
 
 EVENT_KINDS = ("onset", "end", "touch", "release")
+MAPS = 3
+"""Arrays that the maps of contact and slip are stored as."""
 SAMPLE_ARRAYS = FrictionSamples.arrays()
 """Of these the last but one, the kind, is stored as whether it is "contact"; older versions stored none. Whether
 velocities are relative is the same for all elements of a log, and one number."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class StoredPatches:
+    """What is kept of contact patches, end to end: of which ``frame`` each entry [k] is and which ``patch``, the
+    ``pose`` [k, 3] as ``slipcore.Patch`` has it, and the ``regime`` as its place in ``REGIMES``.
+    """
+
+    frame: NDArray[np.int64]
+    patch: NDArray[np.int64]
+    pose: FloatArray
+    regime: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class StoredHistory:
     """What is kept of a slip history: ``time`` [t] s, ``stick_ratio`` [t] (NaN without contact), the events, and which
-    elements were in ``contact`` and in ``slip`` [t, n, m]; older versions kept no such maps (None).
+    elements were in ``contact`` and in ``slip`` [t, n, m]; older versions kept no such maps (None), and no ``patches``.
     """
 
     time: FloatArray
@@ -39,6 +54,7 @@ class StoredHistory:
     events: SlipEvents
     contact: BoolArray | None
     slip: BoolArray | None
+    patches: StoredPatches | None = None
 
 
 def encode_history(history: SlipHistory) -> bytes:
@@ -46,7 +62,7 @@ def encode_history(history: SlipHistory) -> bytes:
     events = [getattr(history.events, kind) for kind in EVENT_KINDS]
     parts = [part for each in events for part in (each.element, each.time)]
     maps = [np.array(history.contact.shape), np.packbits(history.contact), np.packbits(history.slip)]
-    return _pack([history.time, history.stick_ratio, *parts, *maps])
+    return _pack([history.time, history.stick_ratio, *parts, *maps, *_patch_arrays(history.patches)])
 
 
 def decode_history(path: Path, *, with_maps: bool = True) -> StoredHistory:
@@ -57,8 +73,21 @@ def decode_history(path: Path, *, with_maps: bool = True) -> StoredHistory:
     if not maps:
         return StoredHistory(time, stick_ratio, events, None, None)
     shape = tuple(maps[0].tolist())
-    contact, slip = (np.unpackbits(bits, count=math.prod(shape)).reshape(shape).astype(bool) for bits in maps[1:])
-    return StoredHistory(time, stick_ratio, events, contact, slip)
+    contact, slip = (np.unpackbits(bits, count=math.prod(shape)).reshape(shape).astype(bool) for bits in maps[1:MAPS])
+    patches = StoredPatches(*maps[MAPS:]) if len(maps) > MAPS else None
+    return StoredHistory(time, stick_ratio, events, contact, slip, patches)
+
+
+def _patch_arrays(patches: Sequence[Patch]) -> list[NDArray[Any]]:
+    """The arrays of ``StoredPatches``."""
+    if not patches:
+        return [np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 3)), np.empty(0, np.uint8)]
+    number = np.repeat(np.arange(len(patches)), np.diff(bounds_of(patches)))
+    regime = joined(patches, "regime")
+    codes = np.zeros(len(regime), np.uint8)
+    for code, name in enumerate(REGIMES):
+        codes[regime == name] = code
+    return [frames_of(patches), number, joined(patches, "pose"), codes]
 
 
 def encode_samples(samples: FrictionSamples) -> bytes:

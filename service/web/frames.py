@@ -1,8 +1,9 @@
 """What the player shows of one log, in one compact file (``service.packed_arrays``).
 
 Its header tells ``rows`` and ``columns`` of the lattice, how many frames of the log one frame shown stands for
-(``step``), and what 127 means in ``displacement`` (m) and ``force`` (N). What is not known, because the upload was
-deleted or the log has no forces, is left out.
+(``step``), and what 127 means in ``displacement`` (m) and ``force`` (N). Of contact patches there is, for each in
+``patch_frame``, its regime, and in ``patch_place`` its column and row and its direction along them. What is not known,
+because the upload was deleted or the log has no forces, is left out.
 """
 
 from pathlib import Path
@@ -12,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service import formats
-from service.domain.stored_results import StoredHistory, decode_history
+from service.domain.stored_results import StoredHistory, StoredPatches, decode_history
+from service.formats.lattice import columns_and_rows, lattice_axes
 from service.packed_arrays import Arrays, pack_arrays
 from slipcore.frames import GraspLog
+from slipcore.patch_record import REGIMES
 
 MOST_CELLS = 1_500_000
 """Elements of all frames shown, 5 bytes each; of a log with more only every second, third … frame is shown."""
@@ -43,9 +46,24 @@ def pack(history: StoredHistory, log: GraspLog | None) -> bytes:
     header: dict[str, Any] = {"rows": grid[0], "columns": grid[1], "step": step, "frames": frames}
     if history.contact is not None and history.slip is not None:
         arrays["state"] = (history.contact[shown].astype(np.uint8) + (history.contact & history.slip)[shown]).ravel()
+    if history.patches is not None:
+        _add_patches(arrays, header, history.patches, log)
     if log is not None:
         _add_vectors(arrays, header, log, shown)
     return pack_arrays(header, arrays)
+
+
+def _add_patches(arrays: Arrays, header: dict[str, Any], patches: StoredPatches, log: GraspLog | None) -> None:
+    """Of each patch in a frame shown, by time: its regime and, where the lattice is known, its place and direction."""
+    rows = np.flatnonzero(patches.frame % header["step"] == 0)
+    rows = rows[np.argsort(patches.frame[rows], kind="stable")]
+    header["regimes"] = REGIMES
+    arrays["patch_frame"], arrays["patch_regime"] = _single(patches.frame[rows] // header["step"]), patches.regime[rows]
+    if log is not None:
+        x, y, yaw = patches.pose[rows].T
+        places = columns_and_rows(log.position, np.stack([x, y], axis=1))
+        along = np.stack([np.cos(yaw), np.sin(yaw)], axis=1) @ lattice_axes(log.position)
+        arrays["patch_place"] = _single(np.concatenate([places, along], axis=1).ravel())
 
 
 def _add_vectors(arrays: Arrays, header: dict[str, Any], log: GraspLog, shown: slice) -> None:
@@ -58,12 +76,6 @@ def _add_vectors(arrays: Arrays, header: dict[str, Any], log: GraspLog, shown: s
         total = np.nansum(log.force[shown], axis=(1, 2))
         arrays["normal_force"] = _single(np.abs(total[:, 2]))
         arrays["tangential_force"] = _single(np.hypot(total[:, 0], total[:, 1]))
-
-
-def lattice_axes(position: NDArray[Any]) -> NDArray[Any]:
-    """Directions [2, 2], x and y of each in a column, in which columns and rows of a lattice [n, m, 3] are counted."""
-    along = [np.diff(position[..., :2], axis=axis).reshape(-1, 2).sum(axis=0) for axis in (1, 0)]
-    return np.stack([step / (float(np.hypot(*step)) or 1.0) for step in along], axis=1)
 
 
 def _single(values: NDArray[Any]) -> NDArray[np.float32]:

@@ -15,7 +15,70 @@ function drawMap() {
   const shown = states ? states.subarray(first, first + cells) : new Uint8Array(cells);
   const [context, size] = drawElements(map, rows, columns, shown);
   const values = log[`${arrows.value}Values`];
+  if (states) drawOutlines(context, shown, size);
+  drawPatches(context, size);
   if (arrows.value && values) drawArrows(context, values, first, size);
+}
+
+// Around each contact patch: where an element touches and its neighbour does not.
+function drawOutlines(context, shown, size) {
+  const { rows, columns } = log;
+  const touches = (row, column) => row >= 0 && row < rows && column >= 0 && column < columns && shown[row * columns + column] > 0;
+  context.strokeStyle = colour("text");
+  context.lineWidth = 2;
+  context.beginPath();
+  for (let row = 0; row <= rows; row += 1) {
+    for (let column = 0; column <= columns; column += 1) {
+      const x = column * size, y = row * size, here = touches(row, column);
+      if (here !== touches(row - 1, column)) {
+        context.moveTo(x, y);
+        context.lineTo(x + size, y);
+      }
+      if (here !== touches(row, column - 1)) {
+        context.moveTo(x, y);
+        context.lineTo(x, y + size);
+      }
+    }
+  }
+  context.stroke();
+}
+
+// The centre of each patch as a cross, its longer arm along the patch's longer axis; a round one has none.
+function drawPatches(context, size) {
+  const places = log.patch_placeValues;
+  if (!places) return;
+  context.strokeStyle = colour("text");
+  context.lineWidth = 2;
+  context.beginPath();
+  for (const k of patchesAt(frame)) {
+    const [column, row, dx, dy] = places.subarray(4 * k, 4 * k + 4);
+    if (Number.isNaN(column)) continue;
+    const x = (column + 0.5) * size, y = (row + 0.5) * size, isRound = Number.isNaN(dx);
+    const [a, b, long] = isRound ? [1, 0, 0.6 * size] : [dx, dy, 1.6 * size];
+    for (const [along, across] of [[long, 0], [0, 0.6 * size]]) {
+      context.moveTo(x - along * a + across * b, y - along * b - across * a);
+      context.lineTo(x + along * a - across * b, y + along * b + across * a);
+    }
+  }
+  context.stroke();
+}
+
+// Which entries are of a frame; they are in the order of frames.
+function patchesAt(wanted) {
+  const frames = log.patch_frameValues, found = [];
+  if (!frames) return found;
+  for (let k = firstNotBelow(frames, wanted); k < frames.length && frames[k] === wanted; k += 1) found.push(k);
+  return found;
+}
+
+function firstNotBelow(values, wanted) {
+  let low = 0, high = values.length;
+  while (low < high) {
+    const middle = Math.floor((low + high) / 2);
+    if (values[middle] < wanted) low = middle + 1;
+    else high = middle;
+  }
+  return low;
 }
 
 function drawArrows(context, values, first, size) {
@@ -106,6 +169,8 @@ function tell() {
   const parts = [`frame ${frame * log.step + 1} of ${log.frames}`, `${log.timeValues[frame].toFixed(3)} s`];
   const ratio = log.stick_ratioValues[frame];
   parts.push(Number.isNaN(ratio) ? "no contact" : `stick ratio ${three(ratio)}`);
+  const regimes = patchesAt(frame).map((k) => log.regimes[log.patch_regimeValues[k]]);
+  if (regimes.length) parts.push(`${regimes.length === 1 ? "patch" : "patches"}: ${regimes.join(", ")}`);
   if (log.normal_forceValues) {
     parts.push(`normal force ${three(log.normal_forceValues[frame])} N`);
     parts.push(`tangential force ${three(log.tangential_forceValues[frame])} N`);

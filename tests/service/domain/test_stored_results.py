@@ -13,6 +13,7 @@ from db.records import StoredModel
 from service.domain import stored_results
 from service.http.schemas.models import FrictionModelOut
 from slipcore import FrictionSamples, GraspLog, SlipHistory
+from slipcore.patch_record import REGIMES
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +50,41 @@ def test_a_history_comes_back_to_the_last_bit(history: SlipHistory, tmp_path: Pa
     for kind in stored_results.EVENT_KINDS:
         np.testing.assert_array_equal(getattr(found.events, kind).element, getattr(history.events, kind).element)
         np.testing.assert_array_equal(getattr(found.events, kind).time, getattr(history.events, kind).time)
+
+
+def test_contact_patches_come_back_with_their_frames_and_regimes(history: SlipHistory, tmp_path: Path) -> None:
+    (patch,) = history.patches
+    two = replace(history, patches=(patch, replace(patch, first=patch.first + 1)))
+    (tmp_path / "history").write_bytes(stored_results.encode_history(two))
+    found = stored_results.decode_history(tmp_path / "history").patches
+    assert found is not None
+    frames = np.arange(patch.first, patch.first + len(patch.pose))
+    np.testing.assert_array_equal(found.frame, [*frames, *(frames + 1)])
+    np.testing.assert_array_equal(found.patch, np.repeat([0, 1], len(frames)))
+    np.testing.assert_array_equal(found.pose, np.concatenate([patch.pose, patch.pose]))
+    assert [REGIMES[code] for code in found.regime] == [*patch.regime, *patch.regime]
+
+
+def test_a_history_without_patches_has_none(history: SlipHistory, tmp_path: Path) -> None:
+    (tmp_path / "history").write_bytes(stored_results.encode_history(replace(history, patches=())))
+    found = stored_results.decode_history(tmp_path / "history").patches
+    assert found is not None
+    assert len(found.frame) == len(found.pose) == 0
+
+
+def test_a_history_with_maps_of_an_older_version_has_no_patches(history: SlipHistory, tmp_path: Path) -> None:
+    arrays = stored_results._unpack(_stored(history, tmp_path))
+    with (tmp_path / "older").open("wb") as stream:
+        for array in arrays[:-4]:
+            np.save(stream, array, allow_pickle=False)
+    found = stored_results.decode_history(tmp_path / "older")
+    assert found.patches is None
+    np.testing.assert_array_equal(found.slip, history.slip)
+
+
+def _stored(history: SlipHistory, folder: Path) -> Path:
+    (folder / "history").write_bytes(stored_results.encode_history(history))
+    return folder / "history"
 
 
 def test_a_history_of_an_older_version_has_no_maps(history: SlipHistory, tmp_path: Path) -> None:

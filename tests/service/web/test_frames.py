@@ -10,6 +10,7 @@ import pytest
 
 import slipcore
 from service.domain import stored_results
+from service.formats.lattice import lattice_axes
 from service.web import frames
 from slipcore import GraspLog, SlipHistory
 
@@ -57,7 +58,7 @@ def test_arrows_run_along_columns_and_rows_of_any_lattice(ramp: GraspLog, stored
     turned = replace(
         ramp, position=np.stack([ramp.position[..., 1], -ramp.position[..., 0], ramp.position[..., 2]], -1)
     )
-    axes, turned_axes = frames.lattice_axes(ramp.position), frames.lattice_axes(turned.position)
+    axes, turned_axes = lattice_axes(ramp.position), lattice_axes(turned.position)
     for found in (axes, turned_axes):
         np.testing.assert_allclose(found.T @ found, np.eye(2), atol=1e-9)
     rotation = np.array([[0.0, 1.0], [-1.0, 0.0]])
@@ -66,6 +67,30 @@ def test_arrows_run_along_columns_and_rows_of_any_lattice(ramp: GraspLog, stored
     assert ramp.displacement is not None
     shown = arrays["displacement"].reshape(*ramp.displacement.shape[:3], 2) * header["displacement"] / 127
     np.testing.assert_allclose(shown, ramp.displacement[..., :2] @ axes, atol=header["displacement"] / 127)
+
+
+@pytest.mark.parametrize("step", [1, 3])
+def test_patches_stand_where_their_pressure_is(
+    ramp: GraspLog, stored: Any, history: SlipHistory, monkeypatch: pytest.MonkeyPatch, step: int
+) -> None:
+    monkeypatch.setattr(frames, "MOST_CELLS", -(-history.contact.size // step))
+    pose = stored.patches.pose.copy()
+    pose[:, 2] = np.linspace(0.0, 3.0, len(pose))  # as if the patch were not round
+    header, arrays = unpacked(frames.pack(replace(stored, patches=replace(stored.patches, pose=pose)), ramp))
+    (patch,) = history.patches
+    shown = np.arange(patch.first, patch.first + len(patch.pose))
+    shown = shown[shown % step == 0]
+    assert header["step"] == step
+    np.testing.assert_array_equal(arrays["patch_frame"] * step, shown)
+    assert [header["regimes"][code] for code in arrays["patch_regime"]] == patch.regime[shown - patch.first].tolist()
+    places = arrays["patch_place"].reshape(-1, 4)
+    assert ramp.force is not None
+    for frame, yaw, (column, row, *along) in zip(shown, pose[shown - patch.first, 2], places, strict=True):
+        pressing = np.maximum(np.abs(ramp.force[frame, ..., 2]) * history.contact[frame], 0.0)
+        rows, columns = np.indices(pressing.shape)
+        centre = [(weights * pressing).sum() / pressing.sum() for weights in (columns, rows)]
+        np.testing.assert_allclose([column, row], centre, atol=1.0)
+        np.testing.assert_allclose(lattice_axes(ramp.position) @ along, [np.cos(yaw), np.sin(yaw)], atol=1e-6)
 
 
 def test_a_long_log_is_thinned_out(
@@ -80,7 +105,7 @@ def test_a_long_log_is_thinned_out(
 
 def test_without_the_upload_the_map_is_there_and_the_forces_are_not(stored: Any) -> None:
     header, arrays = unpacked(frames.pack(stored, None))
-    assert {*arrays} == {"time", "stick_ratio", "onset", "state"}
+    assert {*arrays} == {"time", "stick_ratio", "onset", "state", "patch_frame", "patch_regime"}
     assert (header["rows"], header["columns"]) == (14, 14)
 
 
