@@ -62,6 +62,7 @@ for command in (
     local.check,
     local.fit,
     local.convert,
+    local.export,
     remote.upload,
     remote.lookup,
     remote.plan,

@@ -86,12 +86,10 @@ def check(
 ) -> None:
     """Look for what makes the friction of a grasp log doubtful, and say what to do (docs/checks.md)."""
     from service import formats
-    from slipcore import LOOKAHEAD, check_log, detect_slip
-    from slipcore.defaults import DEFAULT_METHOD
+    from slipcore import check_log
 
     grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
-    grasp, options = corrected(grasp, sensor_model, method)
-    history = detect_slip(grasp, method=method or DEFAULT_METHOD, lookahead=LOOKAHEAD, sensor_model=None, **options)
+    grasp, history = detected(grasp, sensor_model, method)
     findings, contact = check_log(grasp, history), _contact_record(grasp, history)
     if json:
         print_json(
@@ -119,15 +117,11 @@ def fit(
     from estimators import fit as fit_model
     from service import formats
     from service.domain.doubtful_logs import with_doubts
-    from slipcore import LOOKAHEAD, check_log, collect_samples, detect_slip
-    from slipcore.defaults import DEFAULT_METHOD
+    from slipcore import check_log, collect_samples
 
     grasps, found = [], []
     for path in logs:
-        grasp, options = corrected(formats.read(path, mapping=mapping_text(mapping)), sensor_model, detector)
-        history = detect_slip(
-            grasp, method=detector or DEFAULT_METHOD, lookahead=LOOKAHEAD, sensor_model=None, **options
-        )
+        grasp, history = detected(formats.read(path, mapping=mapping_text(mapping)), sensor_model, detector)
         found.append(check_log(grasp, history))
         for finding in found[-1]:
             typer.echo(f"{path.name}: {finding.name}: {finding.evidence}", err=True)
@@ -157,6 +151,33 @@ def convert(
     typer.echo(f"{output}: {len(grasp)} frames of {grasp.grid[0]} × {grasp.grid[1]} markers")
 
 
+def export(
+    logs: Annotated[list[Path], typer.Argument(help="Grasp logs in any format of docs/formats.md.")],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "--output",
+            "-o",
+            help="Where to write: NAME.mcap for Foxglove, NAME.rrd for Rerun, each of one log; a folder for LeRobot.",
+        ),
+    ],
+    method: Annotated[str | None, typer.Option(help=DETECTOR_HELP)] = None,
+    mapping: Mapping = None,
+    sensor_model: SensorModelFile = None,
+) -> None:
+    """Write grasp logs with the slip detected in them for Foxglove, Rerun or LeRobot (docs/exports.md)."""
+    from service import exports, formats
+
+    target = exports.target_of(output)
+    recordings = []
+    for path in logs:
+        grasp, history = detected(formats.read(path, mapping=mapping_text(mapping)), sensor_model, method)
+        recordings.append(exports.Recording(grasp, history, path.name))
+    exports.write(recordings, output, target)
+    frames = sum(len(recording.log) for recording in recordings)
+    typer.echo(f"{output}: {frames} frames of {len(logs)} grasp(s), for {target}")
+
+
 def mapping_text(path: Path | None) -> str | None:
     """What a mapping's file says, where there is one."""
     return None if path is None else path.read_text(encoding="utf-8")
@@ -180,6 +201,15 @@ def corrected(grasp: "GraspLog", sensor_model: Path | None, method: str | None) 
     log, changed, options = SensorModel.from_json(told).apply(grasp, method or DEFAULT_METHOD)
     typer.echo(f"{sensor_model.name}: {'; '.join(changed) or 'nothing to correct'}", err=True)
     return log, dict(options)
+
+
+def detected(grasp: "GraspLog", sensor_model: Path | None, method: str | None) -> "tuple[GraspLog, SlipHistory]":
+    """The log as a calibration of its sensor corrects it, and the slip in it."""
+    from slipcore import LOOKAHEAD, detect_slip
+    from slipcore.defaults import DEFAULT_METHOD
+
+    log, options = corrected(grasp, sensor_model, method)
+    return log, detect_slip(log, method=method or DEFAULT_METHOD, lookahead=LOOKAHEAD, sensor_model=None, **options)
 
 
 def model_record(model: "FrictionModel") -> dict[str, Any]:

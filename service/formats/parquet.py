@@ -92,12 +92,16 @@ class _Columns:
         return f"the columns {', '.join(sorted(self._names))}"[:300]
 
     def _defaults(self) -> dict[str, Origin]:
-        """The members' own names, or in a LeRobot dataset ``timestamp`` and names that begin with ``observation.``."""
+        """The members' own names, or in a LeRobot dataset names that begin with ``observation.``.
+
+        Without ``observation.time`` there, time is the ``timestamp``, which runs evenly and in single precision.
+        """
         if "time" in self._names or "timestamp" not in self._names:
             return default_origins()
         lerobot = {name: Origin((f"observation.{name}",), explicit=False) for name in default_origins()}
         once = {name: Origin((name,), explicit=False) for name in ONCE if name in self._log}
-        return {**lerobot, **once, "time": Origin(("timestamp",), explicit=False)}
+        time = "observation.time" if "observation.time" in self._names else "timestamp"
+        return {**lerobot, **once, "time": Origin((time,), explicit=False)}
 
     def _episode(self) -> NDArray[np.bool_] | slice:
         """The rows of the episode that is asked for, or of the only one."""

@@ -30,7 +30,7 @@ def messages(log: GraspLog) -> Iterator[tuple[str, str, str, int, bytes]]:
     texts = {LOG_TYPE: definition(True, set(arrays)), FRAME_TYPE: definition(False, set(arrays))}
     for name, text in texts.items():
         store.register(get_types_from_msg(text, name))
-    moments = [_nanoseconds(time) for time in log.time]
+    moments = [nanoseconds(time) for time in log.time]
     once = {name: _value(name, arrays[name]) for name in ONCE if name in arrays}
     whole = store.types[LOG_TYPE](**once, grid=np.array(log.grid, dtype=np.uint32))
     yield LOG_TOPIC, LOG_TYPE, texts[LOG_TYPE], moments[0], bytes(store.serialize_cdr(whole, LOG_TYPE))
@@ -56,7 +56,8 @@ def _value(name: str, array: NDArray[Any]) -> Any:
     return np.ascontiguousarray(array.reshape(-1), dtype=np.bool_ if kind == "bool[]" else np.float64)
 
 
-def _nanoseconds(time: float) -> int:
+def nanoseconds(time: float) -> int:
+    """A time of a log, s, as recordings count it; raises ``InvalidInput``."""
     moment = round(float(time) * 1e9)
     if not 0 <= moment < 2**63:
         raise InvalidInput("time", f"{time:g} s", "0 to 9.2e9 s, for a recording counts nanoseconds from 0")

@@ -1,0 +1,64 @@
+"""Grasp logs with their slip state, for viewers and learners of others: one module each."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+
+from service.formats import EXTRA, UnsupportedFormat
+from slipcore.errors import InvalidInput
+from slipcore.frames import GraspLog
+from slipcore.slip_state import SlipHistory
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recording:
+    """A log, what was detected in it, and its name."""
+
+    log: GraspLog
+    history: SlipHistory
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Where logs go: the module that writes it, how its files' names end, what installs its library, and whether it
+    takes several logs.
+    """
+
+    module: str
+    suffix: str
+    install: str = f"pip install 'stiction[{EXTRA}]'"
+    takes_many: bool = False
+
+
+TARGETS = {
+    "foxglove": Target("service.exports.foxglove", ".mcap"),
+    "rerun": Target("service.exports.rerun", ".rrd", "pip install rerun-sdk (171 MB)"),
+    "lerobot": Target("service.exports.lerobot", "", takes_many=True),
+}
+"""By name; a name without an ending is a folder."""
+
+
+def target_of(output: Path) -> str:
+    """What an output's name asks for; raises ``InvalidInput``."""
+    for name, target in TARGETS.items():
+        if output.suffix.lower() == target.suffix:
+            return name
+    allowed = ", ".join(target.suffix or "no ending (a folder)" for target in TARGETS.values())
+    raise InvalidInput("output", output.name, f"a name with the ending {allowed}")
+
+
+def write(recordings: Sequence[Recording], output: Path, name: str) -> None:
+    """Write a file or a new folder; raises ``InvalidInput``, and ``UnsupportedFormat`` where the library is missing."""
+    target = TARGETS[name]
+    if len(recordings) > 1 and not target.takes_many:
+        raise InvalidInput("logs", len(recordings), f"one log a file for {name}")
+    try:
+        module = import_module(target.module)
+    except ModuleNotFoundError as error:
+        if str(error.name).startswith("service"):
+            raise
+        missing = f"{error.name}, which is not installed"
+        raise UnsupportedFormat(f"library of {name}", missing, target.install) from error
+    module.write(recordings, output)
