@@ -25,6 +25,12 @@ UNPRIVILEGED = "nobody" if os.geteuid() == 0 else None
 OPTIONS = ("listen_addresses=", "max_connections=200")
 """No network."""
 
+PREFIX = "stiction-postgresql-"
+"""Of folders."""
+
+MEMORY, ROOM = Path("/dev/shm"), 2**30
+"""A file system in memory, and the bytes that must be free there for it to be used."""
+
 
 class NoPrograms(RuntimeError):
     """The wheel has no programs for this machine."""
@@ -103,12 +109,13 @@ class PostgreSQL:
 
 
 @contextmanager
-def running_postgresql(*options: str) -> Iterator[PostgreSQL]:
+def running_postgresql(*options: str, in_memory: bool = False) -> Iterator[PostgreSQL]:
     """A server with further ``options``, in a folder that an unprivileged user may enter, whatever stands above the
-    project. Raises ``NoPrograms``.
+    project; its data are ``in_memory`` where this machine has room there. Raises ``NoPrograms``.
     """
     programs = _programs()
-    folder = Path(tempfile.mkdtemp(prefix="stiction-postgresql-", dir="/tmp"))  # a socket's path is short
+    folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir="/tmp"))  # a socket's path is short
+    data = Path(tempfile.mkdtemp(prefix=PREFIX, dir=MEMORY if in_memory and _has_room(MEMORY) else folder))
     bin_folder = folder / "wheel" / programs.name / "bin"
     try:
         shutil.copytree(programs, bin_folder.parent, symlinks=True, ignore=shutil.ignore_patterns("include", "*.a"))
@@ -118,7 +125,7 @@ def running_postgresql(*options: str) -> Iterator[PostgreSQL]:
         folder.chmod(0o755)
         if UNPRIVILEGED is not None:
             shutil.chown(folder, UNPRIVILEGED)
-        data = folder / "data"
+            shutil.chown(data, UNPRIVILEGED)
         as_user: dict[str, Any] = {"cwd": folder} | ({} if UNPRIVILEGED is None else {"user": UNPRIVILEGED})
         initdb = [bin_folder / "initdb", "--no-sync", "--auth=trust", "-U", "postgres", "-E", "UTF8", "--no-locale"]
         with (folder / "log").open("wb") as log:
@@ -130,7 +137,12 @@ def running_postgresql(*options: str) -> Iterator[PostgreSQL]:
         finally:
             server.stop(signal.SIGQUIT)  # nothing in it is to be kept
     finally:
+        shutil.rmtree(data, ignore_errors=True)
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _has_room(memory: Path) -> bool:
+    return memory.is_dir() and os.access(memory, os.W_OK) and shutil.disk_usage(memory).free > ROOM
 
 
 def _programs() -> Path:
