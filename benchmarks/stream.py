@@ -2,10 +2,11 @@
 
     python -m benchmarks.stream --connections 20 --rate 30 --seconds 20
     python -m benchmarks.stream --connections 1 --watchers 0 10
+    python -m benchmarks.stream --connections 1 --watchers 0 10 0 10 --lookups 50
 
 Each connection sends frames of a simulated grasp (20×20 markers with forces) at its rate, all out of step, and notes
-how long after its sending a frame is answered. Watchers read what the dashboard shows of the first connection. Server,
-its detectors and these clients share the machine.
+how long after its sending a frame is answered. Watchers read what the dashboard shows of the first connection. Beside
+them a planner may look friction up, so many times a second. Server, its detectors and these clients share the machine.
 """
 
 import argparse
@@ -25,12 +26,16 @@ from typing import Any
 import httpx
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosedOK
 
 from service.stream.watching import READ_TOGETHER
 from slipcore import GraspLog
 from slipcore.contact import tangential_ramp
+from stiction_client import FrictionClient
+
+MATERIAL = "looked up"
 
 
 async def sensor(
@@ -81,19 +86,50 @@ async def watch(port: int, opened: asyncio.Future[str]) -> int:
     return frames
 
 
-async def measure(port: int, connections: int, watchers: int, rate: float, seconds: float) -> dict[str, Any]:
+async def look_up(port: int, rate: float, seconds: float) -> list[float]:
+    """Seconds that each look-up of one planner took; they begin evenly, a late one delays none."""
+    path, asked = f"/v1/materials/{MATERIAL}/friction", {"v": 0.001, "fn": 0.05, "quantile": 0.01}
+    latencies: list[float] = []
+    if not rate:
+        return latencies
+
+    async def once(client: httpx.AsyncClient) -> None:
+        begin = time.perf_counter()
+        (await client.get(path, params=asked)).raise_for_status()
+        latencies.append(time.perf_counter() - begin)
+
+    async with httpx.AsyncClient(base_url=f"http://127.0.0.1:{port}") as client, asyncio.TaskGroup() as group:
+        await once(client)  # loads what a quantile needs
+        latencies.clear()
+        begin = time.perf_counter()
+        for k in range(int(rate * seconds)):
+            await asyncio.sleep(max(begin + k / rate - time.perf_counter(), 0.0))
+            group.create_task(once(client))
+    return latencies
+
+
+async def measure(
+    port: int, connections: int, watchers: int, rate: float, seconds: float, lookups: float
+) -> dict[str, Any]:
     """Quantiles of all latencies, ms, and how many frames a second each watcher saw."""
     log = tangential_ramp(points=20, pitch=1e-3, marker_noise=1e-6, force_noise=1e-3, seed=1)
     url = f"ws://127.0.0.1:{port}/v1/stream"
     lateness = np.linspace(0.0, 1.0 / rate, connections, endpoint=False)
     opened: asyncio.Future[str] = asyncio.get_running_loop().create_future()
     watching = [asyncio.create_task(watch(port, opened)) for _ in range(watchers)]
+    planner = asyncio.create_task(look_up(port, lookups, seconds))
     parts = await asyncio.gather(*(sensor(url, log, rate, seconds, late, opened) for late in lateness))
-    latencies = 1e3 * np.concatenate(parts)
+    latencies = np.concatenate(parts)
     shown = [await each / seconds for each in watching]
-    found = {f"p{q:g}_ms": round(float(np.percentile(latencies, q)), 2) for q in (50, 90, 99, 99.9)}
+    found: dict[str, Any] = quantiles("", latencies) | quantiles("lookup_", np.array(await planner))
     found |= {"watchers": watchers, "shown_a_second": [round(min(shown), 1), round(max(shown), 1)] if shown else []}
     return {"connections": connections, "rate": rate, "frames": len(latencies), **found}
+
+
+def quantiles(name: str, latencies: NDArray[np.float64]) -> dict[str, float]:
+    """Of latencies, s, in ms; none of none."""
+    wanted = (50, 90, 99, 99.9) if len(latencies) else ()
+    return {f"{name}p{q:g}_ms": round(1e3 * float(np.percentile(latencies, q)), 2) for q in wanted}
 
 
 def cpu_seconds(pid: int) -> float:
@@ -114,29 +150,39 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--connections", type=int, nargs="+", default=[20])
     parser.add_argument("--watchers", type=int, nargs="+", default=[0])
+    parser.add_argument("--lookups", type=float, default=0.0, help="a second, of friction, beside the streams")
     parser.add_argument("--rate", type=float, default=30.0)
     parser.add_argument("--seconds", type=float, default=20.0)
     chosen = parser.parse_args()
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = int(probe.getsockname()[1])
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, Path(folder, "server.log").open("wb") as log:
         settings = {"STICTION_DATA_FOLDER": folder, "STICTION_PORT": str(port)}
         command = [sys.executable, "-m", "service.cli", "serve"]
-        server = subprocess.Popen(command, env=os.environ | settings, stdout=subprocess.DEVNULL)
+        server = subprocess.Popen(command, env=os.environ | settings, stdout=log, stderr=log)
         try:
             with httpx.Client(base_url=f"http://127.0.0.1:{port}") as client:
                 while not _is_up(client):
                     time.sleep(0.1)
+            if chosen.lookups:
+                fit_material(port)
             for connections, watchers in itertools.product(chosen.connections, chosen.watchers):
                 before = cpu_seconds(server.pid)
-                found = asyncio.run(measure(port, connections, watchers, chosen.rate, chosen.seconds))
+                found = asyncio.run(measure(port, connections, watchers, chosen.rate, chosen.seconds, chosen.lookups))
                 used = (cpu_seconds(server.pid) - before) / chosen.seconds
                 load = os.getloadavg()[0] / (os.cpu_count() or 1)
                 print(json.dumps(found | {"cores_of_the_service": round(used, 2), "load_per_core": round(load, 2)}))
         finally:
             server.terminate()
             server.wait()
+
+
+def fit_material(port: int) -> None:
+    """Let the service know friction that can be looked up."""
+    with FrictionClient(f"http://127.0.0.1:{port}") as client:
+        client.create_material(MATERIAL)
+        client.wait(client.upload(tangential_ramp(points=14, seed=1), material=MATERIAL).job)
 
 
 def _is_up(client: httpx.Client) -> bool:
