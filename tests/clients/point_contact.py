@@ -19,7 +19,8 @@ class PointContact:
     """A mass under ``load`` (time → N) that a gripper of 30 ms lag presses; its stick ratio is Cattaneo and Mindlin's.
 
     ``told`` says when the detector tells anything; ``sampled_below``: stick ratio below which elements are sampled;
-    ``missed``: share of the slipping area that the detector takes for sticking.
+    ``missed``: share of the slipping area that the detector takes for sticking; ``sampled_share``: of the elements'
+    friction that their samples show, less where some of them stick, each bearing what the contact bears.
     """
 
     load: Callable[[float], float]
@@ -27,6 +28,7 @@ class PointContact:
     told: Callable[[float], bool] = lambda _: True
     sampled_below: float = 0.9
     missed: float = 0.0
+    sampled_share: float = 1.0
     seed: int = 0
     normal: float = 0.5
     velocity: float = 0.0
@@ -55,7 +57,8 @@ class PointContact:
         normal, tangential = np.maximum([self.normal + 0.01 * noise[0], borne + 0.01 * noise[1]], 0.0).tolist()
         if not self.told(time):
             return Observation(time, normal, tangential)
-        samples = SlipSamples(self.friction * (1.0 + 0.02 * noise[3:]), np.full(5, 0.05))
+        shown = self.friction if self.sampled_share == 1.0 else self.sampled_share * borne / self.normal
+        samples = SlipSamples(shown * (1.0 + 0.02 * noise[3:]), np.full(5, 0.05))
         slips = ratio < self.sampled_below
         ratio = 1.0 - (1.0 - self.missed) * (1.0 - ratio)
         return Observation(

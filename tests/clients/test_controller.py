@@ -65,6 +65,15 @@ def test_a_detector_that_misses_slip_does_not_lose_what_is_unknown(seed: int, mi
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+def test_what_sticks_and_is_sampled_as_slip_does_not_press_ever_harder(seed: int) -> None:
+    """Such elements show less friction the harder the contact is pressed."""
+    plant = PointContact(LIFT, sampled_share=0.7, sampled_below=1.1, seed=seed)
+    episode = run(plant, GraspController.init(SETTINGS))
+    assert episode.plant.slipped == 0.0
+    assert max(episode.normal) < 1.4 * 1.5 / SETTINGS.unknown_friction  # the lead for a load that comes fast
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_known_object_is_held_with_the_planner_s_force(seed: int, make_model: Make) -> None:
     model = model_of(make_model, 0.45)
     episode = run(PointContact(LIFT, seed=seed), GraspController.init(SETTINGS, model))
