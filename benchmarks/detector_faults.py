@@ -15,6 +15,7 @@ from benchmarks.detector_accuracy import FORCE_NOISE, score
 from benchmarks.detector_scenes import Case, cases, observed
 from benchmarks.pages import options, picture_folder, table, write
 from slipcore import GraspLog, detect_slip
+from slipcore.frames import FloatArray
 
 MARKER_NOISE = 1e-6
 INPUTS = ("force", "displacement", "motion")
@@ -115,6 +116,68 @@ def hysteresis(size: float) -> Fault:
     return fault
 
 
+def reforced(change: Callable[[FloatArray], FloatArray]) -> Fault:
+    """With other forces, where there are any."""
+    return lambda log, _: log if log.force is None else replace(log, force=change(log.force))
+
+
+def tilted(angle: float) -> Fault:
+    """Forces are told in a frame that is turned about y by an angle in degrees: all normals err by so much."""
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    return reforced(lambda force: force @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]))
+
+
+def domed(angle: float) -> Fault:
+    """Forces on a dome are told as if it were flat: they are tilted outwards by an angle in degrees at its edge."""
+
+    def fault(log: GraspLog, _: np.random.Generator) -> GraspLog:
+        if log.force is None:
+            return log
+        out = log.position[..., :2] - log.position[..., :2].mean(axis=(0, 1))
+        far = np.hypot(*np.moveaxis(out, -1, 0))
+        tilt, out = np.radians(angle) * far / far.max(), out / np.maximum(far, 1e-12)[..., None]
+        radial, normal = (log.force[..., :2] * out).sum(axis=-1), log.force[..., 2]
+        more = np.cos(tilt) * radial + np.sin(tilt) * normal - radial
+        sideways = log.force[..., :2] + more[..., None] * out
+        return replace(
+            log, force=np.concatenate([sideways, (np.cos(tilt) * normal - np.sin(tilt) * radial)[..., None]], axis=-1)
+        )
+
+    return fault
+
+
+def faded(components: slice) -> Fault:
+    """The gain of some components falls evenly to a half from the first frame to the last."""
+
+    def change(force: FloatArray) -> FloatArray:
+        faint = force.copy()
+        faint[..., components] *= np.linspace(1.0, 0.5, len(force))[:, None, None, None]
+        return faint
+
+    return reforced(change)
+
+
+def late(time: float) -> Fault:
+    """Forces are those of so many seconds before."""
+
+    def fault(log: GraspLog, _: np.random.Generator) -> GraspLog:
+        then = np.maximum(np.searchsorted(log.time, log.time - time, side="right") - 1, 0)
+        return log if log.force is None else replace(log, force=log.force[then])
+
+    return fault
+
+
+def stuck(force: FloatArray) -> FloatArray:
+    """Forces that stay as they are at half of the time."""
+    half = len(force) // 2
+    return np.concatenate([force[:half], np.broadcast_to(force[half], force[half:].shape)])
+
+
+def crosstalk(share: float) -> Fault:
+    """A share of each element's normal force appears along x as well."""
+    return reforced(lambda force: force + share * np.stack([force[..., 2], *np.zeros((2, *force.shape[:3]))], axis=-1))
+
+
 FAULTS: dict[str, Fault] = {
     "none": lambda log, _: log,
     "common shake, 3 µm": shake(3e-6),
@@ -132,6 +195,22 @@ FAULTS: dict[str, Fault] = {
     "hysteresis of 5 µm": hysteresis(5e-6),
 }
 
+FORCE_FAULTS: dict[str, Fault] = {
+    "none": lambda log, _: log,
+    "forces tilted by 5°": tilted(5.0),
+    "forces tilted by 15°": tilted(15.0),
+    "forces of a dome of 20°": domed(20.0),
+    "crosstalk of 10 %": crosstalk(0.1),
+    "crosstalk of 30 %": crosstalk(0.3),
+    "normal gain falls to a half": faded(slice(2, 3)),
+    "tangential gain falls to a half": faded(slice(0, 2)),
+    "forces 0.1 s late": late(0.1),
+    "forces 0.5 s late": late(0.5),
+    "forces freeze at half of the time": reforced(stuck),
+    "sign turned": reforced(np.negative),
+    "rows for columns": reforced(lambda force: force.swapaxes(1, 2).copy()),
+}
+"""Faults of forces alone; the lattices are square."""
 
 CALIBRATED = {"correlated noise (0.9), 3 µm": 3e-6, "correlated noise (0.9), 10 µm": 1e-5}
 """Faults of which a calibration of the sensor tells the detector, by the noise in m."""
@@ -145,9 +224,9 @@ COLUMNS = (
 )
 
 
-def measure(scenes: list[Case]) -> Iterator[Cost]:
+def measure(scenes: list[Case], faults: dict[str, Fault]) -> Iterator[Cost]:
     """What each fault costs."""
-    for name, fault in FAULTS.items():
+    for name, fault in faults.items():
         filtered = {inputs: _mean(scenes, fault, inputs, "filter") for inputs in INPUTS}
         yield Cost(name, **filtered, strain_rate=_mean(scenes, fault, "force", "strain_rate"))
         if name in CALIBRATED:
@@ -173,10 +252,11 @@ def main() -> None:
     if not slipping:
         raise SystemExit(f"no scenes of the set {arguments.scenes} are there")
     picture_folder(arguments)
-    rows = list(measure(slipping))
-    made = {"faults": table(COLUMNS, [tuple(asdict(row).values()) for row in rows])}
-    print(made["faults"])
-    write([asdict(row) for row in rows], made, arguments, "detector_faults.json")
+    costs = {"faults": list(measure(slipping, FAULTS)), "force faults": list(measure(slipping, FORCE_FAULTS))}
+    made = {name: table(COLUMNS, [tuple(asdict(row).values()) for row in rows]) for name, rows in costs.items()}
+    print("\n\n".join(made.values()))
+    numbers = {name: [asdict(row) for row in rows] for name, rows in costs.items()}
+    write(numbers, made, arguments, "detector_faults.json")
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipcore.element_forces import stick_ratio
+from slipcore.finding import Finding
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.patch_record import Patch
 from slipcore.references import DETECTION, cited
@@ -77,7 +78,7 @@ class SlipHistory:
 
     ``noise``: estimated standard deviation of one marker coordinate, m (NaN where it could not be estimated);
     ``patches``: the contact as a whole (docs/patches.md), of a whole log alone; ``macro_slip`` is also where all of
-    them slide or pivot over the markers.
+    them slide or pivot over the markers; ``findings``: what the detector found inconsistent in the log.
     """
 
     time: FloatArray
@@ -92,6 +93,7 @@ class SlipHistory:
     method: str
     observed: BoolArray | None = None
     patches: tuple[Patch, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
     @property
     def references(self) -> tuple[str, ...]:

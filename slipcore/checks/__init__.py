@@ -7,10 +7,11 @@ have measured, and at what a friction coefficient cannot depend on.
 import numpy as np
 
 from slipcore.checks import contact, friction, recording
-from slipcore.checks.subject import Check, Finding, Subject
+from slipcore.checks.subject import Check, Subject
 from slipcore.defaults import CheckOptions, choose_options
 from slipcore.element_forces import element_forces
 from slipcore.errors import NoForces, UnknownScale
+from slipcore.finding import Finding
 from slipcore.frames import GraspLog
 from slipcore.samples import FrictionSamples, element_samples
 from slipcore.slip_state import SlipHistory
@@ -26,6 +27,7 @@ CHECKS: tuple[Check, ...] = (
     recording.force_sign,
     recording.saturation,
     recording.rest_in_contact,
+    recording.found_by_detector,
     contact.load_free_tangential_force,
     contact.moving_contact,
     friction.friction_by_force,

@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from slipcore.checks.subject import Finding, Subject
+from slipcore.checks.subject import Subject
+from slipcore.finding import Finding
 from slipcore.frames import FloatArray
 
 

@@ -4,8 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from slipcore.checks.subject import Finding, Subject
+from slipcore.checks.subject import Subject
 from slipcore.collection import contradiction
+from slipcore.finding import Finding
 from slipcore.patch.friction import contact_friction
 
 

@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from slipcore.checks.subject import Finding, Subject
+from slipcore.checks.subject import Subject
+from slipcore.finding import Finding
 
 
 def time_unit(seen: Subject) -> Iterator[Finding]:
@@ -74,3 +75,8 @@ def rest_in_contact(seen: Subject) -> Iterator[Finding]:
     if touching:
         evidence = f"{touching} elements touch in the first frame"
         yield Finding("no rest", evidence, "begin the recording before the touch: what was before is not known")
+
+
+def found_by_detector(seen: Subject) -> Iterator[Finding]:
+    """What the detector itself found inconsistent."""
+    yield from seen.history.findings

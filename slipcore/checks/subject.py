@@ -5,20 +5,10 @@ from dataclasses import dataclass, field
 
 from slipcore.defaults import CheckOptions
 from slipcore.element_forces import ElementForces
+from slipcore.finding import Finding
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.samples import FrictionSamples
 from slipcore.slip_state import SlipHistory
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """Something that makes the friction found in a log doubtful: its ``name`` in docs/checks.md, what was seen, and
-    what to do about it.
-    """
-
-    name: str
-    evidence: str
-    remedy: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)

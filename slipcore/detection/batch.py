@@ -9,7 +9,7 @@ import numpy as np
 from slipcore.calibration.model import SensorModel
 from slipcore.defaults import DEFAULT_METHOD, MOST_LOOKAHEAD
 from slipcore.detection.detector import DetectorState, init, masked, slip_state, step
-from slipcore.detection.methods import find_method
+from slipcore.detection.methods import find_method, findings_by
 from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.interface import CompiledMethod
 from slipcore.detection.whole_log import history_of
@@ -100,7 +100,7 @@ class FixedLagSmoother:
             return now
         after = self._states[0]
         contact = after.memory.contact
-        decision = self._revise([state.memory.elements for state in self._states], before.setup.by_force.settings)
+        decision = self._revise([state.memory.elements for state in self._states], before.setup.sensor.settings)
         revised = after.memory._replace(slip=np.empty_like(contact), probability=np.empty(contact.shape))
         velocity = np.empty((*contact.shape, 2))
         touching, slipping = apply_decision(
@@ -126,4 +126,7 @@ def collect_history(slip_states: Sequence[SlipState], state: DetectorState) -> S
     observed = observed_over_time(slip_states)
     events = slip_events(time, contact, slip, observed)
     noise, method = state.noise, state.setup.method
-    return SlipHistory(time, contact, slip, probability, ratio, velocity, macro_slip, events, noise, method, observed)
+    return SlipHistory(
+        time, contact, slip, probability, ratio, velocity, macro_slip, events, noise, method, observed,
+        findings=findings_by(method, state.memory.common),
+    )  # fmt: skip

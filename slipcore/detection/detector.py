@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from slipcore.defaults import DEFAULT_METHOD, LIMITS, NOISE, ContactOptions, choose_options
-from slipcore.detection.methods import find_method
+from slipcore.detection.methods import find_method, findings_by
 from slipcore.detection.shared.contact import Touch
 from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.interface import CompiledMethod, Observation, Start
 from slipcore.detection.shared.observe import observe
 from slipcore.detection.shared.records import FrameArrays, Memory, Sensor, workspace
 from slipcore.errors import InvalidInput
+from slipcore.finding import Finding
 from slipcore.frames import (
     BoolArray,
     FloatArray,
@@ -49,15 +50,14 @@ NO_FIELD, NO_MASK, NO_POSE = (_read_only(np.empty(s, t)) for s, t in (((0, 0, 3)
 
 class Setup(NamedTuple):
     """What stays the same over a stream: lattice, element area (m²), method and its options; and what kernels take of
-    it where there are forces, and where the pressed shape alone tells which elements touch.
+    it.
     """
 
     lattice: Lattice
     element_area: float
     method: str
     options: ContactOptions
-    by_force: Sensor
-    by_shape: Sensor
+    sensor: Sensor
 
 
 class DetectorState(NamedTuple):
@@ -90,18 +90,15 @@ def init(position: ArrayLike, element_area: float, method: str = DEFAULT_METHOD,
     else:
         of_method = found.init(lattice, chosen)
     position_at_rest, steps, inverse = map(np.array, (lattice.position, lattice.steps, lattice.inverse_jacobian))
-    by_force, by_shape = (  # copies that can be written to, as unpickled ones can: kernels are compiled for one type
-        Sensor(position_at_rest, steps, inverse, lattice.orientation, touch, start.settings)
-        for touch in touch_thresholds(chosen, area)
-    )
+    # copies that can be written to, as unpickled ones can: kernels are compiled for one type
+    touch = touch_thresholds(chosen, area)
+    sensor = Sensor(position_at_rest, steps, inverse, lattice.orientation, *touch, start.settings)
     shape = lattice.position.shape
     frame = FrameArrays(-math.inf, _read_only(np.zeros(shape)), NO_FIELD, NO_POSE, NO_FIELD, NO_MASK)
     noise = np.zeros((9, max(1 + NOISE.memory, NOISE.series)))
     nowhere, nothing = np.zeros(shape[:2], bool), np.zeros(shape[:2])
     memory = Memory(nowhere, nowhere, nothing, noise, start.elements, start.common)
-    return DetectorState(
-        Setup(lattice, area, method, chosen, by_force, by_shape), frame, None, memory, of_method, math.nan
-    )
+    return DetectorState(Setup(lattice, area, method, chosen, sensor), frame, None, memory, of_method, math.nan)
 
 
 def touch_thresholds(options: ContactOptions, element_area: float) -> tuple[FloatArray, FloatArray]:
@@ -126,8 +123,7 @@ def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
     """Take one valid frame, later than the last; on the first, every element in contact sticks."""
     setup, seen, last = state.setup, frame_arrays(frame), _unwritten(state.frame)
     method, memory = find_method(setup.method), state.memory
-    sensor = setup.by_shape if frame.force is None else setup.by_force
-    after, of_method = _empty_like(memory), None
+    sensor, after, of_method = setup.sensor, _empty_like(memory), None
     velocity = np.empty((*memory.probability.shape, 2))
     if isinstance(method, CompiledMethod):
         arguments = sensor, last, seen, memory, after
@@ -222,6 +218,11 @@ class SlipDetector:
     def noise(self) -> float:
         """Estimated standard deviation of one marker coordinate, m; NaN while it cannot be estimated."""
         return self.state.noise
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What was found inconsistent in the frames so far."""
+        return findings_by(self.state.setup.method, self.state.memory.common)
 
     def step(
         self,

@@ -14,6 +14,8 @@ from slipcore.detection.shared.interface import CompiledMethod, Method
 from slipcore.detection.strain_rate import literal
 from slipcore.detection.strain_rate import method as strain_rate
 from slipcore.errors import InvalidInput
+from slipcore.finding import Finding
+from slipcore.frames import FloatArray
 
 METHODS: dict[str, Method[Any, Any] | CompiledMethod[Any]] = {
     "filter": probability_filter.METHOD,
@@ -26,6 +28,13 @@ METHODS: dict[str, Method[Any, Any] | CompiledMethod[Any]] = {
     "strain_threshold": strain_threshold.METHOD,
 }
 """A further method joins by a file of its own, or a room if it has several, and a line here."""
+
+
+def findings_by(name: str, common: FloatArray) -> tuple[Finding, ...]:
+    """What the method of that name found inconsistent, from its memory's ``common``."""
+    method = find_method(name)
+    known = method.findings if isinstance(method, CompiledMethod) else None
+    return known(common) if known is not None else ()
 
 
 def find_method(name: str) -> Method[Any, Any] | CompiledMethod[Any]:

@@ -1,5 +1,6 @@
 """Whole logs by a compiled method: the first frame by ``step``, all others in one call."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -7,6 +8,7 @@ from numpy.typing import NDArray
 
 from slipcore.detection.detector import NO_FIELD, NO_MASK, NO_POSE, DetectorState, step
 from slipcore.detection.fold import FrameResults, Recording, fold, rings_from
+from slipcore.detection.methods import findings_by
 from slipcore.detection.shared.records import workspace
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.slip_state import SlipHistory, slip_events
@@ -21,11 +23,12 @@ def history_of(log: GraspLog, state: DetectorState, lookahead: int) -> SlipHisto
     results.probability[0] = memory.probability
     results.touching[0], results.slipping[0] = memory.contact.sum(), memory.slip.sum()
     is_filter = setup.method == "filter"
-    sensor = setup.by_shape if log.force is None else setup.by_force
     ahead = lookahead if is_filter else 0
     room = workspace(*memory.probability.shape)
-    noise = fold(is_filter, sensor, _recording(log), rings_from(memory, ahead), ahead, room, results)
-    return _history(log, setup.method, noise, results)
+    rings = rings_from(memory, ahead)
+    noise = fold(is_filter, setup.sensor, _recording(log), rings, ahead, room, results)
+    found = findings_by(setup.method, rings.common[(len(log) - 1) % 2])
+    return replace(_history(log, setup.method, noise, results), findings=found)
 
 
 def _empty_results(log: GraspLog) -> FrameResults:

@@ -8,11 +8,21 @@ import numpy as np
 from slipcore.defaults import FilterOptions
 from slipcore.detection.filter.run import run_filter
 from slipcore.detection.filter.smoothing import look_back
-from slipcore.detection.filter.state import COMMON, POSE, PROBABILITY, REFERENCE, ROWS, STICK_VARIANCE
+from slipcore.detection.filter.state import (
+    COMMON,
+    FORCE_FRAMES,
+    POSE,
+    PROBABILITY,
+    PULLED_FRAMES,
+    REFERENCE,
+    ROWS,
+    STICK_VARIANCE,
+)
 from slipcore.detection.filter.step import decide
 from slipcore.detection.filter.tuning import LEAST_TRANSITION, THRESHOLD, settings_of
 from slipcore.detection.shared.interface import CompiledMethod, Start
 from slipcore.detection.shared.records import Decision
+from slipcore.finding import Finding
 from slipcore.frames import FloatArray
 from slipcore.surface.strain import Lattice
 
@@ -36,4 +46,13 @@ def revise(elements: Sequence[FloatArray], settings: FloatArray) -> Decision:
     return decision
 
 
-METHOD = CompiledMethod(FilterOptions, start, run_filter, revise)
+def findings(common: FloatArray) -> tuple[Finding, ...]:
+    """Forces by which the object pulls."""
+    frames, pulled = round(common[FORCE_FRAMES]), round(common[PULLED_FRAMES])
+    if not pulled:
+        return ()
+    evidence = f"the object pulls in {pulled} of {frames} frames in which it touches; slip is told without them there"
+    return (Finding("forces not believed", evidence, "give the force of the object on the sensor, in its frame"),)
+
+
+METHOD = CompiledMethod(FilterOptions, start, run_filter, revise, findings)

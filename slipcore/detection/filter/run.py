@@ -31,8 +31,8 @@ def filter_frame(
     velocity: FloatArray,
 ) -> tuple[float, int, int]:
     """The same in a ``room`` that is there already."""
-    observe(sensor, frame, before, after, room)
-    step_filter(sensor, last, frame, before, after, room)
+    has_force = observe(sensor, frame, before, after, room)
+    step_filter(sensor, last, frame, before, after, room, has_force)
     touching, slipping = apply_decision(
         sensor.position, last, frame, room.decision, before, after, room.weight, velocity
     )

@@ -9,7 +9,7 @@ that it began to slip if it stuck and that it stuck again if it slipped.
 share in which the surface follows the known motion (the same); the pose from which motion counts; for how long there
 has been none, s; and of a given pose: how it was corrected for noise, how far the markers' pose lay from it in the
 last two frames, of how many frames that is known, and what second differences of it say of the noise of place, m, and
-yaw, rad.
+yaw, rad; and in how many frames of contact there were forces, and pulled.
 """
 
 from slipcore.defaults import NOISE
@@ -22,4 +22,6 @@ ROWS = 13
 POSE, LOADING, FRICTION, FOLLOWING, REFERENCE, STILL = 0, 4, 10, 12, 14, 18
 CORRECTION, LAST_OFFSETS, OFFSET_FRAMES, NOISE_OF_PLACE = 19, 22, 28, 29
 NOISE_OF_YAW = NOISE_OF_PLACE + 1 + NOISE.memory
-COMMON = NOISE_OF_YAW + 1 + NOISE.memory
+FORCE_FRAMES = NOISE_OF_YAW + 1 + NOISE.memory
+PULLED_FRAMES = FORCE_FRAMES + 1
+COMMON = PULLED_FRAMES + 1

@@ -12,9 +12,11 @@ from slipcore.detection.filter.loading import low_pass, restick_under_load
 from slipcore.detection.filter.pose import Anchors, Motion, Pose, object_motion, place_on_object
 from slipcore.detection.filter.state import (
     END,
+    FORCE_FRAMES,
     ONSET,
     POSE,
     PROBABILITY,
+    PULLED_FRAMES,
     REFERENCE,
     SLIP_VARIANCE,
     SLIP_X,
@@ -33,16 +35,27 @@ from slipcore.frames import BoolArray, FloatArray
 
 @compiled
 def step_filter(
-    sensor: Sensor, last: FrameArrays, frame: FrameArrays, before: Memory, after: Memory, room: Workspace
+    sensor: Sensor,
+    last: FrameArrays,
+    frame: FrameArrays,
+    before: Memory,
+    after: Memory,
+    room: Workspace,
+    has_force: bool,
 ) -> None:
-    """Fill ``elements`` and ``common`` of the memory ``after``, and the decision, from the surface in the ``room``."""
+    """Fill ``elements`` and ``common`` of the memory ``after``, and the decision, from the surface in the ``room``;
+    ``has_force``: whether there are forces, and they do not pull.
+    """
     tuning = tuning_of(sensor.settings)
     after.common[:] = before.common
+    if frame.force.size and after.contact.any():
+        after.common[FORCE_FRAMES] += 1.0
+        after.common[PULLED_FRAMES] += 0.0 if has_force else 1.0
     if same(last.displacement, frame.displacement) and not touches_anew(after.contact, room.surface.stays):
         after.elements[:] = before.elements  # a frame that repeats the last tells nothing
         after.elements[ONSET] = after.elements[END] = 0.0
     else:
-        step_elements(sensor.position, last, frame, before, after, room, tuning)
+        step_elements(sensor.position, last, frame, before, after, room, has_force, tuning)
     decide(after.elements[PROBABILITY], tuning.threshold, room.decision)
 
 
@@ -54,6 +67,7 @@ def step_elements(
     before: Memory,
     after: Memory,
     room: Workspace,
+    has_force: bool,
     tuning: Tuning,
 ) -> None:
     """The object's motion, the load's change and the forces' log-odds; then each element that stays in contact."""
@@ -61,8 +75,7 @@ def step_elements(
     marker_noise, pressing_noise = surface.noise
     variance = (tuning.noise_margin * known_or(marker_noise, tuning.unknown_noise)) ** 2 + tuning.displacement_floor**2
     force_noise = tuning.force_noise_margin * known_or(pressing_noise, 0.0)
-    interval, has_force = frame.time - last.time, frame.force.size > 0
-    common, elements = before.common, before.elements
+    interval, common, elements = frame.time - last.time, before.common, before.elements
     last_pose = stored_pose(common, POSE)
     places = room.places[: find_places(elements, surface.stays, room.places)]
     anchors, motion, deeper, change, told = rooms_of(room.rows, len(places))

@@ -16,7 +16,7 @@ from slipcore.detection.filter.pose import (
     pose_at,
 )
 from slipcore.detection.filter.pose_noise import PoseNoise, noise_of_pose, own_variance, without_noise
-from slipcore.detection.filter.state import COMMON, CORRECTION, FOLLOWING, POSE
+from slipcore.detection.filter.state import CORRECTION, FOLLOWING, FORCE_FRAMES, POSE
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.detection.shared.records import FrameArrays
 from slipcore.frames import FloatArray
@@ -42,7 +42,7 @@ def step_pose(
         step[2] = math.atan2(math.sin(step[2]), math.cos(step[2]))
         if len(anchors.x) < 2:
             common[FOLLOWING] = common[FOLLOWING + 1] = tuning.following_weight
-            common[CORRECTION:COMMON] = 0.0
+            common[CORRECTION:FORCE_FRAMES] = 0.0
             known, left = frame.object_pose.copy(), spread
         else:
             noise = noise_of_pose(frame.object_pose, pose, spread, common)

@@ -5,6 +5,7 @@ from typing import Generic, NamedTuple, TypeVar
 
 from slipcore.defaults import ContactOptions
 from slipcore.detection.shared.records import Decision
+from slipcore.finding import Finding
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.surface.strain import Lattice
 
@@ -55,10 +56,12 @@ class CompiledMethod(NamedTuple, Generic[Options]):
     """A detection method whose whole step is one compiled call, ``run_filter`` or ``run_strain_rate``.
 
     ``revise``: the decision on a frame from the ``elements`` in its memory and in those of frames after it, and the
-    settings; None for a method that later frames tell nothing.
+    settings; None for a method that later frames tell nothing. ``findings``: what its memory's ``common`` says is
+    inconsistent in the frames so far; None for a method that does not look.
     """
 
     options: type[Options]
     start: Callable[[Lattice, Options], Start]
     run: Callable[..., tuple[float, int, int]]
     revise: Callable[[Sequence[FloatArray], FloatArray], Decision] | None = None
+    findings: Callable[[FloatArray], tuple[Finding, ...]] | None = None

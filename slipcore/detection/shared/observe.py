@@ -1,8 +1,10 @@
 """What all methods share of a frame: noise, normals, split forces, contact."""
 
+import math
+
 from slipcore.compilation import compiled, unpack
 from slipcore.defaults import NOISE
-from slipcore.detection.shared.contact import TOUCH, Touch, find_contact
+from slipcore.detection.shared.contact import TOUCH, Touch, find_contact, spatial_noise
 from slipcore.detection.shared.records import FrameArrays, Memory, Sensor, Workspace
 from slipcore.frames import FloatArray
 from slipcore.noise import noise_of_three, recent_median, remember
@@ -12,9 +14,9 @@ SERIES = NOISE.series
 
 
 @compiled
-def observe(sensor: Sensor, frame: FrameArrays, before: Memory, after: Memory, room: Workspace) -> None:
+def observe(sensor: Sensor, frame: FrameArrays, before: Memory, after: Memory, room: Workspace) -> bool:
     """Fill ``room.surface``, what all methods see of a frame, and in the memory ``after`` contact and the state of the
-    noise estimate.
+    noise estimate. Whether there are forces, and they do not pull: an object cannot, and contact is then by shape.
     """
     normal, pressing, tangential, stays, noise = room.surface
     if frame.normal.size:
@@ -24,26 +26,41 @@ def observe(sensor: Sensor, frame: FrameArrays, before: Memory, after: Memory, r
     if frame.force.size:
         split_forces(frame.force, normal, pressing, tangential)
     else:
-        split_depth(frame.displacement, pressing, tangential)
+        indent(frame.displacement, pressing)
+        tangential[:] = 0.0
     noise[0], noise[1] = step_noise(before.noise, frame.time, frame.displacement, pressing, after.noise, room.series)
     contact, was = after.contact, before.contact
+    by_force, by_shape = Touch(*unpack(sensor.touch_by_force, TOUCH)), Touch(*unpack(sensor.touch_by_shape, TOUCH))
+    pulls = frame.force.size > 0 and pulled(pressing, noise[1], by_force)
     if frame.contact.size:
         contact[:] = frame.contact
+    elif pulls:
+        indent(frame.displacement, room.weight)
+        find_contact(room.weight, noise[0], was, by_shape, contact)
     else:
-        find_contact(pressing, noise[1], was, Touch(*unpack(sensor.touch, TOUCH)), contact)
+        find_contact(pressing, noise[1], was, by_force if frame.force.size else by_shape, contact)
     n, m = contact.shape
     for i in range(n):
         for j in range(m):
             stays[i, j] = contact[i, j] and was[i, j]
+    return frame.force.size > 0 and not pulls
 
 
 @compiled
-def split_depth(displacement: FloatArray, pressing: FloatArray, tangential: FloatArray) -> None:
-    """Without forces the indentation, m, stands for the pressing one, and there is no tangential one."""
-    n, m = pressing.shape
+def pulled(pressing: FloatArray, sigma: float, touch: Touch) -> bool:
+    """Whether elements pull on the whole, by more than noise ``sigma``, N, and what an element needs to touch."""
+    known = spatial_noise(pressing) if math.isnan(sigma) else sigma
+    noise = 0.0 if math.isnan(known) else touch.noise * known * math.sqrt(pressing.size)
+    return bool(pressing.sum() < -noise - touch.least * pressing.size)
+
+
+@compiled
+def indent(displacement: FloatArray, depth: FloatArray) -> None:
+    """Fill the indentation ``depth`` [n, m] m."""
+    n, m = depth.shape
     for i in range(n):
         for j in range(m):
-            pressing[i, j], tangential[i, j] = -displacement[i, j, 2], 0.0
+            depth[i, j] = -displacement[i, j, 2]
 
 
 @compiled

@@ -14,14 +14,15 @@ _SERIES, _ROWS = max(NOISE.series, NOISE.memory), 17
 
 class Sensor(NamedTuple):
     """What stays the same over a stream: the lattice (see ``strain.Lattice``), what an element needs to touch
-    (``contact.Touch`` as an array) and the method's options as an array.
+    by force and by shape (``contact.Touch`` as arrays) and the method's options as an array.
     """
 
     position: FloatArray
     rest_steps: FloatArray
     inverse_jacobian: FloatArray
     orientation: float
-    touch: FloatArray
+    touch_by_force: FloatArray
+    touch_by_shape: FloatArray
     settings: FloatArray
 
 

@@ -33,7 +33,9 @@ def step(
     normal = np.broadcast_to([0.0, 0.0, 1.0], displacement.shape).copy()
     after, decision = np.empty_like(elements), Decision(np.empty(stays.shape, bool), np.empty(stays.shape))
     rest, nothing = lattice(), np.zeros(stays.shape)
-    sensor = Sensor(rest.position, rest.steps, rest.inverse_jacobian, 1.0, np.zeros(0), start(rest, OPTIONS).settings)
+    sensor = Sensor(
+        rest.position, rest.steps, rest.inverse_jacobian, 1.0, np.zeros(0), np.zeros(0), start(rest, OPTIONS).settings
+    )
     surface = Surface(normal, nothing, nothing, stays, np.array([noise, np.nan]))
     step_strain_rate(sensor, displacement, surface, interval, elements, after, decision)
     np.testing.assert_array_equal(decision.probability, decision.slip)
