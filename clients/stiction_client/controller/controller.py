@@ -156,8 +156,8 @@ def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
     demands.append(_Demand(state.felt.required(load, target), "stick ratio"))
     lowest = state.learned.lowest(settings)
     if state.mode == "learn" and lowest > 0.0:
-        bound = min(load / lowest, state.normal_force)  # no more: what sticks, taken for slip, would ask for ever more
-        demands.append(_Demand(bound, "samples of slip"))
+        believed = max(lowest, settings.unknown_friction)  # what sticks, taken for slip, would ask for ever more
+        demands.append(_Demand(load / believed, "samples of slip"))
     if state.mode != "learn":
         why = "no stick ratio" if _blind(state) else "friction unknown"
         demands += [_Demand(load / settings.unknown_friction, why), _Demand(state.normal_force, why)]
