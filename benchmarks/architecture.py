@@ -24,12 +24,12 @@ PACKAGES = {
 """Each package with the folder that it stands in."""
 
 COLUMNS = {
-    "slipcore": (0.0, 0.36),
-    "estimators": (0.37, 0.46),
-    "db": (0.47, 0.55),
-    "migrations": (0.55, 0.63),
-    "stiction_client": (0.64, 0.73),
-    "service": (0.74, 1.0),
+    "slipcore": (0.0, 0.32),
+    "estimators": (0.33, 0.41),
+    "db": (0.42, 0.49),
+    "migrations": (0.48, 0.62),
+    "stiction_client": (0.61, 0.78),
+    "service": (0.78, 1.0),
 }
 """From where to where each package is drawn, of the picture's width."""
 
