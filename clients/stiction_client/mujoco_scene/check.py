@@ -45,7 +45,7 @@ class PairCheck:
 
 @dataclass(frozen=True, slots=True)
 class SceneCheck:
-    """The ``pairs`` of a scene ``seconds`` after its start, and ``left_out``: others, each with the reason."""
+    """The ``pairs`` of a scene ``seconds`` after its start, and ``left_out``: what else may touch, and why it is."""
 
     seconds: float
     pairs: tuple[PairCheck, ...]
@@ -78,7 +78,8 @@ def check_scene(
 
 
 def _checked(model: Any, data: Any, found: list[Touch], seconds: float, wanted: float | None) -> SceneCheck:
-    pairs, left_out = [], []
+    flexible = (mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, k) or f"flex {k}" for k in range(model.nflex))
+    pairs, left_out = [], [f"{name} is a flexible body" for name in flexible]
     for touch in found:
         try:
             pairs.append(_pair(model, data, touch, wanted))

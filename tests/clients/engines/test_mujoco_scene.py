@@ -219,6 +219,18 @@ def test_a_shape_that_cannot_be_taken_out_is_left_out_by_name(tmp_path: Path) ->
     )
 
 
+def test_flexible_bodies_are_left_out_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "cloth.xml"
+    path.write_text(
+        """<mujoco><worldbody><geom name="table" type="plane" size="1 1 .1"/>
+        <flexcomp name="cloth" type="grid" count="3 3 1" spacing=".02 .02 .02" pos=".3 0 .02" dim="2" mass=".01"/>
+        <body pos="0 0 .05"><freejoint/><geom name="box" type="box" size=".05 .05 .05"/></body></worldbody></mujoco>"""
+    )
+    check = check_scene(path, seconds=0.2)
+    assert [pair.geoms for pair in check.pairs] == [("table", "box")]
+    assert check.left_out == ("cloth is a flexible body",)
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
