@@ -76,7 +76,7 @@ def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 def command_names() -> list[str]:
-    names = [c.name or c.callback.__name__ for c in app.registered_commands if c.callback is not None]
+    names = [c.name or c.callback.__name__.replace("_", "-") for c in app.registered_commands if c.callback is not None]
     return [*names, *(str(g.name) for g in app.registered_groups)]
 
 
