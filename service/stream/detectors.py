@@ -124,19 +124,30 @@ def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[st
         return session.last[1], None
     frame = _frame(session, given)
     size = 0 if session.kept is None else _kept_bytes(session, frame)
-    state = session.detector.step(*frame)
+    state, command = _detected(session, frame)
     if session.kept is not None:
         session.kept.append(frame)
         session.held_bytes += size
     _plan_look(session, frame, state)
     answer = _answer(session, given.number, state)
-    if session.grip is not None:
-        answer["command"] = session.grip.step(frame, state)
+    if command is not None:
+        answer["command"] = command
     session.last = (given.number, answer)
     if not is_shown:
         return answer, None
     told = answer.get("command", {}).get("normal_force") if given.command is None else given.command
     return answer, pack_frame(given.number, state, frame.force, told, session.expected)
+
+
+def _detected(session: Session, frame: Frame) -> tuple[SlipState, dict[str, Any] | None]:
+    """The slip state after a frame, and what is then commanded; the session is as it was where one is refused."""
+    before = session.detector.state
+    state = session.detector.step(*frame)
+    try:
+        return state, None if session.grip is None else session.grip.step(frame, state)
+    except InvalidInput:
+        session.detector.state = before
+        raise
 
 
 def _frame(session: Session, given: PackedFrame) -> Frame:

@@ -1,5 +1,7 @@
 """The grip controller beside a live detector: what a stream's frames command (docs/control.md)."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -16,15 +18,23 @@ class Grip:
 
     def __init__(self, position: FloatArray, control: Control, model: FrictionModel | None) -> None:
         self._observer = Observer(position)
-        try:
+        with _named():
             self._state = GraspController.init(settings_of(control), model)
-        except InvalidArgument as error:
-            raise InvalidInput(f"control: {error.name}", error.value, error.allowed) from error
 
     def step(self, frame: Frame, found: SlipState) -> dict[str, Any]:
-        """The command after a frame, as it is told."""
-        self._state, command = GraspController.step(self._state, self._observer(frame, found))
+        """The command after a frame, as it is told; raises ``InvalidInput`` for what the controller cannot take."""
+        with _named():
+            self._state, command = GraspController.step(self._state, self._observer(frame, found))
         return {"normal_force": command.normal_force, "mode": command.mode, "reason": command.reason}
+
+
+@contextmanager
+def _named() -> Iterator[None]:
+    """Raise ``InvalidInput`` in place of the controller's own error."""
+    try:
+        yield
+    except InvalidArgument as error:
+        raise InvalidInput(f"control: {error.name}", error.value, error.allowed) from error
 
 
 def settings_of(control: Control) -> ControlSettings:
@@ -50,5 +60,8 @@ def _value(name: str, value: float, gain: Gain) -> Any:
 def _contact(control: Control) -> Contact:
     area, force = control.contact_area, control.round_at
     contact = Contact.flat(area) if force is None else Contact.round(area, force)
+    if control.torque_arm == 0.0:
+        own = f"{contact.torque_arm:g} m, which this contact has without it"
+        raise InvalidArgument("torque_arm", 0.0, f"above 0 m, for frames have torques, such as {own}")
     told = {"pressure_square": control.pressure_square, "torque_arm": control.torque_arm}
     return replace(contact, **{name: value for name, value in told.items() if value is not None})

@@ -11,7 +11,7 @@ from service.stream.grip import settings_of
 from service.stream.messages import Control
 from service.stream.observing import Observer
 from slipcore import Frame, GraspLog, InvalidInput, SlipDetector
-from stiction_client import GraspController
+from stiction_client import GraspController, InvalidArgument
 
 FORCES = {"least_force": 0.5, "most_force": 30.0}
 ROUND = Control(6e-5, FORCES, round_at=5.0)
@@ -62,6 +62,37 @@ def test_those_who_watch_see_what_the_controller_commands(log: GraspLog) -> None
     detectors.drop("one")
     assert shown is not None
     assert f'"command":{answer["command"]["normal_force"]}'.encode() in shown.replace(b" ", b"")
+
+
+def test_a_contact_that_bears_no_torque_is_refused_for_frames_have_some(log: GraspLog) -> None:
+    with pytest.raises(InvalidInput, match=r"control: torque_arm is 0.0; allowed: above 0 m, .* such as 0\.\d+ m"):
+        answers(log, Control(6e-5, FORCES, torque_arm=0.0))
+
+
+def test_what_the_controller_refuses_leaves_the_session_as_it_was(
+    log: GraspLog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected = answers(log, ROUND)
+    step, refused = GraspController.step, []
+
+    def refuse_some(state: Any, observation: Any) -> Any:
+        if len(refused) < 2:
+            refused.append(observation)
+            raise InvalidArgument("torque", 1.0, "0")
+        return step(state, observation)
+
+    monkeypatch.setattr(GraspController, "step", refuse_some)
+    assert log.force is not None
+    detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", True, 2**30, ROUND)
+    given = PackedFrame(0, float(log.time[0]), log.displacement[0].tobytes(), log.force[0].tobytes())
+    try:
+        for _ in range(2):
+            with pytest.raises(InvalidInput, match=r"control: torque is 1\.0; allowed: 0"):
+                detectors.step("one", given)
+        assert detectors.step("one", given)[0] == expected[0]
+        assert len(detectors._SESSIONS["one"].kept or []) == 1
+    finally:
+        detectors.drop("one")
 
 
 def test_a_frame_without_forces_is_refused_and_leaves_all_as_it_was(log: GraspLog) -> None:
