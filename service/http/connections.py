@@ -81,7 +81,8 @@ class BoundedConnection(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Begin to wait for a request."""
-        super().connection_made(JoinedWrites(transport, self.loop))  # type: ignore[arg-type]  # in a transport's place
+        self._writes = JoinedWrites(transport, self.loop)
+        super().connection_made(self._writes)  # type: ignore[arg-type]  # in a transport's place
         self.flow = self._flow = _HoldingFlow(self.transport)
         if hasattr(transport, "max_size"):  # asyncio's own; other event loops choose by themselves
             transport.max_size = RECEIVED_BYTES
@@ -145,6 +146,11 @@ class BoundedConnection(asyncio.Protocol):
         super().on_response_complete()  # type: ignore[misc]  # of the server's protocol
         if held:
             self.data_received(held)
+
+    def pause_writing(self) -> None:
+        """Hold an answer back that is not read, for as long as some of it is."""
+        super().pause_writing()
+        self._writes.watch()
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forget the connection."""

@@ -1,14 +1,16 @@
 """Answers that leave in one piece: their head and body reach the network together, and wake the client once."""
 
 import asyncio
-import math
+import fcntl
+import struct
+import termios
 from typing import Any
 
 MOST_WAITING_BYTES = 64 * 1024
 """Written at once when there is more: a body of many parts is not to gather in memory."""
 
-CLOSING_SECONDS = 30.0
-"""s within which some of what is unsent at a close must be read; whoever reads none of it is let go."""
+UNREAD_SECONDS = 30.0
+"""s within which a client must read something of what waits for it; whoever reads nothing is let go."""
 
 
 class JoinedWrites:
@@ -21,7 +23,8 @@ class JoinedWrites:
     def __init__(self, transport: asyncio.Transport, loop: asyncio.AbstractEventLoop) -> None:
         self._transport, self._loop = transport, loop
         self._waiting: list[bytes] = []
-        self._size = 0
+        self._size, self._sent = 0, 0
+        self._look: asyncio.TimerHandle | None = None
 
     def write(self, data: bytes) -> None:
         """Send soon, after what was written before."""
@@ -45,7 +48,7 @@ class JoinedWrites:
         """Close once all is sent, or once the client has stopped to read it."""
         self._flush()
         self._transport.close()
-        self._watch(math.inf)
+        self.watch()
 
     def abort(self) -> None:
         """Close at once."""
@@ -56,20 +59,39 @@ class JoinedWrites:
         """Bytes that are not sent yet."""
         return self._size + self._transport.get_write_buffer_size()
 
-    def _watch(self, before: float) -> None:
-        """Let go who read nothing since ``before`` bytes were unsent: a peer that answers may keep them for ever."""
+    def watch(self) -> None:
+        """Let go a client that reads nothing, until all is sent: what waits for it is kept as long as it likes."""
+        if self._look is None:
+            self._let_go_unless_read(-1)
+
+    def _let_go_unless_read(self, before: int) -> None:
+        """Look whether more than ``before`` bytes are read by now."""
+        self._look = None
         unsent = self._transport.get_write_buffer_size()
-        if unsent >= before:
+        if unsent == 0:
+            return
+        read = self._sent - unsent - _unacknowledged(self._transport)
+        if read == before:
             self._transport.abort()
-        elif unsent > 0:
-            self._loop.call_later(CLOSING_SECONDS, self._watch, unsent)
+        else:
+            self._look = self._loop.call_later(UNREAD_SECONDS, self._let_go_unless_read, read)
 
     def _flush(self) -> None:
         if self._waiting:
-            waiting, self._waiting, self._size = self._waiting, [], 0
+            data, self._waiting, self._size = b"".join(self._waiting), [], 0
             if not self._transport.is_closing():  # the client may have gone since it was written
-                self._transport.write(waiting[0] if len(waiting) == 1 else b"".join(waiting))
+                self._sent += len(data)
+                self._transport.write(data)
 
     def __getattr__(self, name: str) -> Any:
         """All that writes nothing is the transport's own."""
         return getattr(self._transport, name)
+
+
+def _unacknowledged(transport: asyncio.Transport) -> int:
+    """Bytes that the system has taken and the client's has not: of a slow reader megabytes, for minutes."""
+    try:
+        told = fcntl.ioctl(transport.get_extra_info("socket").fileno(), termios.TIOCOUTQ, bytes(4))
+    except (AttributeError, OSError, ValueError):  # no socket, or a system that does not tell
+        return 0
+    return int(struct.unpack("i", told)[0])

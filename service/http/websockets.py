@@ -1,9 +1,11 @@
 """The server's WebSocket connections, whose refusals are answers as any others."""
 
-from typing import Any
+from typing import Any, cast
 
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import CloseCode, Frame
+
+from service.http.joined_writes import JoinedWrites
 
 MOST_UNSENT_BYTES = 2**20
 """Of answers to pings that a client does not read; the application waits from 64 KiB on."""
@@ -23,6 +25,11 @@ class WebSocketConnection(WebSocketsSansIOProtocol):
         await super().send(message)
         is_refused = self.initial_response is not None and self.close_sent
         self.handshake_complete = self.handshake_complete or is_refused
+
+    def pause_writing(self) -> None:
+        """Hold messages back that are not read, for as long as some are."""
+        super().pause_writing()
+        cast(JoinedWrites, self.transport).watch()  # that of the connection which became this one
 
     def handle_ping(self) -> None:
         """Answer, unless answers pile up."""

@@ -14,7 +14,7 @@ import pytest
 import uvicorn
 from starlette.types import Receive, Scope, Send
 
-from service.http import connections
+from service.http import connections, joined_writes
 from service.http.connections import BoundedConnection, H11Connection
 from service.http.httptools_connections import HttpToolsConnection
 from service.http.request_middleware import MOST_HEADER_BYTES
@@ -228,6 +228,16 @@ def test_whose_answers_are_not_read_makes_room_for_the_next(connect: Connect, en
     another.sendall(b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n")
     assert rest(another).endswith(b"hello")
     received = len(rest(unread[0]))
+    assert received < len(LARGE)
+
+
+def test_whose_answer_under_way_is_not_read_is_let_go(connect: Connect, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(joined_writes, "UNREAD_SECONDS", PATIENCE)
+    connection = connect()
+    connection.sendall(b"GET /large HTTP/1.1\r\nHost: a\r\n\r\n")
+    assert connection.recv(8).startswith(b"HTTP/1.1")
+    time.sleep(5.0 * PATIENCE)
+    received = len(rest(connection))
     assert received < len(LARGE)
 
 

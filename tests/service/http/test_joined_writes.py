@@ -1,12 +1,18 @@
 """What is written together leaves together, in order, and never later than a close."""
 
 import asyncio
+import socket
+import sys
+import threading
+from contextlib import suppress
+from types import SimpleNamespace
 from typing import cast
 
 import pytest
 
 from service.http import joined_writes
 from service.http.joined_writes import JoinedWrites
+from tests.waiting import wait_until
 
 
 class Sent:
@@ -21,6 +27,9 @@ class Sent:
 
     def get_write_buffer_size(self) -> int:
         return 5
+
+    def get_extra_info(self, _name: str) -> None:
+        return None
 
     def is_closing(self) -> bool:
         return self.is_closed
@@ -75,14 +84,21 @@ def test_nothing_is_sent_to_a_client_that_has_gone_since() -> None:
 
 
 @pytest.mark.parametrize(
-    ("unsent", "expected"),
-    [([0], ["close"]), ([9, 7, 2, 0], ["close"]), ([9, 7, 7], ["close", "abort"])],
-    ids=["nothing", "read slowly", "read no more"],
+    ("unsent", "unacknowledged", "expected"),
+    [
+        ([0], [], ["close"]),
+        ([9, 7, 2, 0], [5, 5, 5], ["close"]),
+        ([9, 9, 9, 0], [5, 4, 3], ["close"]),  # of what the system had taken
+        ([9, 7, 7], [5, 5, 5], ["close", "abort"]),
+    ],
+    ids=["nothing", "read", "read slowly", "read no more"],
 )
 def test_who_reads_nothing_of_the_last_bytes_is_let_go(
-    unsent: list[int], expected: list[str], monkeypatch: pytest.MonkeyPatch
+    unsent: list[int], unacknowledged: list[int], expected: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(joined_writes, "CLOSING_SECONDS", 0.0)
+    of_system = iter(unacknowledged)
+    monkeypatch.setattr(joined_writes, "UNREAD_SECONDS", 0.0)
+    monkeypatch.setattr(joined_writes, "_unacknowledged", lambda _: next(of_system))
 
     async def told_after_closing() -> list[bytes | str]:
         sent, looks = Sent(), iter(unsent)
@@ -94,6 +110,29 @@ def test_who_reads_nothing_of_the_last_bytes_is_let_go(
         return sent.told
 
     assert asyncio.run(told_after_closing()) == expected
+
+
+def read_all(connection: socket.socket) -> None:
+    while connection.recv(2**20):
+        pass
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="this system does not tell what a client has read")
+def test_what_the_system_keeps_of_what_a_client_does_not_read_is_known() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server, socket.create_connection(server.getsockname()) as client:
+        connection, _ = server.accept()
+        transport = cast(asyncio.Transport, SimpleNamespace(get_extra_info=lambda _: connection))
+        with connection:
+            assert joined_writes._unacknowledged(transport) == 0
+            connection.setblocking(False)
+            with suppress(BlockingIOError):
+                while connection.send(bytes(2**20)):
+                    pass
+            assert joined_writes._unacknowledged(transport) > 0
+            read = threading.Thread(target=read_all, args=[client])
+            read.start()
+            wait_until(lambda: joined_writes._unacknowledged(transport) == 0, "the client to read")
+        read.join()
 
 
 def test_what_waits_counts_as_not_sent() -> None:
