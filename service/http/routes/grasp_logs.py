@@ -23,7 +23,7 @@ from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
 from service.http.download import Download
 from service.http.idempotency import IdempotencyKey, KeyWithoutBody, RepeatableResponse, respond_once
-from service.http.long_json import long_json
+from service.http.long_json import LONG_ANSWER, long_json
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import (
     FILE_DAMAGED,
@@ -70,7 +70,7 @@ _FILE: dict[int | str, dict[str, Any]] = {
     }
 }
 _FOUND = problems(UNKNOWN_GRASP_LOG, INVALID_REQUEST, STORAGE_UNAVAILABLE)
-_RESULTS = problems(UNKNOWN_GRASP_LOG, NOT_READY, INVALID_REQUEST, FILE_DAMAGED, STORAGE_UNAVAILABLE)
+_RESULTS = problems(UNKNOWN_GRASP_LOG, NOT_READY, INVALID_REQUEST, FILE_DAMAGED, STORAGE_UNAVAILABLE, TOO_MANY_UPLOADS)
 
 
 @router.post(
@@ -194,7 +194,7 @@ def read_grasp_log(context: CurrentContext, id: str) -> GraspLogOut:  # noqa: A0
 
 @router.get(
     "/{id}/stick-ratio",
-    dependencies=[READ],
+    dependencies=[READ, LONG_ANSWER],
     summary="Look at the stick ratio over time",
     response_model=StickRatioOut,
     responses=_RESULTS,
@@ -207,7 +207,7 @@ def read_stick_ratio(context: CurrentContext, id: str) -> Response:  # noqa: A00
 
 @router.get(
     "/{id}/events",
-    dependencies=[READ],
+    dependencies=[READ, LONG_ANSWER],
     summary="Look at slip and contact events",
     response_model=EventsOut,
     responses=_RESULTS,
@@ -221,7 +221,7 @@ def read_events(context: CurrentContext, id: str) -> Response:  # noqa: A002
 
 @router.get(
     "/{id}/samples",
-    dependencies=[READ],
+    dependencies=[READ, LONG_ANSWER],
     summary="Look at the friction samples",
     response_model=SamplesOut,
     responses=_RESULTS,

@@ -10,10 +10,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fastapi import FastAPI
 
 import slipcore
+from service.domain.principal import Principal
 from service.domain.stored_results import encode_history
+from service.http.access import principal
+from service.http.dependencies import _context as server_context
+from service.http.long_json import LONG_ANSWER, long_json
 from service.http.routes import grasp_logs
+from service.processes import fair_queue
+from service.processes.fair_queue import FairQueue, QueueFull
 from slipcore import GraspLog
 from slipcore.slip_state import EventList, SlipEvents
 
@@ -78,3 +85,42 @@ def test_a_frame_without_contact_has_no_stick_ratio() -> None:
         return b"".join([piece async for piece in answer.body_iterator])
 
     assert json.loads(asyncio.run(whole())) == {"time": [0.0, 0.1], "stick_ratio": [None, 0.5]}
+
+
+def test_an_answer_that_is_not_read_keeps_its_room_until_it_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each holds its arrays until its client has read them, and any number of them would be asked for."""
+    monkeypatch.setattr(fair_queue, "WAIT_SECONDS", 0.05)
+    app, room = FastAPI(), FairQueue(2, "answered")  # of which one owner has half
+    app.dependency_overrides[principal] = lambda: Principal("key")
+    app.dependency_overrides[server_context] = lambda: SimpleNamespace(answers=room)
+    app.add_api_route("/long", lambda: long_json({"a": np.arange(30_000)}), dependencies=[LONG_ANSWER])
+
+    async def ask(read: asyncio.Event) -> bytes:
+        received = b""
+
+        async def send(message: Any) -> None:
+            nonlocal received
+            received += message.get("body", b"")
+            await read.wait()
+
+        async def receive() -> Any:
+            await asyncio.Event().wait()
+
+        await app({"type": "http", "method": "GET", "path": "/long", "query_string": b"", "headers": []}, receive, send)
+        return received
+
+    async def ask_twice() -> None:
+        read, at_once = asyncio.Event(), asyncio.Event()
+        at_once.set()
+        first = asyncio.create_task(ask(read))
+        while not room._taken:
+            await asyncio.sleep(0.001)
+        with pytest.raises(QueueFull, match=r"not answered within 0\.05 s"):
+            await ask(at_once)
+        read.set()
+        expected = list(range(30_000))
+        assert json.loads(await first) == {"a": expected}
+        assert json.loads(await ask(at_once)) == {"a": expected}
+        assert not room._taken
+
+    asyncio.run(ask_twice())
