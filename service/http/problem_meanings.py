@@ -162,8 +162,9 @@ MEANINGS: dict[str, Meaning] = {
     ),
     "too-many-uploads": Meaning(
         "Too many files wait to be read already, or the server found no room for this one within 30 s "
-        "(settings.md, `STICTION_READERS` and `STICTION_READING_BYTES`).",
-        "Try again after `Retry-After` seconds, with fewer uploads at once.",
+        "(settings.md, `STICTION_READERS` and `STICTION_READING_BYTES`); or as many answers with long arrays are being "
+        "sent as may be.",
+        "Try again after `Retry-After` seconds, with fewer requests at once.",
     ),
     "stopping": Meaning(
         "The server was told to stop, and the request was not done within `STICTION_SHUTDOWN_SECONDS`. "
