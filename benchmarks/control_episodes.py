@@ -146,7 +146,8 @@ class _Sensor:
         found = self.detector.step(frame.time, frame.displacement, frame.force)
         slip = found.slip & self.seen
         told = dataclasses.replace(found, slip=slip, stick_ratio=stick_ratio(found.contact, slip))
-        return self.observer(frame, told)
+        self.observer, seen = self.observer.step(frame, told)
+        return seen
 
 
 def least_force(world: World, load: Load, finger: int = 0) -> float:

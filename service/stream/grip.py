@@ -24,7 +24,9 @@ class Grip:
     def step(self, frame: Frame, found: SlipState) -> dict[str, Any]:
         """The command after a frame, as it is told; raises ``InvalidInput`` for what the controller cannot take."""
         with _named():
-            self._state, command = GraspController.step(self._state, self._observer(frame, found))
+            observer, seen = self._observer.step(frame, found)
+            self._state, command = GraspController.step(self._state, seen)
+        self._observer = observer
         return {"normal_force": command.normal_force, "mode": command.mode, "reason": command.reason}
 
 

@@ -1,6 +1,7 @@
 """A sensor's frames as a grip controller takes them: resultant forces, and friction where elements slip."""
 
-from collections import deque
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,32 +20,45 @@ LEAST_SHARE = 0.1
 UP = np.array([0.0, 0.0, 1.0])
 
 
+@dataclass(frozen=True, slots=True, eq=False)
 class Observer:
-    """Frames of one sensor, one after the other; ``position`` [n, m, 3] m of its markers at rest."""
+    """What turns the frames of one sensor into observations: the ``position`` [n, m, 3] m of its markers at rest, and
+    the ``last`` slip states.
+    """
 
-    def __init__(self, position: FloatArray) -> None:
-        self._x, self._y = position[..., 0], position[..., 1]
-        self._last: deque[SlipState] = deque(maxlen=WINDOW)
+    position: FloatArray
+    last: tuple[SlipState, ...] = ()
 
-    def __call__(self, frame: Frame, found: SlipState) -> Observation:
-        """A frame with forces, and what the detector says of it.
+    def step(self, frame: Frame, found: SlipState) -> tuple["Observer", Observation]:
+        """A frame with forces, and what the detector says of it: the observer after it, and the observation.
 
-        Forces that are not known (NaN) are left out. The torque is about the middle of the lattice.
+        Forces that are not known (NaN) are left out. The torque is about the centre of what presses.
         """
         assert frame.force is not None
         force = np.where(found.contact[..., None], np.nan_to_num(frame.force), 0.0)
-        total = force.sum(axis=(0, 1))
-        torque = float((self._x * force[..., 1] - self._y * force[..., 0]).sum())
+        x, y, z = force.sum(axis=(0, 1)).tolist()
         normal = np.broadcast_to(UP, force.shape) if frame.normal is None else frame.normal
-        samples = self._samples(element_forces(force, normal), found)
-        tangential = float(np.hypot(total[0], total[1]))
-        return Observation(frame.time, max(-float(total[2]), 0.0), tangential, abs(torque), found.stick_ratio, samples)
+        after = replace(self, last=(*self.last, found)[-WINDOW:])
+        samples = after._samples(element_forces(force, normal))
+        torque = abs(_torque(self.position[..., :2], force))
+        return after, Observation(frame.time, max(-z, 0.0), math.hypot(x, y), torque, found.stick_ratio, samples)
 
-    def _samples(self, forces: ElementForces, found: SlipState) -> SlipSamples | None:
+    def _samples(self, forces: ElementForces) -> SlipSamples | None:
         """Friction where elements slip: well pressed, slipping for ``WINDOW`` frames, and fast enough to be seen."""
-        self._last.append(found)
-        velocity = np.nan_to_num(np.mean([state.velocity for state in self._last], axis=0))
-        slips = np.all([state.slip for state in self._last], axis=0) & (len(self._last) == WINDOW)
+        velocity = np.nan_to_num(np.mean([state.velocity for state in self.last], axis=0))
+        slips = np.all([state.slip for state in self.last], axis=0) & (len(self.last) == WINDOW)
         pressed = forces.pressing > LEAST_SHARE * forces.pressing.max()
         use = slips & pressed & (np.hypot(velocity[..., 0], velocity[..., 1]) > LEAST_SPEED)
         return SlipSamples(forces.tangential[use] / forces.pressing[use], forces.pressing[use]) if use.any() else None
+
+
+def _torque(place: FloatArray, force: FloatArray) -> float:
+    """Of forces [n, m, 3] N at ``place`` [n, m, 2] m about the normal through their centre of pressure, N·m: about any
+    other point the tangential force would add to it. 0 where nothing presses.
+    """
+    pressing = np.maximum(-force[..., 2], 0.0)
+    if not pressing.any():
+        return 0.0
+    centre = np.tensordot(pressing, place, 2) / pressing.sum()
+    x, y = np.moveaxis(place - centre, -1, 0)
+    return float((x * force[..., 1] - y * force[..., 0]).sum())

@@ -43,7 +43,7 @@ def test_each_frame_is_answered_with_the_controller_s_command(log: GraspLog) -> 
     state = GraspController.init(settings_of(ROUND))
     for k, answer in enumerate(answers(log, ROUND)):
         frame = Frame(float(log.time[k]), log.displacement[k], log.force[k], None)
-        seen = observer(frame, detector.step(frame.time, frame.displacement, frame.force))
+        observer, seen = observer.step(frame, detector.step(frame.time, frame.displacement, frame.force))
         state, command = GraspController.step(state, seen)
         told = {"normal_force": command.normal_force, "mode": command.mode, "reason": command.reason}
         assert answer["command"] == told
@@ -73,26 +73,45 @@ def test_what_the_controller_refuses_leaves_the_session_as_it_was(
     log: GraspLog, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     expected = answers(log, ROUND)
-    step, refused = GraspController.step, []
+    step, seen = GraspController.step, []
 
-    def refuse_some(state: Any, observation: Any) -> Any:
-        if len(refused) < 2:
-            refused.append(observation)
+    def refuse_every_other(state: Any, observation: Any) -> Any:
+        seen.append(observation)
+        if len(seen) % 2:
             raise InvalidArgument("torque", 1.0, "0")
         return step(state, observation)
 
-    monkeypatch.setattr(GraspController, "step", refuse_some)
+    monkeypatch.setattr(GraspController, "step", refuse_every_other)
     assert log.force is not None
     detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", True, 2**30, ROUND)
-    given = PackedFrame(0, float(log.time[0]), log.displacement[0].tobytes(), log.force[0].tobytes())
     try:
-        for _ in range(2):
+        for k, (time, displacement, force) in enumerate(
+            zip(log.time.tolist(), log.displacement, log.force, strict=True)
+        ):
+            given = PackedFrame(k, time, displacement.tobytes(), force.tobytes())
             with pytest.raises(InvalidInput, match=r"control: torque is 1\.0; allowed: 0"):
                 detectors.step("one", given)
-        assert detectors.step("one", given)[0] == expected[0]
-        assert len(detectors._SESSIONS["one"].kept or []) == 1
+            assert detectors.step("one", given)[0]["command"] == expected[k]["command"]
+        assert len(detectors._SESSIONS["one"].kept or []) == len(log)
     finally:
         detectors.drop("one")
+    assert any(each.slip_samples is not None for each in seen)  # of which the last frames decide
+
+
+def test_torque_is_about_what_presses_wherever_places_are_counted_from(log: GraspLog) -> None:
+    assert log.force is not None
+    shear = log.force[40].copy()
+    shear[..., 0] = -0.3 * shear[..., 2]  # all pulls along x, in proportion to pressure: no torque
+    for shift in (0.0, 0.05):
+        found = SlipDetector(log.position, log.element_area).step(0.0, log.displacement[40], log.force[40])
+        shifted = log.position + np.array([shift, 2.0 * shift, 0.0])
+        shear[..., 1] = 0.0
+        _, seen = Observer(shifted).step(Frame(0.0, log.displacement[40], shear, None), found)
+        assert seen.torque == pytest.approx(0.0, abs=1e-12 * seen.tangential)  # rounding of 0.1 m times the force
+        arm = shifted[..., 0] - shifted[..., 0].mean()
+        shear[..., 1] = -arm * shear[..., 2] * found.contact
+        _, turned = Observer(shifted).step(Frame(0.0, log.displacement[40], shear, None), found)
+        assert turned.torque > 1e-5
 
 
 def test_a_frame_without_forces_is_refused_and_leaves_all_as_it_was(log: GraspLog) -> None:
@@ -112,7 +131,7 @@ def test_unknown_forces_are_left_out_of_what_is_observed(log: GraspLog) -> None:
     found = detector.step(0.0, log.displacement[30], force)
     row, column = np.argwhere(found.contact)[0]
     force[row, column] = np.nan
-    seen = observer(Frame(0.0, log.displacement[30], force, None), found)
+    _, seen = observer.step(Frame(0.0, log.displacement[30], force, None), found)
     known = found.contact.copy()
     known[row, column] = False
     assert seen.normal == pytest.approx(-log.force[30][known].sum(axis=0)[2], rel=1e-12)
