@@ -17,6 +17,11 @@ if TYPE_CHECKING:
     from slipcore.labelled import DataFrame, Dataset, Variables
 
 
+def element_states(contact: BoolArray, slip: BoolArray) -> NDArray[np.uint8]:
+    """Of each element, in arrays of one shape: 0 no contact, 1 sticks, 2 slips."""
+    return contact.astype(np.uint8) + (contact & slip)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SlipState:
     """What a detector finds in one frame.

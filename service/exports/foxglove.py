@@ -7,7 +7,7 @@ the regime of each contact patch at its place; ``/slip/state``: numbers over tim
 import base64
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from service.exports import Recording
-from service.exports.scene import COLOURS, arrows, normal_force, patches_at, slip_states, tangential_force
+from service.exports.scene import COLOURS, arrows, normal_force, patches_at, tangential_force
 from service.formats.lattice import cell_size, lattice_axes
 from service.formats.stiction_messages import nanoseconds
 from slipcore.frames import GraspLog
+from slipcore.slip_state import element_states
 
 FRAME = "sensor"
 """The frame of reference: the sensor's, its z along the outward normal."""
@@ -113,14 +114,15 @@ def write(recordings: Sequence[Recording], path: Path) -> None:
     """Write the one recording."""
     (recording,) = recordings
     streams = {"/slip/grid": _grids(recording), "/slip/scene": _scenes(recording), "/slip/state": _states(recording)}
+    frames = zip(recording.log.time, *streams.values(), strict=True)
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start(profile="", library="stiction")
         channels = {topic: _channel(writer, topic) for topic in TOPICS}
-        for number, time in enumerate(recording.log.time):
+        for number, (time, *messages) in enumerate(frames):
             moment = nanoseconds(time)
-            for topic, messages in streams.items():
-                content = json.dumps(messages[number], allow_nan=False).encode()
+            for topic, message in zip(streams, messages, strict=True):
+                content = json.dumps(message, allow_nan=False).encode()
                 writer.add_message(channels[topic], moment, content, moment, number)
         writer.finish()  # type: ignore[no-untyped-call]
 
@@ -145,13 +147,12 @@ def _pose(position: NDArray[np.float64], rotation: Rotation | None = None) -> Js
     return {"position": _point(position), "orientation": dict(zip("xyzw", turned.as_quat().tolist(), strict=True))}
 
 
-def _grids(recording: Recording) -> list[Json]:
+def _grids(recording: Recording) -> Iterator[Json]:
     log = recording.log
-    cells = COLOURS[slip_states(recording.history)]
-    packed = np.empty(cells.shape[:3], CELL)
+    packed = np.empty(recording.history.contact.shape, CELL)
+    packed["state"] = element_states(recording.history.contact, recording.history.slip)
     for k, name in enumerate(("red", "green", "blue", "alpha")):
-        packed[name] = cells[..., k]
-    packed["state"] = slip_states(recording.history)
+        packed[name] = COLOURS[packed["state"], k]
     fixed = {
         "frame_id": FRAME,
         **_lattice(log),
@@ -160,10 +161,8 @@ def _grids(recording: Recording) -> list[Json]:
         "cell_stride": CELL.itemsize,
         "fields": [{"name": name, "offset": k, "type": UINT8} for k, name in enumerate(CELL.names or ())],
     }
-    return [
-        {"timestamp": _timestamp(time), **fixed, "data": base64.b64encode(frame.tobytes()).decode()}
-        for time, frame in zip(log.time, packed, strict=True)
-    ]
+    for time, frame in zip(log.time, packed, strict=True):
+        yield {"timestamp": _timestamp(time), **fixed, "data": base64.b64encode(frame.tobytes()).decode()}
 
 
 def _lattice(log: GraspLog) -> Json:
@@ -176,10 +175,10 @@ def _lattice(log: GraspLog) -> Json:
     return {"pose": _pose(corner, rotation), "cell_size": {"x": size[0], "y": size[1]}}
 
 
-def _scenes(recording: Recording) -> list[Json]:
+def _scenes(recording: Recording) -> Iterator[Json]:
     drawn = arrows(recording)
     note = [{"key": "longest line", "value": f"{drawn.longest:.4g} {drawn.unit} of {drawn.what}"}]
-    return [_scene(recording, drawn.begin[k], drawn.end[k], k, note) for k in range(len(recording.log))]
+    return (_scene(recording, drawn.begin[k], drawn.end[k], k, note) for k in range(len(recording.log)))
 
 
 def _scene(
@@ -217,30 +216,19 @@ def _scene(
     return {"deletions": [], "entities": [entity]}
 
 
-def _states(recording: Recording) -> list[Json]:
+def _states(recording: Recording) -> Iterator[Json]:
     log, history = recording.log, recording.history
-    over = (1, 2)
-    return [
-        {
+    pressing, shearing = normal_force(log), tangential_force(log)
+    for k, time in enumerate(log.time):
+        yield {
             "timestamp": _timestamp(time),
             "stick_ratio": _or_none(history.stick_ratio[k]),
             "macro_slip": bool(history.macro_slip[k]),
-            "elements_in_contact": int(touching),
-            "elements_in_slip": int(slipping),
-            "normal_force": _or_none(pressing),
-            "tangential_force": _or_none(shearing),
+            "elements_in_contact": int(history.contact[k].sum()),
+            "elements_in_slip": int((history.contact[k] & history.slip[k]).sum()),
+            "normal_force": _or_none(pressing[k]),
+            "tangential_force": _or_none(shearing[k]),
         }
-        for k, (time, touching, slipping, pressing, shearing) in enumerate(
-            zip(
-                log.time,
-                history.contact.sum(over),
-                (history.contact & history.slip).sum(over),
-                normal_force(log),
-                tangential_force(log),
-                strict=True,
-            )
-        )
-    ]
 
 
 def _or_none(value: float) -> float | None:

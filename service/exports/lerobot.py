@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from service.exports import Recording
 from service.formats.parquet import LOG_KEY
 from slipcore.errors import InvalidInput
+from slipcore.slip_state import element_states
 from stiction_client.container import members
 
 VERSION = "v3.0"
@@ -75,10 +76,9 @@ def _episode(recording: Recording, number: int, rate: int) -> Columns:
     log, history = recording.log, recording.history
     frames = np.arange(len(log))
     given = {name: getattr(log, name) for name in VECTORS if getattr(log, name) is not None}
-    slip_state = history.contact.astype(np.uint8) + (history.contact & history.slip)
     return {
         **{f"observation.{name}": values.astype(np.float32) for name, values in given.items()},
-        "observation.slip_state": slip_state,
+        "observation.slip_state": element_states(history.contact, history.slip),
         "observation.stick_ratio": np.nan_to_num(history.stick_ratio, nan=1.0).astype(np.float32),
         "observation.time": log.time,
         "timestamp": (frames / rate).astype(np.float32),

@@ -13,9 +13,10 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from service.exports import Recording
-from service.exports.scene import COLOURS, arrows, normal_force, patches_at, slip_states, tangential_force
+from service.exports.scene import COLOURS, arrows, normal_force, patches_at, tangential_force
 from service.formats.lattice import cell_size, columns_and_rows, lattice_axes
 from slipcore.frames import FloatArray
+from slipcore.slip_state import element_states
 
 APPLICATION, TIME = "stiction", "time"
 STATES = ("no contact", "sticks", "slips")
@@ -58,7 +59,7 @@ def _log_numbers(stream: rr.RecordingStream, recording: Recording) -> None:
 
 def _log_frames(stream: rr.RecordingStream, recording: Recording) -> None:
     log, history = recording.log, recording.history
-    states, drawn = slip_states(history), arrows(recording)
+    states, drawn = element_states(history.contact, history.slip), arrows(recording)
     axes, size = lattice_axes(log.position), cell_size(log.position)
     middles = np.stack(np.meshgrid(*(np.arange(count) + 0.5 for count in log.grid), indexing="ij")[::-1], axis=-1)
     for k, time in enumerate(log.time):

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from service.exports import Recording
 from slipcore.frames import FloatArray, GraspLog
@@ -30,11 +29,6 @@ class Arrows:
     longest: float
     what: str
     unit: str
-
-
-def slip_states(history: SlipHistory) -> NDArray[np.uint8]:
-    """Of each element [t, n, m]: 0 no contact, 1 sticks, 2 slips."""
-    return history.contact.astype(np.uint8) + (history.contact & history.slip)
 
 
 def arrows(recording: Recording) -> Arrows:

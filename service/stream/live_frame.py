@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from service.packed_arrays import Arrays, pack_arrays
 from slipcore import SlipState
+from slipcore.slip_state import element_states
 
 
 def pack_frame(
@@ -29,7 +30,7 @@ def pack_frame(
     if force is not None:
         x, y, z = np.nansum(force, axis=(0, 1)).tolist()
         header |= {"normal_force": abs(z), "tangential_force": math.hypot(x, y)}
-    arrays: Arrays = {"state": (state.contact.astype(np.uint8) + (state.contact & state.slip)).ravel()}
+    arrays: Arrays = {"state": element_states(state.contact, state.slip).ravel()}
     return pack_arrays(header, arrays)
 
 

@@ -18,6 +18,7 @@ from service.formats.lattice import columns_and_rows, lattice_axes
 from service.packed_arrays import Arrays, pack_arrays
 from slipcore.frames import GraspLog
 from slipcore.patch_record import REGIMES
+from slipcore.slip_state import element_states
 
 MOST_CELLS = 1_500_000
 """Elements of all frames shown, 5 bytes each; of a log with more only every second, third … frame is shown."""
@@ -45,7 +46,7 @@ def pack(history: StoredHistory, log: GraspLog | None) -> bytes:
     arrays["onset"] = _single(history.events.onset.time[:MOST_EVENTS])
     header: dict[str, Any] = {"rows": grid[0], "columns": grid[1], "step": step, "frames": frames}
     if history.contact is not None and history.slip is not None:
-        arrays["state"] = (history.contact[shown].astype(np.uint8) + (history.contact & history.slip)[shown]).ravel()
+        arrays["state"] = element_states(history.contact[shown], history.slip[shown]).ravel()
     if history.patches is not None:
         _add_patches(arrays, header, history.patches, log)
     if log is not None:

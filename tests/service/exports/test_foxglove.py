@@ -17,7 +17,8 @@ from scipy.spatial.transform import Rotation
 from service import exports
 from service.exports import Recording
 from service.exports.foxglove import CELL, TOPICS
-from service.exports.scene import COLOURS, slip_states
+from service.exports.scene import COLOURS
+from slipcore.slip_state import element_states
 
 FRAME = 60
 """In which elements slip."""
@@ -55,7 +56,7 @@ def test_every_topic_has_a_message_a_frame_at_its_time(messages: dict[str, list[
 def test_the_grid_shows_the_state_of_each_element_where_it_is(
     messages: dict[str, list[Any]], recording: Recording
 ) -> None:
-    states, log = slip_states(recording.history), recording.log
+    states, log = element_states(recording.history.contact, recording.history.slip), recording.log
     for (_, grid), expected in zip(messages["/slip/grid"], states, strict=True):
         cells = np.frombuffer(base64.b64decode(grid["data"]), CELL).reshape(log.grid)
         np.testing.assert_array_equal(cells["state"], expected)

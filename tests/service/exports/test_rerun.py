@@ -7,7 +7,7 @@ import pytest
 
 from service import exports
 from service.exports import Recording
-from service.exports.scene import slip_states
+from slipcore.slip_state import element_states
 
 chunk = pytest.importorskip("rerun.chunk", reason="rerun-sdk is not installed: pip install rerun-sdk")
 
@@ -46,7 +46,7 @@ def values(columns: dict[tuple[str, str], dict[float, Any]], entity: str, compon
 
 def test_the_map_shows_the_state_of_each_element(columns: Any, recording: Recording) -> None:
     images = values(columns, "/sensor/map", ":buffer")
-    expected = slip_states(recording.history)
+    expected = element_states(recording.history.contact, recording.history.slip)
     assert len(images) == len(expected)
     for image, states in zip(images, expected, strict=True):
         np.testing.assert_array_equal(np.frombuffer(bytes(image[0]), np.uint8).reshape(states.shape), states)
