@@ -6,6 +6,7 @@ from importlib import import_module
 from pathlib import Path
 
 from service.formats import EXTRA, UnsupportedFormat
+from service.whole_files import write_whole
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 from slipcore.slip_state import SlipHistory
@@ -50,7 +51,10 @@ def target_of(output: Path) -> str:
 
 
 def write(recordings: Sequence[Recording], output: Path, name: str) -> None:
-    """Write a file or a new folder; raises ``InvalidInput``, and ``UnsupportedFormat`` where the library is missing."""
+    """Write a file or a new folder, whole or not at all.
+
+    Raises ``InvalidInput``, for a folder that is not empty, too, and ``UnsupportedFormat`` where a library is missing.
+    """
     target = TARGETS[name]
     if len(recordings) > 1 and not target.takes_many:
         raise InvalidInput("logs", len(recordings), f"one log a file for {name}")
@@ -61,4 +65,6 @@ def write(recordings: Sequence[Recording], output: Path, name: str) -> None:
             raise
         missing = f"{error.name}, which is not installed"
         raise UnsupportedFormat(f"library of {name}", missing, target.install) from error
-    module.write(recordings, output)
+    if not target.suffix and output.exists() and (output.is_file() or any(output.iterdir())):
+        raise InvalidInput("output", output, "a folder that is empty or not there yet")
+    write_whole(output, lambda beside: module.write(recordings, beside))

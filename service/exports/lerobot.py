@@ -32,9 +32,7 @@ Columns = dict[str, NDArray[Any]]
 
 
 def write(recordings: Sequence[Recording], folder: Path) -> None:
-    """Write the data set; raises ``InvalidInput`` for logs of different sensors, and where the folder is not empty."""
-    if folder.exists() and any(folder.iterdir()):
-        raise InvalidInput("output", folder, "a folder that is empty or not there yet")
+    """Write the data set; raises ``InvalidInput`` for logs of different sensors."""
     _check_alike(recordings)
     rate = _frame_rate(recordings)
     parts = [_episode(recording, number, rate) for number, recording in enumerate(recordings)]

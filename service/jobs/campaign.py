@@ -8,7 +8,7 @@ import hashlib
 import json
 import multiprocessing
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
@@ -18,6 +18,7 @@ from typing import Any
 from db.errors import DriverMissing
 from service.observability import logs
 from service.processes import spawned
+from service.whole_files import write_whole
 from slipcore.contact import Scene, simulate
 from slipcore.errors import InvalidInput, SlipcoreError
 from slipcore.frames import GraspLog
@@ -107,7 +108,7 @@ def _kept(done: Future[GraspLog], outcome: Outcome) -> Outcome:
         return replace(outcome, refused=str(error))
     except Exception as error:  # its process died, or the cluster did
         return replace(outcome, refused=f"{type(error).__name__}: {error}")
-    _write_whole(outcome.path, lambda path: container.write(log, path))
+    write_whole(outcome.path, lambda path: container.write(log, path))
     return outcome
 
 
@@ -126,7 +127,7 @@ def _write_plan(folder: Path, scenes: Sequence[Scene], promise: Promise) -> None
         digest = hashlib.sha256(repr(scene).encode()).hexdigest()
         if known["scenes"].setdefault(_file_name(scene), digest) != digest:
             raise InvalidInput("scene", f"another {scene.name!r} than that in {folder}", "the same, or another folder")
-    _write_whole(path, lambda path: path.write_text(json.dumps(known, indent=2), encoding="utf-8"))
+    write_whole(path, lambda path: path.write_text(json.dumps(known, indent=2), encoding="utf-8"))
 
 
 def _read_plan(path: Path) -> dict[str, dict[str, Any]]:
@@ -135,12 +136,6 @@ def _read_plan(path: Path) -> dict[str, dict[str, Any]]:
         return {name: dict(known[name]) for name in ("scenes", "promise")}
     except (ValueError, KeyError, TypeError) as error:
         raise InvalidInput("campaign", f"{path}, damaged or of something else", "a folder of its own") from error
-
-
-def _write_whole(path: Path, write: Callable[[Path], object]) -> None:
-    partial = path.with_suffix(".part")
-    write(partial)
-    partial.replace(path)
 
 
 def _file_name(scene: Scene) -> str:

@@ -15,6 +15,7 @@ from markupsafe import Markup
 
 from service.formatting import moment
 from service.report.colours import OF_THE_PAGE
+from service.whole_files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -77,10 +78,7 @@ class Report:
 
 def write_report(report: Report, path: Path) -> Path:
     """Write a report to ``path``, as a whole or not at all, making its folder if need be, and return the path."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f"{path.name}.part")
-    beside.write_text(render(report), encoding="utf-8")
-    return beside.replace(path)
+    return write_whole(path, lambda beside: beside.write_text(render(report), encoding="utf-8"))
 
 
 def render(report: Report) -> str:

@@ -1,5 +1,6 @@
 """The command that writes logs for others' tools, and what it refuses."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,14 @@ def test_several_logs_in_a_file_of_one_are_refused(recording: Recording, tmp_pat
     with pytest.raises(InvalidInput, match="logs is 2; allowed: one log a file for foxglove"):
         exports.write([recording, recording], tmp_path / "log.mcap", "foxglove")
     assert not (tmp_path / "log.mcap").exists()
+
+
+def test_an_export_that_breaks_off_leaves_the_file_of_before(recording: Recording, tmp_path: Path) -> None:
+    (tmp_path / "log.mcap").write_text("before")
+    torn = Recording(recording.log, replace(recording.history, stick_ratio=recording.history.stick_ratio[:10]), "torn")
+    with pytest.raises(IndexError, match="index 10 is out of bounds"):
+        exports.write([torn], tmp_path / "log.mcap", "foxglove")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"log.mcap": "before"}
 
 
 def test_a_missing_library_is_named_with_what_brings_it(
