@@ -58,21 +58,26 @@ function drawSlash(context, x, y, size) {
 }
 
 function drawAxes(context, width, top, bottom, most, label) {
+  const levels = [0, 0.5, 1].map((part) => [bottom - (bottom - top) * part, Number((most * part).toPrecision(2)).toString()]);
+  drawLevels(context, width, levels);
+  context.fillText(label, LEFT + 4, bottom + 15);
+}
+
+// Lines across the picture, each [its height, what stands beside it].
+function drawLevels(context, width, levels) {
   context.font = "13px system-ui, sans-serif";
   context.fillStyle = colour("faint");
   context.strokeStyle = colour("line");
   context.lineWidth = 1;
   context.textAlign = "right";
   context.beginPath();
-  for (const part of [0, 0.5, 1]) {
-    const y = bottom - (bottom - top) * part;
-    context.fillText(Number((most * part).toPrecision(2)).toString(), LEFT - 6, y + 4);
+  for (const [y, text] of levels) {
+    context.fillText(text, LEFT - 6, y + 4);
     context.moveTo(LEFT, y);
     context.lineTo(width - RIGHT, y);
   }
   context.stroke();
   context.textAlign = "left";
-  context.fillText(label, LEFT + 4, bottom + 15);
 }
 
 // A line through the values over time, broken where there is none; across and up say where a point lies.

@@ -157,31 +157,15 @@ function drawTimes() {
   const last = largest(seconds) || 1, most = roundUp(largest(residual.map(Math.abs)));
   const across = (time) => LEFT + ((width - LEFT - RIGHT) * time) / last;
   const up = (value) => (HEIGHT - 40) / 2 + 10 - ((HEIGHT - 50) / 2) * (value / most);
-  drawResidualAxis(context, width, most, up);
+  const levels = [-1, -0.5, 0, 0.5, 1].map((part) => most * part);
+  drawLevels(context, width, levels.map((level) => [up(level), three(level).replace("-", "−")]));
+  context.fillText("friction coefficient above the model's", LEFT + 4, 26);
   context.globalAlpha = 0.5;
   seconds.forEach((time, k) => drawSample(context, across(time), up(residual[k]), found.outsideValues[k]));
   context.globalAlpha = 1;
   const [middles, means] = binned(seconds, residual, last);
   drawLine(context, middles, means, across, up, colour("text"), []);
   drawSeconds(context, width, HEIGHT, 0, last, across);
-}
-
-function drawResidualAxis(context, width, most, up) {
-  context.font = "13px system-ui, sans-serif";
-  context.fillStyle = colour("faint");
-  context.strokeStyle = colour("line");
-  context.lineWidth = 1;
-  context.textAlign = "right";
-  context.beginPath();
-  for (const part of [-1, -0.5, 0, 0.5, 1]) {
-    const y = up(most * part);
-    context.fillText(three(most * part).replace("-", "−"), LEFT - 6, y + 4);
-    context.moveTo(LEFT, y);
-    context.lineTo(width - RIGHT, y);
-  }
-  context.stroke();
-  context.textAlign = "left";
-  context.fillText("friction coefficient above the model's", LEFT + 4, 26);
 }
 
 // Means of the residuals over equal parts of the time; NaN where there are none.
