@@ -196,7 +196,10 @@ class BoundedConnection(asyncio.Protocol):
         self._is_beyond = not unneeded
         if unneeded:
             least = min(unneeded, key=lambda each: (not each.transport.is_closing(), getattr(each, "idle_since", 0.0)))
-            least.transport.abort() if _has_unsent(least) else least.transport.close()
+            if _has_unsent(least):
+                least.transport.abort()
+            else:
+                least.transport.close()
 
     def _wait_for_headers(self) -> None:
         self._header_timer = self.loop.call_later(HEADER_SECONDS, self.transport.close)

@@ -7,10 +7,11 @@ from fastapi import Depends, Request
 from service.http.context import ServerContext
 
 
-async def _context(request: Request) -> ServerContext:
+async def server_context(request: Request) -> ServerContext:
+    """What the application of a request holds."""
     context: ServerContext = request.app.state.context
     return context
 
 
-CurrentContext = Annotated[ServerContext, Depends(_context)]
+CurrentContext = Annotated[ServerContext, Depends(server_context)]
 """The open stores and the running jobs."""

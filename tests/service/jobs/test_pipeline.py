@@ -6,6 +6,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from sqlalchemy import select, update
+from sqlalchemy.orm import Session
 
 import estimators
 import slipcore
@@ -23,6 +24,8 @@ from service.jobs import pipeline
 from slipcore import FrictionSamples, GraspLog, forces
 from slipcore.forces import reconstruct
 from stiction_client.container import encode
+
+RunWith = Callable[[Callable[[Session], object]], Job]
 
 NOTHING_DETECTED = Detection("strain_rate", None, None, 0, 0, 0, 0, 0, 0, 0.1, "0" * 64)
 
@@ -223,40 +226,42 @@ def test_a_model_leaves_no_samples_out_that_came_in_while_it_was_fitted(
     assert {(stored.version, stored.model.n) for stored in shop.material().models} == {(2, 2 * samples.count)}
 
 
-def test_a_job_stays_with_its_material_whatever_takes_its_name(
-    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    _, job_id = shop.ingest(content)
-    detect = slipcore.detect_slip
+@pytest.fixture
+def run_with(shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch) -> RunWith:
+    """Runs an ingest, with a change to the database that another process makes while slip is detected."""
 
-    def detect_while_the_name_goes(*given: Any, **options: Any) -> slipcore.SlipHistory:
-        with shop.database.write() as session:
-            materials.rename(session, shop.material_id, "card")
-            materials.remove_alias(session, shop.material_id, "paper")
-            materials.create(session, "paper", "another one")
-        return detect(*given, **options)
+    def run(change: Callable[[Session], object]) -> Job:
+        detect = slipcore.detect_slip
 
-    monkeypatch.setattr(slipcore, "detect_slip", detect_while_the_name_goes)
-    job = shop.run(job_id)
+        def detect_meanwhile(*given: Any, **options: Any) -> slipcore.SlipHistory:
+            with shop.database.write() as session:
+                change(session)
+            return detect(*given, **options)
+
+        monkeypatch.setattr(slipcore, "detect_slip", detect_meanwhile)
+        return shop.run(shop.ingest(content)[1])
+
+    return run
+
+
+def test_a_job_stays_with_its_material_whatever_takes_its_name(shop: Shop, run_with: RunWith) -> None:
+    def take_the_name(session: Session) -> None:
+        materials.rename(session, shop.material_id, "card")
+        materials.remove_alias(session, shop.material_id, "paper")
+        materials.create(session, "paper", "another one")
+
+    job = run_with(take_the_name)
     assert (job.status, job.material) == ("done", "card")
     with shop.database.read() as session:
         assert [stored.version for stored in materials.get(session, "card").models] == [1, 1]
     assert shop.material().models == ()  # of the other paper
 
 
-def test_a_log_that_is_merged_away_while_it_is_read_counts_in_the_other_material(
-    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    _, job_id = shop.ingest(content)
-    detect = slipcore.detect_slip
+def test_a_log_that_is_merged_away_while_it_is_read_counts_in_the_other_material(shop: Shop, run_with: RunWith) -> None:
+    def merge(session: Session) -> None:
+        materials.merge(session, materials.create(session, "card", "").id, shop.material_id)
 
-    def detect_while_it_is_merged(*given: Any, **options: Any) -> slipcore.SlipHistory:
-        with shop.database.write() as session:
-            materials.merge(session, materials.create(session, "card", "").id, shop.material_id)
-        return detect(*given, **options)
-
-    monkeypatch.setattr(slipcore, "detect_slip", detect_while_it_is_merged)
-    assert shop.run(job_id).status == "done"
+    assert run_with(merge).status == "done"
     material = shop.material()  # an alias by now
     assert (material.name, material.grasp_logs, len(material.models)) == ("card", 1, 2)
 

@@ -177,7 +177,9 @@ def test_the_noise_of_a_single_element_is_no_load_sideways(ball: GraspLog) -> No
     fields = {name: getattr(ball, name)[middle] for name in ("displacement", "force", "normal")}
     element = replace(ball, position=ball.position[middle[1:]], **fields)
     for seed in range(300, 310):
-        calibrate_sensor([Faults(marker_noise=1e-6, force_noise=2e-3).put_into(element, seed)])
+        model = calibrate_sensor([Faults(marker_noise=1e-6, force_noise=2e-3).put_into(element, seed)])
+        np.testing.assert_allclose(model.offset, 0.0, rtol=0.0, atol=2e-3)  # the noise of one frame
+        assert str(model["marker_noise"].not_identified).startswith("1 elements; 16 are needed")
 
 
 def test_a_flat_body_tells_no_kernel(ball: GraspLog) -> None:

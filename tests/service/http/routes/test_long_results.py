@@ -16,7 +16,7 @@ import slipcore
 from service.domain.principal import Principal
 from service.domain.stored_results import encode_history
 from service.http.access import principal
-from service.http.dependencies import _context as server_context
+from service.http.dependencies import server_context
 from service.http.long_json import LONG_ANSWER, long_json
 from service.http.routes import grasp_logs
 from service.processes import fair_queue
