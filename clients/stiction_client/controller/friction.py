@@ -72,9 +72,10 @@ class LearnedFriction:
         return LearnedFriction(values, (*self.sampled, friction)[-settings.learn_frames :])
 
     def lowest(self, settings: ControlSettings) -> float:
-        """Friction that a force may rely on which falls, by the median of all samples; NaN while they are few.
+        """The least friction to expect while the force is being lowered; NaN while there are few samples.
 
-        A detector that misses slip contradicts samples that are right: they are then all that is known.
+        It counts all samples, those among them that the stick ratio contradicts: a detector that misses slip makes the
+        stick ratio contradict samples that are right.
         """
         if len(self.sampled) < settings.contradiction_frames:
             return math.nan
