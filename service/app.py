@@ -92,11 +92,10 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             "auto_configure": False,
             "exclude": lambda scope: scope["path"] in UNTRACED,
         },
-        generate_unique_id_function=openapi.operation_id,
     )
     for module in (health, metrics, materials, owners, grasp_logs, curation, sensors, planning, jobs, stream, audit):
-        app.include_router(module.router)
-    app.include_router(pages.router)
+        app.take(module.router)
+    app.take(pages.router)
     access.check_routes(app)
     app.state.metrics = Metrics()
     access_log = AccessLog(app.state.metrics.requests)

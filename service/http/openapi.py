@@ -1,9 +1,11 @@
 """The application's own description, OpenAPI."""
 
+from collections.abc import Iterable
 from typing import Any
 
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI
 from fastapi.routing import APIRoute
+from starlette.routing import BaseRoute
 
 from service.http.descriptions import description_of
 from service.http.problems import (
@@ -28,23 +30,32 @@ OF_PROTECTED_ROUTES = (KEY_REQUIRED, INVALID_KEY, INSUFFICIENT_SCOPE, MISDIRECTE
 """Problems of every route that needs a key."""
 
 
-def operation_id(route: APIRoute) -> str:
-    """The route's function names the operation, and so the functions of generated clients."""
-    return route.name
-
-
 class DescribedApp(FastAPI):
     """An application whose description says of every error that it is answered as problem details.
 
     The framework would say JSON of its own. The description is made when it is first asked for.
     """
 
+    def take(self, router: APIRouter) -> None:
+        """Answer the routes of a module as they are: ``include_router`` would build them anew for each application."""
+        self.router.routes.extend(router.routes)
+
     def openapi(self) -> dict[str, Any]:
         """The description of all routes."""
         if self.openapi_schema is None:
-            _describe_problems(super().openapi())
+            description = super().openapi()
+            _name_operations(description, self.routes)
+            _describe_problems(description)
         assert self.openapi_schema is not None
         return self.openapi_schema
+
+
+def _name_operations(description: dict[str, Any], routes: Iterable[BaseRoute]) -> None:
+    """The route's function names the operation, and so the functions of generated clients."""
+    for route in routes:
+        if isinstance(route, APIRoute) and route.include_in_schema:
+            for method in route.methods:
+                description["paths"][route.path_format][method.lower()]["operationId"] = route.name
 
 
 def _describe_problems(description: dict[str, Any]) -> None:
