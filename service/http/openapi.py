@@ -54,7 +54,7 @@ def _name_operations(description: dict[str, Any], routes: Iterable[BaseRoute]) -
     """The route's function names the operation, and so the functions of generated clients."""
     for route in routes:
         if isinstance(route, APIRoute) and route.include_in_schema:
-            for method in route.methods:
+            for method in route.methods or ():
                 description["paths"][route.path_format][method.lower()]["operationId"] = route.name
 
 
