@@ -16,15 +16,21 @@ Thing = TypeVar("Thing")
 
 
 def counted(things: Iterable[Thing], total: int, name: str) -> Iterator[Thing]:
-    """The same things, with how many of them there are said on standard error, where there are several."""
+    """The same things; where there are several, how many are done and the time left are said on standard error."""
     if total == 1:
         yield from things
         return
     typer.echo(f"0 of {total} {name}", err=True, nl=False)
+    began = perf_counter()
     for count, thing in enumerate(things, 1):
-        typer.echo(f"\r{count} of {total} {name}", err=True, nl=False)
+        left = (perf_counter() - began) / count * (total - count)
+        typer.echo(f"\r{count} of {total} {name}, {_left(left)} left ", err=True, nl=False)
         yield thing
     typer.echo(err=True)
+
+
+def _left(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
 
 
 @contextmanager

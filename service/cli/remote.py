@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from difflib import get_close_matches
-from json import loads
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,9 +12,10 @@ import typer
 
 from estimators.method_names import METHODS
 from service.cli.exit_codes import FAILURE, INPUT_REFUSED, SERVICE_REFUSED
-from service.cli.local import FrameRate, Mapping, Scale, mapping_text
+from service.cli.local import FrameRate, Mapping, Scale
 from service.cli.output import print_json, print_lines, print_table
 from service.cli.progress import counted
+from service.cli.sources import Source, found
 from service.formatting import at_least, number
 
 if TYPE_CHECKING:
@@ -60,7 +60,9 @@ def connected(url: str, key: str | None) -> Iterator["FrictionClient"]:
 
 
 def upload(
-    logs: Annotated[list[Path], typer.Argument(help="Grasp logs in any format of docs/formats.md.")],
+    logs: Annotated[
+        list[Path], typer.Argument(help="Grasp logs in any format of docs/formats.md, or folders of them.")
+    ],
     material: Annotated[
         str | None, typer.Option(help="Material that was held; without it slip is only detected.")
     ] = None,
@@ -77,12 +79,12 @@ def upload(
 
     if create and material is None:
         raise typer.BadParameter("--create needs --material")
-    told = _mapping(mapping)
+    sources = found(logs, mapping)
     with connected(url, key) as client:
         if create and material is not None:
             client.ensure_material(material)
-        said = {"material": material, "scale": scale, "frame_rate": frame_rate, "mapping": told}
-        results = list(counted((_upload(client, path, wait, **said) for path in logs), len(logs), "logs"))
+        said = {"material": material, "scale": scale, "frame_rate": frame_rate}
+        results = list(counted((_upload(client, each, wait, **said) for each in sources), len(sources), "logs"))
     if json:
         print_json({"uploads": results})
     else:
@@ -203,28 +205,23 @@ def plan(
         print_lines(f"Grip for {load:g} N on {material}", _grip_lines(answer, model))
 
 
-def _mapping(path: Path | None) -> Any:
-    """A mapping's file, looked at before anything is sent."""
-    from service.formats.mapping import parse
-
-    text = mapping_text(path)
-    return None if text is None else loads(parse(text).text)
-
-
-def _upload(client: "FrictionClient", path: Path, wait: bool, **said: Any) -> dict[str, Any]:
-    """Upload one file; that the service does not take it is a result like any other."""
+def _upload(client: "FrictionClient", source: Source, wait: bool, **said: Any) -> dict[str, Any]:
+    """Upload one log; that it is not read or that the service does not take it is a result like any other."""
+    from slipcore import InvalidInput
     from stiction_client import ProblemError
 
     try:
-        receipt = client.upload(path, **said)
-    except ProblemError as problem:
-        return {"file": path.name, "status": "rejected", "reason": str(problem)}
+        log, mapping = source.log()
+        receipt = client.upload(log, mapping=mapping, **said)
+    except (InvalidInput, ProblemError) as refusal:
+        return {"file": source.name, "status": "rejected", "reason": str(refusal)}
     job = client.wait(receipt.job) if wait else receipt.job
     detection = client.grasp_log(receipt.id).detection if wait else receipt.detection
     findings = () if detection is None else detection.findings or ()
     for finding in findings:
-        typer.echo(f"{path.name}: {finding.name}: {finding.evidence}; {finding.remedy}", err=True)
-    return {"file": path.name, "grasp_log": receipt.id, **asdict(job), "findings": [asdict(each) for each in findings]}
+        typer.echo(f"{source.name}: {finding.name}: {finding.evidence}; {finding.remedy}", err=True)
+    told = {**asdict(job), "findings": [asdict(each) for each in findings]}
+    return {"file": source.name, "grasp_log": receipt.id, **told}
 
 
 def _middle_force(model: "FrictionModel") -> float:

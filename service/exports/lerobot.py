@@ -25,6 +25,9 @@ CHUNK_SIZE = 1000
 VECTORS = ("displacement", "force", "normal", "object_pose")
 """Members of a log that are features, where it has them."""
 
+QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
+"""Statistics by which LeRobot normalises the inputs of some policies."""
+
 OF_A_SENSOR = ("position", "element_area", "sensor")
 """Members that all logs of a data set share."""
 
@@ -41,8 +44,9 @@ def write(recordings: Sequence[Recording], folder: Path) -> None:
     columns["index"] = np.arange(sum(lengths))
     tasks = sorted({_task(recording) for recording in recordings})
     columns["task_index"] = np.repeat([tasks.index(_task(recording)) for recording in recordings], lengths)
-    _write_table(folder / DATA_PATH.format(chunk_index=0, file_index=0), columns, _once(recordings[0]))
-    _write_table(folder / EPISODES_PATH, _episodes(recordings, lengths))
+    data = folder / DATA_PATH.format(chunk_index=0, file_index=0)
+    _write_table(data, _split(columns, lengths), _once(recordings[0]))
+    _write_table(folder / EPISODES_PATH, [_episodes(recordings, columns, lengths)])
     _write_tasks(folder / "meta/tasks.parquet", tasks)
     _write_json(folder / "meta/info.json", _info(columns, lengths, len(tasks), rate))
     _write_json(folder / "meta/stats.json", {name: _statistics(column) for name, column in columns.items()})
@@ -91,7 +95,14 @@ def _once(recording: Recording) -> dict[bytes, str]:
     return {LOG_KEY: json.dumps({name: arrays[name].tolist() for name in OF_A_SENSOR if name in arrays})}
 
 
-def _episodes(recordings: Sequence[Recording], lengths: Sequence[int]) -> Columns:
+def _split(columns: Columns, lengths: Sequence[int]) -> list[Columns]:
+    """The frames of each episode."""
+    ends = np.cumsum(lengths)[:-1]
+    parts = {name: np.split(column, ends) for name, column in columns.items()}
+    return [{name: part[number] for name, part in parts.items()} for number in range(len(lengths))]
+
+
+def _episodes(recordings: Sequence[Recording], columns: Columns, lengths: Sequence[int]) -> Columns:
     ends = np.cumsum(lengths)
     zeros = np.zeros(len(lengths), np.int64)
     places = ("data/chunk_index", "data/file_index", "meta/episodes/chunk_index", "meta/episodes/file_index")
@@ -103,7 +114,18 @@ def _episodes(recordings: Sequence[Recording], lengths: Sequence[int]) -> Column
         "length": np.array(lengths),
         "dataset_from_index": ends - lengths,
         "dataset_to_index": ends,
+        **_statistics_of_each(_split(columns, lengths)),
         **dict.fromkeys(places, zeros),
+    }
+
+
+def _statistics_of_each(episodes: Sequence[Columns]) -> Columns:
+    """A column of each statistic of each feature, as LeRobot's own writer has them."""
+    told = [{name: _statistics(column) for name, column in columns.items()} for columns in episodes]
+    return {
+        f"stats/{name}/{statistic}": np.array([each[name][statistic] for each in told])
+        for name, statistics in told[0].items()
+        for statistic in statistics
     }
 
 
@@ -132,13 +154,17 @@ def _statistics(column: NDArray[Any]) -> dict[str, Any]:
     """Over all frames, of each entry of a frame."""
     values = column.reshape(len(column), *(column.shape[1:] or (1,))).astype(np.float64)
     over = {name: getattr(values, name)(axis=0).tolist() for name in ("min", "max", "mean", "std")}
-    return {**over, "count": [len(column)]}
+    quantiles = np.quantile(values, list(QUANTILES.values()), axis=0).tolist()
+    return {**over, **dict(zip(QUANTILES, quantiles, strict=True)), "count": [len(column)]}
 
 
-def _write_table(path: Path, columns: Columns, notes: dict[bytes, str] | None = None) -> None:
+def _write_table(path: Path, parts: Sequence[Columns], notes: dict[bytes, str] | None = None) -> None:
+    """Write the parts one below the other, each as a group of rows, so that one is read without the others."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    table = pa.table({name: _nested(column) for name, column in columns.items()}, metadata=notes)
-    pq.write_table(table, path, compression="zstd")
+    tables = [pa.table({name: _nested(column) for name, column in part.items()}, metadata=notes) for part in parts]
+    with pq.ParquetWriter(path, tables[0].schema, compression="zstd") as writer:
+        for table in tables:
+            writer.write_table(table)
 
 
 def _nested(column: NDArray[Any]) -> pa.Array:

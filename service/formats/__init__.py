@@ -16,12 +16,14 @@ from slipcore.frames import GraspLog
 __all__ = [
     "CONTENT_TYPES",
     "FORMATS",
+    "LEROBOT_INFO",
     "UNSPECIFIC_TYPES",
     "Format",
     "UnsupportedFormat",
     "UnusedSetting",
     "check_settings",
     "check_start",
+    "episodes_of",
     "identify",
     "module_of",
     "parse_mapping",
@@ -77,6 +79,9 @@ EXTRA = "formats"
 STORAGE = (".db3", ".mcap")
 """Names of rosbag2's storage files end so."""
 
+LEROBOT_INFO = "meta/info.json"
+"""Where a LeRobot data set, which is a folder, describes itself."""
+
 ZIP = b"PK\x03\x04"
 """How a zip begins."""
 
@@ -97,7 +102,8 @@ class UnusedSetting(InvalidInput):
 
 
 def read(path: Path, content_type: str | None = None, **settings: float | str | None) -> GraspLog:
-    """Read a grasp log of any known format: a file, or the folder of a Tac3D or rosbag2 recording.
+    """Read a grasp log of any known format: a file, or the folder of a Tac3D or rosbag2 recording or, with
+    the episode in the mapping, of a LeRobot data set.
 
     The format is what ``content_type`` names or, without one, what the file's content tells. ``settings``, where they
     are not None: of tracked markers ``scale`` (m per pixel) and ``frame_rate`` (1/s), of formats with topics, fields or
@@ -109,6 +115,12 @@ def read(path: Path, content_type: str | None = None, **settings: float | str | 
     if "mapping" in given:
         given["mapping"] = parse_mapping(settings)
     return _reader(name)(path, **given)
+
+
+def episodes_of(folder: Path, mapping: str | None = None) -> list[int]:
+    """Numbers of the episodes of a LeRobot data set, or the one that the mapping names; raises ``InvalidInput``."""
+    parsed = parse_mapping({"mapping": mapping})
+    return [episode.number for episode in module_of("parquet").lerobot.episodes(folder, parsed)]
 
 
 def check_settings(name: str, settings: Mapping[str, float | str | None]) -> None:
@@ -138,9 +150,7 @@ def identify(
         return "frame table" if is_mapped and name == "tracked markers" else name
     if media_type not in UNSPECIFIC_TYPES:
         raise UnsupportedFormat("content type", media_type[:100])
-    if path.is_dir():
-        return "rosbag2" if any(file.suffix in STORAGE for file in path.iterdir()) else "tac3d"
-    return _sniff(path, is_mapped)
+    return _sniff_folder(path) if path.is_dir() else _sniff(path, is_mapped)
 
 
 def check_start(path: Path, name: str) -> None:
@@ -166,6 +176,12 @@ def module_of(name: str) -> ModuleType:
 def _reader(name: str) -> Callable[..., GraspLog]:
     reader: Callable[..., GraspLog] = getattr(module_of(name), FORMATS[name].reader.partition(".")[2])
     return reader
+
+
+def _sniff_folder(path: Path) -> str:
+    if (path / LEROBOT_INFO).is_file():
+        return "parquet"
+    return "rosbag2" if any(file.suffix in STORAGE for file in path.iterdir()) else "tac3d"
 
 
 def _sniff(path: Path, is_mapped: bool) -> str:

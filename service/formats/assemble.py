@@ -128,9 +128,18 @@ def _in_si(name: str, array: NDArray[Any], origin: Origin, metadata: dict[str, s
         raise InvalidInput(name, f"of dtype {array.dtype}", "an array of real numbers")
     if origin.factors is None:
         return array
-    if array.ndim and len(origin.factors) > 1 and array.shape[-1] != len(origin.factors):
-        raise InvalidInput(name, f"of shape {list(array.shape)}", f"shape [any, {len(origin.factors)}]")
-    return np.asarray(array * np.array(origin.factors if len(origin.factors) > 1 else origin.factors[0]))
+    return np.asarray(array * _factors(name, array, origin.factors))
+
+
+def _factors(name: str, array: NDArray[Any], factors: tuple[float, ...]) -> NDArray[np.float64]:
+    """One factor, or those of the components on the last axis, which may have the elements' one behind the other."""
+    if len(factors) == 1 or not array.ndim:
+        return np.array(factors[0])
+    flat = name in VECTORS and array.ndim == (1 if name in ONCE else 2)
+    elements, rest = divmod(array.shape[-1], len(factors))
+    if rest or (elements != 1 and not flat):
+        raise InvalidInput(name, f"of shape {list(array.shape)}", f"shape [any, {len(factors)}]")
+    return np.tile(factors, elements)
 
 
 def _seconds(time: NDArray[Any], origin: Origin, metadata: dict[str, str]) -> NDArray[np.float64]:

@@ -1,8 +1,9 @@
 """Parquet tables with one row a frame, LeRobot v3's data files among them (docs/formats.md)."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from service.formats import lerobot
 from service.formats import mapping as mappings
 from service.formats.assemble import MAX_CONTENT_BYTES, as_array, assemble
 from service.formats.mapping import FieldMapping, Origin, default_origins
@@ -31,7 +33,14 @@ _VALUES = (pa.types.is_integer, pa.types.is_floating, pa.types.is_boolean, pa.ty
 
 
 def read(path: Path, mapping: FieldMapping | None = None) -> GraspLog:
-    """Read a grasp log from a Parquet file. Raises ``InvalidInput`` naming the member or column that is wrong."""
+    """Read a grasp log from a Parquet file, or the mapping's episode from the folder of a LeRobot data set.
+
+    Raises ``InvalidInput`` naming the member or column that is wrong.
+    """
+    if path.is_dir():
+        chosen, mapping = lerobot.episode(path, mapping)
+        log = read(chosen.file, mapping)
+        return log if chosen.task is None else replace(log, metadata={**log.metadata, "task": chosen.task})
     with _library():
         _check_footer(path)
         with pq.ParquetFile(path, pre_buffer=False, thrift_string_size_limit=MAX_FOOTER_BYTES) as file:
@@ -70,6 +79,7 @@ class _Columns:
         own = mappings.parse(notes[MAPPING_KEY].decode("utf-8", "replace")) if MAPPING_KEY in notes else None
         self.mapping = (mapping or own or mappings.UNMAPPED).over(self._defaults())
         self._bytes = 0
+        self._groups: Sequence[int] = range(file.metadata.num_row_groups)
         self._rows = self._episode()
 
     def column(self, name: str, _topic: str | None, field: str, once: bool) -> NDArray[Any] | None:
@@ -117,12 +127,18 @@ class _Columns:
         if chosen is None or chosen not in present:
             allowed = ", ".join(str(each) for each in present[:20]) + (", …" if len(present) > 20 else "")
             raise InvalidInput("episode", "missing" if chosen is None else chosen, f"one of {allowed}")
-        rows: NDArray[np.bool_] = episodes == chosen
-        return rows
+        return self._only_groups_of(episodes == chosen)
+
+    def _only_groups_of(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Leave row groups without any of these rows unread; the rows within the others."""
+        lengths = [self._file.metadata.row_group(group).num_rows for group in self._groups]
+        parts = np.split(rows, np.cumsum(lengths)[:-1])
+        self._groups = [group for group, part in enumerate(parts) if part.any()]
+        return np.concatenate([parts[group] for group in self._groups])
 
     def _read(self, name: str, field: str) -> NDArray[Any]:
         parts: list[NDArray[Any]] = []
-        for batch in self._file.iter_batches(batch_size=1024, columns=[field], use_threads=False):
+        for batch in self._file.iter_batches(1024, row_groups=self._groups, columns=[field], use_threads=False):
             if field not in batch.schema.names:
                 raise InvalidInput(name, f"column {field}, damaged", "a column of this name")
             self._bytes += batch.nbytes

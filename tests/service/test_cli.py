@@ -18,12 +18,13 @@ from db.blobs import BlobStore
 from db.database import Database
 from db.records import NewGraspLog
 from db.repositories import grasp_logs
-from service import formats
+from service import exports, formats
 from service.cli import app, main, streaming
 from service.cli.exit_codes import INPUT_REFUSED, NOT_FEASIBLE, SERVICE_REFUSED
 from service.cli.output import plain
 from service.demo.server import running_server
 from service.settings import Settings
+from slipcore import detect_slip
 from slipcore.contact import tangential_ramp
 from slipcore.contact.tiers.ramp import RampSchedule
 from stiction_client import FrictionClient, container
@@ -542,6 +543,40 @@ def test_a_recording_is_uploaded_with_its_mapping(run: Run, url: str, ramps: lis
     code, _, err = run("upload", path, "--mapping", mapping, "--url", url)
     assert code == INPUT_REFUSED
     assert "mapping is of the unknown 'tim'" in err
+
+
+def test_a_lerobot_data_set_is_uploaded_one_log_an_episode(
+    run: Run, url: str, ramps: list[Path], tmp_path: Path
+) -> None:
+    logs = [formats.read(path) for path in ramps[:2]]
+    recordings = [exports.Recording(log, detect_slip(log), "ramp") for log in logs]
+    exports.write(recordings, tmp_path / "grasps", "lerobot")
+    code, out, err = run(
+        "upload", tmp_path / "grasps", "--material", "from lerobot", "--create", "--url", url, "--json"
+    )
+    told = json.loads(out)["uploads"]
+    assert (code, [each["file"] for each in told]) == (0, ["grasps episode 0", "grasps episode 1"])
+    assert [each["status"] for each in told] == ["done", "done"]
+    assert re.search(r"1 of 2 logs, \d+ s left", err)
+    with FrictionClient(url) as client:
+        model = client.model("from lerobot", "ols")
+        assert (client.material("from lerobot").grasp_logs, model.interval(0.95)[0][0] < 0.5) == (2, True)
+    (tmp_path / "mapping.json").write_text('{"displacement": "observation.tactile"}')
+    code, _, err = run("upload", tmp_path / "grasps", "--mapping", tmp_path / "mapping.json", "--url", url)
+    assert code == INPUT_REFUSED
+    assert "displacement is not among the features (observation.tactile)" in err
+    assert "observation.displacement [20, 20, 3]" in err
+
+
+def test_each_file_of_a_folder_is_uploaded(run: Run, url: str, ramps: list[Path], tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    assert run("upload", tmp_path / "empty", "--url", url)[0] == WRONG_USAGE
+    (tmp_path / "1.npz").write_bytes(ramps[0].read_bytes())
+    (tmp_path / "2.txt").write_text("no log")
+    (tmp_path / ".hidden").write_text("")
+    code, out, _ = run("upload", tmp_path, "--url", url, "--json")
+    told = [(each["file"], each["status"]) for each in json.loads(out)["uploads"]]
+    assert (code, told) == (SERVICE_REFUSED, [("1.npz", "done"), ("2.txt", "rejected")])
 
 
 def test_owners_and_the_audit_trail_from_the_command_line(run: Run, url: str) -> None:

@@ -111,6 +111,25 @@ def test_statistics_are_those_of_the_frames(folder: Path, recording: Recording, 
     assert stats["observation.force"]["count"] == [len(force)]
 
 
+def test_statistics_of_each_episode_stand_beside_it(folder: Path, second: Recording) -> None:
+    episodes = pd.read_parquet(folder / "meta/episodes/chunk-000/file-000.parquet")
+    assert second.log.force is not None
+    told = np.array([[list(row) for row in rows] for rows in episodes["stats/observation.force/q90"][1]])
+    np.testing.assert_allclose(told, np.quantile(second.log.force, 0.9, axis=0), atol=1e-7)
+    assert episodes["stats/observation.stick_ratio/count"][1].tolist() == [len(second.log)]
+
+
+def test_lerobot_itself_loads_it(folder: Path, recording: Recording, second: Recording) -> None:
+    """With what trains on it: where LeRobot is installed, which brings PyTorch."""
+    reason = "lerobot is not installed: pip install lerobot"
+    loaded = pytest.importorskip("lerobot.datasets.lerobot_dataset", reason=reason).LeRobotDataset("me/it", root=folder)
+    assert (len(loaded), loaded.num_episodes) == (len(recording.log) + len(second.log), 2)
+    last = loaded[len(loaded) - 1]
+    assert second.log.force is not None
+    np.testing.assert_array_equal(last["observation.force"], second.log.force[-1].astype(np.float32))
+    assert (last["task"], int(last["frame_index"])) == ("lift the cup", len(second.log) - 1)
+
+
 @pytest.mark.parametrize("episode", [0, 1])
 def test_an_episode_is_read_back_as_a_log(folder: Path, recording: Recording, second: Recording, episode: int) -> None:
     log = (recording, second)[episode].log
