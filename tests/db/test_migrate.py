@@ -95,15 +95,18 @@ def test_revisions_stand_in_one_line() -> None:
     assert len(ScriptDirectory.from_config(migrate._config()).get_heads()) == 1
 
 
-@pytest.mark.parametrize("revision", REVISIONS)
-def test_every_migration_goes_up_and_down_and_up(empty_database: Database, revision: str) -> None:
-    migrate.upgrade(empty_database, revision)
-    there = shape(empty_database)
-    migrate.downgrade(empty_database, "-1")
-    assert shape(empty_database) != there
-    migrate.upgrade(empty_database, revision)
-    assert migrate.current(empty_database) == revision
-    assert shape(empty_database) == there
+def test_every_migration_goes_up_and_down_and_up(empty_database: Database) -> None:
+    before = shape(empty_database)
+    for revision in REVISIONS:
+        migrate.upgrade(empty_database, revision)
+        there = shape(empty_database)
+        assert there != before, f"{revision} changes nothing"
+        migrate.downgrade(empty_database, "-1")
+        assert shape(empty_database) == before, f"the way back from {revision}"
+        migrate.upgrade(empty_database, revision)
+        assert migrate.current(empty_database) == revision
+        assert shape(empty_database) == there, f"{revision} after the way back"
+        before = there
 
 
 def test_migrations_go_down_and_up_with_data_in_every_table(
