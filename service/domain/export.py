@@ -1,6 +1,7 @@
 """Hand a stored log out as a file: as it is kept where that is asked for, or written anew in a reader's process."""
 
 import asyncio
+from collections.abc import Awaitable, Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,8 +20,10 @@ class LogFile:
     close: ExitStack
 
 
-async def export(context: Context, log: StoredGraspLog, name: str, owner: str = "") -> LogFile:
-    """The log as a file of format ``name``, made in the share of ``owner``.
+async def export(
+    context: Context, log: StoredGraspLog, name: str, owner: str, room: Callable[[], Awaitable[None]]
+) -> LogFile:
+    """The log as a file of format ``name``; what is not there yet is made in the share of ``owner``, after ``room``.
 
     Raises ``FileDeleted`` where there is none, ``UnsupportedFormat`` without a library of that format, ``QueueFull``.
     """
@@ -30,6 +33,7 @@ async def export(context: Context, log: StoredGraspLog, name: str, owner: str = 
     with ExitStack() as spools:
         if name == "npz" and await asyncio.to_thread(formats.identify, source) == "npz":
             return LogFile(source, spools.pop_all())
+        await room()
         spool = spools.enter_context(context.blobs.spool())
         try:
             await context.readers.write(source, spool.path, name, owner)

@@ -9,7 +9,7 @@ from service.processes.fair_queue import FairQueue
 from service.stream.sessions import Streams
 
 LONG_ANSWERS = 16
-"""With arrays at once, 8 MB each of 10⁶ frames; half of them to one key or address."""
+"""With arrays, 8 MB each of 10⁶ frames, or with a file made for them, at once; half of them to one key or address."""
 
 
 def _room_for_answers() -> FairQueue:

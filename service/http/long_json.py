@@ -1,31 +1,17 @@
 """JSON answers with long arrays, which are made a piece at a time while they are sent."""
 
-from collections.abc import AsyncIterator, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import msgspec
 import numpy as np
-from fastapi import Depends
 from fastapi.responses import StreamingResponse
 from numpy.typing import NDArray
-
-from service.http.access import CurrentPrincipal
-from service.http.dependencies import CurrentContext
 
 PIECE = 10_000
 """Numbers made into text at once: as Python's objects and text they take ten times their bytes."""
 
 Arrays = Mapping[str, NDArray[Any]]
-
-
-async def _room(context: CurrentContext, principal: CurrentPrincipal) -> AsyncIterator[None]:
-    """Wait for room, and hold it until the answer is sent; raises ``QueueFull``."""
-    async with context.answers.turn(principal.share):
-        yield
-
-
-LONG_ANSWER = Depends(_room)
-"""Of a route whose answer holds arrays while it is sent, however slowly its client reads."""
 
 
 def long_json(members: Mapping[str, "NDArray[Any] | float | Arrays"]) -> StreamingResponse:

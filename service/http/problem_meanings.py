@@ -162,8 +162,8 @@ MEANINGS: dict[str, Meaning] = {
     ),
     "too-many-uploads": Meaning(
         "Too many files wait to be read already, or the server found no room for this one within 30 s "
-        "(settings.md, `STICTION_READERS` and `STICTION_READING_BYTES`); or as many answers with long arrays are being "
-        "sent as may be.",
+        "(settings.md, `STICTION_READERS` and `STICTION_READING_BYTES`); or as many answers with long arrays or "
+        "with files made for them are being sent as may be.",
         "Try again after `Retry-After` seconds, with fewer requests at once.",
     ),
     "stopping": Meaning(

@@ -23,7 +23,8 @@ from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
 from service.http.download import Download
 from service.http.idempotency import IdempotencyKey, KeyWithoutBody, RepeatableResponse, respond_once
-from service.http.long_json import LONG_ANSWER, long_json
+from service.http.long_answers import LONG_ANSWER, Room
+from service.http.long_json import long_json
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import (
     FILE_DAMAGED,
@@ -253,6 +254,7 @@ def read_samples(context: CurrentContext, id: str) -> Response:  # noqa: A002
 async def read_file(
     context: CurrentContext,
     principal: CurrentPrincipal,
+    room: Room,
     id: str,  # noqa: A002
     format: Annotated[  # noqa: A002
         str, Query(description="Of the file", json_schema_extra={"enum": list(writing.SUFFIXES)})
@@ -261,7 +263,7 @@ async def read_file(
     """As it was uploaded, or as NPZ, Parquet or MCAP made of it: each is read back bit for bit."""
     if format not in writing.SUFFIXES:
         raise Problem.wrong_value(INVALID_REQUEST, "format", format, ", ".join(writing.SUFFIXES))
-    file = await export(context, await asyncio.to_thread(_find, context, id), format, principal.share)
+    file = await export(context, await asyncio.to_thread(_find, context, id), format, principal.share, room)
     return Download(
         file.path,
         file.close.close,

@@ -12,6 +12,7 @@ from service.domain.errors import ResultsNotReady
 from service.http.access import READ, CurrentPrincipal
 from service.http.conditional import KEEP_AND_ASK, is_one_of, unchanged
 from service.http.dependencies import CurrentContext
+from service.http.long_answers import LONG_ANSWER
 from service.web import reports
 from service.web.derived import derive
 from service.web.frames import write_frames
@@ -28,7 +29,7 @@ def show_log(context: CurrentContext, request: Request, id: str) -> Response:  #
     return render(request, "log.html", log=log, is_kept=is_kept)
 
 
-@router.get("/logs/{id}/frames", dependencies=[READ])
+@router.get("/logs/{id}/frames", dependencies=[READ, LONG_ANSWER])
 async def read_frames(context: CurrentContext, request: Request, principal: CurrentPrincipal, id: str) -> Response:  # noqa: A002
     """What the player shows (``service.web.frames``), made in a reader's process; raises ``ResultsNotReady``."""
     log, detection = await asyncio.to_thread(_find_results, context, id)
@@ -42,7 +43,7 @@ async def read_frames(context: CurrentContext, request: Request, principal: Curr
     return await derive(context, principal, log.format, write, headers=headers, media_type="application/octet-stream")
 
 
-@router.get("/logs/{id}/report", dependencies=[READ])
+@router.get("/logs/{id}/report", dependencies=[READ, LONG_ANSWER])
 async def read_report(context: CurrentContext, principal: CurrentPrincipal, id: str) -> Response:  # noqa: A002
     """The log's report, as one file; raises ``ResultsNotReady``."""
     log, detection = await asyncio.to_thread(_find_results, context, id)

@@ -20,6 +20,7 @@ from service.domain.errors import NoModel
 from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.conditional import KEEP_AND_ASK, is_one_of, unchanged
 from service.http.dependencies import CurrentContext
+from service.http.long_answers import LONG_ANSWER
 from service.http.paging import CursorText, Page
 from service.http.schemas.common import Force, Velocity
 from service.http.schemas.grasp_logs import GraspLogOut
@@ -120,7 +121,7 @@ def show_material(
     )
 
 
-@router.get("/materials/{name}/samples", dependencies=[READ])
+@router.get("/materials/{name}/samples", dependencies=[READ, LONG_ANSWER])
 async def read_samples(
     context: CurrentContext,
     request: Request,
@@ -152,7 +153,7 @@ def _sampled(context: Context, name: str, method: str | None) -> tuple[StoredMod
     return model, logs
 
 
-@router.get("/materials/{name}/report", dependencies=[READ])
+@router.get("/materials/{name}/report", dependencies=[READ, LONG_ANSWER])
 async def read_report(context: CurrentContext, principal: CurrentPrincipal, name: str) -> Response:
     """The material's report, as one file; raises ``NotFound``."""
     write = await asyncio.to_thread(_report_of, context, name)

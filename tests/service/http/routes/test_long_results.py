@@ -17,7 +17,8 @@ from service.domain.principal import Principal
 from service.domain.stored_results import encode_history
 from service.http.access import principal
 from service.http.dependencies import server_context
-from service.http.long_json import LONG_ANSWER, long_json
+from service.http.long_answers import LONG_ANSWER
+from service.http.long_json import long_json
 from service.http.routes import grasp_logs
 from service.processes import fair_queue
 from service.processes.fair_queue import FairQueue, QueueFull
