@@ -12,7 +12,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from sqlalchemy import URL, Table, func, insert, select, text, update
+from sqlalchemy import URL, Table, func, insert, inspect, select, text, update
 from sqlalchemy.orm import Session
 
 from db import identity, migrate
@@ -99,21 +99,26 @@ def restore(
 
     Every blob must have the bytes that it is named for. A blob store of another database is only filled where it is
     ``taken_over_by`` somebody, as the audit trail then tells; that database is refused there from then on. Raises
-    ``NotEmpty`` for a database that has any rows, ``StoreMismatch``, ``NotFound`` for a blob that is missing,
-    ``BlobDamaged`` for one whose bytes have changed.
+    ``NotEmpty`` for a database that has any rows, ``StoreMismatch``, ``SchemaMismatch``, ``NotFound`` for a blob that
+    is missing: all before anything is changed. ``BlobDamaged``, for a blob whose bytes have changed, leaves tables
+    without rows and the blobs before it, and the same restore can be begun again.
     """
     file = folder / FILE
     if not file.is_file():
         raise FileNotFoundError(f"backup {file} is not there")
-    migrate.upgrade(database)
-    _refuse_rows(database)
-    if taken_over_by is not None:
-        identity.adopt(database, blobs, None)
-    else:
-        identity.join(database, blobs, alone=True, to_fill=True)
+    source = BlobStore(folder)
     with TemporaryDirectory() as own, closing(_opened(_copied(file, Path(own)))) as copy:
         migrate.check(copy)
-        _copy_blobs(copy, BlobStore(folder), blobs, report)
+        _require_blobs(copy, source, blobs)
+        _refuse_rows(database)
+        if taken_over_by is None:
+            identity.check_to_fill(database, blobs)
+        migrate.upgrade(database)
+        if taken_over_by is None:
+            identity.join(database, blobs, alone=True, to_fill=True)
+        else:
+            identity.adopt(database, blobs, None)
+        _copy_blobs(copy, source, blobs, report)
         _copy_rows(copy, database, report, taken_over_by)
 
 
@@ -143,10 +148,15 @@ def _opened(file: Path) -> Database:
 
 
 def _refuse_rows(database: Database) -> None:
+    """Of any older schema, or of none; a file that is not there is not made."""
+    if database.is_missing:
+        return
     with database.read() as session:
+        there = inspect(session.connection()).get_table_names()
         for table in Base.metadata.sorted_tables:
-            count = session.scalar(select(func.count()).select_from(table))
-            if count and table.name not in LEFT_OUT:
+            if table.name in LEFT_OUT or table.name not in there:
+                continue
+            if count := session.scalar(select(func.count()).select_from(table)):
                 raise NotEmpty(f"table {table.name} ({count} rows)", "an empty database")
 
 
@@ -189,6 +199,15 @@ def _settled(table: Table, row: dict[str, object]) -> dict[str, object]:
 
 def _is_postgresql(session: Session) -> bool:
     return session.connection().dialect.name == "postgresql"
+
+
+def _require_blobs(rows: Database, source: BlobStore, target: BlobStore) -> None:
+    """That all that the rows refer to is in one of the two."""
+    present = {*source.hashes(), *target.hashes()}
+    with rows.read() as session:
+        for sha256 in identity.wanted(session):
+            if sha256 not in present:
+                source.locate(sha256)
 
 
 def _copy_blobs(rows: Database, source: BlobStore, target: BlobStore, report: Report) -> None:

@@ -59,6 +59,13 @@ def join(database: Database, blobs: BlobStore, *, alone: bool, to_fill: bool = F
     database.store_id = blobs.store_id = known
 
 
+def check_to_fill(database: Database, blobs: BlobStore) -> None:
+    """Make sure that the two can be joined to be filled, and change neither; raises ``StoreMismatch``."""
+    known = _known_in_any_schema(database)
+    has_begun = known is None and not blobs.is_settled and next(blobs.hashes(), None) is None
+    _require_same(database, blobs, known, None if has_begun else blobs.read_store_id())
+
+
 def verify(database: Database, blobs: BlobStore) -> None:
     """Make sure that the two belong together, or have not been joined yet; raises ``StoreMismatch``."""
     with database.read() as session:
@@ -72,16 +79,23 @@ def verify_before_upgrade(database: Database, blobs: BlobStore) -> None:
 
     One that is not there is not made either.
     """
-    known, has_logs = None, False
+    known, has_logs = _known_in_any_schema(database), False
     if not database.is_missing:
         with database.read() as session:
-            known = stores.find_id(session) if stores.has_table(session) else None
             has_logs = grasp_logs.any_in_older_schema(session)
     has_files = next(blobs.hashes(), None) is not None
     if known is not None or has_files or blobs.is_settled:
         _require_same(database, blobs, known, blobs.read_store_id())
     if known is None and has_files and not has_logs:
         raise _refers_to_none(database, blobs)
+
+
+def _known_in_any_schema(database: Database) -> str | None:
+    """The store id of a database whose schema may be older or not there yet; a file that is not there is not made."""
+    if database.is_missing:
+        return None
+    with database.read() as session:
+        return stores.find_id(session) if stores.has_table(session) else None
 
 
 def adopt(database: Database, blobs: BlobStore, actor: Actor | None) -> Adopted:

@@ -6,13 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from sqlalchemy import select, update
+from sqlalchemy import inspect, select, update
 
 from db import migrate
 from db.backup import FILE, LEFT_OUT, backup, restore
 from db.blobs import BlobStore
 from db.database import Database
-from db.errors import BlobDamaged, NotEmpty, NotFound, SchemaMismatch, StorageUnavailable
+from db.errors import BlobDamaged, NotEmpty, NotFound, SchemaMismatch, StorageUnavailable, StoreMismatch
 from db.records import Claim, Detection, NewGraspLog, NewModel, SampleSummary
 from db.repositories import access_keys, detections, friction_models, grasp_logs, jobs, materials, runners
 from db.sqlite_file import SIDE_FILES
@@ -198,6 +198,49 @@ def test_a_backup_whose_log_cannot_be_brought_into_its_file_is_none(
             backup(filled, blobs, tmp_path / "copy", read_meanwhile)
     assert not file.exists()
     backup(filled, blobs, tmp_path / "copy", nothing)
+
+
+@pytest.fixture(params=["no schema", "a missing blob", "files of another store"])
+def refused(
+    request: pytest.FixtureRequest, filled: Database, blobs: BlobStore, tmp_path: Path
+) -> tuple[Path, BlobStore, str]:
+    """A backup, a blob store that it is not restored into, and what is said of that."""
+    copy, again = tmp_path / "copy", BlobStore(tmp_path / "again")
+    backup(filled, blobs, copy, nothing)
+    if request.param == "no schema":
+        (copy / FILE).unlink()
+        with closing(sqlite3.connect(copy / FILE)) as connection:
+            connection.execute("CREATE TABLE other (id INTEGER)")
+        return copy, again, "revision"
+    if request.param == "a missing blob":
+        sha256 = next(BlobStore(copy).hashes())
+        BlobStore(copy).path(sha256).unlink()
+        return copy, again, sha256
+    again.write_store_id("0" * 32)
+    return copy, again, "of store 0"
+
+
+def test_a_restore_that_is_refused_makes_no_database(refused: tuple[Path, BlobStore, str], tmp_path: Path) -> None:
+    copy, again, said = refused
+    id_before, file = again.read_store_id(), tmp_path / "new" / "stiction.sqlite3"
+    file.parent.mkdir()
+    with (
+        closing(Database(f"sqlite:///{file}")) as database,
+        pytest.raises((SchemaMismatch, NotFound, StoreMismatch), match=said),
+    ):
+        restore(copy, database, again, nothing)
+    assert list(file.parent.iterdir()) == []
+    assert (again.read_store_id(), list(again.hashes())) == (id_before, [])
+
+
+def test_a_restore_that_is_refused_leaves_an_empty_database_as_it_was(
+    refused: tuple[Path, BlobStore, str], other: Database
+) -> None:
+    copy, again, said = refused
+    with pytest.raises((SchemaMismatch, NotFound, StoreMismatch), match=said):
+        restore(copy, other, again, nothing)
+    with other.connect() as connection:
+        assert inspect(connection).get_table_names() == []
 
 
 def test_a_blob_that_changed_or_went_stops_a_restore_before_any_row(
