@@ -47,6 +47,7 @@ def list_jobs(
 )
 async def read_job(
     context: CurrentContext,
+    principal: CurrentPrincipal,
     id: str,  # noqa: A002  (the path's own name)
     wait: Annotated[float, Query(ge=0.0, le=MOST_SECONDS, description="s to wait for its end", examples=[10.0])] = 0.0,
 ) -> JobOut:
@@ -55,7 +56,7 @@ async def read_job(
     With `wait` the answer comes at the job's end, or after so many seconds: who wants its result asks once, not again
     and again.
     """
-    return JobOut.of(await await_job(context, id, wait))
+    return JobOut.of(await await_job(context, id, wait, principal.key_id))
 
 
 @router.post(

@@ -2,6 +2,7 @@
 
 import hmac
 import json
+import threading
 import time
 from collections.abc import AsyncIterator, Callable
 from datetime import timedelta
@@ -141,3 +142,24 @@ def test_nothing_is_stored_for_a_key_that_is_revoked_while_the_upload_comes(
     assert 'error="invalid_token"' in answer.headers["www-authenticate"]
     with database.read() as session:
         assert not grasp_logs.list_all(session, Window("created_at", descending=True), LogFilter())
+
+
+@pytest.mark.parametrize("expires", [True, False], ids=["expires", "is revoked"])
+def test_who_waits_for_a_job_is_told_nothing_once_the_key_has_ended(
+    reach: Reach, make: Make, content: bytes, database: Database, expires: bool
+) -> None:
+    headers = {"content-type": "application/vnd.stiction.grasp-log+npz"}
+    job = reach("open").request("POST", "/v1/grasp-logs", content=content, headers=headers).json()["job"]["id"]
+    key = make(expires_at=now() + timedelta(seconds=1.5) if expires else None)
+    client, began = reach(key=key), time.monotonic()
+
+    def revoke() -> None:
+        with database.write() as session:
+            access_keys.revoke(session, str(keys.key_id(key)))
+
+    ending = threading.Timer(0.5, (lambda: None) if expires else revoke)
+    ending.start()
+    answer = client.get(f"/v1/jobs/{job}?wait=10")
+    ending.join()
+    assert (answer.status_code, answer.json()["type"]) == (401, "/problems/invalid-key")
+    assert time.monotonic() - began < 8.0
