@@ -24,6 +24,8 @@ class Limits:
     """m; no gel moves further."""
     force: float = 1e4
     """N on one element."""
+    press: tuple[float, float] = (1e-6, 1e4)
+    """N in all with which a body is pressed on a sensor to calibrate it."""
     element_area: tuple[float, float] = (1e-12, 1e-2)
     """m²; 1 µm to 100 mm pitch."""
     median_interval: tuple[float, float] = (1e-6, 60.0)

@@ -119,7 +119,7 @@ class GraspLog:
         _set(self, "element_area", check_element_area(self.element_area))
         _set(self, "metadata", _metadata(self.metadata))
         _set(self, "truth", _truth(self.truth, field_shape[:3]))
-        _check_magnitude("displacement", self.displacement, _largest_displacement(position), "m (is it in m?)")
+        check_displacement(self.displacement, position)
         _check_magnitude("force", self.force, LIMITS.force, "N per element")
         _check_pose(self.object_pose)
         _check_normal(self.normal)
@@ -238,6 +238,18 @@ def check_normal(normal: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
     return checked
 
 
+def check_span(first: float, last: float) -> None:
+    """Times of a log's first and last frame, s: that a clock could have told them."""
+    if not abs(first) <= LIMITS.clock or not last - first <= LIMITS.span:
+        allowed = f"at most {LIMITS.span:g} s in all, begun within {LIMITS.clock:g} s of 0 (is it in s?)"
+        raise InvalidInput("time", f"{first:.6g} to {last:.6g} s", allowed)
+
+
+def check_displacement(displacement: FloatArray, position: FloatArray) -> None:
+    """Of markers at rest at ``position``, m: that they could have moved so far."""
+    _check_magnitude("displacement", displacement, _largest_displacement(position), "m (is it in m?)")
+
+
 def check_mask(name: str, value: ArrayLike, shape: tuple[int, ...]) -> BoolArray:
     """One truth value an element, of exactly this shape."""
     mask = np.array(value)
@@ -321,11 +333,7 @@ def _check_time(time: FloatArray) -> None:
     if step[worst] <= 0.0:
         value = f"{time[worst + 1]:.9g} s at frame {worst + 1}, after {time[worst]:.9g} s"
         raise InvalidInput("time", value, "strictly increasing seconds")
-    if not abs(time[0]) <= LIMITS.clock or not time[-1] - time[0] <= LIMITS.span:
-        value = f"{time[0]:.6g} to {time[-1]:.6g} s"
-        raise InvalidInput(
-            "time", value, f"at most {LIMITS.span:g} s in all, begun within {LIMITS.clock:g} s of 0 (is it in s?)"
-        )
+    check_span(float(time[0]), float(time[-1]))
     low, high = LIMITS.median_interval
     median = float(np.median(step))
     if not low <= median <= high:

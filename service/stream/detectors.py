@@ -21,6 +21,7 @@ from service.stream.grip import Grip
 from service.stream.live_frame import pack_frame
 from service.stream.messages import Control
 from slipcore import Frame, FrictionSamples, GraspLog, InvalidInput, SlipState, collect_samples
+from slipcore.frames import check_displacement, check_span
 from stiction_client import container
 
 if TYPE_CHECKING:
@@ -37,6 +38,8 @@ MAX_KEPT_BYTES = 64 * 2**20
 """Bytes of frames kept of one session for its log: 12 minutes of a 20×20 sensor with forces at 30 frames a second."""
 
 MAX_MARKERS = 4096
+MOST_COMMAND = 1e6
+"""N, as of the planner's forces."""
 
 Numbers = bytes | Sequence[float]
 """Numbers in a row, row-major: bytes of little-endian float32 or float64, or flat."""
@@ -59,7 +62,8 @@ class Session:
     """A running detector with what it saw: the last frames and answers, all frames if they are ``kept``; and the
     controller of the grip, where one was asked for.
 
-    ``friction`` is what its client is told, ``expected`` what those are who watch it.
+    ``friction`` is what its client is told, ``expected`` what those are who watch it; ``begun``: time of its first
+    frame, s.
     """
 
     detector: "SlipDetector"
@@ -78,6 +82,7 @@ class Session:
     expected: dict[str, float] | None = None
     held_bytes: int = 0
     most_bytes: int = 0
+    begun: float | None = None
 
 
 _SESSIONS: dict[str, Session] = {}
@@ -125,6 +130,7 @@ def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[st
     frame = _frame(session, given)
     size = 0 if session.kept is None else _kept_bytes(session, frame)
     state, command = _detected(session, frame)
+    session.begun = frame.time if session.begun is None else session.begun
     if session.kept is not None:
         session.kept.append(frame)
         session.held_bytes += size
@@ -151,14 +157,18 @@ def _detected(session: Session, frame: Frame) -> tuple[SlipState, dict[str, Any]
 
 
 def _frame(session: Session, given: PackedFrame) -> Frame:
+    """The frame, if a log could have it: one that could not would spoil what is kept."""
     shape, command = session.position.shape, given.command
-    if command is not None and not 0.0 <= command < math.inf:
-        raise InvalidInput("command", command, "a normal force of 0 N or more")
+    if command is not None and not 0.0 <= command <= MOST_COMMAND:
+        raise InvalidInput("command", command, f"a normal force of 0 to {MOST_COMMAND:g} N")
     if session.grip is not None and given.force is None:
         raise InvalidInput("force", None, "the elements' forces, by which the grip is controlled")
+    check_span(given.time if session.begun is None else session.begun, given.time)
+    displacement = _array("displacement", given.displacement, shape)
+    check_displacement(displacement, session.position)
     return Frame(
         given.time,
-        _array("displacement", given.displacement, shape),
+        displacement,
         None if given.force is None else _array("force", given.force, shape),
         None if given.object_pose is None else _array("object_pose", given.object_pose, (3,)),
         None if given.normal is None else _array("normal", given.normal, shape),

@@ -10,7 +10,10 @@ from service.stream.observing import Observer
 from slipcore import Frame, InvalidInput, SlipState
 from slipcore.frames import FloatArray
 from stiction_client import Contact, ControlSettings, FrictionModel, GraspController, InvalidArgument
+from stiction_client.arguments import within
 from stiction_client.controller import Gain, gains
+
+CONTACT_RANGES = {"pressure_square": (0.1, 1e6, "-"), "torque_arm": (1e-9, 1.0, "m")}
 
 
 class Grip:
@@ -65,5 +68,9 @@ def _contact(control: Control) -> Contact:
     if control.torque_arm == 0.0:
         own = f"{contact.torque_arm:g} m, which this contact has without it"
         raise InvalidArgument("torque_arm", 0.0, f"above 0 m, for frames have torques, such as {own}")
-    told = {"pressure_square": control.pressure_square, "torque_arm": control.torque_arm}
-    return replace(contact, **{name: value for name, value in told.items() if value is not None})
+    told = {
+        name: float(within(name, value, low, high, unit))
+        for name, (low, high, unit) in CONTACT_RANGES.items()
+        if (value := getattr(control, name)) is not None
+    }
+    return replace(contact, **told)

@@ -13,6 +13,7 @@ from slipcore.calibration.marker_noise import marker_noise
 from slipcore.calibration.model import AXES, SensorModel
 from slipcore.calibration.press import ImpurePress, Press, find_press, impurity
 from slipcore.calibration.zero import drifts, offsets
+from slipcore.defaults import LIMITS
 from slipcore.errors import InvalidInput, UnknownScale
 from slipcore.frames import FloatArray, GraspLog
 
@@ -47,9 +48,10 @@ def _checked(logs: Sequence[GraspLog], known_force: Sequence[float | None] | Non
     known = [None] * len(logs) if known_force is None else known_force
     if len(known) != len(logs):
         raise InvalidInput("known_force", f"{len(known)} forces", f"one for each of {len(logs)} logs, or None")
+    least, most = LIMITS.press
     for force in known:
-        if force is not None and not 0.0 < force < np.inf:
-            raise InvalidInput("known_force", force, "above 0 N and finite")
+        if force is not None and not least <= force <= most:
+            raise InvalidInput("known_force", force, f"{least:g} to {most:g} N")
     for name in ("sensor", "grid"):
         values = sorted({str(getattr(log, name)) for log in logs})
         if len(values) > 1:

@@ -278,7 +278,9 @@ def _field(name: str, value: ArrayLike, shape: tuple[int, ...], limit: float, un
     if isinstance(value, np.ndarray) and value.dtype == np.float64 and value.shape == shape:
         copy = value.copy()
         flat = copy.ravel()
-        if flat @ flat <= limit * limit:  # none is larger, nor infinite or NaN
+        with np.errstate(over="ignore"):
+            square = flat @ flat
+        if square <= limit * limit:  # none is larger, nor infinite or NaN
             copy.flags.writeable = False
             return copy
     return check_frame(name, value, shape, limit, unit)

@@ -8,7 +8,8 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.config import JsonDict
 
 from db.records import Calibration, CalibrationPress, Gel, Sensor
-from service.http.schemas.common import LARGEST_FORCE, MOMENT_EXAMPLE, Body, Next, Reference
+from service.http.schemas.common import MOMENT_EXAMPLE, Body, Next, Reference
+from slipcore.defaults import LIMITS
 
 GEL_EXAMPLE: JsonDict = {"young_modulus": 2.5e5, "poisson_ratio": 0.48, "thickness": 4e-3, "marker_depth": 5e-4}
 SENSOR_EXAMPLE: JsonDict = {"name": "GelSight Mini", "gel": GEL_EXAMPLE, "calibration": None}
@@ -101,7 +102,7 @@ class PressIn(Body):
     grasp_log: Annotated[Reference, Field(max_length=100, description="Its id; it is of this sensor")]
     known_force: Annotated[
         float | None,
-        Field(gt=0.0, le=LARGEST_FORCE, allow_inf_nan=False, description="Normal force with which it pressed, N"),
+        Field(ge=LIMITS.press[0], le=LIMITS.press[1], allow_inf_nan=False, description="Normal force of the press, N"),
     ] = None
 
     def record(self) -> CalibrationPress:

@@ -147,3 +147,12 @@ def test_a_name_that_no_database_takes_is_not_found(database: Database, name: st
     """However it comes in: a live stream names its material, too."""
     with database.read() as session, pytest.raises(NotFound):
         materials.find_id(session, name)
+
+
+@ONLY_SQLITE
+@pytest.mark.parametrize("force", [5e-324, 1e-300, 0.0, 1e5, 1e308])
+def test_a_known_force_that_no_press_has_is_refused_by_name(local: Any, force: float) -> None:
+    presses = [{"grasp_log": "x", "known_force": force}]
+    answer = local.request("POST", "/v1/sensors/finger/calibrations", json={"presses": presses})
+    assert answer.status_code == httpx.codes.UNPROCESSABLE_ENTITY
+    assert answer.json()["name"].endswith("known_force")

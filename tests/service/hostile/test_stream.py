@@ -5,6 +5,7 @@ import json
 import tracemalloc
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import nullcontext, suppress
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -224,8 +225,15 @@ def test_a_message_that_is_none_has_its_documented_code(make: Callable[..., Stre
         ({"object_pose": [0, 0, False]}, "object_pose"),
         ({"number": -1}, "number"),
         ({"number": -(2**53)}, "number"),
+        ({"time": 1e308}, "time"),
+        ({"time": -1e308}, "time"),
+        ({"time": 1e13}, "time"),
+        ({"displacement": [1e308] * 48}, "displacement"),
+        ({"force": [-1e308] * 48}, "force"),
+        ({"object_pose": [1e308, 0.0, 0.0]}, "object_pose x, y"),
+        ({"command": 1e308}, "command"),
     ],
-    ids=["nested", "large", "truth values", "half", "text", "truth value", "-1", "-2^53"],
+    ids=["nested", "large", "truth values", "half", "text", "truth value", "-1", "-2^53", *["huge"] * 7],
 )
 def test_a_wrong_frame_is_answered_by_name_and_the_next_is_taken(
     make: Callable[..., Streams], wrong: dict[str, Any], name: str
@@ -234,6 +242,43 @@ def test_a_wrong_frame_is_answered_by_name_and_the_next_is_taken(
     opened, error, state = converse(make(), first(), frame(**wrong), frame(number=1, time=1.0)).answers
     assert (opened["type"], error["type"], state["type"]) == ("opened", "error", "state")
     assert (error["number"], error["name"], state["number"]) == (number, name, 1)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("pressure_square", 1e-300), ("pressure_square", 1e300), ("torque_arm", 5e-324), ("contact_area", 1e-300)],
+)
+def test_a_controllers_contact_that_cannot_be_is_refused_by_name(
+    make: Callable[..., Streams], name: str, value: float
+) -> None:
+    control = {"contact_area": 6e-5, "settings": {"least_force": 0.5, "most_force": 20.0}, name: value}
+    closed = converse(make(), first(control=control)).closed
+    assert closed is not None
+    assert closed[0] == REFUSED
+    assert name.removeprefix("contact_") in closed[1]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"time": 1e308}, {"time": 2e9}, {"displacement": [0.05] * 48}],
+    ids=["never", "in sixty years", "beyond the sensor"],
+)
+def test_a_frame_that_no_log_could_have_does_not_spoil_the_recording(
+    make: Callable[..., Streams], tmp_path: Path, wrong: dict[str, Any]
+) -> None:
+    """A time far ahead would have every later frame refused, and the log at its end with it."""
+    streams = make()
+
+    async def go() -> None:
+        session = await streams.open(opening(keep=True), "key", "10.0.0.9")
+        packed = [PackedFrame(number, 0.1 * number, [0.0] * 48) for number in range(4)]
+        packed[2] = PackedFrame(2, **({"time": 0.2, "displacement": [0.0] * 48} | wrong))
+        for each in packed:
+            with pytest.raises(InvalidInput) if each.number == 2 else nullcontext():
+                detectors.step(session.id, each)
+        assert detectors.write(session.id, tmp_path / "log", "finger").frames == 3
+
+    run(go)
 
 
 def test_messages_wait_as_they_were_sent_and_not_as_lists() -> None:
