@@ -7,18 +7,27 @@ from sqlalchemy.orm import Session
 from db.errors import NotFound
 from db.records import Job, Material, StoredGraspLog
 from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, owners
+from service.domain import quotas
 from service.domain.context import Context
 from service.domain.errors import InsufficientScope, InvalidValue
 from service.domain.ownership import check_may_change
 from service.domain.principal import ANONYMOUS, Principal
 from service.domain.queueing import queue
+from service.settings import Settings
+
+MOST_ALIASES = 100
+"""Of one material."""
 
 REFITTED = "ols"
 """The method by which a material is fitted even if it has no model yet, as after an upload."""
 
 
-def create(session: Session, name: str, description: str, principal: Principal) -> Material:
-    """Make a material known, which belongs to the principal's key and its group; raises ``AlreadyExists``."""
+def create(session: Session, settings: Settings, name: str, description: str, principal: Principal) -> Material:
+    """Make a material known, which belongs to the principal's key and its group.
+
+    Raises ``AlreadyExists``, and ``QuotaExceeded`` for a key that has changed as much as it may.
+    """
+    quotas.check_change(session, settings, principal.key_id)
     made = materials.create(session, name, description)
     for owner in principal.owners:
         owners.add(session, made.id, owner)
@@ -33,7 +42,7 @@ def change(
     """Rename a material, its old name becoming an alias, or change its description.
 
     Raises ``NotFound``, ``AlreadyExists`` for a name that another material has, ``NotOwner`` or ``InsufficientScope``
-    for who may not.
+    for who may not, ``QuotaExceeded``, and ``InvalidValue`` for an alias more than a material may have.
     """
     with context.database.write() as session:
         material_id = _changeable(session, material, principal)
@@ -41,6 +50,7 @@ def change(
         name = None if name == before.name else name
         description = None if description == before.description else description
         if (name, description) != (None, None):
+            quotas.check_change(session, context.settings, principal.key_id)
             audit.add(
                 session, principal.actor, "material.changed", material, {"name": name, "description": description}
             )
@@ -49,6 +59,8 @@ def change(
         if name is not None:
             materials.rename(session, material_id, name)
         changed = materials.get(session, name or material)
+        if len(changed.aliases) > len(before.aliases):
+            _check_aliases(changed)
     context.models.seen()
     return changed
 
@@ -56,9 +68,13 @@ def change(
 def add_alias(context: Context, material: str, alias: str, principal: Principal = ANONYMOUS) -> Material:
     """Let a material be found by one more name; raises as ``change``."""
     with context.database.write() as session:
-        if materials.add_alias(session, _changeable(session, material, principal), alias):
+        quotas.check_change(session, context.settings, principal.key_id)
+        is_new = materials.add_alias(session, _changeable(session, material, principal), alias)
+        changed = materials.get(session, material)
+        if is_new:
+            _check_aliases(changed)
             audit.add(session, principal.actor, "alias.added", material, {"alias": alias})
-        return materials.get(session, material)
+    return changed
 
 
 def remove_alias(context: Context, material: str, alias: str, principal: Principal = ANONYMOUS) -> None:
@@ -80,6 +96,7 @@ def merge(context: Context, material: str, source: str, principal: Principal = A
         audit.add(session, principal.actor, "material.merged", material, {"source": source})
         queued = _queue_refits(session, target_id, methods, principal.key_id)
         merged = materials.get(session, material)
+        _check_aliases(merged)
     return merged, _follow_up(context, queued)
 
 
@@ -133,6 +150,12 @@ def restore(context: Context, log_id: str, principal: Principal = ANONYMOUS) -> 
             queued = _queue_refits(session, material_id, methods, principal.key_id)
         log = grasp_logs.get(session, log_id)
     return log, _follow_up(context, queued)
+
+
+def _check_aliases(material: Material) -> None:
+    """All answers that have a material have all of its names."""
+    if len(material.aliases) > MOST_ALIASES:
+        raise InvalidValue("aliases", len(material.aliases), f"at most {MOST_ALIASES} of a material")
 
 
 def _changeable(session: Session, material: str, principal: Principal) -> int:

@@ -1,4 +1,5 @@
-"""How much one access key may have: jobs queued, logs a day, bytes of uploads. Without a key nothing is limited.
+"""How much one access key may have: jobs queued, logs and changes a day, bytes of uploads. Without a key nothing is
+limited.
 
 An upload is checked twice: before its file is kept, and in the transaction that stores it, for others of the same key
 may have been stored meanwhile. What is stored already takes nothing of a quota, and that is known by the content only:
@@ -10,13 +11,16 @@ from datetime import timedelta
 
 from sqlalchemy.orm import Session
 
-from db.records import NewGraspLog
+from db.records import AuditAction, NewGraspLog
 from db.repositories import access_keys, grasp_logs, usage
 from db.tables import now
 from service.domain.errors import QuotaExceeded, StorageQuotaExceeded
 from service.settings import Settings
 
 DAY = timedelta(days=1)
+CHANGES: tuple[AuditAction, ...] = ("material.created", "material.changed", "alias.added", "sensor.described")
+"""Those of which a key could otherwise store any number; what takes a name or a log away is never refused."""
+
 JOBS_RETRY_SECONDS, LOGS_RETRY_SECONDS = 10, 3600
 
 
@@ -53,9 +57,20 @@ def check_job(session: Session, settings: Settings, key_id: str | None) -> None:
         raise _exceeded("queued jobs", most, "STICTION_KEY_QUEUED_JOBS", JOBS_RETRY_SECONDS)
 
 
+def check_change(session: Session, settings: Settings, key_id: str | None) -> None:
+    """Raises ``QuotaExceeded`` where a key may make no more changes; call it before what is changed is locked."""
+    most = settings.key_changes_a_day
+    if key_id is None or most is None:
+        return
+    lock(session, settings, key_id)
+    if usage.changes_since(session, key_id, CHANGES, now() - DAY) >= most:
+        what = "changes of materials and sensors in the last 24 hours"
+        raise _exceeded(what, most, "STICTION_KEY_CHANGES_A_DAY", LOGS_RETRY_SECONDS)
+
+
 def _any_is_set(settings: Settings) -> bool:
-    quotas = (settings.key_queued_jobs, settings.key_logs_a_day, settings.key_stored_bytes)
-    return any(most is not None for most in quotas)
+    quotas = ("key_queued_jobs", "key_logs_a_day", "key_stored_bytes", "key_changes_a_day")
+    return any(getattr(settings, quota) is not None for quota in quotas)
 
 
 def _exceeded(what: str, most: int, setting: str, seconds: int) -> QuotaExceeded:

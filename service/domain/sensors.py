@@ -4,6 +4,7 @@ from dataclasses import asdict
 
 from db.records import Gel, Sensor
 from db.repositories import audit, sensors
+from service.domain import quotas
 from service.domain.context import Context
 from service.domain.errors import InsufficientScope
 from service.domain.principal import Principal
@@ -22,7 +23,7 @@ def describe(context: Context, name: str, gel: Gel, principal: Principal) -> Sen
     """Store the mechanics of a sensor's gel: forces of logs that come in from then on follow from it.
 
     All keys' logs of that sensor do: whoever may upload may describe it once, and only admins otherwise. Raises
-    ``InsufficientScope``.
+    ``InsufficientScope``, and ``QuotaExceeded`` for a key that has changed as much as it may.
     """
     with context.database.write() as session:
         known = sensors.find(session, name)
@@ -30,5 +31,6 @@ def describe(context: Context, name: str, gel: Gel, principal: Principal) -> Sen
             return known
         if known is not None and known.gel is not None and not principal.is_admin:
             raise InsufficientScope("upload", "admin")
+        quotas.check_change(session, context.settings, principal.key_id)
         audit.add(session, principal.actor, "sensor.described", name, asdict(gel))
         return sensors.describe(session, name, gel)

@@ -24,6 +24,7 @@ from service.domain.receive import UNPACKING_BYTES, check_encoding, check_expans
 from service.domain.sensors import RECONSTRUCTED
 from service.formats.archive import unpacked_bytes
 from service.formats.reading import Description, FormatSettings, to_its_end
+from service.settings import Settings
 from slipcore.defaults import METHOD_NAMES
 from slipcore.errors import InvalidInput
 
@@ -159,7 +160,7 @@ def accept(session: Session, context: Context, received: ReceivedLog) -> StoredU
     settings, principal = context.settings, received.principal
     check_not_ended(session, principal.key_id)
     quotas.lock(session, settings, principal.key_id)
-    log = replace(received.log, material_id=_material(session, received))
+    log = replace(received.log, material_id=_material(session, context.settings, received))
     quotas.check_log(session, settings, principal.key_id, log)
     try:
         log_id, is_new = grasp_logs.add(session, log), True
@@ -207,12 +208,12 @@ def _may_differ(session: Session, log: StoredGraspLog) -> bool:
     return by_gel and ended is not None and audit.is_recorded(session, "sensor.described", log.sensor, ended)
 
 
-def _material(session: Session, received: ReceivedLog) -> int | None:
+def _material(session: Session, settings: Settings, received: ReceivedLog) -> int | None:
     """The key of the log's material: one to be made known, or one that was merged into another meanwhile."""
     material_id, principal = received.log.material_id, received.principal
     if received.new_material is not None:
         try:
-            return curate.create(session, received.new_material, "", principal).id
+            return curate.create(session, settings, received.new_material, "", principal).id
         except AlreadyExists:  # somebody else made it known while the log came in
             material_id = materials.find_id(session, received.new_material)
     if material_id is None:

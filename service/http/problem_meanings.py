@@ -141,7 +141,7 @@ MEANINGS: dict[str, Meaning] = {
         "Try again after `Retry-After` seconds.",
     ),
     "quota-exceeded": Meaning(
-        "One key has as many jobs queued, or logs of the last day, as it may (settings.md).",
+        "One key has as many jobs queued, or logs or changes of the last day, as it may (settings.md).",
         "Try again after `Retry-After` seconds.",
     ),
     "headers-too-large": Meaning(

@@ -24,6 +24,7 @@ UNSET = {
     "dask_address": "none",
     "key_queued_jobs": "none",
     "key_logs_a_day": "none",
+    "key_changes_a_day": "none",
     "key_stored_bytes": "none",
     "webhook_url": "none",
     "webhook_secret": "none",

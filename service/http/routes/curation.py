@@ -13,6 +13,7 @@ from service.http.problems import (
     INVALID_REQUEST,
     MATERIAL_EXISTS,
     NOT_OWNER,
+    QUOTA_EXCEEDED,
     STORAGE_UNAVAILABLE,
     UNKNOWN_ALIAS,
     UNKNOWN_GRASP_LOG,
@@ -36,7 +37,7 @@ _BODY = (UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILA
     tags=["materials"],
     dependencies=[UPLOAD],
     summary="Rename or describe a material",
-    responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, MATERIAL_EXISTS, *_BODY),
+    responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, MATERIAL_EXISTS, QUOTA_EXCEEDED, *_BODY),
 )
 def change_material(
     context: CurrentContext, name: str, change: MaterialChange, principal: CurrentPrincipal
@@ -50,7 +51,9 @@ def change_material(
     tags=["materials"],
     dependencies=[UPLOAD],
     summary="Give a material one more name",
-    responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, MATERIAL_EXISTS, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+    responses=problems(
+        NOT_OWNER, UNKNOWN_MATERIAL, MATERIAL_EXISTS, QUOTA_EXCEEDED, INVALID_REQUEST, STORAGE_UNAVAILABLE
+    ),
 )
 def add_alias(context: CurrentContext, name: str, alias: Alias, principal: CurrentPrincipal) -> MaterialOut:
     """Every route finds the material by any of its names."""

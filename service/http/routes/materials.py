@@ -54,7 +54,7 @@ _BODY = (UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, IDEMPOTENCY_KEY_
     summary="Make a material known",
     status_code=201,
     response_model=MaterialOut,
-    responses=problems(MATERIAL_EXISTS, *_BODY),
+    responses=problems(MATERIAL_EXISTS, QUOTA_EXCEEDED, *_BODY),
 )
 def create_material(
     context: CurrentContext, new: NewMaterial, key: KeyWithBody, principal: CurrentPrincipal
@@ -63,7 +63,7 @@ def create_material(
     with context.database.write() as session:
 
         def create() -> RepeatableResponse:
-            made = MaterialOut.of(curate.create(session, new.name, new.description, principal))
+            made = MaterialOut.of(curate.create(session, context.settings, new.name, new.description, principal))
             return RepeatableResponse(201, f"/v1/materials/{quote(new.name)}", made.model_dump(mode="json"))
 
         return respond_once(session, key, create).response()

@@ -16,6 +16,7 @@ from service.http.paging import LARGEST_ID, MOST, USUAL, CursorText, Limit, Page
 from service.http.problems import (
     FILE_DELETED,
     INVALID_REQUEST,
+    QUOTA_EXCEEDED,
     STORAGE_UNAVAILABLE,
     TOO_MANY_UPLOADS,
     UNKNOWN_CALIBRATION,
@@ -121,7 +122,7 @@ def read_sensor(context: CurrentContext, name: SensorName) -> SensorOut:
     "/{name:path}",
     dependencies=[UPLOAD],
     summary="Describe a sensor's gel",
-    responses=problems(UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+    responses=problems(QUOTA_EXCEEDED, UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
 def describe_sensor(context: CurrentContext, name: SensorName, gel: GelIn, principal: CurrentPrincipal) -> SensorOut:
     """From then on, forces of its logs that have none are reconstructed from the displacement of their markers."""

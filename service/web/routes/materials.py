@@ -76,7 +76,7 @@ def create_material(
     """Make a material known; raises as the API's route does."""
     new = checked(NewMaterial, {"name": name.strip(), "description": description.strip()})
     with context.database.write() as session:
-        curate.create(session, new.name, new.description, principal)
+        curate.create(session, context.settings, new.name, new.description, principal)
     return RedirectResponse(f"/materials/{quote(new.name, safe='')}", 303)
 
 

@@ -8,7 +8,7 @@ from service.domain import quotas
 from service.settings import Settings
 
 
-@pytest.mark.parametrize("quota", ["key_queued_jobs", "key_logs_a_day", "key_stored_bytes"])
+@pytest.mark.parametrize("quota", ["key_queued_jobs", "key_logs_a_day", "key_stored_bytes", "key_changes_a_day"])
 @pytest.mark.parametrize(("key_id", "is_set", "locked"), [("a", True, ["a"]), ("a", False, []), (None, True, [])])
 def test_a_key_is_locked_only_where_something_of_it_is_counted(
     monkeypatch: pytest.MonkeyPatch, quota: str, key_id: str | None, is_set: bool, locked: list[str]

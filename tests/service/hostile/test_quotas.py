@@ -11,7 +11,7 @@ import pytest
 from db.blobs import BlobStore
 from db.database import Database
 from db.repositories import access_keys, usage
-from service.domain import keys, upload
+from service.domain import curate, keys, upload
 from service.domain.errors import DomainError
 from service.domain.principal import Principal
 from service.formats.reading import Description
@@ -148,3 +148,47 @@ def test_a_log_that_a_stream_stores_keeps_to_the_quotas(
         request = upload.UploadRequest(None, None, "filter", principal=Principal(key_id=key_id))
         with pytest.raises(DomainError, match=setting.upper()):
             asyncio.run(upload.store_made(context, spool, found, request))
+
+
+CHANGES: tuple[tuple[str, str, dict[str, Any] | None], ...] = (
+    ("POST", "/v1/materials", {"name": "glass"}),
+    ("PATCH", "/v1/materials/paper", {"description": "thin"}),
+    ("PUT", "/v1/materials/paper/aliases/A4", None),
+    ("PUT", "/v1/sensors/finger", {"young_modulus": 2.5e5, "poisson_ratio": 0.48}),
+)
+
+
+@ONLY_SQLITE
+@pytest.mark.parametrize(("method", "path", "body"), CHANGES, ids=["material", "description", "alias", "sensor"])
+def test_a_key_that_has_changed_as_much_as_it_may_changes_no_more(
+    reach: Callable[..., Any], key: str, method: str, path: str, body: dict[str, Any] | None
+) -> None:
+    bounded, free = reach(key=key, key_changes_a_day=1), reach("open", key_changes_a_day=1)
+    assert bounded.request("POST", "/v1/materials", json={"name": "paper"}).status_code == 201
+    more: dict[str, Any] = {} if body is None else {"json": body}
+    refused = bounded.request(method, path, **more)
+    assert (refused.status_code, refused.json()["type"]) == (429, "/problems/quota-exceeded")
+    assert "STICTION_KEY_CHANGES_A_DAY" in refused.json()["detail"]
+    assert "retry-after" in refused.headers
+    assert free.request(method, path, **more).is_success
+
+
+@ONLY_SQLITE
+def test_a_material_has_a_bounded_number_of_aliases(reach: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(curate, "MOST_ALIASES", 2)
+    client = reach("open")
+    for name in ("paper", "glass"):
+        client.request("POST", "/v1/materials", json={"name": name}).raise_for_status()
+        client.request("PUT", f"/v1/materials/{name}/aliases/{name} 2").raise_for_status()
+    for _ in range(2):  # once more it is known
+        client.request("PUT", "/v1/materials/paper/aliases/A4").raise_for_status()
+    for method, path, body in (
+        ("PUT", "/v1/materials/paper/aliases/A5", None),
+        ("PATCH", "/v1/materials/paper", {"name": "card"}),
+        ("POST", "/v1/materials/paper/merges", {"source": "glass"}),
+    ):
+        refused = client.request(method, path, json=body)
+        assert (refused.status_code, refused.json()["name"]) == (422, "aliases")
+        assert refused.json()["allowed"].startswith("at most 2")
+    assert client.get("/v1/materials/paper").json()["aliases"] == ["A4", "paper 2"]
+    client.request("PATCH", "/v1/materials/paper", json={"name": "A4"}).raise_for_status()  # as many as before
