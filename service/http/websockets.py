@@ -14,15 +14,41 @@ MOST_FRAGMENTS = 1024
 """Of one message; the bound on its bytes does not count those that are empty."""
 
 
+PARSED_BYTES = 4096
+"""Made into messages at once, until the application asks for more: small ones take many times their bytes."""
+
+
 class WebSocketConnection(WebSocketsSansIOProtocol):
     """Takes a refusal for the end of the handshake: by itself the server logs it as an error of the application.
 
     Who pings without reading is let go, and so is who sends a message in pieces without end.
     """
 
+    _held = b""
+
+    def data_received(self, data: bytes) -> None:
+        """Take what has come, a piece after the other while the application has nothing to read."""
+        self._held += data
+        self._parse()
+
+    async def receive(self) -> Any:
+        """The next message."""
+        message = await super().receive()
+        self._parse()
+        return message
+
+    def _parse(self) -> None:
+        while self._held and not self.read_paused and not self.transport.is_closing():
+            piece, self._held = self._held[:PARSED_BYTES], self._held[PARSED_BYTES:]
+            super().data_received(piece)
+
     async def send(self, message: Any) -> None:
         """Send what the application says."""
         await super().send(message)
+        if self.close_sent:
+            while self.queue.qsize() > 1:  # but that it is over, nothing is asked for any more
+                self.queue.get_nowait()
+            self._parse()
         is_refused = self.initial_response is not None and self.close_sent
         self.handshake_complete = self.handshake_complete or is_refused
 

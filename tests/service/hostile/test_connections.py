@@ -3,6 +3,7 @@
 import json
 import socket
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, suppress
 
@@ -13,7 +14,7 @@ from service import serving as server
 from service.http.connections import BoundedConnection, H11Connection
 from service.http.httptools_connections import HttpToolsConnection
 from service.http.request_middleware import MOST_HEADER_BYTES
-from service.http.websockets import MOST_FRAGMENTS
+from service.http.websockets import MOST_FRAGMENTS, PARSED_BYTES, WebSocketConnection
 from service.settings import Settings
 
 MOST_OF_ONE = 20
@@ -241,7 +242,7 @@ def frame(opcode: int, content: bytes = b"") -> bytes:
     return bytes([opcode, 0x80 | len(content)]) + bytes(4) + content
 
 
-PING, TEXT_BEGINS, CONTINUES = 0x89, 0x01, 0x00
+PING, TEXT_BEGINS, CONTINUES, LAST = 0x89, 0x01, 0x00, 0x80
 
 
 def flood(connection: socket.socket, content: bytes, times: int) -> None:
@@ -268,3 +269,41 @@ def test_a_message_in_pieces_without_end_ends_the_connection(address: Address) -
     with websocket(address) as connection:
         connection.sendall(frame(TEXT_BEGINS) + frame(CONTINUES) * MOST_FRAGMENTS)
         assert everything(connection)[2:4] == (1009).to_bytes(2)  # behind the opcode and the length
+
+
+TEXT, SMALL = 0x81, 8
+
+
+@pytest.fixture
+def most_waiting(monkeypatch: pytest.MonkeyPatch) -> Counter[int]:
+    """How many messages waited in the queue of a connection, by its number."""
+    found: Counter[int] = Counter()
+    original = WebSocketConnection.send_receive_event_to_app
+
+    def counting(connection: WebSocketConnection) -> None:
+        original(connection)
+        found[id(connection)] = max(found[id(connection)], connection.queue.qsize())
+
+    monkeypatch.setattr(WebSocketConnection, "send_receive_event_to_app", counting)
+    return found
+
+
+def test_small_messages_are_not_made_before_they_are_asked_for(address: Address, most_waiting: Counter[int]) -> None:
+    """As objects they take many times their bytes, and after the close of the first nobody asks for the others."""
+    with websocket(address) as connection:
+        connection.sendall(frame(TEXT, b"{}") * 30_000)
+        assert everything(connection)[2:4] == (1003).to_bytes(2)
+    assert 1 <= max(most_waiting.values()) <= PARSED_BYTES // SMALL
+
+
+def test_messages_that_wait_as_bytes_come_in_their_order(address: Address, most_waiting: Counter[int]) -> None:
+    corners = [[x, y, 0.0] for x in (0.0, 1e-3) for y in (0.0, 1e-3)]
+    opening = {"type": "open", "position": corners, "grid": [2, 2], "element_area": 1e-6}
+    begin = frame(TEXT_BEGINS) + b"".join(frame(CONTINUES, bytes([each])) for each in json.dumps(opening).encode())
+    again = frame(TEXT, b'{"type":"frame","number":0,"time":0.0,"displacement":[0,0,0,0,0,0,0,0,0,0,0,0]}')
+    with websocket(address) as connection:
+        connection.sendall(begin + frame(LAST) + again * 1000 + frame(TEXT, b'{"type":"finish"}'))
+        said = everything(connection)
+    assert [said.count(each) for each in (b'"opened"', b'"state"', b'"finished"')] == [1, 1, 1]
+    assert said.endswith((1000).to_bytes(2) + b"finished")
+    assert max(most_waiting.values()) <= PARSED_BYTES // len(again) + 1
