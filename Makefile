@@ -56,7 +56,7 @@ docs: setup  ## the pages and the Python reference as a site, in site/; a link t
 setup: $(VENV)/.installed
 
 $(VENV)/.installed: pyproject.toml clients/pyproject.toml constraints.txt
-	@echo "== setting up $(VENV) (about a minute the first time)"
+	@echo "== setting up $(VENV) (one to three minutes the first time)"
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed: make PYTHON=..."; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	@awk '/^[^ ]/ {wanted = /^uv==/} wanted' constraints.txt \

@@ -38,6 +38,9 @@ CODE_OF_STATUS = {
 }
 """How an upload ended, as an exit code: our fault, data that allow no fit, not wanted, a file that is not taken."""
 
+LARGEST_AREA = 0.02
+"""m², of a hand: whoever names a larger contact area is asked back."""
+
 DEFAULT_URL = "http://127.0.0.1:8000"
 
 
@@ -53,6 +56,9 @@ def connected(url: str, key: str | None) -> Iterator["FrictionClient"]:
             near = get_close_matches(problem.value or "", [material.name for material in client.materials()])
             if near:
                 problem.add_note(f"did you mean {' or '.join(near)}?")
+            problem.add_note(
+                "`stiction upload --create` makes a new one; `stiction materials list` shows those there are"
+            )
             raise
         except ConnectionFailed as failure:
             failure.add_note(f"is a service running at {url}? `stiction serve` starts one; --url names another")
@@ -185,6 +191,11 @@ def plan(
     """Say how hard to grip so that slip stays improbable, with the model's uncertainty in the answer."""
     from stiction_client import grasp, required_normal_force
 
+    if contact_area > LARGEST_AREA:
+        cm2 = f"{contact_area * 1e4:g} cm²"
+        typer.confirm(
+            f"{contact_area:g} m² are {cm2}, more than a hand; 1 cm² is 1e-4. Is it m²?", abort=True, err=True
+        )
     with connected(url, key) as client:
         model = client.model(material, method=method)
     answer = required_normal_force(
@@ -208,11 +219,13 @@ def plan(
 def _upload(client: "FrictionClient", source: Source, wait: bool, **said: Any) -> dict[str, Any]:
     """Upload one log; that it is not read or that the service does not take it is a result like any other."""
     from slipcore import InvalidInput
-    from stiction_client import ProblemError
+    from stiction_client import ProblemError, problems
 
     try:
         log, mapping = source.log()
         receipt = client.upload(log, mapping=mapping, **said)
+    except problems.UnknownMaterial:  # so it will be for the others
+        raise
     except (InvalidInput, ProblemError) as refusal:
         return {"file": source.name, "status": "rejected", "reason": str(refusal)}
     job = client.wait(receipt.job) if wait else receipt.job
@@ -240,8 +253,13 @@ def _friction_lines(answer: "FrictionAnswer") -> list[tuple[str, str | None]]:
         ("model", f"{answer.method}, version {answer.version}"),
         ("because", answer.chosen_because),
         ("warning", answer.warning),
-        ("support", answer.support and f"{answer.support}: {answer.advice}"),
+        ("support", answer.support and _support(answer.support, answer.advice, answer.warning)),
     ]
+
+
+def _support(support: str, advice: str | None, warning: str | None) -> str:
+    """How far data support an answer, with the advice where the warning has not given it."""
+    return support if advice is None or advice in (warning or "") else f"{support}: {advice}"
 
 
 def _probe_lines(told: "NextGrasp") -> list[tuple[str, str | None]]:
@@ -267,5 +285,5 @@ def _grip_lines(grip: "RequiredForce", model: "FrictionModel") -> list[tuple[str
         ("μ", f"{number(grip.friction_coefficient)}, so low in {whose} at {number(grip.element_force)} N an element"),
         ("model", f"{model.method}, version {model.version}"),
         ("warning", grip.warning),
-        ("support", f"{grip.support}: {grip.advice}"),
+        ("support", _support(grip.support, grip.advice, grip.warning)),
     ]

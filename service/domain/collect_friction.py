@@ -18,10 +18,7 @@ def collect(
     if not log.is_scaled:
         return _no_samples(log), "the log's scale is unknown; friction needs velocities in m/s, not pixels a second"
     if log.force is None:
-        return _no_samples(log), (
-            "the log has no forces; friction is tangential over normal force. If a sensor sees only its markers move, "
-            f"describe the gel of sensor {log.sensor!r}, from which forces follow, and send the log again"
-        )
+        return _no_samples(log), _without_forces(log)
     if not history.contact.any():
         return _no_samples(log), f"no element was in contact in any of the {len(log)} frames"
     options = {} if reconstruction is None else {"force_noise": reconstruction.force_noise}
@@ -32,6 +29,16 @@ def collect(
         because = f"{seen}; an element counts once all around it slips: load it further, or press less"
         return found, "; ".join(filter(None, (found.elements_left_out or because, _bound(found.contact))))
     return found, None
+
+
+def _without_forces(log: GraspLog) -> str:
+    told = "the log has no forces; friction is tangential over normal force. "
+    if left_out := log.metadata.get("columns_left_out"):
+        told += f"If they are among the columns that were left out ({left_out[:80]}), say which in a mapping. "
+    return told + (
+        "If a sensor sees only its markers move, "
+        f"describe the gel of sensor {log.sensor!r}, from which forces follow, and send the log again"
+    )
 
 
 def _bound(contact: ContactFriction | None) -> str | None:

@@ -71,6 +71,13 @@ _WHERE = {
     "mapping": "only beside a format of topics, fields or columns",
 }
 
+PAGE = "docs/formats.md"
+TABLES = (
+    "the columns of tracked markers (time or frame, marker, x, y), or a mapping that says which columns are what "
+    f"({PAGE} has examples)"
+)
+"""What is taken of delimited text."""
+
 NO_SETTINGS: Mapping[str, float | str | None] = {}
 
 EXTRA = "formats"
@@ -199,10 +206,13 @@ def _sniff(path: Path, is_mapped: bool) -> str:
     if frame_table.looks_like(start):
         if is_mapped:
             return "frame table"
-        allowed = "columns of tracked markers, or a mapping that says which columns are what (docs/formats.md)"
-        raise UnsupportedFormat("file", f"a table that begins with {start.splitlines()[0][:60]!r}", allowed)
-    value = f"of no known format (it starts with {start[:4]!r})" if start else "empty"
-    raise UnsupportedFormat("file", value)
+        header = start.splitlines()[0].decode("utf-8", "replace")[:60]
+        raise UnsupportedFormat("file", f"a table that begins with {header!r}", TABLES)
+    if not start:
+        raise UnsupportedFormat("file", "empty", "a grasp log")
+    raise UnsupportedFormat(
+        "file", f"of no known format (it starts with {start[:4]!r})", f"{', '.join(FORMATS)} ({PAGE})"
+    )
 
 
 def _sniff_zip(path: Path) -> str:

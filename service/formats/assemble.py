@@ -1,6 +1,7 @@
 """From what a mapping points at to a grasp log: units, lattice, checks."""
 
 import json
+import math
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,6 +18,9 @@ MAX_CONTENT_BYTES = MAX_ARRAY_BYTES // 2
 """Bytes of all that is read of one file: they are held twice while the log is made of them."""
 
 VECTORS = ("displacement", "position", "force", "normal")
+FLAT = ("position", "displacement")
+"""Vectors of which x and y may stand alone."""
+
 MASKS = tuple(name for name, dtypes in DTYPES.items() if dtypes == FLAG)
 
 
@@ -59,6 +63,9 @@ def _log(
         members["position"] = flat_lattice(members["displacement"].shape[1:3], mapping.pitch)
         metadata["position"] = f"a flat lattice of pitch {mapping.pitch:g} m"
     _require("position", members, recording)
+    if len(mapping.origins["displacement"].fields) == 2 and not {"force", "contact"} & members.keys():
+        members["contact"] = np.ones(members["displacement"].shape[:3], dtype=bool)
+        metadata["contact"] = "assumed"
     if "element_area" not in members:
         members["element_area"] = np.array(element_area("position", members["position"]))
         metadata["element_area"] = "mean of the cells between the markers"
@@ -88,6 +95,8 @@ def _read(recording: Recording, name: str, origin: Origin) -> NDArray[Any] | Non
     if len({part.shape for part in parts}) > 1:
         shapes = ", ".join(str(list(part.shape)) for part in parts)
         raise InvalidInput(name, f"of components of shapes {shapes}"[:200], "components of one shape")
+    if name in FLAT and len(parts) == 2:  # seen from above: what moves along the normal is not known
+        parts.append(np.zeros_like(parts[0]))
     return np.stack(parts, axis=-1)
 
 
@@ -169,13 +178,22 @@ def _on_grid(name: str, array: NDArray[Any], grid: tuple[int, int] | None) -> ND
     if array.ndim >= ndim:
         return array
     if grid is None:
-        allowed = f"{ndim} axes, or a grid in the mapping, such as [20, 20]"
-        raise InvalidInput(name, f"of shape {list(array.shape)}", allowed)
+        raise InvalidInput(name, f"of shape {list(array.shape)}", f"{ndim} axes, or a {_likely_grid(name, array)}")
     lead = () if name in ONCE else array.shape[:1]
     shape = (*lead, *grid, *((3,) if name in VECTORS else ()))
     if array.size != np.prod(shape, dtype=object):
         raise InvalidInput(name, f"of shape {list(array.shape)}", f"{list(shape)} or as many numbers")
     return array.reshape(shape)
+
+
+def _likely_grid(name: str, array: NDArray[Any]) -> str:
+    """What a mapping would say of the lattice, by the number of elements where that is a square."""
+    lead = array.shape[: 0 if name in ONCE else 1]
+    elements = array.size // max(1, math.prod(lead)) // (3 if name in VECTORS else 1)
+    side = math.isqrt(elements)
+    if side**2 != elements:
+        return f"`grid` of {elements} elements in the mapping, such as [20, 20]"
+    return f'`grid` in the mapping, such as "grid": [{side}, {side}]'
 
 
 def _with(members: Members, metadata: dict[str, str]) -> NDArray[Any]:

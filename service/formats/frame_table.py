@@ -1,4 +1,6 @@
-"""Tables with one row a frame and a column a number, as loggers of tactile arrays write them (docs/formats.md)."""
+"""Tables with one row a frame and a column a number, as loggers of tactile arrays write them, or with one row a frame
+and element (docs/formats.md).
+"""
 
 import re
 from array import array
@@ -15,7 +17,10 @@ from service.formats.mapping import UNMAPPED, FieldMapping, default_origins
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray, GraspLog
 
-MAX_ROWS = 1_000_000
+MAX_ROWS = 5_000_000
+OF_FRAMES = ("time", "object_pose", "sensor", "metadata", "element_area")
+"""Members that are the same for all elements of a frame."""
+
 ANY_NUMBER = "*"
 """In a field, stands for the number of an element: ``P*_FX`` are the columns P0_FX, P1_FX, … in their order."""
 
@@ -47,9 +52,11 @@ class _Table:
         for name, origin in mapping.origins.items():
             self._check_same_elements(name, origin.fields)
         fields = [field for origin in mapping.origins.values() for field in origin.fields]
+        fields += [] if mapping.element is None else [mapping.element]
         chosen = sorted({column for field in fields for column in self._columns(field)})
         self._place = {column: k for k, column in enumerate(chosen)}
         self._values = self._read(rows(lines, delimiter, len(self._names), before, MAX_ROWS), chosen)
+        self._order = None if mapping.element is None else self._of_elements(mapping.element)
 
     def column(self, name: str, _topic: str | None, field: str, once: bool) -> NDArray[Any] | None:
         """A column, or those of a field with a number in it side by side; None where there is none."""
@@ -57,6 +64,8 @@ class _Table:
         if not places:
             return None
         found: NDArray[Any] = self._values[:, places if ANY_NUMBER in field else places[0]]
+        if self._order is not None:
+            found = found[self._order[:, 0] if name in OF_FRAMES else self._order]
         if name in MASKS and np.isin(found, (0.0, 1.0)).all():
             found = found == 1.0
         return found[0] if once else found
@@ -79,9 +88,28 @@ class _Table:
         found = [(int(match[1]), k) for k, name in enumerate(self._names) if (match := pattern.fullmatch(name))]
         return sorted(found)
 
+    def _of_elements(self, element: str) -> NDArray[np.intp]:
+        """The row of each frame and element [t, e], in the order of time and of the elements' numbers."""
+        fields = (element, *self.mapping.origins["time"].fields)
+        missing = [field for field in fields if not self._columns(field)]
+        if missing or len(fields) != 2:
+            raise InvalidInput("element", f"without {', '.join(missing) or 'a column of time'}"[:100], self.contents())
+        column, time = (self._values[:, self._place[self._columns(field)[0]]] for field in fields)
+        order = np.lexsort((column, time))
+        frames, elements = len(np.unique(time)), len(np.unique(column))
+        if len(order) == frames * elements:
+            table = order.reshape(frames, elements)
+            if (time[table] == time[table[:, :1]]).all() and (column[table] == column[table[0]]).all():
+                return table
+        counts = f"{len(order)} rows of {frames} times and {elements} elements"
+        raise InvalidInput("element", counts, "a row for each element at each time, once")
+
     def _check_same_elements(self, name: str, fields: Sequence[str]) -> None:
         """Components side by side must be of the same elements, each there once."""
         numbers = [[number for number, _ in self._numbered(field)] for field in fields if ANY_NUMBER in field]
+        if any(numbers) and [] in numbers:
+            missing = [field for field in fields if not self._columns(field)]
+            raise InvalidInput(name, f"not there ({missing[0]})"[:100], self.contents())
         if any(each != numbers[0] or len(set(each)) < len(each) for each in numbers):
             found = "; ".join(f"{', '.join(map(str, each[:9]))}" for each in numbers)
             raise InvalidInput(name, f"of the elements {found}"[:200], "the same in each component, each once")

@@ -34,7 +34,7 @@ LARGEST = 1e300
 
 _ORIGIN_KEYS = {"field", "topic", "unit", "value"}
 _ALLOWED_ORIGIN = "a field, a list of fields, or an object of field or value, topic and unit"
-_SETTINGS = ("topic", "grid", "pitch", "tolerance", "episode")
+_SETTINGS = ("topic", "grid", "pitch", "tolerance", "episode", "element")
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,8 @@ class Origin:
 
 @dataclass(frozen=True, slots=True)
 class FieldMapping:
-    """Origin of each member, and what the file may not tell: lattice, pitch (m), tolerance (s) and episode.
+    """Origin of each member, and what the file may not tell: lattice, pitch (m), tolerance (s), episode, and the column
+    that numbers the elements where a table has a row for each.
 
     ``text`` is the mapping as it was given, empty where none was.
     """
@@ -67,6 +68,7 @@ class FieldMapping:
     pitch: float | None = None
     tolerance: float | None = None
     episode: int | None = None
+    element: str | None = None
     text: str = ""
 
     def over(self, defaults: Mapping[str, Origin]) -> "FieldMapping":
@@ -97,6 +99,7 @@ def parse(text: str) -> FieldMapping:
         pitch=_positive("pitch", given["pitch"]) if "pitch" in given else None,
         tolerance=_positive("tolerance", given["tolerance"]) if "tolerance" in given else None,
         episode=_episode(given["episode"]) if "episode" in given else None,
+        element=_text("element", given["element"]) if "element" in given else None,
         text=json.dumps(given, sort_keys=True, ensure_ascii=False),
     )
 

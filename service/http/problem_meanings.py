@@ -46,7 +46,7 @@ MEANINGS: dict[str, Meaning] = {
     ),
     "unknown-material": Meaning(
         "No material has this name or alias.",
-        "`POST /v1/materials` first.",
+        "`POST /v1/materials` first; `stiction upload --create` and the form of an upload can make it, too.",
     ),
     "unknown-alias": Meaning(
         "The material has no such alias (its own name is none).",

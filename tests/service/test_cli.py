@@ -1,5 +1,6 @@
 """The command line, as an outsider uses it: real files, a real server, documented exit codes."""
 
+import io
 import itertools
 import json
 import re
@@ -373,6 +374,33 @@ def test_an_unknown_material_is_named_with_the_nearest_that_is_known(run: Run, u
     with FrictionClient(url) as client:
         client.ensure_material("cardboard")
     assert "did you mean cardboard?" in run("lookup", "cardbord", "--url", url)[2]
+
+
+def test_an_upload_for_an_unknown_material_says_how_to_make_it(run: Run, url: str, ramps: list[Path]) -> None:
+    code, _, err = run("upload", *ramps, "--material", "new stuff", "--url", url)
+    assert code == SERVICE_REFUSED
+    assert "material is new stuff" in err
+    assert "`stiction upload --create` makes a new one" in err
+
+
+def test_an_area_that_is_larger_than_a_hand_is_asked_back(
+    run: Run, url: str, ramps: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run("upload", *ramps[:2], "--material", "plate", "--create", "--url", url)
+    plan = ("plan", "plate", "--load", 1.0, "--url", url, "--contact-area")
+    monkeypatch.setattr("sys.stdin", io.StringIO("n\ny\n"))
+    code, out, err = run(*plan, 1)
+    assert (code, out.strip()) == (1, "")
+    assert "1 m² are 10000 cm², more than a hand; 1 cm² is 1e-4. Is it m²?" in err
+    assert "press with" in run(*plan, 1)[1]
+    assert "Is it m²?" not in run(*plan, 0.01)[2]
+
+
+def test_advice_that_the_warning_gave_is_not_said_again(run: Run, url: str, ramps: list[Path]) -> None:
+    run("upload", ramps[0], "--material", "one grasp", "--create", "--url", url)
+    out = run("plan", "one grasp", "--load", 1.0, "--contact-area", 6e-5, "--url", url)[1]
+    assert out.count("record more grasps") == 1, out
+    assert re.search(r"support +not identified\n", out)
 
 
 def test_what_is_printed_for_people_has_units_and_no_empty_values(run: Run, ramps: list[Path], url: str) -> None:

@@ -32,6 +32,12 @@ BESIDE_THE_FILE = 2**20
 """Bytes of a form that are not its file: fields, and what stands between them."""
 
 
+EXAMPLE_OF_A_MAPPING = """{"time": "time", "element": "marker", "grid": [8, 8], "pitch": 0.001,
+ "displacement": {"field": ["dx", "dy"], "unit": "mm"},
+ "force": {"field": ["fx", "fy", "fz"], "unit": "N"}}"""
+"""Of a table with a row for each marker and frame."""
+
+
 class NewUpload(BaseModel):
     """What the form says beside the file; what was left empty is None."""
 
@@ -73,7 +79,8 @@ async def receive_upload(context: CurrentContext, request: Request, principal: C
 
 def _form(context: Context, fields: dict[str, str]) -> dict[str, Any]:
     """What the template needs beside a problem."""
-    return {"fields": fields, "names": names(context), "formats": formats.FORMATS, "detectors": METHOD_NAMES}
+    choices = {"names": names(context), "formats": formats.FORMATS, "detectors": METHOD_NAMES}
+    return {"fields": fields, **choices, "example_of_a_mapping": EXAMPLE_OF_A_MAPPING}
 
 
 def _file(form: FormData) -> UploadFile:

@@ -176,3 +176,71 @@ def test_no_table_does_worse_than_be_refused(tmp_path: Path, names: list[str], r
     mapping = json.dumps({"time": "t", "displacement": "u*", "grid": [1, 1], "pitch": 1e-3})
     with contextlib.suppress(InvalidInput):
         assert np.isfinite(formats.read(path, "text/csv", mapping=mapping).displacement).all()
+
+
+LONG: dict[str, Any] = {
+    "element": "marker",
+    "grid": [2, 3],
+    "time": {"field": "t_ms", "unit": "ms"},
+    "position": {"field": ["x_mm", "y_mm"], "unit": "mm"},
+    "displacement": {"field": ["dx_mm", "dy_mm"], "unit": "mm"},
+    "force": {"field": ["fx", "fy", "fz"], "unit": ["N", "N", "-N"]},
+}
+
+
+def long_table(path: Path, leave_out: int | None = None) -> tuple[Path, np.ndarray]:
+    """A row a marker and frame, in any order, as a spreadsheet has it; and the numbers [t, marker, column]."""
+    rng = np.random.default_rng(3)
+    told = rng.uniform(0.01, 0.1, (4, 6, 7))
+    told[..., 5:] = np.stack(np.meshgrid([0.0, 1.5], [0.0, 1.5, 3.0], indexing="ij"), axis=-1).reshape(6, 2)
+    rows = [
+        [10 + marker, fz, dy, 33 * frame, fx, fy, dx, x, y]
+        for frame, markers in enumerate(told)
+        for marker, (dx, dy, fx, fy, fz, x, y) in enumerate(markers)
+    ]
+    rng.shuffle(rows)
+    lines = [";".join(map(repr, map(float, row))) for row in rows[leave_out:]]
+    path.write_text("marker;fz;dy_mm;t_ms;fx;fy;dx_mm;x_mm;y_mm\n" + "\n".join(lines) + "\n", encoding="utf-8")
+    return path, told
+
+
+def test_a_table_with_a_row_for_each_marker_and_frame_is_read(tmp_path: Path) -> None:
+    path, told = long_table(tmp_path / "log.csv")
+    log = formats.read(path, mapping=json.dumps(LONG))
+    np.testing.assert_allclose(log.time, [0.0, 0.033, 0.066, 0.099], rtol=1e-12)
+    lattice = told.reshape(4, 2, 3, 7)
+    np.testing.assert_allclose(log.displacement[..., :2], 1e-3 * lattice[..., :2], rtol=1e-12)
+    assert not log.displacement[..., 2].any(), "along the normal nothing is told"
+    np.testing.assert_allclose(log.force, lattice[..., 2:5] * [1.0, 1.0, -1.0], rtol=1e-12)
+    np.testing.assert_allclose(log.position[..., :2], 1e-3 * lattice[0, ..., 5:], rtol=1e-12)
+    assert log.contact is None, "forces tell it"
+
+
+def test_markers_seen_from_above_without_forces_are_taken_to_touch(tmp_path: Path) -> None:
+    path, _ = long_table(tmp_path / "log.csv")
+    mapping = {name: value for name, value in LONG.items() if name != "force"}
+    log = formats.read(path, mapping=json.dumps(mapping))
+    assert log.contact is not None
+    assert log.contact.all()
+    assert log.metadata["contact"] == "assumed"
+
+
+def test_a_missing_row_or_column_of_a_long_table_is_refused_by_name(tmp_path: Path) -> None:
+    path, _ = long_table(tmp_path / "log.csv", leave_out=1)
+    with pytest.raises(InvalidInput, match="element is 23 rows of 4 times and 6 elements; allowed: a row for each"):
+        formats.read(path, mapping=json.dumps(LONG))
+    with pytest.raises(InvalidInput, match=r"element is without id; allowed: the columns marker, fz, "):
+        formats.read(path, mapping=json.dumps(LONG | {"element": "id"}))
+
+
+def test_a_component_without_columns_is_named(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.csv", columns(np.random.default_rng(1)))
+    with pytest.raises(InvalidInput, match=r"force is not there \(P\*_FN\); allowed: the columns T_us, P0_DX"):
+        read(path, force=["P*_FX", "P*_FY", "P*_FN"])
+
+
+def test_the_lattice_that_is_missing_is_suggested(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.csv", columns(np.random.default_rng(1)))
+    mapping = {name: value for name, value in MAPPING.items() if name != "grid"}
+    with pytest.raises(InvalidInput, match=r'`grid` in the mapping, such as "grid": \[3, 3\]'):
+        formats.read(path, mapping=json.dumps(mapping))

@@ -414,6 +414,13 @@ def test_without_a_description_a_log_without_forces_is_refused_with_advice(shop:
     assert "forces" not in job.seconds
 
 
+def test_columns_that_were_left_out_are_named_where_forces_are_missing(shop: Shop, blind: GraspLog) -> None:
+    told = replace(blind, metadata={"columns_left_out": "fx, fy, fz"})
+    job = shop.run(shop.ingest(encode(told))[1])
+    assert job.reason is not None
+    assert "the columns that were left out (fx, fy, fz), say which in a mapping" in job.reason
+
+
 def test_samples_carry_the_noise_of_reconstructed_forces(blind: GraspLog) -> None:
     found = reconstruct(blind, forces.Gel(1e6, 0.49))
     log = found.apply(blind)

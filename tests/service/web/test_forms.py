@@ -1,4 +1,5 @@
 import errno
+import html
 import json
 import re
 import tempfile
@@ -31,6 +32,17 @@ def test_a_form_stores_a_log_and_leads_to_it(client: httpx.Client, content: byte
     assert wait(client, log["job"]["id"])["status"] == "done"
     again = client.post("/upload", data=data, files={"file": ("grasp.npz", content)}, headers=HTML)
     assert again.headers["location"] == answer.headers["location"]
+
+
+@ON_SQLITE
+def test_the_form_shows_a_mapping_that_can_be_used(client: httpx.Client) -> None:
+    example = re.search(r'name="mapping".*placeholder="([^"]*)"', client.get("/upload", headers=HTML).text)
+    assert example is not None
+    rows = [f"{k / 30},{m},{0.01 * k},0,0.1,0,-1" for k in range(3) for m in range(64)]
+    table = "time,marker,dx,dy,fx,fy,fz\n" + "\n".join(rows)
+    data = {"mapping": html.unescape(example[1])}
+    answer = client.post("/upload", data=data, files={"file": ("grasp.csv", table.encode())}, headers=HTML)
+    assert answer.status_code == 303, answer.text
 
 
 @ON_SQLITE

@@ -124,6 +124,8 @@ def test_samples_are_drawn_and_turned_by_keys_and_buttons(
     page.run("document.querySelector('[data-view=force]').click()")
     assert page.run("document.querySelector('.space').toDataURL()") != before
     assert fits(page)
+    page.run("[...document.querySelector('.charts').children].slice(1).forEach(each => each.remove())")
+    assert page.run("document.querySelector('.charts .chart').getBoundingClientRect().width") < 800, "blown up alone"
 
 
 @ON_SQLITE
