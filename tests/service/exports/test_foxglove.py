@@ -118,6 +118,38 @@ def test_messages_are_as_their_schemas_say(path: Path) -> None:
             assert content.keys() == told["properties"].keys()
 
 
+@pytest.mark.parametrize("name", ["Grid", "SceneUpdate"])
+def test_messages_fit_foxgloves_own_definitions(messages: dict[str, list[Any]], name: str) -> None:
+    """Every field is there under its name, and of its type: in the definitions that Foxglove publishes."""
+    reason = "foxglove-schemas-protobuf is not installed: pip install foxglove-schemas-protobuf"
+    definition = pytest.importorskip(f"foxglove_schemas_protobuf.{name}_pb2", reason=reason)
+    from google.protobuf import json_format
+
+    (topic,) = [topic for topic, (schema, _) in TOPICS.items() if schema == f"foxglove.{name}"]
+    for _, message in messages[topic][:: len(messages[topic]) // 5]:
+        read = json_format.ParseDict(with_protobufs_times(message), getattr(definition, name)())
+        told = json_format.MessageToDict(read, always_print_fields_with_no_presence=True)
+        assert {json_format_name(field) for field in message} == told.keys()
+
+
+def json_format_name(field: str) -> str:
+    first, *others = field.split("_")
+    return first + "".join(map(str.capitalize, others))
+
+
+def with_protobufs_times(told: Any, of: str = "") -> Any:
+    """Times as JSON of Protocol Buffers has them, where Foxglove's JSON has seconds and nanoseconds."""
+    if isinstance(told, list):
+        return [with_protobufs_times(each) for each in told]
+    if not isinstance(told, dict):
+        return told
+    if told.keys() == {"sec", "nsec"}:
+        part = f"{told['nsec']:09d}"
+        moment = f"1970-01-01T00:{told['sec'] // 60:02d}:{told['sec'] % 60:02d}.{part}Z"
+        return f"{told['sec']}.{part}s" if of == "lifetime" else moment
+    return {name: with_protobufs_times(value, name) for name, value in told.items()}
+
+
 def test_a_log_without_forces_shows_displacement(recording: Recording, tmp_path: Path) -> None:
     bare = Recording(replace(recording.log, force=None, truth=None), recording.history, "bare")
     exports.write([bare], tmp_path / "bare.mcap", "foxglove")
