@@ -65,6 +65,8 @@ class NumericsDefaults(Options):
 
     least_spread: Annotated[float, Option(0.0, 1e-12, "m²", "far below a marker's variance")] = 1e-30
     """Weighted spread of points about their centre."""
+    least_element_force: Annotated[float, Option(1e-15, 1e-3, "N", "far below what any sensor tells")] = 1e-9
+    """By which forces are divided (``detection/forces_only``)."""
     least_lever: Annotated[float, Option(1e-12, 1e-3, "m", "far below a pitch")] = 1e-9
     """Of the moment of a contact's forces."""
     stretch_variance: Annotated[float, Option(0.0, 1e-4, "-", "rounding of a fit of many points")] = 1e-14
@@ -356,6 +358,80 @@ class ForceRatioOptions(ContactOptions):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ForcesOnlyOptions(ContactOptions):
+    """Method ``forces_only``: chosen on coarse arrays (benchmarks/detector_coarse.py, set ``tuning``)."""
+
+    contact_force_share: Annotated[float, Option(0.0, 0.9, "-", "taxels at the rim bear little")] = 0.03
+    """Least share of the frame's largest normal force."""
+    force_smoothing: Annotated[float, Option(0.0, 10.0, "s", "tuning scenes")] = 0.036
+    """Time constant of the low-pass on element forces."""
+    least_load_change: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.008
+    """Change of the elements' forces over the normal force, beyond noise, at which they are looked at again."""
+    load_deviations: Annotated[float, Option(0.0, 100.0, "-", "noise sums up evenly over elements")] = 1.5
+    """Multiple of what noise makes of that change on average that does not count."""
+    least_friction: Annotated[float, Option(1e-3, 10.0, "-", "PTFE and oiled steel")] = 0.05
+    """Least friction coefficient that is considered."""
+    largest_friction: Annotated[float, Option(1e-2, 100.0, "-", "soft rubber")] = 2.5
+    """Largest friction coefficient that is considered."""
+    frictions: Annotated[int, Option(2, 1000, "-", "steps of 19 %; with twice as many F1 differs by 0.002")] = 24
+    """How many friction coefficients are considered."""
+    usual_friction: Annotated[float, Option(1e-3, 100.0, "-", "of dry things on silicone")] = 0.55
+    """Median friction coefficient before anything is seen."""
+    friction_spread: Annotated[float, Option(0.01, 100.0, "-", "95 % between 0.2 and 1.5: what is grasped")] = 0.5
+    """Standard deviation of its logarithm."""
+    friction_memory: Annotated[float, Option(1e-3, 1e6, "-", "tuning scenes")] = 0.4
+    """Change of load over normal force within which what is known of friction fades."""
+    friction_weight: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 1.0
+    """Weight of each element's evidence on friction."""
+    excess: Annotated[float, Option(1e-4, 10.0, "-", "tuning scenes")] = 0.035
+    """By how much the force ratio of elements stands above friction, as a share of it."""
+    slip_level: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes: more than half of an element slips")] = 0.64
+    """Force ratio over friction at which an element as likely slips as sticks."""
+    slip_level_width: Annotated[float, Option(1e-3, 10.0, "-", "tuning scenes")] = 0.05
+    """Scale of the logistic function about it."""
+    largest_level_odds: Annotated[float, Option(0.1, 100.0, "log-odds", "tuning scenes")] = 5.0
+    """Most that the force ratio tells."""
+    part_spread: Annotated[float, Option(1e-3, 10.0, "-", "tuning scenes")] = 0.12
+    """Scatter of the part of a change of load that a sticking element takes, around what it took before."""
+    overload: Annotated[float, Option(1.0, 100.0, "-", "tuning scenes")] = 1.3
+    """Part that sticking elements take for others that slip."""
+    overload_spread: Annotated[float, Option(1e-3, 10.0, "-", "tuning scenes")] = 0.35
+    """Scatter of it."""
+    overload_share: Annotated[float, Option(1e-3, 0.999, "-", "tuning scenes")] = 0.42
+    """Share of sticking elements that do."""
+    slip_part: Annotated[float, Option(0.0, 100.0, "-", "tuning scenes")] = 1.3
+    """Part that a slipping element takes is this times (1 − ratio/friction) to the power of ``slip_exponent``."""
+    slip_exponent: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes; a third in a whole contact")] = 0.4
+    """Power of it."""
+    slip_part_spread: Annotated[float, Option(1e-3, 10.0, "-", "tuning scenes")] = 0.22
+    """Scatter of that part."""
+    part_weight: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 0.8
+    """Weight of what the part tells of an element."""
+    outlier_share: Annotated[float, Option(1e-6, 0.5, "-", "5 %")] = 0.05
+    """Share of elements of which the part tells nothing."""
+    least_change: Annotated[float, Option(1e-9, 1.0, "-", "tuning scenes")] = 0.0005
+    """Change of an element's force ratio that counts as load, and of the normal force as pressing."""
+    largest_share: Annotated[float, Option(1.0, 100.0, "-", "elements in the middle bear twice what is even")] = 3.0
+    """How unevenly elements share a load, at most."""
+    largest_gain: Annotated[float, Option(0.1, 100.0, "log-odds", "tuning scenes")] = 3.0
+    """Most that one change of load tells of an element."""
+    memory: Annotated[float, Option(1e-3, 1e6, "-", "tuning scenes")] = 0.08
+    """Change of load over normal force within which what was told of an element fades."""
+    largest_log_odds: Annotated[float, Option(0.1, 100.0, "log-odds", "tuning scenes")] = 3.0
+    """Most that changes of load tell of an element."""
+    taken_back: Annotated[float, Option(0.0, 100.0, "log-odds", "tuning scenes")] = 2.0
+    """What it tells for stick that an element's load is taken back."""
+    pressing_share: Annotated[float, Option(0.01, 10.0, "-", "tuning scenes; Mindlin–Deresiewicz: 1")] = 1.6
+    """All stick while the tangential load grows by less than this share of friction times the normal load's growth."""
+    pressing_deviations: Annotated[float, Option(0.0, 100.0, "standard deviations", "3 σ")] = 3.0
+    """Least growth of the normal force over its noise."""
+    pressed_log_odds: Annotated[float, Option(0.0, 100.0, "log-odds", "tuning scenes")] = 8.0
+    """What that tells for stick."""
+    threshold: Annotated[float, Option(0.01, 0.99, "-", "tuning scenes; the reported probability is ½ there")] = 0.4
+    """Least posterior of slip."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RigidFitOptions(ContactOptions):
     """Method ``rigid_fit``: Dong et al. 2019."""
 
@@ -482,9 +558,12 @@ METHOD_NAMES = (
     "deformation_gradient",
     "force_ratio",
     "strain_threshold",
+    "forces_only",
 )
 """The methods of detection, for who offers them without loading their kernels (``slipcore.METHODS`` does)."""
 DEFAULT_METHOD = "filter"
+FORCES_METHOD = "forces_only"
+"""In its place for logs without displacement."""
 LOOKAHEAD = 2
 """Frames after it that a frame of a stored log is decided by; more than two gains little (tuning scenes)."""
 MOST_LOOKAHEAD = 100

@@ -68,6 +68,10 @@ class GroundTruth:
         return GroundTruth(*masks, self.stick_ratio[frames], self.friction)
 
 
+NONE = "none"
+"""In a log's metadata, for what its sensor does not tell."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class GraspLog:
     """A recorded grasp in SI units and the sensor frame (z along the outward normal of the sensor's surface).
@@ -78,6 +82,7 @@ class GraspLog:
     [t, 3], x m, y m and yaw rad of the object relative to the sensor, or None; ``contact`` [t, n, m] bool where it is
     known otherwise than from force or shape, or None; ``observed`` [t, n, m] bool, or None for all: where it is False
     no marker tells of the element, and its displacement is a placeholder that only neighbours' derivatives may see.
+    A ``displacement`` of None, of a sensor that tells forces alone, is held as zeros: see ``has_displacement``.
 
     Arrays are held as read-only float64 or bool. Raises ``InvalidInput`` naming the field, its value and what is
     allowed.
@@ -101,12 +106,12 @@ class GraspLog:
         if len(time) < LIMITS.min_frames:
             raise InvalidInput("time", f"{len(time)} frame(s)", f"at least {LIMITS.min_frames} frames")
         _check_time(time)
-        position = check_position(self.position)
+        position, without_displacement = check_position(self.position), self.displacement is None
         field_shape = (len(time), *position.shape)
         arrays = {
             "time": time,
             "position": position,
-            "displacement": _array("displacement", self.displacement, field_shape),
+            "displacement": _displacement(self.displacement, self.force, field_shape),
             "force": _optional("force", self.force, field_shape),
             "normal": _optional("normal", self.normal, field_shape),
             "object_pose": _optional("object_pose", self.object_pose, (len(time), 3)),
@@ -117,7 +122,7 @@ class GraspLog:
         for name, array in arrays.items():
             _set(self, name, array)
         _set(self, "element_area", check_element_area(self.element_area))
-        _set(self, "metadata", _metadata(self.metadata))
+        _set(self, "metadata", _metadata(self.metadata, {"displacement": NONE} if without_displacement else {}))
         _set(self, "truth", _truth(self.truth, field_shape[:3]))
         check_displacement(self.displacement, position)
         _check_magnitude("force", self.force, LIMITS.force, "N per element")
@@ -138,6 +143,11 @@ class GraspLog:
     def is_scaled(self) -> bool:
         """Whether lengths are true metres; False where the metadata tell that the scale is unknown, and one assumed."""
         return self.metadata.get("scale") != "unknown"
+
+    @property
+    def has_displacement(self) -> bool:
+        """Whether displacement was measured; False where the metadata tell that there are forces alone."""
+        return self.metadata.get("displacement") != NONE
 
     def __len__(self) -> int:
         return len(self.time)
@@ -304,10 +314,17 @@ def _optional(name: str, value: ArrayLike | None, shape: tuple[int | None, ...])
     return None if value is None else _array(name, value, shape)
 
 
-def _metadata(metadata: Mapping[str, str]) -> Mapping[str, str]:
+def _displacement(value: ArrayLike | None, force: ArrayLike | None, shape: tuple[int, ...]) -> FloatArray:
+    """The displacement, or zeros in the place of what a sensor of forces alone does not tell."""
+    if value is None and force is None:
+        raise InvalidInput("displacement", "missing, as forces are", "displacement, force or both")
+    return _array("displacement", np.zeros(shape) if value is None else value, shape)
+
+
+def _metadata(metadata: Mapping[str, str], more: Mapping[str, str]) -> Mapping[str, str]:
     if not isinstance(metadata, Mapping):
         raise InvalidInput("metadata", f"a {type(metadata).__name__}", "a mapping of strings")
-    return MappingProxyType({str(key): str(value) for key, value in metadata.items()})
+    return MappingProxyType({str(key): str(value) for key, value in {**metadata, **more}.items()})
 
 
 def _extent(position: FloatArray) -> float:

@@ -28,6 +28,8 @@ PAPERS = {
     "johnson1985": "Johnson, Contact Mechanics (1985)",
     "juarez2010": "Juárez and Steel, Model-based clustering of non-Gaussian panel data based on skew-t distributions, "
     "J. Bus. Econ. Stat. 28 (2010) 52",
+    "khamis2018": "Khamis, Izquierdo Albero, Salerno, Shah Idil, Loizou and Redmond, PapillArray: an incipient slip "
+    "sensor for dexterous robotic or prosthetic manipulation, Sens. Actuators A 270 (2018) 195",
     "kim1994": "Kim, Dynamic linear models with Markov-switching, J. Econometrics 60 (1994) 1",
     "lee1960": "Lee and Radok, The contact problem for viscoelastic bodies, J. Appl. Mech. 27 (1960) 438",
     "paper": "Li, Zhang, Huang, Li and Jiang, Modeling, simulation, and application of spatio-temporal characteristics "
@@ -68,6 +70,7 @@ DETECTION = {
     "deformation_gradient": ("sui2022",),
     "force_ratio": ("song2014",),
     "strain_threshold": ("paper",),
+    "forces_only": ("cattaneo1938", "mindlin1949", "mindlin1953", "khamis2018"),
 }
 """Papers behind each method of detection."""
 

@@ -12,7 +12,7 @@ from service.formats.mapping import FieldMapping, Origin
 from service.formats.members import DTYPES, FLAG, ONCE, REQUIRED, TEXT, Members, grasp_log, told_metadata
 from service.formats.npy import MAX_ARRAY_BYTES
 from slipcore.errors import InvalidInput
-from slipcore.frames import GraspLog
+from slipcore.frames import NONE, GraspLog
 
 MAX_CONTENT_BYTES = MAX_ARRAY_BYTES // 2
 """Bytes of all that is read of one file: they are held twice while the log is made of them."""
@@ -53,6 +53,9 @@ def assemble(recording: Recording, mapping: FieldMapping) -> GraspLog:
 def _log(
     members: dict[str, NDArray[Any]], mapping: FieldMapping, metadata: dict[str, str], recording: Recording
 ) -> GraspLog:
+    if "force" in members and "displacement" not in members:
+        members["displacement"] = np.zeros(members["force"].shape)
+        metadata["displacement"] = NONE
     for name in ("displacement", "time"):
         _require(name, members, recording)
     grid = mapping.grid or recording.grid()

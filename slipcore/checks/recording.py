@@ -18,9 +18,10 @@ def time_unit(seen: Subject) -> Iterator[Finding]:
 
 def still_markers(seen: Subject) -> Iterator[Finding]:
     """A log without displacement."""
-    if not np.ptp(seen.log.displacement, axis=0).any():
+    if seen.log.has_displacement and not np.ptp(seen.log.displacement, axis=0).any():
         evidence = "no marker ever moves"
-        yield Finding("no displacement", evidence, "map the field of displacements; forces alone tell no slip here")
+        remedy = "map the field of displacements; of a sensor that tells forces alone, use method forces_only"
+        yield Finding("no displacement", evidence, remedy)
 
 
 def repeated_frames(seen: Subject) -> Iterator[Finding]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from slipcore.calibration.model import SensorModel
-from slipcore.defaults import DEFAULT_METHOD, MOST_LOOKAHEAD
+from slipcore.defaults import DEFAULT_METHOD, FORCES_METHOD, MOST_LOOKAHEAD
 from slipcore.detection.detector import DetectorState, init, masked, slip_state, step
 from slipcore.detection.methods import find_method, findings_by
 from slipcore.detection.shared.decision import apply_decision
@@ -31,10 +31,13 @@ def detect_slip(
     """Detect local slip in a whole log: the fold of ``step`` over its frames.
 
     With a ``lookahead`` each frame is decided in the light of that many frames after it (see ``FixedLagSmoother``);
-    with a ``sensor_model`` the log is first corrected by it (``SensorModel.apply``). ``options`` are the method's, and
+    with a ``sensor_model`` the log is first corrected by it (``SensorModel.apply``). A log without displacement is left
+    to method "forces_only" where the default would see nothing. ``options`` are the method's, and
     ``kernel_width`` of ``defaults.PatchOptions``; what the sensor model knows of noise and smoothing goes before their
     defaults. Raises ``InvalidInput`` as ``init`` does, and for a log of another lattice than the sensor model's.
     """
+    if method == DEFAULT_METHOD and not log.has_displacement:
+        method = FORCES_METHOD
     if sensor_model is not None:
         log, _, known = sensor_model.apply(log, method)
         options = {**known, **options}
@@ -49,6 +52,8 @@ def detect_slip(
         if (settled := smoother.take(state, now)) is not None:
             settled_states.append(settled)
     history = collect_history([*settled_states, *smoother.rest()], state)
+    if not log.has_displacement:
+        history = replace(history, velocity=np.full_like(history.velocity, np.nan))
     return with_patches(log, history, kernel_width=kernel_width)
 
 

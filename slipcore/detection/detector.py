@@ -5,10 +5,10 @@ again; ``SlipDetector`` holds such a state, and ``batch.detect_slip`` is the fol
 """
 
 import math
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from slipcore.defaults import DEFAULT_METHOD, LIMITS, NOISE, ContactOptions, choose_options
 from slipcore.detection.methods import find_method, findings_by
@@ -16,7 +16,18 @@ from slipcore.detection.shared.contact import Touch
 from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.interface import CompiledMethod, Observation, Start
 from slipcore.detection.shared.observe import observe
-from slipcore.detection.shared.records import FrameArrays, Memory, Sensor, workspace
+from slipcore.detection.shared.records import (
+    NO_FIELD,
+    NO_MASK,
+    NO_POSE,
+    FrameArrays,
+    Memory,
+    Sensor,
+    empty_like,
+    read_only,
+    unwritten,
+    workspace,
+)
 from slipcore.errors import InvalidInput
 from slipcore.finding import Finding
 from slipcore.frames import (
@@ -31,21 +42,6 @@ from slipcore.frames import (
 )
 from slipcore.slip_state import SlipState
 from slipcore.surface.strain import Lattice
-
-Scalar = TypeVar("Scalar", bound=np.generic)
-
-
-def _read_only(array: NDArray[Scalar]) -> NDArray[Scalar]:
-    """The same data, not to be written to: users can't change what a detector remembers, kernels see one type."""
-    if not array.flags.writeable:
-        return array
-    view = array.view()
-    view.flags.writeable = False
-    return view
-
-
-NO_FIELD, NO_MASK, NO_POSE = (_read_only(np.empty(s, t)) for s, t in (((0, 0, 3), float), ((0, 0), bool), (0, float)))
-"""Stand for what a frame does not have."""
 
 
 class Setup(NamedTuple):
@@ -94,7 +90,7 @@ def init(position: ArrayLike, element_area: float, method: str = DEFAULT_METHOD,
     touch = touch_thresholds(chosen, area)
     sensor = Sensor(position_at_rest, steps, inverse, lattice.orientation, *touch, start.settings)
     shape = lattice.position.shape
-    frame = FrameArrays(-math.inf, _read_only(np.zeros(shape)), NO_FIELD, NO_POSE, NO_FIELD, NO_MASK)
+    frame = FrameArrays(-math.inf, read_only(np.zeros(shape)), NO_FIELD, NO_POSE, NO_FIELD, NO_MASK)
     noise = np.zeros((9, max(1 + NOISE.memory, NOISE.series)))
     nowhere, nothing = np.zeros(shape[:2], bool), np.zeros(shape[:2])
     memory = Memory(nowhere, nowhere, nothing, noise, start.elements, start.common)
@@ -121,9 +117,9 @@ def touch_thresholds(options: ContactOptions, element_area: float) -> tuple[Floa
 
 def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
     """Take one valid frame, later than the last; on the first, every element in contact sticks."""
-    setup, seen, last = state.setup, frame_arrays(frame), _unwritten(state.frame)
+    setup, seen, last = state.setup, frame_arrays(frame), unwritten(state.frame)
     method, memory = find_method(setup.method), state.memory
-    sensor, after, of_method = setup.sensor, _empty_like(memory), None
+    sensor, after, of_method = setup.sensor, empty_like(memory), None
     velocity = np.empty((*memory.probability.shape, 2))
     if isinstance(method, CompiledMethod):
         arguments = sensor, last, seen, memory, after
@@ -131,9 +127,15 @@ def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
     else:
         room = workspace(*memory.probability.shape)
         observe(sensor, seen, memory, after, room)
-        noise = float(room.surface.noise[0])
+        noise, pressing_noise = (float(known) for known in room.surface.noise)
         observation = Observation(
-            seen.time - last.time, seen.displacement, seen.force, after.contact, *room.surface[:4], noise
+            seen.time - last.time,
+            seen.displacement,
+            seen.force,
+            after.contact,
+            *room.surface[:4],
+            noise,
+            pressing_noise,
         )
         of_method, decision = method.step(state.of_method, setup.lattice, observation, setup.options)
         touching, slipping = apply_decision(sensor.position, last, seen, decision, memory, after, room.weight, velocity)
@@ -147,35 +149,11 @@ def frame_arrays(frame: Frame) -> FrameArrays:
     """A frame as kernels take it, not to be written to; what it does not have is empty."""
     return FrameArrays(
         frame.time,
-        _read_only(frame.displacement),
-        NO_FIELD if frame.force is None else _read_only(frame.force),
-        NO_POSE if frame.object_pose is None else _read_only(frame.object_pose),
-        NO_FIELD if frame.normal is None else _read_only(frame.normal),
-        NO_MASK if frame.contact is None else _read_only(frame.contact),
-    )
-
-
-def _unwritten(frame: FrameArrays) -> FrameArrays:
-    """The same frame: unpickled arrays can be written to, and kernels are compiled for one type."""
-    return FrameArrays(
-        frame.time,
-        _read_only(frame.displacement),
-        _read_only(frame.force),
-        _read_only(frame.object_pose),
-        _read_only(frame.normal),
-        _read_only(frame.contact),
-    )
-
-
-def _empty_like(memory: Memory) -> Memory:
-    """Arrays to fill, of the same shapes."""
-    return Memory(
-        np.empty_like(memory.contact),
-        np.empty_like(memory.slip),
-        np.empty_like(memory.probability),
-        np.empty_like(memory.noise),
-        np.empty_like(memory.elements),
-        np.empty_like(memory.common),
+        read_only(frame.displacement),
+        NO_FIELD if frame.force is None else read_only(frame.force),
+        NO_POSE if frame.object_pose is None else read_only(frame.object_pose),
+        NO_FIELD if frame.normal is None else read_only(frame.normal),
+        NO_MASK if frame.contact is None else read_only(frame.contact),
     )
 
 
@@ -183,12 +161,12 @@ def slip_state(time: float, memory: Memory, velocity: FloatArray, touching: int,
     """The slip state of a step, with the number of elements that touch and of those that slip."""
     ratio = 1.0 - slipping / touching if touching else math.nan
     contact, slip, probability = (
-        _read_only(memory.contact),
-        _read_only(memory.slip),
-        _read_only(memory.probability),
+        read_only(memory.contact),
+        read_only(memory.slip),
+        read_only(memory.probability),
     )
     macro_slip = 0 < touching == slipping
-    return SlipState(time, contact, slip, probability, ratio, _read_only(velocity), macro_slip=macro_slip)
+    return SlipState(time, contact, slip, probability, ratio, read_only(velocity), macro_slip=macro_slip)
 
 
 def masked(now: SlipState, observed: BoolArray | None, before: BoolArray | None) -> SlipState:

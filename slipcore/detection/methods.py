@@ -10,6 +10,7 @@ from slipcore.detection.baselines import (
     strain_threshold,
 )
 from slipcore.detection.filter import method as probability_filter
+from slipcore.detection.forces_only import method as forces_only
 from slipcore.detection.shared.interface import CompiledMethod, Method
 from slipcore.detection.strain_rate import literal
 from slipcore.detection.strain_rate import method as strain_rate
@@ -26,6 +27,7 @@ METHODS: dict[str, Method[Any, Any] | CompiledMethod[Any]] = {
     "deformation_gradient": deformation_gradient.METHOD,
     "force_ratio": force_ratio.METHOD,
     "strain_threshold": strain_threshold.METHOD,
+    "forces_only": forces_only.METHOD,
 }
 """A further method joins by a file of its own, or a room if it has several, and a line here."""
 

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slipcore.detection.detector import NO_FIELD, NO_MASK, NO_POSE, DetectorState, step
+from slipcore.detection.detector import DetectorState, step
 from slipcore.detection.fold import FrameResults, Recording, fold, rings_from
 from slipcore.detection.methods import findings_by
-from slipcore.detection.shared.records import workspace
+from slipcore.detection.shared.records import NO_FIELD, NO_MASK, NO_POSE, workspace
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.slip_state import SlipHistory, slip_events
 

@@ -1,10 +1,11 @@
 """What a detection method is given, and what it decides."""
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Generic, NamedTuple, TypeVar
 
 from slipcore.defaults import ContactOptions
-from slipcore.detection.shared.records import Decision
+from slipcore.detection.shared.records import NO_POSE, Decision
 from slipcore.finding import Finding
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.surface.strain import Lattice
@@ -19,7 +20,8 @@ class Observation(NamedTuple):
     ``interval`` s since the frame before (infinite for the first); ``displacement`` [n, m, 3] m and outward ``normal``;
     ``force`` [n, m, 3] N as measured, empty where missing; ``pressing``: the force inwards, N, or without forces the
     indentation, m, and ``tangential`` force, N, [n, m]; ``contact`` and ``stays`` (in contact now and before) [n, m];
-    ``noise`` of a marker coordinate, m, NaN while unknown.
+    ``noise`` of a marker coordinate, m, and ``force_noise`` of ``pressing``, N, NaN while unknown; ``object_pose``
+    [3] m, m, rad, empty where missing.
     """
 
     interval: float
@@ -31,6 +33,8 @@ class Observation(NamedTuple):
     tangential: FloatArray
     stays: BoolArray
     noise: float
+    force_noise: float = math.nan
+    object_pose: FloatArray = NO_POSE
 
 
 class Method(NamedTuple, Generic[State, Options]):

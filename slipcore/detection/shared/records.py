@@ -1,6 +1,6 @@
 """What compiled steps take and fill, as named tuples of plain arrays; a field that a frame does not have is empty."""
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,21 @@ from slipcore.compilation import borrowed, compiled
 from slipcore.defaults import NOISE
 from slipcore.frames import BoolArray, FloatArray
 
+Scalar = TypeVar("Scalar", bound=np.generic)
 _SERIES, _ROWS = max(NOISE.series, NOISE.memory), 17
+
+
+def read_only(array: NDArray[Scalar]) -> NDArray[Scalar]:
+    """The same data, not to be written to: users can't change what a detector remembers, kernels see one type."""
+    if not array.flags.writeable:
+        return array
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+NO_FIELD, NO_MASK, NO_POSE = (read_only(np.empty(s, t)) for s, t in (((0, 0, 3), float), ((0, 0), bool), (0, float)))
+"""Stand for what a frame does not have."""
 
 
 class Sensor(NamedTuple):
@@ -52,6 +66,30 @@ class Memory(NamedTuple):
     noise: FloatArray
     elements: FloatArray
     common: FloatArray
+
+
+def unwritten(frame: FrameArrays) -> FrameArrays:
+    """The same frame: unpickled arrays can be written to, and kernels are compiled for one type."""
+    return FrameArrays(
+        frame.time,
+        read_only(frame.displacement),
+        read_only(frame.force),
+        read_only(frame.object_pose),
+        read_only(frame.normal),
+        read_only(frame.contact),
+    )
+
+
+def empty_like(memory: Memory) -> Memory:
+    """Arrays to fill, of the same shapes."""
+    return Memory(
+        np.empty_like(memory.contact),
+        np.empty_like(memory.slip),
+        np.empty_like(memory.probability),
+        np.empty_like(memory.noise),
+        np.empty_like(memory.elements),
+        np.empty_like(memory.common),
+    )
 
 
 class Surface(NamedTuple):

@@ -244,3 +244,15 @@ def test_the_lattice_that_is_missing_is_suggested(tmp_path: Path) -> None:
     mapping = {name: value for name, value in MAPPING.items() if name != "grid"}
     with pytest.raises(InvalidInput, match=r'`grid` in the mapping, such as "grid": \[3, 3\]'):
         formats.read(path, mapping=json.dumps(mapping))
+
+
+def test_taxels_that_tell_forces_alone_make_a_log_without_displacement(tmp_path: Path) -> None:
+    told = {name: column for name, column in columns(np.random.default_rng(3)).items() if "_D" not in name}
+    mapping = {name: MAPPING[name] for name in ("grid", "pitch", "time", "force", "contact")}
+    path = written(tmp_path / "taxels.csv", told)
+    log = formats.read(path, "text/csv", mapping=json.dumps(mapping))
+    assert not log.has_displacement
+    assert not log.displacement.any()
+    np.testing.assert_array_equal(log.force, field(told, "F") * [1.0, 1.0, -1.0])
+    with pytest.raises(InvalidInput, match="displacement"):
+        formats.read(path, "text/csv", mapping=json.dumps(MAPPING))

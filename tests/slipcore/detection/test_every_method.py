@@ -20,6 +20,8 @@ from slipcore.surface.strain import Lattice
 Same = Callable[[SlipHistory, SlipHistory], None]
 
 EACH_METHOD = pytest.mark.parametrize("method", METHODS)
+BY_LOAD = ("forces_only",)
+"""Look at the load once it has changed by more than noise: with another estimate of it at other frames."""
 
 
 def lattice() -> np.ndarray:
@@ -212,7 +214,7 @@ def test_how_the_lattice_lies_and_what_the_clock_says_changes_nothing(
     other, back = changed(log, change)
     expected, found = detect_slip(log, method), detect_slip(other, method)
     np.testing.assert_array_equal(back(found.contact), expected.contact)
-    assert np.mean(back(found.slip) != expected.slip) < 1e-3
+    assert np.mean(back(found.slip) != expected.slip) < (4e-3 if method in BY_LOAD else 1e-3)
 
 
 def changed(log: GraspLog, change: str) -> tuple[GraspLog, Callable[[np.ndarray], np.ndarray]]:
