@@ -432,6 +432,16 @@ class ForcesOnlyOptions(ContactOptions):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CoarseOptions(ForcesOnlyOptions):
+    """Method ``coarse``: those of ``forces_only``, and what it is joined with method ``filter`` by."""
+
+    filter_weight: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes: the same by 0.01 from 0.25 to 0.5")] = 0.4
+    """Weight of the log-odds that method ``filter`` tells beside those of the forces."""
+    largest_sum: Annotated[float, Option(1.0, 30.0, "log-odds", "tuning scenes")] = 9.0
+    """Most that either tells."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RigidFitOptions(ContactOptions):
     """Method ``rigid_fit``: Dong et al. 2019."""
 
@@ -559,6 +569,7 @@ METHOD_NAMES = (
     "force_ratio",
     "strain_threshold",
     "forces_only",
+    "coarse",
 )
 """The methods of detection, for who offers them without loading their kernels (``slipcore.METHODS`` does)."""
 DEFAULT_METHOD = "filter"

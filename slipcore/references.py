@@ -71,6 +71,7 @@ DETECTION = {
     "force_ratio": ("song2014",),
     "strain_threshold": ("paper",),
     "forces_only": ("cattaneo1938", "mindlin1949", "mindlin1953", "khamis2018"),
+    "coarse": ("cattaneo1938", "mindlin1949", "mindlin1953", "khamis2018", "blom1988"),
 }
 """Papers behind each method of detection."""
 

@@ -9,6 +9,7 @@ from slipcore.detection.baselines import (
     rigid_fit,
     strain_threshold,
 )
+from slipcore.detection.coarse import method as coarse
 from slipcore.detection.filter import method as probability_filter
 from slipcore.detection.forces_only import method as forces_only
 from slipcore.detection.shared.interface import CompiledMethod, Method
@@ -28,6 +29,7 @@ METHODS: dict[str, Method[Any, Any] | CompiledMethod[Any]] = {
     "force_ratio": force_ratio.METHOD,
     "strain_threshold": strain_threshold.METHOD,
     "forces_only": forces_only.METHOD,
+    "coarse": coarse.METHOD,
 }
 """A further method joins by a file of its own, or a room if it has several, and a line here."""
 

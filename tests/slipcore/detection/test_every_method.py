@@ -20,7 +20,7 @@ from slipcore.surface.strain import Lattice
 Same = Callable[[SlipHistory, SlipHistory], None]
 
 EACH_METHOD = pytest.mark.parametrize("method", METHODS)
-BY_LOAD = ("forces_only",)
+BY_LOAD = ("forces_only", "coarse")
 """Look at the load once it has changed by more than noise: with another estimate of it at other frames."""
 
 

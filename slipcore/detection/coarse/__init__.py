@@ -1,0 +1,1 @@
+"""Slip on arrays of few elements: from forces and from displacement, joined."""

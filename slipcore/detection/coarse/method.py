@@ -1,0 +1,88 @@
+"""For arrays of few elements that tell displacement and forces: methods ``forces_only`` and ``filter``, joined.
+
+An element that is not much smaller than the contact slips bit by bit: half of it slips while it still takes on load,
+and its mean displacement parts from the object's motion long before. How elements share the load tells more there, and
+where several stick beside each other their markers tell when one does not. Log-odds of both are added.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import expit, logit
+
+from slipcore.defaults import NOISE, CoarseOptions, FilterOptions
+from slipcore.detection.filter import method as by_place
+from slipcore.detection.forces_only import method as by_force
+from slipcore.detection.shared.contact import Touch
+from slipcore.detection.shared.interface import Method, Observation
+from slipcore.detection.shared.records import (
+    NO_FIELD,
+    NO_MASK,
+    NO_POSE,
+    Decision,
+    FrameArrays,
+    Memory,
+    Sensor,
+    empty_like,
+    read_only,
+    unwritten,
+)
+from slipcore.frames import FloatArray
+from slipcore.surface.strain import Lattice
+
+
+class State(NamedTuple):
+    """What each method remembers, and the last frame, as the filter sees it."""
+
+    forces: by_force.State
+    memory: Memory
+    frame: FrameArrays
+
+
+def init(lattice: Lattice, options: CoarseOptions) -> State:
+    """Nothing touches yet."""
+    shape, start = lattice.position.shape, by_place.METHOD.start(lattice, FilterOptions())
+    noise = np.zeros((9, max(1 + NOISE.memory, NOISE.series)))
+    nowhere, nothing = np.zeros(shape[:2], bool), np.zeros(shape[:2])
+    frame = FrameArrays(-np.inf, read_only(np.zeros(shape)), NO_FIELD, NO_POSE, NO_FIELD, NO_MASK)
+    memory = Memory(nowhere, nowhere, nothing, noise, start.elements, start.common)
+    return State(by_force.init(lattice, options), memory, frame)
+
+
+def step(state: State, lattice: Lattice, seen: Observation, options: CoarseOptions) -> tuple[State, Decision]:
+    """Both, on the same contact; without forces the filter's word alone."""
+    forces, decision = by_force.step(state.forces, lattice, seen, options)
+    last = unwritten(state.frame)
+    frame = FrameArrays(
+        0.0 if np.isinf(last.time) else last.time + seen.interval,
+        read_only(seen.displacement),
+        read_only(seen.force) if seen.force.size else NO_FIELD,
+        read_only(seen.object_pose),
+        read_only(seen.normal.copy()),
+        read_only(seen.contact.copy()),
+    )
+    after = empty_like(state.memory)
+    velocity = np.empty((*seen.contact.shape, 2))
+    arguments = _sensor(lattice, options), last, frame, state.memory, after
+    by_place.METHOD.run(*map(tuple, arguments), velocity)  # as in ``detector.step``, lest another kernel is compiled
+    odds = _log_odds(after.probability, options)
+    if seen.force.size:
+        odds = _log_odds(decision.probability, options) + options.filter_weight * odds
+    return State(forces, after, frame), Decision(odds > 0.0, expit(odds))
+
+
+def _log_odds(probability: FloatArray, options: CoarseOptions) -> FloatArray:
+    least = expit(-options.largest_sum)
+    odds: FloatArray = logit(np.clip(probability, least, 1.0 - least))
+    return odds
+
+
+def _sensor(lattice: Lattice, options: CoarseOptions) -> Sensor:
+    """The lattice and options for the filter's kernel; contact is known, and only what pulls is told by them."""
+    touch = np.array(Touch(0.0, 0.0, options.contact_noise, 1.0, 1.0, 0.0, 1.0, 0.0, 0.0))
+    settings = by_place.METHOD.start(lattice, FilterOptions()).settings
+    position, steps, inverse = map(np.array, (lattice.position, lattice.steps, lattice.inverse_jacobian))
+    return Sensor(position, steps, inverse, lattice.orientation, touch, touch, settings)
+
+
+METHOD = Method(CoarseOptions, init, step)
