@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 from estimators.defaults import IDENTIFIABILITY
 from estimators.errors import InvalidSamples
 from slipcore.references import ESTIMATION, LIKELIHOODS, cited
-from stiction_client.linear_friction import Domain, FloatArray, LinearFriction, Scale, Scales
+from stiction_client.linear_friction import Domain, LinearFriction, Scale, Scales
 from stiction_client.model import Cost
 
 if TYPE_CHECKING:
     from estimators.inference_data import InferenceData
+
+FloatArray = NDArray[np.float64]
 
 __all__ = ["Cost", "Domain", "FrictionModel", "Scale", "Scales"]
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from stiction_client.elementwise import Number
 from stiction_client.errors import InvalidArgument
-from stiction_client.linear_friction import Number
 
 
 def within(name: str, value: object, low: float, high: float, unit: str = "") -> Number:
     """``value`` as a float, or an array of them, all in [low, high]; raises ``InvalidArgument`` for anything else."""
-    if type(value) is float or (type(value) is int and abs(value) < 2**53):
+    if isinstance(value, float) or (type(value) is int and abs(value) < 2**53):
         number = float(value)
         if low <= number <= high:
             return number

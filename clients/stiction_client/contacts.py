@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stiction_client.arguments import within
-from stiction_client.linear_friction import Number
+from stiction_client.elementwise import Number
 
 AREAS = (1e-12, 1.0)
 """m² that a contact of a gripper may have."""

@@ -4,10 +4,8 @@ import math
 import sys
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from stiction_client.linear_friction import Number
-from stiction_client.quantile import FrictionQuantile, Truth
+from stiction_client.elementwise import Number, Truth, anywhere, greatest, least, select
+from stiction_client.quantile import FrictionQuantile
 
 MOST_STEPS = 200
 """Steps of a search; a root that only touches takes 50, any other fewer than 20."""
@@ -54,17 +52,19 @@ class LoadedContact:
     def interval(self, most: Number) -> tuple[Number, Number, Truth]:
         """The least x that holds, the greatest up to ``most``, and whether there are such."""
         loaded = (self.load > 0.0) | (self.moment > 0.0)
-        low, found = self._search(select(loaded, self._start(), 1.0), 1)
-        end = self.end(most)
+        line = self.quantile.asymptote
+        low, found = self._search(select(loaded, self._start(line), 1.0), 1)
+        high = end = self._end(line, most)
         bounded = (end > 0.0) & (end < math.inf)
-        high = select(bounded, self._search(select(bounded, end, 1.0), -1)[0], end)
+        if anywhere(bounded):
+            high = select(bounded, self._search(select(bounded, end, 1.0), -1)[0], end)
         rests = (self.load + self.moment == 0.0) & (self.quantile(0.0)[0] <= 0.0)  # and no force but 0 is sure to hold
         low, high = select(loaded, low, 0.0), select(rests, 0.0, high)
         return low, select(high > low, high, low), (found | (low == 0.0)) & (low <= most * (1.0 + ROUNDING))
 
     def best(self, most: float) -> float:
         """The x up to ``most`` at which most of the load is held: 0 where none ever is, infinite if it has no end."""
-        end = float(self.end(most))
+        end = float(self._end(self.quantile.asymptote, most))
         if not end < math.inf:
             return end
         least = min(self.quantile.peak() / float(self.unit), end)
@@ -76,14 +76,14 @@ class LoadedContact:
         """How many times its load the contact holds at x; without a load, how many newtons."""
         return float(self.force(x) * self.quantile(self.unit * x)[0] / (self._load(x) or 1.0))
 
-    def end(self, most: Number) -> Number:
-        """An x up to ``most`` beyond which nothing holds: where the line that bounds friction from above meets zero."""
-        height, slope = self.quantile.asymptote
+    def _end(self, line: tuple[Number, Number], most: Number) -> Number:
+        """An x up to ``most`` beyond which nothing holds: where the ``line`` above friction meets 0."""
+        height, slope = line
         falls = slope < 0.0
         zero = -height / select(falls, slope, -1.0) / self.unit
         end = select(falls, zero, select((slope > 0.0) | (height > 0.0), math.inf, 0.0))
         end = select(self.unit * end < ENDLESS, end, math.inf)
-        return select(end < most, select(end > 0.0, end, 0.0), most)
+        return select(end < most, greatest(end, 0.0), most)
 
     def _load(self, x: Number) -> Number:
         """L(x), N."""
@@ -118,20 +118,20 @@ class LoadedContact:
                 & (step > -x)  # friction may fall in a straight line to 0 without load: then there is no root
                 & (self.unit * x < ENDLESS)
             )
-            if not (moving.any() if isinstance(moving, np.ndarray) else moving):
+            if not anywhere(moving):
                 break
             x = x + select(moving, step, 0.0)
             value, slope = self.surplus(x)
         return x, (value >= -rounding) | (onwards & (self.unit * x < ENDLESS))
 
-    def _start(self) -> Number:
+    def _start(self, line: tuple[Number, Number]) -> Number:
         """An x that is no greater than the least that holds: where friction, if it were on that line, would."""
-        height, slope = (0.5 / (select(part > 0.0, part, 0.0) + 1e-300) for part in self.quantile.asymptote)
+        height, slope = (0.5 / (greatest(part, 0.0) + 1e-300) for part in line)
         starts = [
             least((load * height) ** (1.0 / power), (load * slope / self.unit) ** (1.0 / (power + 1)))
             for load, power in ((self.load, self.power), (self.moment, 1 if self.power == 1 else 4))
         ]
-        return -least(-starts[0], -starts[1])
+        return greatest(*starts)
 
     def _growth(self, x: float) -> tuple[float, float]:
         """Sign of the growth with x of the load that is held, φ = q·(n + relief) + unit·x·q', and its slope."""
@@ -154,13 +154,3 @@ class LoadedContact:
                 break
             x = guess
         return x
-
-
-def select(condition: Truth, yes: Number, no: Number) -> Number:
-    """``yes`` where the condition holds: NumPy's ``where``, which takes too long for floats."""
-    return np.where(condition, yes, no) if isinstance(condition, np.ndarray) else (yes if condition else no)
-
-
-def least(one: Number, other: Number) -> Number:
-    """The smaller one."""
-    return select(one < other, one, other)

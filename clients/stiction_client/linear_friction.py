@@ -8,16 +8,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stiction_client.elementwise import FloatArray, Number
 from stiction_client.errors import InvalidArgument
 from stiction_client.support import Kind, Support, extrapolation, support, widening
 
 if TYPE_CHECKING:
     from stiction_client.labelled import DataFrame, Dataset, Row
-
-FloatArray = NDArray[np.float64]
-
-Number = float | FloatArray
-"""One float, or an array of any shape that broadcasts with the others."""
 
 KINDS = ("element", "contact")
 """Whose friction a quantile may be of."""

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction_client.elementwise import FloatArray
 from stiction_client.errors import InvalidArgument
 from stiction_client.linear_friction import (
     Domain,
-    FloatArray,
     LinearFriction,
     Scales,
     degrees_from_json,

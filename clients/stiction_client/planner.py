@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from stiction_client.arguments import within
 from stiction_client.contacts import AREAS, Contact, Contacts
+from stiction_client.elementwise import FloatArray, Number, anywhere, least, select
 from stiction_client.errors import Cause, InvalidArgument, NoFeasibleForce
-from stiction_client.holding import LoadedContact, least, select
-from stiction_client.linear_friction import KINDS, FloatArray, Number
+from stiction_client.holding import LoadedContact
+from stiction_client.linear_friction import KINDS
 from stiction_client.model import FrictionModel
 from stiction_client.quantile import FrictionQuantile
 from stiction_client.support import Kind, kinds
@@ -246,7 +247,7 @@ def _shares(
     if contacts.lever_arm is not None:
         return (load * load + (turns / contacts.lever_arm) ** 2) ** 0.5, 0.0
     contact = contacts.contact
-    if np.any(turns) and not np.all(contact.torque_arm):
+    if anywhere(contact.torque_arm == 0.0) and anywhere(turns > 0.0):
         raise InvalidArgument("torque", float(np.max(torque)), "0 where the contact has no torque_arm")
     arm = contact.arm(1.0)
     return load, turns / (arm + (arm == 0.0))

@@ -1,18 +1,17 @@
 """The conservative quantile of μ as a function of an element's normal force: a hyperbola, steeper outside the data."""
 
 import math
+import sys
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from itertools import chain
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from stiction_client.elementwise import Number, hypot, plain, select
 from stiction_client.errors import InvalidArgument
-from stiction_client.linear_friction import FloatArray, Number
 from stiction_client.model import FrictionModel
-from stiction_client.support import bend, beyond
-
-Truth = bool | np.bool_ | NDArray[np.bool_]
+from stiction_client.support import bend, beyond_velocity
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,56 +47,29 @@ class FrictionQuantile:
         """
         from scipy import special  # takes longer to import than all else of this package
 
-        shared, own = model.scatter(probability, elements)
-        error = -special.stdtrit(model.degrees_of_freedom, probability)
-        spread = [np.sum(shared), np.sum(own), np.sum(error)]
-        if not np.isfinite([*model.coefficients, *model.covariance.flat, *spread]).all():
+        shared, own = (plain(part) for part in model.scatter(probability, elements))
+        error = plain(-special.stdtrit(model.degrees_of_freedom, probability))
+        b0, b1, b2 = coefficients = model.coefficients.tolist()
+        covariance = model.covariance.tolist()
+        if not _finite(*coefficients, *chain(*covariance), shared, own, error):
             raise InvalidArgument("model", "not finite at this slip probability", "finite coefficients and quantile")
-        variance, axes = np.linalg.eigh(model.covariance)
-        factor = axes * np.sqrt(np.maximum(variance, 0.0))
-        growth = math.hypot(*factor[2])
-        direction = factor[2] / growth if growth > 0.0 else factor[2]
-        along = factor[:2] @ direction
-        across = factor[:2] - np.outer(along, direction)
-        apart = ((across[0] + np.multiply.outer(tangential_velocity, across[1])) ** 2).sum(axis=-1) ** 0.5
-        inside = cls(
-            a=_plain(model.coefficients[0] + tangential_velocity * model.coefficients[1]),
-            c=_plain(model.coefficients[2]),
-            s=_plain(np.hypot(own, error * apart)),
-            k=_plain(error * (along[0] + tangential_velocity * along[1])),
-            g=_plain(error * growth),
-        )
+        growth, (along, along_v), (apart, apart_v, apart_vv) = _factor(covariance)
+        v = tangential_velocity
+        level = b0 + v * b1
+        s = hypot(own, error * hypot(apart + v * apart_v, v * apart_vv))
+        k, g = error * (along + v * along_v), error * growth
         if model.scales is not None:
-            level, slope = inside.a, inside.c
-            inside = inside._joined(shared * level, shared * slope)
-        return inside._widened(model, tangential_velocity, probability)
-
-    def _widened(self, model: FrictionModel, tangential_velocity: Number, probability: Number) -> "FrictionQuantile":
-        """The same with what the law bends outside the data."""
-        from scipy import special
-
-        each = -special.ndtri(probability) * bend(model)
+            s, k, g = _joined(s, k, g, shared * level, shared * b2)
+        each = -plain(special.ndtri(probability)) * bend(model)
         low, high = model.domain.normal_force
-        beside = each * beyond(model.domain, tangential_velocity, low)[0]
         below, above = (each / bound if bound > 0.0 else 0.0 * each for bound in (low, high))
-        spread = _plain(np.hypot(self.s, beside))
-        return replace(self, s=spread, low=low, high=high, below=_plain(below), above=_plain(above))
-
-    def _joined(self, constant: Number, slope: Number) -> "FrictionQuantile":
-        """The same with (``constant`` + ``slope``·f)² added below the root: (p₁ + q₁f)² + (p₂ + q₂f)² as one square.
-
-        With r = (q₁, q₂), it is (p·r̂ + |r| f)² + (p × r̂)².
-        """
-        growth = np.hypot(slope, self.g)
-        safe = growth + (growth == 0.0)
-        along = (constant * slope + self.k * self.g) / safe
-        across = np.where(growth == 0.0, np.hypot(constant, self.k), (constant * self.g - self.k * slope) / safe)
-        return replace(self, s=_plain(np.hypot(self.s, across)), k=_plain(along), g=_plain(growth))
+        s = hypot(s, each * beyond_velocity(model.domain, v))
+        return cls(level, b2, s, k, g, low, high, below, above)
 
     def _outside(self, force: Number) -> tuple[Number, Number]:
         """h and its slope."""
-        under = cast(Number, (force < self.low) * self.below)
-        over = cast(Number, (force > self.high) * self.above)
+        under: Any = (force < self.low) * self.below
+        over: Any = (force > self.high) * self.above
         return over * (force - self.high) + under * (self.low - force), over - under
 
     def __call__(self, force: Number) -> tuple[Number, Number]:
@@ -120,32 +92,62 @@ class FrictionQuantile:
     @property
     def asymptote(self) -> tuple[Number, Number]:
         """A and C of a line A + C·f that is nowhere below q, and meets it where f is great."""
-        last = self._joined(-self.above * self.high, self.above)
-        still = last.g == 0.0  # then the spread is the same at any force
-        spread = still * (last.s * last.s + last.k * last.k) ** 0.5
-        return last.a - spread - (1.0 - still) * last.k, last.c - last.g
+        s, k, g = _joined(self.s, self.k, self.g, -self.above * self.high, self.above)
+        still = g == 0.0  # then the spread is the same at any force
+        return self.a - select(still, hypot(s, k), k), self.c - g
 
     def peak(self) -> float:
         """The element's normal force of most friction, N: at least 0; infinite where friction keeps growing."""
-        inside = self._peak_of_hyperbola()
-        if inside > self.high and np.any(self.above):
-            return max(self._joined(-self.above * self.high, self.above)._peak_of_hyperbola(), self.high)
-        if inside < self.low and np.any(self.below):
-            return min(self._joined(self.below * self.low, -self.below)._peak_of_hyperbola(), self.low)
-        return inside
-
-    def _peak_of_hyperbola(self) -> float:
-        """The same where the data have no end."""
-        c, s, k, g = (float(part) for part in (self.c, self.s, self.k, self.g))
-        if c >= g:
-            return math.inf if c > 0.0 else 0.0
-        return max((s * c / (math.sqrt(g - c) * math.sqrt(g + c)) - k) / g, 0.0) if c > -g else 0.0
+        c, s, k, g, below, above = (float(part) for part in (self.c, self.s, self.k, self.g, self.below, self.above))
+        peak = _peak_of_hyperbola(c, s, k, g)
+        if peak > self.high and above:
+            return max(_peak_of_hyperbola(c, *_joined(s, k, g, -above * self.high, above)), self.high)
+        if peak < self.low and below:
+            return min(_peak_of_hyperbola(c, *_joined(s, k, g, below * self.low, -below)), self.low)
+        return peak
 
     def expected(self) -> "FrictionQuantile":
         """The mean instead: what is known were there no uncertainty and no scatter."""
         return replace(self, s=0.0, k=0.0, g=0.0, below=0.0, above=0.0)
 
 
-def _plain(value: Any) -> Number:
-    """A float where it is one number, which computes ten times as fast as NumPy's."""
-    return float(value) if np.ndim(value) == 0 else cast(FloatArray, value)
+def _factor(covariance: list[list[float]]) -> tuple[float, tuple[float, float], tuple[float, float, float]]:
+    """L of Σ = L·Lᵀ with β₂ before β₀ and β₁: |r|; u·r̂ as a line in v; and two more of u's parts, which are
+    ``apart`` + v·``apart_v`` and v·``apart_vv``.
+
+    What is left of a variance within its rounding counts as nothing: that coefficient is a function of the others.
+    """
+    (c00, _, _), (c10, c11, _), (c20, c21, c22) = covariance
+    growth = _deviation(c22, c22)
+    along, along_v = (c20 / growth, c21 / growth) if growth > 0.0 else (0.0, 0.0)
+    apart = _deviation(c00 - along * along, c00)
+    apart_v = (c10 - along * along_v) / apart if apart > 0.0 else 0.0
+    return growth, (along, along_v), (apart, apart_v, _deviation(c11 - along_v * along_v - apart_v * apart_v, c11))
+
+
+def _deviation(left: float, variance: float) -> float:
+    """Root of what is left of a variance."""
+    return math.sqrt(left) if left > 4.0 * sys.float_info.epsilon * variance else 0.0
+
+
+def _joined(s: Number, k: Number, g: Number, constant: Number, slope: Number) -> Any:
+    """s, k and g with (``constant`` + ``slope``·f)² added below the root: (p₁ + q₁f)² + (p₂ + q₂f)² as one square.
+
+    With r = (q₁, q₂), it is (p·r̂ + |r| f)² + (p × r̂)².
+    """
+    growth = hypot(slope, g)
+    still = growth == 0.0
+    safe = growth + still
+    across = select(still, hypot(constant, k), (constant * g - k * slope) / safe)
+    return hypot(s, across), (constant * slope + k * g) / safe, growth
+
+
+def _peak_of_hyperbola(c: float, s: float, k: float, g: float) -> float:
+    """The element's normal force of most friction, N, were there no end of the data."""
+    if c >= g:
+        return math.inf if c > 0.0 else 0.0
+    return max((s * c / (math.sqrt(g - c) * math.sqrt(g + c)) - k) / g, 0.0) if c > -g else 0.0
+
+
+def _finite(*numbers: Number) -> bool:
+    return all(np.isfinite(each).all() if isinstance(each, np.ndarray) else math.isfinite(each) for each in numbers)

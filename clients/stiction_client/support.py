@@ -9,7 +9,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-FloatArray = NDArray[np.float64]
+from stiction_client.elementwise import FloatArray, Number, greatest, least, logarithm, plain, root, select
 
 Kind = Literal["supported", "extrapolated", "not identified", "stale", "implausible"]
 
@@ -100,7 +100,7 @@ def support(model: Model, tangential_velocity: float, normal_force: float, stale
     part = float(uncertainty(model, *within(model.domain, tangential_velocity, normal_force)))
     if tangential_velocity > 0.0 and _knows_no_velocity(model):
         return Support("not identified", f"{model.diagnostics['unknown_velocity']}: record a grasp with its motion")
-    if not part <= UNCERTAIN or not model.identifiable.any():
+    if not part <= UNCERTAIN or not any(model.identifiable.tolist()):
         return Support("not identified", _ignorance(part))
     outside = extrapolation(model.domain, tangential_velocity, normal_force)
     if outside is not None:
@@ -117,8 +117,8 @@ def kinds(
         return np.full(v.shape, "implausible")
     if stale is not None or model.diagnostics.get("surface_change"):
         return np.full(v.shape, "stale")
-    unknown = ~(uncertainty(model, *within(model.domain, v, f_n)) <= UNCERTAIN) | ~model.identifiable.any()
-    unknown |= (v > 0.0) & _knows_no_velocity(model)
+    told = np.asarray(uncertainty(model, *within(model.domain, v, f_n)) <= UNCERTAIN) & model.identifiable.any()
+    unknown = ~told | ((v > 0.0) & _knows_no_velocity(model))
     (low, high), fastest = model.domain.normal_force, model.domain.tangential_velocity[1]
     outside = (f_n < low) | (f_n > high) | (v > fastest)
     return np.select([unknown, outside], ["not identified", "extrapolated"], "supported")
@@ -132,8 +132,9 @@ def disagreement(method: str, model: Model, others: Mapping[str, Model]) -> str 
     """
     (_, fastest), (low, high) = model.domain.tangential_velocity, model.domain.normal_force
     v, f_n = np.array([0.0, 0.0, 0.0, fastest, fastest]), np.array([0.5 * (low + high), low, high, low, high])
+    mean, half = map(np.asarray, _interval(model, v, f_n))
     for name, other in others.items():
-        (mean, half), (expected, spread) = _interval(model, v, f_n), _interval(other, v, f_n)
+        expected, spread = map(np.asarray, _interval(other, v, f_n))
         gap = np.abs(mean - expected) - (half + spread)
         at = int(np.argmax(gap))
         if gap[at] > 0.0:
@@ -143,41 +144,42 @@ def disagreement(method: str, model: Model, others: Mapping[str, Model]) -> str 
     return None
 
 
-def uncertainty(model: Model, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> FloatArray:
+def uncertainty(model: Model, tangential_velocity: Number, normal_force: Number) -> Number:
     """Half-width of the 95 % interval of the friction expected at v and f_n, in parts of it."""
     mean, half = _interval(model, tangential_velocity, normal_force)
-    unknown = np.full(np.broadcast(mean, half).shape, np.inf)  # of a mean that is nothing beside its uncertainty
-    return np.asarray(np.divide(half, mean, out=unknown, where=mean > 1e-9 * half))
+    told = mean > 1e-9 * half  # else it is nothing beside its uncertainty
+    return select(told, half / select(told, mean, 1.0), math.inf)
 
 
-def within(domain: Domain, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def within(domain: Domain, tangential_velocity: Number, normal_force: Number) -> tuple[Number, Number]:
     """The nearest v and f_n in the data; any v below them is near enough, as the limit v → 0."""
-    v = np.minimum(np.asarray(tangential_velocity, float), domain.tangential_velocity[1])
-    return v, np.clip(np.asarray(normal_force, float), *domain.normal_force)
+    low, high = domain.normal_force
+    return least(tangential_velocity, domain.tangential_velocity[1]), least(greatest(normal_force, low), high)
 
 
-def beyond(domain: Domain, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """How far v and f_n lie outside the data, 0 inside and at a bound of 0.
+def beyond_velocity(domain: Domain, tangential_velocity: Number) -> Number:
+    """How far v lies outside the data, 0 inside: the logarithm of its ratio to the fastest."""
+    return logarithm(greatest(tangential_velocity * _inverse(domain.tangential_velocity[1]), 1.0))
 
-    v by the logarithm of its ratio to the fastest, f_n in parts of the bound that it passes.
-    """
-    v, f_n = np.asarray(tangential_velocity, float), np.asarray(normal_force, float)
-    fastest, (low, high) = domain.tangential_velocity[1], domain.normal_force
-    return (
-        np.log(np.maximum(v * _inverse(fastest), 1.0)),
-        np.maximum(f_n - high, 0.0) * _inverse(high) + np.maximum(low - f_n, 0.0) * _inverse(low),
-    )
+
+def beyond_force(domain: Domain, normal_force: Number) -> Number:
+    """How far f_n lies outside the data, in parts of the bound that it passes: 0 inside and at a bound of 0."""
+    low, high = domain.normal_force
+    above, below = greatest(normal_force - high, 0.0), greatest(low - normal_force, 0.0)
+    return above * _inverse(high) + below * _inverse(low)
 
 
 def widening(model: Model, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> FloatArray:
     """Standard deviation of what the law bends away from its line at v and f_n outside the data; 0 inside."""
-    return np.asarray(bend(model) * np.hypot(*beyond(model.domain, tangential_velocity, normal_force)))
+    v, f_n = np.asarray(tangential_velocity, float), np.asarray(normal_force, float)
+    return np.asarray(bend(model) * np.hypot(beyond_velocity(model.domain, v), beyond_force(model.domain, f_n)))
 
 
 def bend(model: Model) -> float:
-    """The same at a distance of 1 (``BEND``, ``beyond``)."""
-    middle = [1.0, *(0.5 * sum(ends) for ends in (model.domain.tangential_velocity, model.domain.normal_force))]
-    return BEND * abs(float(np.dot(middle, model.coefficients)))
+    """The same at a distance of 1 (``BEND``, ``beyond_velocity``, ``beyond_force``)."""
+    (slowest, fastest), (low, high) = model.domain.tangential_velocity, model.domain.normal_force
+    b0, b1, b2 = model.coefficients.tolist()
+    return BEND * abs(float(b0 + 0.5 * (slowest + fastest) * b1 + 0.5 * (low + high) * b2))
 
 
 def extrapolation(domain: Domain, tangential_velocity: float, normal_force: float) -> str | None:
@@ -197,14 +199,14 @@ def extrapolation(domain: Domain, tangential_velocity: float, normal_force: floa
     return "; ".join(remarks) or None
 
 
-def _interval(model: Model, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def _interval(model: Model, v: Number, f_n: Number) -> tuple[Number, Number]:
     """The friction expected at v and f_n, and the half-width of its 95 % interval."""
     from scipy import special  # takes longer to import than all else of this package
 
-    v, f_n = np.broadcast_arrays(np.asarray(tangential_velocity, float), np.asarray(normal_force, float))
-    x = np.stack([np.ones_like(v), v, f_n], axis=-1)
-    variance = np.maximum(np.einsum("...i,ij,...j->...", x, model.covariance, x), 0.0)
-    return x @ model.coefficients, np.asarray(special.stdtrit(model.degrees_of_freedom, 0.975) * np.sqrt(variance))
+    b0, b1, b2 = model.coefficients.tolist()
+    (c00, c01, c02), (c10, c11, c12), (c20, c21, c22) = model.covariance.tolist()
+    variance = c00 + v * (c01 + c10) + v * v * c11 + f_n * (c02 + c20 + v * (c12 + c21) + f_n * c22)
+    return b0 + v * b1 + f_n * b2, plain(special.stdtrit(model.degrees_of_freedom, 0.975)) * root(variance)
 
 
 def _knows_no_velocity(model: Model) -> bool:

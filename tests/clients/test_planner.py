@@ -140,6 +140,53 @@ def test_the_hyperbola_is_the_models_own_quantile_of_a_contact(
     assert abs(max(found, 0.0) - expected) <= 1e-12 * (size + 1.0)
 
 
+@search
+@given(models(), velocities, probabilities, st.booleans())
+def test_numbers_are_answered_as_arrays_are(
+    model: FrictionModel, velocity: float, probability: float, scatters: bool
+) -> None:
+    asked = replace(model, scales=SCALES if scatters else None)
+    for contact in (Contact.flat(AREA), Contact.round(AREA, at_force=5.0)):
+        options: dict[str, Any] = {"contacts": contact, "torque": 2e-3, "tangential_velocity": velocity}
+        many = required_normal_force(asked, np.array([1.5]), probability, **options)
+        if np.isnan(many.normal_force[0]):
+            with pytest.raises(NoFeasibleForce) as refusal:
+                required_normal_force(asked, 1.5, probability, **options)
+            assert many.outcome[0] == refusal.value.cause
+            continue
+        one = required_normal_force(asked, 1.5, probability, **options)
+        for name in ("normal_force", "element_force", "friction_coefficient", "elements"):
+            assert getattr(many, name)[0] == pytest.approx(getattr(one, name), rel=1e-11), name
+        assert many.support[0] == one.support
+
+
+@pytest.mark.parametrize("load", [1.5, np.float64(1.5)])
+def test_one_grasp_is_answered_in_plain_numbers(make_model: Make, load: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Arrays of one, and decompositions of 3 x 3 matrices, took most of the time."""
+
+    def refused(*_: Any, **__: Any) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(np.linalg, "eigh", refused)
+    for name in ("where", "asarray", "broadcast_arrays", "hypot", "sum", "any", "clip", "minimum", "einsum"):
+        monkeypatch.setattr(np, name, refused)
+    answer = required_normal_force(make_model(), load, contact_area=AREA, torque=1e-3)
+    assert type(answer.normal_force) is float
+
+
+@pytest.mark.parametrize("known", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.3, -2.0, 0.7)])
+def test_one_unknown_behind_all_coefficients_spreads_as_it_alone_does(
+    make_model: Make, known: tuple[float, float, float]
+) -> None:
+    """Such a covariance has two eigenvalues of 0, and rounding makes them negative as likely as not."""
+    way = 0.02 * np.array(known)
+    model = make_model((0.5, 0.0, 0.0), np.outer(way, way), scale=0.0, degrees_of_freedom=np.inf)
+    quantile = FrictionQuantile.of(model, 1e-3, 0.01)
+    for force in (0.01, 0.1):
+        spread = 2.3263478740408408 * abs(way @ [1.0, 1e-3, force])
+        assert quantile(force)[0] == pytest.approx(0.5 - spread, rel=1e-12)
+
+
 def test_a_contact_is_the_default_where_the_model_tells_its_scales(make_model: Make) -> None:
     without, scattering = make_model(), replace(make_model(), scales=SCALES)
     answers = {

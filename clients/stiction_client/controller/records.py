@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from stiction_client.elementwise import FloatArray
 from stiction_client.errors import InvalidArgument
-from stiction_client.linear_friction import FloatArray
 
 Mode = Literal["feel", "learn", "hold", "alarm"]
 """feel: friction unknown, regulated by the stick ratio; learn: the same, and the force falls until enough slips to be

@@ -7,8 +7,8 @@ import numpy as np
 
 from stiction_client.arguments import within
 from stiction_client.contacts import AREAS
+from stiction_client.elementwise import FloatArray
 from stiction_client.errors import InvalidArgument
-from stiction_client.linear_friction import FloatArray
 from stiction_client.model import FrictionModel
 
 QUANTILE = 0.05
