@@ -75,5 +75,16 @@ def test_a_box_lifted_in_mujoco_is_held_and_slips_with_less_friction(
     assert number(r"80% of that friction the box slips ([\d.]+) mm", text) > 50.0
 
 
+def test_a_box_is_held_in_drake_at_95_percent_of_its_friction_and_slips_at_105(
+    service_url: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("pydrake", reason="drake is not installed")
+    monkeypatch.setenv("STICTION_URL", service_url)
+    text = printed("hold_in_drake", capsys)
+    assert 2.0 * 0.3 * 8.0 < number(r"hold ([\d.]+) N", text) < 2.0 * 0.47 * 8.0
+    assert abs(number(r"at 95% of that the box moves at (-?[\d.]+) mm/s", text)) < 1.0
+    assert number(r"at 105% of that the box moves at ([\d.]+) mm/s", text) > 20.0
+
+
 def test_every_example_is_run_here() -> None:
     assert set(re.findall(r'printed\("(\w+)"', Path(__file__).read_text())) == set(EXAMPLES)
