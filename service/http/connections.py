@@ -1,20 +1,22 @@
 """HTTP connections that cannot be kept waiting, whichever parser reads them.
 
-Who is slow with a request's headers is let go, and so is who goes on with a body after its answer. No address may
-hold all connections, who sends requests without waiting for answers is read no faster than he is answered, and a
-request that two parsers could read differently is refused.
+Who is slow with a request's headers is let go, and so is who goes on with a body after its answer. Who sends much
+waits for the others (``service.http.turns``). No address may hold all connections, who sends requests without waiting
+for answers is read no faster than he is answered, and a request that two parsers could read differently is refused.
 """
 
 import asyncio
 import json
 from http import HTTPStatus
+from time import perf_counter
 from typing import Any
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 from uvicorn.config import Config
-from uvicorn.protocols.http.flow_control import FlowControl
+from uvicorn.protocols.http.flow_control import HIGH_WATER_LIMIT, FlowControl
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from service.http import turns
 from service.http.joined_writes import JoinedWrites
 from service.http.problems import BAD_REQUEST, MEDIA_TYPE, TOO_MANY_CONNECTIONS, ProblemType
 
@@ -26,6 +28,9 @@ As long may a body go on that was answered before it was whole: nobody reads it.
 
 RECEIVED_BYTES = 512 * 1024
 """Taken from a socket at once at most. With asyncio's own 256 KiB a body of 4 MB takes 11 ms to receive, not 7."""
+
+H11_BYTES = 4096
+"""Parsed at once by h11, which takes 30 ms for as many in chunks of a byte."""
 
 VERSIONS = frozenset({"1.0", "1.1"})
 BODY_HEADERS = frozenset({b"content-length", b"transfer-encoding"})
@@ -71,7 +76,7 @@ class BoundedConnection(asyncio.Protocol):
         self._most, self.limit_concurrency = self.limit_concurrency, None  # its own refusal is plain text
         self._per_address = per_address
         self._is_beyond = False
-        self._held = b""
+        self._held, self._waits_for_turn = b"", False
         self.idle_since = self.loop.time()
 
     @property
@@ -92,14 +97,34 @@ class BoundedConnection(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         """Parse until a request is whole, and hold back what is behind it until it is answered (RFC 9112, 9.3.2).
 
-        Parsed requests take many times the bytes that they are sent in.
+        Parsed requests take many times their bytes. What takes longer than a turn goes on in others.
         """
-        data, parsed = self._held + data, 0
+        data, parsed, end_of_turn = self._held + data, 0, perf_counter() + turns.TURN_SECONDS
         while parsed < len(data) and self._may_parse():
+            if parsed and perf_counter() >= end_of_turn:
+                self._wait_for_turn()
+                break
             end = parsed + self._parsed_at_once()
             self._parse(data[parsed:end])
             parsed = end
         self._hold(data[parsed:] if self._is_open() else b"")
+
+    def _wait_for_turn(self) -> None:
+        if not self._waits_for_turn:
+            self._waits_for_turn = True
+            turns.turns_of(self.loop).wait(self._take_turn)
+
+    def _take_turn(self) -> None:
+        self._waits_for_turn = False
+        self._parse_held()
+        if not self._held and self._is_open() and (self.is_idle or len(self.cycle.body) <= HIGH_WATER_LIMIT):
+            self.flow.resume_reading()
+
+    def _parse_held(self) -> None:
+        held = self._held
+        self._hold(b"")
+        if held:
+            self.data_received(held)
 
     def _hold(self, data: bytes) -> None:
         self._held, self._flow.is_holding = data, bool(data)
@@ -141,11 +166,9 @@ class BoundedConnection(asyncio.Protocol):
     def on_response_complete(self) -> None:
         """Begin to be idle, or go on with what came behind the request."""
         self.idle_since = self.loop.time()
-        held = self._held
-        self._hold(b"")
+        self._flow.is_holding = False
         super().on_response_complete()  # type: ignore[misc]  # of the server's protocol
-        if held:
-            self.data_received(held)
+        self._parse_held()
 
     def pause_writing(self) -> None:
         """Hold an answer back that is not read, for as long as some of it is."""
@@ -239,8 +262,8 @@ class H11Connection(BoundedConnection, H11Protocol):
     """Read by h11, in Python: where the compiled parser is not installed."""
 
     def _parsed_at_once(self) -> int:
-        """All that comes: h11 goes no further than to the end of a request."""
-        return RECEIVED_BYTES
+        """A part of what comes; h11 goes no further than to the end of a request."""
+        return H11_BYTES
 
 
 def ambiguity(scope: Scope) -> str | None:

@@ -1,10 +1,12 @@
 """The server's WebSocket connections, whose refusals are answers as any others."""
 
+from time import perf_counter
 from typing import Any, cast
 
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.frames import CloseCode, Frame
 
+from service.http import turns
 from service.http.joined_writes import JoinedWrites
 
 MOST_UNSENT_BYTES = 2**20
@@ -14,7 +16,7 @@ MOST_FRAGMENTS = 1024
 """Of one message; the bound on its bytes does not count those that are empty."""
 
 
-PARSED_BYTES = 4096
+PARSED_BYTES = 1024
 """Made into messages at once, until the application asks for more: small ones take many times their bytes."""
 
 
@@ -38,9 +40,23 @@ class WebSocketConnection(WebSocketsSansIOProtocol):
         return message
 
     def _parse(self) -> None:
-        while self._held and not self.read_paused and not self.transport.is_closing():
-            piece, self._held = self._held[:PARSED_BYTES], self._held[PARSED_BYTES:]
-            super().data_received(piece)
+        data, parsed, end_of_turn = self._held, 0, perf_counter() + turns.TURN_SECONDS
+        while parsed < len(data) and not self.read_paused and not self.transport.is_closing():
+            if parsed and perf_counter() >= end_of_turn:
+                self.read_paused = True
+                self.transport.pause_reading()
+                turns.turns_of(self.loop).wait(self._take_turn)
+                break
+            super().data_received(data[parsed : parsed + PARSED_BYTES])
+            self._answer_pings()
+            parsed += PARSED_BYTES
+        self._held = data[parsed:]
+
+    def _take_turn(self) -> None:
+        if self.read_paused and self.queue.empty() and not self.transport.is_closing():
+            self.read_paused = False
+            self.transport.resume_reading()
+        self._parse()
 
     async def send(self, message: Any) -> None:
         """Send what the application says."""
@@ -58,8 +74,12 @@ class WebSocketConnection(WebSocketsSansIOProtocol):
         cast(JoinedWrites, self.transport).watch()  # that of the connection which became this one
 
     def handle_ping(self) -> None:
-        """Answer, unless answers pile up."""
-        super().handle_ping()
+        """Leave it to be answered with the others that came with it."""
+
+    def _answer_pings(self) -> None:
+        """Send the answers, unless they pile up."""
+        if answers := b"".join(self.conn.data_to_send()):
+            self.transport.write(answers)
         if self.transport.get_write_buffer_size() > MOST_UNSENT_BYTES:
             self.transport.abort()
 

@@ -11,6 +11,7 @@ import httpx
 import pytest
 
 from service import serving as server
+from service.http import turns
 from service.http.connections import BoundedConnection, H11Connection
 from service.http.httptools_connections import HttpToolsConnection
 from service.http.request_middleware import MOST_HEADER_BYTES
@@ -271,7 +272,8 @@ def test_a_message_in_pieces_without_end_ends_the_connection(address: Address) -
         assert everything(connection)[2:4] == (1009).to_bytes(2)  # behind the opcode and the length
 
 
-TEXT, CLOSE, SMALL = 0x81, 0x88, 8
+TEXT, CLOSE, PING, SMALL = 0x81, 0x88, 0x89, 8
+PONG = bytes([0x8A, 0])
 
 
 def until_close(connection: socket.socket) -> bytes:
@@ -303,6 +305,24 @@ def test_small_messages_are_not_made_before_they_are_asked_for(address: Address,
         connection.sendall(frame(TEXT, b"{}") * 30_000)
         assert until_close(connection)[2:4] == (1003).to_bytes(2)
     assert 1 <= max(most_waiting.values()) <= PARSED_BYTES // SMALL
+
+
+def test_pings_are_answered_in_turns(address: Address, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A connection of nothing else kept all others waiting for as long as it lasted."""
+    taken: list[object] = []
+    wait = turns.Turns.wait
+    monkeypatch.setattr(turns, "TURN_SECONDS", 0.0)
+    monkeypatch.setattr(turns.Turns, "wait", lambda own, go_on: (taken.append(go_on), wait(own, go_on)))
+    pings = 10_000
+    with websocket(address) as connection:
+        connection.sendall(frame(PING) * pings)
+        said = b""
+        while len(said) < 2 * pings:
+            said += connection.recv(65536)
+        assert said == PONG * pings
+        assert len(taken) > 6 * pings // PARSED_BYTES // 2
+        connection.sendall(frame(CLOSE))
+        assert everything(connection)[:1] == bytes([CLOSE])
 
 
 def test_messages_that_wait_as_bytes_come_in_their_order(address: Address, most_waiting: Counter[int]) -> None:

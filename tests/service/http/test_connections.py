@@ -14,7 +14,7 @@ import pytest
 import uvicorn
 from starlette.types import Receive, Scope, Send
 
-from service.http import connections, joined_writes
+from service.http import connections, joined_writes, turns
 from service.http.connections import BoundedConnection, H11Connection
 from service.http.httptools_connections import HttpToolsConnection
 from service.http.request_middleware import MOST_HEADER_BYTES
@@ -28,14 +28,17 @@ Connect = Callable[[], socket.socket]
 
 
 async def hello(scope: Scope, receive: Receive, send: Send) -> None:
-    """Answers when it has the whole body, or early, and shortly or at length; the path comes back as a header."""
+    """Answers when it has the whole body, or early, and shortly or at length; headers tell the path and what came."""
     assert scope["type"] == "http"
-    while scope["path"] != "/early" and (await receive()).get("more_body"):
-        pass
+    received, is_read = 0, scope["path"] == "/early"
+    while not is_read:
+        message = await receive()
+        received, is_read = received + len(message.get("body", b"")), not message.get("more_body")
     if scope["path"] == "/slow":
         await asyncio.sleep(PATIENCE)
     body = LARGE if scope["path"] == "/large" else b"hello"
-    headers = [(b"content-length", str(len(body)).encode()), (b"path", scope["raw_path"])]
+    told = {b"content-length": str(len(body)).encode(), b"path": scope["raw_path"], b"received": b"%d" % received}
+    headers = [*told.items()]
     await send({"type": "http.response.start", "status": 200, "headers": headers})
     await send({"type": "http.response.body", "body": body})
 
@@ -303,3 +306,35 @@ def test_whoever_waits_for_more_of_a_request_has_nothing_behind_it_read(
 def send_until_shut(connection: socket.socket, data: bytes) -> None:
     with suppress(OSError):
         connection.sendall(data)
+
+
+@pytest.fixture
+def turns_taken(monkeypatch: pytest.MonkeyPatch) -> list[object]:
+    """What waited for a turn, with turns so short that each piece takes one."""
+    taken: list[object] = []
+    wait = turns.Turns.wait
+
+    def noted(waiting: turns.Turns, go_on: Callable[[], None]) -> None:
+        taken.append(go_on)
+        wait(waiting, go_on)
+
+    monkeypatch.setattr(turns, "TURN_SECONDS", 0.0)
+    monkeypatch.setattr(turns.Turns, "wait", noted)
+    return taken
+
+
+@pytest.mark.parametrize("chunk", [b"x", bytes(100_000)], ids=["of one byte", "large"])
+def test_a_body_in_chunks_is_parsed_in_turns_and_comes_whole(
+    connect: Connect, turns_taken: list[object], chunk: bytes
+) -> None:
+    count = 20_000 // len(chunk) or 20
+    framed = b"%x\r\n%b\r\n" % (len(chunk), chunk) * count + b"0\r\n\r\n"
+    behind = b"GET /behind HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
+    with connect() as connection:
+        connection.sendall(
+            b"POST / HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n" + framed + behind
+        )
+        answers = b"".join(iter(partial(connection.recv, 2**16), b""))
+    assert b"received: %d\r\n" % (count * len(chunk)) in answers
+    assert b"path: /behind" in answers
+    assert len(turns_taken) > len(framed) // connections.H11_BYTES // 2
