@@ -5,15 +5,15 @@ from dataclasses import dataclass, field
 from service.domain.context import Context
 from service.jobs.scrub import Scrub
 from service.observability.store_watch import StoreWatch
-from service.processes.fair_queue import FairQueue
+from service.processes.fair_queue import FairQueue, OpenEndedQueue
 from service.stream.sessions import Streams
 
 LONG_ANSWERS = 16
-"""With arrays, 8 MB each of 10⁶ frames, or with a file made for them, at once; half of them to one key or address."""
+"""With arrays, 8 MB each of 10⁶ frames, or with a file made for them, at once."""
 
 
 def _room_for_answers() -> FairQueue:
-    return FairQueue(LONG_ANSWERS, "answered")
+    return OpenEndedQueue(LONG_ANSWERS, "answered")
 
 
 @dataclass(frozen=True, slots=True)

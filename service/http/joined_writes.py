@@ -2,6 +2,7 @@
 
 import asyncio
 import fcntl
+import math
 import struct
 import termios
 from typing import Any
@@ -9,8 +10,8 @@ from typing import Any
 MOST_WAITING_BYTES = 64 * 1024
 """Written at once when there is more: a body of many parts is not to gather in memory."""
 
-UNREAD_SECONDS = 30.0
-"""s within which a client must read something of what waits for it; whoever reads nothing is let go."""
+UNREAD_SECONDS, SLOWEST_READ = 30.0, 10_000.0
+"""s between looks at whether a client reads what waits for it, and bytes/s that it must read, or it is let go."""
 
 
 class JoinedWrites:
@@ -60,21 +61,22 @@ class JoinedWrites:
         return self._size + self._transport.get_write_buffer_size()
 
     def watch(self) -> None:
-        """Let go a client that reads nothing, until all is sent: what waits for it is kept as long as it likes."""
+        """Let go a client that reads too slowly, until all is sent: what waits for it is kept for so long."""
         if self._look is None:
-            self._let_go_unless_read(-1)
+            self._let_go_unless_read(-math.inf)
 
-    def _let_go_unless_read(self, before: int) -> None:
-        """Look whether more than ``before`` bytes are read by now."""
+    def _let_go_unless_read(self, least: float) -> None:
+        """Look whether ``least`` bytes are read by now."""
         self._look = None
         unsent = self._transport.get_write_buffer_size()
         if unsent == 0:
             return
         read = self._sent - unsent - _unacknowledged(self._transport)
-        if read == before:
+        if read < least:
             self._transport.abort()
         else:
-            self._look = self._loop.call_later(UNREAD_SECONDS, self._let_go_unless_read, read)
+            least = read + max(1.0, UNREAD_SECONDS * SLOWEST_READ)
+            self._look = self._loop.call_later(UNREAD_SECONDS, self._let_go_unless_read, least)
 
     def _flush(self) -> None:
         if self._waiting:

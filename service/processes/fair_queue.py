@@ -92,9 +92,13 @@ class FairQueue:
     def _next(self) -> str | None:
         """The first owner with a share left, unless there is no room for it: then nobody overtakes it."""
         for owner, (first, *_) in self._waiting.items():
-            if self._taken[owner] + first.weight <= self._share and not first.turn.cancelled():
+            if self._taken[owner] + first.weight <= self._most(owner) and not first.turn.cancelled():
                 return owner if first.weight <= self._free else None
         return None
+
+    def _most(self, owner: str) -> int:  # noqa: ARG002  (of which it depends in others)
+        """Units that an owner may have by now."""
+        return self._share
 
     def _remove(self, owner: str, waiting: _Waiting) -> None:
         """Out of the queue; the owner's other work waits behind that of the other owners."""
@@ -103,3 +107,13 @@ class FairQueue:
             self._waiting.move_to_end(owner)
         else:
             del self._waiting[owner]
+
+
+class OpenEndedQueue(FairQueue):
+    """For work that lasts as long as its owner likes, in pieces of one unit: an owner has half of what others leave.
+
+    So there is some left for the next one, however many pieces the first few ask for and however long they keep them.
+    """
+
+    def _most(self, owner: str) -> int:
+        return (self._taken[owner] + self._free + 1) // 2

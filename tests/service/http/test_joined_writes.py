@@ -84,20 +84,28 @@ def test_nothing_is_sent_to_a_client_that_has_gone_since() -> None:
 
 
 @pytest.mark.parametrize(
-    ("unsent", "unacknowledged", "expected"),
+    ("unsent", "unacknowledged", "slowest", "expected"),
     [
-        ([0], [], ["close"]),
-        ([9, 7, 2, 0], [5, 5, 5], ["close"]),
-        ([9, 9, 9, 0], [5, 4, 3], ["close"]),  # of what the system had taken
-        ([9, 7, 7], [5, 5, 5], ["close", "abort"]),
+        ([0], [], 0.0, ["close"]),
+        ([9, 7, 2, 0], [5, 5, 5], 0.0, ["close"]),
+        ([9, 9, 9, 0], [5, 4, 3], 0.0, ["close"]),  # of what the system had taken
+        ([9, 7, 7], [5, 5, 5], 0.0, ["close", "abort"]),
+        ([9, 7, 5, 0], [5, 5, 5], 2e4, ["close"]),
+        ([9, 7, 6], [5, 5, 5], 2e4, ["close", "abort"]),
     ],
-    ids=["nothing", "read", "read slowly", "read no more"],
+    ids=["nothing", "read", "read slowly", "read no more", "fast enough", "too slowly"],
 )
-def test_who_reads_nothing_of_the_last_bytes_is_let_go(
-    unsent: list[int], unacknowledged: list[int], expected: list[str], monkeypatch: pytest.MonkeyPatch
+def test_who_does_not_read_the_last_bytes_is_let_go(
+    unsent: list[int],
+    unacknowledged: list[int],
+    slowest: float,
+    expected: list[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    """Two bytes a look are asked for by ``slowest``."""
     of_system = iter(unacknowledged)
-    monkeypatch.setattr(joined_writes, "UNREAD_SECONDS", 0.0)
+    monkeypatch.setattr(joined_writes, "UNREAD_SECONDS", 1e-4)
+    monkeypatch.setattr(joined_writes, "SLOWEST_READ", slowest)
     monkeypatch.setattr(joined_writes, "_unacknowledged", lambda _: next(of_system))
 
     async def told_after_closing() -> list[bytes | str]:

@@ -5,14 +5,14 @@ from typing import Any
 import pytest
 
 from service.processes import fair_queue
-from service.processes.fair_queue import FairQueue, QueueFull
+from service.processes.fair_queue import FairQueue, OpenEndedQueue, QueueFull
 
 
 class Crew:
     """Starts pieces of work that hold their turn until they are told to end."""
 
-    def __init__(self, capacity: int) -> None:
-        self.turns = FairQueue(capacity, "read")
+    def __init__(self, capacity: int, kind: type[FairQueue] = FairQueue) -> None:
+        self.turns = kind(capacity, "read")
         self.begun: list[str] = []
         self._ends: dict[str, asyncio.Event] = {}
         self._tasks: dict[str, asyncio.Task[None]] = {}
@@ -148,5 +148,24 @@ def test_nobody_waits_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
         await crew.end("a1")
         await crew.start("c1")
         assert crew.begun == ["a1", "c1"]
+
+    run(check)
+
+
+def test_of_what_lasts_as_long_as_one_likes_some_is_left_for_the_next() -> None:
+    async def check() -> None:
+        crew = Crew(16, OpenEndedQueue)
+        for owner in "abcd":
+            await crew.start(*(f"{owner}{k}" for k in range(10)))
+        assert [sum(name[0] == owner for name in crew.begun) for owner in "abcd"] == [8, 4, 2, 1]
+        await crew.start("e1")
+        assert crew.begun[-1] == "e1"
+        await crew.start("f1")
+        await crew.end("a1")
+        assert crew.begun[-1] == "f1"
+        await crew.end("a2")
+        assert crew.begun[-1] == "f1"  # who waits has as much as is left
+        await crew.start("g1")
+        assert crew.begun[-1] == "g1"
 
     run(check)
