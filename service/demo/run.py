@@ -108,7 +108,10 @@ def _sections(
             "Friction of each material",
             f"{wording.MODEL} Simulated grasps follow Coulomb's law, so β₁ and β₂ are truly 0; of the real recordings "
             "no truth is known.",
-            [tables.friction(answers, {log.material: log.truth for log in logs})],
+            [
+                tables.friction(answers, {log.material: log.truth for log in logs}),
+                *tables.reasons((f"{answer.material} by {answer.method}", answer.job) for answer in answers),
+            ],
         ),
         Section(
             "The planner's answer",
@@ -119,7 +122,11 @@ def _sections(
         Section(
             "The grasps",
             f"What the detector said of each grasp. {wording.STICK_RATIO} The real recordings carry no labels.",
-            [tables.grasps(uploads), tables.stages(uploads)],
+            [
+                tables.grasps(uploads),
+                *tables.reasons((upload.log.name, upload.receipt.job) for upload in uploads),
+                tables.stages(uploads),
+            ],
             draw_grasps(seen),
             folded=True,
         ),

@@ -38,12 +38,12 @@ class Answer:
 
 
 def friction(answers: Iterable[Answer], truths: Mapping[str, FrictionLaw | None]) -> Table:
-    """Coefficients with 95 % intervals, σ, and the truth where known; a refusal with its reason."""
+    """Coefficients with 95 % intervals, σ, and the truth where known; how the job ended where there is no model."""
     columns = ("material", "method", *COEFFICIENTS, "σ [-]", "true β₀")
     rows = []
     for answer in answers:
         if answer.model is None:
-            outcome = [f"{answer.job.status}: {answer.job.reason}", *[""] * 4]
+            outcome = [answer.job.status, *[""] * 4]
         else:
             outcome = _fitted(answer.model, truths[answer.material])
         rows.append([answer.material, answer.method, *outcome])
@@ -81,6 +81,12 @@ def stages(uploads: Sequence[Upload]) -> Table:
     return Table("Time per stage (median over the uploads)", ("stage", "time"), rows)
 
 
+def reasons(jobs: Iterable[tuple[str, Job]]) -> list[Table]:
+    """Why jobs, each of something by name, ended as they did, in a column with room for it; no table without any."""
+    rows = [(name, job.status, job.reason) for name, job in jobs if job.reason is not None]
+    return [Table("Reasons", ("of what", "outcome", "reason"), rows)] if rows else []
+
+
 def _fitted(model: FrictionModel, truth: FrictionLaw | None) -> list[str]:
     halves = 0.5 * np.diff(model.interval(0.95), axis=1).ravel()
     cells = [
@@ -98,7 +104,6 @@ def _grip(grip: RequiredForce | NoFeasibleForce | None) -> list[str]:
 
 def _grasp(upload: Upload) -> list[str]:
     receipt, seen = upload.receipt, upload.receipt.detection
-    outcome = receipt.job.status if receipt.job.reason is None else f"{receipt.job.status}: {receipt.job.reason}"
     detected = [""] * 6
     if seen is not None:
         detected = [
@@ -110,7 +115,7 @@ def _grasp(upload: Upload) -> list[str]:
             str(seen.samples),
         ]
     work = _milliseconds(sum(receipt.job.seconds.values()))
-    return [upload.log.name, *detected, outcome, work]
+    return [upload.log.name, *detected, receipt.job.status, work]
 
 
 def _milliseconds(seconds: float) -> str:

@@ -3,10 +3,15 @@
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
+from service.cli.output import print_table
+from service.demo import tables
 from service.demo.inputs import FRICTION
+from service.report.page import Table
 
 ROOT = Path(__file__).parents[2]
 RECORDINGS = ROOT / ".cache" / "tac3d" / "PyTac3D" / "example_data"
@@ -17,6 +22,33 @@ def demo(output: Path, *options: str) -> str:
     result = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert result.returncode == 0, result.stdout + result.stderr
     return result.stdout
+
+
+@pytest.mark.parametrize("kind", ["friction", "grasps"])
+def test_a_reason_stands_in_lines_of_words_within_100_columns(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    reason = "the samples tell too little: 12 samples in 1 grasp, and 30 are needed for a fit of three coefficients"
+    for table in _refused(kind, "example_2/HDL1-GWH0021", reason):
+        print_table(table.caption, table.columns, table.rows, width=100)
+    printed = capsys.readouterr().out
+    assert max(map(len, printed.splitlines())) <= 100
+    assert "samples tell too little: 12 samples in 1" in printed
+    assert "refused" in printed
+
+
+def test_jobs_that_end_well_have_no_table_of_reasons() -> None:
+    done: Any = SimpleNamespace(status="done", reason=None)
+    assert tables.reasons([("cardboard by ols", done)]) == []
+
+
+def _refused(kind: str, name: str, reason: str) -> list[Table]:
+    """The tables of a job that was refused: of a fit, or of an upload in which nothing was detected."""
+    job: Any = SimpleNamespace(status="refused", reason=reason, seconds={"frames": 0.5})
+    if kind == "friction":
+        answers = [tables.Answer(name, "bayes", job, None, None)]
+        return [tables.friction(answers, {name: None}), *tables.reasons([(f"{name} by bayes", job)])]
+    receipt: Any = SimpleNamespace(job=job, detection=None, frames=82)
+    log: Any = SimpleNamespace(name=name)
+    return [tables.grasps([tables.Upload(log, receipt)]), *tables.reasons([(name, job)])]
 
 
 @pytest.mark.long  # the demo once more, half a minute
