@@ -2,7 +2,11 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from sqlalchemy import event
 
+from db.database import Database
+from db.records import NewModel
+from db.repositories import friction_models, jobs, materials
 from tests.service.web.conftest import HOSTILE, OWN
 
 pytestmark = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -67,6 +71,25 @@ def test_a_long_list_comes_in_parts_that_lead_on(
         seen += [link for link in links if link.startswith("/materials/")]
         path = next((link for link in links if "cursor=" in link), "")
     assert seen == [f"/materials/m{number:02}" for number in reversed(range(70))]
+
+
+@pytest.mark.usefixtures("store")
+def test_the_first_page_asks_the_database_no_more_often_for_many_materials(
+    browser: Any, database: Database, new_model: NewModel
+) -> None:
+    asked: list[str] = []
+    event.listen(database.engine, "before_cursor_execute", lambda *given: asked.append(given[2]))
+    browser.get("/")
+    for_one = len([each for each in asked if each.startswith("SELECT")])
+    with database.write() as session:
+        for number in range(40):
+            material = materials.create(session, f"m{number:02}", "").id
+            job = jobs.add(session, "fit", "ols", material_id=material)
+            friction_models.add(session, material, job, new_model)
+    asked.clear()
+    page = browser.get("/").text
+    assert page.count("ols v1") == 41
+    assert 0 < len([each for each in asked if each.startswith("SELECT")]) <= for_one
 
 
 @pytest.mark.parametrize("typed", HOSTILE)
