@@ -24,11 +24,16 @@ def collect(
     options = {} if reconstruction is None else {"force_noise": reconstruction.force_noise}
     found = slipcore.collect_friction(log, history, **options)
     if len(found.samples) == 0:
-        slipping = int(history.slip.sum())
-        seen = f"no slip gave a friction sample ({slipping} slipping elements in {len(log)} frames)"
-        because = f"{seen}; an element counts once all around it slips: load it further, or press less"
-        return found, "; ".join(filter(None, (found.elements_left_out or because, _bound(found.contact))))
+        because = found.elements_left_out or _without_samples(log, history)
+        return found, "; ".join(filter(None, (because, _bound(found.contact))))
     return found, None
+
+
+def _without_samples(log: GraspLog, history: SlipHistory) -> str:
+    if not log.has_displacement:
+        return "forces alone tell slip but no velocity, so no friction samples"
+    seen = f"no slip gave a friction sample ({int(history.slip.sum())} slipping elements in {len(log)} frames)"
+    return f"{seen}; an element counts once all around it slips: load it further, or press less"
 
 
 def _without_forces(log: GraspLog) -> str:

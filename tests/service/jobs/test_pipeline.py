@@ -426,3 +426,11 @@ def test_samples_carry_the_noise_of_reconstructed_forces(blind: GraspLog) -> Non
     log = found.apply(blind)
     collected, _ = collect(log, slipcore.detect_slip(log), found)
     assert collected.elements.normal_force_noise == pytest.approx(found.force_noise / np.sqrt(2.0))
+
+
+def test_of_forces_alone_it_is_said_that_they_tell_no_velocity(shop: Shop, ramp: GraspLog) -> None:
+    _, job_id = shop.ingest(encode(replace(ramp, displacement=None, truth=None)))
+    job = shop.run(job_id)
+    assert job.status == "refused"
+    assert job.reason is not None
+    assert job.reason.startswith("forces alone tell slip but no velocity, so no friction samples")
