@@ -3,6 +3,7 @@
 import hashlib
 import os
 import re
+import shutil
 import time
 import uuid
 from collections.abc import Callable, Iterable, Iterator
@@ -133,7 +134,10 @@ class BlobStore:
     def clear_spool(self) -> None:
         """Remove what was under way when its process ended; only for one who works in the folder alone."""
         for path in self._spool.iterdir():
-            path.unlink(missing_ok=True)
+            if path.is_dir():  # of a report that was written there
+                shutil.rmtree(path)
+            else:
+                path.unlink(missing_ok=True)
 
     def put(self, content: bytes) -> str:
         """Store bytes and return their hash."""

@@ -87,6 +87,8 @@ def test_an_unknown_blob_is_named(blobs: BlobStore, name: str) -> None:
 def test_only_blobs_count_and_what_was_under_way_can_be_cleared(blobs: BlobStore, tmp_path: Path) -> None:
     kept = blobs.put(b"kept")
     (tmp_path / "spool" / "left").write_bytes(b"half an upload")
+    (tmp_path / "spool" / ".stiction-left.part").mkdir()
+    (tmp_path / "spool" / ".stiction-left.part" / "report").write_text("half a report")
     foreign = tmp_path / "blobs" / kept[:2] / "README"
     foreign.write_text("not ours")
     blobs.write_store_id("0" * 32)

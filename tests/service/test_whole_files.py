@@ -1,5 +1,6 @@
 """Files and folders that are written whole or not at all."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -47,9 +48,71 @@ def test_a_folder_takes_the_place_of_an_empty_one_alone(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["folder"]
 
 
-def test_what_a_killed_writer_left_does_not_stand_in_the_way(tmp_path: Path) -> None:
-    for name, make in (("file", lambda path: path.write_text("old")), ("folder", lambda path: path.mkdir())):
-        make(tmp_path / f"{name}.part")
+def test_what_is_named_like_a_part_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "file.part").write_text("mine")
+    (tmp_path / "folder.part").mkdir()
+    (tmp_path / "folder.part" / "notes").write_text("mine, too")
+    for name in ("file", "folder"):
         write_whole(tmp_path / name, lambda beside: beside.write_text("new"))
+        with pytest.raises(OSError, match="the disk is full"):
+            write_whole(tmp_path / name, half_a_file)
         assert (tmp_path / name).read_text() == "new"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "file.part", "folder", "folder.part"]
+    assert (tmp_path / "file.part").read_text() == "mine"
+    assert (tmp_path / "folder.part" / "notes").read_text() == "mine, too"
+
+
+def test_two_writers_of_one_name_do_not_meet(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+
+    def first(beside: Path) -> None:
+        beside.write_text("first, ")
+        write_whole(path, lambda other: other.write_text("second"))
+        assert path.read_text() == "second"
+        with beside.open("a") as stream:
+            stream.write("whole")
+
+    write_whole(path, first)
+    assert {each.name: each.read_text() for each in tmp_path.iterdir()} == {"file": "first, whole"}
+
+
+def test_what_a_killed_writer_left_is_hidden_and_does_not_stand_in_the_way(tmp_path: Path) -> None:
+    def killed(beside: Path) -> None:
+        beside.write_text("half")
+        os._exit(9)
+
+    path = tmp_path / "file"
+    child = os.fork()
+    if child == 0:
+        write_whole(path, killed)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 9
+    (left,) = tmp_path.iterdir()
+    assert left.name.startswith(".")
+    write_whole(path, lambda beside: beside.write_text("new"))
+    assert path.read_text() == "new"
+    assert {each.name for each in tmp_path.iterdir()} == {"file", left.name}
+
+
+def test_a_link_stays_one_and_leads_to_what_was_written(tmp_path: Path) -> None:
+    (tmp_path / "far").mkdir()
+    link = tmp_path / "link"
+    link.symlink_to(tmp_path / "far" / "file")
+    for text in ("one", "two"):
+        assert write_whole(link, lambda beside, text=text: beside.write_text(text)) == link
+        assert link.is_symlink()
+        assert (tmp_path / "far" / "file").read_text() == text
+    assert [path.name for path in (tmp_path / "far").iterdir()] == ["file"]
+
+
+def test_a_device_is_not_replaced(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(FileExistsError, match="pipe is there and is neither a file nor a folder"):
+        write_whole(tmp_path / "pipe", lambda beside: beside.write_text("new"))
+    assert (tmp_path / "pipe").is_fifo()
+
+
+def test_the_folder_that_one_works_in_is_refused_as_any_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(IsADirectoryError):
+        write_whole(Path(), lambda beside: beside.write_text("new"))
+    assert tmp_path.is_dir()
