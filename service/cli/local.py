@@ -146,6 +146,7 @@ def convert(
     from service.formats import writing
 
     name = writing.format_of(output)
+    check_output(output, log, mapping)
     grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
     writing.write(grasp, output, name)
     typer.echo(f"{output}: {len(grasp)} frames of {grasp.grid[0]} × {grasp.grid[1]} markers")
@@ -169,6 +170,7 @@ def export(
     from service import exports, formats
 
     target = exports.target_of(output)
+    exports.check_output(output, target)
     recordings = []
     for path in logs:
         grasp, history = detected(formats.read(path, mapping=mapping_text(mapping)), sensor_model, method)
@@ -176,6 +178,17 @@ def export(
     exports.write(recordings, output, target)
     frames = sum(len(recording.log) for recording in recordings)
     typer.echo(f"{output}: {frames} frames of {len(logs)} grasp(s), for {target}")
+
+
+def check_output(output: Path, *inputs: Path | None) -> None:
+    """Raises ``InvalidInput`` where a command would write over what it reads, or into it, by whatever name or link."""
+    from slipcore import InvalidInput
+
+    for path in inputs:
+        if path is None or not path.exists() or not output.exists():
+            continue
+        if output.samefile(path) or output.resolve().is_relative_to(path.resolve()):
+            raise InvalidInput("output", f"{output}, which is read", "another file")
 
 
 def mapping_text(path: Path | None) -> str | None:

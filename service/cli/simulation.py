@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from service.cli.exit_codes import INPUT_REFUSED
-from service.cli.local import Picture
+from service.cli.local import Picture, check_output
 from service.cli.output import print_json, print_lines, print_table
 from service.cli.progress import counted, patience
 from service.formatting import number
@@ -45,6 +45,8 @@ def simulate(
     from slipcore.contact import Scene
 
     wanted = Scene.from_toml(scene)
+    if output is not None:
+        check_output(output, Path(scene))
     if explain:
         _explain(wanted, seed, json)
         return

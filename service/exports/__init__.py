@@ -50,11 +50,24 @@ def target_of(output: Path) -> str:
     raise InvalidInput("output", output.name, f"a name with the ending {allowed}")
 
 
-def write(recordings: Sequence[Recording], output: Path, name: str) -> None:
-    """Write a file or a new folder, whole or not at all.
+def check_output(output: Path, name: str) -> None:
+    """Raises ``InvalidInput`` where something is that an export would take the place of, as it may be its input."""
+    if TARGETS[name].suffix:
+        if output.exists():
+            raise InvalidInput("output", output, "a file that is not there yet")
+    elif output.exists() and (output.is_file() or any(output.iterdir())):
+        raise InvalidInput("output", output, "a folder that is empty or not there yet")
+    elif output.resolve() == Path.cwd():  # the new folder would not be the one that the shell is in
+        raise InvalidInput("output", f"{output}, the folder that you are in", "another, empty or not there yet")
 
-    Raises ``InvalidInput``, for a folder that is not empty, too, and ``UnsupportedFormat`` where a library is missing.
+
+def write(recordings: Sequence[Recording], output: Path, name: str) -> None:
+    """Write a new file or folder, whole or not at all.
+
+    Raises as ``check_output``, ``InvalidInput`` for several logs in a file of one, and ``UnsupportedFormat`` where a
+    library is missing.
     """
+    check_output(output, name)
     target = TARGETS[name]
     if len(recordings) > 1 and not target.takes_many:
         raise InvalidInput("logs", len(recordings), f"one log a file for {name}")
@@ -65,6 +78,4 @@ def write(recordings: Sequence[Recording], output: Path, name: str) -> None:
             raise
         missing = f"{error.name}, which is not installed"
         raise UnsupportedFormat(f"library of {name}", missing, target.install) from error
-    if not target.suffix and output.exists() and (output.is_file() or any(output.iterdir())):
-        raise InvalidInput("output", output, "a folder that is empty or not there yet")
     write_whole(output, lambda beside: module.write(recordings, beside))
