@@ -98,10 +98,10 @@ def ended_since(session: Session, moment: datetime) -> list[Job]:
     return [record(*row) for row in session.execute(query.order_by(JobRow.finished_at))]
 
 
-def is_fit_queued(session: Session, material_id: int, method: str) -> bool:
-    """Whether a fit of this material by this method waits for a runner."""
+def queued_fit(session: Session, material_id: int, method: str) -> str | None:
+    """Id of a fit of this material by this method that no runner takes before the end of the transaction, if any."""
     same = (JobRow.material_id == material_id, JobRow.status == "queued", JobRow.kind == "fit", JobRow.method == method)
-    return session.scalar(select(JobRow.id).where(*same).limit(1)) is not None
+    return session.scalar(select(JobRow.id).where(*same).limit(1).with_for_update())
 
 
 def any_queued(session: Session, *, only_short: bool = False) -> bool:

@@ -125,9 +125,15 @@ def begin_epoch(
 def withdraw(
     context: Context, log_id: str, because: str, principal: Principal = ANONYMOUS
 ) -> tuple[StoredGraspLog, list[Job]]:
-    """Take a log out of its material's fits, and fit again without it; raises as ``change``."""
+    """Take a log out of its material's fits, and fit again without it, or only renew the reason; raises as ``change``.
+
+    ``QuotaExceeded`` is for a renewed reason alone.
+    """
     with context.database.write() as session:
         material_id = _material_to_change(session, log_id, principal)
+        known = grasp_logs.get(session, log_id).withdrawal
+        if known is not None and known.because != because:
+            quotas.check_change(session, context.settings, principal.key_id)
         before = grasp_logs.withdraw(session, log_id, because, principal.key_id)
         if before is None or before.because != because:
             audit.add(session, principal.actor, "grasp_log.withdrawn", log_id, {"reason": because})
@@ -141,6 +147,8 @@ def restore(context: Context, log_id: str, principal: Principal = ANONYMOUS) -> 
     """Put a withdrawn log back into its material's fits, and fit again with it; raises as ``change``."""
     with context.database.write() as session:
         material_id = _material_to_change(session, log_id, principal)
+        if grasp_logs.get(session, log_id).withdrawal is not None:
+            quotas.check_change(session, context.settings, principal.key_id)
         was_withdrawn = grasp_logs.restore(session, log_id)
         if was_withdrawn:
             audit.add(session, principal.actor, "grasp_log.restored", log_id)
@@ -188,11 +196,13 @@ def _refit_without(session: Session, material_id: int | None, key_id: str | None
 
 
 def _queue_refits(session: Session, material_id: int, methods: Iterable[str], key_id: str | None) -> list[Job]:
+    """The fits by these methods, those that are queued already among them: they begin after this transaction."""
     if not detections.any_samples(session, material_id):
         return []
     friction_models.mark_outdated(session, material_id)
     ids = [
-        queue(session, "fit", method, material_id=material_id, requested_by=key_id)
+        jobs.queued_fit(session, material_id, method)
+        or queue(session, "fit", method, material_id=material_id, requested_by=key_id)
         for method in sorted({REFITTED, *methods})
     ]
     return [jobs.get(session, job_id) for job_id in ids]

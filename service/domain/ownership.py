@@ -4,9 +4,13 @@ from sqlalchemy.orm import Session
 
 from db.errors import NotFound
 from db.repositories import access_keys, audit, materials, owners
+from service.domain import quotas
 from service.domain.context import Context
 from service.domain.errors import InsufficientScope, InvalidValue, NotOwner, UnknownOwner
 from service.domain.principal import Principal
+
+MOST_OWNERS = 100
+"""Of one material."""
 
 
 def check_may_add(session: Session, material_id: int, principal: Principal) -> None:
@@ -34,13 +38,19 @@ def list_owners(context: Context, material: str) -> list[str]:
 def add_owner(context: Context, material: str, owner: str, principal: Principal) -> list[str]:
     """Let a key or a group own a material, too.
 
-    Raises as ``check_may_change``, ``NotFound``, and ``InvalidValue`` for a key that is not stored.
+    Raises as ``check_may_change``, ``NotFound``, ``QuotaExceeded`` for a key that has changed as much as it may, and
+    ``InvalidValue`` for a key that is not stored and for an owner more than a material may have.
     """
     with context.database.write() as session:
         material_id = materials.find_id(session, material)
         check_may_change(session, material_id, principal)
         _check_owner(session, owner)
+        known = owners.of_material(session, material_id)
+        if owner not in known:
+            quotas.check_change(session, context.settings, principal.key_id)
         if owners.add(session, material_id, owner):
+            if len(known) >= MOST_OWNERS:
+                raise InvalidValue("owners", len(known) + 1, f"at most {MOST_OWNERS} of a material")
             audit.add(session, principal.actor, "owner.added", material, {"owner": owner})
         return owners.of_material(session, material_id)
 

@@ -52,5 +52,5 @@ def queue(
 def queue_cheap_refits(session: Session, material_id: int, requested_by: str | None) -> None:
     """Let outdated models of a material be fitted again where that is cheap, and is not queued already."""
     for method in friction_models.outdated_methods(session, material_id):
-        if method in CHEAP_METHODS and not jobs.is_fit_queued(session, material_id, method):
+        if method in CHEAP_METHODS and jobs.queued_fit(session, material_id, method) is None:
             queue(session, "fit", method, material_id=material_id, requested_by=requested_by)

@@ -18,8 +18,18 @@ from service.domain.errors import QuotaExceeded, StorageQuotaExceeded
 from service.settings import Settings
 
 DAY = timedelta(days=1)
-CHANGES: tuple[AuditAction, ...] = ("material.created", "material.changed", "alias.added", "sensor.described")
-"""Those of which a key could otherwise store any number; what takes a name or a log away is never refused."""
+CHANGES: tuple[AuditAction, ...] = (
+    "material.created",
+    "material.changed",
+    "alias.added",
+    "owner.added",
+    "sensor.described",
+    "grasp_log.withdrawn",
+    "grasp_log.restored",
+)
+"""Those of which a key could otherwise store any number. What takes a name or a log away is never refused: the first
+withdrawal of a log counts, and another reason for it, or its being taken back, may be refused.
+"""
 
 JOBS_RETRY_SECONDS, LOGS_RETRY_SECONDS = 10, 3600
 

@@ -111,7 +111,7 @@ def begin_epoch(context: CurrentContext, name: str, new: NewEpoch, principal: Cu
     tags=["grasp logs"],
     dependencies=[UPLOAD],
     summary="Withdraw a grasp log",
-    responses=problems(NOT_OWNER, UNKNOWN_GRASP_LOG, *_BODY),
+    responses=problems(NOT_OWNER, UNKNOWN_GRASP_LOG, QUOTA_EXCEEDED, *_BODY),
 )
 def withdraw_grasp_log(
     context: CurrentContext,
@@ -132,7 +132,7 @@ def withdraw_grasp_log(
     tags=["grasp logs"],
     dependencies=[UPLOAD],
     summary="Take a withdrawal back",
-    responses=problems(NOT_OWNER, UNKNOWN_GRASP_LOG, INVALID_REQUEST, STORAGE_UNAVAILABLE),
+    responses=problems(NOT_OWNER, UNKNOWN_GRASP_LOG, QUOTA_EXCEEDED, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
 def restore_grasp_log(context: CurrentContext, id: str, principal: CurrentPrincipal) -> WithdrawnOut:  # noqa: A002
     """The log counts again, and its material's models are fitted again with it."""

@@ -11,6 +11,7 @@ from service.http.descriptions import problems
 from service.http.problems import (
     INVALID_REQUEST,
     NOT_OWNER,
+    QUOTA_EXCEEDED,
     STORAGE_UNAVAILABLE,
     UNKNOWN_MATERIAL,
     UNKNOWN_OWNER,
@@ -37,7 +38,10 @@ def list_owners(context: CurrentContext, name: str) -> OwnersOut:
 
 
 @router.put(
-    "/{owner}", dependencies=[UPLOAD], summary="Let another own a material", responses=problems(NOT_OWNER, *_ALWAYS)
+    "/{owner}",
+    dependencies=[UPLOAD],
+    summary="Let another own a material",
+    responses=problems(NOT_OWNER, QUOTA_EXCEEDED, *_ALWAYS),
 )
 def add_owner(context: CurrentContext, name: str, owner: Owner, principal: CurrentPrincipal) -> OwnersOut:
     """For its owners, and admins."""

@@ -21,6 +21,9 @@ def _storable(text: str) -> str:
 
 Name = Annotated[str, Field(pattern=NAME_PATTERN, description="1 to 100 letters, digits, spaces and `._-`.")]
 Text = Annotated[str, Field(max_length=10_000), AfterValidator(_storable)]
+Reason = Annotated[str, Field(min_length=1, max_length=1_000), AfterValidator(_storable)]
+"""Why a log counts no more: kept with the log and in the audit trail. Those from before may be longer."""
+
 Reference = Annotated[str, AfterValidator(_storable)]
 """The name or id of what may be stored."""
 

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic.config import JsonDict
 
 from db.records import Detection, StoredGraspLog, Withdrawal
-from service.http.schemas.common import MOMENT_EXAMPLE, Body, Next, Text
+from service.http.schemas.common import MOMENT_EXAMPLE, Body, Next, Reason
 from service.http.schemas.jobs import JOB_EXAMPLE, JobOut
 
 FINDING_EXAMPLE: JsonDict = {
@@ -62,7 +62,7 @@ class NewWithdrawal(Body):
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"reason": "the sensor was wet"}]})
 
-    reason: Annotated[Text, Field(min_length=1)]
+    reason: Reason
 
 
 class WithdrawalOut(BaseModel):

@@ -8,7 +8,7 @@ from pydantic.config import JsonDict
 
 from db.records import Material
 from service.domain.recommended import Recommended, recommended
-from service.http.schemas.common import MOMENT_EXAMPLE, Body, Name, Next, Reference, Text
+from service.http.schemas.common import MOMENT_EXAMPLE, Body, Name, Next, Reason, Reference, Text
 from service.http.schemas.jobs import JOB_EXAMPLE, JobOut
 from service.http.schemas.models import MODEL_EXAMPLE, FrictionModelOut
 
@@ -62,7 +62,7 @@ class NewEpoch(Body):
         }
     )
 
-    reason: Annotated[Text, Field(min_length=1)]
+    reason: Reason
     first_grasp_log: Annotated[
         Reference | None, Field(description="Id of the first log of the epoch; null: the next that comes")
     ] = None

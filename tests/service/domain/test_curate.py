@@ -144,6 +144,19 @@ def test_a_withdrawn_log_leaves_every_fit_and_comes_back(shop: Shop) -> None:
     assert curate.restore(shop.context, good)[1] == []
 
 
+def test_a_fit_that_is_queued_already_is_named_and_not_queued_again(shop: Shop) -> None:
+    shop.ingest("paper", 0)
+    log = shop.ingest("paper", 1)
+    first = [job.id for job in curate.withdraw(shop.context, log, "wet")[1]]
+    assert first
+    for _ in range(3):
+        assert [job.id for job in curate.restore(shop.context, log)[1]] == first
+        assert [job.id for job in curate.withdraw(shop.context, log, "wet")[1]] == first
+    assert [job.status for job in shop.work()] == ["done"] * len(first)
+    begun = [job.id for job in curate.restore(shop.context, log)[1]]
+    assert not {*begun} & {*first}  # those are done
+
+
 @pytest.mark.parametrize("withdrawn_at", ["once it is stored", "while it is detected"])
 def test_a_log_that_is_withdrawn_before_its_samples_are_stored_outdates_no_model(
     shop: Shop, monkeypatch: pytest.MonkeyPatch, withdrawn_at: str

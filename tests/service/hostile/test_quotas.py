@@ -11,7 +11,7 @@ import pytest
 from db.blobs import BlobStore
 from db.database import Database
 from db.repositories import access_keys, usage
-from service.domain import curate, keys, upload
+from service.domain import curate, keys, ownership, upload
 from service.domain.errors import DomainError
 from service.domain.principal import Principal
 from service.formats.reading import Description
@@ -154,12 +154,15 @@ CHANGES: tuple[tuple[str, str, dict[str, Any] | None], ...] = (
     ("POST", "/v1/materials", {"name": "glass"}),
     ("PATCH", "/v1/materials/paper", {"description": "thin"}),
     ("PUT", "/v1/materials/paper/aliases/A4", None),
+    ("PUT", "/v1/materials/paper/owners/group:lab", None),
     ("PUT", "/v1/sensors/finger", {"young_modulus": 2.5e5, "poisson_ratio": 0.48}),
 )
 
 
 @ONLY_SQLITE
-@pytest.mark.parametrize(("method", "path", "body"), CHANGES, ids=["material", "description", "alias", "sensor"])
+@pytest.mark.parametrize(
+    ("method", "path", "body"), CHANGES, ids=["material", "description", "alias", "owner", "sensor"]
+)
 def test_a_key_that_has_changed_as_much_as_it_may_changes_no_more(
     reach: Callable[..., Any], key: str, method: str, path: str, body: dict[str, Any] | None
 ) -> None:
@@ -171,6 +174,44 @@ def test_a_key_that_has_changed_as_much_as_it_may_changes_no_more(
     assert "STICTION_KEY_CHANGES_A_DAY" in refused.json()["detail"]
     assert "retry-after" in refused.headers
     assert free.request(method, path, **more).is_success
+
+
+@ONLY_SQLITE
+@pytest.mark.parametrize(("method", "body"), [("PUT", {"reason": "torn"}), ("DELETE", None)], ids=["reason", "restore"])
+def test_a_withdrawal_counts_and_is_never_refused_but_no_more_is_done_with_it(
+    reach: Callable[..., Any], key: str, contents: list[bytes], method: str, body: dict[str, str] | None
+) -> None:
+    client = reach(key=key, key_changes_a_day=1)
+    client.request("POST", "/v1/materials", json={"name": "paper"}).raise_for_status()
+    headers = {**client.headers, **HEADERS}
+    sent = client.request("POST", "/v1/grasp-logs?material=paper", content=contents[0], headers=headers)
+    path = f"/v1/grasp-logs/{sent.raise_for_status().json()['id']}/withdrawal"
+    for _ in range(2):  # once more it changes nothing
+        withdrawn = client.request("PUT", path, json={"reason": "wet"})
+    refused = client.request(method, path, json=body)
+    assert (refused.status_code, refused.json()["type"]) == (429, "/problems/quota-exceeded")
+    told = client.get(path.removesuffix("/withdrawal")).json()["withdrawal"]
+    assert told == withdrawn.raise_for_status().json()["grasp_log"]["withdrawal"]
+
+
+@ONLY_SQLITE
+@pytest.mark.parametrize("path", ["/v1/grasp-logs/none/withdrawal", "/v1/materials/none/epochs"])
+def test_a_reason_has_a_bounded_length(reach: Callable[..., Any], path: str) -> None:
+    client, method = reach("open"), "PUT" if "logs" in path else "POST"
+    assert client.request(method, path, json={"reason": "a" * 1000}).status_code == 404
+    assert client.request(method, path, json={"reason": "a" * 1001}).status_code == 422
+
+
+@ONLY_SQLITE
+def test_a_material_has_a_bounded_number_of_owners(reach: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ownership, "MOST_OWNERS", 2)
+    client = reach("open")
+    client.request("POST", "/v1/materials", json={"name": "paper"}).raise_for_status()
+    for owner in ("group:a", "group:b", "group:b"):  # once more it is known
+        client.request("PUT", f"/v1/materials/paper/owners/{owner}").raise_for_status()
+    refused = client.request("PUT", "/v1/materials/paper/owners/group:c")
+    assert (refused.status_code, refused.json()["name"], refused.json()["allowed"][:9]) == (422, "owners", "at most 2")
+    assert client.get("/v1/materials/paper/owners").json()["owners"] == ["group:a", "group:b"]
 
 
 @ONLY_SQLITE
