@@ -3,6 +3,8 @@
 import logging
 import os
 import signal
+import socket
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -38,10 +40,15 @@ def serve(
     _prepare(settings)
     chosen = configuration(settings)
     server = uvicorn.Server(chosen)
-    server.run()
-    if not server.started:  # its log says why
+    with suppress(SystemExit):  # its own, of a start that failed
+        server.run()
+    if not server.started:
         error = getattr(getattr(chosen.app, "state", None), "start_error", None)
-        raise typer.Exit((error and exit_code(error)) or FAILURE)
+        if error is None:
+            _require_address(settings)
+        elif exit_code(error) is not None:
+            raise error  # told once more: the log ends with what says nothing
+        raise typer.Exit(FAILURE)
 
 
 def open_dashboard(url: Url = DEFAULT_URL) -> None:
@@ -96,6 +103,21 @@ def demo(
     from service.demo.run import run_demo
 
     run_demo(output, recordings, seed, partial(print_table, width=100))
+
+
+def _require_address(settings: "Settings") -> None:
+    """Raises ``OSError`` where this machine cannot listen at the address and the port."""
+    try:
+        with socket.create_server((settings.host, settings.port), family=_family(settings.host)):
+            pass
+    except (OSError, UnicodeError) as error:
+        named = f"STICTION_HOST (--host) is {settings.host!r} and STICTION_PORT (--port) {settings.port}"
+        why = getattr(error, "strerror", None) or error
+        raise OSError(f"{named}: {why}; allowed: an address of this machine, and a free port") from error
+
+
+def _family(host: str) -> socket.AddressFamily:
+    return socket.getaddrinfo(host, None, type=socket.SOCK_STREAM)[0][0]
 
 
 def _prepare(settings: "Settings") -> None:
