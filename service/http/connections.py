@@ -44,6 +44,11 @@ class _HoldingFlow(FlowControl):
 
     is_holding = False
 
+    def pause_reading(self) -> None:
+        """Read no more, also where the server resumed past this object, as it does with h11."""
+        self.read_paused = True
+        self._transport.pause_reading()
+
     def resume_reading(self) -> None:
         """Go on reading, unless bytes are held back: who waits for more of a request has it among those."""
         if not self.is_holding:
@@ -159,6 +164,8 @@ class BoundedConnection(asyncio.Protocol):
         self._stop_waiting()
         refusal = self._refusal(self.scope) or _fault_of_handshake(self.scope)
         if refusal is None and self.is_idle:
+            self._hold(b"")
+            self.flow.resume_reading()  # which a turn that ended within the handshake has paused
             super().handle_websocket_upgrade(*event)  # type: ignore[misc]  # of the server's protocol
         else:
             self._end(*(refusal or (BAD_REQUEST, "a WebSocket is asked for before another answer is whole")))

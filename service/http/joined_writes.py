@@ -10,7 +10,7 @@ from typing import Any
 MOST_WAITING_BYTES = 64 * 1024
 """Written at once when there is more: a body of many parts is not to gather in memory."""
 
-UNREAD_SECONDS, SLOWEST_READ = 30.0, 10_000.0
+UNREAD_SECONDS, SLOWEST_READ = 30.0, 5_000.0
 """s between looks at whether a client reads what waits for it, and bytes/s that it must read, or it is let go."""
 
 

@@ -53,7 +53,8 @@ class WebSocketConnection(WebSocketsSansIOProtocol):
         self._held = data[parsed:]
 
     def _take_turn(self) -> None:
-        if self.read_paused and self.queue.empty() and not self.transport.is_closing():
+        is_wanted = self.close_sent or self.queue.empty()  # after the close all is passed over but the client's own
+        if self.read_paused and is_wanted and not self.transport.is_closing():
             self.read_paused = False
             self.transport.resume_reading()
         self._parse()

@@ -276,10 +276,21 @@ TEXT, CLOSE, PING, SMALL = 0x81, 0x88, 0x89, 8
 PONG = bytes([0x8A, 0])
 
 
+def opcodes(received: bytes) -> list[int]:
+    """Of the frames that have come."""
+    found, at = [], 0
+    while at + 2 <= len(received):
+        found.append(received[at])
+        size, at = received[at + 1], at + 2
+        more = {126: 2, 127: 8}.get(size, 0)
+        at += more + (int.from_bytes(received[at : at + more]) if more else size)
+    return found
+
+
 def until_close(connection: socket.socket) -> bytes:
     """What the server sends on a WebSocket until it closes, which is answered: else it waits 10 s for that."""
     received = b""
-    while CLOSE not in received:
+    while CLOSE not in opcodes(received):
         received += connection.recv(65536)
     connection.sendall(frame(CLOSE))
     return received + everything(connection)
@@ -323,6 +334,33 @@ def test_pings_are_answered_in_turns(address: Address, monkeypatch: pytest.Monke
         assert len(taken) > 6 * pings // PARSED_BYTES // 2
         connection.sendall(frame(CLOSE))
         assert everything(connection)[:1] == bytes([CLOSE])
+
+
+@pytest.mark.parametrize("behind", [b"", b"POST /login HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n"])
+def test_a_websocket_whose_handshake_takes_several_turns_is_read(
+    address: Address, monkeypatch: pytest.MonkeyPatch, behind: bytes
+) -> None:
+    monkeypatch.setattr(turns, "TURN_SECONDS", 0.0)
+    headers = b"".join(b"X-%d: %b\r\n" % (k, b"x" * 100) for k in range(100))
+    before = behind and behind + b"1\r\nx\r\n" * 20_000 + b"0\r\n\r\n"
+    with closing(socket.create_connection(address, timeout=20.0)) as connection:
+        connection.sendall(before + HANDSHAKE + headers + b"\r\n")
+        said = b""
+        while b"101 Switching" not in said or not said.endswith(b"\r\n\r\n"):
+            said += connection.recv(4096)
+        connection.sendall(frame(PING))
+        assert connection.recv(4096) == PONG
+
+
+def test_pings_behind_the_last_message_do_not_delay_the_close(
+    address: Address, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(turns, "TURN_SECONDS", 0.0)
+    began = time.monotonic()
+    with websocket(address) as connection:
+        connection.sendall(frame(TEXT, b"{}") + frame(PING) * 20_000)
+        until_close(connection)
+    assert time.monotonic() - began < 8.0  # the server gives the close 10 s
 
 
 def test_messages_that_wait_as_bytes_come_in_their_order(address: Address, most_waiting: Counter[int]) -> None:

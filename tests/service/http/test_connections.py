@@ -338,3 +338,17 @@ def test_a_body_in_chunks_is_parsed_in_turns_and_comes_whole(
     assert b"received: %d\r\n" % (count * len(chunk)) in answers
     assert b"path: /behind" in answers
     assert len(turns_taken) > len(framed) // connections.H11_BYTES // 2
+
+
+def test_what_is_held_back_behind_an_early_answer_pauses_reading(connect: Connect, turns_taken: list[object]) -> None:
+    """The server's h11 resumes reading by itself at the end of a body whose answer was early."""
+    del turns_taken
+    head = b"POST /early HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n"
+    with connect() as connection:
+        connection.sendall(head + b"1\r\nx\r\n" * 5_000 + b"0\r\n\r\nGET /large HTTP/1.1\r\nHost: a\r\n\r\n")
+        connection.settimeout(2.0)
+        sent, block = 0, bytes(2**18)
+        with suppress(TimeoutError, ConnectionResetError, BrokenPipeError):
+            while sent < 2**26:
+                sent += connection.send(block)
+    assert sent < 2**25
