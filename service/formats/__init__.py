@@ -209,7 +209,7 @@ def _sniff(path: Path, is_mapped: bool) -> str:
         header = start.splitlines()[0].decode("utf-8", "replace")[:60]
         raise UnsupportedFormat("file", f"a table that begins with {header!r}", TABLES)
     if not start:
-        raise UnsupportedFormat("file", "empty", "a grasp log")
+        raise UnsupportedFormat("file", "empty")
     raise UnsupportedFormat(
         "file", f"of no known format (it starts with {start[:4]!r})", f"{', '.join(FORMATS)} ({PAGE})"
     )
