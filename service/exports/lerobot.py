@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from service.exports import Recording
 from service.formats.parquet import LOG_KEY
 from slipcore.errors import InvalidInput
+from slipcore.frames import GraspLog
 from slipcore.slip_state import element_states
 from stiction_client.container import members
 
@@ -54,13 +55,19 @@ def write(recordings: Sequence[Recording], folder: Path) -> None:
 
 def _check_alike(recordings: Sequence[Recording]) -> None:
     first = recordings[0].log
-    present = [name for name in VECTORS if getattr(first, name) is not None]
+    present = list(_vectors(first))
     for recording in recordings[1:]:
         log = recording.log
-        if [name for name in VECTORS if getattr(log, name) is not None] != present:
+        if list(_vectors(log)) != present:
             raise InvalidInput(recording.name, "with other members than the first log", f"those: {', '.join(present)}")
         if not np.array_equal(log.position, first.position):
             raise InvalidInput(recording.name, "of a sensor with other markers", "logs of one sensor in a data set")
+
+
+def _vectors(log: GraspLog) -> Columns:
+    """The features that the log has, by name."""
+    told = {name: getattr(log, name) for name in VECTORS if name != "displacement" or log.has_displacement}
+    return {name: values for name, values in told.items() if values is not None}
 
 
 def _frame_rate(recordings: Sequence[Recording]) -> int:
@@ -77,9 +84,8 @@ def _episode(recording: Recording, number: int, rate: int) -> Columns:
     """The frames of a log. Time runs evenly in ``timestamp``, as LeRobot wants it; the log's own is beside it."""
     log, history = recording.log, recording.history
     frames = np.arange(len(log))
-    given = {name: getattr(log, name) for name in VECTORS if getattr(log, name) is not None}
     return {
-        **{f"observation.{name}": values.astype(np.float32) for name, values in given.items()},
+        **{f"observation.{name}": values.astype(np.float32) for name, values in _vectors(log).items()},
         "observation.slip_state": element_states(history.contact, history.slip),
         "observation.stick_ratio": np.nan_to_num(history.stick_ratio, nan=1.0).astype(np.float32),
         "observation.time": log.time,

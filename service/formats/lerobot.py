@@ -76,10 +76,11 @@ def _info(folder: Path) -> dict[str, Any]:
 
 
 def _check_features(features: dict[str, Any], mapping: FieldMapping) -> None:
-    """Raises ``InvalidInput`` where what slip is found from is not there, with what is."""
+    """Raises ``InvalidInput`` where what slip is found from, displacement or forces, is not there, with what is."""
     origin = mapping.origins.get("displacement")
+    has_forces = "force" in mapping.origins or "observation.force" in features
     wanted = origin.fields if origin else ("observation.displacement",)
-    missing = [name for name in wanted if name not in features]
+    missing = [name for name in wanted if name not in features and (origin or not has_forces)]
     if missing:
         given = ", ".join(f"{name} {feature['shape']}" for name, feature in features.items() if "." in name)
         allowed = f"a mapping that names the features of the markers; the data set has {given or 'no observations'}"

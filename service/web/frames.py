@@ -70,7 +70,7 @@ def _add_patches(arrays: Arrays, header: dict[str, Any], patches: StoredPatches,
 def _add_vectors(arrays: Arrays, header: dict[str, Any], log: GraspLog, shown: slice) -> None:
     """Displacement and force of each element along columns and rows of the lattice, and the resultants, N."""
     axes = lattice_axes(log.position)
-    if log.displacement is not None:
+    if log.has_displacement:
         arrays["displacement"], header["displacement"] = _scaled(log.displacement[shown, ..., :2] @ axes)
     if log.force is not None:
         arrays["force"], header["force"] = _scaled(log.force[shown, ..., :2] @ axes)

@@ -142,6 +142,16 @@ def test_an_episode_is_read_back_as_a_log(folder: Path, recording: Recording, se
     assert (back.element_area, back.sensor, back.contact) == (log.element_area, log.sensor, None)
 
 
+def test_a_log_of_forces_alone_stays_one(recording: Recording, tmp_path: Path) -> None:
+    alone = Recording(replace(recording.log, displacement=None, truth=None), recording.history, "alone")
+    exports.write([alone], tmp_path / "alone", "lerobot")
+    assert "observation.displacement" not in pq.read_table(tmp_path / "alone" / DATA).column_names
+    read = formats.read(tmp_path / "alone", mapping='{"episode": 0}')
+    assert not read.has_displacement
+    assert read.force is not None
+    np.testing.assert_allclose(read.force, recording.log.force, rtol=1e-6, atol=0.0)  # of single precision
+
+
 def test_logs_of_different_sensors_or_members_are_refused(recording: Recording, tmp_path: Path) -> None:
     log = recording.log
     bare = Recording(replace(log, force=None, truth=None), recording.history, "bare.npz")

@@ -69,6 +69,12 @@ def test_arrows_run_along_columns_and_rows_of_any_lattice(ramp: GraspLog, stored
     np.testing.assert_allclose(shown, ramp.displacement[..., :2] @ axes, atol=header["displacement"] / 127)
 
 
+def test_of_forces_alone_no_displacement_is_shown(ramp: GraspLog, stored: Any) -> None:
+    header, arrays = unpacked(frames.pack(stored, replace(ramp, displacement=None, truth=None)))
+    assert "displacement" not in header.keys() | arrays.keys()
+    assert header["force"] > 0.0
+
+
 @pytest.mark.parametrize("step", [1, 3])
 def test_patches_stand_where_their_pressure_is(
     ramp: GraspLog, stored: Any, history: SlipHistory, monkeypatch: pytest.MonkeyPatch, step: int
