@@ -146,7 +146,7 @@ def convert(
     from service.formats import writing
 
     name = writing.format_of(output)
-    check_output(output, log, mapping)
+    refuse_inputs(output, log, mapping)
     grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
     writing.write(grasp, output, name)
     typer.echo(f"{output}: {len(grasp)} frames of {grasp.grid[0]} × {grasp.grid[1]} markers")
@@ -180,7 +180,7 @@ def export(
     typer.echo(f"{output}: {frames} frames of {len(logs)} grasp(s), for {target}")
 
 
-def check_output(output: Path, *inputs: Path | None) -> None:
+def refuse_inputs(output: Path, *inputs: Path | None) -> None:
     """Raises ``InvalidInput`` where a command would write over what it reads, or into it, by whatever name or link."""
     from slipcore import InvalidInput
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.local import DETECTOR_HELP, FrameRate, Mapping, Scale, check_output, mapping_text
+from service.cli.local import DETECTOR_HELP, FrameRate, Mapping, Scale, mapping_text, refuse_inputs
 from service.cli.remote import DEFAULT_URL, Key, Url, connected
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def report(
     from service.report.page import write_report
 
     path = Path(what)
-    check_output(output, path, mapping)
+    refuse_inputs(output, path, mapping)
     if path.exists():
         made = _of_log(path, method, scale, frame_rate, mapping)
     elif len(path.parts) > 1:

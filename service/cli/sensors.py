@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from service.cli.local import Mapping as MappingFile
-from service.cli.local import check_output, mapping_text
+from service.cli.local import mapping_text, refuse_inputs
 from service.cli.output import print_json, print_table
 from service.cli.remote import DEFAULT_URL, Json, Key, Url, connected
 from service.formatting import interval, number
@@ -79,7 +79,7 @@ def calibrate(
     if store and (output is not None or mapping is not None):
         raise typer.BadParameter("--store with --output or --mapping; allowed: one of them")
     if output is not None:
-        check_output(output, *logs, mapping)
+        refuse_inputs(output, *logs, mapping)
     forces = _known_forces(known_force, len(logs))
     told = _stored(logs, forces, sensor, url, key) if store else _learnt(logs, forces, mapping)
     if output is not None:

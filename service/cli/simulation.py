@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from service.cli.exit_codes import INPUT_REFUSED
-from service.cli.local import Picture, check_output
+from service.cli.local import Picture, refuse_inputs
 from service.cli.output import print_json, print_lines, print_table
 from service.cli.progress import counted, patience
 from service.formatting import number
@@ -46,7 +46,7 @@ def simulate(
 
     wanted = Scene.from_toml(scene)
     if output is not None:
-        check_output(output, Path(scene))
+        refuse_inputs(output, Path(scene))
     if explain:
         _explain(wanted, seed, json)
         return

@@ -11,7 +11,8 @@ MOST_WAITING_BYTES = 64 * 1024
 """Written at once when there is more: a body of many parts is not to gather in memory."""
 
 UNREAD_SECONDS, SLOWEST_READ = 30.0, 5_000.0
-"""s between looks at whether a client reads what waits for it, and bytes/s that it must read, or it is let go."""
+"""s between looks at whether a client reads what waits for it, and bytes/s that it must read, or it is let go: half of
+the least pace of a body, for what is read shows in steps of tens of kB."""
 
 
 class JoinedWrites:

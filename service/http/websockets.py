@@ -15,7 +15,6 @@ MOST_UNSENT_BYTES = 2**20
 MOST_FRAGMENTS = 1024
 """Of one message; the bound on its bytes does not count those that are empty."""
 
-
 PARSED_BYTES = 1024
 """Made into messages at once, until the application asks for more: small ones take many times their bytes."""
 
