@@ -1,3 +1,4 @@
+import configparser
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
@@ -15,6 +16,7 @@ from stiction_client import (
     dexnet_friction,
     drake_friction,
     friction_cone,
+    graspit_friction,
     moveit_max_contact_force,
     mujoco_friction,
     mujoco_geom,
@@ -145,6 +147,34 @@ def test_dexnet_s_sigma_is_the_variance_of_an_observation(make_model: Make) -> N
     told = dexnet_friction(model, 0.1)
     assert told["friction_coef"] == float(model.predict(0.0, 0.1))
     assert told["sigma_friction_coef"] == pytest.approx(model.scale**2, rel=1e-9)
+
+
+def test_graspit_reads_the_friction_of_a_pair_of_its_materials(make_model: Make) -> None:
+    """As World::readSettings does: by the numbers of the materials, the smaller first."""
+    friction = graspit_friction(make_model((0.4, -20.0, 0.0)), ("rubber", "plastic"), 0.1)
+    assert friction.static_friction == conservative_friction(make_model((0.4, -20.0, 0.0)), 0.1)
+    assert friction.dynamic_friction < friction.static_friction
+    assert friction.settings() == {
+        "GraspIt/World/cof35": friction.static_friction,
+        "GraspIt/World/kcof35": friction.dynamic_friction,
+    }
+    grows = graspit_friction(make_model((0.4, 5.0, 0.0)), ("wood", "wood"), 0.1)
+    assert list(grows.settings()) == ["GraspIt/World/cof44", "GraspIt/World/kcof44"]
+    assert grows.dynamic_friction == grows.static_friction
+
+
+def test_graspit_s_lines_are_an_ini_file_of_qt(make_model: Make) -> None:
+    friction = graspit_friction(make_model(), ("rubber", "plastic"), 0.1)
+    read = configparser.ConfigParser()
+    read.read_string(friction.to_ini())
+    told = {f"graspit/{key}".replace("\\", "/"): float(value) for key, value in read["GraspIt"].items()}
+    assert told == pytest.approx({key.lower(): value for key, value in friction.settings().items()}, rel=1e-8)
+
+
+@pytest.mark.parametrize("materials", [("rubber", "cork"), ("rubber", "frictionless"), ("rubber",), ("wood",) * 3])
+def test_graspit_has_no_other_materials(make_model: Make, materials: tuple[str, str]) -> None:
+    with pytest.raises(InvalidArgument, match=r"materials is .*; allowed: two"):
+        graspit_friction(make_model(), materials, 0.1)
 
 
 def test_a_cone_s_half_angle_is_the_arc_tangent(make_model: Make) -> None:

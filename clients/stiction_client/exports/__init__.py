@@ -11,12 +11,15 @@ from stiction_client.exports.formats import (
     sdf_surface,
     urdf_gazebo,
 )
+from stiction_client.exports.graspit import GRASPIT_MATERIALS, GraspitFriction, graspit_friction
 from stiction_client.exports.mujoco import HOLDING_OPTION, MujocoPair, mujoco_friction, mujoco_geom, mujoco_pair
 
 __all__ = [
+    "GRASPIT_MATERIALS",
     "HOLDING_OPTION",
     "QUANTILE",
     "CoulombFriction",
+    "GraspitFriction",
     "MujocoPair",
     "PhysxMaterial",
     "cone_half_angle",
@@ -25,6 +28,7 @@ __all__ = [
     "dexnet_friction",
     "drake_friction",
     "friction_cone",
+    "graspit_friction",
     "moveit_max_contact_force",
     "mujoco_friction",
     "mujoco_geom",
