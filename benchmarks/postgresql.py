@@ -29,7 +29,7 @@ PREFIX = "stiction-postgresql-"
 """Of folders."""
 
 MEMORY, ROOM = Path("/dev/shm"), 2**30
-"""A file system in memory, and the bytes that must be free there for it to be used."""
+"""A file system in memory, and the bytes that must be free there for a server's data to be kept in it."""
 
 
 class NoPrograms(RuntimeError):
@@ -115,7 +115,7 @@ def running_postgresql(*options: str, in_memory: bool = False) -> Iterator[Postg
     """
     programs = _programs()
     folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir="/tmp"))  # a socket's path is short
-    data = Path(tempfile.mkdtemp(prefix=PREFIX, dir=MEMORY if in_memory and _has_room(MEMORY) else folder))
+    data = Path(tempfile.mkdtemp(prefix=PREFIX, dir=MEMORY if in_memory and has_room(MEMORY, ROOM) else folder))
     bin_folder = folder / "wheel" / programs.name / "bin"
     try:
         shutil.copytree(programs, bin_folder.parent, symlinks=True, ignore=shutil.ignore_patterns("include", "*.a"))
@@ -141,8 +141,9 @@ def running_postgresql(*options: str, in_memory: bool = False) -> Iterator[Postg
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _has_room(memory: Path) -> bool:
-    return memory.is_dir() and os.access(memory, os.W_OK) and shutil.disk_usage(memory).free > ROOM
+def has_room(memory: Path, size: int) -> bool:
+    """Whether ``memory`` is a folder for everybody on this machine with more than ``size`` bytes free."""
+    return memory.is_dir() and os.access(memory, os.W_OK) and shutil.disk_usage(memory).free > size
 
 
 def _programs() -> Path:

@@ -262,7 +262,7 @@ def check_displacement(displacement: FloatArray, position: FloatArray) -> None:
 
 def check_mask(name: str, value: ArrayLike, shape: tuple[int, ...]) -> BoolArray:
     """One truth value an element, of exactly this shape."""
-    mask = np.array(value)
+    mask = np.array(value, order="C")  # kernels are compiled for one layout: half a minute for another
     if mask.dtype != np.bool_ or mask.shape != shape:
         raise InvalidInput(name, f"{mask.dtype} of shape {list(mask.shape)}", f"bool of shape {list(shape)}")
     mask.flags.writeable = False

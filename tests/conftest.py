@@ -1,6 +1,7 @@
 """A real PostgreSQL server, and a store like S3, for whoever asks for them."""
 
 import gc
+import os
 import re
 import shutil
 import threading
@@ -17,7 +18,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from benchmarks.postgresql import NoPrograms, PostgreSQL, running_postgresql
+from benchmarks.postgresql import MEMORY, NoPrograms, PostgreSQL, has_room, running_postgresql
 from db import migrate
 from db.database import Database
 from db.records import Claim
@@ -28,6 +29,13 @@ hypothesis.settings.load_profile("suite")
 
 FAST = ("fsync=off", "full_page_writes=off", "synchronous_commit=off")
 """No promise for power cuts, which no test makes: a database a test then costs 35 ms, and half of that in memory."""
+
+
+FOLDERS = 4 * 2**30
+"""Bytes in memory that must be free for the tests' folders: a whole run writes 2 GB and keeps those of failed tests."""
+
+if has_room(MEMORY, FOLDERS):  # SQLite waits 4 to 10 ms for a disk in each transaction
+    os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(MEMORY))
 
 
 def pytest_collection_finish() -> None:

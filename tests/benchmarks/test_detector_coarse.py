@@ -67,6 +67,7 @@ def test_taxels_in_a_ramp_slip_as_the_closed_form_says(elements: int) -> None:
     assert said <= 0.05 * sticking
 
 
+@pytest.mark.long  # ten seconds of frames a millisecond apart
 def test_separate_pillars_at_1_khz_do_better_by_forces_than_by_place() -> None:
     array = Array("pillars", None, 1000.0, 5e-6, 1e-2)
     runs = {name: ("force", name) for name in ("filter", "forces_only", "coarse")}

@@ -96,17 +96,18 @@ def test_revisions_stand_in_one_line() -> None:
 
 
 def test_every_migration_goes_up_and_down_and_up(empty_database: Database) -> None:
-    before = shape(empty_database)
+    shapes = [shape(empty_database)]
     for revision in REVISIONS:
         migrate.upgrade(empty_database, revision)
-        there = shape(empty_database)
-        assert there != before, f"{revision} changes nothing"
-        migrate.downgrade(empty_database, "-1")
-        assert shape(empty_database) == before, f"the way back from {revision}"
-        migrate.upgrade(empty_database, revision)
         assert migrate.current(empty_database) == revision
-        assert shape(empty_database) == there, f"{revision} after the way back"
-        before = there
+        shapes.append(shape(empty_database))
+        assert shapes[-1] != shapes[-2], f"{revision} changes nothing"
+    newest = shapes.pop()
+    for revision in reversed(REVISIONS):
+        migrate.downgrade(empty_database, "-1")
+        assert shape(empty_database) == shapes.pop(), f"the way back from {revision}"
+    migrate.upgrade(empty_database)
+    assert shape(empty_database) == newest
 
 
 def test_migrations_go_down_and_up_with_data_in_every_table(

@@ -1,3 +1,7 @@
+from dataclasses import replace
+
+import numpy as np
+
 from slipcore import SlipDetector, detect_slip, warm_up
 from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.detection.filter.run import run_filter
@@ -19,4 +23,7 @@ def test_after_warming_up_no_first_frame_compiles() -> None:
                 frame.time, frame.displacement, frame.force if force else None, frame.object_pose if pose else None
             )
         detect_slip(log, lookahead=2)
+    by_columns = np.asfortranarray(np.ones(log.grid, bool))  # as a lattice of markers has it
+    SlipDetector(log.position, log.element_area, "filter").step(0.0, log.displacement[0], contact=by_columns)
+    detect_slip(replace(log, contact=np.repeat(by_columns.T[None], len(log), axis=0).transpose(0, 2, 1)))
     assert [len(kernel.signatures) for kernel in KERNELS] == compiled

@@ -3,6 +3,7 @@ import logging
 import re
 from collections.abc import Callable
 from typing import Any
+from unittest.mock import AsyncMock
 
 import httpx
 import pytest
@@ -15,6 +16,7 @@ from service.domain import keys
 from service.domain.keys import SCOPES, NoKeys, check_start
 from service.http import access, authentication
 from service.settings import Settings
+from service.web.routes import practice
 from stiction_client import AsyncFrictionClient, Material, ProblemError
 
 ROUTES = access.scopes_of_routes(create_app(Settings()))
@@ -38,7 +40,8 @@ def knock(client: Any, route: str) -> httpx.Response:
 
 
 @ONLY_SQLITE
-def test_no_route_answers_without_its_scope(reach: Reach, make: Make) -> None:
+def test_no_route_answers_without_its_scope(reach: Reach, make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(practice, "load_practice", AsyncMock())  # simulating the grasps takes seconds for each key
     texts = {scope: make(scope) for scope in SCOPES}
     clients = {scope: reach(key=key) for scope, key in texts.items()}
     nobody = reach()

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from slipcore.detection.shared.decision import apply_decision
-from slipcore.detection.shared.records import Decision, FrameArrays, Memory
+from slipcore.detection.shared.records import Decision, FrameArrays, Memory, unwritten
 from slipcore.detection.shared.rigid_motion import fit_motion
 
 SHAPE = (4, 5)
@@ -28,7 +28,7 @@ def said(end: np.ndarray, slips: np.ndarray, poses: tuple[np.ndarray, np.ndarray
     was = contact.copy()
     was[1, 1] = False
     last, frame = (
-        FrameArrays(time, displacement, NO_FIELD, pose, NO_FIELD, NO_MASK)
+        unwritten(FrameArrays(time, displacement, NO_FIELD, pose, NO_FIELD, NO_MASK))
         for time, displacement, pose in ((0.0, START, poses[0]), (0.1, end, poses[1]))
     )
     before = Memory(was, nothing, likely * 0.0, *NO_MEMORY)
