@@ -90,18 +90,16 @@ class LoadedContact:
         twist = self.moment if self.power == 1 else self.moment / x
         return (self.load * self.load + twist * twist) ** 0.5
 
-    def _relief(self, x: Number) -> Number:
-        """−d log L / d log x: what part of the load is torque that a larger contact bears more easily."""
-        if self.power == 1:
-            return 0.0
-        load = self._load(x)
-        return (self.moment / x / (load + (load == 0.0))) ** 2
+    def _relief(self, x: Number, load: Number) -> Number:
+        """−d log L / d log x where L is ``load``: what part of it is torque that a larger contact bears more easily."""
+        return 0.0 if self.power == 1 else (self.moment / x / (load + (load == 0.0))) ** 2
 
     def surplus(self, x: Number) -> tuple[Number, Number]:
         """q(unit·x) − L(x)/xⁿ, and its slope."""
         friction, slope = self.quantile(self.unit * x)
-        asked = self._load(x) / x if self.power == 1 else self._load(x) / x / x / x  # no power of x may underflow
-        return friction - asked, self.unit * slope + (self.power + self._relief(x)) * asked / x
+        load = self._load(x)
+        asked = load / x if self.power == 1 else load / x / x / x  # no power of x may underflow
+        return friction - asked, self.unit * slope + (self.power + self._relief(x, load)) * asked / x
 
     def _search(self, x: Number, direction: int) -> tuple[Number, Truth]:
         """Newton's method from ``x``: the next root in ``direction``, 1 or -1, and whether there is one."""
@@ -136,7 +134,7 @@ class LoadedContact:
     def _growth(self, x: float) -> tuple[float, float]:
         """Sign of the growth with x of the load that is held, φ = q·(n + relief) + unit·x·q', and its slope."""
         f = self.unit * x
-        (friction, slope), bend, relief = self.quantile(f), self.quantile.bend(f), self._relief(x)
+        (friction, slope), bend, relief = self.quantile(f), self.quantile.bend(f), self._relief(x, self._load(x))
         growth = friction * (self.power + relief) + f * slope
         relieving = -2.0 * relief * (1.0 - relief) / x
         bent = self.unit * (slope * (self.power + relief + 1.0) + f * bend) + friction * relieving
@@ -150,7 +148,7 @@ class LoadedContact:
             below, above = (x, above) if growth > 0.0 else (below, x)
             guess = x - growth / slope if slope < 0.0 else math.inf
             guess = guess if below <= guess <= above else 0.5 * (below + above)
-            if abs(guess - x) <= ROUNDING * x:
+            near, x = abs(guess - x) <= ROUNDING**0.5 * x, guess
+            if near:  # one step from there squares what is left
                 break
-            x = guess
         return x

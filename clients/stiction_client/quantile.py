@@ -51,7 +51,7 @@ class FrictionQuantile:
         error = plain(-special.stdtrit(model.degrees_of_freedom, probability))
         b0, b1, b2 = coefficients = model.coefficients.tolist()
         covariance = model.covariance.tolist()
-        if not _finite(*coefficients, *chain(*covariance), shared, own, error):
+        if not (all(map(math.isfinite, chain(coefficients, *covariance))) and _finite(shared, own, error)):
             raise InvalidArgument("model", "not finite at this slip probability", "finite coefficients and quantile")
         growth, (along, along_v), (apart, apart_v, apart_vv) = _factor(covariance)
         v = tangential_velocity
