@@ -190,8 +190,8 @@ def observe(world: World, state: WorldState, finger: int = 0, generator: np.rand
     contact = world.contact(float(state.normal_force[finger]))
     radius = np.hypot(*np.moveaxis(world.position[..., :2], -1, 0))
     force = np.concatenate([state.force[finger], -_normal(world, state, finger)[..., None]], axis=-1)
-    everywhere = np.arange(radius.size)
-    sideways = displaced(state.pad, everywhere, everywhere, state.force[finger].reshape(-1, 2))
+    shear = state.force[finger].reshape(-1, 2)
+    sideways = displaced(state.pad, np.arange(radius.size), np.flatnonzero(shear.any(axis=1)), shear)
     depth = -contact.normal_displacement(radius)[..., None]
     displacement = np.concatenate([sideways.reshape(*radius.shape, 2), depth], axis=-1)
     if generator is not None:
