@@ -22,7 +22,7 @@ from stiction_client import (
     required_normal_force,
 )
 from stiction_client.controller import gains
-from stiction_client.controller.friction import LearnedFriction, utilisation
+from stiction_client.controller.friction import KnownFriction, LearnedFriction, utilisation
 from tests.clients.point_contact import FRAME, Episode, PointContact, ramp, run
 
 Make = Callable[..., FrictionModel]
@@ -270,13 +270,54 @@ def test_friction_is_learnt_once_the_latest_frames_agree() -> None:
     learned = LearnedFriction()
     for value in [0.2, 0.6, 0.3, *[0.40, 0.41] * 4]:
         assert learned.known(SETTINGS) is None
-        learned = learned.with_frame(value, True, SETTINGS)
+        learned = learned.with_frame(value, 5, True, SETTINGS)
     known = learned.known(SETTINGS)
     assert known is not None
     low, high = known.bounds(5.0)
     assert (low + high) / 2.0 == pytest.approx(0.405, rel=1e-12)
-    spread = math.hypot(0.005 * math.sqrt(8.0 / 7.0), 0.405 * SETTINGS.learned_error)
-    assert low == pytest.approx(0.405 - 3.0902 * spread, rel=1e-12)
+    error = math.hypot(SETTINGS.learned_error, SETTINGS.sample_error / math.sqrt(40.0))
+    assert low == pytest.approx(0.405 * (1.0 - 3.0902 * error), rel=1e-12)
+
+
+def test_a_frame_teaches_by_the_number_of_its_elements() -> None:
+    learned = LearnedFriction()
+    for value, count in [(0.4, 12), (0.8, 1)]:
+        learned = learned.with_frame(value, count, True, SETTINGS)
+    assert learned.mean == pytest.approx((12 * 0.4 + 0.8) / 13, rel=1e-12)
+    assert learned.error(SETTINGS) < LearnedFriction((0.4,), (1,)).error(SETTINGS)
+
+
+@pytest.mark.parametrize(("count", "refuted"), [(1, False), (12, True)])
+def test_samples_refute_a_model_as_soon_as_they_are_enough(count: int, refuted: bool, make_model: Make) -> None:
+    """Of a fifth less friction than promised two frames with an element each tell too little, with twelve enough."""
+    state = GraspController.init(SETTINGS, model_of(make_model, 0.45))
+    for frame in range(1, 3):
+        seen = SlipSamples(np.full(count, 0.36), np.full(count, 0.05))
+        state, command = GraspController.step(state, Observation(frame * FRAME, 2.0, 0.5, 0.0, 0.5, seen))
+    assert (state.known is None, command.mode == "alarm") == (refuted, refuted)
+
+
+def test_more_friction_than_promised_refutes_no_model_at_once(make_model: Make) -> None:
+    state = GraspController.init(SETTINGS, model_of(make_model, 0.45))
+    seen = SlipSamples(np.full(12, 0.7), np.full(12, 0.05))
+    state, _ = GraspController.step(state, Observation(FRAME, 2.0, 0.5, 0.0, 0.5, seen))
+    assert state.known is not None
+
+
+@pytest.mark.parametrize("probability", [1e-6, 1e-3, 0.5])
+def test_a_model_s_scatter_is_read_off_its_quantile(probability: float, make_model: Make) -> None:
+    settings = dataclasses.replace(SETTINGS, slip_probability=probability)
+    known = KnownFriction.of_model(model_of(make_model, 0.45), settings)
+    for friction, refuted in [(0.42, False), (0.3, True)]:
+        learned = LearnedFriction((friction,), (100,))
+        assert known.refuted(learned, 1.0, 5.0, settings) is refuted
+
+
+def test_samples_of_less_friction_than_is_borne_refute_nothing(make_model: Make) -> None:
+    known = KnownFriction.of_model(model_of(make_model, 0.45), SETTINGS)
+    learned = LearnedFriction((0.3,), (100,))
+    assert known.refuted(learned, 1.0, 5.0, SETTINGS)
+    assert not known.refuted(learned, 0.42 * 5.0, 5.0, SETTINGS)
 
 
 def test_samples_that_the_stick_ratio_contradicts_teach_nothing() -> None:

@@ -67,7 +67,9 @@ def _sense(state: ControllerState, observation: Observation, elapsed: float) -> 
     sampled = _sampled(observation, felt, state.settings)
     agrees = not math.isnan(sampled) and _agrees(sampled, observation.normal, felt, load.size, state.settings)
     friction = sampled if agrees else math.nan
-    learned = state.learned if math.isnan(sampled) else state.learned.with_frame(sampled, agrees, state.settings)
+    learned = state.learned
+    if observation.slip_samples is not None and not math.isnan(sampled):
+        learned = learned.with_frame(sampled, observation.slip_samples.normal_force.size, agrees, state.settings)
     against = _contradicts(state, felt, observation.normal, load.size, friction)
     contradictions = state.contradictions if against is None else state.contradictions + 1 if against else 0
     return replace(state, time=observation.time, load=load, felt=felt, learned=learned, contradictions=contradictions)
@@ -111,7 +113,7 @@ def _contradicts(state: ControllerState, felt: Felt, normal: float, size: float,
 def _decide(state: ControllerState, observation: Observation) -> ControllerState:
     """The mode after a frame. Evidence against what is known discards it, and all that was learnt with it."""
     settings = state.settings
-    if state.known is not None and state.contradictions >= settings.contradiction_frames:
+    if state.known is not None and _refuted(state, state.known, observation.normal):
         return _enter(replace(state, known=None, learned=LearnedFriction(), contradictions=0), "alarm")
     if state.known is not None:
         return _enter(state, "hold")
@@ -124,6 +126,13 @@ def _decide(state: ControllerState, observation: Observation) -> ControllerState
         return _enter(replace(state, known=known), "hold")
     settled = _loaded(state) and state.time - state.load.steady >= settings.settle_time
     return _enter(state, "learn" if settled and observation.stick_ratio >= 0.0 else "feel")
+
+
+def _refuted(state: ControllerState, known: KnownFriction, normal: float) -> bool:
+    """Whether all samples together, or some frames in a row, speak against what is known."""
+    if state.contradictions >= state.settings.contradiction_frames:
+        return True
+    return normal > 0.0 and known.refuted(state.learned, state.load.size, normal, state.settings)
 
 
 def _enter(state: ControllerState, mode: Mode) -> ControllerState:

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from statistics import median
+from statistics import NormalDist, median
 
 from stiction_client.contacts import Contact
 from stiction_client.controller.settings import ControlSettings
@@ -13,14 +13,21 @@ from stiction_client.quantile import FrictionQuantile
 NORMAL_DEVIATIONS = 3.0902
 """Standard deviations of a normal quantile of 1e-3, the default bound: what is learnt in one grasp has no better."""
 
+LEAST_CERTAIN = 0.3
+"""Largest probability at whose quantile a model's scatter is read: near a half it lies at the mean, and tells none."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KnownFriction:
-    """A conservative ``quantile`` of a contact's friction over the normal force of its elements, ``unit``·F^(1/n) N."""
+    """A conservative ``quantile`` of a contact's friction over the normal force of its elements, ``unit``·F^(1/n) N.
+
+    ``deviations``: how many standard deviations it lies below the mean.
+    """
 
     contact: Contact
     quantile: FrictionQuantile
     unit: float
+    deviations: float = NORMAL_DEVIATIONS
 
     @classmethod
     def of_model(cls, model: FrictionModel, settings: ControlSettings) -> "KnownFriction":
@@ -32,7 +39,8 @@ class KnownFriction:
         contact, area = settings.contact, model.element_area
         touching = 1.0 if model.scales is None else max(float(contact.elements(settings.least_force, area)), 1.0)
         quantile = FrictionQuantile.of(model, 0.0, settings.slip_probability, touching)
-        return cls(contact, quantile, float(contact.element_force(1.0, area)))
+        deviations = -NormalDist().inv_cdf(min(settings.slip_probability, LEAST_CERTAIN))
+        return cls(contact, quantile, float(contact.element_force(1.0, area)), deviations)
 
     @classmethod
     def learned(cls, low: float, mean: float, contact: Contact) -> "KnownFriction":
@@ -48,9 +56,23 @@ class KnownFriction:
 
     def bounds(self, force: float) -> tuple[float, float]:
         """The quantile under ``force`` N, and its mirror image above the mean."""
-        element = self.unit * (force if self.contact.power == 1 else force ** (1.0 / 3.0))
-        low, mean = float(self.quantile(element)[0]), float(self.quantile.expected()(element)[0])
+        low, mean = self._low_and_mean(force)
         return low, 2.0 * mean - low
+
+    def refuted(self, learned: "LearnedFriction", size: float, force: float, settings: ControlSettings) -> bool:
+        """Whether the latest samples together tell of less friction under ``force`` N than both errors explain.
+
+        A contact that bears a load of ``size`` N has at least that friction, whatever samples say.
+        """
+        if not learned.values:
+            return False
+        low, mean = self._low_and_mean(force)
+        error = math.hypot((mean - low) / self.deviations, learned.error(settings) * mean)
+        return mean - max(learned.mean, size / force) > settings.contradiction_deviations * error
+
+    def _low_and_mean(self, force: float) -> tuple[float, float]:
+        element = self.unit * (force if self.contact.power == 1 else force ** (1.0 / 3.0))
+        return float(self.quantile(element)[0]), float(self.quantile.expected()(element)[0])
 
     def _twist(self, torque: float) -> float:
         return torque / float(self.contact.arm(1.0)) if torque > 0.0 else 0.0
@@ -58,18 +80,33 @@ class KnownFriction:
 
 @dataclass(frozen=True, slots=True)
 class LearnedFriction:
-    """The contact's friction by the elements that slipped: ``values`` of the latest frames that told it.
+    """The contact's friction by the elements that slipped: ``values`` of the latest frames that told it, by how many
+    elements (``counts``).
 
     ``sampled``: of the latest frames that had samples, those among them that the stick ratio contradicts.
     """
 
     values: tuple[float, ...] = ()
+    counts: tuple[int, ...] = ()
     sampled: tuple[float, ...] = ()
 
-    def with_frame(self, friction: float, agrees: bool, settings: ControlSettings) -> "LearnedFriction":
+    def with_frame(self, friction: float, count: int, agrees: bool, settings: ControlSettings) -> "LearnedFriction":
         """The same after one more frame; of the older ones ``learn_frames`` are kept."""
-        values = (*self.values, friction)[-settings.learn_frames :] if agrees else self.values
-        return LearnedFriction(values, (*self.sampled, friction)[-settings.learn_frames :])
+        frames = settings.learn_frames
+        sampled = (*self.sampled, friction)[-frames:]
+        if not agrees:
+            return LearnedFriction(self.values, self.counts, sampled)
+        return LearnedFriction((*self.values, friction)[-frames:], (*self.counts, count)[-frames:], sampled)
+
+    @property
+    def mean(self) -> float:
+        """Of all elements in these frames."""
+        total = sum(value * count for value, count in zip(self.values, self.counts, strict=True))
+        return total / sum(self.counts)
+
+    def error(self, settings: ControlSettings) -> float:
+        """Of the mean, relative: one standard deviation, of which the bias common to all samples is a part."""
+        return math.hypot(settings.learned_error, settings.sample_error / math.sqrt(sum(self.counts)))
 
     def lowest(self, settings: ControlSettings) -> float:
         """The least friction to expect while the force is being lowered; NaN while there are few samples.
@@ -81,20 +118,18 @@ class LearnedFriction:
             return math.nan
         return median(self.sampled) * (1.0 - NORMAL_DEVIATIONS * settings.learned_error)
 
-    def known(self, settings: ControlSettings) -> KnownFriction | None:
-        """A model of it, once ``learn_frames`` agree to within ``learn_spread``.
+    @property
+    def spread(self) -> float:
+        """Of the frames about the mean, relative, each by the number of its elements."""
+        squares = sum((value - self.mean) ** 2 * count for value, count in zip(self.values, self.counts, strict=True))
+        return math.sqrt(squares / sum(self.counts)) / self.mean
 
-        Frames of one grasp share their errors, so that their spread is not divided by their number.
-        """
-        count = len(self.values)
-        if count < settings.learn_frames:
+    def known(self, settings: ControlSettings) -> KnownFriction | None:
+        """A model of it, once ``learn_frames`` agree to within ``learn_spread``."""
+        if len(self.values) < settings.learn_frames or self.mean == 0.0 or self.spread > settings.learn_spread:
             return None
-        mean = sum(self.values) / count
-        spread = math.sqrt(sum((value - mean) ** 2 for value in self.values) / (count - 1))
-        if spread > settings.learn_spread * mean:
-            return None
-        low = mean - NORMAL_DEVIATIONS * math.hypot(spread, settings.learned_error * mean)
-        return KnownFriction.learned(low, mean, settings.contact) if low > 0.0 else None
+        low = self.mean * (1.0 - NORMAL_DEVIATIONS * self.error(settings))
+        return KnownFriction.learned(low, self.mean, settings.contact) if low > 0.0 else None
 
 
 def utilisation(stick_ratio: float) -> float:

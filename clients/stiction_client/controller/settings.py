@@ -70,6 +70,12 @@ class ControlSettings:
     learned_error: Annotated[
         float, Gain(0.0, 1.0, "-", "relative bias of friction from detected slip, one standard deviation")
     ] = 0.03
+    sample_error: Annotated[
+        float, Gain(0.0, 1.0, "-", "relative, of the friction of one slipping element, one standard deviation")
+    ] = 0.13
+    contradiction_deviations: Annotated[
+        float, Gain(0.5, 10.0, "-", "of both errors: of 700 right models one is doubted for its samples")
+    ] = 3.0
     contradiction_frames: Annotated[
         int, Gain(1, 100, "frames", "50 ms at 60 frames/s; one frame is wrong too often")
     ] = 3
