@@ -8,6 +8,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -39,11 +40,15 @@ START = 1.0
 LOST = 10e-3
 """m of slip after which an episode ends."""
 
+OPENING, FALLING = 0.5, 3.0
+"""s in which a gripper opens, and after which an object that is still there is stuck (SimReady FET005)."""
+
 
 @dataclass(frozen=True)
 class Task:
-    """``load`` on all fingers over time (s), for ``seconds``; mean ``friction`` of the material at each finger;
-    ``limit``: normal force, N, above which the object breaks.
+    """``load`` on all fingers over time (s), for ``seconds``; mean ``friction`` of the material at each finger, and
+    what models are ``told`` that it is, where that differs; ``limit``: normal force, N, above which the object breaks;
+    ``opens``: whether the gripper opens at the end.
     """
 
     name: str
@@ -51,6 +56,8 @@ class Task:
     seconds: float
     load: Callable[[float], Load]
     limit: float = math.inf
+    told: tuple[float, ...] = ()
+    opens: bool = False
 
 
 class Strategy(Protocol):
@@ -63,7 +70,8 @@ class Strategy(Protocol):
 @dataclass(frozen=True, eq=False)
 class Episode:
     """Arrays over the frames: ``time`` s; and [frames, fingers] of ``normal`` force, its ``command`` and the ``least``
-    that would hold (N), true and ``told`` ``stick_ratio``, and ``slipped`` m.
+    that would hold (N), true and ``told`` ``stick_ratio``, and ``slipped`` m. ``freed``: whether the object left a
+    gripper that opened; True where none did.
     """
 
     task: str
@@ -75,6 +83,7 @@ class Episode:
     stick_ratio: FloatArray
     told: FloatArray
     slipped: FloatArray
+    freed: bool = True
 
 
 def world_of(task: Task, seed: int) -> World:
@@ -113,7 +122,19 @@ def run(task: Task, world: World, strategies: Sequence[Strategy], seed: int, mis
         if state.slipped.max() > LOST:
             break
     time, *columns = (np.array(column) for column in zip(*rows, strict=True))
-    return Episode(task.name, task.limit, time, *columns)
+    freed = not task.opens or _freed(world, state, task.load(task.seconds))
+    return Episode(task.name, task.limit, time, *columns, freed)
+
+
+def _freed(world: World, state: WorldState, load: Load) -> bool:
+    """Whether the object leaves the gripper that opens; where it is apart, how far it slipped is NaN."""
+    held = state.normal_force
+    for count in range(round((OPENING + FALLING) / FRAME)):
+        opening = max(1.0 - count * FRAME / OPENING, 0.0)
+        state = reduced.step(world, state, opening * held, load, FRAME)
+        if not (state.slipped <= LOST).all():
+            return True
+    return False
 
 
 def _row(
@@ -150,14 +171,17 @@ class _Sensor:
         return seen
 
 
+@lru_cache(maxsize=4)
 def least_force(world: World, load: Load, finger: int = 0) -> float:
     """Normal force, N, at which a finger could just bear its share of the load at rest (elliptic limit surface)."""
     x, y, moment = (part / len(world.friction) for part in load.resultant())
     contact, friction = contact_of(world), world.friction[finger]
     radius = np.hypot(world.position[..., 0], world.position[..., 1])
-    force = START
+    force, before = START, math.inf
     for _ in range(30):
+        if abs(force - before) < 1e-9 * force:
+            break
         height = np.sqrt(np.maximum(1.0 - (radius / world.contact(force).contact_radius) ** 2, 0.0))
         mean = float((friction * height).sum() / height.sum())
-        force = max(math.hypot(x, y, moment / float(contact.arm(force))) / mean, 0.05)
+        force, before = max(math.hypot(x, y, moment / float(contact.arm(force))) / mean, 0.05), force
     return force

@@ -105,7 +105,7 @@ def model_of(friction: float, world: World) -> FrictionModel:
 
 def with_model(factor: float, task: Task, world: World, finger: int) -> Strategy:
     """The controller with the material's friction, or ``factor`` times it; it is told what breaks the object."""
-    model = model_of(factor * task.friction[finger], world)
+    model = model_of(factor * (task.told or task.friction)[finger], world)
     return Controlled(GraspController.init(settings_of(world, task.limit), model))
 
 

@@ -1,7 +1,10 @@
-"""Tasks of grip control: twelve lifts, and those of the paper's Fig. 19.
+"""Tasks of grip control: twelve lifts, those of the paper's Fig. 19, and two protocols of SimReady.
 
 An object that is lifted stands on a table at first, which lets go of it within 1 s.
 """
+
+import math
+from dataclasses import replace
 
 from benchmarks.control_episodes import Task
 from slipcore.contact.reduced import GRAVITY, Load
@@ -16,6 +19,11 @@ TWIST, SEATED = 2.0, 2.4
 """s at which the cap begins to turn, and its thread to draw."""
 CUT, THROUGH, INSERTED = 3.0, 4.0, 5.5
 """s at which the knife meets the skin, is through it, and is in its place."""
+
+TAKEN = 0.15
+"""s within which a gripper that rises takes over the weight."""
+SHAKEN, RATE = 2.5, 2.0 * math.pi * 2.0
+"""s at which both protocols of SimReady begin to shake, and by how many rad/s."""
 
 
 def rise(time: float, start: float, lasts: float) -> float:
@@ -95,6 +103,48 @@ def knife() -> Task:
     return Task("knife in a fruit", (PAPER_ON_RUBBER,), 8.5, load)
 
 
+def grasp_and_lift() -> Task:
+    """SimReady FET005, grasp_and_lift 1.3.0: lifted 0.3 m within 1 s by a smoothstep, held 1 s, shaken on a circle of
+    1 cm at 2 Hz for 1.5 s, which swells and fades within 0.25 s, held 1 s, and let go. Of the circle, one axis lies in
+    the contact.
+    """
+
+    def load(time: float) -> Load:
+        envelope = rise(time, SHAKEN, 0.25) - rise(time, SHAKEN + 1.25, 0.25)
+        shaken = 0.01 * RATE**2 * envelope * math.sin(RATE * (time - SHAKEN))
+        return _carried(0.1, time, height=0.3, shaken=(0.0, shaken))
+
+    return Task("SimReady FET005", (PAPER_ON_RUBBER,), 5.0, load, opens=True)
+
+
+def close_and_lift() -> Task:
+    """SimReady FET028, gripper_close_lift_cube 1.4.0, with 85 % of a payload of 0.2 kg a finger: lifted 0.2 m within
+    1 s, shaken up and down by 2 cm at 2 Hz for 2 s, and let go. That it is held for a second between is ours.
+    """
+
+    def load(time: float) -> Load:
+        shakes = SHAKEN <= time < SHAKEN + 2.0
+        shaken = -0.02 * RATE**2 * math.sin(RATE * (time - SHAKEN)) if shakes else 0.0
+        return _carried(0.85 * 0.2, time, height=0.2, shaken=(shaken, 0.0))
+
+    return Task("SimReady FET028", (PAPER_ON_RUBBER,), 4.5, load, opens=True)
+
+
+def _carried(mass: float, time: float, height: float, shaken: tuple[float, float]) -> Load:
+    """A load lifted by ``height`` m, and its inertia under accelerations ``shaken`` (m/s², up and sideways)."""
+    share = (time - LIFT) / (LIFTED - LIFT)
+    lifting = 6.0 * height * (1.0 - 2.0 * share) / (LIFTED - LIFT) ** 2 if 0.0 <= share < 1.0 else 0.0
+    taken = rise(time, LIFT, TAKEN)
+    return Load(mass, 1.0 - taken, (mass * (taken * lifting + shaken[0]), mass * shaken[1]))
+
+
+def slippery(friction: float) -> Task:
+    """The lift of 1 N with an object of this friction, of which strategies are told that it is rubber on paper."""
+    task = lift(0.1, friction)
+    return replace(task, told=(PAPER_ON_RUBBER,), seconds=3.0)
+
+
 LIFTS = tuple(lift(mass, friction) for friction in (0.3, 0.45, 0.7) for mass in (0.05, 0.1, 0.15, 0.2))
 PAPER = (sudden(), shell(), cup(), cap(), block(), knife())
 TASKS = (*LIFTS, *PAPER)
+PROTOCOLS = (grasp_and_lift(), close_and_lift())
