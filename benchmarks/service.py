@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
@@ -28,6 +29,7 @@ from matplotlib.figure import Figure
 from benchmarks.http_load import CALLERS, CONNECTIONS, Load, Target, in_turn, leave_first_core, load, pin
 from benchmarks.pages import options, picture_folder, save, write
 from benchmarks.postgresql import running_postgresql
+from slipcore import GraspLog
 from slipcore.contact import RampSchedule, tangential_ramp
 from stiction_client import FrictionClient
 from stiction_client.container import encode
@@ -95,12 +97,17 @@ def free_port() -> int:
         return int(found.getsockname()[1])
 
 
-def content(seed: int) -> bytes:
-    """A grasp log of 200 frames of 20×20 elements with forces."""
+def grasp(seed: int) -> GraspLog:
+    """A log of 200 frames of 20×20 elements with forces."""
     schedule = RampSchedule(rest=0.3, press=1.0, settle=0.4, shear=4.0, hold=0.95)
     log = tangential_ramp(points=20, schedule=schedule, marker_noise=1e-6, force_noise=2e-3, seed=seed)
     assert len(log) == 200, len(log)
-    return encode(replace(log, normal=None, truth=None))
+    return replace(log, normal=None, truth=None)
+
+
+def content(seed: int) -> bytes:
+    """The same as a file."""
+    return encode(grasp(seed))
 
 
 def uploads(url: str, bodies: list[bytes]) -> Requests:
@@ -156,19 +163,25 @@ def beside(work: Callable[[], object], measured: Callable[[], Load]) -> Load:
 
 
 @contextmanager
-def serving(**settings: str) -> Iterator[tuple[str, int, int]]:
-    """A service with one worker that is ready and knows the material: its URL, port and process."""
+def ready(folder: Path, **settings: str) -> Iterator[tuple[str, int, int]]:
+    """A service on a data folder, once it is ready: its URL, port and process."""
     port = free_port()
     url = f"http://127.0.0.1:{port}"
-    with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "service.cli", "serve", "--port", str(port), "--data-folder", folder]
-        with running(command, port, STICTION_RATE_LIMIT="0", **settings) as process:
-            while httpx.get(f"{url}/readyz").status_code != httpx.codes.OK:
-                time.sleep(0.05)
-            FrictionClient(url).create_material(MATERIAL)
-            uploads(url, [content(seed) for seed in range(3)])
-            pin(process)
-            yield url, port, process
+    command = [sys.executable, "-m", "service.cli", "serve", "--port", str(port), "--data-folder", str(folder)]
+    with running(command, port, STICTION_RATE_LIMIT="0", **settings) as process:
+        while httpx.get(f"{url}/readyz").status_code != httpx.codes.OK:
+            time.sleep(0.05)
+        yield url, port, process
+
+
+@contextmanager
+def serving(**settings: str) -> Iterator[tuple[str, int, int]]:
+    """A service with one worker that is ready and knows the material: its URL, port and process."""
+    with tempfile.TemporaryDirectory() as folder, ready(Path(folder), **settings) as (url, port, process):
+        FrictionClient(url).create_material(MATERIAL)
+        uploads(url, [content(seed) for seed in range(3)])
+        pin(process)
+        yield url, port, process
 
 
 def measure() -> tuple[list[Requests], list[Load]]:

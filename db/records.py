@@ -262,8 +262,8 @@ class SampleSummary:
     """The friction samples of one log, in numbers; the samples are in the blob of hash ``samples_blob``.
 
     ``none_because`` says why there are none, where there are none; ``moments`` are their sufficient statistics as the
-    estimators wrote them, None where there are no samples. ``velocity_is_relative``: whether the velocities are only
-    relative to what seems to stick; None where there are none, or an older version did not note it.
+    estimators wrote them, None where there are no samples, and in a list of logs. ``velocity_is_relative``: whether the
+    velocities are only relative to what seems to stick; None where there are none, or an older version did not note it.
     """
 
     count: int

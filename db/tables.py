@@ -167,6 +167,14 @@ class GraspLogRow(Base):
         CheckConstraint("(withdrawn_at IS NULL) = (withdrawn_because IS NULL)", name="withdrawn"),
         Index(None, "created_at", "id"),
         Index(None, "material_id", "created_at", "id"),
+        Index(None, "sensor_id", "created_at", "id"),
+        # counted for each material in a list, without a look at its other logs
+        Index(
+            "ix_grasp_logs_withdrawn",
+            "material_id",
+            sqlite_where=text("withdrawn_at IS NOT NULL"),
+            postgresql_where=text("withdrawn_at IS NOT NULL"),
+        ),
         Index(None, "uploaded_by", "created_at"),  # how much a key has sent lately
         _one_of("file_state", ("leaving", "gone")),
         Index(None, "file_state", "file_since"),  # what has been there for longest, and what is to be deleted
@@ -178,7 +186,7 @@ class GraspLogRow(Base):
     format: Mapped[str] = mapped_column(String(50))
     detector: Mapped[str] = mapped_column(String(50))
     material_id: Mapped[int | None] = mapped_column(ForeignKey("materials.id"))
-    sensor_id: Mapped[int] = mapped_column(ForeignKey("sensors.id"), index=True)
+    sensor_id: Mapped[int] = mapped_column(ForeignKey("sensors.id"))
     frames: Mapped[int]
     duration: Mapped[float]
     grid_rows: Mapped[int]

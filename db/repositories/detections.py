@@ -126,8 +126,8 @@ def detection_record(row: DetectionRow | None) -> Detection | None:
     return Detection(**found | {"findings": findings, "contact_friction": contact, "corrections": corrections})
 
 
-def samples_record(row: SampleSummaryRow | None) -> SampleSummary | None:
-    """The row as a plain record."""
+def samples_record(row: SampleSummaryRow | None, *, with_moments: bool = True) -> SampleSummary | None:
+    """The row as a plain record, which leaves the moments out where they were not asked for."""
     if row is None:
         return None
     return SampleSummary(
@@ -138,7 +138,7 @@ def samples_record(row: SampleSummaryRow | None) -> SampleSummary | None:
         tangential_velocity=_range(row.tangential_velocity_min, row.tangential_velocity_max),
         normal_force=_range(row.normal_force_min, row.normal_force_max),
         samples_blob=row.samples_blob,
-        moments=row.moments,
+        moments=row.moments if with_moments else None,
         velocity_is_relative=row.velocity_is_relative,
     )
 

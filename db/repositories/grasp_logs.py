@@ -4,7 +4,7 @@ import uuid
 
 from sqlalchemy import exists, func, inspect, select, tuple_, update
 from sqlalchemy.exc import IntegrityError
-from sqlalchemy.orm import Session, aliased
+from sqlalchemy.orm import Session, aliased, defer
 
 from db.errors import AlreadyExists, NotFound
 from db.paging import Window, windowed
@@ -21,6 +21,9 @@ _WHOLE = (
     .outerjoin(SampleSummaryRow, SampleSummaryRow.grasp_log_id == GraspLogRow.id)
 )
 """Logs with their jobs, sensors, materials, detections and samples; made once, for that takes longer than asking."""
+
+_LISTED = _WHOLE.options(defer(SampleSummaryRow.moments, raiseload=True))
+"""The same without the moments, which are most of a row's bytes."""
 
 
 def add(session: Session, log: NewGraspLog) -> str:
@@ -78,19 +81,20 @@ def get(session: Session, log_id: str) -> StoredGraspLog:
 
 
 def list_all(session: Session, window: Window, wanted: LogFilter) -> list[StoredGraspLog]:
-    """Logs with their jobs, detections and samples, in one query."""
-    query = _WHOLE
+    """Logs with their jobs, detections and samples, but without the moments of these, in one query."""
+    query = _LISTED
     if wanted.material_id is not None:
         query = query.where(GraspLogRow.material_id == wanted.material_id)
     if wanted.sensor is not None:
-        query = query.where(SensorRow.name == wanted.sensor)
+        named = select(SensorRow.id).where(SensorRow.name == wanted.sensor).scalar_subquery()
+        query = query.where(GraspLogRow.sensor_id == named)  # of the index, which has them by time
     if wanted.status is not None:
         query = query.where(JobRow.status == wanted.status)
     if wanted.withdrawn is not None:
         at = GraspLogRow.withdrawn_at
         query = query.where(at.is_not(None) if wanted.withdrawn else at.is_(None))
     found = session.execute(windowed(query, window, {"created_at": GraspLogRow.created_at}, GraspLogRow.id))
-    return [_record(*row) for row in found]
+    return [_record(*row, with_moments=False) for row in found]
 
 
 def material_id(session: Session, log_id: str) -> int | None:
@@ -159,6 +163,8 @@ def _record(
     material: str | None,
     detection: DetectionRow | None,
     samples: SampleSummaryRow | None,
+    *,
+    with_moments: bool = True,
 ) -> StoredGraspLog:
     return StoredGraspLog(
         id=row.id,
@@ -177,7 +183,7 @@ def _record(
         withdrawal=_withdrawal(row),
         job=jobs.record(job, material),
         detection=detections.detection_record(detection),
-        samples=detections.samples_record(samples),
+        samples=detections.samples_record(samples, with_moments=with_moments),
         calibration=row.calibration,
     )
 

@@ -51,6 +51,12 @@ def list_all(session: Session, window: Window = BY_NAME, search: str | None = No
     return _with_counts_and_models(session, list(session.scalars(windowed(query, window, columns, MaterialRow.id))))
 
 
+def first_names(session: Session, limit: int) -> list[str]:
+    """Names of the first materials, in alphabetical order, without aliases."""
+    query = select(MaterialRow.name).where(MaterialRow.merged_into_id.is_(None))
+    return list(session.scalars(query.order_by(MaterialRow.name).limit(limit)))
+
+
 def still(session: Session, material_id: int) -> int:
     """This material, or the one that it was merged into: it stays so until the transaction ends."""
     query = select(MaterialRow.merged_into_id).where(MaterialRow.id == material_id)
