@@ -73,7 +73,7 @@ class SensorModel:
             raise InvalidInput("grid", f"{log.grid[0]} × {log.grid[1]}", f"{self.grid[0]} × {self.grid[1]}, calibrated")
         changed = tuple(self._changes()) if log.force is not None else ()
         corrected = replace(log, force=self._force(log)) if changed else log
-        options = self._noise_options() if method == "filter" else {}
+        options = self._noise_options() if method == "filter" and log.has_displacement else {}
         if log.force is not None:
             options |= self._kernel_options()
         told = tuple(_TOLD[name].format(1e6 * value) for name, value in options.items())

@@ -104,6 +104,18 @@ def test_what_makes_a_log_doubtful_stands_on_its_page(
 
 
 @ON_SQLITE
+def test_the_detector_that_ran_is_told_where_a_log_has_forces_alone(
+    client: httpx.Client, ramp: GraspLog, upload: Any, wait: Any, fitted: Any, page_of: Callable[[str], Any]
+) -> None:
+    accepted = upload(client, encode(replace(ramp, displacement=None))).json()
+    wait(client, accepted["job"]["id"])
+    assert "forces_only; asked for: filter" in page_of(f"/logs/{accepted['id']}").text
+    assert "asked for" not in page_of(f"/logs/{fitted['id']}").text
+    assert "forces_only" in client.get(f"/logs/{accepted['id']}/report").text
+    wait_for_empty_spool(client)
+
+
+@ON_SQLITE
 def test_a_material_with_a_model_shows_its_sections_coefficients_and_logs(
     fitted: Any, page_of: Callable[[str], Any]
 ) -> None:

@@ -266,6 +266,7 @@ def test_a_detector_is_told_of_noise_that_it_would_not_see(
         log = faults.put_into(clean, 9)
         assert set(model.apply(log).options) == told
         assert model.apply(log, "strain_rate").options == {}
+        assert model.apply(replace(log, displacement=None)).options == {}  # forces alone have no markers
         with_model = f1_score(log, detect_slip(log, lookahead=2, sensor_model=model))
         assert with_model > least
         assert not told or with_model > f1_score(log, detect_slip(log, lookahead=2)) + 0.05
