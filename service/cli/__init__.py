@@ -25,13 +25,13 @@ from service.cli import (
     simulation,
     streaming,
 )
-from service.cli.exit_codes import exit_code, message
+from service.cli.exit_codes import INTERRUPTED, exit_code, message
 
 app = typer.Typer(
     name="stiction",
     help="Friction identification for robotic grasping: what a held object's micro-slips tell of its friction.",
     epilog="Exit codes: 0 done, 1 failure, 2 wrong usage, 3 input refused, 4 service unreachable or refusing, "
-    "5 no force holds the load. More: docs/cli.md.",
+    "5 no force holds the load, 130 interrupted. More: docs/cli.md.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
@@ -89,6 +89,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run one command and leave with its documented exit code."""
     try:
         app(arguments)
+    except (SystemExit, KeyboardInterrupt) as end:
+        if isinstance(end, SystemExit) and end.code != INTERRUPTED:
+            raise
+        typer.echo("stiction: interrupted; nothing is left half written", err=True)
+        sys.exit(INTERRUPTED)
     except Exception as error:
         code = exit_code(error)
         if code is None:

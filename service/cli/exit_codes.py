@@ -4,6 +4,8 @@ INPUT_REFUSED = 3
 FAILURE = 1
 SERVICE_REFUSED = 4
 NOT_FEASIBLE = 5
+INTERRUPTED = 130
+"""As shells have it of what SIGINT ended; typer leaves with it, too."""
 
 
 def message(error: Exception) -> str:

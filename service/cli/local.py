@@ -9,11 +9,13 @@ import typer
 
 from estimators.method_names import METHODS
 from service.cli.output import print_json, print_lines, print_table
+from service.cli.progress import counted, patience
 from service.formatting import interval, number
+from service.whole_files import write_whole
 
 if TYPE_CHECKING:
     from estimators import FrictionModel
-    from slipcore import GraspLog, SlipHistory
+    from slipcore import Finding, FrictionSamples, GraspLog, SlipHistory
 
 Log = Annotated[
     Path,
@@ -119,15 +121,17 @@ def fit(
     from service.domain.doubtful_logs import with_doubts
     from slipcore import check_log, collect_samples
 
-    grasps, found = [], []
-    for path in logs:
+    def look(path: Path) -> "tuple[FrictionSamples, list[Finding]]":
         grasp, history = detected(formats.read(path, mapping=mapping_text(mapping)), sensor_model, detector)
-        found.append(check_log(grasp, history))
-        for finding in found[-1]:
+        return collect_samples(grasp, history), check_log(grasp, history)
+
+    seen = list(counted(map(look, logs), len(logs), "logs looked at"))
+    for path, (_, findings) in zip(logs, seen, strict=True):
+        for finding in findings:
             typer.echo(f"{path.name}: {finding.name}: {finding.evidence}", err=True)
-        grasps.append(collect_samples(grasp, history))
-    names = [[finding.name for finding in findings] for findings in found]
-    model = with_doubts(fit_model(grasps, method=method, seed=seed), names)
+    with patience(f"fitting by {method}"):
+        model = fit_model([samples for samples, _ in seen], method=method, seed=seed)
+    model = with_doubts(model, [[finding.name for finding in findings] for _, findings in seen])
     if json:
         print_json(model_record(model))
     else:
@@ -148,7 +152,7 @@ def convert(
     name = writing.format_of(output)
     refuse_inputs(output, log, mapping)
     grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
-    writing.write(grasp, output, name)
+    write_whole(output, lambda beside: writing.write(grasp, beside, name))
     typer.echo(f"{output}: {len(grasp)} frames of {grasp.grid[0]} × {grasp.grid[1]} markers")
 
 

@@ -1,7 +1,7 @@
 """Signs of life of a command that takes longer than a moment."""
 
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from time import perf_counter
 from typing import TypeVar
@@ -15,39 +15,62 @@ MOMENT = 1.0
 Thing = TypeVar("Thing")
 
 
+class Line:
+    """A line on standard error that is written anew: what is being done, for how long and, once it is told which part
+    is done, for how much longer.
+    """
+
+    def __init__(self, doing: str) -> None:
+        self._doing, self._part, self._began, self._said = doing, 0.0, perf_counter(), ""
+
+    def tell(self, part: float, doing: str | None = None) -> None:
+        """Note which part is done, from 0 to 1, and what is being done by now."""
+        self._part, self._doing = part, self._doing if doing is None else doing
+
+    def say(self) -> None:
+        """Write the line."""
+        seconds = perf_counter() - self._began
+        left = f", {_rounded(seconds * (1.0 / self._part - 1.0))} left" if 0.0 < self._part < 1.0 else ""
+        text = f"{self._doing}: {_rounded(seconds)}{left}"
+        typer.echo(f"\r{text:<{len(self._said)}}", err=True, nl=False)
+        self._said = text
+
+    def end(self) -> None:
+        """Write it a last time, if it was ever written."""
+        if self._said:
+            self.say()
+            typer.echo(err=True)
+
+
 def counted(things: Iterable[Thing], total: int, name: str) -> Iterator[Thing]:
-    """The same things; where there are several, how many are done and the time left are said on standard error."""
-    if total == 1:
-        yield from things
-        return
-    typer.echo(f"0 of {total} {name}", err=True, nl=False)
-    began = perf_counter()
-    for count, thing in enumerate(things, 1):
-        left = (perf_counter() - began) / count * (total - count)
-        typer.echo(f"\r{count} of {total} {name}, {_left(left)} left ", err=True, nl=False)
-        yield thing
-    typer.echo(err=True)
-
-
-def _left(seconds: float) -> str:
-    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
+    """The same things, while it is said how many are done and how long the others will take."""
+    with patience(f"0 of {total} {name}") as tell:
+        for count, thing in enumerate(things, 1):
+            tell(count / total, f"{count} of {total} {name}")
+            yield thing
 
 
 @contextmanager
-def patience(doing: str) -> Iterator[None]:
-    """Say on standard error what is being done, and for how long, once a second; nothing if it is done in a moment."""
-    done, began = threading.Event(), perf_counter()
+def patience(doing: str) -> Iterator[Callable[..., None]]:
+    """Say on standard error what is being done, once a second; nothing if it is done in a moment.
+
+    Gives whom to tell the part that is done (``Line.tell``).
+    """
+    done, line = threading.Event(), Line(doing)
 
     def report() -> None:
         while not done.wait(MOMENT):
-            typer.echo(f"\r{doing}: {perf_counter() - began:.0f} s", err=True, nl=False)
+            line.say()
 
     thread = threading.Thread(target=report, daemon=True)
     thread.start()
     try:
-        yield
+        yield line.tell
     finally:
         done.set()
         thread.join()
-        if perf_counter() - began > MOMENT:
-            typer.echo(err=True)
+        line.end()
+
+
+def _rounded(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"

@@ -12,6 +12,7 @@ from service.cli.local import mapping_text, refuse_inputs
 from service.cli.output import print_json, print_table
 from service.cli.remote import DEFAULT_URL, Json, Key, Url, connected
 from service.formatting import interval, number
+from service.whole_files import write_whole
 
 app = typer.Typer(help="Show sensors, describe their gels, and learn their faults.", no_args_is_help=True)
 
@@ -83,7 +84,7 @@ def calibrate(
     forces = _known_forces(known_force, len(logs))
     told = _stored(logs, forces, sensor, url, key) if store else _learnt(logs, forces, mapping)
     if output is not None:
-        output.write_text(dumps(told), encoding="utf-8")
+        write_whole(output, lambda beside: beside.write_text(dumps(told), encoding="utf-8"))
     if json:
         print_json(told)
     else:

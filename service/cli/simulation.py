@@ -3,6 +3,7 @@
 import os
 from collections.abc import Iterable
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +14,7 @@ from service.cli.local import Picture, refuse_inputs
 from service.cli.output import print_json, print_lines, print_table
 from service.cli.progress import counted, patience
 from service.formatting import number
+from service.whole_files import write_whole
 
 if TYPE_CHECKING:
     from service.jobs.campaign import Outcome
@@ -52,12 +54,12 @@ def simulate(
         return
     from slipcore.contact import simulate as simulate_scene
 
-    with patience(f"simulating {wanted.name}"):
-        log = simulate_scene(wanted, accuracy=accuracy, seconds=seconds, seed=seed, tier=tier)
+    with patience(f"simulating {wanted.name}") as tell:
+        log = simulate_scene(wanted, accuracy=accuracy, seconds=seconds, seed=seed, tier=tier, progress=tell)
     if output is not None:
         from stiction_client import container
 
-        container.write(log, output)
+        write_whole(output, partial(container.write, log))
     if picture is not None:
         from service.report.pictures import save, truth_over_time
 
@@ -104,8 +106,8 @@ def _print_campaign(made: "Iterable[Outcome]", folder: Path, json: bool) -> None
 
 
 def _explain(scene: "Scene", seed: int, json: bool) -> None:
-    with patience(f"explaining {scene.name}"):
-        explanation = scene.explain(seed)
+    with patience(f"explaining {scene.name}") as tell:
+        explanation = scene.explain(seed, progress=tell)
     if json:
         print_json(asdict(explanation))
     else:

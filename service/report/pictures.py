@@ -14,6 +14,7 @@ from matplotlib.patches import Patch
 from scipy import stats
 
 from service.report.colours import FAINT, LINE, NO_CONTACT, SLIP, STICK, TRUTH
+from service.whole_files import write_whole
 from slipcore import FrictionLaw, FrictionSamples, GraspLog, SlipHistory
 from stiction_client.linear_friction import LinearFriction
 
@@ -45,10 +46,8 @@ class SlipOverTime:
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write a figure as PNG or SVG, as its name says, making its folder if need be."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=110, bbox_inches="tight")
-    return path
+    """Write a figure as PNG or SVG, as its name says, making its folder if need be; as a whole or not at all."""
+    return write_whole(path, lambda beside: figure.savefig(beside, dpi=110, bbox_inches="tight"))
 
 
 def slip_over_time(log: GraspLog, history: SlipHistory, title: str) -> Figure:

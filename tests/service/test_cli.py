@@ -20,7 +20,7 @@ from db.database import Database
 from db.records import NewGraspLog
 from db.repositories import grasp_logs
 from service import exports, formats
-from service.cli import app, main, streaming
+from service.cli import app, main, progress, streaming
 from service.cli.exit_codes import INPUT_REFUSED, NOT_FEASIBLE, SERVICE_REFUSED
 from service.cli.output import plain
 from service.demo.server import running_server
@@ -178,7 +178,10 @@ def test_simulate_takes_the_tier_that_is_named_and_refuses_one_that_is_not(run: 
     assert "boundary elements" in err
 
 
-def test_a_campaign_fills_a_folder_and_says_what_was_refused(run: Run, tmp_path: Path) -> None:
+def test_a_campaign_fills_a_folder_and_says_what_was_refused(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(progress, "MOMENT", 0.01)
     press, pull = tmp_path / "press.toml", tmp_path / "pull.toml"
     press.write_text('name = "my press"\n[[effect]]\nkind = "SensorSampling"\nframe_rate = 3.0\n', encoding="utf-8")
     pull.write_text('name = "pull"\n[[effect]]\nkind = "TangentialLoad"\nforce = [100.0, 0.0]\n', encoding="utf-8")
@@ -574,8 +577,9 @@ def test_a_recording_is_uploaded_with_its_mapping(run: Run, url: str, ramps: lis
 
 
 def test_a_lerobot_data_set_is_uploaded_one_log_an_episode(
-    run: Run, url: str, ramps: list[Path], tmp_path: Path
+    run: Run, url: str, ramps: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(progress, "MOMENT", 0.01)
     logs = [formats.read(path) for path in ramps[:2]]
     recordings = [exports.Recording(log, detect_slip(log), "ramp") for log in logs]
     exports.write(recordings, tmp_path / "grasps", "lerobot")
@@ -585,7 +589,7 @@ def test_a_lerobot_data_set_is_uploaded_one_log_an_episode(
     told = json.loads(out)["uploads"]
     assert (code, [each["file"] for each in told]) == (0, ["grasps episode 0", "grasps episode 1"])
     assert [each["status"] for each in told] == ["done", "done"]
-    assert re.search(r"1 of 2 logs, \d+ s left", err)
+    assert "2 of 2 logs" in err
     with FrictionClient(url) as client:
         model = client.model("from lerobot", "ols")
         assert (client.material("from lerobot").grasp_logs, model.interval(0.95)[0][0] < 0.5) == (2, True)

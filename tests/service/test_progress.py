@@ -1,11 +1,20 @@
 """A command that takes long says so; one that does not stays quiet."""
 
+import re
 import time
+from pathlib import Path
 
 import pytest
 
-from service.cli import progress
-from service.cli.progress import patience
+from service.cli import main, progress
+from service.cli.exit_codes import INTERRUPTED
+from service.cli.progress import counted, patience
+from slipcore.contact import Scene, simulate
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress, "MOMENT", 0.02)
 
 
 def test_a_command_says_how_long_it_has_been_at_it_and_stays_quiet_if_quick(
@@ -20,4 +29,64 @@ def test_a_command_says_how_long_it_has_been_at_it_and_stays_quiet_if_quick(
     out, err = capsys.readouterr()
     assert out == ""
     assert "thinking: 0 s" in err
+    assert " left" not in err
     assert err.endswith("\n")
+
+
+@pytest.mark.usefixtures("impatient")
+def test_the_time_left_is_told_once_it_is_known_which_part_is_done(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moments = iter([0.0, 30.0, *[600.0] * 1000])
+    with monkeypatch.context() as patched:
+        patched.setattr(progress, "perf_counter", lambda: next(moments))
+        line = progress.Line("thinking")
+        line.tell(0.25)
+        line.say()
+        line.tell(0.5)
+        line.end()
+    assert capsys.readouterr().err == "\rthinking: 30 s, 90 s left\rthinking: 10 min, 10 min left\n"
+
+
+@pytest.mark.usefixtures("impatient")
+def test_things_are_counted_as_they_are_done(capsys: pytest.CaptureFixture[str]) -> None:
+    for _ in counted(range(3), 3, "logs"):
+        time.sleep(0.05)
+    err = capsys.readouterr().err
+    assert re.search(r"\r1 of 3 logs: \d+ s, \d+ s left", err)
+    assert re.search(r"\r3 of 3 logs: \d+ s *\n$", err)
+
+
+def test_a_line_that_becomes_shorter_covers_what_stood_there(capsys: pytest.CaptureFixture[str]) -> None:
+    line = progress.Line("thinking hard")
+    line.say()
+    line.tell(0.0, "done")
+    line.say()
+    first, second = capsys.readouterr().err.strip("\r").split("\r")
+    assert len(second) == len(first)
+    assert second.startswith("done: 0 s  ")
+
+
+@pytest.mark.parametrize("given", [{"accuracy": 0.3}, {"seconds": 0.3}, {}], ids=["accuracy", "seconds", "neither"])
+def test_a_simulation_tells_which_part_is_done(given: dict[str, float]) -> None:
+    told: list[float] = []
+    simulate(Scene.from_toml("lifting_10N"), **given, progress=told.append)
+    assert all(0.0 < part <= 1.0 for part in told)
+    if not given:
+        assert told == sorted(told)
+        assert told[-1] == 1.0
+
+
+@pytest.mark.parametrize("arguments", [("simulate", "lifting_10N"), ("simulate", "lifting_10N", "--explain")])
+def test_an_interrupted_command_leaves_nothing_behind(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, arguments: tuple[str, ...]
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("slipcore.contact.tiers.boundary_elements._frames", interrupt)
+    with pytest.raises(SystemExit) as end:
+        main([*arguments, "--output", str(tmp_path / "log.npz")])
+    assert end.value.code == INTERRUPTED
+    assert capsys.readouterr().err == "stiction: interrupted; nothing is left half written\n"
+    assert list(tmp_path.iterdir()) == []

@@ -10,6 +10,7 @@ from slipcore.contact.defaults import EXPLAIN
 from slipcore.contact.effects.finite_layer import FiniteLayer
 from slipcore.contact.plan.description import SceneDescription
 from slipcore.contact.plan.plan import Effect, Plan, SamplingPlan
+from slipcore.contact.progress import Progress, unheard
 from slipcore.contact.scene.simulate import observe
 from slipcore.contact.tiers.accuracy import Difference, difference
 from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach, run
@@ -87,16 +88,18 @@ class Measured:
     applications: int
 
 
-def explain(scene: SceneDescription, seed: int = 0) -> Explanation:
+def explain(scene: SceneDescription, seed: int = 0, progress: Progress = unheard) -> Explanation:
     """Run a scene coarsely, with all its effects and without each in turn. Raises what ``simulate`` raises."""
-    sampling = _few_frames(scene.plan(seed))
+    sampling, effects, reports = _few_frames(scene.plan(seed)), scene.present(), list[EffectReport]()
     _measure(scene, sampling, seed)  # compiles what is compiled at its first use
     whole = _measure(scene, sampling, seed)
-    reports = tuple(_report(whole, effect, sampling, seed) for effect in scene.present())
+    for count, effect in enumerate(effects, 1):
+        progress(count / (1 + len(effects)))
+        reports.append(_report(whole, effect, sampling, seed))
     added = (propose(whole) for propose in PROPOSALS)
     left_out = (_superfluous(report) for report in reports)
     proposals = tuple(proposal for proposal in (*added, *left_out) if proposal is not None)
-    return Explanation(scene.name, whole.seconds, whole.applications, reports, proposals)
+    return Explanation(scene.name, whole.seconds, whole.applications, tuple(reports), proposals)
 
 
 def _few_frames(plan: Plan) -> SamplingPlan:

@@ -7,6 +7,7 @@ import numpy as np
 
 from slipcore.contact.plan.description import SceneDescription
 from slipcore.contact.plan.plan import Plan
+from slipcore.contact.progress import Progress, unheard
 from slipcore.contact.tiers import boundary_elements
 from slipcore.contact.tiers.accuracy import simulate_to
 from slipcore.contact.tiers.boundary_elements import Fidelity
@@ -22,6 +23,7 @@ def simulate(
     seed: int = 0,
     fidelity: Fidelity | None = None,
     tier: str | None = None,
+    progress: Progress = unheard,
 ) -> GraspLog:
     """Simulate a scene to an ``accuracy``, within ``seconds``, or at a ``fidelity``; with none of them, at the default
     one. For an accuracy the cheapest tier is taken that has it, unless ``tier`` names one: "closed form", "beams" (the
@@ -29,7 +31,7 @@ def simulate(
 
     ``accuracy`` is the largest of: absolute error of the stick ratio, relative L2 error over time of displacement and
     of force at the sensor's points, all before observation effects. ``seed`` draws random fields and noise. The
-    metadata tell tier, grid, steps, tolerance, estimated accuracy and seconds.
+    metadata tell tier, grid, steps, tolerance, estimated accuracy and seconds. ``progress`` is told which part is done.
 
     Raises ``InfeasibleLoad`` where friction cannot carry a load, ``NotConverged`` and ``InvalidInput``.
     """
@@ -44,9 +46,9 @@ def simulate(
     if cheap is not None:
         log, estimated = cheap.run(scene, plan), f"{cheap.accuracy(scene, plan):.2g}"
     elif accuracy is None and seconds is None:
-        log, estimated = boundary_elements.run(plan, fidelity), "not asked for"
+        log, estimated = boundary_elements.run(plan, fidelity, progress), "not asked for"
     else:
-        found = simulate_to(plan, accuracy, seconds)
+        found = simulate_to(plan, accuracy, seconds, progress)
         log, estimated = found.log, f"{found.error.largest:.2g}"
         log = replace(log, metadata={**log.metadata, "seconds": f"{found.seconds:.3f}"})
     return observe(plan, replace(log, metadata={"scene": scene.name, **log.metadata, "estimated accuracy": estimated}))

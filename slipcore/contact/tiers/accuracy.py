@@ -9,6 +9,7 @@ import numpy as np
 from slipcore.contact.defaults import ACCURACY, PROBE
 from slipcore.contact.errors import NotConverged
 from slipcore.contact.plan.plan import Plan, SamplingPlan
+from slipcore.contact.progress import Progress, unheard
 from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach, run
 from slipcore.contact.tiers.sampling import sensor_grid
 from slipcore.errors import InvalidInput
@@ -64,8 +65,12 @@ class Refined:
     seconds: float
 
 
-def simulate_to(plan: Plan, accuracy: float | None = None, seconds: float | None = None) -> Refined:
+def simulate_to(
+    plan: Plan, accuracy: float | None = None, seconds: float | None = None, progress: Progress = unheard
+) -> Refined:
     """The cheapest log that is estimated to be as accurate as asked, or the best one within about ``seconds``.
+
+    ``progress`` is told from the first estimate on: before that nobody knows what the accuracy will take.
 
     Raises ``NotConverged`` where the finest grid does not reach the accuracy asked.
     """
@@ -74,7 +79,8 @@ def simulate_to(plan: Plan, accuracy: float | None = None, seconds: float | None
             raise InvalidInput(name, value, "finite and above 0")
     began, target = time.perf_counter(), 0.0 if accuracy is None else accuracy
     budget = np.inf if seconds is None else seconds
-    for found in _refinements(_sampled(plan), target):
+    forecast = _Forecast(began, budget, progress)
+    for found in _refinements(_sampled(plan), target, forecast):
         if found.error.largest <= target or time.perf_counter() - began + _next_seconds(found, target) > budget:
             break
     if seconds is None and found.error.largest > target:
@@ -82,20 +88,37 @@ def simulate_to(plan: Plan, accuracy: float | None = None, seconds: float | None
     return replace(found, seconds=time.perf_counter() - began)
 
 
-def _refinements(plan: Plan, target: float) -> Iterator[Refined]:
+@dataclass(frozen=True, slots=True)
+class _Forecast:
+    """Tells ``progress`` the part of the seconds since ``began`` and of those that are left, within a ``budget``."""
+
+    began: float
+    budget: float
+    progress: Progress
+
+    def of_next(self, last: Refined, target: float) -> Progress:
+        """Whom the run after the ``last`` one tells how far it is."""
+        spent, takes = time.perf_counter() - self.began, _next_seconds(last, target)
+        total = min(spent + max(takes, _seconds_left(last, target)), self.budget)
+        return lambda part: self.progress(min((spent + part * takes) / total, 1.0))
+
+
+def _refinements(plan: Plan, target: float, forecast: _Forecast) -> Iterator[Refined]:
     """Ever finer logs, each with an error estimated from its difference from the one before."""
     reach = PROBE.room * contact_reach(plan)
     tolerance = min(ACCURACY.loosest, ACCURACY.solver_share * target) if target > 0.0 else ACCURACY.timed_tolerance
     fidelity, step_error, coarse = _steps(plan, Fidelity(ACCURACY.coarsest_cells, 1, tolerance), target)
     cells, error = _across(plan, reach, ACCURACY.coarsest_cells), np.inf
+    tell: Progress = unheard
     while error == np.inf or cells < ACCURACY.finest_cells:
         fidelity = replace(fidelity, cells=_next_cells(cells, error, target))
         began = time.perf_counter()
-        fine = run(plan, fidelity)
+        fine = run(plan, fidelity, tell)
         spent, finer = time.perf_counter() - began, _across(plan, reach, fidelity.cells)
         estimate = _extrapolated(difference(coarse, fine), finer / cells, step_error)
-        yield Refined(fine, fidelity, estimate, spent)
-        coarse, cells, error = fine, finer, estimate.largest
+        found = Refined(fine, fidelity, estimate, spent)
+        yield found
+        coarse, cells, error, tell = fine, finer, estimate.largest, forecast.of_next(found, target)
 
 
 def _steps(plan: Plan, fidelity: Fidelity, target: float) -> tuple[Fidelity, Difference, GraspLog]:
@@ -135,6 +158,13 @@ def _next_cells(cells: int, error: float, target: float) -> int:
 def _next_seconds(last: Refined, target: float) -> float:
     """Seconds that the next grid would take."""
     growth = _next_cells(last.fidelity.cells, last.error.largest, target) / last.fidelity.cells
+    return last.seconds * float(growth**ACCURACY.cost_order)
+
+
+def _seconds_left(last: Refined, target: float) -> float:
+    """Seconds that all further grids would take, by the last and finest of them."""
+    finest = ACCURACY.finest_cells / last.fidelity.cells
+    growth = min(ACCURACY.overshoot * last.error.largest / target, finest) if target > 0.0 else finest
     return last.seconds * float(growth**ACCURACY.cost_order)
 
 

@@ -11,6 +11,7 @@ from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import Scaled
 from slipcore.contact.elasticity.operator import Operators
 from slipcore.contact.plan.plan import Plan
+from slipcore.contact.progress import Progress, unheard
 from slipcore.contact.solver.normal import solve_normal
 from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
 from slipcore.contact.solver.resolution import summary
@@ -45,8 +46,8 @@ class Fidelity:
             raise InvalidInput("fidelity", self, "4 cells or more, 1 substep or more, a tolerance between 0 and 1")
 
 
-def run(plan: Plan, fidelity: Fidelity | None = None) -> GraspLog:
-    """Simulate a plan; the log has no observation effects yet.
+def run(plan: Plan, fidelity: Fidelity | None = None, progress: Progress = unheard) -> GraspLog:
+    """Simulate a plan; the log has no observation effects yet. ``progress`` is told after each frame.
 
     Raises ``InfeasibleLoad``, ``NotConverged`` and ``InvalidInput``.
     """
@@ -56,7 +57,7 @@ def run(plan: Plan, fidelity: Fidelity | None = None) -> GraspLog:
     gap_tolerance = FIDELITY.normal_share * fidelity.tolerance
     solver = QuasiStatic(plan.problem, where.grid, fidelity.tolerance, gap_tolerance, second_order=True)
     times = frame_times(plan)
-    frames, warnings = _frames(plan, solver, where, times, fidelity)
+    frames, warnings = _frames(plan, solver, where, times, fidelity, progress)
     metadata = {
         "tier": "boundary elements",
         "grid": f"{where.grid.shape[1]} x {where.grid.shape[0]} cells of {where.grid.pitch[0]:.6g} m",
@@ -70,7 +71,7 @@ def run(plan: Plan, fidelity: Fidelity | None = None) -> GraspLog:
 
 
 def _frames(
-    plan: Plan, solver: QuasiStatic, where: SensorGrid, times: FloatArray, fidelity: Fidelity
+    plan: Plan, solver: QuasiStatic, where: SensorGrid, times: FloatArray, fidelity: Fidelity, progress: Progress
 ) -> tuple[list[FrameRecord], list[tuple[str, ...]]]:
     """Records of all frames, and of each load step what the grid does not resolve."""
     state, growth = solver.start(), 1.0 / (fidelity.cells * fidelity.substeps)
@@ -83,6 +84,7 @@ def _frames(
             results.append(result)
         warnings += [result.warnings() for result in results]
         frames.append(frame_record(where, results))
+        progress(len(frames) / len(times))
     return frames, warnings
 
 
