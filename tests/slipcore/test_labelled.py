@@ -1,9 +1,12 @@
+import csv
+import io
 import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from estimators import fit
 from slipcore import FrictionSamples, GraspLog, SlipHistory, collect_samples, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
 
@@ -78,6 +81,15 @@ def test_a_notebook_shows_records_and_what_somebody_typed_as_text(
     assert history._repr_html_().count('<path d="M') == 1
     assert f"<td>{len(samples)}</td>" in samples._repr_html_()
     assert "<td>0</td>" in samples.take(np.zeros(len(samples), bool))._repr_html_()
+
+
+def test_no_cell_of_a_table_is_a_formula_whatever_somebody_typed(log: GraspLog, history: SlipHistory) -> None:
+    typed = replace(log, sensor='=HYPERLINK("http://x")', metadata={"object": "@SUM(1)", "+1": "-2+3", "\t=1": "\t=1"})
+    samples = collect_samples(typed, history)
+    for table in (samples, history, fit(samples, method="ols")):
+        cells = {cell for row in csv.reader(io.StringIO(table.to_dataframe().to_csv())) for cell in row}
+        doubtful = {cell for cell in cells if cell.startswith(("=", "+", "-", "@", "\t", "\r"))}
+        assert all(np.isfinite(float(cell)) for cell in doubtful)
 
 
 def test_frames_without_contact_leave_a_gap_in_the_curve(history: SlipHistory) -> None:
