@@ -10,7 +10,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from service.demo import tables
 from service.demo.drawing import draw_grasps, draw_models, see
 from service.demo.inputs import DemoLog, recorded_logs, simulated_logs
-from service.demo.server import running_server
+from service.demo.server import starting_server
 from service.demo.tables import METHODS, Answer, Upload
 from service.report import wording
 from service.report.page import Report, Section, write_report
@@ -45,12 +45,12 @@ def run_demo(output: Path, recordings: Path | None, seed: int, show: Show) -> No
     console = Console()
     output.mkdir(parents=True, exist_ok=True)
     shutil.rmtree(output / "service", ignore_errors=True)  # the demo's own folder: each run starts a fresh database
-    logs = _inputs(output, recordings, seed, console)
-    with _progress(console) as progress:
-        with running_server(output / "service") as url, FrictionClient(url) as client:
+    with starting_server(output / "service") as address:
+        logs = _inputs(output, recordings, seed, console)
+        with _progress(console) as progress, FrictionClient(address()) as client:
             uploads = _upload(client, logs, progress)
             answers = _ask(client, list(dict.fromkeys(log.material for log in logs)), seed, progress)
-        sections = _sections(uploads, answers, progress)
+            sections = _sections(uploads, answers, progress)
     for section in sections:
         for table in section.tables:
             show(table.caption, table.columns, table.rows)

@@ -5,8 +5,9 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import httpx
@@ -21,6 +22,13 @@ def running_server(folder: Path) -> Iterator[str]:
 
     Raises ``RuntimeError`` with the end of the server's own log if it does not get ready.
     """
+    with starting_server(folder) as address:
+        yield address()
+
+
+@contextmanager
+def starting_server(folder: Path) -> Iterator[Callable[[], str]]:
+    """The same, for who has something to do while the server starts: waits for it where the address is asked for."""
     folder.mkdir(parents=True, exist_ok=True)
     port = _free_port()
     log = folder / "server.log"
@@ -29,9 +37,7 @@ def running_server(folder: Path) -> Iterator[str]:
     with log.open("wb") as output:
         process = subprocess.Popen(command, env=environment, stdout=output, stderr=subprocess.STDOUT)
         try:
-            url = f"http://127.0.0.1:{port}"
-            _wait_until_ready(url, process, log)
-            yield url
+            yield partial(_address, f"http://127.0.0.1:{port}", process, log)
         finally:
             process.terminate()
             process.wait(timeout=30)
@@ -43,14 +49,16 @@ def _free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def _wait_until_ready(url: str, process: "subprocess.Popen[bytes]", log: Path) -> None:
+def _address(url: str, process: "subprocess.Popen[bytes]", log: Path) -> str:
+    """The server's address, once it is ready."""
     deadline = time.monotonic() + START_TIMEOUT
-    while time.monotonic() < deadline and process.poll() is None:
-        try:
-            if httpx.get(f"{url}/readyz", timeout=2.0).status_code == httpx.codes.OK:
-                return
-        except httpx.TransportError:
-            pass  # not listening yet
-        time.sleep(0.05)
+    with httpx.Client(timeout=2.0, verify=False, trust_env=False) as client:  # certificates take longer than asking
+        while time.monotonic() < deadline and process.poll() is None:
+            try:
+                if client.get(f"{url}/readyz").status_code == httpx.codes.OK:
+                    return url
+            except httpx.TransportError:
+                pass  # not listening yet
+            time.sleep(0.05)
     tail = "\n".join(log.read_text(errors="replace").splitlines()[-20:])
     raise RuntimeError(f"the server did not get ready on {url}; the end of its log:\n{tail}")
