@@ -35,21 +35,25 @@ class WebSocketConnection(WebSocketsSansIOProtocol):
     async def receive(self) -> Any:
         """The next message."""
         message = await super().receive()
-        self._parse()
+        if self._held and not self.read_paused:  # the application goes on at once as long as a message is there
+            self._wait_for_turn()
         return message
 
     def _parse(self) -> None:
         data, parsed, end_of_turn = self._held, 0, perf_counter() + turns.TURN_SECONDS
         while parsed < len(data) and not self.read_paused and not self.transport.is_closing():
             if parsed and perf_counter() >= end_of_turn:
-                self.read_paused = True
-                self.transport.pause_reading()
-                turns.turns_of(self.loop).wait(self._take_turn)
+                self._wait_for_turn()
                 break
             super().data_received(data[parsed : parsed + PARSED_BYTES])
             self._answer_pings()
             parsed += PARSED_BYTES
         self._held = data[parsed:]
+
+    def _wait_for_turn(self) -> None:
+        self.read_paused = True
+        self.transport.pause_reading()
+        turns.turns_of(self.loop).wait(self._take_turn)
 
     def _take_turn(self) -> None:
         is_wanted = self.close_sent or self.queue.empty()  # after the close all is passed over but the client's own

@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from service.stream.broadcast import Broadcast
-from service.stream.errors import FINISHED, KEY_ENDED, SLOW_READER, End
+from service.stream.errors import FINISHED, KEY_ENDED, NOT_UNDERSTOOD, SLOW_READER, End
 from service.stream.sessions import Streams
 from service.stream.sockets import KEY_SECONDS, close, until_one_ends
 
@@ -67,10 +67,12 @@ class _Watcher:
             await self._read.wait()
 
     async def listen(self) -> None:
-        """Each word of the watcher tells that it has read some frames."""
+        """Each word of the watcher tells that it has read some frames; raises ``End`` where they were not sent."""
         while True:
             event = await self._socket.receive()
             if event["type"] == "websocket.disconnect":
                 raise WebSocketDisconnect(event.get("code", 1000))
+            if self._on_the_way < READ_TOGETHER - 1:  # the last may be read before its sending has returned
+                raise End(NOT_UNDERSTOOD, f"a word without {READ_TOGETHER} frames to have read")
             self._on_the_way = max(self._on_the_way - READ_TOGETHER, 0)
             self._read.set()

@@ -318,12 +318,19 @@ def test_small_messages_are_not_made_before_they_are_asked_for(address: Address,
     assert 1 <= max(most_waiting.values()) <= PARSED_BYTES // SMALL
 
 
-def test_pings_are_answered_in_turns(address: Address, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A connection of nothing else kept all others waiting for as long as it lasted."""
+@pytest.fixture
+def turns_taken(monkeypatch: pytest.MonkeyPatch) -> list[object]:
     taken: list[object] = []
     wait = turns.Turns.wait
-    monkeypatch.setattr(turns, "TURN_SECONDS", 0.0)
     monkeypatch.setattr(turns.Turns, "wait", lambda own, go_on: (taken.append(go_on), wait(own, go_on)))
+    return taken
+
+
+def test_pings_are_answered_in_turns(
+    address: Address, turns_taken: list[object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A connection of nothing else kept all others waiting for as long as it lasted."""
+    monkeypatch.setattr(turns, "TURN_SECONDS", 0.0)
     pings = 10_000
     with websocket(address) as connection:
         connection.sendall(frame(PING) * pings)
@@ -331,7 +338,7 @@ def test_pings_are_answered_in_turns(address: Address, monkeypatch: pytest.Monke
         while len(said) < 2 * pings:
             said += connection.recv(65536)
         assert said == PONG * pings
-        assert len(taken) > 6 * pings // PARSED_BYTES // 2
+        assert len(turns_taken) > 6 * pings // PARSED_BYTES // 2
         connection.sendall(frame(CLOSE))
         assert everything(connection)[:1] == bytes([CLOSE])
 
@@ -363,7 +370,10 @@ def test_pings_behind_the_last_message_do_not_delay_the_close(
     assert time.monotonic() - began < 8.0  # the server gives the close 10 s
 
 
-def test_messages_that_wait_as_bytes_come_in_their_order(address: Address, most_waiting: Counter[int]) -> None:
+def test_messages_that_wait_as_bytes_come_in_their_order(
+    address: Address, most_waiting: Counter[int], turns_taken: list[object]
+) -> None:
+    """And in turns: the application goes from one to the next without a pause in which others would come."""
     corners = [[x, y, 0.0] for x in (0.0, 1e-3) for y in (0.0, 1e-3)]
     opening = {"type": "open", "position": corners, "grid": [2, 2], "element_area": 1e-6}
     begin = frame(TEXT_BEGINS) + b"".join(frame(CONTINUES, bytes([each])) for each in json.dumps(opening).encode())
@@ -374,3 +384,4 @@ def test_messages_that_wait_as_bytes_come_in_their_order(address: Address, most_
     assert [said.count(each) for each in (b'"opened"', b'"state"', b'"finished"')] == [1, 1, 1]
     assert said.endswith((1000).to_bytes(2) + b"finished")
     assert max(most_waiting.values()) <= PARSED_BYTES // len(again) + 1
+    assert len(turns_taken) > len(again) * 1000 // PARSED_BYTES // 2

@@ -33,15 +33,15 @@ class Reader:
         self.got: list[bytes] = []
         self.closed: tuple[int, str] | None = None
         self._reads = reads
-        self._said = asyncio.Semaphore(0)
+        self.said = asyncio.Semaphore(0)
 
     async def send_bytes(self, content: bytes) -> None:
         self.got.append(content)
         if self._reads and len(self.got) % READ_TOGETHER == 0:
-            self._said.release()
+            self.said.release()
 
     async def receive(self) -> dict[str, str]:
-        await self._said.acquire()
+        await self.said.acquire()
         return {"type": "websocket.receive", "text": ""}
 
     async def close(self, code: int, reason: str) -> None:
@@ -98,6 +98,14 @@ def test_who_reads_nothing_is_sent_no_more_than_a_few_frames_and_is_dropped(monk
     watched(reader, 100)
     assert reader.got == [str(number).encode() for number in range(MOST_ON_THE_WAY)]
     assert reader.closed == (4408, "nothing was read for 0.2 s")
+
+
+def test_who_says_to_have_read_what_was_not_sent_is_let_go() -> None:
+    reader = Reader()
+    reader.said.release()
+    watched(reader, 100)
+    assert reader.closed == (1003, "a word without 8 frames to have read")
+    assert len(reader.got) < 100
 
 
 def test_who_reads_slowly_sees_the_newest_frame_and_not_those_before() -> None:
