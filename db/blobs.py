@@ -1,6 +1,7 @@
 """Content-addressed files: a blob's name is the SHA-256 of its bytes, and it is there as a whole or not at all."""
 
 import hashlib
+import math
 import os
 import re
 import shutil
@@ -22,6 +23,9 @@ from db.quarantine import FolderQuarantine, Quarantine, move, sync_folder
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 STORE_ID = "store-id"
 """File beside the blobs that tells which store they belong to (``db.identity``)."""
+
+MOST_CHECKED = 10_000
+"""Blobs of which it is remembered when they were read last; when there are more, all are forgotten."""
 
 UNSETTLED = "first start of "
 """What that file begins with until the database has the id, too."""
@@ -109,6 +113,7 @@ class BlobStore:
         self.quarantine: Quarantine = (
             FolderQuarantine(folder / "quarantine", self._place) if remote is None else ObjectQuarantine(remote)
         )
+        self._checked: dict[str, tuple[float, tuple[int, ...]]] = {}  # when, and as which file
         self.store_id: str | None = None  # that of the database that works with it, once somebody has compared them
         for part in (self._blobs, self._spool):
             part.mkdir(parents=True, exist_ok=True)
@@ -155,20 +160,37 @@ class BlobStore:
                 raise BlobDamaged(sha256, spool.sha256)
             spool.keep()
 
-    def path(self, sha256: str) -> Path:
+    def path(self, sha256: str, checked_within: float = 0.0) -> Path:
         """The file that holds a blob, with the bytes that it is named for: they are read and compared each time.
 
-        Raises ``NotFound``, and ``BlobDamaged``.
+        Not those that were read ``checked_within`` so many seconds, of a file that nobody has written to since. Raises
+        ``NotFound``, and ``BlobDamaged``.
         """
+        if self._is_checked(sha256, checked_within):
+            return self._place(sha256)
         path = self.locate(sha256)
+        checked = time.monotonic(), _state(path)
         found = _hash(path)
         if found != sha256 and self._remote is not None:  # the cache's copy
             path.unlink(missing_ok=True)
             path = self.locate(sha256)
+            checked = time.monotonic(), _state(path)
             found = _hash(path)
         if found != sha256:
             raise BlobDamaged(sha256, found)
+        if len(self._checked) >= MOST_CHECKED:
+            self._checked.clear()
+        self._checked[sha256] = checked
         return path
+
+    def _is_checked(self, sha256: str, within: float) -> bool:
+        at, state = self._checked.get(sha256, (-math.inf, None))
+        if time.monotonic() - at >= within:
+            return False
+        try:
+            return _state(self._place(sha256)) == state
+        except StorageUnavailable:  # it is not there any more
+            return False
 
     def locate(self, sha256: str) -> Path:
         """The file that holds a blob, for one who compares its bytes with the hash; raises ``NotFound``."""
@@ -325,6 +347,13 @@ class BlobStore:
 def open_blobs(folder: Path, url: str | None = None, cache_bytes: int = 0) -> BlobStore:
     """The blobs in a folder, or those of the object store at ``url`` with the folder as their cache."""
     return BlobStore(folder, None if url is None else ObjectStore(url), cache_bytes)
+
+
+def _state(path: Path) -> tuple[int, ...]:
+    """What is another once somebody has written to a file, or put another in its place."""
+    with disk_errors_named():
+        told = path.stat()
+    return told.st_ino, told.st_size, told.st_mtime_ns
 
 
 def _hash(path: Path) -> str:

@@ -44,6 +44,7 @@ from service.observability.access_log import AccessLog
 from service.observability.metrics import Metering, Metrics
 from service.observability.store_watch import StoreWatch
 from service.processes import data_folder, private_files
+from service.processes.fair_threads import FairThreads
 from service.processes.folder_lock import shared
 from service.settings import Settings
 from service.stream.sessions import Streams
@@ -141,7 +142,8 @@ async def running(
                 poll_seconds=settings.poll_seconds,
                 shutdown_seconds=settings.shutdown_seconds,
             )
-            readers = Readers(settings.read_seconds, settings.readers, settings.reading_bytes)
+            for_clients = FairThreads()
+            readers = Readers(settings.read_seconds, settings.readers, settings.reading_bytes, for_clients)
             streams = Streams(settings.stream_sessions_per_key, settings.stream_bytes)
             await runner.start()
             retention = Retention(
@@ -161,7 +163,16 @@ async def running(
             try:
                 models = ModelCache(settings.lookup_seconds)
                 yield ServerContext(
-                    settings, database, blobs, runner, readers, models, streams=streams, scrub=scrub, watch=watch
+                    settings,
+                    database,
+                    blobs,
+                    runner,
+                    readers,
+                    models,
+                    threads=for_clients,
+                    streams=streams,
+                    scrub=scrub,
+                    watch=watch,
                 )
             finally:
                 for thread in threads:
@@ -169,6 +180,7 @@ async def running(
                 await streams.stop()
                 await runner.stop()
                 await readers.stop()
+                for_clients.stop()
 
 
 def _enter(

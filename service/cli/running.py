@@ -4,6 +4,7 @@ import logging
 import os
 import signal
 import socket
+import sys
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -34,8 +35,10 @@ def serve(
     """Run the web service until it is told to stop (every setting: docs/settings.md)."""
     import uvicorn
 
+    from service.processes.side_process import SWITCH_SECONDS
     from service.serving import configuration
 
+    sys.setswitchinterval(SWITCH_SECONDS)  # who is answered by the event loop does not wait for threads
     settings = _settings(host=host, port=port, data_folder=data_folder, database_url=database_url)
     _prepare(settings)
     chosen = configuration(settings)

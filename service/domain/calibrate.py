@@ -1,6 +1,5 @@
 """What is wrong with a sensor, from stored logs of presses, and the correction of its later logs by that."""
 
-import asyncio
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -47,14 +46,15 @@ async def calibrate(
     sensor or a log, ``FileDeleted``, ``InsufficientScope``, and ``InvalidValue`` for logs that are another sensor's or
     no pure presses, with what was seen in each.
     """
-    paths = await asyncio.to_thread(_files, context, sensor, presses, principal)
+    hashes = await context.threads.run(principal.share, _hashes, context, sensor, presses, principal)
+    paths = await context.files(principal.share, hashes)
     forces = [press.known_force for press in presses]
     try:
         model, offset = await context.readers.derive(partial(learn, sensor, paths, forces), "press", principal.share)
     except SlipcoreError as error:
         raise InvalidValue("grasp_logs", _with_ids(error, presses), "pure presses of one sensor") from error
     new = NewCalibration(tuple(presses), model, offset, principal.key_id)
-    return await asyncio.to_thread(_store, context, sensor, new, principal)
+    return await context.threads.run(principal.share, _store, context, sensor, new, principal)
 
 
 def _store(context: Context, sensor: str, new: NewCalibration, principal: Principal) -> Calibration:
@@ -116,8 +116,8 @@ def _check_right(session: Session, sensor: str, principal: Principal) -> None:
         raise InsufficientScope("upload", "admin")
 
 
-def _files(context: Context, sensor: str, presses: Sequence[CalibrationPress], principal: Principal) -> list[Path]:
-    """Where the logs are; each must be of this sensor, and they must not be too much together."""
+def _hashes(context: Context, sensor: str, presses: Sequence[CalibrationPress], principal: Principal) -> list[str]:
+    """Of the logs; each must be of this sensor, and they must not be too much together."""
     with context.database.read() as session:
         _check_right(session, sensor, principal)
         logs = [grasp_logs.get(session, press.grasp_log) for press in presses]
@@ -129,7 +129,7 @@ def _files(context: Context, sensor: str, presses: Sequence[CalibrationPress], p
     elements = sum(log.frames * log.grid[0] * log.grid[1] for log in logs)
     if elements > MOST_ELEMENTS:
         raise InvalidValue("grasp_logs", f"{elements} elements in all frames", f"at most {MOST_ELEMENTS}")
-    return [context.blobs.path(log.sha256) for log in logs]
+    return [log.sha256 for log in logs]
 
 
 def _with_ids(error: SlipcoreError, presses: Sequence[CalibrationPress]) -> str:

@@ -1,9 +1,12 @@
 """What the use cases have to work with."""
 
 import asyncio
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
 from typing import Protocol
 
 from sqlalchemy.orm import Session
@@ -13,6 +16,7 @@ from db.database import Database
 from service.domain.model_cache import ModelCache
 from service.domain.receive import Bodies
 from service.formats.reading import Readers
+from service.processes.fair_threads import LONG, FairThreads
 from service.settings import Settings
 
 
@@ -35,7 +39,10 @@ class Jobs(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """The open stores and the running jobs of one application."""
+    """The open stores and the running jobs of one application.
+
+    ``threads``: for all that is done on a client's behalf; ``waits``: of each client for jobs, at the moment.
+    """
 
     settings: Settings
     database: Database
@@ -44,6 +51,13 @@ class Context:
     readers: Readers = field(default_factory=Readers)
     models: ModelCache = field(default_factory=ModelCache)
     bodies: Bodies = field(default_factory=Bodies)
+    threads: FairThreads = field(default_factory=FairThreads)
+    waits: Counter[str] = field(default_factory=Counter)
+
+    async def files(self, owner: str, hashes: Iterable[str], checked_within: float = 0.0) -> list[Path]:
+        """The files that hold these blobs, for a client; each is compared with its hash (``BlobStore.path``)."""
+        path = partial(self.threads.run, owner, self.blobs.path, weight=LONG)
+        return [await path(sha256, checked_within) for sha256 in hashes]
 
     @contextmanager
     def queueing(self) -> Iterator[Session]:

@@ -1,6 +1,5 @@
 """Hand a stored log out as a file: as it is kept where that is asked for, or written anew in a reader's process."""
 
-import asyncio
 from collections.abc import Awaitable, Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -21,17 +20,23 @@ class LogFile:
 
 
 async def export(
-    context: Context, log: StoredGraspLog, name: str, owner: str, room: Callable[[], Awaitable[None]]
+    context: Context,
+    log: StoredGraspLog,
+    name: str,
+    owner: str,
+    room: Callable[[], Awaitable[None]],
+    checked_within: float = 0.0,
 ) -> LogFile:
     """The log as a file of format ``name``; what is not there yet is made in the share of ``owner``, after ``room``.
 
+    The stored file is compared with its hash unless it was ``checked_within`` so many seconds (``BlobStore.path``).
     Raises ``FileDeleted`` where there is none, ``UnsupportedFormat`` without a library of that format, ``QueueFull``.
     """
     if not log.has_file:
         raise FileDeleted(f"the file of grasp log {log.id} was deleted, as old uploads are here")
-    source = await asyncio.to_thread(context.blobs.path, log.sha256)
+    (source,) = await context.files(owner, [log.sha256], checked_within)
     with ExitStack() as spools:
-        if name == "npz" and await asyncio.to_thread(formats.identify, source) == "npz":
+        if name == "npz" and await context.threads.run(owner, formats.identify, source) == "npz":
             return LogFile(source, spools.pop_all())
         await room()
         spool = spools.enter_context(context.blobs.spool())

@@ -4,8 +4,10 @@ import asyncio
 import gzip
 import sys
 import zlib
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
+from contextlib import asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 from db.blobs import Spool
 from service.domain.errors import InvalidValue, TooLarge, UnsupportedFormat, UploadInterrupted
@@ -29,6 +31,9 @@ WINDOW_LOG = 23
 
 EXPANSION_FROM = 16 * CHUNK_BYTES
 """Bytes unpacked before their ratio to the packed ones counts: a small log of zeros is no attack."""
+
+InThread = Callable[..., Awaitable[None]]
+"""Calls its first argument with the others in a thread."""
 
 
 def _unpack_zstd(path: Path) -> zstd.ZstdFile:
@@ -68,14 +73,14 @@ class Bodies:
     def __init__(self) -> None:
         self._count = 0
 
-    async def receive(self, spool: Spool, chunks: AsyncIterator[bytes], limit: int) -> None:
+    async def receive(self, spool: Spool, chunks: AsyncIterator[bytes], limit: int, in_thread: InThread) -> None:
         """Write a body to ``spool`` as it comes.
 
         Raises ``TooLarge`` for one over the limit, ``UploadInterrupted`` where ``chunks`` raises ``ConnectionError``.
         """
         self._count += 1
         try:
-            await _receive(spool, chunks, limit, self._chunk_bytes)
+            await _receive(spool, chunks, limit, self._chunk_bytes, in_thread)
         finally:
             self._count -= 1
 
@@ -83,7 +88,9 @@ class Bodies:
         return min(max(BUFFER_BYTES // self._count, LEAST_CHUNK_BYTES), CHUNK_BYTES)
 
 
-async def _receive(spool: Spool, chunks: AsyncIterator[bytes], limit: int, chunk_bytes: Callable[[], int]) -> None:
+async def _receive(
+    spool: Spool, chunks: AsyncIterator[bytes], limit: int, chunk_bytes: Callable[[], int], in_thread: InThread
+) -> None:
     """A chunk is written while the next is received: no faster than the disk takes it."""
     size, waiting, writing = 0, bytearray(), None
     try:
@@ -94,13 +101,13 @@ async def _receive(spool: Spool, chunks: AsyncIterator[bytes], limit: int, chunk
             if len(waiting) >= chunk_bytes():
                 if writing is not None:
                     await writing
-                writing, waiting = asyncio.create_task(asyncio.to_thread(spool.write, waiting)), bytearray()
+                writing, waiting = asyncio.ensure_future(in_thread(spool.write, waiting)), bytearray()
     except ConnectionError as error:
         raise UploadInterrupted(f"the connection ended after {size} bytes") from error
     finally:
         if writing is not None:
             await writing
-    await asyncio.to_thread(spool.write, waiting)
+    await in_thread(spool.write, waiting)
 
 
 def unpack(packed: Spool, spool: Spool, encoding: str, limit: int, expansion: int) -> None:
@@ -115,3 +122,27 @@ def unpack(packed: Spool, spool: Spool, encoding: str, limit: int, expansion: in
     except (EOFError, gzip.BadGzipFile, zlib.error, zstd.ZstdError) as error:
         value = f"not a complete {encoding} stream ({str(error)[:80]})"
         raise InvalidValue("body", value, f"{encoding}, as content-encoding says") from error
+
+
+@asynccontextmanager
+async def unless_gone(gone: Coroutine[Any, Any, None]) -> AsyncIterator[None]:
+    """Ends what is waited for inside once ``gone`` has ended: raises ``UploadInterrupted``, which nobody reads."""
+    watch, loop = asyncio.create_task(gone), asyncio.get_running_loop()
+    try:
+        async with asyncio.timeout(None) as patience:
+
+            def end(_: object) -> None:
+                patience.reschedule(loop.time())
+
+            watch.add_done_callback(end)
+            try:
+                yield
+            finally:
+                watch.remove_done_callback(end)
+    except TimeoutError as error:
+        if not patience.expired():
+            raise
+        raise UploadInterrupted("the connection ended before there was an answer") from error
+    finally:
+        watch.cancel()
+        await asyncio.wait({watch})

@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
 from contextlib import ExitStack, asynccontextmanager, contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, TypeVar
 
 from sqlalchemy.orm import Session
@@ -15,15 +16,16 @@ from db.repositories import audit, detections, friction_models, grasp_logs, jobs
 from service import formats
 from service.domain import curate, quotas
 from service.domain.context import Context
-from service.domain.errors import InvalidGraspLog, InvalidValue, UnsupportedFormat, UploadInterrupted
+from service.domain.errors import InvalidGraspLog, InvalidValue, UnsupportedFormat
 from service.domain.keys import check_not_ended
 from service.domain.ownership import check_may_add
 from service.domain.principal import ANONYMOUS, Principal
 from service.domain.queueing import INGEST_METHODS, queue
-from service.domain.receive import UNPACKING_BYTES, check_encoding, check_expansion, check_size, unpack
+from service.domain.receive import UNPACKING_BYTES, check_encoding, check_expansion, check_size, unless_gone, unpack
 from service.domain.sensors import RECONSTRUCTED
 from service.formats.archive import unpacked_bytes
-from service.formats.reading import Description, FormatSettings, to_its_end
+from service.formats.reading import Description, FormatSettings
+from service.processes.fair_threads import LONG
 from service.settings import Settings
 from slipcore.defaults import METHOD_NAMES
 from slipcore.errors import InvalidInput
@@ -97,19 +99,17 @@ async def received(
     ``gone`` ends when the client has gone: what is still to be read then is not. Raises ``DomainError`` for what cannot
     be taken, ``QueueFull``, ``NotFound`` for an unknown material.
     """
-    limit, expansion = context.settings.max_upload_bytes, context.settings.max_expansion
+    limit = context.settings.max_upload_bytes
     check_size(request.content_length or 0, limit)
     _check_type(request.content_type)
     encoding = check_encoding(request.content_encoding)
-    material_id = await asyncio.to_thread(_check, context, request)
+    in_thread = partial(context.threads.run, request.principal.share)
+    material_id = await in_thread(_check, context, request)
     with ExitStack() as spools:
-        body = spool = spools.enter_context(context.blobs.spool())
-        await context.bodies.receive(body, chunks, limit)
-        if encoding:
-            spool = spools.enter_context(context.blobs.spool())
-            async with context.readers.room.turn(request.principal.share, UNPACKING_BYTES):
-                await to_its_end(asyncio.to_thread(unpack, body, spool, encoding, limit, expansion))
-        kept, description = await _unless_gone(_read(context, spools, spool, request, body.size), gone())
+        body = spools.enter_context(context.blobs.spool())
+        await context.bodies.receive(body, chunks, limit, in_thread)
+        async with unless_gone(gone()):
+            kept, description = await _unpack_and_read(context, spools, body, encoding, request)
         new_material = request.material if material_id is None else None
         log = _new_log(kept, description, request, material_id)
         yield ReceivedLog(kept, log, body.sha256, request.principal, new_material)
@@ -118,13 +118,15 @@ async def received(
 async def upload(context: Context, chunks: AsyncIterator[bytes], request: UploadRequest) -> StoredUpload:
     """Store a log that comes in ``chunks``, and queue its ingest; raises as ``received`` and ``accept``."""
     async with received(context, chunks, request) as log:
-        return await asyncio.to_thread(store, context, log, lambda session: accept(session, context, log))
+        do = partial(store, context, log, lambda session: accept(session, context, log))
+        return await context.threads.run(request.principal.share, do)
 
 
 async def check_target(context: Context, request: UploadRequest) -> None:
     """Raises ``DomainError`` or ``NotFound`` for what a new log could not be stored for."""
-    await asyncio.to_thread(_check, context, request)
-    await asyncio.to_thread(_check_quotas, context, request.principal)
+    share = request.principal.share
+    await context.threads.run(share, _check, context, request)
+    await context.threads.run(share, _check_quotas, context, request.principal)
 
 
 def store_made(context: Context, spool: Spool, found: Description, request: UploadRequest) -> StoredUpload:
@@ -223,20 +225,6 @@ def _material(session: Session, settings: Settings, received: ReceivedLog) -> in
     return material_id
 
 
-async def _unless_gone(work: Coroutine[Any, Any, Result], gone: Coroutine[Any, Any, None]) -> Result:
-    """The result of ``work``; raises ``UploadInterrupted`` where the client has gone before it is there."""
-    tasks = asyncio.create_task(work), asyncio.create_task(gone)
-    try:
-        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-        if not tasks[0].done():
-            raise UploadInterrupted("the connection ended while the log was read")
-        return tasks[0].result()
-    finally:
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
-
-
 def _check(context: Context, request: UploadRequest) -> int | None:
     """What can be told before the bytes are there; returns the material's key, None where there is none yet."""
     if request.detector not in METHOD_NAMES:
@@ -293,25 +281,35 @@ def _identify(spool: Spool, request: UploadRequest) -> tuple[str, int]:
         return name, unpacked_bytes(spool.path)
 
 
+async def _unpack_and_read(
+    context: Context, spools: ExitStack, body: Spool, encoding: str, request: UploadRequest
+) -> tuple[Spool, Description]:
+    spool, settings, share = body, context.settings, request.principal.share
+    if encoding:
+        spool = spools.enter_context(context.blobs.spool())
+        do = partial(unpack, body, spool, encoding, settings.max_upload_bytes, settings.max_expansion)
+        async with context.readers.room.turn(share, UNPACKING_BYTES):
+            await context.threads.run(share, do, weight=LONG)
+    return await _read(context, spools, spool, request, body.size)
+
+
 async def _read(
     context: Context, spools: ExitStack, spool: Spool, request: UploadRequest, received: int
 ) -> tuple[Spool, Description]:
     """What is to be stored, the body or a container made of it, with its description; ``received``: bytes."""
-    expansion = context.settings.max_expansion
-    name, unpacked = await asyncio.to_thread(_identify, spool, request)
+    expansion, share = context.settings.max_expansion, request.principal.share
+    name, unpacked = await context.threads.run(share, _identify, spool, request)
     check_expansion(received, unpacked, expansion)
     with _refusals_named():
         if formats.FORMATS[name].plain:
             found, _ = await asyncio.gather(  # the disk is slow while the reader computes
-                context.readers.describe(spool.path, name, unpacked, request.principal.share),
-                asyncio.to_thread(spool.sync),
+                context.readers.describe(spool.path, name, unpacked, share),
+                context.threads.run(share, spool.sync),
             )
             return spool, found
         made = spools.enter_context(context.blobs.spool())
-        description = await context.readers.convert(
-            spool.path, made.path, name, request.settings, request.principal.share
-        )
-        await asyncio.to_thread(made.adopt)
+        description = await context.readers.convert(spool.path, made.path, name, request.settings, share)
+        await context.threads.run(share, made.adopt, weight=LONG)
         check_expansion(received, made.size, expansion)
     return made, description
 

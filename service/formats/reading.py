@@ -7,7 +7,7 @@ that process with it. Of another format comes a Stiction container, so that noth
 import asyncio
 import os
 import resource
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
@@ -21,6 +21,7 @@ from service import formats
 from service.formats import writing
 from service.processes import spawned
 from service.processes.fair_queue import FairQueue
+from service.processes.fair_threads import LONG, SHORT, FairThreads
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 from stiction_client import container
@@ -38,6 +39,9 @@ IDLE_SECONDS = 60.0
 WORKING_FACTOR = 6
 """Bytes that reading takes at its height for each byte of the unpacked log: up to 4.3 of NPZ and 6 of Tac3D, both in
 single precision, and 1.6 of an NPZ in double precision as the client writes it."""
+
+SHORT_BYTES = 2**20
+"""Of an unpacked log that is read in some ms."""
 
 Result = TypeVar("Result")
 FormatSettings = Mapping[str, float | str | None]
@@ -82,8 +86,11 @@ class Readers:
     the client has gone, gives up its place at once.
     """
 
-    def __init__(self, seconds: float = 60.0, size: int = 2, room: int = 2**28) -> None:
+    def __init__(
+        self, seconds: float = 60.0, size: int = 2, room: int = 2**28, threads: FairThreads | None = None
+    ) -> None:
         self.room = FairQueue(room, "read")
+        self._threads = threads or FairThreads()
         self._most_here = room // 4
         self._seconds = seconds
         self._turns = FairQueue(size, "read")
@@ -96,7 +103,8 @@ class Readers:
         if needed >= self._most_here:
             return await self._do(partial(read_plain, source, name), name, self._seconds_for(source), owner)
         async with self.room.turn(owner, needed):
-            return await to_its_end(asyncio.to_thread(read_plain, source, name))
+            weight = SHORT if unpacked <= SHORT_BYTES else LONG
+            return await self._threads.run(owner, read_plain, source, name, weight=weight)
 
     async def convert(
         self, source: Path, target: Path, name: str, settings: FormatSettings, owner: str = ""
@@ -179,16 +187,6 @@ class Readers:
     def _retire(self, executor: ProcessPoolExecutor) -> None:
         self._idle.pop(executor).timer.cancel()
         executor.shutdown(wait=False)
-
-
-async def to_its_end(work: Awaitable[Result]) -> Result:
-    """The result of a thread's work. Cancelled, it still waits for it: until then the thread has its memory."""
-    future = asyncio.ensure_future(work)
-    try:
-        return await asyncio.shield(future)
-    except asyncio.CancelledError:
-        await asyncio.wait({future})
-        raise
 
 
 async def _runs(executor: ProcessPoolExecutor) -> bool:

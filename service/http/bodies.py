@@ -4,11 +4,11 @@ from collections.abc import AsyncIterator, Callable, Coroutine
 from typing import Any
 
 from fastapi import Request, Response
-from fastapi.routing import APIRoute
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.types import Message, Receive
 
+from service.http.fair_route import FairRoute
 from service.http.problems import UNSUPPORTED_FORMAT, Problem
 
 MAX_JSON_BYTES = 64 * 1024
@@ -24,13 +24,7 @@ async def chunks(request: Request) -> AsyncIterator[bytes]:
         raise ConnectionError("the client has closed its connection") from error
 
 
-async def gone(request: Request) -> None:
-    """Wait until the client has closed its connection; the body must have been read."""
-    while (await request.receive())["type"] != "http.disconnect":
-        pass
-
-
-class JsonRoute(APIRoute):
+class JsonRoute(FairRoute):
     """A route whose body, if it takes one, is JSON of bounded size: the framework reads all of it into memory."""
 
     most_bytes = MAX_JSON_BYTES

@@ -5,22 +5,32 @@ from dataclasses import dataclass, field
 from service.domain.context import Context
 from service.jobs.scrub import Scrub
 from service.observability.store_watch import StoreWatch
-from service.processes.fair_queue import FairQueue, OpenEndedQueue
+from service.processes.fair_queue import FairQueue, OpenEndedQueue, PatientQueue
 from service.stream.sessions import Streams
 
 LONG_ANSWERS = 16
 """With arrays, 8 MB each of 10⁶ frames, or with a file made for them, at once."""
+
+ROUTES_AT_ONCE = 4
+"""Answered in threads, one of each client: they share one interpreter, and more would only wait for it."""
 
 
 def _room_for_answers() -> FairQueue:
     return OpenEndedQueue(LONG_ANSWERS, "answered")
 
 
+def _turns_of_routes() -> FairQueue:
+    return PatientQueue(ROUTES_AT_ONCE, "answered", share=1)
+
+
 @dataclass(frozen=True, slots=True)
 class ServerContext(Context):
-    """The open stores, the running jobs, the live streams, room for long answers, and what looks after the stores."""
+    """The open stores, the running jobs, the live streams, room for long answers, turns for routes that are answered in
+    threads, and what looks after the stores.
+    """
 
     streams: Streams = field(default_factory=Streams)
     answers: FairQueue = field(default_factory=_room_for_answers)
+    turns: FairQueue = field(default_factory=_turns_of_routes)
     scrub: Scrub | None = None
     watch: StoreWatch | None = None

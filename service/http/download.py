@@ -5,10 +5,21 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from fastapi import Request
 from fastapi.responses import FileResponse
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive, Scope, Send
+
+from service.http.head_requests import IS_HEAD
+
+CHECKED_SECONDS = 60.0
+"""s after which a file of which parts are asked for is compared with its hash anew."""
+
+
+def checked_within(request: Request) -> float:
+    """How many seconds ago a stored file may have been compared with its hash: a whole one is each time it is sent."""
+    return CHECKED_SECONDS if "range" in request.headers or request.scope.get(IS_HEAD) else 0.0
 
 
 class Download(FileResponse):
@@ -38,7 +49,8 @@ class Download(FileResponse):
             if name != b"range" or RANGE.fullmatch(value.decode("latin-1"))
         ]
         try:
-            await super().__call__({**scope, "headers": understood}, receive, send_unless_refused)
+            method = "HEAD" if scope.get(IS_HEAD) else scope["method"]  # of which nothing is read
+            await super().__call__({**scope, "method": method, "headers": understood}, receive, send_unless_refused)
         finally:
             await run_in_threadpool(self._close)
 

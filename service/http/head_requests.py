@@ -2,6 +2,9 @@
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+IS_HEAD = "stiction.is_head"
+"""In the scope of a request that is handed on as GET."""
+
 
 class HeadRequests:
     """Hands HEAD on as GET and drops the body of the answer."""
@@ -18,6 +21,6 @@ class HeadRequests:
         async def send_without_body(message: Message) -> None:
             await send({**message, "body": b""} if message["type"] == "http.response.body" else message)
 
-        inner = {**scope, "method": "GET"}
+        inner = {**scope, "method": "GET", IS_HEAD: True}
         await self.app(inner, receive, send_without_body)
         scope["route"] = inner.get("route")  # what is counted and logged is known by it

@@ -23,14 +23,14 @@ class _Waiting(NamedTuple):
 
 
 class FairQueue:
-    """Room of ``capacity`` units, of which one owner has half at most as long as others may come.
+    """Room of ``capacity`` units, of which one owner has its ``share`` at most, half unless another is said.
 
     Owners who wait are let in one after the other, each owner's work in the order in which it came: however much one
     of them asks for, another waits for a single piece of it at most.
     """
 
-    def __init__(self, capacity: int, what: str) -> None:
-        self._free, self._share, self._what = capacity, max(capacity // 2, 1), what
+    def __init__(self, capacity: int, what: str, share: int | None = None) -> None:
+        self._free, self._share, self._what = capacity, share or max(capacity // 2, 1), what
         self._taken: Counter[str] = Counter()
         self._waiting: OrderedDict[str, deque[_Waiting]] = OrderedDict()
 
@@ -50,15 +50,18 @@ class FairQueue:
         self._let_in()
         try:
             if not waiting.turn.done():
-                self._check_length(owner)
-                async with asyncio.timeout(WAIT_SECONDS):
-                    await waiting.turn
-        except TimeoutError as error:
-            self._give_up(owner, waiting)
-            raise QueueFull(f"not {self._what} within {WAIT_SECONDS:g} s") from error
+                await self._wait(owner, waiting.turn)
         except BaseException:
             self._give_up(owner, waiting)
             raise
+
+    async def _wait(self, owner: str, turn: asyncio.Future[None]) -> None:
+        self._check_length(owner)
+        try:
+            async with asyncio.timeout(WAIT_SECONDS):
+                await turn
+        except TimeoutError as error:
+            raise QueueFull(f"not {self._what} within {WAIT_SECONDS:g} s") from error
 
     def _leave(self, owner: str, weight: int) -> None:
         self._free += weight
@@ -117,3 +120,10 @@ class OpenEndedQueue(FairQueue):
 
     def _most(self, owner: str) -> int:
         return (self._taken[owner] + self._free + 1) // 2
+
+
+class PatientQueue(FairQueue):
+    """For short work of requests, of which there are no more than connections: nobody is refused."""
+
+    async def _wait(self, owner: str, turn: asyncio.Future[None]) -> None:  # noqa: ARG002
+        await turn

@@ -19,6 +19,7 @@ from service.domain.recommended import AUTO
 from service.domain.stored_results import to_client_model
 from service.domain.upload import UploadRequest, check_target
 from service.formats.reading import Description
+from service.processes.fair_threads import LONG
 from service.stream import detectors
 from service.stream.errors import FINISHED, KEY_ENDED, NOT_UNDERSTOOD, REFUSED, SLOW_READER, STORAGE_AWAY, End
 from service.stream.messages import (
@@ -120,7 +121,7 @@ class _Connection:
             return None
         with suppress(NoModel):
             known = await self._context.models.get(self._context.database, opening.material, AUTO)
-            return await asyncio.to_thread(to_client_model, known.stored)
+            return await self._context.threads.run(self._principal.share, to_client_model, known.stored)
         return None
 
     async def _greet(self, session: Session, missed: list[dict[str, Any]]) -> None:
@@ -210,7 +211,10 @@ class _Connection:
             raise End(REFUSED, "store needs keep, said when the session was opened")
         with self._context.blobs.spool() as spool:
             found = await self._streams.call(detectors.write, session.id, spool.path, opening.sensor)
-            stored = await asyncio.to_thread(self._store, spool, found, self._upload(opening))
+            share = self._principal.share
+            stored = await self._context.threads.run(
+                share, self._store, spool, found, self._upload(opening), weight=LONG
+            )
         return {"type": "finished", "grasp_log": stored}
 
     def _upload(self, opening: Open) -> UploadRequest:

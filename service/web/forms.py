@@ -5,7 +5,6 @@ from typing import IO, Any, TypeVar
 
 from fastapi import Request, Response
 from fastapi.exceptions import RequestValidationError
-from fastapi.routing import APIRoute
 from pydantic import BaseModel, BeforeValidator, ValidationError
 from starlette.datastructures import FormData
 from starlette.exceptions import HTTPException
@@ -13,6 +12,7 @@ from starlette.formparsers import MultiPartException, MultiPartParser
 
 from db.text import is_storable
 from service.http.bodies import limited
+from service.http.fair_route import FairRoute
 
 MOST_FORM_BYTES = 2**18
 """Of a form without a file; the longest description takes half of that."""
@@ -23,7 +23,7 @@ EMPTY_IS_NONE = BeforeValidator(lambda text: None if text == "" else text)
 """Of a field that may be left empty."""
 
 
-class FormRoute(APIRoute):
+class FormRoute(FairRoute):
     """A route whose form is of bounded size: the framework parses all of it before it is asked who sends it."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from db import blobs as module
 from db.blobs import BlobStore, open_blobs
 from db.errors import BlobDamaged, NotFound, StorageUnavailable
 
@@ -124,6 +125,30 @@ def test_a_flipped_bit_is_named_at_the_next_reading(tmp_path: Path) -> None:
         blobs.path(sha256)
     assert blobs.put(CONTENT) == sha256  # sent again, it is mended
     assert blobs.path(sha256).read_bytes() == CONTENT
+
+
+def test_what_was_read_a_moment_ago_is_not_read_again_where_that_will_do(
+    blobs: BlobStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[Path] = []
+    hashed = module._hash
+    monkeypatch.setattr(module, "_hash", lambda path: read.append(path) or hashed(path))  # type: ignore[func-returns-value]
+    blobs.put(CONTENT)
+    for within, times in ((60.0, 1), (60.0, 1), (0.0, 2), (60.0, 2), (1e-9, 3)):
+        assert blobs.path(SHA256, within).read_bytes() == CONTENT
+        assert len(read) == times
+
+
+def test_a_file_that_somebody_wrote_to_since_is_read_again(tmp_path: Path) -> None:
+    blobs = BlobStore(tmp_path)
+    path = blobs.path(blobs.put(CONTENT))
+    path.write_bytes(CONTENT[::-1])
+    os.utime(path, ns=(0, 0))  # within one tick of the clock
+    with pytest.raises(BlobDamaged):
+        blobs.path(SHA256, 60.0)
+    path.unlink()
+    with pytest.raises(NotFound):
+        blobs.path(SHA256, 60.0)
 
 
 def test_a_folder_that_is_not_there_any_more_is_no_missing_blob(tmp_path: Path) -> None:

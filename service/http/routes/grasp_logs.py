@@ -1,6 +1,5 @@
 """Grasp logs and what was found in them."""
 
-import asyncio
 from functools import partial
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -18,10 +17,11 @@ from service.domain.upload import ReceivedLog, StoredUpload, UploadRequest, acce
 from service.formats import writing
 from service.formats.tracked_markers import FRAME_RATE, SCALE
 from service.http.access import READ, UPLOAD, CurrentPrincipal
-from service.http.bodies import chunks, gone
+from service.http.bodies import chunks
 from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
-from service.http.download import Download
+from service.http.download import Download, checked_within
+from service.http.fair_route import FairRoute, gone
 from service.http.idempotency import IdempotencyKey, KeyWithoutBody, RepeatableResponse, respond_once
 from service.http.long_answers import LONG_ANSWER, Room
 from service.http.long_json import long_json
@@ -49,7 +49,7 @@ from service.http.schemas.grasp_logs import GraspLogOut, GraspLogsOut
 from service.http.schemas.results import EventsOut, SamplesOut, StickRatioOut
 from slipcore.defaults import DEFAULT_METHOD, METHOD_NAMES
 
-router = APIRouter(prefix="/v1/grasp-logs", tags=["grasp logs"])
+router = APIRouter(prefix="/v1/grasp-logs", tags=["grasp logs"], route_class=FairRoute)
 
 Found = TypeVar("Found")
 
@@ -140,7 +140,8 @@ async def create_grasp_log(
         principal,
     )
     async with received(context, chunks(request), asked, partial(gone, request)) as log:
-        answer = await asyncio.to_thread(_store, context, log, key and key.about(log.body_sha256))
+        about = key and key.about(log.body_sha256)
+        answer = await context.threads.run(principal.share, _store, context, log, about)
     return answer.response()
 
 
@@ -253,6 +254,7 @@ def read_samples(context: CurrentContext, id: str) -> Response:  # noqa: A002
 )
 async def read_file(
     context: CurrentContext,
+    request: Request,
     principal: CurrentPrincipal,
     room: Room,
     id: str,  # noqa: A002
@@ -263,7 +265,9 @@ async def read_file(
     """As it was uploaded, or as NPZ, Parquet or MCAP made of it: each is read back bit for bit."""
     if format not in writing.SUFFIXES:
         raise Problem.wrong_value(INVALID_REQUEST, "format", format, ", ".join(writing.SUFFIXES))
-    file = await export(context, await asyncio.to_thread(_find, context, id), format, principal.share, room)
+    share, within = principal.share, checked_within(request)
+    log = await context.threads.run(share, _find, context, id)
+    file = await export(context, log, format, share, room, within)
     return Download(
         file.path,
         file.close.close,

@@ -11,11 +11,12 @@ from service.domain.cancel import cancel
 from service.http.access import ADMIN, READ, CurrentPrincipal
 from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
+from service.http.fair_route import FairRoute
 from service.http.paging import USUAL, CursorText, Limit, Page, link_next
 from service.http.problems import INVALID_REQUEST, JOB_ENDED, STORAGE_UNAVAILABLE, UNKNOWN_JOB
 from service.http.schemas.jobs import JobOut, JobsOut
 
-router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"], route_class=FairRoute)
 
 
 @router.get("", dependencies=[READ], summary="List jobs", responses=problems(INVALID_REQUEST, STORAGE_UNAVAILABLE))
@@ -56,7 +57,7 @@ async def read_job(
     With `wait` the answer comes at the job's end, or after so many seconds: who wants its result asks once, not again
     and again.
     """
-    return JobOut.of(await await_job(context, id, wait, principal.key_id))
+    return JobOut.of(await await_job(context, id, wait, principal))
 
 
 @router.post(

@@ -8,10 +8,11 @@ from prometheus_client import CONTENT_TYPE_LATEST
 from service.http.access import READ
 from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
+from service.http.fair_route import FairRoute
 from service.http.problems import STORAGE_UNAVAILABLE
 from service.observability.metrics import Metrics
 
-router = APIRouter(tags=["health"])
+router = APIRouter(tags=["health"], route_class=FairRoute)
 
 _TEXT: dict[int | str, dict[str, Any]] = {
     200: {"content": {"text/plain": {}}, "description": "In the text format of Prometheus."}

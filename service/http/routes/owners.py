@@ -8,6 +8,7 @@ from service.domain import ownership
 from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
+from service.http.fair_route import FairRoute
 from service.http.problems import (
     INVALID_REQUEST,
     NOT_OWNER,
@@ -18,7 +19,7 @@ from service.http.problems import (
 )
 from service.http.schemas.owners import OwnersOut
 
-router = APIRouter(prefix="/v1/materials/{name}/owners", tags=["materials"])
+router = APIRouter(prefix="/v1/materials/{name}/owners", tags=["materials"], route_class=FairRoute)
 
 Owner = Annotated[
     str,

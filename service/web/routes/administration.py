@@ -10,10 +10,11 @@ from db.repositories import access_keys, audit
 from service.domain.keys import is_valid
 from service.http.access import ADMIN
 from service.http.dependencies import CurrentContext
+from service.http.fair_route import FairRoute
 from service.http.paging import CursorText, Page
 from service.web.rendering import render
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(include_in_schema=False, route_class=FairRoute)
 
 ENTRIES_ON_A_PAGE = 50
 

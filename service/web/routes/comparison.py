@@ -10,6 +10,7 @@ from db.repositories import friction_models, materials
 from service.domain.context import Context
 from service.http.access import READ
 from service.http.dependencies import CurrentContext
+from service.http.fair_route import FairRoute
 from service.http.problems import INVALID_REQUEST, Problem
 from service.web.comparison import MOST_COMPARED, common_force, compare, picture
 from service.web.friction import usual_model
@@ -17,7 +18,7 @@ from service.web.materials import names
 from service.web.rendering import render
 from service.web.routes.materials import ForceOrEmpty
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(include_in_schema=False, route_class=FairRoute)
 
 Names = Annotated[list[str], Query(default_factory=list, max_length=MOST_COMPARED + 1)]  # and the field for one more
 Ids = Annotated[list[Annotated[int, Query(ge=1, le=2**53)]], Query(default_factory=list, max_length=MOST_COMPARED)]

@@ -10,11 +10,12 @@ from db.repositories import jobs
 from service.domain.cancel import cancel
 from service.http.access import ADMIN, READ, CurrentPrincipal
 from service.http.dependencies import CurrentContext
+from service.http.fair_route import FairRoute
 from service.http.paging import CursorText, Page
 from service.web.forms import EMPTY_IS_NONE
 from service.web.rendering import render
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(include_in_schema=False, route_class=FairRoute)
 
 ON_A_PAGE = 50
 STAGES = {

@@ -1,6 +1,5 @@
 """One grasp log: what became of it, and the frames that its player shows."""
 
-import asyncio
 from functools import partial
 
 from fastapi import APIRouter, Request, Response
@@ -12,13 +11,14 @@ from service.domain.errors import ResultsNotReady
 from service.http.access import READ, CurrentPrincipal
 from service.http.conditional import KEEP_AND_ASK, is_one_of, unchanged
 from service.http.dependencies import CurrentContext
+from service.http.fair_route import FairRoute
 from service.http.long_answers import LONG_ANSWER
 from service.web import reports
 from service.web.derived import derive
 from service.web.frames import write_frames
 from service.web.rendering import render
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(include_in_schema=False, route_class=FairRoute)
 
 
 @router.get("/logs/{id}", dependencies=[READ])
@@ -32,25 +32,25 @@ def show_log(context: CurrentContext, request: Request, id: str) -> Response:  #
 @router.get("/logs/{id}/frames", dependencies=[READ, LONG_ANSWER])
 async def read_frames(context: CurrentContext, request: Request, principal: CurrentPrincipal, id: str) -> Response:  # noqa: A002
     """What the player shows (``service.web.frames``), made in a reader's process; raises ``ResultsNotReady``."""
-    log, detection = await asyncio.to_thread(_find_results, context, id)
+    log, detection = await context.threads.run(principal.share, _find_results, context, id)
     tag = f'"{detection.history_blob[:32]}{"" if log.has_file else "-"}"'
     if is_one_of(tag, request.headers.get("if-none-match", "")):
         return unchanged(tag)
-    history = await asyncio.to_thread(context.blobs.path, detection.history_blob)
-    upload = await asyncio.to_thread(context.blobs.path, log.sha256) if log.has_file else None
+    wanted = [detection.history_blob, *([log.sha256] if log.has_file else [])]
+    history, *upload = await context.files(principal.share, wanted)
+    write = partial(write_frames, history, upload[0] if upload else None)
     headers = {"ETag": tag, "Cache-Control": KEEP_AND_ASK}
-    write = partial(write_frames, history, upload)
     return await derive(context, principal, log.format, write, headers=headers, media_type="application/octet-stream")
 
 
 @router.get("/logs/{id}/report", dependencies=[READ, LONG_ANSWER])
 async def read_report(context: CurrentContext, principal: CurrentPrincipal, id: str) -> Response:  # noqa: A002
     """The log's report, as one file; raises ``ResultsNotReady``."""
-    log, detection = await asyncio.to_thread(_find_results, context, id)
+    log, detection = await context.threads.run(principal.share, _find_results, context, id)
     if log.samples is None:
         raise ResultsNotReady(log.job.id, log.job.status)
     wanted = [detection.history_blob, log.samples.samples_blob, *([log.sha256] if log.has_file else [])]
-    history, samples, *upload = [await asyncio.to_thread(context.blobs.path, each) for each in wanted]
+    history, samples, *upload = await context.files(principal.share, wanted)
     write = partial(reports.write_log, log, history, samples, upload[0] if upload else None)
     return await reports.show(context, principal, log.format, write)
 

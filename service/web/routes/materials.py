@@ -1,6 +1,5 @@
 """Materials: all of them, and one."""
 
-import asyncio
 from functools import partial
 from hashlib import sha256
 from typing import Annotated, Literal
@@ -130,12 +129,12 @@ async def read_samples(
     method: ModelMethod | None = None,
 ) -> Response:
     """The newest logs' samples beside the model (``service.web.samples``); raises ``NotFound``, ``NoModel``."""
-    model, logs = await asyncio.to_thread(_sampled, context, name, method)
+    model, logs = await context.threads.run(principal.share, _sampled, context, name, method)
     blobs = [log.samples.samples_blob for log in logs]
     tag = f'"{sha256(" ".join([str(model.id), *blobs]).encode()).hexdigest()[:32]}"'
     if is_one_of(tag, request.headers.get("if-none-match", "")):
         return unchanged(tag)
-    paths = await asyncio.to_thread(lambda: [context.blobs.path(blob) for blob in blobs])
+    paths = await context.files(principal.share, blobs)
     files = [SampleFile(path, log.grid) for path, log in zip(paths, logs, strict=True)]
     headers = {"ETag": tag, "Cache-Control": KEEP_AND_ASK}
     write = partial(write_samples, model.model, files)
@@ -156,7 +155,7 @@ def _sampled(context: Context, name: str, method: str | None) -> tuple[StoredMod
 @router.get("/materials/{name}/report", dependencies=[READ, LONG_ANSWER])
 async def read_report(context: CurrentContext, principal: CurrentPrincipal, name: str) -> Response:
     """The material's report, as one file; raises ``NotFound``."""
-    write = await asyncio.to_thread(_report_of, context, name)
+    write = await context.threads.run(principal.share, _report_of, context, name)
     return await reports.show(context, principal, "stored", write)
 
 

@@ -8,13 +8,14 @@ from estimators.method_names import METHODS
 from service.domain import plan
 from service.http.access import READ
 from service.http.dependencies import CurrentContext
+from service.http.fair_route import FairRoute
 from service.http.schemas.planning import NewGraspForce
 from service.web.force_curve import draw_forces, probabilities
 from service.web.forms import checked
 from service.web.materials import names
 from service.web.rendering import on_problem, render
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(include_in_schema=False, route_class=FairRoute)
 
 FIELDS = frozenset(NewGraspForce.model_fields)
 

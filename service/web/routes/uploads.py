@@ -6,7 +6,6 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import RedirectResponse
 from pydantic import BaseModel, ConfigDict, Field
-from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import FormData, UploadFile
 
 from db.blobs import disk_errors_named
@@ -19,6 +18,7 @@ from service.formats.tracked_markers import FRAME_RATE, SCALE
 from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.bodies import limited
 from service.http.dependencies import CurrentContext
+from service.http.fair_route import FairRoute
 from service.http.problems import INVALID_REQUEST, Problem
 from service.http.schemas.materials import NewMaterial
 from service.web.forms import checked, read_form
@@ -26,7 +26,7 @@ from service.web.materials import names
 from service.web.rendering import on_problem, render
 from slipcore.defaults import DEFAULT_METHOD, METHOD_NAMES
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(include_in_schema=False, route_class=FairRoute)
 
 BESIDE_THE_FILE = 2**20
 """Bytes of a form that are not its file: fields, and what stands between them."""
@@ -62,14 +62,14 @@ def show_upload(context: CurrentContext, request: Request, material: str = "") -
 @router.post("/upload", dependencies=[UPLOAD])
 async def receive_upload(context: CurrentContext, request: Request, principal: CurrentPrincipal) -> Response:
     """Store the file with its job, and lead to the log; raises as the API's route does."""
-    on_problem(request, "upload.html", **await run_in_threadpool(_form, context, {}))
+    on_problem(request, "upload.html", **await context.threads.run(principal.share, _form, context, {}))
     most = context.settings.max_upload_bytes + BESIDE_THE_FILE
     bounded = Request(request.scope, limited(request.receive, most))
     with disk_errors_named():
         form = await read_form(bounded, context.blobs.unnamed_file, max_files=1, max_fields=len(NewUpload.model_fields))
     try:
         fields = {name: text.strip() for name, text in form.items() if isinstance(text, str)}
-        on_problem(request, "upload.html", **await run_in_threadpool(_form, context, fields))
+        on_problem(request, "upload.html", **await context.threads.run(principal.share, _form, context, fields))
         file, wanted = _file(form), checked(NewUpload, fields)
         stored = await upload(context, _chunks(file), _asked(wanted, file, principal))
     finally:

@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from collections import Counter
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -9,6 +10,8 @@ from typing import Any
 import pytest
 
 from service.domain import await_job
+from service.domain.principal import ANONYMOUS
+from service.processes.fair_threads import FairThreads
 
 SECONDS = 0.4
 
@@ -17,7 +20,12 @@ SECONDS = 0.4
 def wait(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[Any, float]]:
     """Ask for a job whose looks are given, the last for good; what was told, and after how many seconds."""
 
-    def asked(*finished_at: str | None, most: float = SECONDS, ends_after: float | None = None) -> tuple[Any, float]:
+    def asked(
+        *finished_at: str | None,
+        most: float = SECONDS,
+        ends_after: float | None = None,
+        others: Counter[str] | None = None,
+    ) -> tuple[Any, float]:
         looks = list(finished_at)
         found = lambda *_: SimpleNamespace(finished_at=looks.pop(0) if len(looks) > 1 else looks[0])  # noqa: E731
         monkeypatch.setattr(await_job, "_look", found)
@@ -26,7 +34,11 @@ def wait(monkeypatch: pytest.MonkeyPatch) -> Callable[..., tuple[Any, float]]:
             ending = asyncio.Event()
             if ends_after is not None:
                 asyncio.get_running_loop().call_later(ends_after, ending.set)
-            context: Any = SimpleNamespace(jobs=SimpleNamespace(ending=lambda _: ending))
+            context: Any = SimpleNamespace(
+                jobs=SimpleNamespace(ending=lambda _: ending),
+                threads=FairThreads(),
+                waits=Counter() if others is None else others,
+            )
             return await await_job.await_job(context, "id", most)
 
         began = time.monotonic()
@@ -59,3 +71,15 @@ def test_one_that_ends_here_is_not_waited_for_until_the_next_look(
     finished_at, seconds = wait(None, "now", most=60.0, ends_after=0.05)
     assert finished_at == "now"
     assert 0.05 <= seconds < 30.0
+
+
+def test_the_more_waits_of_a_client_there_are_the_more_seldom_each_looks(
+    wait: Callable[..., tuple[Any, float]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(await_job, "LOOK_SECONDS", SECONDS / 8)
+    others = Counter({ANONYMOUS.share: 8 * await_job.LOOKERS})
+    finished_at, _ = wait(None, None, "now", others=others)
+    assert finished_at is None, "it looked at the begin and at the end"
+    assert others == {ANONYMOUS.share: 8 * await_job.LOOKERS}, "its own wait is over"
+    finished_at, _ = wait(None, None, "now", others=Counter({"somebody else": 1000}))
+    assert finished_at == "now"

@@ -96,7 +96,7 @@ def test_bodies_that_stop_on_their_way_hold_little_memory_together(count: int, h
 
     async def check() -> None:
         bodies = receive.Bodies()
-        tasks = [asyncio.create_task(bodies.receive(sink, slow_body(), 2**20)) for sink in sinks]  # type: ignore[arg-type]
+        tasks = [asyncio.create_task(bodies.receive(sink, slow_body(), 2**20, asyncio.to_thread)) for sink in sinks]  # type: ignore[arg-type]
         await begun.wait()
         async with asyncio.timeout(30.0):  # for the threads to write what is not to be held
             while sum(900_000 - sink.size for sink in sinks) > held:

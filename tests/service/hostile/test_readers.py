@@ -100,7 +100,7 @@ def test_who_has_too_many_waiting_is_told_to_come_again(
 def test_what_does_not_begin_as_its_format_does_reaches_no_reader(
     client: httpx.Client, new_key: Callable[[], dict[str, str]], name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fair_queue.FairQueue, "turn", None)
+    monkeypatch.setattr(reading.Readers, "convert", None)
     kind = f"application/{'x-' if name == 'mcap' else ''}{name}"
     answer = client.post("/v1/grasp-logs", content=TABLE, headers={"content-type": kind, **new_key()})
     assert (answer.status_code, answer.json()["name"]) == (422, "file")

@@ -16,6 +16,7 @@ import pytest
 from starlette.websockets import WebSocketDisconnect
 
 from service.domain.principal import Principal
+from service.processes.fair_threads import FairThreads
 from service.settings import Settings
 from service.stream import connection, detectors, errors, sessions
 from service.stream.detectors import PackedFrame
@@ -160,7 +161,7 @@ class Socket:
 
 def converse(streams: Streams, *said: Any, raw: bool = False) -> Socket:
     database = SimpleNamespace(read=lambda: nullcontext())  # nothing is looked up without a key and a material
-    context: Any = SimpleNamespace(streams=streams, database=database, settings=Settings())
+    context: Any = SimpleNamespace(streams=streams, database=database, settings=Settings(), threads=FairThreads())
     socket: Any = Socket(*(said if raw else (json.dumps(each) for each in said)))
 
     async def go() -> None:

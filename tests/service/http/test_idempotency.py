@@ -1,7 +1,6 @@
+import asyncio
 import multiprocessing
-import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from datetime import timedelta
 from typing import Any
@@ -85,14 +84,12 @@ def test_a_key_that_cannot_be_is_refused_by_name(client: Any, key: Any) -> None:
 def test_identical_uploads_at_once_under_one_key_get_one_answer(
     client: Any, database: Database, content: bytes
 ) -> None:
-    together = threading.Barrier(4)
+    async def upload_together() -> list[httpx.Response]:
+        headers = NPZ | {"Idempotency-Key": "k"}
+        uploads = [client._request("POST", "/v1/grasp-logs", content=content, headers=headers) for _ in range(4)]
+        return await asyncio.gather(*uploads)
 
-    def upload(_: int) -> httpx.Response:
-        together.wait()
-        return send(client, "/v1/grasp-logs", content=content, headers=NPZ)
-
-    with ThreadPoolExecutor(4) as threads:
-        answers = list(threads.map(upload, range(4)))
+    answers = asyncio.run(upload_together())
     assert {(answer.status_code, answer.content) for answer in answers} == {(202, answers[0].content)}
     assert (count(database, GraspLogRow), count(database, JobRow)) == (1, 1)
     other = send(client, "/v1/grasp-logs?detector=strain_rate", content=content, headers=NPZ)

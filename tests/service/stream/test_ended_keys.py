@@ -14,6 +14,7 @@ from db.repositories import access_keys
 from service.domain import keys
 from service.domain.errors import KeyEnded
 from service.domain.principal import Principal
+from service.processes.fair_threads import FairThreads
 from service.settings import Settings
 from service.stream import connection
 from service.stream.sessions import Streams
@@ -64,7 +65,8 @@ def code_of_end(database: Database, key_id: str, *said: dict[str, Any]) -> int:
 
     async def served() -> int:
         socket: Any = Socket([OPENING, *said], revoke)
-        context: Any = SimpleNamespace(database=database, settings=Settings(), blobs=SimpleNamespace(spool=spool))
+        blobs = SimpleNamespace(spool=spool)
+        context: Any = SimpleNamespace(database=database, settings=Settings(), blobs=blobs, threads=FairThreads())
         principal = Principal(key_id, None, is_admin=False)
         await asyncio.wait_for(connection.serve(socket, context, NoDetectors(), principal, store), 20.0)
         return int(socket.code)

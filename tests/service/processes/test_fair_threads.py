@@ -1,0 +1,83 @@
+"""Threads of which nobody has all."""
+
+import asyncio
+import threading
+from collections.abc import Callable
+from contextvars import ContextVar
+
+import pytest
+
+from service.processes.fair_threads import LONG, SHORT, THREADS, FairThreads
+
+ABOUT: ContextVar[str] = ContextVar("ABOUT")
+
+
+def begun(*asked: tuple[str, int]) -> list[str]:
+    """Who has a thread, of owners whose work of some weight does not end, in the order in which it began."""
+    owners, may_end = list[str](), threading.Event()
+
+    def work(owner: str) -> None:
+        owners.append(owner)
+        may_end.wait(30.0)
+
+    async def ask() -> list[str]:
+        threads = FairThreads()
+        tasks = [asyncio.create_task(threads.run(owner, work, owner, weight=weight)) for owner, weight in asked]
+        try:
+            await asyncio.sleep(0.05)
+            return list(owners)
+        finally:
+            may_end.set()
+            await asyncio.gather(*tasks)
+            threads.stop()
+
+    return asyncio.run(ask())
+
+
+def test_an_owner_has_half_of_them() -> None:
+    assert begun(*[("a", SHORT)] * (THREADS + 1), ("b", SHORT)) == ["a"] * (THREADS // 2) + ["b"]
+
+
+def test_an_owner_has_one_long_piece_at_once_and_short_ones_beside_it() -> None:
+    assert begun(("a", LONG), ("a", LONG), ("b", SHORT), ("a", SHORT)) == ["a", "b"]
+
+
+def test_two_have_long_pieces_at_once_beside_which_others_have_short_ones() -> None:
+    assert begun(("a", LONG), ("b", LONG), ("c", SHORT), ("d", SHORT)) == ["a", "b", "c", "d"]
+
+
+def test_results_errors_and_what_the_log_is_about_are_those_of_the_caller() -> None:
+    def fail() -> None:
+        raise ValueError(ABOUT.get())
+
+    async def ask(do: Callable[[], object]) -> object:
+        ABOUT.set("a request")
+        return await FairThreads().run("a", do)
+
+    assert asyncio.run(ask(ABOUT.get)) == "a request"
+    with pytest.raises(ValueError, match="a request"):
+        asyncio.run(ask(fail))
+
+
+def test_who_is_cancelled_gives_up_its_place_and_is_done_no_earlier_than_what_has_begun() -> None:
+    did, has_begun, may_end = list[str](), threading.Event(), threading.Event()
+
+    def work() -> None:
+        has_begun.set()
+        may_end.wait(30.0)
+        did.append("work")
+
+    async def ask() -> None:
+        threads = FairThreads()
+        first, second = (asyncio.create_task(threads.run("a", work, weight=LONG)) for _ in range(2))
+        await asyncio.to_thread(has_begun.wait)
+        first.cancel()
+        second.cancel()
+        await asyncio.wait({second})
+        assert not first.done()
+        may_end.set()
+        await asyncio.wait({first})
+        assert first.cancelled()
+
+    asyncio.run(ask())
+    assert did == ["work"]
