@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cache
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -91,6 +92,19 @@ class Run:
         begin = perf_counter()
         yield
         self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - begin
+
+
+def prepare(database: Database, claim: Claim) -> None:
+    """Load the kernels that a job needs: their compiler ends the whole process where memory is at its limit."""
+    with database.read() as session:
+        job = jobs.get(session, claim.job_id)
+        if job.grasp_log_id is not None:
+            _load_kernels(grasp_logs.get(session, job.grasp_log_id).detector)
+
+
+@cache
+def _load_kernels(detector: str) -> None:
+    slipcore.warm_up(detector)
 
 
 def run_job(database: Database, blobs: BlobStore, claim: Claim) -> None:

@@ -60,6 +60,7 @@ def _run(config: StoreConfig, claim: Claim) -> None:
 
     database, blobs = _stores(config)
     try:
+        pipeline.prepare(database, claim)
         with limits.memory(config.job_memory_bytes):
             pipeline.run_job(database, blobs, claim)
     except StorageUnavailable:

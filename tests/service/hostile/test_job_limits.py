@@ -1,6 +1,7 @@
 """A job that wants too much is ended once, says where and why, and the next one is done."""
 
 import asyncio
+import resource
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -12,9 +13,10 @@ import httpx
 import numpy as np
 import pytest
 
+import slipcore
 from db.blobs import BlobStore
 from db.database import Database
-from db.records import NewGraspLog
+from db.records import Claim, NewGraspLog
 from db.repositories import grasp_logs, jobs, runners
 from service.jobs import pipeline, process_executor, worker
 from service.jobs.executor import LimitReached
@@ -49,22 +51,27 @@ def test_a_job_that_takes_too_long_is_refused_once_and_the_next_is_done(
         assert wait(client, honest)["status"] == "done"
 
 
-@ONLY_SQLITE
-def test_a_job_that_wants_too_much_memory_is_refused_and_its_process_goes_on(
-    database: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def claim(database: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Claim:
+    """To the job of a log, which a worker may do in this process."""
     store = BlobStore(tmp_path)
+    monkeypatch.setattr(worker, "_stores", lambda _: (database, store))
     with database.write() as session:
         log = grasp_logs.add(session, NewGraspLog(store.put(b"log"), 3, "npz", "filter", None, "s", 2, 1.0, (1, 1)))
         jobs.add(session, "ingest", "ols", material_id=None, grasp_log_id=log)
         claim = jobs.claim(session, runners.add(session, "host"))
         assert claim is not None
         jobs.start_stage(session, claim, "frames", {})
+    return claim
 
+
+@ONLY_SQLITE
+def test_a_job_that_wants_too_much_memory_is_refused_and_its_process_goes_on(
+    database: Database, claim: Claim, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def allocate(*_: object) -> None:
         np.ones(2**28 // 8 * 2)  # twice what is allowed
 
-    monkeypatch.setattr(worker, "_stores", lambda _: (database, store))
     monkeypatch.setattr(pipeline, "run_job", allocate)
     worker.run_job(worker.StoreConfig(database.url, tmp_path, job_memory_bytes=2**28), claim)
     with database.read() as session:
@@ -72,6 +79,21 @@ def test_a_job_that_wants_too_much_memory_is_refused_and_its_process_goes_on(
     reason = "stage frames wants more than 268435456 bytes of memory (STICTION_JOB_MEMORY_BYTES)"
     assert (job.status, job.reason) == ("refused", reason)
     assert np.ones(2**28 // 8 * 2).all()  # the limit is the job's
+
+
+@ONLY_SQLITE
+def test_kernels_are_loaded_before_memory_has_a_limit(
+    database: Database, claim: Claim, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Their compiler aborts at it, and the job had died three times where it was to be refused."""
+    without, limit_at = resource.getrlimit(resource.RLIMIT_DATA), dict[str, tuple[int, int]]()
+    told = lambda what: limit_at.setdefault(what, resource.getrlimit(resource.RLIMIT_DATA))  # noqa: E731
+    monkeypatch.setattr(slipcore, "warm_up", told)
+    monkeypatch.setattr(pipeline, "run_job", lambda *_: told("the job"))
+    pipeline._load_kernels.cache_clear()
+    worker.run_job(worker.StoreConfig(database.url, tmp_path), claim)
+    assert limit_at.pop("the job")[0] > 0
+    assert limit_at == {"filter": without}
 
 
 def spend(seconds: float) -> None:
@@ -90,10 +112,10 @@ def test_a_worker_that_takes_too_long_is_ended_and_another_one_begins_anew(
         await executor.start()
         try:
             with pytest.raises(LimitReached, match=r"more than 0\.3 s of CPU"):
-                await executor.run(jobs.Claim("job", "runner"))
+                await executor.run(Claim("job", "runner"))
             await executor.start()  # another process, whose time counts from its job's begin
             executor._cpu_seconds = 60.0
-            await executor.run(jobs.Claim("short", "runner"))
+            await executor.run(Claim("short", "runner"))
         finally:
             await executor.close()
 
@@ -101,5 +123,5 @@ def test_a_worker_that_takes_too_long_is_ended_and_another_one_begins_anew(
     assert limits.cpu_seconds(2**22 + 1) is None
 
 
-def spend_on_job(_: worker.StoreConfig, claim: jobs.Claim) -> None:
+def spend_on_job(_: worker.StoreConfig, claim: Claim) -> None:
     spend(0.0 if claim.job_id == "short" else 60.0)
