@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 from db.defaults import OBJECT_STORE_TIMEOUT
 from db.errors import DriverMissing, NotFound, StorageUnavailable
@@ -58,9 +59,10 @@ class ObjectStore:
     def now(self) -> datetime:
         """The present moment by the store's own clock, whatever this machine's says."""
         with _answered("blob store"):
-            self._obstore.put(self._store, _CLOCK, b"")
-            written: datetime = self._obstore.head(self._store, _CLOCK)["last_modified"]
-            self._obstore.delete(self._store, _CLOCK)
+            key = f"{_CLOCK}/{uuid4().hex}"  # another server may look at the same time
+            self._obstore.put(self._store, key, b"")
+            written: datetime = self._obstore.head(self._store, key)["last_modified"]
+            self._obstore.delete(self._store, key)
         return written
 
     def hashes(self, before: datetime | None = None, *, set_aside: bool = False) -> Iterator[str]:

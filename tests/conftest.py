@@ -136,7 +136,7 @@ class S3:
             return self._list(query.get("prefix", ""))
         if key not in self.objects:
             return Response("<Error><Code>NoSuchKey</Code></Error>", 404, media_type="application/xml")
-        day = "Mon, 03" if key.endswith("clock") else "Sat, 01"  # all else was written two days before
+        day = "Mon, 03" if "clock/" in key else "Sat, 01"  # all else was written two days before
         headers = {"ETag": '"1"', "Last-Modified": f"{day} Nov 2025 10:00:00 GMT"}
         return Response(self.objects[key], headers=headers)
 

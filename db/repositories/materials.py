@@ -60,8 +60,20 @@ def first_names(session: Session, limit: int) -> list[str]:
 def still(session: Session, material_id: int) -> int:
     """This material, or the one that it was merged into: it stays so until the transaction ends."""
     query = select(MaterialRow.merged_into_id).where(MaterialRow.id == material_id)
-    merged_into = session.scalar(query.with_for_update(read=True, key_share=True))
-    return material_id if merged_into is None else still(session, merged_into)
+    with session.begin_nested() as attempt:
+        merged_into = session.scalar(query.with_for_update(read=True, key_share=True))
+        if merged_into is None:
+            return material_id
+        attempt.rollback()  # the row is let go: who merges the other way holds the next one, and waits for this one
+    return still(session, merged_into)
+
+
+def hold(session: Session, name: str) -> int:
+    """The key of the material of this name or alias, which nobody merges until the transaction ends.
+
+    Raises ``NotFound``.
+    """
+    return still(session, find_id(session, name))
 
 
 def describe(session: Session, material_id: int, description: str) -> None:

@@ -36,6 +36,13 @@ def find_or_add(session: Session, name: str) -> int:
     return row.id
 
 
+def hold(session: Session, name: str) -> Sensor:
+    """The sensor of this name, made known if it is not yet, which nobody else describes until the transaction ends."""
+    query = select(SensorRow.id).where(SensorRow.id == find_or_add(session, name))
+    session.execute(query.with_for_update(key_share=True))
+    return get(session, name)
+
+
 def find(session: Session, name: str) -> Sensor | None:
     """A sensor with what is known of its gel; None of which nothing was heard yet."""
     found = session.execute(_WHOLE.where(SensorRow.name == name)).one_or_none() if is_storable(name) else None

@@ -59,8 +59,8 @@ async def calibrate(
 
 def _store(context: Context, sensor: str, new: NewCalibration, principal: Principal) -> Calibration:
     with context.database.write() as session:
-        _check_right(session, sensor, principal)
-        stored = calibrations.add(session, sensor, new)
+        stored = calibrations.add(session, sensor, new)  # the next one waits for the sensor's row
+        _check_right(stored.version - 1 or None, principal)
         details = {"version": stored.version, "grasp_logs": [press.grasp_log for press in new.presses]}
         audit.add(session, principal.actor, "sensor.calibrated", sensor, details)
     return stored
@@ -110,16 +110,15 @@ def sensor_model(stored: Calibration) -> "SensorModel":
     return replace(model, offset=np.frombuffer(stored.new.offset, OFFSET).reshape(*model.grid, 3))
 
 
-def _check_right(session: Session, sensor: str, principal: Principal) -> None:
-    known = sensors.get(session, sensor)
-    if known.calibration is not None and not principal.is_admin:
+def _check_right(known_version: int | None, principal: Principal) -> None:
+    if known_version is not None and not principal.is_admin:
         raise InsufficientScope("upload", "admin")
 
 
 def _hashes(context: Context, sensor: str, presses: Sequence[CalibrationPress], principal: Principal) -> list[str]:
     """Of the logs; each must be of this sensor, and they must not be too much together."""
     with context.database.read() as session:
-        _check_right(session, sensor, principal)
+        _check_right(sensors.get(session, sensor).calibration, principal)
         logs = [grasp_logs.get(session, press.grasp_log) for press in presses]
     for log in logs:
         if log.sensor != sensor:

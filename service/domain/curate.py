@@ -88,7 +88,9 @@ def remove_alias(context: Context, material: str, alias: str, principal: Princip
 def merge(context: Context, material: str, source: str, principal: Principal = ANONYMOUS) -> tuple[Material, list[Job]]:
     """Put what is known of ``source`` to ``material`` and refit it; both are the principal's; raises as ``change``."""
     with context.database.write() as session:
-        target_id, source_id = (_changeable(session, name, principal) for name in (material, source))
+        target_id, source_id = (materials.find_id(session, name) for name in (material, source))
+        for each in (target_id, source_id):
+            check_may_change(session, each, principal)
         if target_id == source_id:
             raise InvalidValue("source", source, "another material than the one in the path")
         methods = friction_models.current_methods(session, [target_id, source_id])
@@ -167,8 +169,8 @@ def _check_aliases(material: Material) -> None:
 
 
 def _changeable(session: Session, material: str, principal: Principal) -> int:
-    """The key of a material that the principal may change."""
-    material_id = materials.find_id(session, material)
+    """The key of a material that the principal may change, and that stays until the transaction ends."""
+    material_id = materials.hold(session, material)
     check_may_change(session, material_id, principal)
     return material_id
 

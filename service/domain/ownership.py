@@ -42,7 +42,7 @@ def add_owner(context: Context, material: str, owner: str, principal: Principal)
     ``InvalidValue`` for a key that is not stored and for an owner more than a material may have.
     """
     with context.database.write() as session:
-        material_id = materials.find_id(session, material)
+        material_id = materials.hold(session, material)
         check_may_change(session, material_id, principal)
         _check_owner(session, owner)
         known = owners.of_material(session, material_id)
@@ -61,7 +61,7 @@ def remove_owner(context: Context, material: str, owner: str, principal: Princip
     Raises as ``check_may_change``, ``NotFound``, and ``UnknownOwner`` for who does not own it.
     """
     with context.database.write() as session:
-        material_id = materials.find_id(session, material)
+        material_id = materials.hold(session, material)
         check_may_change(session, material_id, principal)
         if not owners.remove(session, material_id, owner):
             raise UnknownOwner("owner", owner, f"an owner of {material}")

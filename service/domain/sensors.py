@@ -26,10 +26,10 @@ def describe(context: Context, name: str, gel: Gel, principal: Principal) -> Sen
     ``InsufficientScope``, and ``QuotaExceeded`` for a key that has changed as much as it may.
     """
     with context.database.write() as session:
-        known = sensors.find(session, name)
-        if known is not None and known.gel == gel:
+        known = sensors.hold(session, name)
+        if known.gel == gel:
             return known
-        if known is not None and known.gel is not None and not principal.is_admin:
+        if known.gel is not None and not principal.is_admin:
             raise InsufficientScope("upload", "admin")
         quotas.check_change(session, context.settings, principal.key_id)
         audit.add(session, principal.actor, "sensor.described", name, asdict(gel))

@@ -7,6 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import obstore
 import pytest
 
 from db.blobs import open_blobs
@@ -98,6 +99,21 @@ def test_ages_are_those_of_the_stores_clock(s3: Any, tmp_path: Path) -> None:
     assert list(s3.objects) == [f"lab/quarantine/{sha256}"]
     assert list(blobs.quarantine.hashes(blobs.now() - timedelta(days=3))) == []
     assert list(blobs.quarantine.hashes(blobs.now() - timedelta(hours=24))) == [sha256]
+
+
+def test_two_may_look_at_the_stores_clock_at_once(s3: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They wrote to one object, and who was first deleted it under the other."""
+    blobs, head = open_blobs(tmp_path, URL, MIB), obstore.head
+
+    def look_beside(*arguments: Any) -> Any:
+        monkeypatch.setattr(obstore, "head", head)
+        assert blobs.now() == told[0]
+        return head(*arguments)
+
+    told = [blobs.now()]
+    monkeypatch.setattr(obstore, "head", look_beside)
+    assert blobs.now() == told[0]
+    assert s3.objects == {}
 
 
 def test_a_damaged_copy_in_the_cache_is_fetched_again(s3: Any, tmp_path: Path) -> None:
