@@ -1,6 +1,7 @@
 """A LeRobot data set (v3.0) as a folder: its episodes, and which of its files each is in (docs/formats.md)."""
 
 import json
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,9 @@ CONVERTER = "lerobot.datasets.v30.convert_dataset_v21_to_v30"
 EPISODES = "meta/episodes/*/*.parquet"
 PLACE = ("data/chunk_index", "data/file_index")
 COLUMNS = ("episode_index", "tasks", *PLACE)
+
+DATA_PATH = re.compile(r"(?:[^{}]|\{(?:chunk|file)_index(?::0?\dd)?\})+")
+"""Where files of frames are; other formats could ask for a text as long as they like."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +76,9 @@ def _info(folder: Path) -> dict[str, Any]:
         raise InvalidInput(LEROBOT_INFO, value, "the description that LeRobot writes") from error
     if not version.startswith(VERSION):
         raise InvalidInput("codebase_version", version[:20], f"v3.0; python -m {CONVERTER} brings older ones to it")
+    if not DATA_PATH.fullmatch(told["data_path"]):
+        allowed = "a path with {chunk_index:03d} and {file_index:03d}"
+        raise InvalidInput("data_path", repr(told["data_path"])[:60], allowed)
     return told
 
 
@@ -92,6 +99,8 @@ def _episodes(folder: Path, data_path: str) -> list[Episode]:
         tables = [pq.read_table(path, columns=list(COLUMNS)) for path in sorted(folder.glob(EPISODES))]
         rows = [row for table in tables for row in table.to_pylist()]
         found = [Episode(int(row["episode_index"]), _file(folder, data_path, row), _task(row)) for row in rows]
+    except InvalidInput:
+        raise
     except (pa.ArrowException, OSError, KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
         value = f"damaged ({type(error).__name__}: {str(error)[:80]})"
         raise InvalidInput(EPISODES, value, f"a complete table of {', '.join(COLUMNS)}") from error
@@ -104,7 +113,11 @@ def _file(folder: Path, data_path: str, row: dict[str, Any]) -> Path:
     """The file of frames, which has to be inside of the data set."""
     chunk, number = (int(row[name]) for name in PLACE)
     file = folder / data_path.format(chunk_index=chunk, file_index=number)
-    if not file.resolve().is_relative_to(folder.resolve()):
+    try:
+        is_inside = file.resolve().is_relative_to(folder.resolve())
+    except RuntimeError:  # a link that leads to itself
+        is_inside = False
+    if not is_inside:
         raise InvalidInput("data_path", repr(data_path)[:60], "a path inside of the data set")
     if not file.is_file():
         raise InvalidInput("data set", f"without {file.relative_to(folder)}", "all files that its episodes are in")

@@ -122,11 +122,32 @@ def test_an_older_version_is_refused_with_what_brings_it_up_to_date(folder: Path
         formats.episodes_of(folder)
 
 
-@pytest.mark.parametrize("path", ["../../elsewhere.parquet", "/etc/hostname", "data/{chunk_index.real.__class__}"])
+@pytest.mark.parametrize("path", ["../../elsewhere.parquet", "/etc/hostname"])
 def test_no_file_outside_of_the_data_set_is_read(folder: Path, path: str) -> None:
     (folder.parent.parent / "elsewhere.parquet").write_bytes((folder / DATA).read_bytes())
     change(folder, data_path=path)
-    with pytest.raises(InvalidInput, match=r"data_path is .*a path inside of the data set|data set is without"):
+    with pytest.raises(InvalidInput, match=r"^data_path is .*; allowed: a path inside of the data set"):
+        formats.episodes_of(folder)
+
+
+def test_a_file_that_is_a_link_to_itself_is_none(folder: Path) -> None:
+    (folder / DATA).unlink()
+    (folder / DATA).symlink_to(folder / DATA)
+    with pytest.raises(InvalidInput, match=r"^data_path is .*; allowed: a path inside of the data set"):
+        formats.episodes_of(folder)
+
+
+def test_a_missing_file_is_named(folder: Path) -> None:
+    (folder / DATA).unlink()
+    with pytest.raises(InvalidInput, match=f"^data set is without {DATA}"):
+        formats.episodes_of(folder)
+
+
+@pytest.mark.parametrize("path", ["{0}", "data/{chunk_index.real.__class__}", "data/{chunk_index:4000000000d}", ""])
+def test_a_path_that_asks_for_more_than_two_numbers_is_refused(folder: Path, path: str) -> None:
+    """As one of 4 GB."""
+    change(folder, data_path=path)
+    with pytest.raises(InvalidInput, match=r"^data_path is .*; allowed: a path with \{chunk_index:03d\}"):
         formats.episodes_of(folder)
 
 
@@ -137,7 +158,7 @@ def test_a_damaged_data_set_is_refused_by_the_file_that_is(folder: Path, name: s
         formats.read(folder, mapping='{"episode": 0}')
 
 
-@pytest.mark.parametrize("entries", [{"features": None}, {"features": {"a": 1}}, {"data_path": "{0}"}])
+@pytest.mark.parametrize("entries", [{"features": None}, {"features": {"a": 1}}])
 def test_a_description_of_something_else_is_refused(folder: Path, entries: dict[str, Any]) -> None:
     change(folder, **entries)
     with pytest.raises(InvalidInput, match="damaged"):
