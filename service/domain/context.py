@@ -16,7 +16,7 @@ from db.database import Database
 from service.domain.model_cache import ModelCache
 from service.domain.receive import Bodies
 from service.formats.reading import Readers
-from service.processes.fair_threads import LONG, FairThreads
+from service.processes.fair_threads import FairThreads
 from service.settings import Settings
 
 
@@ -56,7 +56,7 @@ class Context:
 
     async def files(self, owner: str, hashes: Iterable[str], checked_within: float = 0.0) -> list[Path]:
         """The files that hold these blobs, for a client; each is compared with its hash (``BlobStore.path``)."""
-        path = partial(self.threads.run, owner, self.blobs.path, weight=LONG)
+        path = partial(self.threads.run, owner, self.blobs.path, is_long=True)
         return [await path(sha256, checked_within) for sha256 in hashes]
 
     @contextmanager

@@ -25,7 +25,6 @@ from service.domain.receive import UNPACKING_BYTES, check_encoding, check_expans
 from service.domain.sensors import RECONSTRUCTED
 from service.formats.archive import unpacked_bytes
 from service.formats.reading import Description, FormatSettings
-from service.processes.fair_threads import LONG
 from service.settings import Settings
 from slipcore.defaults import METHOD_NAMES
 from slipcore.errors import InvalidInput
@@ -289,7 +288,7 @@ async def _unpack_and_read(
         spool = spools.enter_context(context.blobs.spool())
         do = partial(unpack, body, spool, encoding, settings.max_upload_bytes, settings.max_expansion)
         async with context.readers.room.turn(share, UNPACKING_BYTES):
-            await context.threads.run(share, do, weight=LONG)
+            await context.threads.run(share, do, is_long=True)
     return await _read(context, spools, spool, request, body.size)
 
 
@@ -309,7 +308,7 @@ async def _read(
             return spool, found
         made = spools.enter_context(context.blobs.spool())
         description = await context.readers.convert(spool.path, made.path, name, request.settings, share)
-        await context.threads.run(share, made.adopt, weight=LONG)
+        await context.threads.run(share, made.adopt, is_long=True)
         check_expansion(received, made.size, expansion)
     return made, description
 

@@ -21,7 +21,7 @@ from service import formats
 from service.formats import writing
 from service.processes import spawned
 from service.processes.fair_queue import FairQueue
-from service.processes.fair_threads import LONG, SHORT, FairThreads
+from service.processes.fair_threads import FairThreads
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 from stiction_client import container
@@ -103,8 +103,7 @@ class Readers:
         if needed >= self._most_here:
             return await self._do(partial(read_plain, source, name), name, self._seconds_for(source), owner)
         async with self.room.turn(owner, needed):
-            weight = SHORT if unpacked <= SHORT_BYTES else LONG
-            return await self._threads.run(owner, read_plain, source, name, weight=weight)
+            return await self._threads.run(owner, read_plain, source, name, is_long=unpacked > SHORT_BYTES)
 
     async def convert(
         self, source: Path, target: Path, name: str, settings: FormatSettings, owner: str = ""

@@ -11,28 +11,26 @@ from typing import TypeVar
 
 from service.processes.fair_queue import PatientQueue
 
-THREADS = 8
-
-SHORT, LONG = 1, 3
-"""Threads that work counts for: of some ms, or of seconds. Of the latter each owner has one piece at once, and all
-together two, beside which there are threads for the former."""
+SHORT_AT_ONCE, LONG_AT_ONCE = 6, 2
+"""Pieces of work that take some ms each, of which an owner has half at most, and of such as take seconds, of which each
+owner has one: they wait for each other, and none of the former for any of the latter."""
 
 Result = TypeVar("Result")
 
 
 class FairThreads:
-    """Does work in threads, of which one owner has half at most (``FairQueue``).
+    """Does work in threads, shared out by ``FairQueue``.
 
     Who is cancelled gives up its place; work that has begun is waited for: it has its memory and files until then.
     """
 
     def __init__(self) -> None:
-        self._queue = PatientQueue(THREADS, "worked on")
-        self._executor = ThreadPoolExecutor(THREADS, "for_clients")
+        self._short, self._long = (PatientQueue(many, "worked on") for many in (SHORT_AT_ONCE, LONG_AT_ONCE))
+        self._executor = ThreadPoolExecutor(SHORT_AT_ONCE + LONG_AT_ONCE, "for_clients")
 
-    async def run(self, owner: str, do: Callable[..., Result], *arguments: object, weight: int = SHORT) -> Result:
-        """The result of ``do``, or what it raised."""
-        async with self._queue.turn(owner, weight):
+    async def run(self, owner: str, do: Callable[..., Result], *arguments: object, is_long: bool = False) -> Result:
+        """The result of ``do``, or what it raised; ``is_long``: it may take seconds."""
+        async with (self._long if is_long else self._short).turn(owner):
             run = asyncio.get_running_loop().run_in_executor
             return await _to_its_end(run(self._executor, copy_context().run, do, *arguments))
 

@@ -19,7 +19,6 @@ from service.domain.recommended import AUTO
 from service.domain.stored_results import to_client_model
 from service.domain.upload import UploadRequest, check_target
 from service.formats.reading import Description
-from service.processes.fair_threads import LONG
 from service.stream import detectors
 from service.stream.errors import FINISHED, KEY_ENDED, NOT_UNDERSTOOD, REFUSED, SLOW_READER, STORAGE_AWAY, End
 from service.stream.messages import (
@@ -213,7 +212,7 @@ class _Connection:
             found = await self._streams.call(detectors.write, session.id, spool.path, opening.sensor)
             share = self._principal.share
             stored = await self._context.threads.run(
-                share, self._store, spool, found, self._upload(opening), weight=LONG
+                share, self._store, spool, found, self._upload(opening), is_long=True
             )
         return {"type": "finished", "grasp_log": stored}
 

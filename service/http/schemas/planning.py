@@ -1,6 +1,6 @@
 """What a planner asks beyond a look-up: how hard to grip, and which material it is."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -104,20 +104,28 @@ class GraspForceOut(BaseModel):
     advice: Advice
 
 
+MOST_SAMPLES = 50_000
+"""More than a body of its size can hold."""
+
+Item = TypeVar("Item")
+Column = Annotated[list[Item], Field(max_length=MOST_SAMPLES, fail_fast=True)]
+"""Of samples: the first that cannot be is told, and no more, for each would take its time."""
+
+
 class SamplesIn(Body):
     """Friction samples of one grasp, as `GET /v1/grasp-logs/{id}/samples` gives them."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [SAMPLES_EXAMPLE]})
 
-    friction_coefficient: list[Annotated[float, Field(ge=0.0, le=1e3, allow_inf_nan=False)]]
-    tangential_velocity: list[Velocity]
-    normal_force: list[Force]
-    tangential_force: list[Force]
-    time: list[Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]]
-    element: list[Annotated[int, Field(ge=0, lt=2**31)]]
-    weight: list[Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]]
-    kind: Annotated[list[Literal["element", "contact"]] | None, Field(description="Without, all of elements")] = None
-    velocity_is_relative: Annotated[list[bool] | None, Field(description="Without, of none")] = None
+    friction_coefficient: Column[Annotated[float, Field(ge=0.0, le=1e3, allow_inf_nan=False)]]
+    tangential_velocity: Column[Velocity]
+    normal_force: Column[Force]
+    tangential_force: Column[Force]
+    time: Column[Annotated[float, Field(ge=-1e9, le=1e9, allow_inf_nan=False)]]
+    element: Column[Annotated[int, Field(ge=0, lt=2**31)]]
+    weight: Column[Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]]
+    kind: Annotated[Column[Literal["element", "contact"]] | None, Field(description="Without, all of elements")] = None
+    velocity_is_relative: Annotated[Column[bool] | None, Field(description="Without, of none")] = None
     element_area: Area
 
     @model_validator(mode="after")

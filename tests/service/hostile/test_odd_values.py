@@ -156,3 +156,26 @@ def test_a_known_force_that_no_press_has_is_refused_by_name(local: Any, force: f
     answer = local.request("POST", "/v1/sensors/finger/calibrations", json={"presses": presses})
     assert answer.status_code == httpx.codes.UNPROCESSABLE_ENTITY
     assert answer.json()["name"].endswith("known_force")
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        {"samples": {"time": ["a"] * 20_000}},
+        {"samples": {"kind": [{}] * 20_000}},
+        {"samples": {f"field {number}": 0 for number in range(20_000)}},
+        {f"field {number}": 0 for number in range(20_000)},
+        {"materials": [0] * 20_000},
+    ],
+)
+def test_a_body_of_nothing_but_errors_is_refused_by_few_of_them(local: Any, body: dict[str, Any]) -> None:
+    """A single one of 1 MB had 250,000 made and told, and nobody was answered for 13 s."""
+    answer = local.request("POST", "/v1/recognise", json=body)
+    assert answer.status_code == httpx.codes.UNPROCESSABLE_ENTITY
+    assert len(answer.json()["errors"]) < 20
+    assert len(answer.content) < 10_000
+
+
+def test_some_unknown_fields_are_named_one_by_one(local: Any) -> None:
+    answer = local.request("POST", "/v1/recognise", json={"log": "x", "sample": 1})
+    assert {each["name"] for each in answer.json()["errors"]} == {"log", "sample"}

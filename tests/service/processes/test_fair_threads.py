@@ -7,13 +7,16 @@ from contextvars import ContextVar
 
 import pytest
 
-from service.processes.fair_threads import LONG, SHORT, THREADS, FairThreads
+from service.processes.fair_threads import SHORT_AT_ONCE, FairThreads
 
 ABOUT: ContextVar[str] = ContextVar("ABOUT")
 
 
-def begun(*asked: tuple[str, int]) -> list[str]:
-    """Who has a thread, of owners whose work of some weight does not end, in the order in which it began."""
+SHORT, LONG = False, True
+
+
+def begun(*asked: tuple[str, bool]) -> list[str]:
+    """Who has a thread, of owners whose work, short or long, does not end, in the order in which it began."""
     owners, may_end = list[str](), threading.Event()
 
     def work(owner: str) -> None:
@@ -22,7 +25,7 @@ def begun(*asked: tuple[str, int]) -> list[str]:
 
     async def ask() -> list[str]:
         threads = FairThreads()
-        tasks = [asyncio.create_task(threads.run(owner, work, owner, weight=weight)) for owner, weight in asked]
+        tasks = [asyncio.create_task(threads.run(owner, work, owner, is_long=is_long)) for owner, is_long in asked]
         try:
             await asyncio.sleep(0.05)
             return list(owners)
@@ -35,15 +38,15 @@ def begun(*asked: tuple[str, int]) -> list[str]:
 
 
 def test_an_owner_has_half_of_them() -> None:
-    assert begun(*[("a", SHORT)] * (THREADS + 1), ("b", SHORT)) == ["a"] * (THREADS // 2) + ["b"]
+    assert begun(*[("a", SHORT)] * (SHORT_AT_ONCE + 1), ("b", SHORT)) == ["a"] * (SHORT_AT_ONCE // 2) + ["b"]
 
 
 def test_an_owner_has_one_long_piece_at_once_and_short_ones_beside_it() -> None:
-    assert begun(("a", LONG), ("a", LONG), ("b", SHORT), ("a", SHORT)) == ["a", "b"]
+    assert begun(("a", LONG), ("a", LONG), ("b", SHORT), ("a", SHORT)) == ["a", "b", "a"]
 
 
-def test_two_have_long_pieces_at_once_beside_which_others_have_short_ones() -> None:
-    assert begun(("a", LONG), ("b", LONG), ("c", SHORT), ("d", SHORT)) == ["a", "b", "c", "d"]
+def test_two_have_long_pieces_at_once_and_who_waits_for_one_keeps_nobody_from_short_ones() -> None:
+    assert begun(*((owner, LONG) for owner in "abc"), *((owner, SHORT) for owner in "abcd")) == list("ababcd")
 
 
 def test_results_errors_and_what_the_log_is_about_are_those_of_the_caller() -> None:
@@ -69,7 +72,7 @@ def test_who_is_cancelled_gives_up_its_place_and_is_done_no_earlier_than_what_ha
 
     async def ask() -> None:
         threads = FairThreads()
-        first, second = (asyncio.create_task(threads.run("a", work, weight=LONG)) for _ in range(2))
+        first, second = (asyncio.create_task(threads.run("a", work, is_long=True)) for _ in range(2))
         await asyncio.to_thread(has_begun.wait)
         first.cancel()
         second.cancel()
