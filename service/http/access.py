@@ -42,6 +42,8 @@ class Access:
 
 
 EVERYTHING = Access(None, "admin")
+NOTHING_ASKED = Access(None, "read")
+"""Of who asks for what anybody may see."""
 
 
 def is_public(path: str) -> bool:
@@ -75,7 +77,7 @@ READ, UPLOAD, ADMIN = (Security(_required_scope, scopes=[scope]) for scope in SC
 
 async def principal(connection: HTTPConnection) -> Principal:
     """Who asks, as the use cases take it."""
-    access: Access = connection.state.access
+    access: Access = getattr(connection.state, "access", NOTHING_ASKED)
     address = connection.client.host[:LONGEST_ADDRESS] if connection.client else None
     request_id = getattr(connection.state, "request_id", None)
     return Principal(access.key_id, access.group, access.scope == "admin", address, request_id)

@@ -1,5 +1,6 @@
 """Bodies of requests: read as they come, and of bounded size."""
 
+import json
 from collections.abc import AsyncIterator, Callable, Coroutine
 from typing import Any
 
@@ -10,6 +11,9 @@ from starlette.types import Message, Receive
 
 from service.http.fair_route import FairRoute
 from service.http.problems import UNSUPPORTED_FORMAT, Problem
+
+MOST_FIELDS = 100
+"""Of an object in a body, or of a form; those that are known have two dozen at most."""
 
 MAX_JSON_BYTES = 64 * 1024
 """Bytes of a JSON body; the longest description is 10,000 characters."""
@@ -22,6 +26,18 @@ async def chunks(request: Request) -> AsyncIterator[bytes]:
             yield chunk
     except ClientDisconnect as error:
         raise ConnectionError("the client has closed its connection") from error
+
+
+class _JsonRequest(Request):
+    async def json(self) -> Any:
+        """The body; raises ``HTTPException`` for objects of more fields than any has: each would be an error apart."""
+        return json.loads(await self.body(), object_pairs_hook=_few_fields)
+
+
+def _few_fields(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    if len(pairs) > MOST_FIELDS:
+        raise HTTPException(400, f"an object of the body has more than {MOST_FIELDS} fields")
+    return dict(pairs)
 
 
 class JsonRoute(FairRoute):
@@ -39,7 +55,7 @@ class JsonRoute(FairRoute):
             given = request.headers.get("content-type", "")
             if given.partition(";")[0].strip().lower() != "application/json":
                 raise Problem.wrong_value(UNSUPPORTED_FORMAT, "content type", given or "missing", "application/json")
-            return await handle(Request(request.scope, limited(request.receive, self.most_bytes)))
+            return await handle(_JsonRequest(request.scope, limited(request.receive, self.most_bytes)))
 
         return handle_json
 

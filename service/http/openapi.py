@@ -1,9 +1,11 @@
 """The application's own description, OpenAPI."""
 
+import json
 from collections.abc import Iterable
+from functools import cached_property
 from typing import Any
 
-from fastapi import APIRouter, FastAPI
+from fastapi import APIRouter, FastAPI, Request, Response
 from fastapi.routing import APIRoute
 from starlette.routing import BaseRoute
 
@@ -39,6 +41,18 @@ class DescribedApp(FastAPI):
     def take(self, router: APIRouter) -> None:
         """Answer the routes of a module as they are: ``include_router`` would build them anew for each application."""
         self.router.routes.extend(router.routes)
+
+    def setup(self) -> None:
+        """Answer the description, which is written once: anybody may ask for it, and it is long."""
+
+        async def describe(_: Request) -> Response:
+            return Response(self._written, media_type="application/json")
+
+        self.add_route("/openapi.json", describe, include_in_schema=False)
+
+    @cached_property
+    def _written(self) -> bytes:
+        return json.dumps(self.openapi(), ensure_ascii=False, separators=(",", ":")).encode()
 
     def openapi(self) -> dict[str, Any]:
         """The description of all routes."""

@@ -9,13 +9,11 @@ from pydantic import BaseModel, BeforeValidator, ValidationError
 from starlette.datastructures import FormData
 from starlette.exceptions import HTTPException
 from starlette.formparsers import MultiPartException, MultiPartParser
+from starlette.types import Message, Receive
 
 from db.text import is_storable
-from service.http.bodies import limited
+from service.http.bodies import MOST_FIELDS, limited
 from service.http.fair_route import FairRoute
-
-MOST_FORM_BYTES = 2**18
-"""Of a form without a file; the longest description takes half of that."""
 
 Shape = TypeVar("Shape", bound=BaseModel)
 
@@ -26,14 +24,34 @@ EMPTY_IS_NONE = BeforeValidator(lambda text: None if text == "" else text)
 class FormRoute(FairRoute):
     """A route whose form is of bounded size: the framework parses all of it before it is asked who sends it."""
 
+    most_bytes = 2**18
+    """Without a file; the longest description takes half of that."""
+
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """The handler, which receives no more than a form may have."""
         handle = super().get_route_handler()
 
         async def handle_form(request: Request) -> Response:
-            return await handle(Request(request.scope, limited(request.receive, MOST_FORM_BYTES)))
+            receive = limited(request.receive, self.most_bytes)
+            is_plain = request.headers.get("content-type", "").startswith("application/x-www-form-urlencoded")
+            return await handle(Request(request.scope, few_fields(receive) if is_plain else receive))
 
         return handle_form
+
+
+def few_fields(receive: Receive) -> Receive:
+    """What receives a form, and raises ``HTTPException`` for one of more fields than any has: each takes its time."""
+    seen = 0
+
+    async def receive_some() -> Message:
+        nonlocal seen
+        message = await receive()
+        seen += message.get("body", b"").count(b"&")
+        if seen >= MOST_FIELDS:
+            raise HTTPException(400, f"the form has more than {MOST_FIELDS} fields")
+        return message
+
+    return receive_some
 
 
 class _FileParser(MultiPartParser):

@@ -5,10 +5,11 @@ from fastapi import APIRouter
 from db.errors import StorageUnavailable
 from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
+from service.http.fair_route import FairRoute
 from service.http.problems import STORAGE_UNAVAILABLE, WORKERS_NOT_READY, Problem, storage_unavailable
 from service.http.schemas.health import HealthOut, ReadyOut
 
-router = APIRouter(tags=["health"])
+router = APIRouter(tags=["health"], route_class=FairRoute)
 
 
 @router.get("/healthz", summary="Does the process live?", response_model_exclude_none=True)

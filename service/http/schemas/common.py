@@ -1,8 +1,8 @@
 """What the schemas of several resources share: text, names, numbers and the base of request bodies."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from db.text import is_storable
 
@@ -33,19 +33,7 @@ Area = Annotated[float, Field(gt=1e-12, le=1.0, allow_inf_nan=False, description
 Next = Annotated[str | None, Field(description="The `cursor` of what comes after these; null at the end")]
 
 
-MOST_UNKNOWN = 10
-"""Fields that are told one by one."""
-
-
 class Body(BaseModel):
     """What a request may say: known fields only, and of their own types: neither ``true`` nor ``"1"`` is a number."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _few_unknown_fields(cls, told: Any) -> Any:
-        """Each would be an error of its own, which takes its time."""
-        if isinstance(told, dict) and len(told) > len(cls.model_fields) + MOST_UNKNOWN:
-            raise ValueError(f"no more than the fields {', '.join(cls.model_fields)}")
-        return told

@@ -3,9 +3,10 @@
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import RedirectResponse
 
+from service.http.fair_route import FairRoute
 from service.web.rendering import SWAGGER_UI_POLICY, render
 
-router = APIRouter(include_in_schema=False)
+router = APIRouter(include_in_schema=False, route_class=FairRoute)
 
 
 @router.get("/docs")

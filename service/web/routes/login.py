@@ -13,13 +13,20 @@ from service.http.dependencies import CurrentContext
 from service.web.forms import FormRoute
 from service.web.rendering import on_problem, render
 
-router = APIRouter(include_in_schema=False, route_class=FormRoute)
+
+class LoginRoute(FormRoute):
+    """Anybody may send its form, which is a key and a path."""
+
+    most_bytes = 2**13
+
+
+router = APIRouter(include_in_schema=False, route_class=LoginRoute)
 
 SEE_OTHER = 303
 
 
 @router.get("/login")
-async def show_login(request: Request, next: str = "/") -> Response:  # noqa: A002  (the field's own name)
+def show_login(request: Request, next: str = "/") -> Response:  # noqa: A002  (the field's own name)
     """The form that takes a key."""
     return render(request, "login.html", next=_own_path(next), problem=None)
 

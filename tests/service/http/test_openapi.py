@@ -1,4 +1,5 @@
 import importlib
+import json
 import pkgutil
 import re
 from pathlib import Path
@@ -90,3 +91,10 @@ def test_what_goes_over_the_wire_has_an_example() -> None:
     }
     without |= {"HealthOut", "ReadyOut", "WrongValue"}
     assert {schema.__name__ for schema, _ in EXAMPLES} == set(DESCRIPTION["components"]["schemas"]) - without
+
+
+def test_the_description_is_written_once() -> None:
+    """Anybody may ask for it, and it is long."""
+    app = create_app(Settings())
+    assert app._written is app._written  # type: ignore[attr-defined]
+    assert json.loads(app._written) == DESCRIPTION  # type: ignore[attr-defined]

@@ -88,6 +88,18 @@ def test_what_is_no_key_begins_no_session(caller: Any, key: str) -> None:
     assert "unknown, revoked, expired or garbled" in answer.text
 
 
+@pytest.mark.parametrize(
+    ("body", "status", "told"),
+    [(b"&" * 8_000, 400, "the form has more than 100 fields"), (b"key=" + b"x" * 9_000, 413, "more than 8192 bytes")],
+)
+def test_a_form_that_takes_long_to_read_is_not_read(caller: Any, body: bytes, status: int, told: str) -> None:
+    """Anybody may send it: 30 connections of 256 kB of separators kept all others waiting for 24 s."""
+    headers = OWN | {"content-type": "application/x-www-form-urlencoded", "accept": "application/json"}
+    answer = caller.request("POST", "/login", content=body, headers=headers)
+    assert answer.status_code == status
+    assert told in answer.json()["detail"]
+
+
 @pytest.mark.parametrize("path", ["//elsewhere.org/", "/\\elsewhere.org", "https://elsewhere.org", "javascript:1", ""])
 def test_the_login_leads_nowhere_else(caller: Any, make: Callable[..., str], path: str) -> None:
     answer = caller.request("POST", "/login", data={"key": make(), "next": path}, headers=OWN)
