@@ -3,14 +3,18 @@ PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 UV := $(BIN)/uv pip
+INSTALL := $(UV) install --quiet --python $(BIN)/python
 CACHE := .cache
 RECORDINGS := $(CACHE)/tac3d/PyTac3D/example_data
 TAC3D := pytac3d==3.3.0.9 --hash=sha256:403db42faa530bf716d4acbb22ab3b51382750ed95dbbeaeb6e0c43024348865
 SHIPPED := $(CACHE)/shipped
 OUTPUT ?= demo-output
+FIRST := numpy|scipy|numba|llvmlite|setuptools
 CONTACT := from slipcore.contact import Scene, simulate; simulate(Scene.from_toml("table1_condition1"))
-COMPILE := $(BIN)/python -c 'import slipcore; slipcore.warm_up()' & compiling=$$!; \
-    $(BIN)/python -c 'import estimators; estimators.warm_up(); $(CONTACT)'; status=$$?; wait $$compiling && exit $$status
+SAMPLES := from slipcore.warm_up import warm_up_samples; warm_up_samples()
+# The detectors' kernels take most of it, a minute of a core: all others are left to the second process.
+COMPILE_DETECTORS := $(BIN)/python -c 'import slipcore; slipcore.warm_up()'
+COMPILE_OTHERS := $(BIN)/python -c 'import estimators; estimators.warm_up(); $(CONTACT); $(SAMPLES)'
 # Two processes of tests share two cores: threads of BLAS beside them wait for each other, at six times the time.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest
 RESOLUTION := --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
@@ -61,15 +65,18 @@ $(VENV)/.installed: pyproject.toml clients/pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	@awk '/^[^ ]/ {wanted = /^uv==/} wanted' constraints.txt \
 	    | $(BIN)/pip install --quiet --disable-pip-version-check --require-hashes --requirement /dev/stdin
-	$(UV) install --quiet --python $(BIN)/python --compile-bytecode --require-hashes --requirement constraints.txt
-	$(UV) install --quiet --python $(BIN)/python --no-deps --no-build-isolation --editable ./clients --editable .
-	@echo "   compiling the kernels"
-	@$(COMPILE)
+	@awk '/^[^ ]/ {wanted = /^($(FIRST))==/} wanted' constraints.txt | $(INSTALL) --require-hashes --requirement /dev/stdin
+	$(INSTALL) --no-deps --no-build-isolation --editable ./clients --editable .
+	@echo "   installing the packages and, meanwhile, compiling the kernels"
+	@$(COMPILE_DETECTORS) & compiling=$$!; \
+	    { $(INSTALL) --compile-bytecode --require-hashes --requirement constraints.txt && $(COMPILE_OTHERS); } \
+	        || { kill $$compiling; exit 1; }; \
+	    wait $$compiling
 	@touch $@
 
 kernels: setup  # else both processes of the tests would compile what they need; 3 s where nothing has changed
 	@echo "== kernels"
-	@$(COMPILE)
+	@$(COMPILE_DETECTORS) & compiling=$$!; $(COMPILE_OTHERS) || { kill $$compiling; exit 1; }; wait $$compiling
 
 recordings: $(CACHE)/tac3d.tried
 

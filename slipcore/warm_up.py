@@ -1,4 +1,4 @@
-"""Compile what a first frame would otherwise wait for."""
+"""Compile what a first log would otherwise wait for."""
 
 import time
 
@@ -9,11 +9,18 @@ from slipcore.frames import GraspLog
 
 
 def warm_up(*methods: str) -> float:
-    """Compile the kernels of these detection methods, of all if none is named, or load them from where they are kept.
+    """Compile the kernels that logs need by these detection methods, by any if none is named, or load what is kept.
 
     Seconds that it took.
     """
     began = time.perf_counter()
+    warm_up_detectors(*methods)
+    warm_up_samples()
+    return time.perf_counter() - began
+
+
+def warm_up_detectors(*methods: str) -> None:
+    """What a first frame waits for: the kernels of these methods, of all if none is named."""
     from slipcore.detection.batch import detect_slip
     from slipcore.detection.methods import METHODS
 
@@ -23,4 +30,13 @@ def warm_up(*methods: str) -> float:
     log = GraspLog(np.linspace(0.0, 0.3, len(force)), position, np.zeros(force.shape), element_area=1e-6, force=force)
     for method in methods or METHODS:
         detect_slip(log, method, lookahead=1)
-    return time.perf_counter() - began
+
+
+def warm_up_samples() -> None:
+    """What a whole log waits for beside its method: patches and samples, of which another process can take care."""
+    from slipcore.collection import collect_samples
+    from slipcore.contact import tangential_ramp
+    from slipcore.detection.batch import detect_slip
+
+    log = tangential_ramp(points=8, pitch=1.5e-3)
+    collect_samples(log, detect_slip(log, "rigid_fit"))

@@ -45,7 +45,7 @@ def run_demo(output: Path, recordings: Path | None, seed: int, show: Show) -> No
     console = Console()
     output.mkdir(parents=True, exist_ok=True)
     shutil.rmtree(output / "service", ignore_errors=True)  # the demo's own folder: each run starts a fresh database
-    with starting_server(output / "service") as address:
+    with starting_server(output / "service", console.print) as address:
         logs = _inputs(output, recordings, seed, console)
         with _progress(console) as progress, FrictionClient(address()) as client:
             uploads = _upload(client, logs, progress)

@@ -6,14 +6,17 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
 import httpx
 
-START_TIMEOUT = 60.0
-"""s; a cold start imports the numerics and migrates the database, seconds even on a slow disk."""
+START_TIMEOUT = 600.0
+"""s; a start takes seconds, and minutes where the kernels must be compiled and others work on the machine, too."""
+
+SAID_AFTER = 10.0
+"""s of silence; then it is said what is waited for."""
 
 
 @contextmanager
@@ -27,8 +30,11 @@ def running_server(folder: Path) -> Iterator[str]:
 
 
 @contextmanager
-def starting_server(folder: Path) -> Iterator[Callable[[], str]]:
-    """The same, for who has something to do while the server starts: waits for it where the address is asked for."""
+def starting_server(folder: Path, say: Callable[[str], object] = print) -> Iterator[Callable[[], str]]:
+    """The same, for who has something to do while the server starts: waits for it where the address is asked for.
+
+    ``say`` is told what is waited for where that takes long.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     port = _free_port()
     log = folder / "server.log"
@@ -37,7 +43,7 @@ def starting_server(folder: Path) -> Iterator[Callable[[], str]]:
     with log.open("wb") as output:
         process = subprocess.Popen(command, env=environment, stdout=output, stderr=subprocess.STDOUT)
         try:
-            yield partial(_address, f"http://127.0.0.1:{port}", process, log)
+            yield partial(_address, f"http://127.0.0.1:{port}", process, log, say)
         finally:
             process.terminate()
             process.wait(timeout=30)
@@ -49,16 +55,22 @@ def _free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def _address(url: str, process: "subprocess.Popen[bytes]", log: Path) -> str:
-    """The server's address, once it is ready."""
-    deadline = time.monotonic() + START_TIMEOUT
+def _address(url: str, process: "subprocess.Popen[bytes]", log: Path, say: Callable[[str], object]) -> str:
+    """The server's address, once it is ready: as long as its process lives, within bounds, it is waited for."""
+    began, is_said = time.monotonic(), False
     with httpx.Client(timeout=2.0, verify=False, trust_env=False) as client:  # certificates take longer than asking
-        while time.monotonic() < deadline and process.poll() is None:
-            try:
-                if client.get(f"{url}/readyz").status_code == httpx.codes.OK:
-                    return url
-            except httpx.TransportError:
-                pass  # not listening yet
+        while (waited := time.monotonic() - began) < START_TIMEOUT and process.poll() is None:
+            if _is_ready(client, url):
+                return url
+            if waited > SAID_AFTER and not is_said:
+                say("The server is not ready yet: after a change its kernels are compiled first, for a minute or two.")
+                is_said = True
             time.sleep(0.05)
     tail = "\n".join(log.read_text(errors="replace").splitlines()[-20:])
     raise RuntimeError(f"the server did not get ready on {url}; the end of its log:\n{tail}")
+
+
+def _is_ready(client: httpx.Client, url: str) -> bool:
+    with suppress(httpx.TransportError):  # not listening yet
+        return client.get(f"{url}/readyz").status_code == httpx.codes.OK
+    return False

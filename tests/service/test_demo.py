@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from service.cli.output import print_table
-from service.demo import tables
+from service.demo import server, tables
 from service.demo.inputs import FRICTION
 from service.report.page import Table
 
@@ -38,6 +38,23 @@ def test_a_reason_stands_in_lines_of_words_within_100_columns(kind: str, capsys:
 def test_jobs_that_end_well_have_no_table_of_reasons() -> None:
     done: Any = SimpleNamespace(status="done", reason=None)
     assert tables.reasons([("cardboard by ols", done)]) == []
+
+
+def test_a_server_that_compiles_is_waited_for_and_told_of_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    looks, said = iter([False, False, False, True]), list[str]()
+    monkeypatch.setattr(server, "SAID_AFTER", 0.0)
+    monkeypatch.setattr(server, "_is_ready", lambda *_: next(looks))
+    alive: Any = SimpleNamespace(poll=lambda: None)
+    assert server._address("http://127.0.0.1:1", alive, tmp_path / "server.log", said.append) == "http://127.0.0.1:1"
+    assert len(said) == 1
+    assert "compiled" in said[0]
+
+
+def test_a_server_that_ended_is_not_waited_for(tmp_path: Path) -> None:
+    (tmp_path / "server.log").write_text("the port is taken")
+    ended: Any = SimpleNamespace(poll=lambda: 1)
+    with pytest.raises(RuntimeError, match="the port is taken"):
+        server._address("http://127.0.0.1:1", ended, tmp_path / "server.log", print)
 
 
 def _refused(kind: str, name: str, reason: str) -> list[Table]:

@@ -2,14 +2,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from slipcore import SlipDetector, detect_slip, warm_up
+from slipcore import SlipDetector, collect_samples, detect_slip, warm_up
 from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.detection.filter.run import run_filter
 from slipcore.detection.filter.smoothing import look_back
 from slipcore.detection.filter.step import decide
 from slipcore.detection.shared.decision import apply_decision
+from slipcore.noise import noise_of_series
+from slipcore.patch import local_rates, motion
 
 KERNELS = (run_filter, look_back, decide, apply_decision)
+OF_SAMPLES = (motion._fill_fits, local_rates._fill_means, noise_of_series)
 
 
 def test_after_warming_up_no_first_frame_compiles() -> None:
@@ -27,3 +30,11 @@ def test_after_warming_up_no_first_frame_compiles() -> None:
     SlipDetector(log.position, log.element_area, "filter").step(0.0, log.displacement[0], contact=by_columns)
     detect_slip(replace(log, contact=np.repeat(by_columns.T[None], len(log), axis=0).transpose(0, 2, 1)))
     assert [len(kernel.signatures) for kernel in KERNELS] == compiled
+
+
+def test_after_warming_up_no_samples_compile() -> None:
+    warm_up()
+    compiled = [len(kernel.signatures) for kernel in OF_SAMPLES]
+    log = tangential_ramp(points=9, friction=0.3, normal_force=4.0, marker_noise=1e-6, force_noise=2e-3, seed=1)
+    assert len(collect_samples(log, detect_slip(log)))
+    assert [len(kernel.signatures) for kernel in OF_SAMPLES] == compiled == [1, 1, 1]
