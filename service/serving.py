@@ -1,8 +1,10 @@
 """How the application is served: by uvicorn, with bounds on what a connection may do."""
 
 import importlib.util
+import logging
 import math
 from functools import partial
+from socket import socket
 from typing import Any
 
 import uvicorn
@@ -13,8 +15,29 @@ from service.http.request_middleware import MOST_HEADER_BYTES
 from service.http.websockets import WebSocketConnection
 from service.settings import Settings
 
+logger = logging.getLogger(__name__)
+
+OWN_ADDRESS = {"0.0.0.0": "127.0.0.1", "::": "::1"}
+"""Of a server that listens on all addresses of the machine, the one for a browser on it."""
+
 MOST_MESSAGE_BYTES = 2**20
 """Of one message of the live stream: a frame of 4096 markers with forces is 200 kB."""
+
+
+class Server(uvicorn.Server):
+    """Says where the dashboard is, once it can be opened."""
+
+    async def startup(self, sockets: list[socket] | None = None) -> None:
+        """Begin to listen."""
+        await super().startup(sockets)
+        if self.started:
+            logger.info("the dashboard is at %s", dashboard(self.servers[0].sockets[0].getsockname()))
+
+
+def dashboard(address: tuple[Any, ...]) -> str:
+    """The address of the page on a server that listens on this one."""
+    host, port = OWN_ADDRESS.get(address[0], address[0]), address[1]
+    return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
 
 
 def configuration(settings: Settings, **options: Any) -> uvicorn.Config:

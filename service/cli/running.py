@@ -33,16 +33,14 @@ def serve(
     database_url: DatabaseUrl = None,
 ) -> None:
     """Run the web service until it is told to stop (every setting: docs/settings.md)."""
-    import uvicorn
-
     from service.processes.side_process import SWITCH_SECONDS
-    from service.serving import configuration
+    from service.serving import Server, configuration
 
     sys.setswitchinterval(SWITCH_SECONDS)  # who is answered by the event loop does not wait for threads
     settings = _settings(host=host, port=port, data_folder=data_folder, database_url=database_url)
     _prepare(settings)
     chosen = configuration(settings)
-    server = uvicorn.Server(chosen)
+    server = Server(chosen)
     with suppress(SystemExit):  # its own, of a start that failed
         server.run()
     if not server.started:

@@ -33,4 +33,12 @@ def show_plan(context: CurrentContext, request: Request) -> Response:
     curve = plan.force_curve(context, task, probabilities(task.slip_probability))
     given |= {"chart": draw_forces(curve, task.slip_probability)}
     on_problem(request, "plan.html", **given)
-    return render(request, "plan.html", **given | {"answer": plan.grasp_force(context, task)}, problem=None)
+    answer = plan.grasp_force(context, task)
+    given |= {"answer": answer, "further": further_warning(answer.warning, answer.advice)}
+    return render(request, "plan.html", **given, problem=None)
+
+
+def further_warning(warning: str | None, advice: str) -> str:
+    """What a warning says beyond the advice that stands above it, part of which or all of which it may be."""
+    rest = (warning or "").replace(advice, "")
+    return "; ".join(part for part in rest.split("; ") if part and part not in advice)

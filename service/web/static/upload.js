@@ -22,6 +22,7 @@ function finish(request, button) {
   const problem = page.querySelector(".problem");
   if (problem === null) tell(`The service answered ${request.status} ${request.statusText}.`);
   else result.replaceChildren(problem);
+  form.querySelector("details").open = true;  // a mapping or another format may be what it lacks
   result.scrollIntoView();
   button.disabled = false;
 }

@@ -16,6 +16,7 @@ from estimators.method_names import METHODS
 from service.domain import upload
 from service.http.problem_meanings import MEANINGS
 from service.http.problems import PROBLEM_TYPES
+from service.web.routes.planning import further_warning
 from tests.service.web.conftest import HOSTILE, HTML, OWN
 
 ON_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -67,6 +68,7 @@ def test_a_refused_upload_is_told_above_its_form(
     assert answer.status_code in {404, 413, 415, 422}
     assert told in answer.text
     assert '<form id="upload"' in answer.text
+    assert "<details open>" in answer.text  # where a format or a mapping can be given
     kept = {name: text for name, text in data.items() if name in {"scale"}}
     assert all(f'value="{text}"' in answer.text for text in kept.values())
 
@@ -147,6 +149,18 @@ def test_the_calculator_says_what_the_api_says(client: httpx.Client) -> None:
     assert shown is not None
     assert told["normal_force"] <= float(shown[1]) <= 1.01 * told["normal_force"]
     assert 'name="torque" inputmode="decimal" value="0.001"' in page.text
+
+
+@pytest.mark.parametrize(
+    ("warning", "further"),
+    [
+        (None, ""),
+        ("3 logs are doubtful: withdraw them", ""),
+        ("extrapolated; 3 logs are doubtful: withdraw them; ols says 0.2", "extrapolated; ols says 0.2"),
+    ],
+)
+def test_the_calculator_warns_of_nothing_twice(warning: str | None, further: str) -> None:
+    assert further_warning(warning, "3 logs are doubtful: withdraw them") == further
 
 
 @ON_SQLITE

@@ -242,6 +242,7 @@ def test_a_bad_file_that_is_dropped_is_refused_above_the_form(tab: Tab, client: 
     told = tab.until("document.querySelector('#result .problem')?.innerText")
     assert "The format is not supported" in told
     assert tab.run("[location.pathname, sensor.value].join()") == "/upload,kept"
+    assert tab.run("document.querySelector('#upload details').open")
 
 
 @ON_SQLITE

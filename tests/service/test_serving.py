@@ -1,0 +1,34 @@
+"""What the server does beside its application."""
+
+import asyncio
+import logging
+
+import pytest
+import uvicorn
+
+from service.serving import Server, dashboard
+
+
+async def nothing(_scope: object, _receive: object, _send: object) -> None:
+    """An application that is never asked."""
+
+
+def test_the_address_of_the_dashboard_is_told_once_it_listens(caplog: pytest.LogCaptureFixture) -> None:
+    server = Server(uvicorn.Config(nothing, port=0, interface="asgi3", ws="none", lifespan="off", log_config=None))
+    server.should_exit = True
+    with caplog.at_level(logging.INFO, "service.serving"):
+        asyncio.run(server.serve())
+    assert "the dashboard is at http://127.0.0.1:" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("address", "told"),
+    [
+        (("127.0.0.1", 8000), "http://127.0.0.1:8000/"),
+        (("0.0.0.0", 80), "http://127.0.0.1:80/"),
+        (("::", 8000, 0, 0), "http://[::1]:8000/"),
+        (("fe80::1", 8000, 0, 0), "http://[fe80::1]:8000/"),
+    ],
+)
+def test_the_address_is_one_that_a_browser_can_open(address: tuple[str, int], told: str) -> None:
+    assert dashboard(address) == told
