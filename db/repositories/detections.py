@@ -50,9 +50,9 @@ def samples_of_material(session: Session, material_id: int) -> list[SamplesOfLog
 
 
 def newest_sampled_logs(session: Session, material_id: int, most: int) -> list[SampledLog]:
-    """The same of its logs that were sampled last, newest first; of a log that went through several detectors once."""
+    """The same of its newest logs, newest first; of a log that went through several detectors, as it was sent last."""
     newest = _samples(material_id).add_columns(GraspLogRow.created_at, GraspLogRow.grid_rows, GraspLogRow.grid_columns)
-    newest = newest.order_by(SampleSummaryRow.created_at.desc(), GraspLogRow.id.desc()).limit(most)
+    newest = newest.order_by(GraspLogRow.created_at.desc(), GraspLogRow.id.desc()).limit(most)  # as an index has them
     found: dict[str, SampledLog] = {}
     for row in session.execute(newest):
         grid = (row.grid_rows, row.grid_columns)

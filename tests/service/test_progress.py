@@ -1,6 +1,9 @@
 """A command that takes long says so; one that does not stays quiet."""
 
 import re
+import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -89,4 +92,15 @@ def test_an_interrupted_command_leaves_nothing_behind(
         main([*arguments, "--output", str(tmp_path / "log.npz")])
     assert end.value.code == INTERRUPTED
     assert capsys.readouterr().err == "stiction: interrupted; nothing is left half written\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_command_that_is_sent_an_interrupt_says_so_and_leaves_nothing_behind(tmp_path: Path) -> None:
+    given = ["simulate", "lifting_10N", "--accuracy", "1e-4", "--output", str(tmp_path / "log.npz")]
+    with subprocess.Popen([sys.executable, "-m", "service.cli", *given], stderr=subprocess.PIPE) as process:
+        assert process.stderr is not None
+        assert process.stderr.read(1) == b"\r"  # it is at it
+        process.send_signal(signal.SIGINT)
+        assert process.stderr.read().endswith(b"\nstiction: interrupted; nothing is left half written\n")
+    assert process.returncode == INTERRUPTED
     assert list(tmp_path.iterdir()) == []

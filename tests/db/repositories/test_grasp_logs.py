@@ -2,14 +2,14 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
-from sqlalchemy import func, select
+from sqlalchemy import event, func, select
 
 from db.database import Database
 from db.errors import AlreadyExists, NotFound
 from db.paging import Window
 from db.records import Detection, LogFilter, NewGraspLog, SampleSummary
 from db.repositories import blobs, detections, grasp_logs, jobs, materials
-from db.tables import SensorRow
+from db.tables import SampleSummaryRow, SensorRow
 
 NEWEST_FIRST = Window("created_at", descending=True)
 
@@ -113,6 +113,30 @@ def test_samples_of_a_material_are_one_part_a_grasp(
             detections.add(session, log_id, detection, SampleSummary(count, none_because, 1e-6, None, None, None, blob))
     with database.read() as session:
         assert [found.samples_blob for found in detections.samples_of_material(session, paper)] == ["3" * 64, "2" * 64]
+
+
+@pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+def test_the_newest_logs_with_samples_are_found_without_sorting_all(
+    database: Database, new_log: Callable[..., NewGraspLog]
+) -> None:
+    with database.write() as session:
+        paper = materials.create(session, "paper", "").id
+        logs = [grasp_logs.add(session, new_log(paper)) for _ in range(3)]
+        for log_id in logs[1:]:
+            session.add(SampleSummaryRow(grasp_log_id=log_id, count=5, element_area=1e-6, samples_blob="1" * 64))
+    asked: list[tuple[str, tuple[object, ...]]] = []
+
+    def note(_connection: object, _cursor: object, statement: str, values: tuple[object, ...], *_rest: object) -> None:
+        asked.append((statement, values))
+
+    event.listen(database.engine, "before_cursor_execute", note)
+    with database.read() as session:
+        found = detections.newest_sampled_logs(session, paper, 5)
+        statement, values = asked[-1]
+        plan = session.connection().exec_driver_sql(f"EXPLAIN QUERY PLAN {statement}", values).all()
+    assert [log.samples.grasp_log_id for log in found] == logs[:0:-1]
+    assert "TEMP B-TREE" not in str(plan)
+    assert "ix_grasp_logs_material_id_created_at_id" in str(plan)
 
 
 def test_the_blobs_that_rows_refer_to_are_known(
