@@ -35,8 +35,8 @@ BETWEEN_GRASPS, BETWEEN_PLACES = 0.03, 0.02
 GRASPS = ((5.0, 1.0), (7.0, 3.0), (9.0, 0.5), (11.0, 2.0), (13.0, 1.5))
 """Normal force, N, and speed of the object, mm/s."""
 SAMPLING = SensorSampling((20, 20), PITCH, 30.0)
-SECONDS, STEPS = 2.0, 10
-"""Length of a grasp, and steps of the physics in a frame."""
+SECONDS, STEPS = 2.0, 300.0
+"""Length of a grasp, and steps of the physics in a second."""
 RELAXED = 0.3
 """Part of a step's slip that its speed takes up: friction that changes at once with speed would chatter."""
 METHODS = ("auto", "ols", "bayes")
@@ -59,22 +59,31 @@ class Law:
         return np.maximum(level + velocity * speed + force * normal_force + self.scatter, 0.05)
 
 
-def grasp_log(law: Law, normal_force: float, speed: float, rng: np.random.Generator) -> GraspLog:
-    """A log of an object that is pressed with ``normal_force`` N and drawn along x, then aside, at ``speed`` m/s."""
+def grasp_log(
+    law: Law,
+    normal_force: float,
+    speed: float,
+    rng: np.random.Generator | None = None,
+    sampling: SensorSampling = SAMPLING,
+) -> GraspLog:
+    """A log of an object that is pressed with ``normal_force`` N and drawn along x, then aside, at ``speed`` m/s.
+
+    Without ``rng`` there is no noise.
+    """
     world = World(
-        friction=np.ones((1, *SAMPLING.points)),
-        sampling=SAMPLING,
+        friction=np.ones((1, *sampling.points)),
+        sampling=sampling,
         marker_noise=MARKER_NOISE,
         force_noise=FORCE_NOISE,
     )
     state = init(world, normal_force)
     pressing = observe(world, state).force
     assert pressing is not None
-    normal, slipping = -pressing[..., 2], np.zeros(SAMPLING.points)
-    interval = 1.0 / (STEPS * SAMPLING.frame_rate)
+    normal, slipping = -pressing[..., 2], np.zeros(sampling.points)
+    interval, steps = 1.0 / STEPS, round(STEPS / sampling.frame_rate)
     frames, poses = [], []
     for count in range(round(SECONDS / interval)):
-        if count % STEPS == 0:
+        if count % steps == 0:
             frames.append(observe(world, state, generator=rng))
             poses.append(state.pose)
         after = _dragged(world, state, law(slipping, normal) * normal, _pose(speed, state.time + interval), interval)
