@@ -343,6 +343,10 @@ class Recognition(Options):
     """Degrees of freedom of σ² between materials, about the square of the reference scatter."""
     least_scatter: Annotated[float, Option(1e-12, 0.1, "-", "rounding of reported friction")] = 1e-6
     """Of a material, in parts of the mean friction: a model without scatter still meets rounded data."""
+    nodes: Annotated[
+        int, Option(1, 100, "-", "sixteenths from either end: tails of few degrees of freedom are cut there")
+    ] = 8
+    """Quantiles of the scatter between grasps over which the likelihood is averaged."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,5 +1,6 @@
 """Which material is this: by the exact predictive likelihood of a grasp's samples under each model."""
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -11,11 +12,15 @@ from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.linear.fit_data import FitData, GraspData, gather
 from estimators.linear.least_squares import upper_triangle, whole_triangle
+from estimators.linear.place_errors import error_of_places
 from estimators.linear.unknown_velocity import offset_variance
 
 FloatArray = NDArray[np.float64]
 
 UNKNOWN = "unknown"
+
+_NODES = (np.arange(RECOGNITION.nodes) + 0.5) / RECOGNITION.nodes
+"""Probabilities of the quantiles that stand for a scale that is not known exactly."""
 
 
 def recognise(
@@ -26,11 +31,12 @@ def recognise(
 ) -> dict[str, float]:
     """Probability of each material, and of "unknown", for the samples of one grasp (or several of one thing).
 
-    The likelihood is exact for Gaussian errors: β of a material is normal with its model's covariance (and, where the
-    model knows of grasps, the scatter between them; where the samples' velocities are unknown, what those change), σ²
-    inverse-gamma with its degrees of freedom, both integrated out. "unknown" is the same for a surface of which only a
-    population of materials is known. ``prior``: weights of the materials, alike where None; ``unknown``: prior
-    probability that it is none of them.
+    The likelihood is that of Gaussian errors: β of a material is normal with its model's covariance (and, where the
+    model tells its ``scales``, scatter of the whole law between grasps, which is Student-t as far as few grasps tell
+    it, and what the grasp's places, of which it has only so many, shift; where the samples' velocities are unknown,
+    what those change), σ² inverse-gamma with its degrees of freedom, all integrated out. "unknown" is the same for a
+    surface of which only a population of materials is known. ``prior``: weights of the materials, alike where None;
+    ``unknown``: prior probability that it is none of them.
 
     Raises ``InvalidSamples`` for no materials, one called "unknown", and a prior that does not fit them.
     """
@@ -39,7 +45,8 @@ def recognise(
     if not 0.0 <= unknown < 1.0:
         raise InvalidSamples("unknown", unknown, "at least 0 and below 1")
     data, belief = gather(samples), _belief(materials, prior)
-    log = {name: belief[name] + np.log1p(-unknown) + _of_material(data, materials[name]) for name in materials}
+    places = error_of_places(data)
+    log = {name: belief[name] + np.log1p(-unknown) + _of_material(data, places, materials[name]) for name in materials}
     log[UNKNOWN] = (np.log(unknown) if unknown > 0.0 else -np.inf) + _of_unknown(data)
     probability = special.softmax(np.array(list(log.values())))
     return dict(zip(log, map(float, probability), strict=True))
@@ -76,21 +83,42 @@ def _belief(materials: Mapping[str, FrictionModel], prior: Mapping[str, float] |
     return {name: float(np.log(value / total)) for name, value in weight.items()}
 
 
-def _of_material(data: FitData, model: FrictionModel) -> float:
-    triangle = whole_triangle(data.factor).astype(float)
-    triangle[:, 2] *= model.element_area / data.element_area  # the same pressure on an element of the model's area
-    covariance, scale = model.covariance.copy(), model.scale
-    if model.scales is not None:
-        scale = float(np.hypot(model.scales.between_places.value, model.scales.within.value))
-        covariance += model.scales.between_grasps.value**2 * np.outer(model.coefficients, model.coefficients)
-    if data.unknown_velocity > 0.0:
-        slope, variance = float(model.coefficients[1]), float(model.covariance[1, 1])
-        covariance[0, 0] += offset_variance(data.mean_friction, slope, variance)
+def _of_material(data: FitData, places: FloatArray, model: FrictionModel) -> float:
+    triangle, size = whole_triangle(data.factor).astype(float), np.ones(3)
+    size[2] = model.element_area / data.element_area  # the same pressure on an element of the model's area
+    triangle[:, :3] *= size
     freedom = model.n - 3.0 if model.scatter_degrees_of_freedom is None else model.scatter_degrees_of_freedom
     floor = RECOGNITION.least_scatter * max(
         abs(float(data.mean_friction)), RECOGNITION.least_scatter
     )  # a model without scatter still meets rounded data
-    return log_predictive(triangle, data.effective_n, model.coefficients, covariance, max(scale, floor), freedom)
+    scale = max(_scale(model), floor)
+    shared = _shared(data, places / np.outer(size, size), model)
+    found = [log_predictive(triangle, data.effective_n, model.coefficients, each, scale, freedom) for each in shared]
+    return float(special.logsumexp(found) - np.log(len(found)))
+
+
+def _scale(model: FrictionModel) -> float:
+    """Scatter of a sample in a grasp of the material."""
+    if model.scales is None:
+        return model.scale
+    return float(np.hypot(model.scales.between_places.value, model.scales.within.value))
+
+
+def _shared(data: FitData, places: FloatArray, model: FrictionModel) -> list[FloatArray]:
+    """Covariances of a grasp's β, as likely as each other."""
+    covariance = model.covariance.copy()
+    if data.unknown_velocity > 0.0:
+        slope, variance = float(model.coefficients[1]), float(model.covariance[1, 1])
+        covariance[0, 0] += offset_variance(data.mean_friction, slope, variance)
+    if model.scales is None:
+        return [covariance]
+    covariance += model.scales.between_places.value**2 * places
+    between = model.scales.between_grasps
+    law = between.value**2 * np.outer(model.coefficients, model.coefficients)
+    if not math.isfinite(between.degrees_of_freedom):
+        return [covariance + law]
+    ratio = between.degrees_of_freedom / special.chdtri(between.degrees_of_freedom, _NODES)
+    return [covariance + each * law for each in ratio]
 
 
 def _of_unknown(data: FitData) -> float:

@@ -1,13 +1,17 @@
 """Recognition: exact likelihoods, calibrated probabilities, and strangers known as such."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy import stats
 
 import estimators
+from benchmarks import scatter
 from estimators import recognise
+from estimators.linear.fit_data import gather
+from estimators.linear.place_errors import error_of_places
 from estimators.recognition import log_predictive
 from slipcore.samples import FrictionSamples
 
@@ -103,3 +107,58 @@ def test_what_makes_no_sense_is_refused(samples: Make, options: dict[str, object
         recognise(samples(20), **({"materials": known} | options))
     with pytest.raises(estimators.InvalidSamples, match="materials"):
         recognise(samples(20), {"unknown": known["m"]})
+
+
+def scattering(levels: tuple[float, ...], grasps: int, seed: int) -> dict[str, list[FrictionSamples]]:
+    """Grasps of materials whose friction scatters by 7 % between grasps, and from place to place."""
+    rng, kind = np.random.default_rng(seed), scatter.KINDS["grasp and place"]
+    return {f"{level:g}": [_times(scatter.grasp(kind, rng), level) for _ in range(grasps)] for level in levels}
+
+
+def _times(samples: FrictionSamples, level: float) -> FrictionSamples:
+    return replace(
+        samples,
+        friction_coefficient=level * samples.friction_coefficient,
+        tangential_force=level * samples.tangential_force,
+    )
+
+
+@pytest.mark.parametrize(("other", "least", "most"), [(1.03, 0.3, 0.8), (1.6, 0.98, 1.0)])
+def test_materials_are_told_apart_where_they_differ_by_more_than_grasps_of_one(
+    other: float, least: float, most: float
+) -> None:
+    learnt, new = (scattering((1.0, other), grasps, seed) for grasps, seed in ((6, 1), (8, 2)))
+    known = {name: estimators.fit(grasps, method="auto") for name, grasps in learnt.items()}
+    told = [recognise(grasp, known, unknown=0.0)[name] for name, grasps in new.items() for grasp in grasps]
+    assert least <= np.mean(told) <= most
+    assert min(told) > 1e-3  # nobody is sure of what is wrong
+
+
+def test_few_grasps_leave_it_open_how_far_the_next_one_may_differ() -> None:
+    learnt = scattering((1.0,), 2, 3)["1"]
+    model = estimators.fit(learnt, method="auto")
+    assert model.scales is not None
+    sure = replace(model.scales, between_grasps=replace(model.scales.between_grasps, degrees_of_freedom=np.inf))
+    far = _times(learnt[0], 1.0 + 8.0 * model.scales.between_grasps.value)
+    by_two, by_many = (recognise(far, {"m": each})["m"] for each in (model, replace(model, scales=sure)))
+    assert by_two > by_many
+
+
+def test_what_places_shift_is_what_least_squares_scatters_by() -> None:
+    rng = np.random.default_rng(0)
+    grasp = scatter.grasp(scatter.Kind(within=0.0), rng)
+    x = np.column_stack([np.ones(len(grasp)), grasp.tangential_velocity, grasp.normal_force])
+    shifts = rng.standard_normal((grasp.element.max() + 1, 4000))[grasp.element]
+    found = np.linalg.lstsq(x, shifts, rcond=None)[0]
+    expected = error_of_places(gather(grasp))
+    size = np.sqrt(np.diag(expected))
+    np.testing.assert_allclose(np.cov(found) / np.outer(size, size), expected / np.outer(size, size), atol=0.08)
+    moments = error_of_places(gather(estimators.Moments.from_samples(grasp)))
+    np.testing.assert_allclose(moments, expected, rtol=1e-6)
+
+
+def test_places_shift_nothing_along_what_samples_do_not_tell() -> None:
+    grasp = scatter.grasp(scatter.Kind(), np.random.default_rng(0))
+    still = error_of_places(gather(replace(grasp, tangential_velocity=np.zeros(len(grasp)))))
+    assert not still[1].any()
+    assert 0.0 < still[0, 0] < 1.0
