@@ -2,9 +2,12 @@
 
 They carry no truth. Reported are the gaps met, the marker noise estimated, events, and two shares of slip that is most
 likely false: in frames of mere pressing (by Mindlin and Deresiewicz all sticks), and where the force ratio is below
-half of the median at which elements slip. Writes recordings.json and a picture each; says so where they are not there.
+half of the median at which elements slip; and how the sensors' own forces agree with those that follow from
+displacement by gels of some thicknesses, for theirs is not known. Writes recordings.json and pictures; says so where
+they are not there.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -16,7 +19,8 @@ from benchmarks.pages import options, picture_folder, save, table, write
 from service.formats import tac3d
 from service.report.pictures import slip_over_time
 from slipcore import GraspLog, SlipHistory, detect_slip, element_forces
-from slipcore.frames import BoolArray
+from slipcore.forces import Agreement, ForceComparison, Gel, compare_forces, reconstruct
+from slipcore.frames import BoolArray, FloatArray
 from slipcore.surface.log_normals import normals_of
 
 RECORDINGS = Path(".cache/tac3d/PyTac3D/example_data")
@@ -27,6 +31,11 @@ PRESSES = 0.01
 STEADY = 0.2
 GAP = 0.1
 """s; longer intervals are shaded in the pictures."""
+
+YOUNG_MODULUS, POISSON_RATIO = 2e5, 0.48
+"""Pa, as silicones are; the first only scales forces."""
+THICKNESSES = (2e-3, 4e-3, 8e-3, math.inf)
+"""m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +67,16 @@ class Found:
     pressing: int
     false_in_pressing: float
     false_by_ratio: float
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """How forces agree by a gel of some thickness, m; ``totals`` [2, t] N: own normal force and that by the gel."""
+
+    recording: str
+    thickness: float
+    agreement: ForceComparison
+    totals: FloatArray
 
 
 def recordings(folder: Path) -> Iterator[tuple[str, GraspLog]]:
@@ -115,6 +134,34 @@ def find(name: str, log: GraspLog, history: SlipHistory) -> Found:
     )
 
 
+def compare(name: str, log: GraspLog, thickness: float) -> Compared:
+    """A sensor's own forces beside those by a gel of some thickness."""
+    found = reconstruct(log, Gel(YOUNG_MODULUS, POISSON_RATIO, thickness))
+    own_total = 0.0 if log.force is None else log.force[..., 2].sum(axis=(1, 2))
+    totals = np.stack((-own_total, -found.force[..., 2].sum(axis=(1, 2))))
+    return Compared(name, thickness, compare_forces(log, found), totals)
+
+
+def draw_totals(compared: list[Compared]) -> Figure:
+    """Normal force over frames: the sensor's own, and by the gel that agrees best, to the same scale."""
+    figure = Figure(figsize=(9.0, 3.2), layout="constrained")
+    names = list(dict.fromkeys(each.recording for each in compared))
+    for axes, name in zip(figure.subplots(1, len(names), squeeze=False)[0], names, strict=True):
+        best = max((c for c in compared if c.recording == name), key=lambda c: c.agreement.normal.correlation)
+        own, found = best.totals
+        axes.plot(own, color="0.2", label="the sensor's own")
+        axes.plot(best.agreement.total_normal.ratio * found, ls="--", label=f"by {gel_name(best.thickness)}, scaled")
+        axes.set(title=name.rpartition("/")[2], xlabel="frame", ylabel="normal force, N")
+        axes.set_ylim(bottom=0.0)
+        axes.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def gel_name(thickness: float) -> str:
+    """A gel as tables tell it."""
+    return "half-space" if math.isinf(thickness) else f"{1e3 * thickness:g} mm"
+
+
 def draw(name: str, log: GraspLog, histories: dict[str, SlipHistory]) -> Figure:
     """Maps and stick ratio of the filter, that of the strain rate beside it, and gaps shaded."""
     figure = slip_over_time(log, histories["filter"], f"{name}: filter (dashed: strain_rate; grey: gaps)")
@@ -130,8 +177,8 @@ def share(value: float) -> str:
     return "–" if np.isnan(value) else f"{value:.1%}"
 
 
-def tables(met: list[Met], found: list[Found]) -> dict[str, str]:
-    """What was met and what was found, in Markdown."""
+def tables(met: list[Met], found: list[Found], compared: list[Compared]) -> dict[str, str]:
+    """What was met, what was found and how forces agree, in Markdown."""
     columns = ("recording", "frames", "seconds", "dropped", "largest gap, s", "gated frames", "largest normal force, N")
     rows = [list(asdict(entry).values()) for entry in met]
     heads = ("recording", "method", "noise, µm", "stick ratio, mean", "smallest", "onsets", "ends",
@@ -142,7 +189,17 @@ def tables(met: list[Met], found: list[Found]) -> dict[str, str]:
          share(f.false_by_ratio))
         for f in found
     ]  # fmt: skip
-    return {"met": table(columns, rows), "found": table(heads, cells)}
+    parts = ("normal", "tangential", "total_normal", "total_tangential")
+    agreements = [
+        (c.recording, gel_name(c.thickness), *(cell(getattr(c.agreement, part)) for part in parts)) for c in compared
+    ]
+    wholes = ("recording", "gel", "normal, elements", "tangential, elements", "normal, contact", "tangential, contact")
+    return {"met": table(columns, rows), "found": table(heads, cells), "forces": table(wholes, agreements)}
+
+
+def cell(agreement: Agreement) -> str:
+    """Correlation, and the sensor's own force over that by the gel."""
+    return f"{agreement.correlation:.2f} (× {agreement.ratio:.2f})"
 
 
 def main() -> None:
@@ -159,9 +216,12 @@ def main() -> None:
         histories = {method: detect_slip(log, method) for method in METHODS}
         found += [find(name, log, history) for history in histories.values()]
         save(draw(name, log, histories), pictures / f"recording-{name.rpartition('/')[2]}.png")
-    made = tables(met, found)
+    compared = [compare(name, log, thickness) for name, log in logs.items() for thickness in THICKNESSES]
+    save(draw_totals(compared), pictures / "recording-forces.png")
+    made = tables(met, found, compared)
     print("\n\n".join(made.values()))
     numbers = {"met": [asdict(entry) for entry in met], "found": [asdict(entry) for entry in found]}
+    numbers["forces"] = [{"recording": c.recording, "thickness": c.thickness, **asdict(c.agreement)} for c in compared]
     write(numbers, made, arguments, "recordings.json")
 
 

@@ -2,12 +2,12 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from estimators.method_names import METHODS
+from service.cli.looking import GelFile, SensorModelFile, comparison, look
 from service.cli.output import print_json, print_lines, print_table
 from service.cli.progress import counted, patience
 from service.formatting import interval, number
@@ -16,6 +16,7 @@ from service.whole_files import write_whole
 if TYPE_CHECKING:
     from estimators import FrictionModel
     from slipcore import Finding, FrictionSamples, GraspLog, SlipHistory
+    from slipcore.forces import ForceComparison
 
 Log = Annotated[
     Path,
@@ -39,10 +40,6 @@ Mapping = Annotated[
     Path | None,
     typer.Option("--mapping", help="A JSON file that says which topic, field or column of the log is what."),
 ]
-SensorModelFile = Annotated[
-    Path | None,
-    typer.Option("--sensor-model", help="Correct the log by this JSON, which `stiction sensors calibrate` writes."),
-]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
 
 
@@ -53,28 +50,25 @@ def detect(
     frame_rate: FrameRate = None,
     mapping: Mapping = None,
     sensor_model: SensorModelFile = None,
+    gel: GelFile = None,
     json: Json = False,
     picture: Picture = None,
 ) -> None:
     """Detect local slip in one grasp log and say what was seen."""
     from service import formats
-    from slipcore import LOOKAHEAD, detect_slip
-    from slipcore.defaults import DEFAULT_METHOD
 
     grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
-    grasp, options = corrected(grasp, sensor_model, method)
-    start = perf_counter()
-    history = detect_slip(grasp, method=method or DEFAULT_METHOD, lookahead=LOOKAHEAD, sensor_model=None, **options)
-    seconds = perf_counter() - start
+    with patience(f"looking at {log.name}"):
+        seen = look(grasp, method, sensor_model, gel)
     if picture is not None:
         from service.report.pictures import save, slip_over_time
 
-        save(slip_over_time(grasp, history, log.name), picture)
-    summary = _detection_summary(grasp, history, seconds)
+        save(slip_over_time(seen.log, seen.history, log.name), picture)
+    summary = _detection_summary(seen.log, seen.history, seen.seconds)
     if json:
-        print_json(summary | {"time": history.time, "stick_ratio": history.stick_ratio})
+        print_json(summary | {"time": seen.history.time, "stick_ratio": seen.history.stick_ratio})
     else:
-        print_lines(f"{log.name}: local slip by {history.method}", _detection_lines(summary))
+        print_lines(f"{log.name}: local slip by {seen.history.method}", _detection_lines(summary))
 
 
 def check(
@@ -84,19 +78,20 @@ def check(
     frame_rate: FrameRate = None,
     mapping: Mapping = None,
     sensor_model: SensorModelFile = None,
+    gel: GelFile = None,
     json: Json = False,
 ) -> None:
     """Look for what makes the friction of a grasp log doubtful, and say what to do (docs/checks.md)."""
     from service import formats
-    from slipcore import check_log
 
     grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
-    grasp, history = detected(grasp, sensor_model, method)
-    findings, contact = check_log(grasp, history), _contact_record(grasp, history)
+    with patience(f"looking at {log.name}"):
+        seen = look(grasp, method, sensor_model, gel)
+    findings, contact = seen.findings(), _contact_record(seen.log, seen.history)
+    compared = None if seen.reconstruction else comparison(seen.log, gel)
     if json:
-        print_json(
-            {"log": log.name, "findings": [asdict(finding) for finding in findings], "contact_friction": contact}
-        )
+        told = {"log": log.name, "findings": [asdict(finding) for finding in findings], "contact_friction": contact}
+        print_json(told if compared is None else told | {"forces_by_gel": asdict(compared)})
         return
     for finding in findings:
         typer.echo(f"{finding.name}: {finding.evidence}\n  {finding.remedy}")
@@ -104,6 +99,8 @@ def check(
         typer.echo(f"{log.name}: nothing found against it")
     if contact is not None:
         typer.echo(f"friction of the contact: {_contact_line(contact)}")
+    if compared is not None:
+        print_comparison(compared)
 
 
 def fit(
@@ -113,19 +110,19 @@ def fit(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the sampler.")] = 0,
     mapping: Mapping = None,
     sensor_model: SensorModelFile = None,
+    gel: GelFile = None,
     json: Json = False,
 ) -> None:
     """Fit the stochastic linear friction model to the slip seen in one or more grasp logs."""
     from estimators import fit as fit_model
     from service import formats
     from service.domain.doubtful_logs import with_doubts
-    from slipcore import check_log, collect_samples
 
-    def look(path: Path) -> "tuple[FrictionSamples, list[Finding]]":
-        grasp, history = detected(formats.read(path, mapping=mapping_text(mapping)), sensor_model, detector)
-        return collect_samples(grasp, history), check_log(grasp, history)
+    def found(path: Path) -> "tuple[FrictionSamples, list[Finding]]":
+        seen = look(formats.read(path, mapping=mapping_text(mapping)), detector, sensor_model, gel)
+        return seen.samples(), seen.findings()
 
-    seen = list(counted(map(look, logs), len(logs), "logs looked at"))
+    seen = list(counted(map(found, logs), len(logs), "logs looked at"))
     for path, (_, findings) in zip(logs, seen, strict=True):
         for finding in findings:
             typer.echo(f"{path.name}: {finding.name}: {finding.evidence}", err=True)
@@ -169,16 +166,19 @@ def export(
     method: Annotated[str | None, typer.Option(help=DETECTOR_HELP)] = None,
     mapping: Mapping = None,
     sensor_model: SensorModelFile = None,
+    gel: GelFile = None,
 ) -> None:
     """Write grasp logs with the slip detected in them for Foxglove, Rerun or LeRobot (docs/exports.md)."""
     from service import exports, formats
 
     target = exports.target_of(output)
     exports.check_output(output, target)
-    recordings = []
-    for path in logs:
-        grasp, history = detected(formats.read(path, mapping=mapping_text(mapping)), sensor_model, method)
-        recordings.append(exports.Recording(grasp, history, path.name))
+
+    def recorded(path: Path) -> exports.Recording:
+        seen = look(formats.read(path, mapping=mapping_text(mapping)), method, sensor_model, gel)
+        return exports.Recording(seen.log, seen.history, path.name)
+
+    recordings = list(counted(map(recorded, logs), len(logs), "logs looked at"))
     exports.write(recordings, output, target)
     frames = sum(len(recording.log) for recording in recordings)
     typer.echo(f"{output}: {frames} frames of {len(logs)} grasp(s), for {target}")
@@ -200,33 +200,18 @@ def mapping_text(path: Path | None) -> str | None:
     return None if path is None else path.read_text(encoding="utf-8")
 
 
-def corrected(grasp: "GraspLog", sensor_model: Path | None, method: str | None) -> "tuple[GraspLog, dict[str, float]]":
-    """The log as a calibration of its sensor corrects it, and options of detection; what that changed goes to standard
-    error.
-    """
-    if sensor_model is None:
-        return grasp, {}
-    from json import loads
-
-    from slipcore import InvalidInput, SensorModel
-    from slipcore.defaults import DEFAULT_METHOD
-
-    try:
-        told = loads(sensor_model.read_bytes())
-    except ValueError as error:
-        raise InvalidInput("sensor model", f"{sensor_model.name}, no JSON ({error})", "a JSON file") from error
-    log, changed, options = SensorModel.from_json(told).apply(grasp, method or DEFAULT_METHOD)
-    typer.echo(f"{sensor_model.name}: {'; '.join(changed) or 'nothing to correct'}", err=True)
-    return log, dict(options)
-
-
-def detected(grasp: "GraspLog", sensor_model: Path | None, method: str | None) -> "tuple[GraspLog, SlipHistory]":
-    """The log as a calibration of its sensor corrects it, and the slip in it."""
-    from slipcore import LOOKAHEAD, detect_slip
-    from slipcore.defaults import DEFAULT_METHOD
-
-    log, options = corrected(grasp, sensor_model, method)
-    return log, detect_slip(log, method=method or DEFAULT_METHOD, lookahead=LOOKAHEAD, sensor_model=None, **options)
+def print_comparison(found: "ForceComparison") -> None:
+    """Print how a sensor's own forces agree with those that its gel would tell."""
+    rows = [
+        (name, number(agreement.ratio), number(agreement.correlation))
+        for name, agreement in (
+            ("normal, of elements", found.normal),
+            ("normal, of the contact", found.total_normal),
+            ("tangential, of elements", found.tangential),
+            ("tangential, of the contact", found.total_tangential),
+        )
+    ]
+    print_table("The sensor's own forces against those by its gel", ("", "own / by gel", "correlation"), rows)
 
 
 def model_record(model: "FrictionModel") -> dict[str, Any]:

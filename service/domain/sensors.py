@@ -9,9 +9,6 @@ from service.domain.context import Context
 from service.domain.errors import InsufficientScope
 from service.domain.principal import Principal
 
-RECONSTRUCTED = "reconstructed forces"
-"""The finding of a log whose forces follow from its sensor's gel."""
-
 
 def find(context: Context, name: str) -> Sensor:
     """One sensor; raises ``NotFound``."""

@@ -22,7 +22,7 @@ from service.domain.ownership import check_may_add
 from service.domain.principal import ANONYMOUS, Principal
 from service.domain.queueing import INGEST_METHODS, queue
 from service.domain.receive import UNPACKING_BYTES, check_encoding, check_expansion, check_size, unless_gone, unpack
-from service.domain.sensors import RECONSTRUCTED
+from service.domain.reconstruct import RECONSTRUCTED
 from service.formats.archive import unpacked_bytes
 from service.formats.reading import Description, FormatSettings
 from service.settings import Settings

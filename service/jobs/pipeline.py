@@ -6,10 +6,9 @@ worker that was taken for dead, or whose job was cancelled, stores nothing.
 """
 
 import logging
-import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -28,7 +27,7 @@ from service.domain.calibrate import corrected
 from service.domain.collect_friction import collect
 from service.domain.doubtful_logs import with_doubts
 from service.domain.queueing import INGEST_METHODS, queue_cheap_refits
-from service.domain.sensors import RECONSTRUCTED
+from service.domain.reconstruct import needs_forces, said, with_forces
 from service.domain.stored_results import (
     decode_samples,
     encode_history,
@@ -39,7 +38,7 @@ from service.domain.stored_results import (
 )
 from service.domain.surface_change import MARK, with_change
 from service.observability import logs, traces
-from slipcore import Finding, FrictionSamples, GraspLog, SlipcoreError
+from slipcore import FrictionSamples, GraspLog, SlipcoreError
 
 if TYPE_CHECKING:
     from slipcore.forces import Reconstruction
@@ -157,7 +156,7 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
     with run.stage("samples"):
         found, none_because = collect(log, history, reconstruction)
         samples, findings = found.samples, slipcore.check_log(log, history, found.elements)
-        findings = [*_said(reconstruction), *findings]
+        findings = [*said(reconstruction), *findings]
         blob = run.blobs.put(encode_history(history))
         detection = summarise_history(
             history, run.seconds["slip_state"], blob, findings, found.contact, is_scaled=log.is_scaled
@@ -207,30 +206,14 @@ def fit_material(run: Run) -> None:
 
 def _with_forces(run: Run, log: GraspLog, sensor: str) -> "tuple[GraspLog, Reconstruction | None]":
     """The log, with reconstructed forces where it has none and its sensor's gel is described."""
-    if log.force is not None or not log.is_scaled:
+    if not needs_forces(log):
         return log, None
     with run.database.read() as session:
         gel = sensors.get(session, sensor).gel
     if gel is None:
         return log, None
-    from slipcore.forces import Gel, reconstruct  # few logs need it
-
     with run.stage("forces"):
-        thickness = math.inf if gel.thickness is None else gel.thickness
-        found = reconstruct(log, Gel(gel.young_modulus, gel.poisson_ratio, thickness, gel.marker_depth))
-        return found.apply(log), found
-
-
-def _said(reconstruction: "Reconstruction | None") -> list[Finding]:
-    """That forces are reconstructed, and how well they are known."""
-    if reconstruction is None:
-        return []
-    told = ", ".join(f"{axis} {share:.0%}" for axis, share in zip("xyz", reconstruction.information, strict=True))
-    evidence = (
-        f"forces follow from displacement by the sensor's gel, in effect averaged over "
-        f"{1e3 * reconstruction.kernel_width:.2g} mm; share of the resultant that data tell: {told}"
-    )
-    return [Finding(RECONSTRUCTED, evidence, "friction is as sure as the description of the sensor's gel")]
+        return with_forces(log, asdict(gel))
 
 
 def _fit(run: Run, parts: Sequence[SamplesOfLog]) -> list[FrictionModel]:

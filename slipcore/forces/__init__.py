@@ -1,6 +1,7 @@
 """Forces on micro-elements from the displacement of markers, for sensors that measure no forces."""
 
+from slipcore.forces.comparison import Agreement, ForceComparison, compare_forces
 from slipcore.forces.gel import Gel
 from slipcore.forces.reconstruction import Reconstruction, reconstruct
 
-__all__ = ["Gel", "Reconstruction", "reconstruct"]
+__all__ = ["Agreement", "ForceComparison", "Gel", "Reconstruction", "compare_forces", "reconstruct"]

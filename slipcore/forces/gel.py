@@ -1,7 +1,9 @@
 """The mechanics of a sensor's gel, as far as forces follow from displacement by them."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
 
 from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import GEL
@@ -27,6 +29,19 @@ class Gel:
         _check("thickness", self.thickness, thick, f"{GEL.thickness:g} m or more, inf for a half-space")
         inside = 0.0 <= self.marker_depth < min(self.thickness, GEL.marker_depth)
         _check("marker_depth", self.marker_depth, inside, f"0 m to less than the thickness, {self.thickness:g} m")
+
+    @classmethod
+    def from_json(cls, told: Mapping[str, Any]) -> "Gel":
+        """As the service tells the gel of a sensor: a ``thickness`` of None is a half-space's. Raises ``InvalidInput``
+        for what is no number, another name or a missing modulus or ratio.
+        """
+        names = [each.name for each in fields(cls)]
+        try:
+            return cls(**{name: math.inf if value is None else float(value) for name, value in told.items()})
+        except (AttributeError, TypeError, ValueError) as error:
+            if isinstance(error, InvalidInput):
+                raise
+            raise InvalidInput("gel", str(error)[:120], f"numbers named {', '.join(names)}") from error
 
 
 def _check(name: str, value: float, allowed: bool, what: str) -> None:

@@ -25,7 +25,7 @@ from service.cli.exit_codes import INPUT_REFUSED, NOT_FEASIBLE, SERVICE_REFUSED
 from service.cli.output import plain
 from service.demo.server import running_server
 from service.settings import Settings
-from slipcore import detect_slip
+from slipcore import GraspLog, detect_slip
 from slipcore.contact import tangential_ramp
 from slipcore.contact.tiers.ramp import RampSchedule
 from stiction_client import FrictionClient, container
@@ -660,6 +660,57 @@ def test_what_no_sensor_can_be_calibrated_by_is_refused(run: Run, presses: list[
     assert "log 1: the load sideways" in err
     assert run("sensors", "calibrate", presses[0], *["--known-force", 1.0] * 2)[0] == WRONG_USAGE
     assert run("detect", presses[0], "--sensor-model", presses[0])[0] == INPUT_REFUSED
+
+
+@pytest.fixture(scope="module")
+def gel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """That of the simulator."""
+    path = tmp_path_factory.mktemp("gel") / "gel.json"
+    path.write_text(json.dumps({"young_modulus": 1e6, "poisson_ratio": 0.5, "thickness": None}), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def felt(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A log of few elements that has forces."""
+    path = tmp_path_factory.mktemp("felt") / "felt.npz"
+    container.write(tangential_ramp(points=10, pitch=1.5e-3, normal_force=6.0, marker_noise=1e-6, seed=1), path)
+    return path
+
+
+def without_forces(log: GraspLog, path: Path) -> Path:
+    container.write(replace(log, force=None), path)
+    return path
+
+
+def test_a_log_without_forces_is_fitted_by_its_gel(run: Run, gel: Path, tmp_path: Path) -> None:
+    own = tangential_ramp(points=16, pitch=0.96e-3, friction=0.5, normal_force=20.0, marker_noise=1e-6, seed=1)
+    log = without_forces(own, tmp_path / "unfelt.npz")
+    assert run("fit", log)[0] == INPUT_REFUSED
+    code, out, err = run("fit", log, "--gel", gel, "--method", "ols", "--json")
+    assert code == 0
+    assert json.loads(out)["coefficients"][0] == pytest.approx(0.5, abs=0.05)
+    assert f"{log.name}: reconstructed forces: " in err
+
+
+def test_a_log_without_forces_is_looked_at_by_its_gel(run: Run, felt: Path, gel: Path, tmp_path: Path) -> None:
+    log = without_forces(formats.read(felt), tmp_path / "unfelt.npz")
+    assert "share of the resultant that data tell: x 100%, y 100%, z 100%" in run("check", log, "--gel", gel)[1]
+    with_forces, without = (json.loads(run("detect", log, "--json", *more)[1]) for more in (("--gel", gel), ()))
+    assert with_forces["frames_in_contact"] == without["frames_in_contact"] > 0
+    assert with_forces["contact_friction"] is not None
+    assert without["contact_friction"] is None
+
+
+def test_check_tells_how_a_sensors_own_forces_agree_with_those_by_its_gel(run: Run, felt: Path, gel: Path) -> None:
+    found = json.loads(run("check", felt, "--gel", gel, "--json")[1])["forces_by_gel"]
+    assert found["total_normal"] == {"ratio": pytest.approx(1.0, abs=0.1), "correlation": pytest.approx(1.0, abs=0.01)}
+    assert set(found) == {"normal", "tangential", "total_normal", "total_tangential"}
+    assert re.search(r"normal, of the contact +0\.9\d+ +1\.00", run("check", felt, "--gel", gel)[1])
+    assert "forces_by_gel" not in json.loads(run("check", felt, "--json")[1])
+    code, _, err = run("check", felt, "--gel", felt)
+    assert code == INPUT_REFUSED
+    assert "gel is felt.npz, no JSON" in err
 
 
 def test_a_sensor_is_described_and_listed_from_the_command_line(run: Run, url: str) -> None:

@@ -15,7 +15,7 @@ from db.records import NewCalibration
 from db.repositories import calibrations, detections, jobs, materials, runners, sensors
 from db.tables import DetectionRow
 from service.domain.calibrate import OFFSET, corrected
-from service.domain.sensors import RECONSTRUCTED
+from service.domain.reconstruct import RECONSTRUCTED
 from service.jobs import pipeline
 from slipcore import GraspLog, calibrate_sensor
 from stiction_client import FrictionClient, calls

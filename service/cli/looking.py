@@ -1,0 +1,106 @@
+"""Look at a log on this machine: corrected by its sensor's calibration, with forces by its gel, and the slip in it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from service.cli.progress import patience
+
+if TYPE_CHECKING:
+    from slipcore import Finding, FrictionSamples, GraspLog, SlipHistory
+    from slipcore.forces import ForceComparison, Reconstruction
+
+SensorModelFile = Annotated[
+    Path | None,
+    typer.Option("--sensor-model", help="Correct the log by this JSON, which `stiction sensors calibrate` writes."),
+]
+GelFile = Annotated[
+    Path | None,
+    typer.Option("--gel", help="Of a sensor without forces: a JSON file of its gel, by which they are reconstructed."),
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """A log as it was looked at, the slip in it, the ``seconds`` of detection, and what is known of forces that are
+    not the sensor's own.
+    """
+
+    log: "GraspLog"
+    history: "SlipHistory"
+    seconds: float
+    reconstruction: "Reconstruction | None"
+
+    def samples(self) -> "FrictionSamples":
+        """Friction samples, with the noise of reconstructed forces."""
+        from slipcore import collect_samples
+
+        noise = {} if self.reconstruction is None else {"force_noise": self.reconstruction.force_noise}
+        return collect_samples(self.log, self.history, **noise)
+
+    def findings(self) -> "list[Finding]":
+        """What makes friction from it doubtful."""
+        from service.domain.reconstruct import said
+        from slipcore import check_log
+
+        return [*said(self.reconstruction), *check_log(self.log, self.history)]
+
+
+def look(log: "GraspLog", method: str | None = None, sensor_model: Path | None = None, gel: Path | None = None) -> Seen:
+    """Correct a log, reconstruct forces that it lacks, and detect slip in it."""
+    from slipcore import LOOKAHEAD, detect_slip
+    from slipcore.defaults import DEFAULT_METHOD
+
+    method = method or DEFAULT_METHOD
+    log, options = _corrected(log, sensor_model, method)
+    log, reconstruction = _with_forces(log, gel)
+    begin = perf_counter()
+    history = detect_slip(log, method=method, lookahead=LOOKAHEAD, sensor_model=None, **options)
+    return Seen(log, history, perf_counter() - begin, reconstruction)
+
+
+def comparison(log: "GraspLog", gel: Path | None) -> "ForceComparison | None":
+    """How the log's own forces agree with those by the gel, where there are both."""
+    if gel is None or log.force is None:
+        return None
+    from slipcore.forces import Gel, compare_forces, reconstruct
+
+    with patience("reconstructing forces"):
+        return compare_forces(log, reconstruct(log, Gel.from_json(_told(gel, "gel"))))
+
+
+def _corrected(log: "GraspLog", sensor_model: Path | None, method: str) -> "tuple[GraspLog, dict[str, float]]":
+    """The log as a calibration of its sensor corrects it, and options of detection; what that changed goes to standard
+    error.
+    """
+    if sensor_model is None:
+        return log, {}
+    from slipcore import SensorModel
+
+    found, changed, options = SensorModel.from_json(_told(sensor_model, "sensor model")).apply(log, method)
+    typer.echo(f"{sensor_model.name}: {'; '.join(changed) or 'nothing to correct'}", err=True)
+    return found, dict(options)
+
+
+def _with_forces(log: "GraspLog", gel: Path | None) -> "tuple[GraspLog, Reconstruction | None]":
+    from service.domain.reconstruct import needs_forces, with_forces
+
+    if gel is None or not needs_forces(log):
+        return log, None
+    return with_forces(log, _told(gel, "gel"))
+
+
+def _told(path: Path, name: str) -> Mapping[str, Any]:
+    from json import loads
+
+    from slipcore import InvalidInput
+
+    try:
+        told: Mapping[str, Any] = loads(path.read_bytes())
+    except ValueError as error:
+        raise InvalidInput(name, f"{path.name}, no JSON ({error})", "a JSON file") from error
+    return told

@@ -1,0 +1,38 @@
+"""Forces of logs that have none, where their sensor's gel is known."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from slipcore import Finding, GraspLog
+    from slipcore.forces import Reconstruction
+
+RECONSTRUCTED = "reconstructed forces"
+"""The finding of a log whose forces follow from its sensor's gel."""
+
+
+def needs_forces(log: "GraspLog") -> bool:
+    """Whether a log has none, and displacements in metres from which they would follow."""
+    return log.force is None and log.is_scaled
+
+
+def with_forces(log: "GraspLog", gel: Mapping[str, float | None]) -> "tuple[GraspLog, Reconstruction]":
+    """The log with forces that follow from its displacement by this gel (``slipcore.forces.Gel.from_json``)."""
+    from slipcore.forces import Gel, reconstruct  # few logs need it
+
+    found = reconstruct(log, Gel.from_json(gel))
+    return found.apply(log), found
+
+
+def said(reconstruction: "Reconstruction | None") -> "list[Finding]":
+    """That forces are reconstructed, and how well they are known; nothing where they are the sensor's."""
+    if reconstruction is None:
+        return []
+    from slipcore import Finding
+
+    told = ", ".join(f"{axis} {share:.0%}" for axis, share in zip("xyz", reconstruction.information, strict=True))
+    evidence = (
+        f"forces follow from displacement by the sensor's gel, in effect averaged over "
+        f"{1e3 * reconstruction.kernel_width:.2g} mm; share of the resultant that data tell: {told}"
+    )
+    return [Finding(RECONSTRUCTED, evidence, "friction is as sure as the description of the sensor's gel")]
