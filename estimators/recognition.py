@@ -87,21 +87,26 @@ def _of_material(data: FitData, places: FloatArray, model: FrictionModel) -> flo
     triangle, size = whole_triangle(data.factor).astype(float), np.ones(3)
     size[2] = model.element_area / data.element_area  # the same pressure on an element of the model's area
     triangle[:, :3] *= size
-    freedom = model.n - 3.0 if model.scatter_degrees_of_freedom is None else model.scatter_degrees_of_freedom
     floor = RECOGNITION.least_scatter * max(
         abs(float(data.mean_friction)), RECOGNITION.least_scatter
     )  # a model without scatter still meets rounded data
-    scale = max(_scale(model), floor)
+    scale, freedom = _scatter(model)
     shared = _shared(data, places / np.outer(size, size), model)
-    found = [log_predictive(triangle, data.effective_n, model.coefficients, each, scale, freedom) for each in shared]
+    found = [
+        log_predictive(triangle, data.effective_n, model.coefficients, each, max(scale, floor), freedom)
+        for each in shared
+    ]
     return float(special.logsumexp(found) - np.log(len(found)))
 
 
-def _scale(model: FrictionModel) -> float:
-    """Scatter of a sample in a grasp of the material."""
+def _scatter(model: FrictionModel) -> tuple[float, float]:
+    """Scatter of a sample in a grasp of the material, and its degrees of freedom (Satterthwaite, 1946)."""
     if model.scales is None:
-        return model.scale
-    return float(np.hypot(model.scales.between_places.value, model.scales.within.value))
+        return model.scale, model.scatter_degrees_of_freedom
+    places, within = model.scales.between_places, model.scales.within
+    parts = [each.value**2 for each in (places, within)]
+    lost = parts[0] ** 2 / places.degrees_of_freedom + parts[1] ** 2 / within.degrees_of_freedom
+    return math.sqrt(sum(parts)), sum(parts) ** 2 / lost if lost > 0.0 else float(model.n)
 
 
 def _shared(data: FitData, places: FloatArray, model: FrictionModel) -> list[FloatArray]:

@@ -144,6 +144,13 @@ def test_few_grasps_leave_it_open_how_far_the_next_one_may_differ() -> None:
     assert by_two > by_many
 
 
+def test_how_far_samples_scatter_is_known_of_a_single_grasp_too() -> None:
+    learnt, rough = (scatter.grasp(scatter.Kind(within=part), np.random.default_rng(4)) for part in (0.03, 0.2))
+    known = {"m": estimators.fit(learnt, method="auto")}
+    assert recognise(learnt, known)["m"] > 0.5
+    assert recognise(rough, known)["unknown"] > 0.99
+
+
 def test_what_places_shift_is_what_least_squares_scatters_by() -> None:
     rng = np.random.default_rng(0)
     grasp = scatter.grasp(scatter.Kind(within=0.0), rng)
