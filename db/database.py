@@ -166,7 +166,7 @@ def _unavailable_named(name: str = "database") -> Iterator[None]:
     except (DBAPIError, PoolTimeout) as error:
         if isinstance(error, DBAPIError) and not _says_unavailable(error):
             raise
-        cause = error.orig if isinstance(error, DBAPIError) else error
+        cause = str(error.orig if isinstance(error, DBAPIError) else error).partition("\nDETAIL:")[0]
         raise StorageUnavailable(f"{name}: {cause}") from error
 
 

@@ -142,7 +142,7 @@ async def running(
                 poll_seconds=settings.poll_seconds,
                 shutdown_seconds=settings.shutdown_seconds,
             )
-            for_clients = FairThreads()
+            for_clients, for_the_store = FairThreads(), FairThreads()
             readers = Readers(settings.read_seconds, settings.readers, settings.reading_bytes, for_clients)
             streams = Streams(settings.stream_sessions_per_key, settings.stream_bytes)
             await runner.start()
@@ -170,6 +170,7 @@ async def running(
                     readers,
                     models,
                     threads=for_clients,
+                    store_threads=for_the_store,
                     streams=streams,
                     scrub=scrub,
                     watch=watch,
@@ -181,6 +182,7 @@ async def running(
                 await runner.stop()
                 await readers.stop()
                 for_clients.stop()
+                for_the_store.stop()
 
 
 def _enter(

@@ -41,7 +41,8 @@ class Jobs(Protocol):
 class Context:
     """The open stores and the running jobs of one application.
 
-    ``threads``: for all that is done on a client's behalf; ``waits``: of each client for jobs, at the moment.
+    ``threads``: for all that is done on a client's behalf; ``store_threads``: for what of it waits for the blobs'
+    store, which may hang; ``waits``: of each client for jobs, at the moment.
     """
 
     settings: Settings
@@ -52,11 +53,12 @@ class Context:
     models: ModelCache = field(default_factory=ModelCache)
     bodies: Bodies = field(default_factory=Bodies)
     threads: FairThreads = field(default_factory=FairThreads)
+    store_threads: FairThreads = field(default_factory=FairThreads)
     waits: Counter[str] = field(default_factory=Counter)
 
     async def files(self, owner: str, hashes: Iterable[str], checked_within: float = 0.0) -> list[Path]:
         """The files that hold these blobs, for a client; each is compared with its hash (``BlobStore.path``)."""
-        path = partial(self.threads.run, owner, self.blobs.path, is_long=True)
+        path = partial(self.store_threads.run, owner, self.blobs.path, is_long=True)
         return [await path(sha256, checked_within) for sha256 in hashes]
 
     @contextmanager

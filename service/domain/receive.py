@@ -128,17 +128,19 @@ def unpack(packed: Spool, spool: Spool, encoding: str, limit: int, expansion: in
 async def unless_gone(gone: Coroutine[Any, Any, None]) -> AsyncIterator[None]:
     """Ends what is waited for inside once ``gone`` has ended: raises ``UploadInterrupted``, which nobody reads."""
     watch, loop = asyncio.create_task(gone), asyncio.get_running_loop()
+    is_waiting = True
     try:
         async with asyncio.timeout(None) as patience:
 
             def end(_: object) -> None:
-                patience.reschedule(loop.time())
+                if is_waiting:  # the loop may call this when all is over
+                    patience.reschedule(loop.time())
 
             watch.add_done_callback(end)
             try:
                 yield
             finally:
-                watch.remove_done_callback(end)
+                is_waiting = False
     except TimeoutError as error:
         if not patience.expired():
             raise

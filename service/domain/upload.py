@@ -118,7 +118,7 @@ async def upload(context: Context, chunks: AsyncIterator[bytes], request: Upload
     """Store a log that comes in ``chunks``, and queue its ingest; raises as ``received`` and ``accept``."""
     async with received(context, chunks, request) as log:
         do = partial(store, context, log, lambda session: accept(session, context, log))
-        return await context.threads.run(request.principal.share, do)
+        return await context.store_threads.run(request.principal.share, do)
 
 
 async def check_target(context: Context, request: UploadRequest) -> None:

@@ -45,4 +45,6 @@ async def _to_its_end(work: Awaitable[Result]) -> Result:
         return await asyncio.shield(future)
     except asyncio.CancelledError:
         await asyncio.wait({future})
+        if not future.cancelled():
+            future.exception()  # nobody is there to be told
         raise

@@ -211,7 +211,7 @@ class _Connection:
         with self._context.blobs.spool() as spool:
             found = await self._streams.call(detectors.write, session.id, spool.path, opening.sensor)
             share = self._principal.share
-            stored = await self._context.threads.run(
+            stored = await self._context.store_threads.run(
                 share, self._store, spool, found, self._upload(opening), is_long=True
             )
         return {"type": "finished", "grasp_log": stored}

@@ -89,14 +89,15 @@ def densities(stored: StoredModel) -> list[Density]:
 
 
 def pairs(stored: StoredModel) -> list[Pair]:
-    """Each of ``PAIRS`` of which both are uncertain."""
+    """Each of ``PAIRS`` of which both are uncertain, by more than the last digit of their numbers."""
     model = to_friction_model(stored.model)
     radius = [_radius(level, model.degrees_of_freedom) for level in ELLIPSES]
+    is_uncertain = model.coefficients + model.standard_errors > model.coefficients
     chosen = (list(pair) for pair in PAIRS)
     return [
         _pair(pair, model.coefficients[pair], model.covariance[np.ix_(pair, pair)], radius)
         for pair in chosen
-        if model.standard_errors[pair].min() > 0.0
+        if is_uncertain[pair].all()
     ]
 
 

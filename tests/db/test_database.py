@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 from sqlalchemy import text
-from sqlalchemy.exc import StatementError
+from sqlalchemy.exc import OperationalError, StatementError
 
+from db import database as module
 from db.database import Database
 from db.errors import DriverMissing, InvalidUrl, StorageUnavailable
 from db.records import Claim, NewGraspLog, NewModel
@@ -278,3 +279,10 @@ def test_a_connection_that_a_thread_has_when_all_are_closed_is_closed_when_it_is
         connection.cursor().execute("SELECT 1")  # type: ignore[union-attr]
     database.ping()  # who goes on with it all the same gets another
     database.close()
+
+
+def test_what_two_writers_held_of_each_other_is_not_told_to_clients() -> None:
+    told = Exception("deadlock detected\nDETAIL:  Process 17 waits for ShareLock on transaction 812; blocked by 18.")
+    with pytest.raises(StorageUnavailable) as refused, module._unavailable_named():
+        raise OperationalError("UPDATE jobs", {}, told)
+    assert str(refused.value) == "database: deadlock detected"

@@ -141,7 +141,7 @@ async def create_grasp_log(
     )
     async with received(context, chunks(request), asked, partial(gone, request)) as log:
         about = key and key.about(log.body_sha256)
-        answer = await context.threads.run(principal.share, _store, context, log, about)
+        answer = await context.store_threads.run(principal.share, _store, context, log, about)
     return answer.response()
 
 

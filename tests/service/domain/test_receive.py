@@ -106,3 +106,25 @@ def test_bodies_that_stop_on_their_way_hold_little_memory_together(count: int, h
         assert all(sink.size == 900_000 for sink in sinks)
 
     asyncio.run(check())
+
+
+def test_who_goes_just_as_the_answer_is_there_disturbs_nobody() -> None:
+    """The loop calls back after all is over, and there is no time to be set any more."""
+    told: list[object] = []
+
+    async def ask() -> None:
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: told.append(context))
+        gone = asyncio.Event()
+
+        async def wait() -> None:
+            await gone.wait()
+
+        async with receive.unless_gone(wait()):
+            await asyncio.sleep(0)
+            gone.set()
+            await asyncio.sleep(0)  # the watch ends now, and its end is told in the next round
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+
+    asyncio.run(ask())
+    assert told == []

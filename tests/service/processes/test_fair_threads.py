@@ -1,6 +1,7 @@
 """Threads of which nobody has all."""
 
 import asyncio
+import gc
 import threading
 from collections.abc import Callable
 from contextvars import ContextVar
@@ -60,6 +61,29 @@ def test_results_errors_and_what_the_log_is_about_are_those_of_the_caller() -> N
     assert asyncio.run(ask(ABOUT.get)) == "a request"
     with pytest.raises(ValueError, match="a request"):
         asyncio.run(ask(fail))
+
+
+def test_what_fails_after_its_client_has_gone_is_told_to_nobody() -> None:
+    has_begun, may_end, told = threading.Event(), threading.Event(), list[object]()
+
+    def fail() -> None:
+        has_begun.set()
+        may_end.wait(30.0)
+        raise ValueError
+
+    async def ask() -> None:
+        asyncio.get_running_loop().set_exception_handler(lambda _, context: told.append(context))
+        task = asyncio.create_task(FairThreads().run("a", fail))
+        await asyncio.to_thread(has_begun.wait)
+        task.cancel()
+        asyncio.get_running_loop().call_later(0.01, may_end.set)
+        await asyncio.wait({task})
+        del task
+        gc.collect()
+        await asyncio.sleep(0)
+
+    asyncio.run(ask())
+    assert told == []
 
 
 def test_who_is_cancelled_gives_up_its_place_and_is_done_no_earlier_than_what_has_begun() -> None:

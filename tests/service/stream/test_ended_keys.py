@@ -66,7 +66,8 @@ def code_of_end(database: Database, key_id: str, *said: dict[str, Any]) -> int:
     async def served() -> int:
         socket: Any = Socket([OPENING, *said], revoke)
         blobs = SimpleNamespace(spool=spool)
-        context: Any = SimpleNamespace(database=database, settings=Settings(), blobs=blobs, threads=FairThreads())
+        threads = {"threads": FairThreads(), "store_threads": FairThreads()}
+        context: Any = SimpleNamespace(database=database, settings=Settings(), blobs=blobs, **threads)
         principal = Principal(key_id, None, is_admin=False)
         await asyncio.wait_for(connection.serve(socket, context, NoDetectors(), principal, store), 20.0)
         return int(socket.code)

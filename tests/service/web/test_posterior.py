@@ -81,6 +81,10 @@ def test_what_is_known_without_doubt_has_no_density(model: NewModel) -> None:
     sure = replace(model, covariance=((0.0,) * 3,) * 3, scatter_degrees_of_freedom=None)
     assert densities(stored(sure)) == []
     assert pairs(stored(sure)) == []
+    nearly = tuple(tuple(1e-40 * (row == column) for column in range(3)) for row in range(3))
+    nearly_sure = replace(sure, covariance=nearly)
+    assert densities(stored(nearly_sure)) == []
+    assert pairs(stored(nearly_sure)) == [], "an axis without any length"
 
 
 def log(number: int, moments: bytes | None) -> SampledLog:
