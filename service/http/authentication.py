@@ -28,6 +28,7 @@ from service.http.problems import (
     Problem,
 )
 from service.http.rate_limit import RateLimit
+from service.processes.fair_queue import PatientQueue
 from service.settings import Settings
 
 KEPT_SECONDS = 2.0
@@ -35,6 +36,10 @@ KEPT_SECONDS = 2.0
 
 MOST_KEPT = 10_000
 """Keys; more than a fleet has."""
+
+
+LOOKS_AT_ONCE = 4
+"""Keys that are read at once, those that one address sends half of them: anybody may send what is none."""
 
 
 class KeyCache:
@@ -47,8 +52,9 @@ class KeyCache:
     def __init__(self) -> None:
         self._kept: dict[str, tuple[AccessKey, float]] = {}
         self._sessions: dict[str, tuple[AccessKey, float]] = {}
+        self._looks = PatientQueue(LOOKS_AT_ONCE, "looked up", share=LOOKS_AT_ONCE // 2)
 
-    async def find(self, database: Database, text: str) -> AccessKey | None:
+    async def find(self, database: Database, text: str, address: str) -> AccessKey | None:
         """The key with this text, if it is a valid one."""
         key_id = keys.key_id(text)
         if key_id is None:
@@ -56,17 +62,19 @@ class KeyCache:
         known = self.find_kept(text)
         if known is not None:
             return known
-        known = await run_in_threadpool(_read, database, key_id)
+        async with self._looks.turn(address):
+            known = await run_in_threadpool(_read, database, key_id)
         if not keys.is_key(text, known):
             return None
         _keep(self._kept, key_id, known)
         return known
 
-    async def find_of_session(self, database: Database, token: str) -> AccessKey | None:
+    async def find_of_session(self, database: Database, token: str, address: str) -> AccessKey | None:
         """The key with which somebody logged in whose browser has this token, if it is valid still."""
         known, until = self._sessions.get(token, (None, 0.0))
         if time.monotonic() > until:
-            known = await run_in_threadpool(sessions.find_key, database, token)
+            async with self._looks.turn(address):
+                known = await run_in_threadpool(sessions.find_key, database, token)
             if known is not None:
                 _keep(self._sessions, token, known)
         return known if known is not None and keys.is_valid(known) else None
@@ -179,7 +187,7 @@ class Authenticator:
             return None
         context: Context = connection.app.state.context
         try:
-            found = await self._keys.find_of_session(context.database, token)
+            found = await self._keys.find_of_session(context.database, token, _address(connection))
         except StorageUnavailable as error:
             raise problems.storage_unavailable(error) from error
         if found is not None:
@@ -189,7 +197,7 @@ class Authenticator:
     async def _find(self, connection: HTTPConnection, text: str) -> AccessKey:
         context: Context = connection.app.state.context
         try:
-            found = await self._keys.find(context.database, text)
+            found = await self._keys.find(context.database, text, _address(connection))
         except StorageUnavailable as error:
             raise problems.storage_unavailable(error) from error
         if found is None:

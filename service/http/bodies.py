@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import AsyncIterator, Callable, Coroutine
+from functools import partial
 from typing import Any
 
 from fastapi import Request, Response
@@ -9,6 +10,8 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.types import Message, Receive
 
+from service.domain.context import Context
+from service.http.access import principal
 from service.http.fair_route import FairRoute
 from service.http.problems import UNSUPPORTED_FORMAT, Problem
 
@@ -31,7 +34,11 @@ async def chunks(request: Request) -> AsyncIterator[bytes]:
 class _JsonRequest(Request):
     async def json(self) -> Any:
         """The body; raises ``HTTPException`` for objects of more fields than any has: each would be an error apart."""
-        return json.loads(await self.body(), object_pairs_hook=_few_fields)
+        body, parse = await self.body(), partial(json.loads, object_pairs_hook=_few_fields)
+        if len(body) <= MAX_JSON_BYTES:
+            return parse(body)
+        context: Context = self.app.state.context
+        return await context.threads.run((await principal(self)).share, parse, body, is_long=True)
 
 
 def _few_fields(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """What somebody with a wrong key, or one that has ended, learns and gets."""
 
+import asyncio
 import hmac
 import json
 import threading
@@ -163,3 +164,29 @@ def test_who_waits_for_a_job_is_told_nothing_once_the_key_has_ended(
     ending.join()
     assert (answer.status_code, answer.json()["type"]) == (401, "/problems/invalid-key")
     assert time.monotonic() - began < 8.0
+
+
+def test_wrong_keys_of_one_address_are_looked_up_two_at_once(
+    reach: Callable[..., Any], make: Callable[..., str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A hundred connections of them kept others waiting for fifty times as long as they would have alone."""
+    looking, most, read = 0, 0, authentication._read
+
+    def look(*about: Any) -> Any:
+        nonlocal looking, most
+        looking += 1
+        most = max(most, looking)
+        time.sleep(0.01)
+        looking -= 1
+        return read(*about)
+
+    monkeypatch.setattr(authentication, "_read", look)
+    text = make()
+    wrong = reach("keys", key=text[:-1] + ("0" if text[-1] != "0" else "1"))
+
+    async def ask() -> list[int]:
+        answers = await asyncio.gather(*(wrong._request("GET", "/v1/materials") for _ in range(10)))
+        return [answer.status_code for answer in answers]
+
+    assert asyncio.run(ask()) == [401] * 10
+    assert most == 2
