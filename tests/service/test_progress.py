@@ -95,12 +95,21 @@ def test_an_interrupted_command_leaves_nothing_behind(
     assert list(tmp_path.iterdir()) == []
 
 
+HEED_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+"""What a shell starts in the background ignores them, and so does all that is started by that: these tests, perhaps."""
+
+
 def test_a_command_that_is_sent_an_interrupt_says_so_and_leaves_nothing_behind(tmp_path: Path) -> None:
+    run = f"{HEED_INTERRUPTS}; import runpy; runpy.run_module('service.cli', run_name='__main__')"
     given = ["simulate", "lifting_10N", "--accuracy", "1e-4", "--output", str(tmp_path / "log.npz")]
-    with subprocess.Popen([sys.executable, "-m", "service.cli", *given], stderr=subprocess.PIPE) as process:
+    with subprocess.Popen([sys.executable, "-c", run, *given], stderr=subprocess.PIPE) as process:
         assert process.stderr is not None
         assert process.stderr.read(1) == b"\r"  # it is at it
         process.send_signal(signal.SIGINT)
-        assert process.stderr.read().endswith(b"\nstiction: interrupted; nothing is left half written\n")
+        try:
+            _, told = process.communicate(timeout=60.0)
+        finally:
+            process.kill()
+    assert told.endswith(b"\nstiction: interrupted; nothing is left half written\n")
     assert process.returncode == INTERRUPTED
     assert list(tmp_path.iterdir()) == []

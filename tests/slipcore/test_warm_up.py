@@ -37,4 +37,5 @@ def test_after_warming_up_no_samples_compile() -> None:
     compiled = [len(kernel.signatures) for kernel in OF_SAMPLES]
     log = tangential_ramp(points=9, friction=0.3, normal_force=4.0, marker_noise=1e-6, force_noise=2e-3, seed=1)
     assert len(collect_samples(log, detect_slip(log)))
-    assert [len(kernel.signatures) for kernel in OF_SAMPLES] == compiled == [1, 1, 1]
+    assert [len(kernel.signatures) for kernel in OF_SAMPLES] == compiled
+    assert all(compiled)
