@@ -136,9 +136,9 @@ def find(name: str, log: GraspLog, history: SlipHistory) -> Found:
 
 def compare(name: str, log: GraspLog, thickness: float) -> Compared:
     """A sensor's own forces beside those by a gel of some thickness."""
+    assert log.force is not None
     found = reconstruct(log, Gel(YOUNG_MODULUS, POISSON_RATIO, thickness))
-    own_total = 0.0 if log.force is None else log.force[..., 2].sum(axis=(1, 2))
-    totals = np.stack((-own_total, -found.force[..., 2].sum(axis=(1, 2))))
+    totals = np.stack([-force[..., 2].sum(axis=(1, 2)) for force in (log.force, found.force)])
     return Compared(name, thickness, compare_forces(log, found), totals)
 
 

@@ -64,11 +64,16 @@ def look(log: "GraspLog", method: str | None = None, sensor_model: Path | None =
 
 
 def comparison(log: "GraspLog", gel: Path | None) -> "ForceComparison | None":
-    """How the log's own forces agree with those by the gel, where there are both."""
+    """How the log's own forces agree with those by the gel, where there are both; raises ``InvalidInput`` for a log of
+    forces alone.
+    """
     if gel is None or log.force is None:
         return None
+    from slipcore import InvalidInput
     from slipcore.forces import Gel, compare_forces, reconstruct
 
+    if not log.has_displacement:
+        raise InvalidInput("gel", "given for a log of forces alone", "a log whose displacement tells forces, too")
     with patience("reconstructing forces"):
         return compare_forces(log, reconstruct(log, Gel.from_json(_told(gel, "gel"))))
 
@@ -87,9 +92,13 @@ def _corrected(log: "GraspLog", sensor_model: Path | None, method: str) -> "tupl
 
 
 def _with_forces(log: "GraspLog", gel: Path | None) -> "tuple[GraspLog, Reconstruction | None]":
-    from service.domain.reconstruct import needs_forces, with_forces
+    """By the gel, if there is one, where the log has none; raises ``UnknownScale`` for one that is not in metres."""
+    from service.domain.reconstruct import with_forces
 
-    if gel is None or not needs_forces(log):
+    if gel is None:
+        return log, None
+    if log.force is not None:
+        typer.echo(f"{gel.name}: slip and friction are by the log's own forces", err=True)
         return log, None
     return with_forces(log, _told(gel, "gel"))
 

@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Protocol
 
@@ -58,8 +57,11 @@ class Context:
 
     async def files(self, owner: str, hashes: Iterable[str], checked_within: float = 0.0) -> list[Path]:
         """The files that hold these blobs, for a client; each is compared with its hash (``BlobStore.path``)."""
-        path = partial(self.store_threads.run, owner, self.blobs.path, is_long=True)
-        return [await path(sha256, checked_within) for sha256 in hashes]
+
+        def find() -> list[Path]:
+            return [self.blobs.path(sha256, checked_within) for sha256 in hashes]
+
+        return await self.store_threads.run(owner, find, is_long=True)
 
     @contextmanager
     def queueing(self) -> Iterator[Session]:

@@ -37,11 +37,17 @@ class Gel:
         """
         names = [each.name for each in fields(cls)]
         try:
-            return cls(**{name: math.inf if value is None else float(value) for name, value in told.items()})
-        except (AttributeError, TypeError, ValueError) as error:
-            if isinstance(error, InvalidInput):
-                raise
+            return cls(**{name: _number(name, value) for name, value in told.items()})
+        except (AttributeError, TypeError) as error:
             raise InvalidInput("gel", str(error)[:120], f"numbers named {', '.join(names)}") from error
+
+
+def _number(name: str, told: object) -> float:
+    if told is None and name == "thickness":
+        return math.inf
+    if isinstance(told, bool) or not isinstance(told, int | float):
+        raise InvalidInput(name, repr(told)[:60], "a number")
+    return float(told)
 
 
 def _check(name: str, value: float, allowed: bool, what: str) -> None:

@@ -708,9 +708,22 @@ def test_check_tells_how_a_sensors_own_forces_agree_with_those_by_its_gel(run: R
     assert set(found) == {"normal", "tangential", "total_normal", "total_tangential"}
     assert re.search(r"normal, of the contact +0\.9\d+ +1\.00", run("check", felt, "--gel", gel)[1])
     assert "forces_by_gel" not in json.loads(run("check", felt, "--json")[1])
+    assert "gel.json: slip and friction are by the log's own forces" in run("detect", felt, "--gel", gel)[2]
     code, _, err = run("check", felt, "--gel", felt)
     assert code == INPUT_REFUSED
     assert "gel is felt.npz, no JSON" in err
+
+
+def test_forces_do_not_follow_from_what_tells_no_displacement_in_metres(
+    run: Run, felt: Path, gel: Path, tmp_path: Path
+) -> None:
+    told = (Path(__file__).parent / "formats" / "tracked_dots.csv").read_text(encoding="utf-8")
+    (tmp_path / "dots.csv").write_text(told.replace("# scale", "# was"), encoding="utf-8")
+    code, _, err = run("detect", tmp_path / "dots.csv", "--gel", gel)
+    assert (code, "the log's scale is unknown" in err) == (INPUT_REFUSED, True), err
+    container.write(replace(formats.read(felt), displacement=None), tmp_path / "taxels.npz")
+    code, _, err = run("check", tmp_path / "taxels.npz", "--gel", gel)
+    assert (code, "gel is given for a log of forces alone" in err) == (INPUT_REFUSED, True), err
 
 
 def test_a_sensor_is_described_and_listed_from_the_command_line(run: Run, url: str) -> None:

@@ -104,8 +104,8 @@ class GraspForceOut(BaseModel):
     advice: Advice
 
 
-MOST_SAMPLES = 50_000
-"""More than a body of its size can hold."""
+MOST_SAMPLES = 75_000
+"""More than its body of 1 MiB can hold: seven columns of two bytes an entry."""
 
 Item = TypeVar("Item")
 Column = Annotated[list[Item], Field(max_length=MOST_SAMPLES, fail_fast=True)]

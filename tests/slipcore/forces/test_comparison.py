@@ -65,7 +65,9 @@ def test_a_log_needs_forces_of_its_own_and_the_reconstruction_is_its_own(
     [
         ({"young_modulus": 1e6}, "gel is .*poisson_ratio"),
         ({**GEL, "hardness": 3.0}, "gel is .*hardness"),
-        ({**GEL, "poisson_ratio": "soft"}, "gel is .*soft"),
+        ({**GEL, "poisson_ratio": "0.4"}, "poisson_ratio is '0.4'; allowed: a number"),
+        ({**GEL, "thickness": True}, "thickness is True; allowed: a number"),
+        ({**GEL, "marker_depth": None}, "marker_depth is None; allowed: a number"),
         ([1e6, 0.49], "gel is .*; allowed: numbers named young_modulus"),
         ({**GEL, "poisson_ratio": 0.6}, "poisson_ratio is 0.6"),
     ],
