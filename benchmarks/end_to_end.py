@@ -14,7 +14,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, astuple, dataclass, replace
 from functools import cache
 from time import process_time
 
@@ -114,25 +114,29 @@ def seen(log: GraspLog, setting: Setting, rng: np.random.Generator) -> GraspLog:
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
-    """One fit: error and half-width of the 95 % interval of friction at the working point, NaN where it was refused.
+class Seconds:
+    """CPU time of all grasps' detection and sampling, and of the fit."""
 
-    CPU seconds of detection and sampling are those of all of its grasps.
-    """
+    detector: float
+    samples: float
+    fit: float
+
+    @property
+    def total(self) -> float:
+        """All of it."""
+        return self.detector + self.samples + self.fit
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One fit: error and half-width of the 95 % interval of friction at the working point, NaN where it was refused."""
 
     setting: Setting
     method: str
     seed: int
     error: float
     half_width: float
-    detector_seconds: float
-    samples_seconds: float
-    fit_seconds: float
-
-    @property
-    def seconds(self) -> float:
-        """All of it."""
-        return self.detector_seconds + self.samples_seconds + self.fit_seconds
+    seconds: Seconds
 
 
 def findings(seed: int, settings: Sequence[Setting] = SETTINGS) -> list[Finding]:
@@ -160,7 +164,7 @@ def _of_setting(setting: Setting, seed: int, logs: Sequence[GraspLog]) -> Iterat
         except EstimatorError:
             error = half = np.nan
         taken = process_time() - begin
-        yield Finding(setting, method, seed, error, half, detected - start, collected - detected, taken)
+        yield Finding(setting, method, seed, error, half, Seconds(detected - start, collected - detected, taken))
 
 
 def _told(model: FrictionModel, setting: Setting, seed: int) -> tuple[float, float]:
@@ -180,7 +184,7 @@ def limit(grasps: int) -> float:
 class Cell:
     """Of the fits of one setting by one method: root mean square error, median half-width, share that held the truth.
 
-    Median CPU seconds of the parts; ``refused`` fits count nowhere else.
+    ``seconds``: the median of each part; ``refused`` fits count nowhere else.
     """
 
     setting: Setting
@@ -190,14 +194,7 @@ class Cell:
     error: float
     half_width: float
     covered: float
-    detector_seconds: float
-    samples_seconds: float
-    fit_seconds: float
-
-    @property
-    def seconds(self) -> float:
-        """All of it."""
-        return self.detector_seconds + self.samples_seconds + self.fit_seconds
+    seconds: Seconds
 
 
 def cells(found: Sequence[Finding]) -> dict[tuple[Setting, str], Cell]:
@@ -216,9 +213,8 @@ def _cell(setting: Setting, method: str, group: Sequence[Finding]) -> Cell:
     if some.any():
         inside = np.mean(np.abs(error[some]) <= half[some])
         accuracy = float(np.sqrt(np.mean(error[some] ** 2))), float(np.median(half[some])), float(inside)
-    parts = ("detector_seconds", "samples_seconds", "fit_seconds")
-    seconds = [float(np.median([getattr(each, name) for each in group])) for name in parts]
-    return Cell(setting, method, len(group), refused, *accuracy, *seconds)
+    seconds = np.median([astuple(each.seconds) for each in group], axis=0)
+    return Cell(setting, method, len(group), refused, *accuracy, Seconds(*seconds.tolist()))
 
 
 def accuracy_table(found: Mapping[tuple[Setting, str], Cell]) -> str:
@@ -251,7 +247,8 @@ def seconds_table(found: Mapping[tuple[Setting, str], Cell]) -> str:
 
 
 def _milliseconds(row: Sequence[Cell]) -> list[float]:
-    return [1e3 * x for x in (row[0].detector_seconds, row[0].samples_seconds, *(cell.fit_seconds for cell in row))]
+    first = row[0].seconds
+    return [1e3 * x for x in (first.detector, first.samples, *(cell.seconds.fit for cell in row))]
 
 
 def draw(found: Mapping[tuple[Setting, str], Cell]) -> Figure:
@@ -286,7 +283,7 @@ def _draw_seconds(axes: Axes, found: Mapping[tuple[Setting, str], Cell]) -> None
     settings = [setting for setting in AXES["grasps"] if (setting, METHODS[0]) in found]
     for k, method in enumerate(METHODS):
         row = [found[setting, method] for setting in settings]
-        axes.plot([cell.seconds for cell in row], [cell.error for cell in row], f"C{k}.-")
+        axes.plot([cell.seconds.total for cell in row], [cell.error for cell in row], f"C{k}.-")
     axes.set(xlabel="CPU seconds in all, 1 to 20 grasps", ylabel="error [-]", xscale="log", yscale="log")
     ticks = [0.02, 0.05, 0.1, 0.2, 0.5]
     axes.set_xticks(ticks, [f"{each:g}" for each in ticks])

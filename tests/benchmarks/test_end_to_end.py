@@ -49,7 +49,7 @@ def test_every_method_tells_friction_near_the_truth(found: list[Finding]) -> Non
     for each in found:
         assert abs(each.error) < 0.05
         assert each.half_width > 0.0
-        assert each.seconds > each.fit_seconds > 0.0
+        assert each.seconds.total > each.seconds.fit > 0.0
 
 
 def test_refused_fits_count_as_such_and_nowhere_else(found: list[Finding]) -> None:
