@@ -4,7 +4,6 @@ A c-optimal design, one grasp ahead (Elfving, 1952; Chaloner & Verdinelli, 1995,
 grasps that a robot can make, the one after which the friction at the planner's working point is known best.
 """
 
-import itertools
 import math
 from dataclasses import dataclass
 
@@ -104,75 +103,81 @@ def next_grasp(
     probing = probing or Probing()
     point = np.array([1.0, working_point.tangential_velocity, working_point.normal_force])
     variance = float(point @ model.covariance @ point)
-    designs = [
-        Design(force, speed, length, working_point.elements, probing)
-        for force in _forces(model, working_point, probing)
-        for speed, length in itertools.product(probing.speed, probing.length)
-    ]
-    if not designs:
+    designs = Designs.of(_forces(model, working_point, probing), working_point.elements, probing)
+    if not len(designs.normal_force):
         allowed = f"what friction holds, but for {probing.drop_probability:g} of the grasps: lay it on a table"
         raise InvalidSamples("load", probing.load, allowed)
-    after = [
-        max(float(point @ updated(model.covariance, design.information(model)) @ point), 0.0) for design in designs
-    ]
-    seconds = np.array([design.seconds for design in designs])
-    best = int(np.argmax((math.sqrt(variance) - np.sqrt(after)) / seconds))
+    left = updated(model.covariance, designs.information(model))
+    after = np.sqrt(np.maximum(point @ left @ point, 0.0))
+    best = int(np.argmax((math.sqrt(variance) - after) / designs.seconds))
     score = float(special.stdtrit(model.degrees_of_freedom, IDENTIFIABILITY.ends[1]))
     told = model.predict(point[1], point[2], working_point.quantile, "contact", working_point.elements)
     return NextGrasp(
-        normal_force=designs[best].normal_force,
-        slip_length=designs[best].length,
-        speed=designs[best].speed,
+        normal_force=float(designs.normal_force[best]),
+        slip_length=float(designs.length[best]),
+        speed=float(designs.speed[best]),
         direction=grasps * GOLDEN_ANGLE % (2.0 * math.pi),
-        seconds=designs[best].seconds,
+        seconds=float(designs.seconds[best]),
         uncertainty=score * math.sqrt(variance),
-        after=score * math.sqrt(after[best]),
+        after=score * float(after[best]),
         conservative_friction=float(told),
     )
 
 
 def updated(covariance: FloatArray, information: FloatArray) -> FloatArray:
-    """Covariance [3, 3] of β after data of the ``information`` [3, 3], (Σ⁻¹ + M)⁻¹; also where Σ is singular."""
-    return np.asarray(np.linalg.solve(np.eye(3) + covariance @ information, covariance))
+    """Covariance [..., 3, 3] of β after data of the ``information`` [..., 3, 3], (Σ⁻¹ + M)⁻¹; also where Σ [3, 3] is
+    singular.
+    """
+    prior = np.broadcast_to(covariance, information.shape)
+    return np.asarray(np.linalg.solve(np.eye(3) + covariance @ information, prior))
 
 
-@dataclass(frozen=True, slots=True)
-class Design:
-    """A grasp that could be made: mean ``normal_force`` of an element (N), ``speed`` m/s and ``length`` m of its slip,
-    of which the contact has so many ``elements``.
+@dataclass(frozen=True, slots=True, eq=False)
+class Designs:
+    """Grasps that could be made, each [d]: mean ``normal_force`` of an element (N), ``speed`` m/s and ``length`` m of
+    the slip, of which the contact has so many ``elements``.
     """
 
-    normal_force: float
-    speed: float
-    length: float
+    normal_force: FloatArray
+    speed: FloatArray
+    length: FloatArray
     elements: int
     probing: Probing
 
+    @classmethod
+    def of(cls, forces: FloatArray, elements: int, probing: Probing) -> "Designs":
+        """All speeds and lengths that the robot can choose at each of the forces [f]."""
+        force, speed, length = np.meshgrid(forces, probing.speed, probing.length, indexing="ij")
+        return cls(force.ravel(), speed.ravel(), length.ravel(), elements, probing)
+
     @property
-    def seconds(self) -> float:
-        """Robot time."""
+    def seconds(self) -> FloatArray:
+        """Robot time [d]."""
         return self.probing.seconds + self.length / self.speed
 
     def places(self) -> tuple[FloatArray, FloatArray]:
-        """x = (1, v, f_n) [9, 3] of the grasp's places, at half of the speed on average, and the number of each [9]."""
-        v = 0.5 * self.speed * (1.0 + math.sqrt(2.0) * self.probing.velocity_spread * NODES)
-        f_n = self.normal_force * (1.0 + math.sqrt(2.0) * self.probing.force_spread * NODES)
-        grid = np.array([[1.0, *pair] for pair in itertools.product(np.maximum(v, 0.0), f_n)])
-        return grid, max(self.probing.slipping * self.elements, 1.0) * np.outer(WEIGHTS, WEIGHTS).ravel()
+        """x = (1, v, f_n) [d, 9, 3] of a grasp's places, at half of the speed on average, and their numbers [9]."""
+        v = 0.5 * np.outer(self.speed, 1.0 + math.sqrt(2.0) * self.probing.velocity_spread * NODES)
+        f_n = np.outer(self.normal_force, 1.0 + math.sqrt(2.0) * self.probing.force_spread * NODES)
+        x = np.ones((len(v), len(NODES), len(NODES), 3))
+        x[..., 1], x[..., 2] = np.maximum(v, 0.0)[:, :, None], f_n[:, None, :]
+        count = max(self.probing.slipping * self.elements, 1.0) * np.outer(WEIGHTS, WEIGHTS).ravel()
+        return x.reshape(len(v), -1, 3), count
 
     def information(self, model: FrictionModel) -> FloatArray:
-        """What the grasp would tell of β [3, 3]: that of its places, less what is told along β by how grasps differ.
+        """What each grasp would tell of β [d, 3, 3]: that of its places, less what is told along β by how grasps vary.
 
         With A = Σ x xᵀ/d over its places and scatter τ of the whole law, M = A − A b bᵀ A τ²/(1 + τ² bᵀ A b), b = β
         (Sherman & Morrison), as in the fit.
         """
         between, places, within = scatter(model)
         x, count = self.places()
-        frames = max(self.probing.frame_rate * self.length / self.speed, 1.0)
-        whole = (x.T * (count / (places**2 + within**2 / frames))) @ x
+        frames = np.maximum(self.probing.frame_rate * self.length / self.speed, 1.0)
+        weight = count / (places**2 + within**2 / frames[:, None])
+        whole = np.einsum("dki,dk,dkj->dij", x, weight, x)
         along = whole @ model.coefficients
-        shared = between**2 / (1.0 + between**2 * float(model.coefficients @ along))
-        return np.asarray(whole - shared * np.outer(along, along))
+        shared = between**2 / (1.0 + between**2 * (along @ model.coefficients))
+        return np.asarray(whole - shared[:, None, None] * along[:, :, None] * along[:, None, :])
 
 
 def scatter(model: FrictionModel) -> tuple[float, float, float]:
@@ -186,12 +191,12 @@ def scatter(model: FrictionModel) -> tuple[float, float, float]:
     return told.between_grasps.value, told.between_places.value, max(told.within.value, least)
 
 
-def _forces(model: FrictionModel, working_point: WorkingPoint, probing: Probing) -> list[float]:
-    """Mean normal forces of an element, N, at which a grasp bears the load."""
+def _forces(model: FrictionModel, working_point: WorkingPoint, probing: Probing) -> FloatArray:
+    """Mean normal forces of an element, N, at which a grasp bears the load, [f]."""
     asked, (least, most) = working_point.normal_force, model.domain.normal_force
     low, high = probing.normal_force or (min(0.5 * least if least > 0.0 else asked, asked), max(2.0 * most, asked))
     if not 0.0 < low <= high < math.inf:
         raise InvalidSamples("normal_force", (low, high), "N an element, above 0, the least first")
     forces = np.append(np.geomspace(low, high, DESIGN.forces), np.clip(working_point.normal_force, low, high))
     held = model.predict(0.0, forces, probing.drop_probability, "contact", working_point.elements)
-    return [float(force) for force in forces[held * forces * working_point.elements >= probing.load]]
+    return np.asarray(forces[held * forces * working_point.elements >= probing.load])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimators import Cost, Domain, FrictionModel, InvalidSamples, Probing, Scale, Scales, WorkingPoint, next_grasp
-from estimators.grasp_design import GOLDEN_ANGLE, Design, updated
+from estimators.grasp_design import GOLDEN_ANGLE, SPEEDS, Designs, updated
 
 POINT = WorkingPoint(0.1)
 
@@ -32,15 +32,15 @@ def model(covariance: np.ndarray | None = None, scales: Scales | None = None) ->
 def test_information_is_that_of_the_grasps_covariance() -> None:
     """XᵀV⁻¹X with V written out: one row a place, its variance on the diagonal and τ² (Xβ)(Xβ)ᵀ in common."""
     known, probing = model(), Probing(slipping=1.0)
-    design = Design(0.1, 2e-3, 1e-3, 16, probing)
-    x, count = design.places()
-    rows = np.repeat(x, count.astype(int), axis=0)
-    assert len(rows) == 16
-    law = rows @ known.coefficients
-    frames = 30.0 * 0.5
-    covariance = (0.02**2 + 0.03**2 / frames) * np.eye(16) + 0.05**2 * np.outer(law, law)
-    expected = rows.T @ np.linalg.solve(covariance, rows)
-    np.testing.assert_allclose(design.information(known), expected, rtol=1e-10)
+    designs = Designs.of(np.array([0.1, 0.3]), 16, replace(probing, speed=(2e-3, 4e-3), length=(1e-3, 2e-3)))
+    x, count = designs.places()
+    assert (len(designs.seconds), count.sum()) == (8, 16)
+    for k, told in enumerate(designs.information(known)):
+        rows = np.repeat(x[k], count.astype(int), axis=0)
+        law = rows @ known.coefficients
+        frames = 30.0 * designs.length[k] / designs.speed[k]
+        covariance = (0.02**2 + 0.03**2 / frames) * np.eye(16) + 0.05**2 * np.outer(law, law)
+        np.testing.assert_allclose(told, rows.T @ np.linalg.solve(covariance, rows), rtol=1e-10)
 
 
 def test_an_update_is_bayes_rule_also_where_nothing_is_uncertain() -> None:
@@ -49,6 +49,20 @@ def test_an_update_is_bayes_rule_also_where_nothing_is_uncertain() -> None:
         updated(covariance, information), np.linalg.inv(np.linalg.inv(covariance) + information), rtol=1e-12
     )
     assert (updated(np.zeros((3, 3)), information) == 0.0).all()
+
+
+def test_the_grasp_is_the_best_of_all_that_can_be_made_worked_out_one_by_one() -> None:
+    known, probing = model(), Probing(normal_force=(0.05, 0.4), length=(1e-3,))
+    point, found = np.array([1.0, 0.0, 0.1]), next_grasp(known, POINT, probing)
+    now, gain = math.sqrt(point @ known.covariance @ point), {}
+    for force in np.append(np.geomspace(0.05, 0.4, 25), 0.1):
+        for speed in SPEEDS:
+            one = Designs(np.array([force]), np.array([speed]), np.array([1e-3]), POINT.elements, probing)
+            after = np.linalg.inv(np.linalg.inv(known.covariance) + one.information(known)[0])
+            gain[float(force), float(speed)] = (now - math.sqrt(point @ after @ point)) / (4.0 + 1e-3 / speed)
+    best = max(gain, key=gain.__getitem__)
+    assert (found.normal_force, found.speed) == pytest.approx(best)
+    assert (found.uncertainty - found.after) / found.uncertainty * now / found.seconds == pytest.approx(gain[best])
 
 
 def test_a_slope_is_asked_for_far_out_and_a_level_where_it_is_needed() -> None:
