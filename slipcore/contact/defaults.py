@@ -371,8 +371,8 @@ class WorldDefaults(Options):
     """Over the bristles, in each step."""
     most_stiff: Annotated[float, Option(0.1, 4.0, "-", "half of that at which steps become unstable")] = 2.0
     """Largest h (h + 2τ) K/m."""
-    cut: Annotated[float, Option(0.0, 1e-3, "-", "rounding")] = 1e-9
-    """By which share a force may lie below its limit and still have been cut to it."""
+    rest: Annotated[float, Option(0.0, 0.1, "-", "a hundredth of what three sweeps leave")] = 3e-4
+    """Share of its limit by which a bristle's force must change in a step, or wait."""
     at_limit: Annotated[float, Option(0.5, 1.0, "-", "an object that comes to rest goes back by a little")] = 0.98
     """Share of its limit from which a bristle counts as slipping."""
 

@@ -13,7 +13,7 @@ from slipcore.frames import BoolArray, FloatArray
 Places = NDArray[np.int64]
 
 
-_CUT, _AT_LIMIT = 1.0 - WORLD.cut, WORLD.at_limit
+_AT_LIMIT, _REST = WORLD.at_limit, WORLD.rest
 
 
 class Pad(NamedTuple):
@@ -28,6 +28,16 @@ class Pad(NamedTuple):
     influence: FloatArray
     same: int
     pressing: float
+
+
+class Patch(NamedTuple):
+    """The bristles that touch: their numbers ``which`` [i]; ``near`` [3, i, i]: displacement of one by 1 N on another,
+    as in ``Pad.influence``; ``moved`` [2, i] m: that by all forces, kept up as these change.
+    """
+
+    which: Places
+    near: FloatArray
+    moved: FloatArray
 
 
 class Bristles(NamedTuple):
@@ -72,6 +82,7 @@ def advance(
     frame.
     """
     fingers = normal.shape[0]
+    patches = [Patch(np.zeros(0, np.int64), np.zeros((3, 0, 0)), np.zeros((2, 0))) for _ in range(fingers)]
     for step in range(steps.number):
         resultant = np.zeros(3)
         motion[0] += steps.length * motion[1]
@@ -80,9 +91,12 @@ def advance(
             side = 1.0 - 2.0 * f
             normal[f] += (command[f] - normal[f]) * -math.expm1(-steps.length / steps.lag)
             limit = friction[f] * pressures(pad, normal[f])
+            if (limit > 0.0).sum() != patches[f].which.size:  # circles about one centre differ by their size alone
+                leave(limit, bristles.force[f], bristles.offset[f], bristles.slips[f])
+                patches[f] = patch_of(pad, np.flatnonzero(limit > 0.0), bristles.force[f])
             pose = target * np.array([1.0, side, side])
-            relax(pad, limit, pose, bristles.force[f], bristles.offset[f], bristles.slips[f], steps.sweeps)
-            resultant += on_object(pad, bristles.force[f], side)
+            settle(pad, patches[f], limit, pose, bristles.force[f], bristles.offset[f], bristles.slips[f], steps.sweeps)
+            resultant += on_object(pad, patches[f].which, bristles.force[f], side)
         share = (step + 1.0) / steps.number
         driving = load[0] + share * (load[1] - load[0]) - resultant
         motion[1, :2] += steps.length / steps.mass * driving[:2]
@@ -103,6 +117,24 @@ def pressures(pad: Pad, normal: float) -> FloatArray:
 
 
 @compiled
+def depths(pad: Pad, normal: float, sphere: float) -> FloatArray:
+    """Normal displacement of the surface, [k] m, under a ball of radius ``sphere`` m and ``normal`` N.
+
+    Johnson, Contact Mechanics (1985), eq. 3.42.
+    """
+    square = (pad.pressing * normal) ** (2.0 / 3.0)
+    depth = np.zeros(pad.x.size)
+    for k in range(depth.size if square > 0.0 else 0):
+        r2 = pad.x[k] ** 2 + pad.y[k] ** 2
+        if r2 <= square:
+            depth[k] = (square - 0.5 * r2) / sphere
+        else:
+            edge = math.sqrt(square * (r2 - square))
+            depth[k] = ((2.0 * square - r2) * math.atan2(square, edge) + edge) / (math.pi * sphere)
+    return depth
+
+
+@compiled
 def relax(
     pad: Pad,
     limit: FloatArray,
@@ -112,70 +144,106 @@ def relax(
     slips: BoolArray,
     sweeps: int,
 ) -> None:
-    """Let bristles follow an object at ``pose`` [3] (m, m, rad), each up to its ``limit`` [k] N, in place.
+    """Let bristles follow an object at ``pose`` [3] (m, m, rad), each up to its ``limit`` [k] N, in place."""
+    leave(limit, force, offset, slips)
+    settle(pad, patch_of(pad, np.flatnonzero(limit > 0.0), force), limit, pose, force, offset, slips, sweeps)
 
-    Projected Gauss-Seidel on the displacement of the surface by all forces, from the last step's forces; what slips is
-    then offset by what it lacks. The offset of what does not touch is NaN.
+
+@compiled
+def leave(limit: FloatArray, force: FloatArray, offset: FloatArray, slips: BoolArray) -> None:
+    """Free the bristles without a ``limit`` [k] N, in place: the offset of what does not touch is NaN."""
+    for k in np.flatnonzero(limit == 0.0):
+        force[k], offset[k], slips[k] = 0.0, np.nan, False
+
+
+@compiled
+def patch_of(pad: Pad, which: Places, force: FloatArray) -> Patch:
+    """The bristles of these numbers as a patch, under the forces [k, 2] N on all."""
+    near = np.empty((3, which.size, which.size))
+    for i, k in enumerate(which):
+        for j in range(which.size):
+            row = pad.same + pad.place[which[j]] - pad.place[k]
+            for component in range(3):
+                near[component, i, j] = pad.influence[row, component]
+    moved = np.zeros((2, which.size))
+    for i, k in enumerate(which):
+        spread(near, i, force[k, 0], force[k, 1], moved)
+    return Patch(which, near, moved)
+
+
+@compiled
+def settle(
+    pad: Pad,
+    patch: Patch,
+    limit: FloatArray,
+    pose: FloatArray,
+    force: FloatArray,
+    offset: FloatArray,
+    slips: BoolArray,
+    sweeps: int,
+) -> None:
+    """Let what touches follow an object at ``pose`` [3] (m, m, rad), each bristle up to its ``limit`` [k] N, in place.
+
+    Projected Gauss-Seidel on the displacement of the surface by all forces, from the last step's forces. What changed
+    by less than ``WORLD.rest`` of its limit waits for the next step. What was cut to its limit is offset by what it
+    lacks.
     """
     x, y, yaw = pose
-    touching = np.flatnonzero(limit > 0.0)
-    for k in np.flatnonzero(limit == 0.0):
-        force[k], offset[k] = 0.0, np.nan
-    wanted = np.empty((touching.size, 2))
-    for i, k in enumerate(touching):
-        shorten(force[k], limit[k])
-        wanted[i, 0], wanted[i, 1] = x - yaw * pad.y[k], y + yaw * pad.x[k]
-    moved = displaced(pad, touching, touching, force)
-    for i, k in enumerate(touching):
+    along_x, along_y = pad.influence[pad.same, 0], pad.influence[pad.same, 1]
+    cut = np.zeros(patch.which.size, np.bool_)
+    for i, k in enumerate(patch.which):
         if np.isnan(offset[k, 0]):  # touches anew: where the surface is, it sticks
-            offset[k] = wanted[i] - moved[i]
+            offset[k, 0] = x - yaw * pad.y[k] - patch.moved[0, i]
+            offset[k, 1] = y + yaw * pad.x[k] - patch.moved[1, i]
     for _ in range(sweeps):
-        for i, k in enumerate(touching):
-            before_x, before_y = force[k, 0], force[k, 1]
-            force[k, 0] += (wanted[i, 0] - offset[k, 0] - moved[i, 0]) / pad.influence[pad.same, 0]
-            force[k, 1] += (wanted[i, 1] - offset[k, 1] - moved[i, 1]) / pad.influence[pad.same, 1]
-            shorten(force[k], limit[k])
-            spread(pad, int(k), force[k, 0] - before_x, force[k, 1] - before_y, touching, moved)
-    slips[:] = False
-    for i, k in enumerate(touching):
-        factor = math.hypot(force[k, 0], force[k, 1]) / limit[k]
-        slips[k] = factor >= _AT_LIMIT
-        if factor >= _CUT:
-            offset[k] = wanted[i] - moved[i]
+        rests = True
+        for i, k in enumerate(patch.which):
+            more_x = (x - yaw * pad.y[k] - offset[k, 0] - patch.moved[0, i]) / along_x
+            more_y = (y + yaw * pad.x[k] - offset[k, 1] - patch.moved[1, i]) / along_y
+            held = force[k, 0] ** 2 + force[k, 1] ** 2 <= limit[k] ** 2
+            if held and more_x**2 + more_y**2 <= (_REST * limit[k]) ** 2:
+                continue
+            wanted_x, wanted_y = force[k, 0] + more_x, force[k, 1] + more_y
+            share = min(limit[k] / math.hypot(wanted_x, wanted_y), 1.0)
+            spread(patch.near, i, share * wanted_x - force[k, 0], share * wanted_y - force[k, 1], patch.moved)
+            force[k, 0], force[k, 1] = share * wanted_x, share * wanted_y
+            cut[i], rests = share < 1.0, False
+        if rests:
+            break
+    for i, k in enumerate(patch.which):
+        slips[k] = math.hypot(force[k, 0], force[k, 1]) >= _AT_LIMIT * limit[k]
+        if cut[i]:
+            offset[k, 0] = x - yaw * pad.y[k] - patch.moved[0, i]
+            offset[k, 1] = y + yaw * pad.x[k] - patch.moved[1, i]
 
 
 @compiled
-def shorten(vector: FloatArray, limit: float) -> None:
-    """Cut a vector [2] to the length ``limit``, in place."""
-    length = math.hypot(vector[0], vector[1])
-    if length > limit:
-        vector *= limit / length
-
-
-@compiled
-def displaced(pad: Pad, at: Places, loaded: Places, force: FloatArray) -> FloatArray:
-    """Displacement [i, 2] m of the bristles ``at`` by the ``force`` on those that are ``loaded``."""
-    moved = np.zeros((at.size, 2))
-    for k in loaded:
-        spread(pad, int(k), force[k, 0], force[k, 1], at, moved)
+def displaced(pad: Pad, force: FloatArray) -> FloatArray:
+    """Displacement [k, 2] m of all bristles by the ``force`` [k, 2] N on them."""
+    moved = np.zeros(force.shape)
+    for k in np.flatnonzero((force[:, 0] != 0.0) | (force[:, 1] != 0.0)):
+        for j in range(len(moved)):
+            x, y, turned = pad.influence[pad.same + pad.place[j] - pad.place[k]]
+            moved[j, 0] += x * force[k, 0] + turned * force[k, 1]
+            moved[j, 1] += turned * force[k, 0] + y * force[k, 1]
     return moved
 
 
-@compiled
-def spread(pad: Pad, source: int, force_x: float, force_y: float, at: Places, moved: FloatArray) -> None:
-    """Add the displacement by a force (N) on one bristle to that of the bristles ``at``, [i, 2] m, in place."""
-    origin = pad.same - pad.place[source]
-    for i in range(at.size):
-        x, y, turned = pad.influence[origin + pad.place[at[i]]]
-        moved[i, 0] += x * force_x + turned * force_y
-        moved[i, 1] += turned * force_x + y * force_y
+@compiled(fastmath={"contract"})
+def spread(near: FloatArray, source: int, force_x: float, force_y: float, moved: FloatArray) -> None:
+    """Add the displacement by a force (N) on one bristle of a patch to that of all its bristles, [2, i] m, in place."""
+    along_x, along_y, across = near[0, source], near[1, source], near[2, source]
+    moved_x, moved_y = moved[0], moved[1]
+    for j in range(moved_x.size):
+        moved_x[j] += along_x[j] * force_x + across[j] * force_y
+        moved_y[j] += across[j] * force_x + along_y[j] * force_y
 
 
 @compiled
-def on_object(pad: Pad, force: FloatArray, side: float) -> FloatArray:
-    """Force and moment that the object meets from one finger, in the first finger's frame, [3] N, N, N·m."""
+def on_object(pad: Pad, which: Places, force: FloatArray, side: float) -> FloatArray:
+    """Force and moment that the object meets from these bristles, in the first finger's frame, [3] N, N, N·m."""
     total = np.zeros(3)
-    for k in range(pad.x.size):
+    for k in which:
         total[0] += force[k, 0]
         total[1] += side * force[k, 1]
         total[2] += side * (pad.x[k] * force[k, 1] - pad.y[k] * force[k, 0])

@@ -12,7 +12,7 @@ from slipcore.contact.effects.sensor_sampling import SensorSampling
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import Component, HalfSpace
 from slipcore.contact.plan.description import Finger
-from slipcore.contact.reduced.kernel import Bristles, Pad, Steps, advance, displaced, pressures
+from slipcore.contact.reduced.kernel import Bristles, Pad, Steps, advance, depths, displaced, pressures
 from slipcore.contact.reference.checks import check_range
 from slipcore.contact.reference.elastic_pair import half_space
 from slipcore.contact.reference.hertz import HertzContact
@@ -127,7 +127,8 @@ class WorldState(NamedTuple):
     def slipped(self) -> FloatArray:
         """How far the middle of each contact has slipped, [f] m: nothing unless all of it does."""
         n, m = self.slip.shape[1:]
-        return np.asarray(np.hypot(*np.moveaxis(self.offset[:, n // 2, m // 2], -1, 0)))
+        along, across = self.offset[:, n // 2, m // 2].T
+        return np.asarray(np.hypot(along, across))
 
 
 def init(world: World, normal_force: float) -> WorldState:
@@ -187,13 +188,11 @@ def step(world: World, state: WorldState, command: ArrayLike, load: Load, durati
 
 def observe(world: World, state: WorldState, finger: int = 0, generator: np.random.Generator | None = None) -> Frame:
     """What the sensor of one finger sees, as a detector takes it; without a ``generator`` there is no noise."""
-    contact = world.contact(float(state.normal_force[finger]))
-    radius = np.hypot(*np.moveaxis(world.position[..., :2], -1, 0))
-    force = np.concatenate([state.force[finger], -_normal(world, state, finger)[..., None]], axis=-1)
+    points, normal = world.friction.shape[1:], float(state.normal_force[finger])
     shear = state.force[finger].reshape(-1, 2)
-    sideways = displaced(state.pad, np.arange(radius.size), np.flatnonzero(shear.any(axis=1)), shear)
-    depth = -contact.normal_displacement(radius)[..., None]
-    displacement = np.concatenate([sideways.reshape(*radius.shape, 2), depth], axis=-1)
+    force = np.column_stack([shear, -pressures(state.pad, normal)]).reshape(*points, 3)
+    depth = depths(state.pad, normal, world.finger.radius)
+    displacement = np.column_stack([displaced(state.pad, shear), -depth]).reshape(*points, 3)
     if generator is not None:
         displacement = displacement + world.marker_noise * generator.standard_normal(displacement.shape)
         force = force + world.force_noise * generator.standard_normal(force.shape)

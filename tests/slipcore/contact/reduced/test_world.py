@@ -9,7 +9,7 @@ from slipcore import SlipDetector
 from slipcore.contact import Finger, Press, Scene, reduced, simulate
 from slipcore.contact.effects import SensorSampling, TangentialLoad
 from slipcore.contact.reduced import GRAVITY, Load, World, WorldState
-from slipcore.contact.reference import CattaneoMindlin, ReissnerSagoci
+from slipcore.contact.reference import CattaneoMindlin, MindlinDeresiewicz, ReissnerSagoci
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray
 
@@ -99,6 +99,31 @@ def test_a_normal_force_that_falls_leaves_what_a_load_leaves() -> None:
     exact = CattaneoMindlin(contact, FRICTION, 0.4 * SLIDING).stick_radius
     found = contact.contact_radius * math.sqrt(reduced.stick_ratio(world, state))
     assert abs(found - exact) < 0.5 * world.sampling.pitch
+
+
+def test_a_load_that_goes_back_slowly_goes_back_as_mindlin_and_deresiewicz_have_it() -> None:
+    """What changes by less than a step takes notice of may wait, but is not lost."""
+    world = world_of()
+    state, exact = pulled(world, 0.8 * SLIDING), MindlinDeresiewicz(world.contact(FORCE), FRICTION)
+    exact = exact.load(FORCE, 0.8 * SLIDING)
+    for step in range(1, 181):
+        force = SLIDING * (0.8 - 0.6 * step / 180)
+        state = reduced.step(world, state, FORCE, Load(MASS, 1.0, (force, 0.0)), FRAME)
+    exact = exact.load(FORCE, 0.2 * SLIDING)
+    assert state.pose[0] == pytest.approx(exact.rigid_displacement, rel=0.05)
+    assert (
+        exact.rigid_displacement
+        > 1.5 * CattaneoMindlin(world.contact(FORCE), FRICTION, 0.2 * SLIDING).rigid_displacement
+    )
+    shear, pressing = np.hypot(*np.moveaxis(state.force[0], -1, 0)), -reduced.observe(world, state).force[..., 2]
+    assert (shear <= FRICTION * pressing * (1.0 + 1e-12)).all()
+
+
+def test_the_surface_is_pressed_in_as_hertz_has_it() -> None:
+    world = world_of()
+    radius = np.hypot(*np.moveaxis(world.position[..., :2], -1, 0))
+    seen = reduced.observe(world, reduced.init(world, FORCE)).displacement[..., 2]
+    np.testing.assert_allclose(-seen, world.contact(FORCE).normal_displacement(radius), rtol=1e-12)
 
 
 def test_the_boundary_elements_see_the_same() -> None:
