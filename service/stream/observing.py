@@ -45,8 +45,10 @@ class Observer:
 
     def _samples(self, forces: ElementForces) -> SlipSamples | None:
         """Friction where elements slip: well pressed, slipping for ``WINDOW`` frames, and fast enough to be seen."""
+        slips = np.logical_and.reduce([state.slip for state in self.last])
+        if len(self.last) < WINDOW or not slips.any():
+            return None
         velocity = np.nan_to_num(np.mean([state.velocity for state in self.last], axis=0))
-        slips = np.all([state.slip for state in self.last], axis=0) & (len(self.last) == WINDOW)
         pressed = forces.pressing > LEAST_SHARE * forces.pressing.max()
         use = slips & pressed & (np.hypot(velocity[..., 0], velocity[..., 1]) > LEAST_SPEED)
         return SlipSamples(forces.tangential[use] / forces.pressing[use], forces.pressing[use]) if use.any() else None
@@ -56,9 +58,10 @@ def _torque(place: FloatArray, force: FloatArray) -> float:
     """Of forces [n, m, 3] N at ``place`` [n, m, 2] m about the normal through their centre of pressure, N·m: about any
     other point the tangential force would add to it. 0 where nothing presses.
     """
-    pressing = np.maximum(-force[..., 2], 0.0)
+    along, across, outward = force.reshape(-1, 3).T
+    pressing = np.maximum(-outward, 0.0)
     if not pressing.any():
         return 0.0
-    centre = np.tensordot(pressing, place, 2) / pressing.sum()
-    x, y = np.moveaxis(place - centre, -1, 0)
-    return float((x * force[..., 1] - y * force[..., 0]).sum())
+    places = place.reshape(-1, 2)
+    x, y = (places - pressing @ places / pressing.sum()).T
+    return float(x @ across - y @ along)
