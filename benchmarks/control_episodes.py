@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -18,8 +18,8 @@ from service.stream.observing import Observer
 from slipcore import SlipDetector
 from slipcore.contact import reduced
 from slipcore.contact.effects import SensorSampling
-from slipcore.contact.reduced import Load, World, WorldState
-from slipcore.frames import BoolArray, FloatArray
+from slipcore.contact.reduced import Load, World
+from slipcore.frames import BoolArray, FloatArray, Frame
 from slipcore.slip_state import stick_ratio
 from stiction_client import Contact, Observation
 
@@ -67,6 +67,24 @@ class Strategy(Protocol):
         """The command after a frame."""
 
 
+class Physics(Protocol):
+    """What moves a world on and sees it, as ``slipcore.contact.reduced`` does; its states have ``time``,
+    ``normal_force`` and ``slipped``.
+    """
+
+    def init(self, world: World, normal_force: float) -> Any:
+        """Fingers at rest."""
+
+    def step(self, world: World, state: Any, command: FloatArray, load: Load, duration: float) -> Any:
+        """The world after a while."""
+
+    def observe(self, world: World, state: Any, finger: int, generator: np.random.Generator) -> Frame:
+        """What the sensor of one finger sees."""
+
+    def stick_ratio(self, world: World, state: Any, finger: int) -> float:
+        """The true one."""
+
+
 @dataclass(frozen=True, eq=False)
 class Episode:
     """Arrays over the frames: ``time`` s; and [frames, fingers] of ``normal`` force, its ``command`` and the ``least``
@@ -105,65 +123,66 @@ def contact_of(world: World) -> Contact:
     return Contact.round(math.pi * world.contact(5.0).contact_radius ** 2, at_force=5.0)
 
 
-def run(task: Task, world: World, strategies: Sequence[Strategy], seed: int, missed: float = 0.0) -> Episode:
+def run(
+    task: Task,
+    world: World,
+    strategies: Sequence[Strategy],
+    seed: int,
+    missed: float = 0.0,
+    physics: Physics = reduced,  # type: ignore[assignment]
+) -> Episode:
     """One episode with a strategy for each finger; ends when the object is lost or the task is over.
 
     ``missed``: share of the elements whose slip the detector never tells.
     """
     generator = np.random.default_rng([seed, 1])
     sensors = [_Sensor(world, finger, generator, missed) for finger in range(len(strategies))]
-    state, commands, rows = reduced.init(world, START), np.full(len(strategies), START), []
+    state, commands, rows = physics.init(world, START), np.full(len(strategies), START), []
     for count in range(1, round(task.seconds / FRAME) + 1):
         load = task.load(count * FRAME)
-        state = reduced.step(world, state, commands, load, FRAME)
-        seen = [sensor(state) for sensor in sensors]
+        state = physics.step(world, state, commands, load, FRAME)
+        frames = [physics.observe(world, state, sensor.finger, generator) for sensor in sensors]
+        seen = [sensor(frame) for sensor, frame in zip(sensors, frames, strict=True)]
         commands = np.array([strategy(each) for strategy, each in zip(strategies, seen, strict=True)])
-        rows.append(_row(world, state, load, commands, seen))
+        sticks = [physics.stick_ratio(world, state, sensor.finger) for sensor in sensors]
+        rows.append(_row(world, state, load, commands, sticks, seen))
         if state.slipped.max() > LOST:
             break
     time, *columns = (np.array(column) for column in zip(*rows, strict=True))
-    freed = not task.opens or _freed(world, state, task.load(task.seconds))
+    freed = not task.opens or _freed(world, state, task.load(task.seconds), physics)
     return Episode(task.name, task.limit, time, *columns, freed)
 
 
-def _freed(world: World, state: WorldState, load: Load) -> bool:
+def _freed(world: World, state: Any, load: Load, physics: Physics) -> bool:
     """Whether the object leaves the gripper that opens; where it is apart, how far it slipped is NaN."""
     held = state.normal_force
     for count in range(round((OPENING + FALLING) / FRAME)):
         opening = max(1.0 - count * FRAME / OPENING, 0.0)
-        state = reduced.step(world, state, opening * held, load, FRAME)
+        state = physics.step(world, state, opening * held, load, FRAME)
         if not (state.slipped <= LOST).all():
             return True
     return False
 
 
 def _row(
-    world: World, state: WorldState, load: Load, commands: FloatArray, seen: list[Observation]
+    world: World, state: Any, load: Load, commands: FloatArray, sticks: list[float], seen: list[Observation]
 ) -> tuple[object, ...]:
-    fingers = range(len(commands))
-    return (
-        state.time,
-        state.normal_force,
-        commands,
-        [least_force(world, load, finger) for finger in fingers],
-        [reduced.stick_ratio(world, state, finger) for finger in fingers],
-        [each.stick_ratio for each in seen],
-        state.slipped,
-    )
+    least = [least_force(world, load, finger) for finger in range(len(commands))]
+    told = [each.stick_ratio for each in seen]
+    return state.time, state.normal_force, commands, least, sticks, told, state.slipped
 
 
 class _Sensor:
     """One finger's sensor with its detector."""
 
     def __init__(self, world: World, finger: int, generator: np.random.Generator, missed: float) -> None:
-        self.world, self.finger, self.generator = world, finger, generator
+        self.finger = finger
         self.detector = SlipDetector(world.position, world.element_area)
         self.seen: BoolArray = generator.random(POINTS) >= missed
         self.observer = Observer(world.position)
 
-    def __call__(self, state: WorldState) -> Observation:
-        """The world as a controller takes it."""
-        frame = reduced.observe(self.world, state, self.finger, self.generator)
+    def __call__(self, frame: Frame) -> Observation:
+        """A frame as a controller takes it."""
         found = self.detector.step(frame.time, frame.displacement, frame.force)
         slip = found.slip & self.seen
         told = dataclasses.replace(found, slip=slip, stick_ratio=stick_ratio(found.contact, slip))
@@ -171,7 +190,7 @@ class _Sensor:
         return seen
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=2048)
 def least_force(world: World, load: Load, finger: int = 0) -> float:
     """Normal force, N, at which a finger could just bear its share of the load at rest (elliptic limit surface)."""
     x, y, moment = (part / len(world.friction) for part in load.resultant())

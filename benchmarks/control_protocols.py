@@ -7,8 +7,9 @@ learn nothing of, before a lift of 1 N loses it. Writes control_protocols.json.
 
 import numpy as np
 
-from benchmarks.control import HELD, episode
+from benchmarks.control import episode
 from benchmarks.control_episodes import Task
+from benchmarks.control_outcomes import HELD
 from benchmarks.control_strategies import STRATEGIES
 from benchmarks.control_tasks import PROTOCOLS, slippery
 from benchmarks.pages import options, table, write

@@ -154,15 +154,20 @@ def exploration(world: World, finger: int) -> tuple[float, float]:
     return float(np.mean(ratios)), state.time
 
 
-STRATEGIES = {
+CONTROLLERS = {
     "known": Approach(partial(with_model, 1.0)),
     "unknown": Approach(without_model),
+}
+MISLED = {
     "known, half of slip missed": Approach(partial(with_model, 1.0), missed=0.5),
     "unknown, half of slip missed": Approach(without_model, missed=0.5),
     "model 40 % too high": Approach(partial(with_model, 1.4)),
     "model 40 % too low": Approach(partial(with_model, 0.6)),
+}
+BASELINES = {
     f"fixed μ = {FIXED:g}": Approach(fixed),
     "stick ratio alone": Approach(by_stick_ratio),
     "slip reflex": Approach(reflex),
     "explored before": Approach(explored),
 }
+STRATEGIES = CONTROLLERS | MISLED | BASELINES

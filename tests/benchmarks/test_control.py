@@ -1,14 +1,18 @@
 import dataclasses
 import math
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from benchmarks.control import FRAME, SIGNATURES, episode, scores
-from benchmarks.control_episodes import START, Episode, least_force, run, world_of
+from benchmarks import control
+from benchmarks.control import campaign, episode
+from benchmarks.control_episodes import FRAME, START, Episode, least_force, run, world_of
+from benchmarks.control_outcomes import SIGNATURES, outcome_of, scores
 from benchmarks.control_strategies import EXPLORED_SLIP, Fixed, Reflex, exploration, settings_of
-from benchmarks.control_tasks import LIFTS, PAPER, TASKS
+from benchmarks.control_tasks import ALL, LIFTS, PAPER, STEP, TASKS
 from slipcore.contact.reduced import GRAVITY, Load
 from stiction_client import Contact, Observation
 
@@ -34,7 +38,7 @@ def test_two_fingers_share_the_load() -> None:
 
 @pytest.mark.parametrize("name", ["known", "unknown", "known, half of slip missed"])
 def test_the_controller_holds_a_lift_seen_by_the_real_detector(name: str) -> None:
-    score = scores(name, [episode(dataclasses.replace(TASK, seconds=2.5), name, 0)])
+    score = scores(name, [outcome_of(episode(dataclasses.replace(TASK, seconds=2.5), name, 0), name, 0)])
     assert score["held"] == "1/1"
     assert 1.0 < float(str(score["final"])) < 2.6
 
@@ -83,12 +87,14 @@ def made(normal: list[float], **changed: Any) -> Episode:
 
 def test_scores_are_of_what_was_held() -> None:
     lost = np.array([[0.0], [0.0], [9e-3]])
-    score = scores("x", [made([2.0, 3.0, 1.5]), made([2.0, 0.5, 0.5], slipped=lost), made([3.0, 3.0, 2.5], limit=2.7)])
+    made_ = [made([2.0, 3.0, 1.5]), made([2.0, 0.5, 0.5], slipped=lost), made([3.0, 1.2, 1.2], limit=2.7)]
+    score = scores("x", [outcome_of(each, "x", seed) for seed, each in enumerate(made_)])
     assert score["held"] == "2/3"
     assert score["crushed"] == "1/1"
     assert score["peak"] == 3.0
-    assert score["final"] == 2.0
-    assert score["final_worst"] == 2.5
+    assert score["final"] == pytest.approx(1.35)
+    assert score["as_asked"] == 50.0
+    assert score["final_worst"] == 1.5
     assert score["slip_mm"] == pytest.approx(9.0)
     assert score["reaction_ms"] == pytest.approx(2e3 * FRAME)
 
@@ -96,13 +102,43 @@ def test_scores_are_of_what_was_held() -> None:
 def test_signatures_tell_the_paper_s_from_others() -> None:
     cap, knife, block = SIGNATURES
     rises = made([1.0] * 4 + [4.0] + [4.5 + 0.2 * count for count in range(9)])
-    assert cap.tell([rises, made([1.0 + 0.1 * count for count in range(14)])]).endswith("1/2")
-    assert knife.tell([made([1.0] * 4 + [2.0] * 2 + [3.0, 1.5]), made([2.0] * 7 + [2.5])]).endswith("1/2")
+    even = made([1.0 + 0.1 * count for count in range(14)])
+    assert cap.tell([cap.ratio(rises), cap.ratio(even)]).endswith("1/2")
+    falls, rose = made([1.0] * 4 + [2.0] * 2 + [3.0, 1.5]), made([2.0] * 7 + [2.5])
+    assert knife.tell([knife.ratio(falls), knife.ratio(rose)]).endswith("1/2")
     two = np.array([[3.0, 2.0]])
     faces = [dataclasses.replace(made([3.0]), normal=normal) for normal in (two, two[:, ::-1])]
-    assert block.tell(faces).endswith("1/2")
+    assert block.tell([block.ratio(each) for each in faces]).endswith("1/2")
+    assert outcome_of(dataclasses.replace(made([3.0]), task=block.task.name, normal=two), "x", 0).signature == 1.5
+    assert math.isnan(outcome_of(made([3.0]), "x", 0).signature)
+
+
+def test_a_campaign_goes_on_where_it_was_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[int, int, list[str]]] = []
+
+    def outcomes(job: tuple[int, int, list[str]]) -> list[control.Outcome]:
+        asked.append(job)
+        task, seed, names = job
+        return [outcome_of(dataclasses.replace(made([2.0]), task=ALL[task].name), name, seed) for name in names]
+
+    monkeypatch.setattr(control, "ProcessPoolExecutor", lambda processes: ThreadPoolExecutor(processes))
+    monkeypatch.setattr(control, "_outcomes", outcomes)
+    keep = tmp_path / "kept.jsonl"
+    first = list(campaign({"known": 2}, 1, keep))
+    assert len(first) == len(asked) == 2 * len(ALL)
+    asked.clear()
+    again = list(campaign({"known": 2, "unknown": 1}, 1, keep))
+    assert asked == [(task, 0, ["unknown"]) for task in range(len(ALL))]
+    assert [each[:3] for each in again[: len(first)]] == [each[:3] for each in first]
+    assert len(list(campaign({"known": 1}, 1, keep))) == len(ALL)
 
 
 def test_there_are_twelve_lifts_and_the_paper_s_six_tasks_by_names_of_their_own() -> None:
     assert (len(LIFTS), len(PAPER)) == (12, 6)
-    assert len({task.name for task in TASKS}) == 18
+    assert len({task.name for task in ALL}) == 19
+
+
+def test_a_step_of_load_comes_faster_than_the_paper_s_sudden_load() -> None:
+    sudden = next(task for task in PAPER if task.name == "sudden load and twist")
+    assert STEP.load(4.03).resultant() == pytest.approx(sudden.load(4.15).resultant())
+    assert STEP not in TASKS
