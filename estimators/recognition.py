@@ -57,21 +57,24 @@ def log_predictive(
 ) -> float:
     """Log density of the data behind a triangle [4, 4] in (1, v, f_n | μ), up to what only the data decide.
 
-    Multivariate Student-t on ``freedom`` degrees of freedom about X ``mean`` with scale matrix ``scale``² I + X
-    ``covariance`` Xᵀ (Gelman et al., BDA3, §14.2), through a factor of 7 × 4: nothing of the size n is formed.
+    Multivariate Student-t on ``freedom`` degrees of freedom (infinite: normal) about X ``mean`` with scale matrix
+    ``scale``² I + X ``covariance`` Xᵀ (Gelman et al., BDA3, §14.2), through a factor of 7 × 4: nothing of the size n is
+    formed.
     """
     values, vectors = np.linalg.eigh(covariance / scale**2)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     rows = np.column_stack([triangle[:, :3] @ root, triangle[:, 3] - triangle[:, :3] @ mean])
     updated = upper_triangle(np.concatenate([np.eye(3, 4), rows]))
-    square = float(updated[3, 3]) ** 2 / (freedom * scale**2)
+    square, determinant = float(updated[3, 3] / scale) ** 2, np.log(np.diag(updated)[:3]).sum()
+    if math.isinf(freedom):
+        return float(-0.5 * effective_n * np.log(2.0 * scale**2) - determinant - 0.5 * square)
     total = freedom + effective_n
     return float(
         special.gammaln(0.5 * total)
         - special.gammaln(0.5 * freedom)
         - 0.5 * effective_n * np.log(freedom * scale**2)
-        - np.log(np.diag(updated)[:3]).sum()
-        - 0.5 * total * np.log1p(square)
+        - determinant
+        - 0.5 * total * np.log1p(square / freedom)
     )
 
 

@@ -43,6 +43,18 @@ def test_log_predictive_is_the_dense_student_density(samples: Make) -> None:
     np.testing.assert_allclose(found[0] - found[1], wanted[0] - wanted[1], rtol=1e-8)  # π's part left out of both
 
 
+def test_log_predictive_without_bounds_on_freedom_is_the_dense_normal_density(samples: Make) -> None:
+    data = samples(12)
+    x = np.column_stack([np.ones(12), data.tangential_velocity, data.normal_force])
+    triangle = np.linalg.qr(np.column_stack([x, data.friction_coefficient]))[1]
+    mean, covariance, scale = np.array([0.4, 2.0, -0.8]), np.diag([0.01, 1.0, 0.1]), 0.02
+    dense = stats.multivariate_normal(x @ mean, scale**2 * np.eye(12) + x @ covariance @ x.T)
+    wanted = dense.logpdf(data.friction_coefficient) + 6.0 * np.log(np.pi)  # π's part is left out
+    known, nearly = (log_predictive(triangle, 12.0, mean, covariance, scale, freedom) for freedom in (np.inf, 1e7))
+    np.testing.assert_allclose(known, wanted, rtol=1e-9)  # the same factorisation in another order
+    np.testing.assert_allclose(nearly, known, rtol=1e-5)  # the first term left out is n²/(4·1e7)
+
+
 def test_ten_materials_are_told_apart_with_calibrated_probabilities(samples: Make) -> None:
     known, right, claimed = library(samples), 0, []
     rng = np.random.default_rng(0)
