@@ -45,10 +45,12 @@ def backup(database: Database, blobs: BlobStore, folder: Path, report: Report) -
     """Copy everything into a folder, as of one moment of the database; blobs that are there already are kept.
 
     May run beside the service. Running jobs are copied as queued ones. Raises ``SchemaMismatch``, ``NotEmpty`` if the
-    folder has another backup or is getting one, ``NotFound`` for a file that is missing, and ``StorageUnavailable`` on
-    a full disk.
+    folder has another backup, is getting one, or is among the blobs, ``NotFound`` for a file that is missing, and
+    ``StorageUnavailable`` on a full disk.
     """
     migrate.check(database)
+    if blobs.has_within(folder):
+        raise NotEmpty(str(blobs), "a folder outside of it")
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / FILE
     unfinished = file.with_suffix(".part")

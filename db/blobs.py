@@ -126,6 +126,11 @@ class BlobStore:
         """Whether the blobs are in an object store."""
         return self._remote is not None
 
+    def has_within(self, folder: Path) -> bool:
+        """Whether a folder is, or is to be, among the store's own files."""
+        place = folder.resolve()
+        return any(place.is_relative_to(part.resolve()) for part in (self._blobs, self._spool))
+
     def spool(self) -> Spool:
         """A new file to write to; use it in a ``with`` statement."""
         with disk_errors_named():

@@ -3,7 +3,8 @@
 import asyncio
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -13,7 +14,7 @@ import httpx
 from stiction_client import calls
 from stiction_client.calls import Call, Ended, Pause, Reply, Request, T
 from stiction_client.container import GraspLogLike
-from stiction_client.errors import ConnectionFailed
+from stiction_client.errors import ConnectionFailed, InvalidArgument
 from stiction_client.model import FrictionModel
 from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt, Job, Material, NextGrasp, Recognition
 
@@ -27,6 +28,9 @@ CONNECT_TIMEOUT = 5.0
 
 JOB_TIMEOUT = 300.0
 """s; a fit of 200,000 samples takes seconds, a queue before it may take minutes."""
+
+SHOWN_URL = 80
+"""Characters of an address that an error shows."""
 
 
 class FrictionClient:
@@ -461,11 +465,24 @@ class AsyncFrictionClient:
 
 def _options(url: str | None, key: str | None, timeout: float) -> dict[str, Any]:
     key = os.environ.get("STICTION_KEY") if key is None else key
+    url = os.environ.get("STICTION_URL", DEFAULT_URL) if url is None else url
+    with _address_checked(url):
+        base_url = httpx.URL(url)
     return {
-        "base_url": os.environ.get("STICTION_URL", DEFAULT_URL) if url is None else url,
+        "base_url": base_url,
         "headers": {"Authorization": f"Bearer {key}"} if key else {},
         "timeout": httpx.Timeout(timeout, connect=min(timeout, CONNECT_TIMEOUT)),
     }
+
+
+@contextmanager
+def _address_checked(url: str) -> Iterator[None]:
+    """Say whose fault it is that ``url`` cannot be asked."""
+    try:
+        yield
+    except (httpx.InvalidURL, UnicodeError) as error:
+        shown = ascii(url) if len(url) <= SHOWN_URL else f"{url[:SHOWN_URL]!a}… ({len(url)} characters)"
+        raise InvalidArgument("address", f"{shown} ({error})", f"one such as {DEFAULT_URL}, in UTF-8") from error
 
 
 def _http_request(http: httpx.Client | httpx.AsyncClient, request: Request) -> httpx.Request:
@@ -478,15 +495,16 @@ def _http_request(http: httpx.Client | httpx.AsyncClient, request: Request) -> h
     limits = http.timeout.as_dict()
     if limits["read"] is not None:
         limits["read"] += request.patience
-    return http.build_request(
-        request.method,
-        request.path,
-        params=dict(request.params),
-        json=request.json,
-        content=request.content,
-        headers=headers,
-        timeout=httpx.Timeout(**limits),
-    )
+    with _address_checked(request.path):
+        return http.build_request(
+            request.method,
+            request.path,
+            params=dict(request.params),
+            json=request.json,
+            content=request.content,
+            headers=headers,
+            timeout=httpx.Timeout(**limits),
+        )
 
 
 def _broken(request: Request, error: httpx.RequestError) -> ConnectionFailed:

@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -25,7 +25,7 @@ from service.cli import (
     simulation,
     streaming,
 )
-from service.cli.exit_codes import INTERRUPTED, exit_code, message
+from service.cli.exit_codes import INPUT_REFUSED, INTERRUPTED, exit_code, message
 
 app = typer.Typer(
     name="stiction",
@@ -92,11 +92,22 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except (SystemExit, KeyboardInterrupt) as end:
         if isinstance(end, SystemExit) and end.code != INTERRUPTED:
             raise
-        typer.echo("stiction: interrupted; nothing is left half written", err=True)
-        sys.exit(INTERRUPTED)
+        _leave("interrupted; nothing is left half written", INTERRUPTED)
     except Exception as error:
+        garbled = _garbled(sys.argv[1:] if arguments is None else arguments)
+        if isinstance(error, UnicodeEncodeError) and garbled is not None:
+            _leave(f"argument {garbled!a} is not UTF-8; allowed: UTF-8, but in names of files", INPUT_REFUSED)
         code = exit_code(error)
         if code is None:
             raise
-        typer.echo(f"stiction: {message(error)}", err=True)
-        sys.exit(code)
+        _leave(message(error), code)
+
+
+def _leave(said: str, code: int) -> NoReturn:
+    typer.echo(f"stiction: {said}", err=True)
+    sys.exit(code)
+
+
+def _garbled(arguments: Sequence[str]) -> str | None:
+    """The first argument that is not what its system's encoding can read: no database and no address takes it."""
+    return next((each for each in arguments if any("\ud800" <= letter <= "\udfff" for letter in each)), None)

@@ -484,6 +484,21 @@ def test_a_name_that_leads_to_another_route_is_refused_here(ask: Ask, service: S
     assert not server.requests
 
 
+@pytest.mark.parametrize("url", ["http://[::1", "http://\udcff", "http://a:b:c", f"http://{'a' * 100_000}"])
+def test_an_address_that_is_none_is_refused_by_name(url: str) -> None:
+    with pytest.raises(InvalidArgument, match=r"^address is 'http://.*; allowed: one such as http://127") as refused:
+        FrictionClient(url)
+    assert len(str(refused.value)) < 400
+
+
+@pytest.mark.parametrize("actor", ["a" * 100_000, "\udcff"])
+def test_what_fits_into_no_address_is_refused_by_name(ask: Ask, service: Service, actor: str) -> None:
+    server = service({"items": []})
+    with pytest.raises(InvalidArgument, match="address is '/v1/audit"):
+        ask(server, "audit", actor)
+    assert not server.requests
+
+
 @pytest.mark.parametrize("name", ["a/b", "a?b", "a#b", "ä", "a%2fb"])
 def test_a_name_stays_one_segment_of_the_path(ask: Ask, service: Service, answers: SimpleNamespace, name: str) -> None:
     server = service(answers.material)

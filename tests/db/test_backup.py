@@ -108,6 +108,16 @@ def test_a_restored_database_goes_on_with_new_rows(
         assert jobs.claim(session, runners.add(session, "host:2")) is not None
 
 
+@pytest.mark.parametrize("part", ["blobs", "blobs/copy", "spool"])
+def test_a_backup_among_the_blobs_themselves_is_refused(
+    filled: Database, blobs: BlobStore, tmp_path: Path, part: str
+) -> None:
+    with pytest.raises(NotEmpty, match=r"blob folder .* is there already; allowed: a folder outside of it"):
+        backup(filled, blobs, tmp_path / "data" / part, nothing)
+    assert not (tmp_path / "data" / "blobs" / "copy").exists()
+    assert not [*(tmp_path / "data").rglob(FILE)]
+
+
 def test_the_next_backup_copies_new_blobs_only(filled: Database, blobs: BlobStore, tmp_path: Path) -> None:
     told: dict[str, int] = {}
     backup(filled, blobs, tmp_path / "copy", nothing)

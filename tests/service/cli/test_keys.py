@@ -7,6 +7,7 @@ from sqlalchemy import URL
 from db.database import Database
 from db.repositories import access_keys
 from service import cli
+from service.cli.exit_codes import INPUT_REFUSED
 from service.domain.keys import is_key
 
 Capture = pytest.CaptureFixture[str]
@@ -71,3 +72,10 @@ def test_a_key_that_is_not_there_is_named(run) -> None:  # type: ignore[no-untyp
     run("create", "other")
     ended, shown = run("revoke", "0123456789ab")
     assert (ended, " ".join(shown.split())) == (3, "stiction: no access key '0123456789ab' is stored")
+
+
+def test_what_is_no_text_is_refused_by_name(run) -> None:  # type: ignore[no-untyped-def]
+    run("create", "gripper 7", "--scope", "upload")
+    code, text = run("revoke", "\udcff")
+    assert code == INPUT_REFUSED
+    assert text.endswith("stiction: argument '\\udcff' is not UTF-8; allowed: UTF-8, but in names of files\n")
