@@ -20,6 +20,7 @@ MAX_DIRECTORY_BYTES = 64 * 1024
 """Bytes of the zip's own table of contents: about 1,000 members, where a log has 20."""
 
 _DAMAGE = (zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, NotImplementedError, RuntimeError, ValueError)
+_MEMBER = b"PK\x03\x04"
 _END_OF_DIRECTORY, _ZIP64_LOCATOR, _END_BYTES, _LOCATOR_BYTES = b"PK\x05\x06", b"PK\x06\x07", 22, 20
 _ENCRYPTED = 0x1
 _LOCAL_BYTES, _LOCAL_LENGTHS = 30, 26
@@ -43,7 +44,7 @@ def unpacked_bytes(path: Path) -> int:
     Raises ``InvalidInput`` for a zip that is none, or none that is taken.
     """
     with path.open("rb") as stream:
-        is_zip = stream.read(4) == b"PK\x03\x04"
+        is_zip = stream.read(len(_MEMBER)) == _MEMBER
     if not is_zip:
         return path.stat().st_size
     with open_archive(path) as archive:
@@ -107,14 +108,19 @@ def _sound() -> Iterator[None]:
 
 
 def _check_directory(path: Path) -> None:
-    """Bound the table of contents before ``zipfile`` turns each of its entries into an object."""
+    """Bound the table of contents before ``zipfile`` turns each of its entries into an object.
+
+    What stands before the first member, which ``zipfile`` passes over, is refused: to others the file is no zip.
+    """
     with path.open("rb") as stream:
-        length = stream.seek(0, 2)
+        start, length = stream.read(len(_MEMBER)), stream.seek(0, 2)
         stream.seek(max(0, length - _END_BYTES - _LOCATOR_BYTES - 2**16))  # a comment may follow, of up to 2¹⁶ bytes
         tail = stream.read()
     end = tail.rfind(_END_OF_DIRECTORY)
     if end < 0 or len(tail) < end + _END_BYTES:
         raise InvalidInput("file", f"not a complete zip ({length} bytes, no table of contents)", "a complete zip")
+    if start not in {_MEMBER, _END_OF_DIRECTORY}:
+        raise InvalidInput("file", f"a zip behind other bytes (it starts with {start!r})", "nothing before a zip")
     size = int.from_bytes(tail[end + 12 : end + 16], "little")
     zip64 = tail[max(0, end - _LOCATOR_BYTES) : end].startswith(_ZIP64_LOCATOR)
     if zip64 or size > MAX_DIRECTORY_BYTES:

@@ -41,7 +41,7 @@ def read_bag1(path: Path, mapping: FieldMapping | None = None) -> GraspLog:
     """Read a grasp log from a rosbag1 file. Raises ``InvalidInput`` naming the member or topic that is wrong."""
     chosen = with_defaults(mapping or mappings.UNMAPPED)
     columns = MessageColumns(chosen)
-    with _library("rosbag1"):
+    with _library("rosbag1", path):
         bag = Bag1(BoundedPath(path))  # type: ignore[arg-type]
         with bag:
             _bound_chunks(bag)
@@ -65,7 +65,7 @@ def read_bag2(path: Path, mapping: FieldMapping | None = None) -> GraspLog:
 
 
 def _gather_sqlite(path: Path, columns: MessageColumns) -> None:
-    with _library("rosbag2"):
+    with _library("rosbag2", path):
         storage = Sqlite3Reader(path)
         storage.open()
         try:
@@ -133,8 +133,8 @@ def _natural(name: str) -> tuple[int, str]:
 
 
 @contextmanager
-def _library(name: str) -> Iterator[None]:
-    """Answer for a library that meets damaged files with whatever its parts raise."""
+def _library(name: str, path: Path) -> Iterator[None]:
+    """Answer for a library that meets damaged files with whatever its parts raise, and tell nobody their place here."""
     try:
         yield
     except (InvalidInput, MemoryError):
@@ -149,7 +149,7 @@ def _library(name: str) -> Iterator[None]:
         ValueError,
         TypeError,
     ) as error:
-        detail = f"{type(error).__name__}: {error}"[:120]
+        detail = f"{type(error).__name__}: {error}".replace(str(path), "the file")[:120]
         raise InvalidInput("file", f"a truncated or damaged {name} ({detail})", f"a complete {name} file") from error
     except OSError as error:
         if error.errno != errno.EINVAL:  # a place in the file that cannot be

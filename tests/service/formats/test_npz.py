@@ -203,6 +203,14 @@ def test_zip64_is_refused(log: GraspLog, tmp_path: Path) -> None:
         npz.read(path)
 
 
+@pytest.mark.parametrize("before", [b"junk", b"{}", b"\n"])
+def test_a_zip_behind_other_bytes_is_refused(log: GraspLog, tmp_path: Path, before: bytes) -> None:
+    path = tmp_path / "log.npz"
+    path.write_bytes(before + container.encode(log))
+    with pytest.raises(InvalidInput, match="a zip behind other bytes"):
+        npz.read(path)
+
+
 @pytest.mark.parametrize(
     "name", ["../time.npy", "/time.npy", "a/../time.npy", "C:time.npy", "a\\time.npy", "./time.npy"]
 )

@@ -451,8 +451,9 @@ def test_any_cut_of_a_recording_is_refused_by_name(robot_log: GraspLog, write: S
         content = path.read_bytes()
         for part in (0.02, 0.3, 0.7, 0.99):
             cut.write_bytes(content[: int(part * len(content))])
-            with pytest.raises(InvalidInput):
+            with pytest.raises(InvalidInput) as refused:
                 formats.read(cut, mapping=given)
+            assert str(tmp_path) not in str(refused.value), "the place of a file on the server"
 
 
 def robot_log_with_normals(log: GraspLog) -> GraspLog:
