@@ -35,13 +35,17 @@ async def export(
     if not log.has_file:
         raise FileDeleted(f"the file of grasp log {log.id} was deleted, as old uploads are here")
     (source,) = await context.files(owner, [log.sha256], checked_within)
-    with ExitStack() as spools:
+    with ExitStack() as held:
         if name == "npz" and await context.threads.run(owner, formats.identify, source) == "npz":
-            return LogFile(source, spools.pop_all())
+            try:
+                stored = held.enter_context(await context.threads.run(owner, source.open, "rb"))
+            except FileNotFoundError as error:
+                raise FileDeleted(f"the file of grasp log {log.id} has just been deleted") from error
+            return LogFile(Path(f"/dev/fd/{stored.fileno()}"), held.pop_all())  # there, too, once it is deleted
         await room()
-        spool = spools.enter_context(context.blobs.spool())
+        spool = held.enter_context(context.blobs.spool())
         try:
             await context.readers.write(source, spool.path, name, owner)
         except formats.UnsupportedFormat as error:
             raise UnsupportedFormat(error.name, error.value, error.allowed) from error
-        return LogFile(spool.path, spools.pop_all())
+        return LogFile(spool.path, held.pop_all())

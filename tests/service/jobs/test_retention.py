@@ -17,7 +17,10 @@ from db.records import AuditFilter, Claim
 from db.repositories import audit, jobs, uploads
 from db.repositories import blobs as references
 from db.tables import AuditEntryRow, GraspLogRow, JobRow, now
+from service import formats
 from service.cli import main
+from service.http.download import Download
+from service.http.routes import grasp_logs
 from service.jobs import pipeline, retention
 from service.jobs.retention import Retention, prune
 from service.settings import Settings
@@ -235,6 +238,36 @@ def test_a_server_deletes_old_uploads_by_itself(
             done = update(JobRow).values(status="done", finished_at=now(), runner_id=None)
             session.execute(done)
         wait_until(lambda: client.get(f"/v1/grasp-logs/{log}/file").status_code == httpx.codes.GONE, "the file to go")
+
+
+@ONLY_SQLITE
+def test_a_file_that_goes_while_it_is_sent_is_sent_whole(
+    shelf: Shelf, content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = shelf.store(content, 100.0)
+
+    class Slow(Download):
+        async def __call__(self, *asgi: Any) -> None:
+            assert shelf.prune() == 1
+            await super().__call__(*asgi)
+
+    monkeypatch.setattr(grasp_logs, "Download", Slow)
+    assert shelf.file(log).content == content
+    assert shelf.file(log).status_code == httpx.codes.GONE
+
+
+@ONLY_SQLITE
+def test_a_file_that_goes_before_it_is_sent_is_gone(
+    shelf: Shelf, content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log = shelf.store(content, 100.0)
+
+    def identify(path: Path) -> str:  # noqa: ARG001
+        assert shelf.prune() == 1
+        return "npz"
+
+    monkeypatch.setattr(formats, "identify", identify)
+    assert shelf.file(log).json()["type"] == "/problems/file-deleted"
 
 
 @ONLY_SQLITE
