@@ -16,6 +16,7 @@ from service.formats.reading import Readers
 from service.http import access, errors, openapi
 from service.http.authentication import Authentication, Authenticator
 from service.http.context import ServerContext
+from service.http.fair_starts import FairStarts
 from service.http.head_requests import HeadRequests
 from service.http.lookups import Lookups
 from service.http.request_middleware import RequestMiddleware
@@ -105,6 +106,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(HeadRequests)
     app.add_middleware(RequestMiddleware)
     app.add_middleware(ProblemPages)
+    app.add_middleware(FairStarts)
     app.add_middleware(Metering, access_log=access_log)
     app.add_middleware(Lookups, authenticator=authenticator, access_log=access_log)
     app.add_middleware(StartRefusal)

@@ -1,0 +1,45 @@
+"""Requests begin in turns, so that whoever sends many at once keeps the others waiting little."""
+
+import asyncio
+import time
+
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from service.processes.fair_queue import PatientQueue
+
+START_SECONDS = 0.001
+"""s between the starts of two requests of an address: so none has all of the time, nor two in a round of the loop."""
+
+ADDRESSES_AT_ONCE = 8
+"""Whose next request waits for its time; those of further ones wait for these."""
+
+MOST_ADDRESSES = 10_000
+"""Remembered; when there are more, all may begin anew."""
+
+
+class FairStarts:
+    """Lets one request of an address begin in a round of the event loop; its others follow in later ones.
+
+    What a request does before it waits for anything keeps everybody waiting, and for who has no key that is all that is
+    done.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self.app = app
+        self._turns = PatientQueue(ADDRESSES_AT_ONCE, "begun", share=1)
+        self._next: dict[str, float] = {}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one connection."""
+        if scope["type"] == "http":
+            await self._start(scope["client"][0] if scope["client"] else "")
+        await self.app(scope, receive, send)
+
+    async def _start(self, address: str) -> None:
+        async with self._turns.turn(address):
+            seconds = self._next.get(address, 0.0) - time.monotonic()
+            if seconds > 0.0:
+                await asyncio.sleep(seconds)
+            if len(self._next) >= MOST_ADDRESSES:
+                self._next.clear()
+            self._next[address] = time.monotonic() + START_SECONDS
