@@ -15,6 +15,10 @@ ROUTES_AT_ONCE = 4
 """Answered in threads, one of each client: they share one interpreter, and more would only wait for it."""
 
 
+LONG_BODIES = 4
+"""Of JSON, parsed and being answered at once, one of each client: up to 20 MB each."""
+
+
 def _room_for_answers() -> FairQueue:
     return OpenEndedQueue(LONG_ANSWERS, "answered")
 
@@ -23,14 +27,19 @@ def _turns_of_routes() -> FairQueue:
     return PatientQueue(ROUTES_AT_ONCE, "answered", share=1)
 
 
+def _turns_of_bodies() -> FairQueue:
+    return PatientQueue(LONG_BODIES, "parsed", share=1)
+
+
 @dataclass(frozen=True, slots=True)
 class ServerContext(Context):
     """The open stores, the running jobs, the live streams, room for long answers, turns for routes that are answered in
-    threads, and what looks after the stores.
+    threads and for long bodies, and what looks after the stores.
     """
 
     streams: Streams = field(default_factory=Streams)
     answers: FairQueue = field(default_factory=_room_for_answers)
     turns: FairQueue = field(default_factory=_turns_of_routes)
+    long_bodies: FairQueue = field(default_factory=_turns_of_bodies)
     scrub: Scrub | None = None
     watch: StoreWatch | None = None

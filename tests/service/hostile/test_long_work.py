@@ -12,6 +12,7 @@ import pytest
 from db import blobs
 from db.repositories import jobs
 from service.domain import upload
+from service.http import bodies
 
 pytestmark = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
 
@@ -127,6 +128,24 @@ def test_dear_lists(attacker: Any, honest: Any, content: bytes, monkeypatch: pyt
     monkeypatch.setattr(jobs, "list_all", lambda *_: block.wait() or [])  # type: ignore[func-returns-value]
     asked = look_up(honest), send(honest, content), lambda: honest._request("GET", "/v1/materials")
     assert beside(block, lambda: attacker._request("GET", "/v1/jobs"), *asked) == [404, 202, 200]
+
+
+def test_long_json(attacker: Any, honest: Any, content: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    block, parse = Block(), bodies._parse_long
+
+    def slowly(body: bytes) -> Any:
+        if b"hostile" in body:
+            block.wait()
+        return parse(body)
+
+    monkeypatch.setattr(bodies, "_parse_long", slowly)
+
+    def recognise(caller: Any, name: str) -> Callable[[], Awaitable[Any]]:
+        return lambda: caller._request("POST", "/v1/recognise", json={"grasp_log": name, "materials": ["x" * 70_000]})
+
+    asked = look_up(honest), send(honest, content), recognise(honest, "honest")
+    assert beside(block, recognise(attacker, "hostile"), *asked) == [404, 202, 422]
+    assert block.begun == MANY, "one after the other, all were parsed in the end"
 
 
 @pytest.mark.parametrize("path", ["{file}", "/v1/jobs"])
