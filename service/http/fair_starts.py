@@ -18,7 +18,7 @@ MOST_ADDRESSES = 10_000
 
 
 class FairStarts:
-    """Lets one request of an address begin in a round of the event loop; its others follow in later ones.
+    """Lets one request or stream of an address begin in a round of the event loop; its others follow in later ones.
 
     What a request does before it waits for anything keeps everybody waiting, and for who has no key that is all that is
     done.
@@ -31,7 +31,7 @@ class FairStarts:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
-        if scope["type"] == "http":
+        if scope["type"] != "lifespan":
             await self._start(scope["client"][0] if scope["client"] else "")
         await self.app(scope, receive, send)
 
