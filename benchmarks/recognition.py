@@ -1,4 +1,4 @@
-"""Recognition of ten simulated materials from one grasp each: `python -m benchmarks.recognition [--output FOLDER]`.
+"""Recognition of ten simulated materials from one grasp each: `python -m benchmarks.recognition [--method NAME]`.
 
 A material is a plane and two scatters; its model is fitted to eight grasps that differ by an intercept. New grasps of
 5 to 40 samples are recognised: accuracy, a reliability diagram (of those told with probability p, how many are right),
@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 import estimators
 from estimators.defaults import RECOGNITION, REFERENCE
+from estimators.recognition import SLOPES
 from slipcore.samples import FrictionSamples
 
 AREA, MATERIALS, GRASPS, TRIALS = 1e-6, 10, 8, 4000
@@ -24,11 +25,11 @@ SPANS = np.concatenate([[1.0], REFERENCE.spans(AREA)])
 
 
 def material(rng: np.random.Generator) -> tuple[np.ndarray, float]:
-    """Plane and scatter of a material from the population that "unknown" stands for: rough ones differ more."""
-    ratio = np.sqrt(RECOGNITION.scatter_freedom / rng.chisquare(RECOGNITION.scatter_freedom))
-    width = ratio * np.array([RECOGNITION.level, RECOGNITION.slope, RECOGNITION.slope])
-    plane = (np.array([REFERENCE.friction, 0.0, 0.0]) + width * rng.standard_normal(3)) / SPANS
-    return plane, float(ratio * REFERENCE.scatter)
+    """Plane and scatter of a material from the population that "unknown" stands for."""
+    slope = RECOGNITION.slope * rng.choice(SLOPES)
+    changes = np.array([RECOGNITION.level, slope, slope]) * rng.standard_normal(3)
+    plane = (np.array([REFERENCE.friction, 0.0, 0.0]) + changes) / SPANS
+    return plane, REFERENCE.scatter * abs(float(rng.standard_t(RECOGNITION.scatter_freedom)))
 
 
 def grasp(plane: np.ndarray, scatter: float, n: int, rng: np.random.Generator) -> FrictionSamples:
@@ -104,12 +105,14 @@ def main() -> None:
     """Learn, recognise, print, draw."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--output", type=Path, default=Path("benchmark-output"))
-    output = parser.parse_args().output
+    parser.add_argument("--method", default="auto", help="whose models are compared")
+    options = parser.parse_args()
+    output = options.output
     output.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(10)
     truths = [material(rng) for _ in range(MATERIALS)]
     learnt = [[grasp(*truth, 60, rng) for _ in range(GRASPS)] for truth in truths]
-    known = {f"material {k}": estimators.fit(grasps, method="bayes") for k, grasps in enumerate(learnt)}
+    known = {f"material {k}": estimators.fit(grasps, method=options.method) for k, grasps in enumerate(learnt)}
     trials = [trial(rng, truths, known) for _ in range(TRIALS)]
     picture(trials, output / "recognition.png")
     print("\n".join(summary(trials)))

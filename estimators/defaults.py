@@ -338,15 +338,26 @@ class Recognition(Options):
     level: Annotated[float, Option(1e-3, 10.0, "-", "known pairs lie between 0.1 and 1")] = 0.25
     """Standard deviation of β₀ between materials."""
     slope: Annotated[float, Option(1e-4, 10.0, "-", "a fifth of the friction itself")] = 0.1
-    """Standard deviation of each slope between materials, as a change of μ over its reference span."""
+    """Standard deviation of each slope between materials, as a change of μ over its reference span; of those whose
+    slopes are large."""
+    least_slope: Annotated[float, Option(1e-4, 1.0, "-", "half a per cent of friction: none to a grip")] = 0.03
+    """Part of it that it is between materials whose slopes are least; others lie between, at equal ratios."""
     scatter_freedom: Annotated[float, Option(0.1, 100.0, "-", "weak, yet proper")] = 2.0
-    """Degrees of freedom of σ² between materials, about the square of the reference scatter."""
-    least_scatter: Annotated[float, Option(1e-12, 0.1, "-", "rounding of reported friction")] = 1e-6
-    """Of a material, in parts of the mean friction: a model without scatter still meets rounded data."""
+    """Of the half-Student-t distribution of σ between materials, whose scale is the reference scatter."""
+    least_scatter: Annotated[float, Option(1e-6, 0.1, "-", "a fifth of the reference: less is the sensor's")] = 0.01
+    """Of samples, of any material: less tells no material from another."""
+    rounding: Annotated[float, Option(1e-6, 1.0, "-", "a hundredth of its variance")] = 0.1
+    """Part of that below which a material's own scatter counts as so much."""
     nodes: Annotated[
         int, Option(1, 100, "-", "sixteenths from either end: tails of few degrees of freedom are cut there")
     ] = 8
     """Quantiles of the scatter between grasps over which the likelihood is averaged."""
+    scatter_nodes: Annotated[int, Option(5, 1000, "nodes", "a third of e apart at first")] = 33
+    """Of log σ."""
+    rounds: Annotated[int, Option(1, 100, "rounds", "nodes 16 times closer each: for a million samples")] = 3
+    """In which these close in."""
+    reach: Annotated[float, Option(1.0, 20.0, "-", "e⁴: a density of e⁻⁴ at the worst")] = 4.0
+    """Of log σ beyond all scatter that there is."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,23 +1,29 @@
 """Which material is this: by the exact predictive likelihood of a grasp's samples under each model."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from estimators.defaults import RECOGNITION, REFERENCE
+from estimators.defaults import GRID, RECOGNITION, REFERENCE
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.linear.fit_data import FitData, GraspData, gather
-from estimators.linear.least_squares import upper_triangle, whole_triangle
+from estimators.linear.least_squares import whole_triangle
 from estimators.linear.place_errors import error_of_places
 from estimators.linear.unknown_velocity import offset_variance
 
 FloatArray = NDArray[np.float64]
+LogDensity: TypeAlias = Callable[[FloatArray], FloatArray]
+"""Log density at log σ, in its shape."""
 
 UNKNOWN = "unknown"
+
+SLOPES = np.geomspace(1.0, RECOGNITION.least_slope, 4)
+"""Sizes, as likely as each other, of the slopes of a surface of which nothing is known: many have next to none."""
 
 _NODES = (np.arange(RECOGNITION.nodes) + 0.5) / RECOGNITION.nodes
 """Probabilities of the quantiles that stand for a scale that is not known exactly."""
@@ -35,8 +41,9 @@ def recognise(
     model tells its ``scales``, scatter of the whole law between grasps, which is Student-t as far as few grasps tell
     it, and what the grasp's places, of which it has only so many, shift; where the samples' velocities are unknown,
     what those change), σ² inverse-gamma with its degrees of freedom, all integrated out. "unknown" is the same for a
-    surface of which only a population of materials is known. ``prior``: weights of the materials, alike where None;
-    ``unknown``: prior probability that it is none of them.
+    surface of which only a population of materials is known: levels, slopes of several sizes, and scatter, each for
+    itself. ``prior``: weights of the materials, alike where None; ``unknown``: prior probability that it is none of
+    them.
 
     Raises ``InvalidSamples`` for no materials, one called "unknown", and a prior that does not fit them.
     """
@@ -53,29 +60,47 @@ def recognise(
 
 
 def log_predictive(
-    triangle: FloatArray, effective_n: float, mean: FloatArray, covariance: FloatArray, scale: float, freedom: float
-) -> float:
-    """Log density of the data behind a triangle [4, 4] in (1, v, f_n | μ), up to what only the data decide.
+    triangle: FloatArray, effective_n: float, mean: FloatArray, covariance: FloatArray, scatter: LogDensity
+) -> FloatArray:
+    """Log density [...] of the data behind a triangle [4, 4] in (1, v, f_n | μ), up to what only the data decide.
 
-    Multivariate Student-t on ``freedom`` degrees of freedom (infinite: normal) about X ``mean`` with scale matrix
-    ``scale``² I + X ``covariance`` Xᵀ (Gelman et al., BDA3, §14.2), through a factor of 7 × 4: nothing of the size n is
-    formed.
+    Normal about X β with variance ``least_scatter``² + σ²: β normal with ``mean`` [3] and ``covariance`` [..., 3, 3],
+    integrated out in closed form, log σ with the density ``scatter``, summed over nodes. The two are apart: how far the
+    law of a grasp or of a new surface may lie off has nothing to do with how much the grasp's own samples scatter.
     """
-    values, vectors = np.linalg.eigh(covariance / scale**2)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    rows = np.column_stack([triangle[:, :3] @ root, triangle[:, 3] - triangle[:, :3] @ mean])
-    updated = upper_triangle(np.concatenate([np.eye(3, 4), rows]))
-    square, determinant = float(updated[3, 3] / scale) ** 2, np.log(np.diag(updated)[:3]).sum()
-    if math.isinf(freedom):
-        return float(-0.5 * effective_n * np.log(2.0 * scale**2) - determinant - 0.5 * square)
-    total = freedom + effective_n
-    return float(
-        special.gammaln(0.5 * total)
-        - special.gammaln(0.5 * freedom)
-        - 0.5 * effective_n * np.log(freedom * scale**2)
-        - determinant
-        - 0.5 * total * np.log1p(square / freedom)
-    )
+    turned, size, _ = np.linalg.svd(triangle[:, :3] @ _root(covariance))
+    away = np.einsum("...ij,i->...j", turned, triangle[:, 3] - triangle[:, :3] @ mean) ** 2
+    shared = np.append(size**2, np.zeros((*size.shape[:-1], 1)), axis=-1)
+    least = RECOGNITION.least_scatter**2
+
+    def log_density(log_sigma: FloatArray) -> FloatArray:
+        variance = least + np.exp(2.0 * log_sigma)
+        spread = variance[..., None] + shared[..., None, :]
+        parts = (np.log(spread) + away[..., None, :] / spread).sum(axis=-1)
+        return np.asarray(scatter(log_sigma) - 0.5 * (parts + (effective_n - 4.0) * np.log(variance)))
+
+    most = 0.5 * np.log(least + REFERENCE.scatter**2 + away.sum(axis=-1) / effective_n)
+    return _integral(log_density, np.full_like(most, 0.5 * np.log(least)) - RECOGNITION.reach, most + RECOGNITION.reach)
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """R [..., 3, 3] with R Rᵀ the covariance, which may be singular, and of any units."""
+    size = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
+    size = np.where(size > 0.0, size, 1.0)
+    values, vectors = np.linalg.eigh(covariance / (size[..., :, None] * size[..., None, :]))
+    return np.asarray(size[..., :, None] * vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :])
+
+
+def _integral(log_density: LogDensity, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Log of the integrals [...] of a density between ``low`` and ``high`` [...], over nodes that close in on it."""
+    for _ in range(RECOGNITION.rounds):
+        nodes = np.linspace(low, high, RECOGNITION.scatter_nodes, axis=-1)
+        log = log_density(nodes)
+        matters = log > log.max(axis=-1, keepdims=True) - GRID.depth
+        first, last = np.argmax(matters, axis=-1), np.argmax(matters[..., ::-1], axis=-1)
+        step = (high - low) / (RECOGNITION.scatter_nodes - 1)
+        low, high = low + step * np.maximum(first - 1, 0), high - step * np.maximum(last - 1, 0)
+    return np.asarray(special.logsumexp(log, axis=-1) + np.log(step))
 
 
 def _belief(materials: Mapping[str, FrictionModel], prior: Mapping[str, float] | None) -> dict[str, float]:
@@ -90,16 +115,32 @@ def _of_material(data: FitData, places: FloatArray, model: FrictionModel) -> flo
     triangle, size = whole_triangle(data.factor).astype(float), np.ones(3)
     size[2] = model.element_area / data.element_area  # the same pressure on an element of the model's area
     triangle[:, :3] *= size
-    floor = RECOGNITION.least_scatter * max(
-        abs(float(data.mean_friction)), RECOGNITION.least_scatter
-    )  # a model without scatter still meets rounded data
-    scale, freedom = _scatter(model)
     shared = _shared(data, places / np.outer(size, size), model)
-    found = [
-        log_predictive(triangle, data.effective_n, model.coefficients, each, max(scale, floor), freedom)
-        for each in shared
-    ]
+    found = log_predictive(triangle, data.effective_n, model.coefficients, shared, _known(*_scatter(model)))
     return float(special.logsumexp(found) - np.log(len(found)))
+
+
+def _known(scale: float, freedom: float) -> LogDensity:
+    """Of log σ of a material: σ² inverse-gamma on ``freedom`` degrees of freedom (infinite: as many as make a Student-t
+    normal) about what ``scale``² has above the least of any material.
+    """
+    least = RECOGNITION.least_scatter
+    own = 0.5 * math.log(max(scale**2 - least**2, (RECOGNITION.rounding * least) ** 2))
+    half = 0.5 * min(freedom, GRID.most_freedom)
+    whole = math.log(2.0) + half * math.log(half) - float(special.gammaln(half))
+
+    def log_density(log_sigma: FloatArray) -> FloatArray:
+        away = log_sigma - own
+        return np.asarray(whole - half * (2.0 * away + np.exp(-2.0 * away)))
+
+    return log_density
+
+
+def _of_the_population(log_sigma: FloatArray) -> FloatArray:
+    """Of log σ of a surface of which nothing is known: σ half-Student-t, its scale the reference scatter."""
+    deviation, freedom = np.exp(log_sigma) / REFERENCE.scatter, RECOGNITION.scatter_freedom
+    whole = math.log(2.0) - 0.5 * math.log(freedom) - float(special.betaln(0.5, 0.5 * freedom))
+    return np.asarray(whole + np.log(deviation) - 0.5 * (freedom + 1.0) * np.log1p(deviation**2 / freedom))
 
 
 def _scatter(model: FrictionModel) -> tuple[float, float]:
@@ -112,30 +153,30 @@ def _scatter(model: FrictionModel) -> tuple[float, float]:
     return math.sqrt(sum(parts)), sum(parts) ** 2 / lost if lost > 0.0 else float(model.n)
 
 
-def _shared(data: FitData, places: FloatArray, model: FrictionModel) -> list[FloatArray]:
-    """Covariances of a grasp's β, as likely as each other."""
+def _shared(data: FitData, places: FloatArray, model: FrictionModel) -> FloatArray:
+    """Covariances [k, 3, 3] of a grasp's β, as likely as each other."""
     covariance = model.covariance.copy()
     if data.unknown_velocity > 0.0:
         slope, variance = float(model.coefficients[1]), float(model.covariance[1, 1])
         covariance[0, 0] += offset_variance(data.mean_friction, slope, variance)
     if model.scales is None:
-        return [covariance]
+        return covariance[None]
     covariance += model.scales.between_places.value**2 * places
     between = model.scales.between_grasps
     law = between.value**2 * np.outer(model.coefficients, model.coefficients)
     if not math.isfinite(between.degrees_of_freedom):
-        return [covariance + law]
+        return (covariance + law)[None]
     ratio = between.degrees_of_freedom / special.chdtri(between.degrees_of_freedom, _NODES)
-    return [covariance + each * law for each in ratio]
+    return np.asarray(covariance + ratio[:, None, None] * law)
 
 
 def _of_unknown(data: FitData) -> float:
     spans = np.concatenate([[1.0], REFERENCE.spans(data.element_area)])
-    return log_predictive(
-        whole_triangle(data.factor).astype(float),
-        data.effective_n,
-        np.array([REFERENCE.friction, 0.0, 0.0]),
-        np.diag((np.array([RECOGNITION.level, RECOGNITION.slope, RECOGNITION.slope]) / spans) ** 2),
-        REFERENCE.scatter,
-        RECOGNITION.scatter_freedom,
+    slope = RECOGNITION.slope * SLOPES
+    deviations = np.stack([np.full_like(slope, RECOGNITION.level), slope, slope], axis=1) / spans
+    mean = np.array([REFERENCE.friction, 0.0, 0.0])
+    covariance = deviations[:, :, None] ** 2 * np.eye(3)
+    found = log_predictive(
+        whole_triangle(data.factor).astype(float), data.effective_n, mean, covariance, _of_the_population
     )
+    return float(special.logsumexp(found) - np.log(len(found)))

@@ -176,10 +176,11 @@ class FrictionClient:
         bounds = {"load": load, "drop_probability": drop_probability}
         return self._run(calls.next_grasp(name, asked | bounds))
 
-    def recognise(self, grasp: Any, materials: Sequence[str] | None = None, method: str = "ols") -> Recognition:
+    def recognise(self, grasp: Any, materials: Sequence[str] | None = None, method: str | None = None) -> Recognition:
         """Which material a grasp was of: a stored log (its receipt or id), or friction samples as slipcore gives them.
 
-        ``materials``: which it may be, at most 100; without, all that have a model of ``method``.
+        ``materials``: which it may be, at most 100; without, all that have a model. Compared are the models of
+        ``method``, or without one each material's recommended one.
         """
         return self._run(calls.recognise(grasp, materials, method))
 
@@ -382,7 +383,9 @@ class AsyncFrictionClient:
         bounds = {"load": load, "drop_probability": drop_probability}
         return await self._run(calls.next_grasp(name, asked | bounds))
 
-    async def recognise(self, grasp: Any, materials: Sequence[str] | None = None, method: str = "ols") -> Recognition:
+    async def recognise(
+        self, grasp: Any, materials: Sequence[str] | None = None, method: str | None = None
+    ) -> Recognition:
         """As ``FrictionClient.recognise``."""
         return await self._run(calls.recognise(grasp, materials, method))
 

@@ -252,13 +252,15 @@ class NextGrasp:
 class Recognition:
     """How probable it is that a grasp was of each material, the likeliest first; ``unknown``: of none of them.
 
-    ``advice``: what to do about each material's model, where that is not supported by its data.
+    ``advice``: what to do about each material's model, where that is not supported by its data; ``methods``: whose
+    model of each material was compared.
     """
 
     method: str
     probability: dict[str, float]
     unknown: float
     advice: dict[str, str] = field(default_factory=dict)
+    methods: dict[str, str] = field(default_factory=dict)
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "Recognition":
@@ -266,7 +268,8 @@ class Recognition:
         probability = {entry["material"]: float(entry["probability"]) for entry in record["candidates"]}
         doubtful = (entry for entry in record["candidates"] if entry.get("support", "supported") != "supported")
         advice = {entry["material"]: f"{entry['support']}: {entry['advice']}" for entry in doubtful}
-        return cls(record["method"], probability, float(record["unknown"]), advice)
+        methods = {entry["material"]: entry.get("method", record["method"]) for entry in record["candidates"]}
+        return cls(record["method"], probability, float(record["unknown"]), advice, methods)
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,11 +57,11 @@ def all_current(session: Session, material_ids: Sequence[int]) -> dict[int, list
     return found
 
 
-def current_of_all(session: Session, method: str, limit: int) -> list[StoredModel]:
-    """Current models by a method, of at most so many materials."""
-    query = _models().where(FrictionModelRow.current, FrictionModelRow.method == method)
-    query = query.where(MaterialRow.merged_into_id.is_(None)).order_by(MaterialRow.name).limit(limit)
-    return [_record(row, material) for row, material in session.execute(query)]
+def materials_with_current(session: Session, methods: Collection[str], limit: int) -> list[int]:
+    """Keys of at most so many materials, by their names, that have a current model by one of some methods."""
+    having = select(FrictionModelRow.material_id).where(FrictionModelRow.current, FrictionModelRow.method.in_(methods))
+    query = select(MaterialRow.id).where(MaterialRow.merged_into_id.is_(None), MaterialRow.id.in_(having))
+    return list(session.scalars(query.order_by(MaterialRow.name).limit(limit)))
 
 
 def current_methods(session: Session, material_ids: Sequence[int]) -> list[str]:

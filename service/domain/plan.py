@@ -16,6 +16,7 @@ from service.domain.context import Context
 from service.domain.errors import InvalidSamples, InvalidValue, NoFeasibleForce, NoModel, ResultsNotReady
 from service.domain.look_up import Averaged
 from service.domain.model_cache import KnownModel
+from service.domain.recommended import AUTO, PREFERENCE
 from service.domain.stored_results import decode_samples, finite_or_none, to_client_model, to_friction_model
 from slipcore import FrictionSamples
 from stiction_client.support import Kind
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from estimators import Moments
 
 MOST_CANDIDATES = 100
-"""Materials compared in one answer, which keeps one thread of the server busy for 0.15 ms each."""
+"""Materials compared in one answer, which keeps one thread of the server busy for up to a millisecond each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,9 +87,10 @@ class ForceCurve:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A material that it may be, with the version of the model that was compared, and what that rests on."""
+    """A material that it may be, with method and version of the model that was compared, and what that rests on."""
 
     material: str
+    method: str
     version: int
     probability: float
     support: Kind
@@ -166,7 +168,8 @@ def recognise(
 ) -> Recognition:
     """How probable it is that a grasp was of each material that has a model: of those named, or of all.
 
-    ``grasp`` is the id of a stored log, or samples; ``unknown`` the probability beforehand that it is none of them.
+    Compared are the models of a ``method``, or each material's recommended one. ``grasp`` is the id of a stored log, or
+    samples; ``unknown`` the probability beforehand that it is none of them.
     Raises ``InvalidSamples`` for those that tell nothing, ``ResultsNotReady``, ``NoModel``, ``InvalidValue``,
     ``NotFound``.
     """
@@ -184,23 +187,30 @@ def recognise(
 
 def _candidate(stored: StoredModel, probability: float) -> Candidate:
     model = to_client_model(stored)
-    return Candidate(stored.material, stored.version, probability, model.support, model.advice)
+    return Candidate(stored.material, stored.model.method, stored.version, probability, model.support, model.advice)
 
 
 def _candidates(context: Context, names: Sequence[str] | None, method: str) -> list[StoredModel]:
+    methods = PREFERENCE if method == AUTO else (method,)
     with context.database.read() as session:
         if names is None:
-            found = friction_models.current_of_all(session, method, MOST_CANDIDATES + 1)
+            ids = friction_models.materials_with_current(session, methods, MOST_CANDIDATES + 1)
         else:
             ids = [materials.find_id(session, name) for name in names]
-            of_them = friction_models.all_current(session, ids).values()
-            found = [model for models in of_them for model in models if model.model.method == method]
+        of_them = friction_models.all_current(session, ids).values()
+    found = [best for models in of_them if (best := _preferred(models, methods)) is not None]
     if len(found) > MOST_CANDIDATES:
         allowed = f"at most {MOST_CANDIDATES} with a model: name those that it may be"
         raise InvalidValue("materials", f"more than {MOST_CANDIDATES}", allowed)
     if not found:
-        raise NoModel(f"no material in question has a model fitted by {method!r}", method)
+        raise NoModel(f"no material in question has a model fitted by {' or '.join(map(repr, methods))}", method)
     return found
+
+
+def _preferred(models: Sequence[StoredModel], methods: Sequence[str]) -> StoredModel | None:
+    """A material's model by the first of these methods that it has."""
+    by_method = {stored.model.method: stored for stored in models}
+    return next((by_method[method] for method in methods if method in by_method), None)
 
 
 def _evidence(context: Context, grasp: str | FrictionSamples) -> "FrictionSamples | Moments":

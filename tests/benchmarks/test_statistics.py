@@ -13,6 +13,7 @@ from benchmarks import http_load, ingest, nist, paper_friction, recognition, str
 from benchmarks.markers import DOTS, LOST, SIDE, STEP, without
 from benchmarks.planner import answer, bracketed, seconds
 from estimators.defaults import RECOGNITION, REFERENCE
+from estimators.recognition import SLOPES
 
 
 def test_growth_of_memory_is_the_slope_of_its_latter_two_thirds() -> None:
@@ -87,11 +88,12 @@ def test_materials_of_the_population_have_its_spread() -> None:
     rng = np.random.default_rng(3)
     drawn = [recognition.material(rng) for _ in range(4000)]
     level = np.array([plane[0] for plane, _ in drawn])
-    ratio = np.array([scatter for _, scatter in drawn]) / REFERENCE.scatter
-    assert np.median(level) == pytest.approx(REFERENCE.friction, abs=0.02)
-    standard = (level - REFERENCE.friction) / (RECOGNITION.level * ratio)
-    assert standard.std() == pytest.approx(1.0, abs=0.04)
-    assert np.median(1.0 / ratio**2) == pytest.approx(np.log(2.0), rel=0.1)  # χ² of two degrees of freedom, over two
+    slope = np.array([plane[1] for plane, _ in drawn]) * REFERENCE.tangential_velocity
+    scatter = np.array([scatter for _, scatter in drawn])
+    assert level.mean() == pytest.approx(REFERENCE.friction, abs=0.02)
+    assert level.std() == pytest.approx(RECOGNITION.level, rel=0.04)
+    assert slope.std() == pytest.approx(RECOGNITION.slope * np.sqrt(np.mean(SLOPES**2)), rel=0.06)
+    assert np.mean(scatter < REFERENCE.scatter) == pytest.approx(1.0 / np.sqrt(3.0), abs=0.03)  # |t| below 1 on two
 
 
 def test_a_grasp_without_scatter_lies_on_its_plane(monkeypatch: pytest.MonkeyPatch) -> None:

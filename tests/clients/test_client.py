@@ -521,9 +521,11 @@ def test_a_grasp_is_recognised_by_its_log_or_by_its_samples(
     receipt = GraspLogReceipt.from_json(answers.grasp_log)
     for grasp in ("g1", receipt, samples):
         found = ask(server, "recognise", grasp, materials=["paper"])
-        assert (found.probability, found.unknown) == ({"paper": 0.9}, 0.1)
+        assert (found.probability, found.unknown, found.methods) == ({"paper": 0.9}, 0.1, {"paper": "ols"})
     sent = [json.loads(request.content) for request in server.requests]
-    assert sent[0] == sent[1] == {"grasp_log": "g1", "materials": ["paper"], "method": "ols"}
+    assert sent[0] == sent[1] == {"grasp_log": "g1", "materials": ["paper"]}
+    ask(server, "recognise", "g1", method="ols")
+    assert json.loads(server.requests[-1].content)["method"] == "ols"
     assert sent[2]["samples"]["weight"] == [1.0, 1.0]
     with pytest.raises(InvalidArgument, match="time is not finite"):
         ask(server, "recognise", SimpleNamespace(**vars(samples) | {"time": np.array([np.nan])}))

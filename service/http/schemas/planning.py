@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from estimators.method_names import FitMethod, ModelMethod
+from estimators.method_names import FitMethod
 from service.domain.look_up import Averaged
 from service.domain.plan import GraspTask
 from service.http.schemas.common import Area, Body, Force, Reference, Velocity
@@ -151,7 +151,9 @@ class NewRecognition(Body):
         list[Annotated[Reference, Field(max_length=100)]] | None,
         Field(min_length=1, max_length=100, description="Which it may be; without, all that have a model"),
     ] = None
-    method: Annotated[ModelMethod, Field(description="Whose current models are compared")] = "ols"
+    method: Annotated[
+        FitMethod, Field(description="Whose current models are compared; `auto`: each material's recommended one")
+    ] = "auto"
     unknown: Annotated[float, Field(ge=0.0, lt=1.0, description="Probability beforehand that it is none of them")] = (
         0.05
     )
@@ -167,6 +169,7 @@ class CandidateOut(BaseModel):
     """A material that it may be."""
 
     material: str
+    method: Annotated[str, Field(description="Of the model that was compared")]
     version: Annotated[int, Field(description="Of the model that was compared")]
     probability: float
     support: SupportKind
@@ -180,10 +183,11 @@ class RecognitionOut(BaseModel):
         json_schema_extra={
             "examples": [
                 {
-                    "method": "ols",
+                    "method": "auto",
                     "candidates": [
                         {
                             "material": "paper",
+                            "method": "hierarchical",
                             "version": 3,
                             "probability": 0.97,
                             "support": "supported",

@@ -112,8 +112,10 @@ def test_a_grasp_is_recognised_from_its_log_and_from_its_samples(
     assert of_log.status_code == 200, of_log.text
     told = of_log.json()
     (candidate,) = told["candidates"]
-    assert (candidate["material"], candidate["version"]) == ("fitted", 1)
+    assert (candidate["material"], candidate["method"], candidate["version"]) == ("fitted", "hierarchical", 1)
     assert candidate["probability"] > 0.9
+    by_ols = client.post("/v1/recognise", json={"grasp_log": fitted["id"], "materials": ["fitted"], "method": "ols"})
+    assert [each["method"] for each in by_ols.json()["candidates"]] == ["ols"]
     assert candidate["probability"] + told["unknown"] == pytest.approx(1.0)
     few = {
         name: value[:400] if isinstance(value, list) else value for name, value in samples_of(client, fitted).items()
