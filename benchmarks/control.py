@@ -121,9 +121,13 @@ def _of(found: Iterable[Outcome], tasks: Sequence[Task], name: str) -> list[Outc
     return [each for each in found if each.strategy == name and each.task in names]
 
 
+def _cell(row: dict[str, object]) -> str:
+    return f"{row['held']}, {row['final']:.2f}, {row['slip_mm']:.1f}".replace("nan", "–")
+
+
 def _groups_table(by_task: dict[str, list[dict[str, object]]]) -> str:
     rows = [
-        [name, *(f"{row['held']}, {row['final']:.2f}, {row['slip_mm']:.1f}" for row in scored)]
+        [name, *map(_cell, scored)]
         for name, scored in zip(STRATEGIES, zip(*by_task.values(), strict=True), strict=True)
     ]
     return table(["held, final overgrip, slip in mm", *by_task], rows)
@@ -135,10 +139,7 @@ def _lifts(found: Sequence[Outcome]) -> dict[str, list[dict[str, object]]]:
 
 
 def _controller_table(found: Sequence[Outcome]) -> str:
-    rows = [
-        [task, *(f"{row['held']}, {row['final']:.2f}, {row['slip_mm']:.1f}" for row in scored)]
-        for task, scored in _lifts(found).items()
-    ]
+    rows = [[task, *map(_cell, scored)] for task, scored in _lifts(found).items()]
     return table(["held, final overgrip, slip in mm", *CONTROLLERS, *MISLED], rows)
 
 
