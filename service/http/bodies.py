@@ -24,6 +24,11 @@ MAX_JSON_BYTES = 64 * 1024
 """Bytes of a JSON body; the longest description is 10,000 characters."""
 
 
+def media_type(request: Request) -> str:
+    """What the body is said to be, without parameters and in lower case (RFC 9110, 8.3.1)."""
+    return request.headers.get("content-type", "").partition(";")[0].strip().lower()
+
+
 async def chunks(request: Request) -> AsyncIterator[bytes]:
     """The body as it comes; raises ``ConnectionError`` where the client goes before its end."""
     try:
@@ -86,9 +91,9 @@ class JsonRoute(FairRoute):
             return handle
 
         async def handle_json(request: Request) -> Response:
-            given = request.headers.get("content-type", "")
-            if given.partition(";")[0].strip().lower() != "application/json":
-                raise Problem.wrong_value(UNSUPPORTED_FORMAT, "content type", given or "missing", "application/json")
+            if media_type(request) != "application/json":
+                given = request.headers.get("content-type") or "missing"
+                raise Problem.wrong_value(UNSUPPORTED_FORMAT, "content type", given, "application/json")
             async with AsyncExitStack() as held:
                 return await handle(_JsonRequest(request.scope, limited(request.receive, self.most_bytes), held))
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Coroutine, Mapping
 from typing import IO, Any, TypeVar
+from urllib.parse import parse_qsl
 
 from fastapi import Request, Response
 from fastapi.exceptions import RequestValidationError
@@ -9,20 +10,27 @@ from pydantic import BaseModel, BeforeValidator, ValidationError
 from starlette.datastructures import FormData
 from starlette.exceptions import HTTPException
 from starlette.formparsers import MultiPartException, MultiPartParser
-from starlette.types import Message, Receive
+from starlette.requests import ClientDisconnect
 
 from db.text import is_storable
-from service.http.bodies import MOST_FIELDS, limited
+from service.domain.context import Context
+from service.domain.errors import UploadInterrupted
+from service.http.bodies import MOST_FIELDS, limited, media_type
 from service.http.fair_route import FairRoute
 
 Shape = TypeVar("Shape", bound=BaseModel)
+
+URL_ENCODED = "application/x-www-form-urlencoded"
+
+SHORT_FORM = 1024
+"""Bytes, parsed in 0.2 ms at most."""
 
 EMPTY_IS_NONE = BeforeValidator(lambda text: None if text == "" else text)
 """Of a field that may be left empty."""
 
 
 class FormRoute(FairRoute):
-    """A route whose form is of bounded size: the framework parses all of it before it is asked who sends it."""
+    """A route whose form is of bounded size: all of it is parsed before it is asked who sends it."""
 
     most_bytes = 2**18
     """Without a file; the longest description takes half of that."""
@@ -32,26 +40,35 @@ class FormRoute(FairRoute):
         handle = super().get_route_handler()
 
         async def handle_form(request: Request) -> Response:
-            receive = limited(request.receive, self.most_bytes)
-            is_plain = request.headers.get("content-type", "").startswith("application/x-www-form-urlencoded")
-            return await handle(Request(request.scope, few_fields(receive) if is_plain else receive))
+            return await handle(_FormRequest(request.scope, limited(request.receive, self.most_bytes)))
 
         return handle_form
 
 
-def few_fields(receive: Receive) -> Receive:
-    """What receives a form, and raises ``HTTPException`` for one of more fields than any has: each takes its time."""
-    seen = 0
+class _FormRequest(Request):
+    """A request with a form that has no files; who sends parts that might be some has sent no fields.
 
-    async def receive_some() -> Message:
-        nonlocal seen
-        message = await receive()
-        seen += message.get("body", b"").count(b"&")
-        if seen >= MOST_FIELDS:
-            raise HTTPException(400, f"the form has more than {MOST_FIELDS} fields")
-        return message
+    The framework's own parsers take 70 ms for 256 kB of separators or of empty parts, and nobody goes on meanwhile.
+    """
 
-    return receive_some
+    async def form(self, **_: object) -> FormData:  # type: ignore[override]  # no files: nothing is to be closed
+        """The fields; raises ``HTTPException`` for more of them than any form has."""
+        body = await self.body()
+        if media_type(self) != URL_ENCODED:
+            return FormData()
+        if len(body) <= SHORT_FORM:
+            return _fields(body)
+        context: Context = self.app.state.context
+        owner = f"forms of {self.client.host if self.client else ''}"
+        return await context.threads.run(owner, _fields, body, is_long=True)  # up to 60 ms, of escapes
+
+
+def _fields(body: bytes) -> FormData:
+    try:
+        text = body.decode("latin-1")  # the names and values are in UTF-8, by escapes
+        return FormData([*parse_qsl(text, keep_blank_values=True, errors="replace", max_num_fields=MOST_FIELDS)])
+    except ValueError as error:
+        raise HTTPException(400, f"the form has more than {MOST_FIELDS} fields") from error
 
 
 class _FileParser(MultiPartParser):
@@ -71,16 +88,19 @@ class _FileParser(MultiPartParser):
 
 
 async def read_form(request: Request, make_file: Callable[[], IO[bytes]], **most: int) -> FormData:
-    """A form with a file, to be closed; no fields of what is none. Raises ``HTTPException`` for a broken one.
+    """A form with a file, to be closed; no fields of what is none.
 
-    ``most``: ``max_files`` and ``max_fields``.
+    Raises ``HTTPException`` for a broken one, ``UploadInterrupted`` where the client goes before its end. ``most``:
+    ``max_files`` and ``max_fields``.
     """
-    if not request.headers.get("content-type", "").startswith("multipart/form-data"):
+    if media_type(request) != "multipart/form-data":
         return FormData()
     try:
         form = await _FileParser(request, make_file, **most).parse()
     except MultiPartException as error:
         raise HTTPException(400, error.message) from error
+    except ClientDisconnect as error:
+        raise UploadInterrupted("the connection ended before the form did") from error
     except (LookupError, UnicodeError) as error:
         raise HTTPException(400, "the form's text is not in the charset that it names; allowed: UTF-8") from error
     sent = (text for pair in form.multi_items() for text in pair)

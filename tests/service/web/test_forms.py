@@ -1,3 +1,4 @@
+import asyncio
 import errno
 import html
 import json
@@ -275,6 +276,29 @@ def test_the_file_of_a_form_is_written_beside_the_blobs_only(
 def test_a_broken_form_is_refused(browser: Any, body: bytes) -> None:
     headers = {**OWN, "content-type": "multipart/form-data; boundary=x"}
     assert browser.request("POST", "/upload", content=body, headers=headers).status_code == 400
+
+
+def test_who_leaves_in_the_middle_of_a_form_is_no_error_of_the_service(
+    browser: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    begun = b'--x\r\nContent-Disposition: form-data; name="file"; filename="log.npz"\r\n\r\nPK'
+    messages = iter([{"type": "http.request", "body": begun, "more_body": True}, {"type": "http.disconnect"}])
+    sent: list[Any] = []
+
+    async def receive() -> Any:
+        return next(messages)
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    headers = browser.headers | OWN | {"content-type": "Multipart/Form-Data; boundary=x"}
+    scope = {"type": "http", "method": "POST", "path": "/upload", "query_string": b"", "scheme": "http"}
+    scope["headers"] = [(name.lower().encode(), value.encode()) for name, value in headers.items()]
+    asyncio.run(
+        browser.app({**scope, "client": (browser.address, 50000), "server": (browser.server, 80)}, receive, send)
+    )
+    assert sent[0]["status"] == httpx.codes.BAD_REQUEST
+    assert not [record for record in caplog.records if record.exc_info]
 
 
 def test_a_form_whose_file_cannot_be_written_is_no_error_of_the_service(

@@ -4,6 +4,7 @@ from http.cookies import SimpleCookie
 from typing import Any
 
 import pytest
+from starlette.formparsers import MultiPartParser
 
 from db.database import Database
 from db.repositories import access_keys, browser_sessions
@@ -88,16 +89,36 @@ def test_what_is_no_key_begins_no_session(caller: Any, key: str) -> None:
     assert "unknown, revoked, expired or garbled" in answer.text
 
 
+@pytest.mark.parametrize("kind", ["application/x-www-form-urlencoded", "Application/X-WWW-Form-Urlencoded ; charset=x"])
 @pytest.mark.parametrize(
     ("body", "status", "told"),
     [(b"&" * 8_000, 400, "the form has more than 100 fields"), (b"key=" + b"x" * 40_000, 413, "more than 32768 bytes")],
 )
-def test_a_form_that_takes_long_to_read_is_not_read(caller: Any, body: bytes, status: int, told: str) -> None:
-    """Anybody may send it: 30 connections of 256 kB of separators kept all others waiting for 24 s."""
-    headers = OWN | {"content-type": "application/x-www-form-urlencoded", "accept": "application/json"}
+def test_a_form_that_takes_long_to_read_is_not_read(
+    caller: Any, body: bytes, status: int, told: str, kind: str
+) -> None:
+    """Anybody may send it: 30 connections of 256 kB of separators kept others waiting for 24 s."""
+    headers = OWN | {"content-type": kind, "accept": "application/json"}
     answer = caller.request("POST", "/login", content=body, headers=headers)
     assert answer.status_code == status
     assert told in answer.json()["detail"]
+
+
+def test_a_form_of_parts_is_not_read(caller: Any, make: Callable[..., str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of 490 empty ones each takes its time, and anybody may send them."""
+    monkeypatch.setattr(MultiPartParser, "__init__", None)
+    answer = caller.request("POST", "/login", files=[("key", (None, make()))] * 100, headers=OWN)
+    assert answer.status_code == 401
+    assert "set-cookie" not in answer.headers
+
+
+def test_a_long_form_is_read_as_a_short_one(caller: Any, make: Callable[..., str]) -> None:
+    body = "key=" + "".join(f"%{letter:02X}" for letter in make().encode()) + "&next=%2Fjobs%3Fa=%C3%A4+b" + "&x" * 90
+    headers = OWN | {"content-type": "application/x-www-form-urlencoded"}
+    for padding in ("", "&pad=" + "+" * 2_000):
+        answer = caller.request("POST", "/login", content=body + padding, headers=headers)
+        assert answer.headers["location"] == "/jobs?a=%C3%A4%20b"
+        assert "set-cookie" in answer.headers
 
 
 @pytest.mark.parametrize("path", ["//elsewhere.org/", "/\\elsewhere.org", "https://elsewhere.org", "javascript:1", ""])
