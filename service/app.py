@@ -106,7 +106,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(HeadRequests)
     app.add_middleware(RequestMiddleware)
     app.add_middleware(ProblemPages)
-    app.add_middleware(FairStarts)
+    app.add_middleware(FairStarts, authenticator=authenticator)
     app.add_middleware(Metering, access_log=access_log)
     app.add_middleware(Lookups, authenticator=authenticator, access_log=access_log)
     app.add_middleware(StartRefusal)

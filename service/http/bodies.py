@@ -23,6 +23,9 @@ MOST_FIELDS = 100
 MAX_JSON_BYTES = 64 * 1024
 """Bytes of a JSON body; the longest description is 10,000 characters."""
 
+SHORT_JSON_BYTES = 4096
+"""Parsed without a turn, in 0.3 ms at most."""
+
 
 def media_type(request: Request) -> str:
     """What the body is said to be, without parameters and in lower case (RFC 9110, 8.3.1)."""
@@ -48,7 +51,7 @@ class _JsonRequest(Request):
     async def json(self) -> Any:
         """The body; raises ``HTTPException`` for objects of more fields than any has: each would be an error apart."""
         body = await self.body()
-        if len(body) <= MAX_JSON_BYTES:
+        if len(body) <= SHORT_JSON_BYTES:
             return json.loads(body, object_pairs_hook=_few_fields)
         context: ServerContext = self.app.state.context
         share = (await principal(self)).share

@@ -3,43 +3,46 @@
 import asyncio
 import time
 
+from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from service.http.authentication import Authenticator
 from service.processes.fair_queue import PatientQueue
 
 START_SECONDS = 0.001
-"""s between the starts of two requests of an address: so none has all of the time, nor two in a round of the loop."""
+"""s between the starts of two requests of one client: so none has all of the time, nor two in a round of the loop."""
 
-ADDRESSES_AT_ONCE = 8
+CLIENTS_AT_ONCE = 8
 """Whose next request waits for its time; those of further ones wait for these."""
 
-MOST_ADDRESSES = 10_000
+MOST_CLIENTS = 10_000
 """Remembered; when there are more, all may begin anew."""
 
 
 class FairStarts:
-    """Lets one request or stream of an address begin in a round of the event loop; its others follow in later ones.
+    """Lets one request or stream of a client begin in a round of the event loop; its others follow in later ones.
 
     What a request does before it waits for anything keeps everybody waiting, and for who has no key that is all that is
-    done.
+    done. A client is a key that is known, or else an address.
     """
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: ASGIApp, authenticator: Authenticator) -> None:
         self.app = app
-        self._turns = PatientQueue(ADDRESSES_AT_ONCE, "begun", share=1)
+        self._client = authenticator.starts_as
+        self._turns = PatientQueue(CLIENTS_AT_ONCE, "begun", share=1)
         self._next: dict[str, float] = {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one connection."""
         if scope["type"] != "lifespan":
-            await self._start(scope["client"][0] if scope["client"] else "")
+            await self._start(self._client(HTTPConnection(scope)))
         await self.app(scope, receive, send)
 
-    async def _start(self, address: str) -> None:
-        async with self._turns.turn(address):
-            seconds = self._next.get(address, 0.0) - time.monotonic()
+    async def _start(self, client: str) -> None:
+        async with self._turns.turn(client):
+            seconds = self._next.get(client, 0.0) - time.monotonic()
             if seconds > 0.0:
                 await asyncio.sleep(seconds)
-            if len(self._next) >= MOST_ADDRESSES:
+            if len(self._next) >= MOST_CLIENTS:
                 self._next.clear()
-            self._next[address] = time.monotonic() + START_SECONDS
+            self._next[client] = time.monotonic() + START_SECONDS

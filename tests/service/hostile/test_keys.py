@@ -72,10 +72,11 @@ def test_a_refusal_takes_the_same_steps_whether_the_id_is_stored_or_not(
         client.get("/v1/materials")
         return list(steps)
 
-    assert taken(text) == ["compared", "asked", "compared"]
-    assert taken(text) == ["compared"]
+    begins = ["compared"]  # among the requests of its key, where it was one before
+    assert taken(text) == [*begins, "compared", "asked", "compared"]
+    assert taken(text) == [*begins, "compared"]
     wrong = text[:-1] + ("0" if text[-1] != "0" else "1")
-    assert taken(wrong) == taken(keys.new_key()[1]) == taken(wrong) == ["compared", "asked", "compared"]
+    assert taken(wrong) == taken(keys.new_key()[1]) == taken(wrong) == [*begins, "compared", "asked", "compared"]
     event.remove(database.engine, "before_cursor_execute", note_query)
 
 

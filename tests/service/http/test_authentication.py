@@ -8,6 +8,7 @@ from unittest.mock import AsyncMock
 import httpx
 import pytest
 from sqlalchemy import event
+from starlette.requests import HTTPConnection
 
 from db.database import Database
 from db.repositories import access_keys
@@ -249,3 +250,23 @@ def test_who_is_on_this_machine_may_ask_at_any_rate(reach: Reach) -> None:
     assert {client.get("/v1/materials").status_code for _ in range(5)} == {200}
     client = reach("open", rate_limit=1.0)
     assert [client.get("/v1/materials").status_code for _ in range(2)] == [200, 429]
+
+
+@ONLY_SQLITE
+def test_who_has_had_a_key_waits_to_begin_among_its_own(
+    reach: Reach, make: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(authentication, "KEPT_SECONDS", 0.0)
+    text = make("read")
+    client = reach(key=text)
+
+    def starts_as(sent: str) -> str:
+        scope = {"type": "http", "client": ("10.0.0.9", 1), "headers": [(b"authorization", f"Bearer {sent}".encode())]}
+        name: str = client.app.state.authenticator.starts_as(HTTPConnection(scope))
+        return name
+
+    assert starts_as(text) == "address 10.0.0.9"
+    client.get("/v1/materials")
+    assert starts_as(text) == keys.key_id(text)
+    assert starts_as(text[:-1] + ("0" if text[-1] != "0" else "1")) == "address 10.0.0.9"
+    assert starts_as("") == "address 10.0.0.9"

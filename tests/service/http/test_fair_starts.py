@@ -4,28 +4,46 @@ import asyncio
 from itertools import groupby
 
 import pytest
+from starlette.requests import HTTPConnection
 from starlette.types import Receive, Scope, Send
 
+from service.http.authentication import Authenticator
 from service.http.fair_starts import FairStarts
+from service.settings import Settings
 
 
 async def nothing(*_: object) -> None:
     raise AssertionError("neither read nor answered")
 
 
-def begun(addresses: str, cancelled: int | None = None, kind: str = "http") -> list[str]:
-    """Who began in each round of the event loop, of requests that came in this order in one round."""
+class Known(Authenticator):
+    """Takes what is sent for a key that was one before."""
+
+    def __init__(self) -> None:
+        super().__init__(Settings(access="keys"))
+
+    def starts_as(self, connection: HTTPConnection) -> str:
+        assert connection.client is not None
+        return connection.headers.get("authorization", connection.client.host)
+
+
+def begun(clients: str, cancelled: int | None = None, kind: str = "http") -> list[str]:
+    """Who began in each round of the event loop, of requests that came in this order in one round.
+
+    A small letter is an address, a capital one a key that is sent from there.
+    """
     order: list[str] = []
 
     async def note(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001
-        order.append(scope["client"][0])
+        order.append(scope["who"])
+
+    def scope_of(who: str) -> Scope:
+        headers = [(b"authorization", who.encode())] if who.isupper() else []
+        return {"type": kind, "client": (who.lower(), 1), "headers": headers, "who": who}
 
     async def check() -> None:
-        starts = FairStarts(note)
-        asked = [
-            asyncio.ensure_future(starts({"type": kind, "client": (address, 1)}, nothing, nothing))
-            for address in addresses
-        ]
+        starts = FairStarts(note, Known())
+        asked = [asyncio.ensure_future(starts(scope_of(who), nothing, nothing)) for who in clients]
         while not all(each.done() for each in asked):
             order.append("-")
             await asyncio.sleep(0)
@@ -43,6 +61,12 @@ def test_one_request_of_each_address_begins_in_a_round(kind: str) -> None:
     assert rounds[1:] == ["a"] * 3
 
 
+def test_who_has_a_key_does_not_wait_for_others_at_the_same_address() -> None:
+    rounds = begun("aaaA")
+    assert sorted(rounds[0]) == ["A", "a"]
+    assert rounds[1:] == ["a"] * 2
+
+
 def test_who_has_gone_begins_nothing_and_holds_nobody_up() -> None:
     assert "".join(begun("aaab", cancelled=1)).count("a") == 2
 
@@ -53,5 +77,5 @@ def test_the_start_of_the_server_takes_no_turn() -> None:
     async def note(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001
         seen.append(scope["type"])
 
-    asyncio.run(FairStarts(note)({"type": "lifespan"}, nothing, nothing))
+    asyncio.run(FairStarts(note, Known())({"type": "lifespan"}, nothing, nothing))
     assert seen == ["lifespan"]
