@@ -331,7 +331,7 @@ class JobRunner:
         """Put jobs that the database says are ours, but that no executor does, back: a commit's answer can be lost."""
         orphans = jobs.claimed(session, self._id) - self._at.keys()
         stay = orphans & self._orphans
-        self._orphans = orphans
+        self._orphans = orphans - stay  # who claims one of these anew is given time as with any
         for job_id in stay:
             logger.warning("job %s is queued again: nobody is at it", job_id)
             jobs.release(session, Claim(job_id, self._id))

@@ -189,6 +189,24 @@ def test_a_job_waits_for_storage_without_losing_an_attempt(
     assert {get(database, job_id).deaths for job_id in queued} == {0}
 
 
+def test_a_job_that_nobody_is_at_is_queued_again_at_the_second_look_of_each_claim(
+    database: Database, queued: list[str]
+) -> None:
+    given = {"attempts": ATTEMPTS, "lease_seconds": 1.0, "poll_seconds": 1.0, "shutdown_seconds": 1.0}
+    runner = JobRunner(database, [ThreadExecutor(lambda _: None)], **given)  # type: ignore[arg-type]
+    with database.write() as session:
+        runner._id = runners.add(session, "host:1")
+    for _ in range(2):
+        with database.write() as session:
+            claim = jobs.claim(session, runner._id)
+        assert claim is not None
+        assert claim.job_id == queued[0]
+        for freed in (False, True):
+            with database.write() as session:
+                assert runner._free_orphans(session) is freed
+        assert get(database, queued[0]).status == "queued"
+
+
 def test_a_job_is_not_begun_twice_at_once_by_a_runner_whose_claim_the_database_has_forgotten(
     database: Database, queued: list[str], working: Callable[..., None]
 ) -> None:
