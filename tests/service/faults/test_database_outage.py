@@ -114,6 +114,7 @@ def first(fleet: Any, postgresql: Any, contents: Callable[[int], list[bytes]]) -
     return accepted
 
 
+@pytest.mark.long
 def test_a_database_that_is_away_under_load_loses_nothing(
     fleet: Any, postgresql: Any, first: list[str], contents: Callable[[int], list[bytes]], ramp: GraspLog
 ) -> None:

@@ -58,6 +58,7 @@ def test_a_server_killed_in_an_upload_and_in_jobs_leaves_all_or_nothing(fleet: A
     fleet.check_complete(accepted)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("engine_name", ["postgresql"], indirect=True)
 def test_the_job_of_a_killed_worker_is_ended_by_another_without_doing_finished_stages_again(
     fleet: Any, contents: Contents

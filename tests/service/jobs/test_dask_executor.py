@@ -87,6 +87,7 @@ def deaths(settings: Settings, job: str) -> int:
         return jobs.get(session, job).deaths
 
 
+@pytest.mark.long
 def test_jobs_are_done_on_a_cluster_whose_workers_and_whose_scheduler_die(
     cluster: Cluster, settings: Settings, serving: Serving, content: bytes, upload: Any, wait: Any
 ) -> None:
