@@ -193,8 +193,7 @@ def settle(
     cut = np.zeros(patch.which.size, np.bool_)
     for i, k in enumerate(patch.which):
         if np.isnan(offset[k, 0]):  # touches anew: where the surface is, it sticks
-            offset[k, 0] = x - yaw * pad.y[k] - patch.moved[0, i]
-            offset[k, 1] = y + yaw * pad.x[k] - patch.moved[1, i]
+            put(pad, patch, pose, i, offset)
     for _ in range(sweeps):
         rests = True
         for i, k in enumerate(patch.which):
@@ -204,7 +203,7 @@ def settle(
             if held and more_x**2 + more_y**2 <= (_REST * limit[k]) ** 2:
                 continue
             wanted_x, wanted_y = force[k, 0] + more_x, force[k, 1] + more_y
-            share = min(limit[k] / math.hypot(wanted_x, wanted_y), 1.0)
+            share = limit[k] / max(limit[k], math.hypot(wanted_x, wanted_y))
             spread(patch.near, i, share * wanted_x - force[k, 0], share * wanted_y - force[k, 1], patch.moved)
             force[k, 0], force[k, 1] = share * wanted_x, share * wanted_y
             cut[i], rests = share < 1.0, False
@@ -213,8 +212,15 @@ def settle(
     for i, k in enumerate(patch.which):
         slips[k] = math.hypot(force[k, 0], force[k, 1]) >= _AT_LIMIT * limit[k]
         if cut[i]:
-            offset[k, 0] = x - yaw * pad.y[k] - patch.moved[0, i]
-            offset[k, 1] = y + yaw * pad.x[k] - patch.moved[1, i]
+            put(pad, patch, pose, i, offset)
+
+
+@compiled
+def put(pad: Pad, patch: Patch, pose: FloatArray, i: int, offset: FloatArray) -> None:
+    """Let the i-th bristle of a patch hold the object where it now is: by its ``offset`` [k, 2] m, in place."""
+    k = patch.which[i]
+    offset[k, 0] = pose[0] - pose[2] * pad.y[k] - patch.moved[0, i]
+    offset[k, 1] = pose[1] + pose[2] * pad.x[k] - patch.moved[1, i]
 
 
 @compiled
