@@ -108,10 +108,10 @@ class BlobStore:
     """
 
     def __init__(self, folder: Path, remote: ObjectStore | None = None, cache_bytes: int = 0) -> None:
-        self._blobs, self._spool = folder / "blobs", folder / "spool"
+        self._blobs, self._spool, self._set_aside = (folder / part for part in ("blobs", "spool", "quarantine"))
         self._remote, self._cache_bytes, self._fetched = remote, cache_bytes, cache_bytes
         self.quarantine: Quarantine = (
-            FolderQuarantine(folder / "quarantine", self._place) if remote is None else ObjectQuarantine(remote)
+            FolderQuarantine(self._set_aside, self._place) if remote is None else ObjectQuarantine(remote)
         )
         self._checked: dict[str, tuple[float, tuple[int, ...]]] = {}  # when, and as which file
         self.store_id: str | None = None  # that of the database that works with it, once somebody has compared them
@@ -129,7 +129,8 @@ class BlobStore:
     def has_within(self, folder: Path) -> bool:
         """Whether a folder is, or is to be, among the store's own files."""
         place = folder.resolve()
-        return any(place.is_relative_to(part.resolve()) for part in (self._blobs, self._spool))
+        own = (self._blobs, self._spool, self._set_aside)
+        return any(place.is_relative_to(part.resolve()) for part in own)
 
     def spool(self) -> Spool:
         """A new file to write to; use it in a ``with`` statement."""

@@ -88,10 +88,10 @@ class KeyCache:
         known, until = self._kept.get(keys.key_id(text) or "", (NO_KEY, 0.0))
         return known if keys.is_key(text, known) and time.monotonic() <= until else None
 
-    def has_found(self, text: str) -> bool:
-        """Whether this is a key that was found once, though it may be none by now."""
+    def id_of_found(self, text: str) -> str | None:
+        """The id of a key that was found once, though it may be none by now."""
         known, _ = self._kept.get(keys.key_id(text) or "", (NO_KEY, 0.0))
-        return keys.is_key(text, known)
+        return known.id if keys.is_key(text, known) else None
 
 
 class Authentication:
@@ -163,8 +163,8 @@ class Authenticator:
     def starts_as(self, connection: HTTPConnection) -> str:
         """Among whose requests one waits to begin: those with its key, if it was one lately, else of its address."""
         kind, _, text = connection.headers.get("authorization", "").partition(" ")
-        is_key = kind.lower() == "bearer" and self._keys.has_found(text.strip())
-        return keys.key_id(text.strip()) or "" if is_key else _address(connection)
+        found = self._keys.id_of_found(text.strip()) if kind.lower() == "bearer" else None
+        return found or _address(connection)
 
     def _count(self, who: str | None) -> None:
         seconds = 0.0 if who is None else self._rate.wait(who)

@@ -23,7 +23,7 @@ class FairStarts:
     """Lets one request or stream of a client begin in a round of the event loop; its others follow in later ones.
 
     What a request does before it waits for anything keeps everybody waiting, and for who has no key that is all that is
-    done. A client is a key that is known, or else an address.
+    done. A client is a key that was one before, or else an address.
     """
 
     def __init__(self, app: ASGIApp, authenticator: Authenticator) -> None:

@@ -108,7 +108,7 @@ def test_a_restored_database_goes_on_with_new_rows(
         assert jobs.claim(session, runners.add(session, "host:2")) is not None
 
 
-@pytest.mark.parametrize("part", ["blobs", "blobs/copy", "spool"])
+@pytest.mark.parametrize("part", ["blobs", "blobs/copy", "spool", "quarantine"])
 def test_a_backup_among_the_blobs_themselves_is_refused(
     filled: Database, blobs: BlobStore, tmp_path: Path, part: str
 ) -> None:
