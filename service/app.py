@@ -19,6 +19,7 @@ from service.http.context import ServerContext
 from service.http.fair_starts import FairStarts
 from service.http.head_requests import HeadRequests
 from service.http.lookups import Lookups
+from service.http.own_cookie import OwnCookie
 from service.http.request_middleware import RequestMiddleware
 from service.http.routes import (
     audit,
@@ -109,6 +110,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(FairStarts, authenticator=authenticator)
     app.add_middleware(Metering, access_log=access_log)
     app.add_middleware(Lookups, authenticator=authenticator, access_log=access_log)
+    app.add_middleware(OwnCookie)
     app.add_middleware(StartRefusal)
     errors.install(app)
     return app

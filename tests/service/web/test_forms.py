@@ -17,6 +17,7 @@ from estimators.method_names import METHODS
 from service.domain import upload
 from service.http.problem_meanings import MEANINGS
 from service.http.problems import PROBLEM_TYPES
+from service.web import forms
 from service.web.routes.planning import further_warning
 from tests.service.web.conftest import HOSTILE, HTML, OWN
 
@@ -87,8 +88,23 @@ def test_a_form_in_an_odd_charset_is_refused(client: httpx.Client, charset: str,
     )
     headers = OWN | {"accept": accepted, "content-type": f"multipart/form-data; boundary=X; charset={charset}"}
     answer = client.post("/upload", content=body, headers=headers)
-    assert answer.status_code in {400, 415, 422}, answer.text
+    assert answer.status_code == 400, answer.text
     assert answer.headers["content-type"].startswith(("text/html", "application/problem+json"))
+    assert "UTF-8" in answer.text
+
+
+@ON_SQLITE
+@pytest.mark.parametrize(
+    ("said", "told"), [("; charset=punycode", "UTF-8"), (';charset="UTF-7"', "UTF-8"), (";" * 2000, "1024 characters")]
+)
+def test_no_text_is_read_of_a_form_whose_type_is_refused(
+    client: httpx.Client, said: str, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The codec of punycode takes a minute for 1 MB."""
+    monkeypatch.setattr(forms._FileParser, "parse", None)
+    headers = OWN | HTML | {"content-type": f"multipart/form-data; boundary=X{said}"}
+    answer = client.post("/upload", content=b"--X--", headers=headers)
+    assert (answer.status_code, told in answer.text) == (400, True)
 
 
 @ON_SQLITE

@@ -4,7 +4,9 @@ from http.cookies import SimpleCookie
 from typing import Any
 
 import pytest
+from starlette import requests
 from starlette.formparsers import MultiPartParser
+from starlette.requests import cookie_parser
 
 from db.database import Database
 from db.repositories import access_keys, browser_sessions
@@ -154,6 +156,30 @@ def test_a_session_of_a_key_that_may_only_read_changes_nothing(caller: Any, make
     answer = caller.request("POST", "/materials", data={"name": "paper"}, headers={**OWN, "cookie": cookie})
     assert answer.status_code == 403
     assert "may only read" in caller.get("/upload", headers={"cookie": cookie}).text
+
+
+@pytest.mark.parametrize("path", ["/v1/materials/paper/friction?fn=0.05", "/v1/materials", "/healthz", "/login", "/"])
+@pytest.mark.parametrize("end", ['"', ""])
+def test_of_cookies_none_but_the_services_own_is_read(
+    caller: Any, cookie: str, path: str, end: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Some versions of Python take seconds to unquote those of 16 kB (CVE-2024-7592)."""
+    read: list[str] = []
+    monkeypatch.setattr(requests, "cookie_parser", lambda sent: read.append(sent) or cookie_parser(sent))
+    quoted = 'a="' + 5000 * '\\"' + end
+    for sent in (quoted, f"{sessions.COOKIE}={quoted}", f"{quoted}; {cookie};b={quoted}"):
+        caller.get(path, headers={"cookie": sent})
+    assert set(read) == {cookie}
+
+
+@pytest.mark.parametrize("sent", ["{}", "a=1; {}", "{};b=2", 'a="x; y" ;\t{} ', "x{};{}"])
+def test_a_session_goes_on_beside_other_cookies(caller: Any, cookie: str, sent: str) -> None:
+    assert caller.get("/", headers={"cookie": sent.replace("{}", cookie)}).status_code == 200
+
+
+@pytest.mark.parametrize("sent", ["x{}", "{}!", "a=1,{}", '"{}"'])
+def test_what_only_looks_like_a_sessions_cookie_is_none(caller: Any, cookie: str, sent: str) -> None:
+    assert caller.get("/", headers={"cookie": sent.replace("{}", cookie)}).status_code == 303
 
 
 def test_logging_out_ends_the_session_at_once(caller: Any, cookie: str) -> None:
