@@ -18,7 +18,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from service.http import turns
 from service.http.joined_writes import JoinedWrites
-from service.http.problems import BAD_REQUEST, MEDIA_TYPE, TOO_MANY_CONNECTIONS, ProblemType
+from service.http.problems import BAD_REQUEST, HEADERS_TOO_LARGE, MEDIA_TYPE, TOO_MANY_CONNECTIONS, ProblemType
 
 HEADER_SECONDS = 10.0
 """s from the first byte of a request, or from the connection, to the end of its headers.
@@ -32,8 +32,18 @@ RECEIVED_BYTES = 512 * 1024
 H11_BYTES = 4096
 """Parsed at once by h11, which takes 4 ms for as many in chunks of a byte."""
 
+MOST_HEADERS = 100
+"""Of a request; each is looked at several times, and browsers send some twenty."""
+
+MOST_PARAMETERS = 100
+"""In the query of an address; routes have ten at most."""
+
+HANDSHAKE_BYTES = 512
+"""Of a header of a WebSocket's handshake: what asks for it is parsed in Python, byte by byte."""
+
 VERSIONS = frozenset({"1.0", "1.1"})
 BODY_HEADERS = frozenset({b"content-length", b"transfer-encoding"})
+HANDSHAKE = frozenset({b"connection", b"upgrade"})
 
 Refusal = tuple[ProblemType, str]
 """What a request is refused as, and why."""
@@ -251,7 +261,9 @@ class BoundedConnection(asyncio.Protocol):
             return TOO_MANY_CONNECTIONS, "this address has as many as it may; try again later"
         if self._most is not None and max(len(self.connections) - 1, len(self.tasks) - 1) >= self._most:
             return TOO_MANY_CONNECTIONS, "as many connections are open as may be; try again later"
-        fault = ambiguity(scope)
+        if len(scope["headers"]) > MOST_HEADERS:
+            return HEADERS_TOO_LARGE, f"{len(scope['headers'])} headers; allowed: at most {MOST_HEADERS}"
+        fault = ambiguity(scope) or _excess(scope)
         return None if fault is None else (BAD_REQUEST, fault)
 
 
@@ -298,12 +310,22 @@ def ambiguity(scope: Scope) -> str | None:
     return None if codings in ([], [b"chunked"]) else "a Transfer-Encoding other than chunked; allowed: chunked"
 
 
+def _excess(scope: Scope) -> str | None:
+    """What of the address takes long to read before it is known who sends it; None for what all the others send."""
+    parameters = scope["query_string"].count(b"&") + 1
+    return None if parameters <= MOST_PARAMETERS else f"{parameters} parameters; allowed: at most {MOST_PARAMETERS}"
+
+
 def _fault_of_handshake(scope: Scope) -> Refusal | None:
-    """What RFC 6455, 4.1 forbids; the WebSocket's own protocol would wait for ever for the end of a body."""
+    """What RFC 6455, 4.1 forbids, or takes long to parse; the WebSocket's own protocol would wait for a body's end."""
     if scope["http_version"] != "1.1":
         return BAD_REQUEST, f"a WebSocket is asked for by HTTP {scope['http_version']}; allowed: 1.1"
-    if any(name in BODY_HEADERS for name, _ in scope["headers"]):
-        return BAD_REQUEST, "a WebSocket is asked for with a body; allowed: none"
+    for name, value in scope["headers"]:
+        if name in BODY_HEADERS:
+            return BAD_REQUEST, "a WebSocket is asked for with a body; allowed: none"
+        if len(value) > HANDSHAKE_BYTES and (name in HANDSHAKE or name.startswith(b"sec-websocket-")):
+            told = f"a header {name.decode('latin-1')} of {len(value)} bytes; allowed: at most {HANDSHAKE_BYTES}"
+            return HEADERS_TOO_LARGE, told
     return None
 
 

@@ -48,7 +48,7 @@ class HttpToolsConnection(BoundedConnection, HttpToolsProtocol):
             return  # the request is read once more, without the offer
         self._unfinished = 0
         super().on_headers_complete()
-        self.scope["raw_path"] = self.url.partition(b"?")[0]  # not only what the parser took for the path
+        self.scope["raw_path"], _, self.scope["query_string"] = self.url.partition(b"?")  # as it was sent, all of it
         self._body_left = next((int(value) for name, value in self.headers if name == b"content-length"), 0)
         if not self.parser.should_upgrade():
             self.headers = []
@@ -74,11 +74,9 @@ class HttpToolsConnection(BoundedConnection, HttpToolsProtocol):
         """The request line and headers as they were sent, without the offer."""
         line = b" ".join([self.parser.get_method(), self.url, b"HTTP/" + self.parser.get_http_version().encode()])
         kept = [name + b": " + value for name, value in self.headers if name not in OFFER | {b"connection"}]
-        options = [
-            option.strip() for name, value in self.headers if name == b"connection" for option in value.split(b",")
-        ]
-        kept += [b"connection: " + option for option in options if option.lower() not in OFFER]
-        return b"\r\n".join([line, *kept, b"", b""])
+        said = b",".join(value for name, value in self.headers if name == b"connection").split(b",")
+        options = [option for option in said if option.strip().lower() not in OFFER]
+        return b"\r\n".join([line, *kept, b"connection: " + b",".join(options), b"", b""])
 
     def _is_receiving(self) -> bool:
         return not self.pipeline and super()._is_receiving()

@@ -103,6 +103,41 @@ def test_what_does_not_end_is_not_kept(address: Address, endless: tuple[bytes, .
     assert time.monotonic() - began < 5.0
 
 
+LOCAL = b"Host: localhost\r\nConnection: close\r\n"
+MANY_OPTIONS = b"Connection: Upgrade" + 300 * b",a" + b"\r\n"
+TO_WEBSOCKET = b"Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
+
+
+@pytest.mark.parametrize(
+    ("sent", "told_of"),
+    [
+        (b"GET /healthz HTTP/1.1\r\n" + LOCAL + b"a: b\r\n" * 99, "101 headers; allowed: at most 100"),
+        (b"GET /healthz?" + b"%4=&" * 100 + b" HTTP/1.1\r\n" + LOCAL, "101 parameters; allowed: at most 100"),
+        (
+            b"GET /v1/stream?" + b"a&" * 100 + b" HTTP/1.1\r\nHost: a\r\nConnection: Upgrade\r\n" + TO_WEBSOCKET,
+            "101 parameters",
+        ),
+        (
+            b"GET /v1/stream HTTP/1.1\r\nHost: a\r\n" + MANY_OPTIONS + TO_WEBSOCKET,
+            "a header connection of 607 bytes; allowed: at most 512",
+        ),
+    ],
+    ids=["headers", "parameters", "parameters of a websocket", "handshake"],
+)
+def test_what_takes_long_to_read_is_refused_before_it_is_known_who_sends_it(
+    address: Address, sent: bytes, told_of: str
+) -> None:
+    head, _, body = told(address, sent + b"\r\n").partition(b"\r\n\r\n")
+    assert head.split()[1] in {b"400", b"431"}
+    assert told_of in json.loads(body)["detail"]
+
+
+def test_an_offer_of_another_protocol_grows_no_more_headers_than_were_sent(address: Address) -> None:
+    """Read once more without the offer, its options were a header each: 15 kB became 82 kB."""
+    sent = b"GET /healthz HTTP/1.1\r\nHost: a\r\n" + MANY_OPTIONS + b"Upgrade: h2c\r\n\r\n"
+    assert told(address, sent + NEXT).count(b"HTTP/1.1 200") == 2
+
+
 OFFERS = (
     b"Connection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\nHTTP2-Settings: AAMAAABkAAQAAP__\r\n",
     b"Connection: upgrade\r\nUpgrade: something/1\r\n",
@@ -348,7 +383,7 @@ def test_a_websocket_whose_handshake_takes_several_turns_is_read(
     address: Address, monkeypatch: pytest.MonkeyPatch, behind: bytes
 ) -> None:
     monkeypatch.setattr(turns, "TURN_SECONDS", 0.0)
-    headers = b"".join(b"X-%d: %b\r\n" % (k, b"x" * 100) for k in range(100))
+    headers = b"".join(b"X-%d: %b\r\n" % (k, b"x" * 100) for k in range(80))
     before = behind and behind + b"1\r\nx\r\n" * 20_000 + b"0\r\n\r\n"
     with closing(socket.create_connection(address, timeout=20.0)) as connection:
         connection.sendall(before + HANDSHAKE + headers + b"\r\n")

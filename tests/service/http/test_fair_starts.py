@@ -1,11 +1,13 @@
 """However many requests of an address come at once, one of them begins in a round of the event loop."""
 
 import asyncio
-from itertools import groupby
+import time
+from contextlib import nullcontext
+from itertools import groupby, pairwise
 
 import pytest
 from starlette.requests import HTTPConnection
-from starlette.types import Receive, Scope, Send
+from starlette.types import Message, Receive, Scope, Send
 
 from service.http.authentication import Authenticator
 from service.http.fair_starts import FairStarts
@@ -79,3 +81,56 @@ def test_the_start_of_the_server_takes_no_turn() -> None:
 
     asyncio.run(FairStarts(note, Known())({"type": "lifespan"}, nothing, nothing))
     assert seen == ["lifespan"]
+
+
+def test_a_client_whose_request_took_long_to_begin_waits_for_as_long() -> None:
+    """Were the next one begun at once, all that came in one round would be, in that round."""
+    began: list[float] = []
+
+    async def slow(scope: Scope, receive: Receive, send: Send) -> None:  # noqa: ARG001
+        began.append(time.monotonic())
+        time.sleep(0.02)
+
+    async def check() -> None:
+        starts = FairStarts(slow, Known())
+        scope = {"type": "http", "client": ("a", 1), "headers": []}
+        await asyncio.gather(*(starts(scope, nothing, nothing) for _ in range(4)))
+
+    asyncio.run(check())
+    assert min(after - before for before, after in pairwise(began)) >= 0.04
+
+
+@pytest.mark.parametrize("waits", [0, 1, 3])
+@pytest.mark.parametrize("ends", ["well", "by an error", "by being given up"])
+def test_a_request_goes_on_from_its_first_wait_to_its_end(waits: int, ends: str) -> None:
+    seen: list[object] = []
+
+    async def request(scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            seen.extend([await receive() for _ in range(waits)])
+            if ends == "by an error":
+                raise LookupError("what was asked for")
+            await send({"type": "end"})
+        except asyncio.CancelledError:
+            seen.append(scope["path"])
+            raise
+
+    async def receive() -> Message:
+        await asyncio.sleep(0)
+        return {"type": "body"}
+
+    async def send(message: Message) -> None:
+        seen.append(message)
+        if ends == "by being given up":
+            await asyncio.Event().wait()
+
+    async def check() -> None:
+        scope = {"type": "http", "client": ("a", 1), "headers": [], "path": "/given-up"}
+        async with asyncio.timeout(0.01 if ends == "by being given up" else None):
+            await FairStarts(request, Known())(scope, receive, send)
+
+    error = {"well": None, "by an error": LookupError, "by being given up": TimeoutError}[ends]
+    with pytest.raises(error) if error else nullcontext():
+        asyncio.run(check())
+    last = {"well": [{"type": "end"}], "by an error": [], "by being given up": [{"type": "end"}, "/given-up"]}[ends]
+    assert seen == waits * [{"type": "body"}] + last
