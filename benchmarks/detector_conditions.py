@@ -11,6 +11,7 @@ import numpy as np
 
 from benchmarks.detector_accuracy import FORCE_NOISE, score
 from benchmarks.detector_scenes import Case, cases, observed, phases, scoring, simulated
+from service.slip_benchmark.faults import dropped
 from slipcore import GraspLog, detect_slip
 from slipcore.contact.effects import SensorSampling
 from slipcore.contact.scene import Scene
@@ -18,11 +19,6 @@ from slipcore.contact.scene import Scene
 MARKER_NOISE = 1e-6
 FAST_SCENES = ("quick pull", "swing", "grip loosens")
 """Simulated at other frame rates: fast, reversed, and with a falling normal force."""
-
-
-def tenth_dropped(log: GraspLog, rng: np.random.Generator) -> GraspLog:
-    """Without a tenth of its frames, chosen at random."""
-    return log.take(np.sort(rng.choice(len(log), round(0.9 * len(log)), replace=False)))
 
 
 def outliers(log: GraspLog, rng: np.random.Generator) -> GraspLog:
@@ -47,7 +43,7 @@ def retimed(factor: float) -> Callable[[GraspLog, np.random.Generator], GraspLog
 
 CHANGES: dict[str, Callable[[GraspLog, np.random.Generator], GraspLog]] = {
     "as it is": lambda log, _: log,
-    "a tenth of the frames dropped": tenth_dropped,
+    "a tenth of the frames dropped": dropped(0.1),
     "1 % outlier markers": outliers,
     "drift of 10 µm/s": drift,
     "a tenth of the speed and frame rate": retimed(0.1),

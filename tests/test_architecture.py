@@ -206,7 +206,17 @@ def test_only_the_application_knows_the_pages_and_these_ask_no_tables() -> None:
 SERVES = ("service.http", "service.web", "service.app", "service.serving")
 """What speaks HTTP."""
 
-WITHOUT_HTTP = ("domain", "formats", "jobs", "observability", "processes", "report", "settings", "stream")
+WITHOUT_HTTP = (
+    "domain",
+    "formats",
+    "jobs",
+    "observability",
+    "processes",
+    "report",
+    "settings",
+    "slip_benchmark",
+    "stream",
+)
 """What does not, in ``service``, nor imports what does; ``cli`` and ``demo`` start it."""
 
 SOCKETS = {

@@ -15,7 +15,7 @@ from benchmarks.detector_accuracy import (
     summarise,
     table,
 )
-from benchmarks.detector_conditions import drift, outliers, retimed, tenth_dropped
+from benchmarks.detector_conditions import CHANGES, drift, outliers, retimed
 from benchmarks.known_truth import Finding
 from benchmarks.markers import f1
 from slipcore.contact import RampSchedule, tangential_ramp
@@ -85,7 +85,7 @@ def test_a_mean_leaves_out_what_is_not_known() -> None:
 def test_conditions_change_what_they_say_and_nothing_else() -> None:
     log = tangential_ramp(points=4, schedule=RampSchedule(rest=0.2, press=0.4, settle=0.2, shear=1.0, hold=0.2))
     rng = np.random.default_rng(1)
-    dropped = tenth_dropped(log, rng)
+    dropped = CHANGES["a tenth of the frames dropped"](log, rng)
     assert len(dropped) == round(0.9 * len(log))
     assert (np.diff(dropped.time) > 0.0).all()
     assert dropped.truth is not None
