@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from benchmarks.detector_scenes import scoring, simulated
 from benchmarks.pages import options, picture_folder, table, write
+from service.slip_benchmark.measures import f1
 from slipcore import GraspLog, detect_slip
 from slipcore.contact.effects import SensorSampling
-from slipcore.frames import BoolArray, FloatArray
+from slipcore.frames import FloatArray
 from slipcore.markers import on_lattice
 
 SIDE, STEP = 60, 3
@@ -97,12 +98,6 @@ def score(log: GraspLog, place: Callable[[np.random.Generator], Places], lost: s
     assert dots.observed is not None
     scored = contact[:, lattice.marker] & dots.observed
     return f1(slips[:, lattice.marker] & scored, found & scored), float(lattice.occupied.sum() / at.shape[1])
-
-
-def f1(true: BoolArray, found: BoolArray) -> float:
-    """F1 of two masks; NaN where neither has anything."""
-    total = np.count_nonzero(true) + np.count_nonzero(found)
-    return 2.0 * np.count_nonzero(true & found) / total if total else float("nan")
 
 
 def measure(logs: dict[str, GraspLog], dots: str, lost: str, known: bool) -> Score:

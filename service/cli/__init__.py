@@ -9,6 +9,7 @@ import typer
 
 from service.cli import (
     audit,
+    benchmark,
     blobs,
     database,
     jobs,
@@ -74,6 +75,7 @@ for command in (
     app.command()(command)
 app.command("next")(remote.next_grasp)
 app.command("open")(running.open_dashboard)
+app.add_typer(benchmark.app, name="benchmark")
 app.add_typer(materials.app, name="materials")
 app.add_typer(logs.app, name="logs")
 app.add_typer(jobs.app, name="jobs")

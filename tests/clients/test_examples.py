@@ -3,12 +3,16 @@
 import json
 import re
 import runpy
+import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import slipcore
+from slipcore.contact import tangential_ramp
+from stiction_client import container
 
 EXAMPLES = {path.stem: path for path in sorted((Path(__file__).parents[2] / "examples").glob("*.py"))}
 
@@ -49,6 +53,19 @@ def test_a_detector_is_added(capsys: pytest.CaptureFixture[str]) -> None:
         assert number(r"far_from_mean: right for (\d+) %", printed("add_a_detector", capsys)) > 60.0
     finally:
         slipcore.METHODS.pop("far_from_mean", None)
+
+
+def test_a_program_joins_the_slip_benchmark(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tangential_ramp(points=6, pitch=2e-3)
+    seen, said = container.write(log, tmp_path / "input.npz"), tmp_path / "output.npz"
+    monkeypatch.setattr(sys, "argv", ["adapter", str(seen), str(said)])
+    assert printed("slip_benchmark_adapter", capsys) == ""
+    with np.load(said) as prediction:
+        assert prediction["slip"].shape == log.displacement.shape[:3]
+        assert prediction["slip"][-1].all()
+        assert not prediction["slip"][0].any()
 
 
 @pytest.mark.filterwarnings("ignore:.*ArviZ is undergoing:FutureWarning")
