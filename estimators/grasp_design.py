@@ -107,7 +107,7 @@ def next_grasp(
     if not len(designs.normal_force):
         allowed = f"what friction holds, but for {probing.drop_probability:g} of the grasps: lay it on a table"
         raise InvalidSamples("load", probing.load, allowed)
-    left = updated(model.covariance, designs.information(model))
+    left = updated(model.covariance, designs.roots(model))
     after = np.sqrt(np.maximum(point @ left @ point, 0.0))
     best = int(np.argmax((math.sqrt(variance) - after) / designs.seconds))
     score = float(special.stdtrit(model.degrees_of_freedom, IDENTIFIABILITY.ends[1]))
@@ -124,12 +124,23 @@ def next_grasp(
     )
 
 
-def updated(covariance: FloatArray, information: FloatArray) -> FloatArray:
-    """Covariance [..., 3, 3] of β after data of the ``information`` [..., 3, 3], (Σ⁻¹ + M)⁻¹; also where Σ [3, 3] is
-    singular.
+def updated(covariance: FloatArray, roots: FloatArray) -> FloatArray:
+    """Covariance [..., 3, 3] of β after data whose information is RᵀR, (Σ⁻¹ + RᵀR)⁻¹, by R [..., 3, 3].
+
+    With Σ = LLᵀ and RL = USVᵀ it is LV(1 + S²)⁻¹VᵀLᵀ: nothing is squared, and Σ [3, 3] or R may be singular.
     """
-    prior = np.broadcast_to(covariance, information.shape)
-    return np.asarray(np.linalg.solve(np.eye(3) + covariance @ information, prior))
+    root = _root(covariance)
+    _, told, along = np.linalg.svd(roots @ root)
+    left = root @ (along.swapaxes(-1, -2) / np.hypot(1.0, told)[..., None, :])
+    return np.asarray(left @ left.swapaxes(-1, -2))
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """L [3, 3] with LLᵀ = Σ, whose variances may be of any size."""
+    deviation = np.sqrt(np.diag(covariance))
+    scale = np.where(deviation > 0.0, deviation, 1.0)
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -164,20 +175,22 @@ class Designs:
         count = max(self.probing.slipping * self.elements, 1.0) * np.outer(WEIGHTS, WEIGHTS).ravel()
         return x.reshape(len(v), -1, 3), count
 
-    def information(self, model: FrictionModel) -> FloatArray:
-        """What each grasp would tell of β [d, 3, 3]: that of its places, less what is told along β by how grasps vary.
+    def roots(self, model: FrictionModel) -> FloatArray:
+        """R [d, 3, 3] of what each grasp would tell of β, RᵀR: that of its places, less what how grasps vary hides.
 
-        With A = Σ x xᵀ/d over its places and scatter τ of the whole law, M = A − A b bᵀ A τ²/(1 + τ² bᵀ A b), b = β
-        (Sherman & Morrison), as in the fit.
+        With A = Q₀ᵀQ₀ of its places and scatter τ of the whole law, the information is A − A b bᵀ A τ²/(1 + τ² bᵀ A b),
+        b = β (Sherman & Morrison), as in the fit; R = (1 − t a aᵀ) Q₀ with a = Q₀ b, 1 − t aᵀa = 1/√(1 + τ² aᵀa).
         """
         between, places, within = scatter(model)
         x, count = self.places()
         frames = np.maximum(self.probing.frame_rate * self.length / self.speed, 1.0)
-        weight = count / (places**2 + within**2 / frames[:, None])
-        whole = np.einsum("dki,dk,dkj->dij", x, weight, x)
-        along = whole @ model.coefficients
-        shared = between**2 / (1.0 + between**2 * (along @ model.coefficients))
-        return np.asarray(whole - shared[:, None, None] * along[:, :, None] * along[:, None, :])
+        weight = np.sqrt(count / (places**2 + within**2 / frames[:, None]))
+        whole = np.linalg.qr(weight[:, :, None] * x, mode="r")
+        law = whole @ model.coefficients
+        size = np.maximum((law**2).sum(axis=1), np.finfo(float).tiny)
+        hidden = (1.0 - 1.0 / np.hypot(1.0, between * np.sqrt(size))) / size
+        along = np.einsum("di,dij->dj", law, whole)
+        return np.asarray(whole - hidden[:, None, None] * law[:, :, None] * along[:, None, :])
 
 
 def scatter(model: FrictionModel) -> tuple[float, float, float]:

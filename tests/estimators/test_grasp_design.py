@@ -35,20 +35,20 @@ def test_information_is_that_of_the_grasps_covariance() -> None:
     designs = Designs.of(np.array([0.1, 0.3]), 16, replace(probing, speed=(2e-3, 4e-3), length=(1e-3, 2e-3)))
     x, count = designs.places()
     assert (len(designs.seconds), count.sum()) == (8, 16)
-    for k, told in enumerate(designs.information(known)):
+    for k, root in enumerate(designs.roots(known)):
         rows = np.repeat(x[k], count.astype(int), axis=0)
         law = rows @ known.coefficients
         frames = 30.0 * designs.length[k] / designs.speed[k]
         covariance = (0.02**2 + 0.03**2 / frames) * np.eye(16) + 0.05**2 * np.outer(law, law)
-        np.testing.assert_allclose(told, rows.T @ np.linalg.solve(covariance, rows), rtol=1e-10)
+        np.testing.assert_allclose(root.T @ root, rows.T @ np.linalg.solve(covariance, rows), rtol=1e-10)
 
 
 def test_an_update_is_bayes_rule_also_where_nothing_is_uncertain() -> None:
-    covariance, information = model().covariance, np.diag([1e3, 1e-2, 10.0])
+    covariance, roots = model().covariance, np.sqrt(np.diag([1e3, 1e-2, 10.0]))
     np.testing.assert_allclose(
-        updated(covariance, information), np.linalg.inv(np.linalg.inv(covariance) + information), rtol=1e-12
+        updated(covariance, roots), np.linalg.inv(np.linalg.inv(covariance) + roots**2), rtol=1e-12, atol=1e-18
     )
-    assert (updated(np.zeros((3, 3)), information) == 0.0).all()
+    assert (updated(np.zeros((3, 3)), roots) == 0.0).all()
 
 
 def test_the_grasp_is_the_best_of_all_that_can_be_made_worked_out_one_by_one() -> None:
@@ -58,7 +58,8 @@ def test_the_grasp_is_the_best_of_all_that_can_be_made_worked_out_one_by_one() -
     for force in np.append(np.geomspace(0.05, 0.4, 25), 0.1):
         for speed in SPEEDS:
             one = Designs(np.array([force]), np.array([speed]), np.array([1e-3]), POINT.elements, probing)
-            after = np.linalg.inv(np.linalg.inv(known.covariance) + one.information(known)[0])
+            (root,) = one.roots(known)
+            after = np.linalg.inv(np.linalg.inv(known.covariance) + root.T @ root)
             gain[float(force), float(speed)] = (now - math.sqrt(point @ after @ point)) / (4.0 + 1e-3 / speed)
     best = max(gain, key=gain.__getitem__)
     assert (found.normal_force, found.speed) == pytest.approx(best)
@@ -129,6 +130,16 @@ def test_hard_cases_have_an_answer(known: FrictionModel) -> None:
     found = next_grasp(known, POINT)
     assert 0.0 <= found.after <= found.uncertainty * (1.0 + 1e-12)
     assert found.normal_force > 0.0
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_model_is_too_exact_or_too_vague(seed: int) -> None:
+    """Variances over forty decades, in directions of their own: an inverse of 1 + ΣM fails in every third."""
+    generator = np.random.default_rng(seed)
+    root = generator.standard_normal((3, 3)) * 10.0 ** generator.uniform(-17.0, 4.0, 3)
+    scales = Scales(*(Scale(10.0**power, 8.0) for power in generator.uniform(-20.0, 0.0, 3)))
+    found = next_grasp(model(root @ root.T * np.outer([1.0, 30.0, 3.0], [1.0, 30.0, 3.0]), scales), POINT)
+    assert 0.0 <= found.after <= found.uncertainty * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize(
