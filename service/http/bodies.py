@@ -20,6 +20,9 @@ from service.http.problems import UNSUPPORTED_FORMAT, Problem
 MOST_FIELDS = 100
 """Of an object in a body, or of a form; those that are known have two dozen at most."""
 
+MOST_FIELDS_TOGETHER = 500
+"""Of all objects in a body; a calibration's presses have 64 at most. Each that is unknown is an error apart."""
+
 MAX_JSON_BYTES = 64 * 1024
 """Bytes of a JSON body; the longest description is 10,000 characters."""
 
@@ -72,14 +75,22 @@ def _parse_long(body: bytes) -> Any:
         parsed = msgspec.json.decode(body)
     except msgspec.DecodeError as error:
         raise json.JSONDecodeError(str(error), "", 0) from error
-    _check_fields(parsed)
+    if isinstance(parsed, (dict, list)):
+        _check_fields(parsed)
     return parsed
 
 
 def _check_fields(parsed: Any) -> None:
-    if isinstance(parsed, dict):
-        for value in _few_fields([*parsed.items()]).values():
-            _check_fields(value)
+    """Raise as ``_few_fields`` does, and for too many in all objects of a body together."""
+    waiting, count = [parsed], 0
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, dict):
+            count += len(_few_fields([*each.items()]))
+            each = each.values()
+        if count > MOST_FIELDS_TOGETHER:
+            raise HTTPException(400, f"the objects of the body have more than {MOST_FIELDS_TOGETHER} fields together")
+        waiting += [inner for inner in each if isinstance(inner, (dict, list))]
 
 
 class JsonRoute(FairRoute):

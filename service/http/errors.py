@@ -59,6 +59,9 @@ from service.processes.fair_queue import QueueFull
 
 logger = logging.getLogger(__name__)
 
+MOST_TOLD = 20
+"""Values of one request that are told to be wrong."""
+
 QUEUE_FULL_SECONDS = "5"
 """s, as text, after which a file may find room to be read; most take less."""
 
@@ -167,7 +170,7 @@ async def _on_queue_full(request: Request, error: Exception) -> JSONResponse:
 
 async def _on_invalid_request(request: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
-    wrong = [_wrong_value(entry) for entry in error.errors()]
+    wrong = [_wrong_value(entry) for entry in error.errors()[:MOST_TOLD]]
     listed = [{"name": each.name, "value": each.value, "allowed": each.allowed} for each in wrong]
     wrong[0].more["errors"] = listed
     return problem_response(request, wrong[0])
