@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from tempfile import TemporaryFile
+from tempfile import TemporaryFile, mkdtemp
 from types import TracebackType
 from typing import IO, Self
 
@@ -142,10 +142,15 @@ class BlobStore:
         with disk_errors_named():
             return TemporaryFile(dir=self._spool)
 
+    def folder(self) -> Path:
+        """A new folder beside the files of ``spool``; who asks for it removes it."""
+        with disk_errors_named():
+            return Path(mkdtemp(dir=self._spool))
+
     def clear_spool(self) -> None:
         """Remove what was under way when its process ended; only for one who works in the folder alone."""
         for path in self._spool.iterdir():
-            if path.is_dir():  # of a report that was written there
+            if path.is_dir():  # of a reader
                 shutil.rmtree(path)
             else:
                 path.unlink(missing_ok=True)

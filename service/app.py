@@ -147,7 +147,9 @@ async def running(
                 shutdown_seconds=settings.shutdown_seconds,
             )
             for_clients, for_the_store = FairThreads(), FairThreads()
-            readers = Readers(settings.read_seconds, settings.readers, settings.reading_bytes, for_clients)
+            readers = Readers(
+                settings.read_seconds, settings.readers, settings.reading_bytes, for_clients, blobs.folder
+            )
             streams = Streams(settings.stream_sessions_per_key, settings.stream_bytes)
             await runner.start()
             retention = Retention(

@@ -7,6 +7,9 @@ that process with it. Of another format comes a Stiction container, so that noth
 import asyncio
 import os
 import resource
+import shutil
+import tempfile
+import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -81,13 +84,19 @@ class Readers:
 
     ``room``: bytes that reading may take of this process at once. A log that would need a quarter of it or more is
     read in a process, whose memory is bounded by itself. At most ``size`` processes are there, each started when it is
-    first needed and ended when it is lost or long idle; a file may take ``seconds`` there. One ``owner`` has half of
+    first needed and ended when it is lost or long idle; a file may take ``seconds`` there, and what it unpacks is in a
+    folder by ``make_folder``, which goes with it. One ``owner`` has half of
     the room and of the processes (``FairQueue``); ``QueueFull`` is raised where too many wait. Who is cancelled, since
     the client has gone, gives up its place at once.
     """
 
     def __init__(
-        self, seconds: float = 60.0, size: int = 2, room: int = 2**28, threads: FairThreads | None = None
+        self,
+        seconds: float = 60.0,
+        size: int = 2,
+        room: int = 2**28,
+        threads: FairThreads | None = None,
+        make_folder: Callable[[], Path] = lambda: Path(tempfile.mkdtemp()),
     ) -> None:
         self.room = FairQueue(room, "read")
         self._threads = threads or FairThreads()
@@ -95,6 +104,7 @@ class Readers:
         self._seconds = seconds
         self._turns = FairQueue(size, "read")
         self._size, self._busy = size, 0
+        self._make_folder = make_folder
         self._idle: dict[ProcessPoolExecutor, _Idle] = {}
 
     async def describe(self, source: Path, name: str, unpacked: int, owner: str = "") -> Description:
@@ -130,22 +140,24 @@ class Readers:
 
     async def _do(self, do: Callable[[], Result], name: str, seconds: float, owner: str) -> Result:
         async with self._turns.turn(owner):
+            folder = self._make_folder()
             self._busy += 1
             try:
-                result, error = await self._in_process(do, name, seconds, owner)
+                result, error = await self._in_process(do, name, seconds, owner, folder)
             finally:
                 self._busy -= 1
+                asyncio.get_running_loop().run_in_executor(None, _remove, folder)
         if error is not None:
             raise error
         return cast(Result, result)
 
     async def _in_process(
-        self, do: Callable[[], Result], name: str, seconds: float, owner: str
+        self, do: Callable[[], Result], name: str, seconds: float, owner: str, folder: Path
     ) -> tuple[Result | None, Exception | None]:
         """What came of it; the process is kept, or ended where the file keeps it or has ended it."""
         executor = await self._take(owner)
         try:
-            done = asyncio.get_running_loop().run_in_executor(executor, _outcome, do)
+            done = asyncio.get_running_loop().run_in_executor(executor, _outcome, do, folder)
             outcome = await asyncio.wait_for(done, seconds)
         except TimeoutError as lost:
             _end(executor)
@@ -207,8 +219,21 @@ def _end(executor: ProcessPoolExecutor) -> None:
     executor.shutdown(wait=False, cancel_futures=True)
 
 
-def _outcome(do: Callable[[], Result]) -> tuple[Result | None, Exception | None]:
-    """In the reader's process: the result, or what was raised; what is raised here is the process's own end."""
+def _remove(folder: Path) -> None:
+    """Remove what was unpacked; a process that has been ended may write for another moment."""
+    for _ in range(100):
+        shutil.rmtree(folder, ignore_errors=True)
+        if not folder.exists():
+            return
+        time.sleep(0.1)
+
+
+def _outcome(do: Callable[[], Result], folder: Path) -> tuple[Result | None, Exception | None]:
+    """In the reader's process: the result, or what was raised; what is raised here is the process's own end.
+
+    What is unpacked on the way goes into ``folder``.
+    """
+    tempfile.tempdir = str(folder)
     try:
         return do(), None
     except MemoryError:

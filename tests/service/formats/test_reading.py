@@ -1,8 +1,11 @@
 import asyncio
 import os
+import tempfile
 import time
 from collections.abc import Awaitable, Callable
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -82,6 +85,45 @@ def opened(pipe: Path) -> int | None:
         return os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
     except OSError:
         return None
+
+
+def unpack(pipe: Path, ends: str) -> None:
+    """In a reader's process: leave a file where files for a while belong, as a library would."""
+    Path(tempfile.mkdtemp(), "unpacked").write_bytes(b"x" * 1000)
+    if ends != "well":
+        pipe.open("rb").read(1)
+    if ends == "by an error":
+        raise ValueError("what it was")
+
+
+@pytest.mark.parametrize("ends", ["well", "by an error", "by being given up", "by its death"])
+def test_what_a_reader_unpacked_goes_with_it(tmp_path: Path, executors: list[ProcessPoolExecutor], ends: str) -> None:
+    """In a folder of the server's own, which a start clears: nobody else removes files of a process that was ended."""
+    pipe, folder = tmp_path / "pipe", tmp_path / "unpacked"
+    os.mkfifo(pipe)
+
+    async def run() -> None:
+        readers = Readers(60.0, make_folder=lambda: folder.mkdir() or folder)
+        reading = asyncio.ensure_future(readers.derive(partial(unpack, pipe, ends), "zip"))
+        while ends != "well" and (end := opened(pipe)) is None:
+            await asyncio.sleep(0.01)
+        if ends != "well":
+            assert len([*folder.rglob("unpacked")]) == 1
+        if ends == "by an error":
+            os.close(end)
+        elif ends == "by being given up":
+            reading.cancel()
+        elif ends == "by its death":
+            for process in running(executors):
+                process.kill()
+        with suppress(ValueError, InvalidInput, asyncio.CancelledError):
+            await reading
+        while folder.exists():
+            await asyncio.sleep(0.01)
+        await readers.stop()
+
+    asyncio.run(asyncio.wait_for(run(), 20.0))
+    assert not folder.exists()
 
 
 def test_a_reader_that_was_lost_between_two_files_is_no_fault_of_the_second(
