@@ -38,10 +38,12 @@ def make(
     from service.jobs.campaign import workers
     from service.slip_benchmark.kinds import kinds_named
     from service.slip_benchmark.making import make as make_scenes
+    from service.slip_benchmark.making import scenes_in
 
     kinds = kinds_named(kind or ())
     with workers(processes or _cores()) as executor:
-        made = list(counted(make_scenes(executor, phrase, scenes, kinds, output), scenes, "scenes"))
+        entries = make_scenes(executor, phrase, scenes, kinds, output)
+        made = list(counted(entries, scenes_in(output, scenes), "scenes"))
     if json:
         print_json({"folder": str(output), "scenes": len(made), "kinds": [each.name for each in kinds]})
     else:

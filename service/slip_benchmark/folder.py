@@ -1,5 +1,6 @@
 """The files of a benchmark (docs/slip-benchmark.md): manifest, inputs, truth and predictions, each written whole."""
 
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
@@ -96,6 +97,19 @@ def write_arrays(path: Path, arrays: Arrays) -> None:
     write_whole(path, lambda beside: np.savez_compressed(beside, allow_pickle=False, **arrays))
 
 
+def sha256(path: Path) -> str:
+    """Of a file."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def check_unchanged(folder: Path, scene: SceneEntry) -> None:
+    """Raises ``InvalidInput`` where a scene's files are others than those that were made."""
+    known = {input_path(folder, scene.name): scene.input_sha256, truth_path(folder, scene.name): scene.truth_sha256}
+    for path, made in known.items():
+        if sha256(path) != made:
+            raise InvalidInput("scene", f"changed: {path} is not the file of the manifest", "files as they were made")
+
+
 def is_whole(path: Path) -> bool:
     """Whether a file is there and every member of it is what was written."""
     if not path.is_file():
@@ -174,6 +188,8 @@ def read_manifest(folder: Path) -> Manifest:
 
 def _entry(record: Mapping[str, Any]) -> SceneEntry:
     rows, columns = record["elements"]
+    if not record["name"].isdecimal():  # it becomes a file's name
+        raise ValueError(f"a scene called {record['name']!r}")
     return SceneEntry(**{**record, "elements": (int(rows), int(columns))})
 
 

@@ -1,6 +1,5 @@
 """Make a benchmark's folder: every scene that it lacks, its manifest and its data card."""
 
-import hashlib
 from collections.abc import Iterator
 from concurrent.futures import Executor, as_completed
 from dataclasses import fields, replace
@@ -23,12 +22,12 @@ from stiction_client import container
 def make(executor: Executor, phrase: str, scenes: int, kinds: tuple[Kind, ...], folder: Path) -> Iterator[SceneEntry]:
     """Make the scenes that a folder lacks, and tell of each; whole ones of before are kept, and more may be asked for.
 
-    Raises ``InvalidInput`` for an empty phrase, and for a folder that holds another phrase or other kinds.
+    Raises ``InvalidInput`` for an empty phrase, and for a folder of another phrase, of other kinds or another version.
     """
     if not phrase.strip():
         raise InvalidInput("phrase", repr(phrase), "some text, which nobody knew before")
     manifest = _begun(phrase, kinds, folder)
-    sealed = [SealedScene(phrase, index, kinds) for index in range(max(scenes, len(manifest.scenes)))]
+    sealed = [SealedScene(phrase, index, kinds) for index in range(scenes_in(folder, scenes))]
     entries = []
     for done in as_completed([executor.submit(make_scene, scene, folder) for scene in sealed]):
         entries.append(done.result())
@@ -48,12 +47,16 @@ def _begun(phrase: str, kinds: tuple[Kind, ...], folder: Path) -> Manifest:
         files.write_manifest(folder, manifest)
         return manifest
     known = files.read_manifest(folder)
-    if (known.seal, known.kinds) != (manifest.seal, manifest.kinds):
-        what = "another phrase" if known.seal != manifest.seal else f"kinds {', '.join(known.kinds)}"
-        raise InvalidInput(
-            "phrase and kinds", f"other than those of {folder}, made of {what}", "the same, or another folder"
-        )
+    if replace(known, scenes=()) != manifest:
+        made = f"made by {known.made_by} of {'this' if known.seal == manifest.seal else 'another'} phrase"
+        told = f"{folder}, {made} for kinds {', '.join(known.kinds)}"
+        raise InvalidInput("folder", told, "one of the same phrase, kinds and version, or a new one")
     return known
+
+
+def scenes_in(folder: Path, asked: int) -> int:
+    """How many scenes a folder will have: as many as are ``asked`` for, or those that it has if these are more."""
+    return max(asked, len(files.read_manifest(folder).scenes) if (folder / files.MANIFEST).exists() else 0)
 
 
 def make_scene(scene: SealedScene, folder: Path) -> SceneEntry:
@@ -118,6 +121,6 @@ def _entry(scene: SealedScene, folder: Path) -> SceneEntry:
         force_noise=(kind.force_noise or 0.0) if fault.marker_noise else 0.0,
         frames=len(log),
         elements=log.grid,
-        input_sha256=hashlib.sha256(seen_path.read_bytes()).hexdigest(),
-        truth_sha256=hashlib.sha256(true_path.read_bytes()).hexdigest(),
+        input_sha256=files.sha256(seen_path),
+        truth_sha256=files.sha256(true_path),
     )

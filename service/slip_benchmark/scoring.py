@@ -109,7 +109,7 @@ def _record(summary: Summary) -> dict[str, Any]:
 def score(folder: Path, count: Callable[[float, str], None] = lambda _, __: None) -> Scores:
     """Score each method that has results; ``count`` is told which part is done.
 
-    Raises ``InvalidInput`` for a folder that holds no whole benchmark, or no results.
+    Raises ``InvalidInput`` for a folder that holds no whole benchmark, a changed one, or no results.
     """
     manifest, methods = files.read_whole_benchmark(folder), files.methods_of(folder)
     if not methods:
@@ -132,6 +132,7 @@ def _refused(folder: Path, method: str) -> dict[str, str]:
 
 
 def _scene_scores(folder: Path, scene: SceneEntry, refused: dict[str, dict[str, str]]) -> Iterator[SceneScore]:
+    files.check_unchanged(folder, scene)
     truth = files.read_truth(files.truth_path(folder, scene.name))
     observed = formats.read(input_path(folder, scene.name)).observed
     for method, why in refused.items():

@@ -27,6 +27,9 @@ from service.slip_benchmark.page import draw, page
 from service.slip_benchmark.running import Program, run
 from service.slip_benchmark.scenes import SealedScene
 from service.slip_benchmark.scoring import score
+from slipcore.contact import Finger
+from slipcore.contact.effects.object_motion import ObjectMotion
+from slipcore.contact.effects.torsion import Torsion
 from slipcore.contact.tiers.boundary_elements import Fidelity
 from slipcore.errors import InvalidInput
 from stiction_client import container
@@ -110,9 +113,9 @@ def test_a_folder_that_was_left_half_made_is_completed_and_what_is_whole_is_kept
 
 
 def test_a_folder_holds_one_phrase(mine: Path, tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match="made of another phrase"):
+    with pytest.raises(InvalidInput, match=r"made by stiction \S+ of another phrase"):
         list(make(Here(), "another", 2, PILLARS, mine))
-    with pytest.raises(InvalidInput, match="made of kinds pillars 3x3"):
+    with pytest.raises(InvalidInput, match="of this phrase for kinds pillars 3x3; allowed: one of the same phrase"):
         list(make(Here(), PHRASE, 2, kinds_named([]), mine))
     with pytest.raises(InvalidInput, match="phrase is ' '"):
         list(make(Here(), " ", 2, PILLARS, tmp_path / "new"))
@@ -140,6 +143,25 @@ def test_a_camera_without_depth_tells_nothing_along_z_and_no_forces(monkeypatch:
     assert true.truth.contact.any()
     assert not true.truth.contact[:7].any()  # rest
     assert np.ptp(np.diff(true.time)) < 1e-9
+
+
+@pytest.mark.parametrize("family", dict.fromkeys(family for family, _ in scenes._FAMILIES), ids=lambda f: f.__name__)
+def test_loads_begin_after_the_press_and_stay_below_sliding_and_motions_go_beyond(family: Any) -> None:
+    body = scenes.Body(0.5, 8.0, 4e-3, Finger())
+    for seed in range(20):
+        effects, duration = family(np.random.default_rng(seed), body, 1.0)
+        for effect in effects:
+            begin = effect.start if isinstance(effect, Torsion) else effect.time[0]
+            assert 0.5 < begin < duration
+        (path,) = (effect for effect in effects if not isinstance(effect, Torsion))
+        if isinstance(path, ObjectMotion):
+            turned = 4e-3 * abs(path.yaw[-1]) if path.yaw else 0.0
+            assert turned + max(np.hypot(path.x, path.y)) > body.give
+        else:
+            normal = body.force + np.array(path.normal_force or np.zeros(len(path.time)))
+            pulled = np.hypot(path.force_x or 0.0, path.force_y or 0.0)
+            assert (normal > 0.0).all()
+            assert (pulled <= 0.98 * body.friction * normal).all()
 
 
 def test_a_fault_changes_what_is_seen_and_not_the_truth() -> None:
@@ -284,6 +306,20 @@ def test_a_program_predicts_or_its_failure_is_told(mine: Path, tmp_path: Path) -
 def test_a_program_that_cannot_be_run_is_refused(made: Path, name: str, command: str, message: str) -> None:
     with pytest.raises(InvalidInput, match=message):
         list(run(Here(), made, [], Program(name, command, 1.0)))
+
+
+def test_a_scene_that_was_changed_is_not_scored(mine: Path) -> None:
+    say(mine, "stick", slip=lambda t: np.zeros_like(t.slip))
+    shutil.copyfile(truth_path(mine, "0000"), truth_path(mine, "0001"))
+    with pytest.raises(InvalidInput, match=r"0001\.npz is not the file of the manifest"):
+        score(mine)
+
+
+def test_a_scene_that_leads_out_of_the_folder_is_refused(mine: Path) -> None:
+    path = mine / files.MANIFEST
+    path.write_text(path.read_text(encoding="utf-8").replace('"0001"', '"../0001"'), encoding="utf-8")
+    with pytest.raises(InvalidInput, match=r"a scene called '\.\./0001'"):
+        score(mine)
 
 
 def test_what_is_no_whole_benchmark_is_refused(mine: Path, tmp_path: Path) -> None:
