@@ -377,6 +377,19 @@ def test_from_a_phrase_to_a_page(command: Callable[..., tuple[int, str, str]], t
     assert "no noise" in text
 
 
+def test_the_page_shows_the_adapter_that_runs() -> None:
+    root = Path(__file__).parents[3]
+    shown = (root / "docs" / "slip-benchmark.md").read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
+    assert (root / "examples" / "slip_benchmark_adapter.py").read_text(encoding="utf-8").endswith(shown)
+
+
+def test_each_kind_and_fault_is_on_the_page() -> None:
+    page_text = (Path(__file__).parents[3] / "docs" / "slip-benchmark.md").read_text(encoding="utf-8")
+    assert [name for name in KINDS if f"| `{name}` |" not in page_text] == []
+    names = {fault.name for kind in KINDS.values() for fault in faults_of(kind) if not fault.name.startswith("noise ")}
+    assert [name for name in names if f"| {name} |" not in page_text] == []
+
+
 def test_what_cannot_be_scored_ends_the_command_with_what_is_wrong(
     command: Callable[..., tuple[int, str, str]], mine: Path
 ) -> None:
