@@ -197,9 +197,8 @@ class _Connection:
             packed_or_none("normal", frame.normal),
             frame.command,
         )
-        return await self._streams.call(
-            detectors.step, session.id, given, session.broadcast.wants(asyncio.get_running_loop().time())
-        )
+        is_shown = session.broadcast.wants(asyncio.get_running_loop().time())
+        return await self._streams.ask(session, detectors.step, given, is_shown)
 
     async def _finish(self, session: Session, message: Finish) -> dict[str, Any]:
         """Store the kept frames through the same door as an upload; until the answer is there it may be said again."""
@@ -209,7 +208,7 @@ class _Connection:
         if not opening.keep:
             raise End(REFUSED, "store needs keep, said when the session was opened")
         with self._context.blobs.spool() as spool:
-            found = await self._streams.call(detectors.write, session.id, spool.path, opening.sensor)
+            found = await self._streams.ask(session, detectors.write, spool.path, opening.sensor)
             share = self._principal.share
             stored = await self._context.store_threads.run(
                 share, self._store, spool, found, self._upload(opening), is_long=True

@@ -57,6 +57,13 @@ class PackedFrame(NamedTuple):
     command: float | None = None
 
 
+class Room(NamedTuple):
+    """Of all sessions together ``most_bytes``, of which one ``owner`` has half of what the others leave."""
+
+    owner: str
+    most_bytes: int
+
+
 @dataclass(slots=True)
 class Session:
     """A running detector with what it saw: the last frames and answers, all frames if they are ``kept``; and the
@@ -70,6 +77,7 @@ class Session:
     position: NDArray[np.float64]
     element_area: float
     moments: "Moments"
+    room: Room
     kept: list[Frame] | None
     grip: Grip | None = None
     frames: list[Frame] = field(default_factory=list)
@@ -81,7 +89,6 @@ class Session:
     friction: dict[str, Any] | None = None
     expected: dict[str, float] | None = None
     held_bytes: int = 0
-    most_bytes: int = 0
     begun: float | None = None
 
 
@@ -98,11 +105,11 @@ def open_session(
     area: float,
     method: str,
     keep: bool,
-    most_bytes: int,
+    room: Room,
     control: Control | None = None,
     model: "stiction_client.FrictionModel | None" = None,
 ) -> None:
-    """Begin a session, for which there must be room in ``most_bytes`` of all sessions together.
+    """Begin a session, for which there must be ``room``.
 
     ``control``: of a grip controller that answers its frames, and begins with ``model`` if there is one. Raises
     ``InvalidInput`` for what cannot be a sensor or a controller.
@@ -112,11 +119,11 @@ def open_session(
         raise InvalidInput("grid", list(grid), f"1 to {MAX_MARKERS} markers")
     at_rest = _array("position", position, (rows, columns, 3))
     held = WINDOW * 3 * at_rest.nbytes  # of the frames that are looked at, each with forces and normals
-    _check_room(held, most_bytes)
+    _check_room(held, room)
     detector, moments = slipcore.SlipDetector(at_rest, area, method), estimators.Moments.empty(area)
     kept: list[Frame] | None = [] if keep else None
     grip = None if control is None else Grip(at_rest, control, model)
-    _SESSIONS[name] = Session(detector, at_rest, area, moments, kept, grip, held_bytes=held, most_bytes=most_bytes)
+    _SESSIONS[name] = Session(detector, at_rest, area, moments, room, kept, grip, held_bytes=held)
 
 
 def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[str, Any], bytes | None]:
@@ -198,15 +205,21 @@ def _kept_bytes(session: Session, frame: Frame) -> int:
     count = len(session.kept or ()) + 1
     if count * size > MAX_KEPT_BYTES:
         raise InvalidInput("frames", count, f"{MAX_KEPT_BYTES // size} of this size, where they are kept")
-    _check_room(size, session.most_bytes)
+    _check_room(size, session.room)
     return size
 
 
-def _check_room(size: int, most_bytes: int) -> None:
-    held = sum(each.held_bytes for each in _SESSIONS.values())
-    if held + size > most_bytes:
-        allowed = f"{most_bytes} of all live streams together; finish one, or set STICTION_STREAM_BYTES"
-        raise InvalidInput("bytes", held + size, allowed)
+def _check_room(size: int, room: Room) -> None:
+    own, others = (
+        sum(each.held_bytes for each in _SESSIONS.values() if (each.room.owner == room.owner) is is_own)
+        for is_own in (True, False)
+    )
+    most = (room.most_bytes - others) // 2
+    if own + size > most:
+        allowed = (
+            f"{most} of one client's live streams, half of what others leave; finish one, or set STICTION_STREAM_BYTES"
+        )
+        raise InvalidInput("bytes", own + size, allowed)
 
 
 def _plan_look(session: Session, frame: Frame, state: SlipState) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 
+from service.processes.fair_queue import PatientQueue
 from service.processes.side_process import ProcessEnded, SideProcess
 from service.stream import detectors
 from service.stream.broadcast import Broadcast, Watchers
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 MOST_SESSIONS = 200
 PATIENCE = 60.0
 """s that a session waits for its client to come back, and a new connection may take to say what it wants."""
+
+FRAMES_AT_ONCE, FRAMES_OF_ONE = 4, 2
+"""With the detectors' process, which does one after the other: one is done while the next one of an owner is sent."""
 
 ANSWERS_KEPT, ANSWER_BYTES_KEPT = 256, 256 * 1024
 """Answers that a client who comes back may have missed; fewer where many elements slip."""
@@ -74,7 +78,8 @@ class Streams:
     """All sessions, and the worker process of their detectors, started with the first of them.
 
     An owner, which is an access key or else an address, has at most ``per_owner`` of them, and what they keep has at
-    most ``most_bytes`` together.
+    most ``most_bytes`` together, of which an owner has half of what others leave. Frames of one owner's sessions wait
+    for two of another's at most, however many that has.
     """
 
     def __init__(self, per_owner: int = 50, most_bytes: int = 512 * 2**20) -> None:
@@ -84,6 +89,7 @@ class Streams:
         self._sessions: dict[str, Session] = {}
         self._dropping: set[asyncio.Task[None]] = set()
         self._watchers = Watchers()
+        self._turns = PatientQueue(FRAMES_AT_ONCE, "detected", share=FRAMES_OF_ONE)
 
     async def open(
         self, opening: Open, key_id: str | None, address: str, model: "FrictionModel | None" = None
@@ -99,7 +105,7 @@ class Streams:
         try:
             await self.call(
                 detectors.open_session, session.id, position, opening.grid, opening.element_area, opening.detector,
-                opening.keep, self._most_bytes, opening.control, model,
+                opening.keep, detectors.Room(session.owner, self._most_bytes), opening.control, model,
             )  # fmt: skip
         except BaseException:
             self._forget(session)
@@ -170,6 +176,11 @@ class Streams:
     async def _drop(self, name: str) -> None:
         with suppress(End):  # the process ended, and every session with it
             await self.call(detectors.drop, name)
+
+    async def ask(self, session: Session, do: Callable[..., Result], *arguments: Any) -> Result:
+        """Do something with a session's detector when it is its owner's turn; raises ``End`` as ``call`` does."""
+        async with self._turns.turn(session.owner):
+            return await self.call(do, session.id, *arguments)
 
     async def call(self, do: Callable[..., Result], *arguments: Any) -> Result:
         """Do something in the worker; raises ``End`` where it died, and all detectors with it."""

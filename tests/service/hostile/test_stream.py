@@ -108,15 +108,16 @@ def test_an_abandoned_session_is_forgotten_though_nobody_opens_another(
     run(go)
 
 
-def test_all_sessions_together_hold_a_bounded_number_of_bytes(make: Callable[..., Streams]) -> None:
+def test_sessions_of_one_hold_half_of_the_bytes_that_others_leave(make: Callable[..., Streams]) -> None:
     reserve = detectors.WINDOW * 3 * POSITION.nbytes
-    most = 2 * reserve + 3 * ZERO.nbytes
+    most = 2 * (2 * reserve + 3 * ZERO.nbytes)
 
     async def go() -> None:
         streams = make(most_bytes=most)
         first, second = [await streams.open(opening(keep=True), None, "") for _ in range(2)]
         with pytest.raises(InvalidInput, match="STICTION_STREAM_BYTES"):
             await streams.open(opening(), None, "")
+        await streams.end(await streams.open(opening(keep=True), "another", ""))
         taken = 0
         with suppress(InvalidInput):
             for number in range(100):
@@ -126,6 +127,29 @@ def test_all_sessions_together_hold_a_bounded_number_of_bytes(make: Callable[...
         assert taken == 3
         await streams.end(first)
         detectors.step(second.id, PackedFrame(50, 50.0, ZERO.tobytes()))
+
+    run(go)
+
+
+def test_a_frame_waits_for_two_of_another_however_many_that_sends(
+    make: Callable[..., Streams], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def go() -> None:
+        streams = make(per_owner=50)
+        order: list[str] = []
+
+        async def call(_: object, name: str) -> None:
+            order.append(name)
+            await asyncio.sleep(0)
+
+        greedy = [await streams.open(opening(), "greedy", "") for _ in range(20)]
+        honest = await streams.open(opening(), "honest", "")
+        monkeypatch.setattr(streams, "call", call)
+        asked = [asyncio.ensure_future(streams.ask(each, detectors.step)) for each in [*greedy, honest]]
+        await asyncio.gather(*asked)
+        assert order.index(honest.id) <= 2
+        assert [*sorted(order)] == sorted(each.id for each in [*greedy, honest])
+        monkeypatch.undo()
 
     run(go)
 

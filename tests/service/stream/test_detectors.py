@@ -12,6 +12,8 @@ from service.stream import detectors
 from service.stream.detectors import PackedFrame
 from slipcore import GraspLog, InvalidInput, collect_samples, detect_slip
 
+ROOM = detectors.Room("me", 2**30)
+
 
 def unpacked(content: bytes) -> tuple[dict[str, Any], NDArray[np.uint8]]:
     """The header of a frame as it is shown, and the state of its elements."""
@@ -25,7 +27,7 @@ def feed(log: GraspLog, *, wait: bool) -> dict[str, object] | None:
     """All frames, with time for the looks between them or only at their end; the friction that was found."""
     assert log.force is not None
     position = log.position.tobytes()
-    detectors.open_session("one", position, log.grid, log.element_area, "filter", keep=False, most_bytes=2**30)
+    detectors.open_session("one", position, log.grid, log.element_area, "filter", keep=False, room=ROOM)
     session = detectors._SESSIONS["one"]
     for k, time in enumerate(log.time.tolist()):
         detectors.step("one", PackedFrame(k, time, log.displacement[k].tobytes(), log.force[k].tobytes()))
@@ -68,7 +70,7 @@ def test_who_watches_sees_each_element_the_forces_and_the_command(ramp: GraspLog
     assert ramp.force is not None
     history = detect_slip(ramp)
     position = ramp.position.tobytes()
-    detectors.open_session("one", position, ramp.grid, ramp.element_area, "filter", keep=False, most_bytes=2**30)
+    detectors.open_session("one", position, ramp.grid, ramp.element_area, "filter", keep=False, room=ROOM)
     for k, time in enumerate(ramp.time.tolist()):
         arrays = (ramp.displacement, ramp.force, ramp.object_pose, ramp.normal)
         given = [None if array is None else array[k].tobytes() for array in arrays]
@@ -94,7 +96,7 @@ def test_who_watches_sees_each_element_the_forces_and_the_command(ramp: GraspLog
 @pytest.mark.parametrize("command", [-1.0, float("nan"), float("inf")])
 def test_a_command_that_is_no_force_is_refused_before_the_frame_is_taken(ramp: GraspLog, command: float) -> None:
     position = ramp.position.tobytes()
-    detectors.open_session("one", position, ramp.grid, ramp.element_area, "filter", keep=False, most_bytes=2**30)
+    detectors.open_session("one", position, ramp.grid, ramp.element_area, "filter", keep=False, room=ROOM)
     frame = PackedFrame(0, 0.0, ramp.displacement[0].tobytes(), command=command)
     with pytest.raises(InvalidInput, match="command"):
         detectors.step("one", frame)

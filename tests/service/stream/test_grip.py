@@ -16,6 +16,8 @@ from stiction_client import GraspController, InvalidArgument
 FORCES = {"least_force": 0.5, "most_force": 30.0}
 ROUND = Control(6e-5, FORCES, round_at=5.0)
 
+ROOM = detectors.Room("me", 2**30)
+
 
 @pytest.fixture
 def log(ramp: GraspLog) -> GraspLog:
@@ -25,7 +27,7 @@ def log(ramp: GraspLog) -> GraspLog:
 def answers(log: GraspLog, control: Control | None) -> list[dict[str, Any]]:
     """Those of a session without an expected model."""
     assert log.force is not None
-    detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", False, 2**30, control)
+    detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", False, ROOM, control)
     try:
         frames = zip(log.time.tolist(), log.displacement, log.force, strict=True)
         return [
@@ -56,7 +58,7 @@ def test_without_a_controller_nothing_is_commanded(log: GraspLog) -> None:
 
 def test_those_who_watch_see_what_the_controller_commands(log: GraspLog) -> None:
     assert log.force is not None
-    detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", False, 2**30, ROUND)
+    detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", False, ROOM, ROUND)
     given = PackedFrame(0, float(log.time[0]), log.displacement[0].tobytes(), log.force[0].tobytes())
     answer, shown = detectors.step("one", given, is_shown=True)
     detectors.drop("one")
@@ -83,7 +85,7 @@ def test_what_the_controller_refuses_leaves_the_session_as_it_was(
 
     monkeypatch.setattr(GraspController, "step", refuse_every_other)
     assert log.force is not None
-    detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", True, 2**30, ROUND)
+    detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", True, ROOM, ROUND)
     try:
         for k, (time, displacement, force) in enumerate(
             zip(log.time.tolist(), log.displacement, log.force, strict=True)
@@ -116,7 +118,7 @@ def test_torque_is_about_what_presses_wherever_places_are_counted_from(log: Gras
 
 def test_a_frame_without_forces_is_refused_and_leaves_all_as_it_was(log: GraspLog) -> None:
     assert log.force is not None
-    detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", False, 2**30, ROUND)
+    detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", False, ROOM, ROUND)
     time, displacement = float(log.time[0]), log.displacement[0].tobytes()
     with pytest.raises(InvalidInput, match="force is None; allowed: the elements' forces"):
         detectors.step("one", PackedFrame(0, time, displacement))
