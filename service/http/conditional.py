@@ -15,6 +15,10 @@ KEEP_AND_ASK = "private, no-cache"
 """Cache-Control: keep it, but ask before it is used again; a proxy keeps nothing, since not everybody may ask."""
 
 
+LONGEST_LIST = 1024
+"""Characters of `If-None-Match`: some thirty tags."""
+
+
 def conditional(request: Request, tag: str, body: Callable[[], str]) -> Response:
     """The JSON ``body`` with its tag, or only that it has not changed; then it is not even made."""
     if is_one_of(tag, request.headers.get("if-none-match", "")):
@@ -38,5 +42,7 @@ def tagged(request: Request, body: str) -> Response:
 
 
 def is_one_of(tag: str, listed: str) -> bool:
-    """Whether ``If-None-Match`` names the tag."""
-    return any(each.strip().removeprefix("W/") in {tag, "*"} for each in listed.split(","))
+    """Whether ``If-None-Match`` names the tag; of a list that is longer than any client's all is taken for unknown."""
+    return len(listed) <= LONGEST_LIST and any(
+        each.strip().removeprefix("W/") in {tag, "*"} for each in listed.split(",")
+    )

@@ -159,7 +159,8 @@ async def _on_blob_damaged(request: Request, error: Exception) -> JSONResponse:
 
 
 async def _on_storage_unavailable(request: Request, error: Exception) -> JSONResponse:
-    logger.error("storage unavailable", exc_info=error)
+    seen = error if logger.isEnabledFor(logging.DEBUG) else None  # each request of an outage has one, for a full disk
+    logger.error("storage unavailable: %s", str(error).partition("\n")[0], exc_info=seen)
     assert isinstance(error, StorageUnavailable)
     return problem_response(request, storage_unavailable(error))
 

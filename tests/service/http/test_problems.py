@@ -73,3 +73,9 @@ def test_errors_have_their_types_and_secrets_stay_inside(error: Exception, kind:
     assert response.headers["content-type"] == "application/problem+json"
     assert response.status_code == PROBLEM_TYPES[kind].status
     assert (response.json()["type"], response.json()["detail"]) == (f"/problems/{kind}", detail)
+
+
+def test_an_outage_is_logged_in_a_line_a_request(caplog: pytest.LogCaptureFixture) -> None:
+    asyncio.run(answer_to(StorageUnavailable("database: disk full\n[SQL: INSERT …]")))
+    (record,) = (each for each in caplog.records if each.name == "service.http.errors")
+    assert (record.getMessage(), record.exc_info) == ("storage unavailable: database: disk full", None)
