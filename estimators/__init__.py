@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from estimators.moments import Moments
     from estimators.not_converged import NotConverged
     from estimators.online import ChangeDetector
+    from estimators.population import ScatterPrior, population_scatter
     from estimators.recognition import recognise
     from estimators.single_grasps import GraspEffect, grasp_effects
 
@@ -36,6 +37,8 @@ _LAZY = {
     "next_grasp": "estimators.grasp_design",
     "NotConverged": "estimators.not_converged",
     "ChangeDetector": "estimators.online",
+    "ScatterPrior": "estimators.population",
+    "population_scatter": "estimators.population",
     "recognise": "estimators.recognition",
 }
 """Names whose modules load scipy: who only handles errors, or passes models on, goes without."""
@@ -57,12 +60,14 @@ __all__ = [
     "Probing",
     "Scale",
     "Scales",
+    "ScatterPrior",
     "TooFewSamples",
     "WorkingPoint",
     "fit",
     "grasp_effects",
     "needs_samples",
     "next_grasp",
+    "population_scatter",
     "recognise",
     "warm_up",
 ]

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from estimators.defaults import ALARM, CHANGE, PRIOR
+from estimators.defaults import ALARM, CHANGE
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.linear.grasp_statistics import GraspStatistics
-from estimators.linear.priors import log_half_student
+from estimators.linear.priors import ScatterPrior
 
 FloatArray = NDArray[np.float64]
 
@@ -137,6 +137,6 @@ def _log_evidence(level: FloatArray, variance: FloatArray, shift: float) -> Floa
     deviation = later[1] - later[0] * whole[1] / whole[0]
     precision = information + shift**-2
     gain = 0.5 * (deviation**2 / precision - np.log(precision * shift**2))
-    prior = log_half_student(TAUS, PRIOR.grasp_scatter, PRIOR.grasp_degrees_of_freedom) + np.log(TAUS)
+    prior = ScatterPrior().log_density(TAUS) + np.log(TAUS)
     null = prior[:, None] + unchanged
     return np.asarray(special.logsumexp(null + gain, axis=0) - special.logsumexp(null))

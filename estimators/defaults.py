@@ -103,6 +103,24 @@ class Prior(Options):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PopulationSettings(Options):
+    """What other materials tell of how much grasps of one differ (``population.py``)."""
+
+    fewest: Annotated[int, Option(2, 1000, "grasps", "three differences: fewer leave τ to its prior")] = 4
+    """Of a material that counts."""
+    stranger: Annotated[float, Option(0.0, 1.0, "-", "one in ten: an odd one decides nothing")] = 0.1
+    """Probability that a material is none of the population but any."""
+    quantiles: Annotated[int, Option(4, 10_000, "quantiles", "ratios of priors to a few per cent")] = 32
+    """Of what a material tells of τ, that are averaged over."""
+    least: Annotated[float, Option(1e-6, 0.1, "-", "below what any sensor repeats")] = 1e-3
+    """Scale of the population's τ from which is summed."""
+    most: Annotated[float, Option(0.1, 100.0, "-", "absurd")] = 3.0
+    """To which is summed."""
+    nodes: Annotated[int, Option(5, 10_000, "nodes", "7 % apart: closer than any population is known")] = 121
+    """Of that sum, at equal ratios."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ChainSettings(Options):
     """How a posterior is sampled, and when the sampling stops."""
 
@@ -460,13 +478,14 @@ LINEAR = LinearSettings()
 RECOGNITION = Recognition()
 REFERENCE = Reference()
 IDENTIFIABILITY = Identifiability()
+POPULATION = PopulationSettings()
 PRIOR = Prior()
 PROPOSAL = ProposalSettings()
 ROBUST = RobustSettings()
 SAMPLING = ChainSettings()
 
 TABLES = (
-    ALARM, AUTOMATIC, CHANGE, CLUSTERS, DESIGN, GRID, LINEAR, RECOGNITION, REFERENCE, IDENTIFIABILITY, PRIOR, PROPOSAL,
-    ROBUST, SAMPLING,
+    ALARM, AUTOMATIC, CHANGE, CLUSTERS, DESIGN, GRID, LINEAR, RECOGNITION, REFERENCE, IDENTIFIABILITY, POPULATION,
+    PRIOR, PROPOSAL, ROBUST, SAMPLING,
 )  # fmt: skip
 """All tables of estimators."""

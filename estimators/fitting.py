@@ -5,7 +5,8 @@ from dataclasses import replace
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.linear.fit_data import FitData, GraspData, gather
-from estimators.method_names import METHODS
+from estimators.linear.priors import ScatterPrior
+from estimators.method_names import METHODS, SCATTER_METHODS
 from estimators.methods import conjugate, hierarchical, ols, robust
 from estimators.methods.automatic import choose, compared
 
@@ -27,6 +28,7 @@ def fit(
     seed: int = 0,
     likelihood: str | None = None,
     loss: str = "tukey",
+    scatter_prior: ScatterPrior | None = None,
 ) -> FrictionModel:
     """Fit ``μ = β₀ + β₁ v + β₂ f_n + ε`` to the samples of one grasp, or of several given as a sequence.
 
@@ -38,9 +40,10 @@ def fit(
     whose ``likelihood`` is "hierarchical" (the default wherever samples come in clusters), "gaussian", "student_t",
     "outlier" (a part of false slip) or "errors_in_variables" (noise in the forces). "auto", recommended, takes
     "hierarchical", without what lies far off its place; ``diagnostics["chosen_because"]`` says why, and
-    ``diagnostics["check"]`` whether least squares agrees. A sampled method stops once the Monte-Carlo error of its
-    means and 5/95 % quantiles is under ``accuracy`` posterior standard deviations, or after ``seconds``; ``seed`` makes
-    it repeatable.
+    ``diagnostics["check"]`` whether least squares agrees. ``scatter_prior``: how much grasps are thought to differ
+    before the samples are seen, by default a weak prior; ``population_scatter`` learns one from other materials. A
+    sampled method stops once the Monte-Carlo error of its means and 5/95 % quantiles is under ``accuracy`` posterior
+    standard deviations, or after ``seconds``; ``seed`` makes it repeatable.
 
     Raises ``TooFewSamples`` where no slip or hardly any was seen, ``InvalidSamples`` naming what cannot be used, and
     ``NotConverged``, which carries its model, where a chain cannot be trusted.
@@ -52,11 +55,14 @@ def fit(
             raise InvalidSamples(name, value, "above 0")
     if likelihood is not None and method != "bayes":
         raise InvalidSamples("likelihood", likelihood, f'none with method "{method}", only with "bayes"')
+    if scatter_prior is not None and (method not in SCATTER_METHODS or likelihood not in {None, "hierarchical"}):
+        raise InvalidSamples("scatter_prior", scatter_prior, f"none but with {', '.join(SCATTER_METHODS)}")
+    scatter_prior = scatter_prior or ScatterPrior()
     data = gather(samples)
     if method != "auto":
-        return _fit(data, method, accuracy, seconds, seed, likelihood, loss)
+        return _fit(data, method, accuracy, seconds, seed, likelihood, loss, scatter_prior)
     choice = choose(data)
-    model = hierarchical.fit(choice.data)
+    model = hierarchical.fit(choice.data, scatter_prior)
     told = {"chosen_because": choice.reason, "check": compared(model, choice.data)}
     return replace(model, diagnostics={**model.diagnostics, **told})
 
@@ -69,6 +75,7 @@ def _fit(
     seed: int,
     likelihood: str | None,
     loss: str,
+    scatter_prior: ScatterPrior,
 ) -> FrictionModel:
     if method == "ols":
         return ols.fit(data)
@@ -77,7 +84,7 @@ def _fit(
     if method == "conjugate":
         return conjugate.fit(data)
     if method == "hierarchical":
-        return hierarchical.fit(data)
+        return hierarchical.fit(data, scatter_prior)
     from estimators.methods import bayes  # emcee takes a second to load
 
-    return bayes.fit(data, likelihood, accuracy, seconds, seed)
+    return bayes.fit(data, likelihood, accuracy, seconds, seed, scatter_prior)

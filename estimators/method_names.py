@@ -9,3 +9,6 @@ FitMethod = Literal[ModelMethod, "auto"]
 """What a fit may be asked for; "auto" takes the method that the data call for."""
 
 METHODS: tuple[FitMethod, ...] = get_args(FitMethod)
+
+SCATTER_METHODS = ("hierarchical", "bayes", "auto")
+"""Those whose model tells scatter between grasps, of which there is a prior."""

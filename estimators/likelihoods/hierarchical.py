@@ -11,7 +11,7 @@ from estimators.linear.fit_data import FitData
 from estimators.linear.hierarchical import Products
 from estimators.linear.mixture_summary import summarise
 from estimators.linear.posterior_grid import Nodes, PosteriorGrid, posterior_grid
-from estimators.linear.priors import structured
+from estimators.linear.priors import WEAK, ScatterPrior, structured
 from estimators.sampling.normal_score import NormalScore, normal_score
 from estimators.sampling.proposal import StudentMixture, standard
 
@@ -30,9 +30,9 @@ class HierarchicalPosterior:
     grid: PosteriorGrid
     scores: tuple[NormalScore, NormalScore]
     at: FloatArray
+    prior: str
     sampled: tuple[str, ...] = ("log_sigma", "log_tau", "log_omega")
     names: tuple[str, ...] = ("beta0", "beta1", "beta2", "sigma", "tau", "omega")
-    prior: str = field(default_factory=structured)
     proposal: StudentMixture = field(default_factory=lambda: standard(3))
     local: float = 0.0
 
@@ -95,16 +95,16 @@ class HierarchicalPosterior:
         )
 
 
-def hierarchical(data: FitData) -> HierarchicalPosterior:
+def hierarchical(data: FitData, scatter_prior: ScatterPrior = WEAK) -> HierarchicalPosterior:
     """Posterior from each grasp's statistics by place."""
-    grid = posterior_grid(data)
+    grid = posterior_grid(data, scatter_prior)
     peak = grid.log_marginal.max()
     density = np.exp(grid.log_marginal - peak)
     scores = (
         _score(grid.log_lambda, np.log(density.sum(axis=1))),
         _score(grid.log_rho, np.log(density.sum(axis=0))),
     )
-    return HierarchicalPosterior(grid=grid, scores=scores, at=data.mean_row())
+    return HierarchicalPosterior(grid=grid, scores=scores, at=data.mean_row(), prior=structured(scatter_prior))
 
 
 def _score(nodes: FloatArray, log_density: FloatArray) -> NormalScore:

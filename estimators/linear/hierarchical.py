@@ -19,7 +19,7 @@ from scipy import special
 from estimators.defaults import PRIOR, REFERENCE, ROUNDING
 from estimators.linear.grasp_statistics import GraspStatistics
 from estimators.linear.normal_inverse_gamma import NormalInverseGamma
-from estimators.linear.priors import log_half_student
+from estimators.linear.priors import WEAK, ScatterPrior, log_half_student
 from estimators.linear.unknown_velocity import columns_off, offset_variance
 
 FloatArray = NDArray[np.float64]
@@ -72,6 +72,7 @@ class Hierarchical:
     unknown: NDArray[np.bool_]
     offset: float
     off_by: FloatArray
+    scatter_prior: ScatterPrior = WEAK
 
     def products(self, log_lambda: FloatArray, log_rho: FloatArray) -> Products:
         """Sums at all pairs of λ [l] and ρ [r], as [l · r] points of which ρ varies fastest."""
@@ -106,7 +107,7 @@ class Hierarchical:
         misfit = square[:, WHOLE[3, 3]] - np.einsum("ki,ki->k", gamma, square[:, WHOLE[:3, 3]])
         log_tau, log_omega = log_sigma + 0.5 * log_lambda, log_sigma + 0.5 * log_rho
         log = -0.5 * (misfit + determinant + np.linalg.slogdet(precision)[1])
-        log += -self.effective_n * log_sigma + log_prior(log_sigma, log_tau, log_omega)
+        log += -self.effective_n * log_sigma + log_prior(log_sigma, log_tau, log_omega, self.scatter_prior)
         root = self.pooled.root
         return Conditional(log, self.pooled.mean + gamma @ root.T, root @ covariance @ root.T)
 
@@ -141,16 +142,22 @@ class Hierarchical:
         return replace(self, direction=_direction(self.pooled, coefficients))
 
 
-def log_prior(log_sigma: FloatArray, log_tau: FloatArray, log_omega: FloatArray) -> FloatArray:
+def log_prior(
+    log_sigma: FloatArray, log_tau: FloatArray, log_omega: FloatArray, scatter_prior: ScatterPrior = WEAK
+) -> FloatArray:
     """Log density [k] of (log σ, log τ, log ω): σ² inverse-gamma, τ and ω half-Student-t; see ``defaults.PRIOR``."""
     scatter = -PRIOR.degrees_of_freedom * (log_sigma + 0.5 * REFERENCE.scatter**2 * np.exp(-2.0 * log_sigma))
-    grasp = log_half_student(np.exp(log_tau), PRIOR.grasp_scatter, PRIOR.grasp_degrees_of_freedom) + log_tau
+    grasp = scatter_prior.log_density(np.exp(log_tau)) + log_tau
     place = log_half_student(np.exp(log_omega), REFERENCE.scatter, PRIOR.effect_degrees_of_freedom) + log_omega
     return np.asarray(scatter + grasp + place)
 
 
 def hierarchical(
-    grasps: Sequence[GraspStatistics], pooled: NormalInverseGamma, spans: FloatArray, centre: FloatArray
+    grasps: Sequence[GraspStatistics],
+    pooled: NormalInverseGamma,
+    spans: FloatArray,
+    centre: FloatArray,
+    scatter_prior: ScatterPrior = WEAK,
 ) -> Hierarchical:
     """The model of these grasps, b̂ the pooled fit; the prior is of friction at ``centre`` and slopes over ``spans``."""
     total = sum(grasp.total_weight for grasp in grasps)
@@ -170,6 +177,7 @@ def hierarchical(
         unknown=np.array([grasp.velocity_unknown for grasp in grasps]),
         offset=offset_variance(float(centre @ pooled.mean), float(pooled.mean[1]), float(pooled.covariance[1, 1])),
         off_by=np.stack([_direction(pooled, each) for each in columns_off(float(centre[2]))]),
+        scatter_prior=scatter_prior,
     )
 
 

@@ -10,6 +10,7 @@ from estimators.defaults import IDENTIFIABILITY
 from estimators.friction_model import Scale, Scales
 from estimators.linear.normal_mixture import Student, matched_student, mixture_quantile
 from estimators.linear.posterior_grid import Nodes
+from estimators.linear.priors import ScatterPrior
 
 FloatArray = NDArray[np.float64]
 
@@ -42,6 +43,16 @@ def summarise(nodes: Nodes, at: FloatArray) -> MixtureSummary:
         scales=Scales(*scales),
         scatter=matched_student(nodes.weight, zero, together),
     )
+
+
+def scatter_alone(nodes: Nodes, scatter_prior: ScatterPrior) -> Scale:
+    """The scale between grasps as the weak default prior would have left it: what the material tells by itself.
+
+    The nodes' weights by the ratio of the priors (Hogg, Myers & Bovy, 2010, Astrophysical Journal 725:2166).
+    """
+    tau = nodes.scatter[:, 1]
+    weight = nodes.weight * np.exp(ScatterPrior().log_density(tau) - scatter_prior.log_density(tau))
+    return Scale(*matched_student(weight / weight.sum(), np.zeros(len(tau)), tau))
 
 
 def _widened(covariance: FloatArray, nodes: Nodes, away: FloatArray, degrees_of_freedom: float) -> FloatArray:

@@ -12,7 +12,7 @@ from estimators.defaults import GRID
 from estimators.linear.fit_data import FitData
 from estimators.linear.hierarchical import Hierarchical, Products, hierarchical
 from estimators.linear.normal_inverse_gamma import exact_posterior
-from estimators.linear.priors import weak_spans
+from estimators.linear.priors import WEAK, ScatterPrior, weak_spans
 from estimators.linear.unknown_velocity import offset_variance
 
 FloatArray = NDArray[np.float64]
@@ -60,7 +60,7 @@ class PosteriorGrid:
         return np.asarray(np.abs(other.mean - narrow.mean)[0] / np.sqrt(np.diag(narrow.covariance[0])))
 
 
-def posterior_grid(data: FitData) -> PosteriorGrid:
+def posterior_grid(data: FitData, scatter_prior: ScatterPrior = WEAK) -> PosteriorGrid:
     """Posterior of the hierarchical model for these data, on a grid that closes in on where its mass lies.
 
     b̂, along which a grasp scales the law, is the posterior mean of the grid before, of which also follows by how much
@@ -68,7 +68,8 @@ def posterior_grid(data: FitData) -> PosteriorGrid:
     """
     grasps = data.grasp_statistics()
     pooled = exact_posterior(data)
-    model = hierarchical(grasps, pooled, weak_spans(data.domain, data.element_area), data.mean_row())
+    spans = weak_spans(data.domain, data.element_area)
+    model = hierarchical(grasps, pooled, spans, data.mean_row(), scatter_prior)
     box = _widest(model)
     for turn in range(GRID.rounds):
         grid = _evaluated(model, box, GRID.coarse if turn < 2 else GRID.fine)

@@ -1,12 +1,53 @@
 """The priors of every Bayesian method, in one place; the numbers stand in ``defaults``."""
 
+import math
+from dataclasses import dataclass, field
+
 import numpy as np
 from numpy.typing import NDArray
 
 from estimators.defaults import PRIOR, REFERENCE, Prior
+from estimators.errors import InvalidSamples
 from estimators.friction_model import Domain
 
 FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class ScatterPrior:
+    """Half-Student-t prior of the scatter τ between grasps, as a part of friction.
+
+    By Gelman (2006, Bayesian Analysis 1:515). The weak default, unless learnt from so many other ``materials``: see
+    ``estimators.population_scatter``. Raises ``InvalidSamples`` for a scale that is not above 0, or degrees of freedom
+    below 1.
+    """
+
+    scale: float = field(default_factory=lambda: PRIOR.grasp_scatter)
+    degrees_of_freedom: float = field(default_factory=lambda: PRIOR.grasp_degrees_of_freedom)
+    materials: int = 0
+
+    def __post_init__(self) -> None:
+        for name, value, right, allowed in (
+            ("scale", self.scale, 0.0 < self.scale < math.inf, "above 0 and finite"),
+            ("degrees_of_freedom", self.degrees_of_freedom, 1.0 <= self.degrees_of_freedom < math.inf, "1 or more"),
+            ("materials", self.materials, self.materials >= 0, "0 or more"),
+        ):
+            if not right:
+                raise InvalidSamples(f"{name} of the prior of scatter", value, allowed)
+
+    def __str__(self) -> str:
+        told = f"tau ~ half-Student-t on {self.degrees_of_freedom:.3g} degrees of freedom with scale {self.scale:.3g}"
+        if self.materials:
+            return f"{told}, from {self.materials} other material{'s' * (self.materials > 1)}"
+        return f"{told}, the default" if self == ScatterPrior() else told
+
+    def log_density(self, tau: FloatArray) -> FloatArray:
+        """Of τ, up to a constant."""
+        return log_half_student(tau, self.scale, self.degrees_of_freedom)
+
+
+WEAK = ScatterPrior()
+"""Where no other material tells how much grasps differ."""
 
 
 def prior_rows(element_area: float, prior: Prior = PRIOR) -> FloatArray:
@@ -49,13 +90,12 @@ def positive_friction() -> str:
     return conjugate_prior() + "; mean friction above 0 over the data's domain"
 
 
-def structured() -> str:
+def structured(scatter_prior: ScatterPrior = WEAK) -> str:
     """The prior of the hierarchical model in words and numbers."""
     return (
         f"friction at the mean of the data ~ N({REFERENCE.friction:g}, {PRIOR.width:g}^2), each slope times its span "
         f"~ N(0, {PRIOR.width:g}^2), the spans {REFERENCE.tangential_velocity:g} m/s and {REFERENCE.pressure:g} Pa "
-        f"times the element area, or the range seen if less; between grasps tau ~ half-Student-t on "
-        f"{PRIOR.grasp_degrees_of_freedom:g} degrees of freedom with scale {PRIOR.grasp_scatter:g}; between places "
-        f"omega ~ half-Student-t on {PRIOR.effect_degrees_of_freedom:g} with scale {REFERENCE.scatter:g}; sigma^2 ~ "
+        f"times the element area, or the range seen if less; between grasps {scatter_prior}; between places omega ~ "
+        f"half-Student-t on {PRIOR.effect_degrees_of_freedom:g} with scale {REFERENCE.scatter:g}; sigma^2 ~ "
         f"IG({PRIOR.degrees_of_freedom / 2:g}, {PRIOR.degrees_of_freedom / 2 * REFERENCE.scatter**2:g})"
     )

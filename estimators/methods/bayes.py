@@ -13,15 +13,16 @@ from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.likelihoods.errors_in_variables import errors_in_variables
 from estimators.likelihoods.gaussian import gaussian
-from estimators.likelihoods.hierarchical import hierarchical
+from estimators.likelihoods.hierarchical import HierarchicalPosterior, hierarchical
 from estimators.likelihoods.outlier import outlier
 from estimators.likelihoods.posterior import Posterior
 from estimators.likelihoods.student_t import student_t
 from estimators.linear.fit_data import FitData
 from estimators.linear.normal_inverse_gamma import exact_posterior
+from estimators.linear.priors import WEAK, ScatterPrior
 from estimators.linear.shared_errors import shared_by_elements
 from estimators.methods.conjugate import sensitivity
-from estimators.methods.reporting import Diagnostics, report
+from estimators.methods.reporting import Diagnostics, borrowed, report
 from estimators.not_converged import NotConverged
 from estimators.sampling.chain import Chain, sample
 
@@ -61,6 +62,7 @@ def fit(
     accuracy: float | None = None,
     seconds: float | None = None,
     seed: int = 0,
+    scatter_prior: ScatterPrior = WEAK,
 ) -> FrictionModel:
     """Posterior of (β, σ, …) by emcee, whitened by its exact or Laplace approximation and started from it.
 
@@ -75,12 +77,14 @@ def fit(
     if name not in LIKELIHOODS:
         raise InvalidSamples("likelihood", name, ", ".join(LIKELIHOODS))
     goal = LIKELIHOODS[name].accuracy if accuracy is None else accuracy
-    posterior = LIKELIHOODS[name].posterior(data)
+    posterior = hierarchical(data, scatter_prior) if name == "hierarchical" else LIKELIHOODS[name].posterior(data)
     left = None if seconds is None else max(seconds - (time.perf_counter() - begin), 0.0)
     chain = sample(posterior.log_probability, posterior.proposal, goal, left, seed, posterior.local)
     found = posterior.summarise(chain.flat(), np.random.default_rng([seed, 1]))
     diagnostics: Diagnostics = {"likelihood": name, "prior": posterior.prior, "draws": ", ".join(posterior.names)}
     diagnostics |= _convergence(chain, posterior) | sensitivity(data, exact_posterior(data))
+    if isinstance(posterior, HierarchicalPosterior):
+        diagnostics |= borrowed(posterior.grid.nodes, scatter_prior)
     independent = name != "hierarchical" and data.cluster_kind != "element"
     if independent and data.observations is not None:  # moments cannot tell
         diagnostics["shared_by_elements"] = shared_by_elements(data)

@@ -7,20 +7,21 @@ from estimators.likelihoods.posterior import Summary
 from estimators.linear.fit_data import FitData
 from estimators.linear.mixture_summary import summarise
 from estimators.linear.posterior_grid import posterior_grid
-from estimators.linear.priors import structured
-from estimators.methods.reporting import Diagnostics, by_coefficient, report
+from estimators.linear.priors import WEAK, ScatterPrior, structured
+from estimators.methods.reporting import Diagnostics, borrowed, by_coefficient, report
 
 
-def fit(data: FitData) -> FrictionModel:
+def fit(data: FitData, scatter_prior: ScatterPrior = WEAK) -> FrictionModel:
     """Posterior of the model with scatter between grasps, between places and within them; see ``linear.hierarchical``.
 
     Deterministic. The intervals are those of the mixture of normals that the posterior of β is.
     """
     begin = time.perf_counter()
-    grid = posterior_grid(data)
+    grid = posterior_grid(data, scatter_prior)
     found = summarise(grid.nodes, data.mean_row())
-    diagnostics: Diagnostics = {"prior": structured(), "nodes": float(len(grid.nodes.weight))}
+    diagnostics: Diagnostics = {"prior": structured(scatter_prior), "nodes": float(len(grid.nodes.weight))}
     diagnostics |= by_coefficient("prior_sensitivity", grid.prior_shift())
+    diagnostics |= borrowed(grid.nodes, scatter_prior)
     summary = Summary(
         found.coefficients,
         found.covariance,

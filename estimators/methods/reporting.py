@@ -10,16 +10,36 @@ from estimators.friction_model import Cost, FrictionModel, Scales
 from estimators.likelihoods.posterior import Summary
 from estimators.linear.fit_data import FitData
 from estimators.linear.least_squares import LinearFit, solve
+from estimators.linear.mixture_summary import scatter_alone
+from estimators.linear.posterior_grid import Nodes
+from estimators.linear.priors import ScatterPrior
 from estimators.methods.identifiability import effects, identifiable
 from estimators.methods.unknown_velocity import in_words, slope_inflation, widened
 
 FloatArray = NDArray[np.float64]
 Diagnostics = dict[str, float | str]
 
+ALONE = "scale_between_grasps_alone"
+"""Diagnostic: the scale between grasps by the default prior, where the model was fitted by another."""
+
 
 def by_coefficient(name: str, values: FloatArray) -> Diagnostics:
     """One diagnostic a coefficient, under names that JSON can carry."""
     return {f"{name}_beta{k}": float(value) for k, value in enumerate(values)}
+
+
+def borrowed(nodes: Nodes, scatter_prior: ScatterPrior) -> Diagnostics:
+    """Of a prior of τ that is not the default: where it is from, in a sentence, and what the data tell without it."""
+    if scatter_prior == ScatterPrior():
+        return {}
+    alone = scatter_alone(nodes, scatter_prior)
+    count = scatter_prior.materials
+    origin = f"{count} other material{'s' * (count > 1)}" if count else "the prior that was given"
+    return {
+        "scatter_prior": f"how much its grasps differ is expected from {origin}, as far as they do not tell",
+        ALONE: alone.value,
+        f"{ALONE}_degrees_of_freedom": alone.degrees_of_freedom,
+    }
 
 
 def describe(data: FitData, linear: LinearFit) -> Diagnostics:
