@@ -135,6 +135,7 @@ async def running(
                 settings.blob_url,
                 settings.blob_cache_bytes,
                 settings.job_memory_bytes,
+                settings.scatter_from_other_materials,
             )
             chosen = config, settings.workers, settings.dask_address, settings.job_cpu_seconds
             runner = JobRunner(

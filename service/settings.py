@@ -139,6 +139,10 @@ class Settings(BaseSettings):
     job_memory_bytes: Annotated[int, Field(ge=64 * MIB, le=2**50)] = Field(
         default=4096 * MIB, description="Bytes of memory that a job may take; one that wants more is refused."
     )
+    scatter_from_other_materials: bool = Field(
+        default=True,
+        description="Learn how much grasps of a material may differ from the other materials of its sensor.",
+    )
     key_queued_jobs: Annotated[int, Field(ge=1, le=10**9)] | None = Field(
         default=None, description="Jobs of one key that may be queued at once. Default: any number."
     )

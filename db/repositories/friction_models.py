@@ -4,12 +4,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import Any
 
-from sqlalchemy import Select, func, select, update
-from sqlalchemy.orm import Session
+from sqlalchemy import Select, exists, func, select, text, update
+from sqlalchemy.orm import Session, aliased
 
 from db.paging import Window, windowed
 from db.records import NewModel, Scale, Scales, StoredModel
-from db.tables import FrictionModelRow, MaterialNameRow, MaterialRow
+from db.tables import FrictionModelRow, GraspLogRow, MaterialNameRow, MaterialRow
 
 NEWEST_FIRST = Window("id", descending=True)
 
@@ -62,6 +62,30 @@ def materials_with_current(session: Session, methods: Collection[str], limit: in
     having = select(FrictionModelRow.material_id).where(FrictionModelRow.current, FrictionModelRow.method.in_(methods))
     query = select(MaterialRow.id).where(MaterialRow.merged_into_id.is_(None), MaterialRow.id.in_(having))
     return list(session.scalars(query.order_by(MaterialRow.name).limit(limit)))
+
+
+def of_same_sensors(session: Session, material_id: int, method: str, most: int) -> list[StoredModel]:
+    """Current models of other materials by a method, not outdated, newest first and at most so many.
+
+    Of materials all of whose logs, but the withdrawn ones, are of sensors that logs of this material are of.
+    """
+    theirs = aliased(GraspLogRow)
+    own = select(GraspLogRow.sensor_id).where(
+        GraspLogRow.material_id == material_id, GraspLogRow.withdrawn_at.is_(None)
+    )
+    foreign = exists().where(
+        theirs.material_id == FrictionModelRow.material_id, theirs.withdrawn_at.is_(None), theirs.sensor_id.not_in(own)
+    )
+    query = _models().where(
+        text("friction_models.current"),  # as the index of current models has it: older versions are not looked at
+        FrictionModelRow.outdated.is_(False),
+        FrictionModelRow.method == method,
+        FrictionModelRow.material_id != material_id,
+        MaterialRow.merged_into_id.is_(None),
+        ~foreign,
+    )
+    found = session.execute(query.order_by(FrictionModelRow.id.desc()).limit(most))
+    return [_record(row, material) for row, material in found]
 
 
 def current_methods(session: Session, material_ids: Sequence[int]) -> list[str]:

@@ -21,11 +21,13 @@ from db.blobs import BlobStore, disk_errors_named
 from db.database import Database
 from db.records import Claim, Job, SamplesOfLog, SampleSummary
 from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, sensors
-from estimators import EstimatorError, FrictionModel, Moments
+from estimators import EstimatorError, FrictionModel, Moments, ScatterPrior
+from estimators.method_names import SCATTER_METHODS
 from service import formats
 from service.domain.calibrate import corrected
 from service.domain.collect_friction import collect
 from service.domain.doubtful_logs import with_doubts
+from service.domain.other_materials import prior_from_others
 from service.domain.queueing import INGEST_METHODS, queue_cheap_refits
 from service.domain.reconstruct import needs_forces, said, with_forces
 from service.domain.stored_results import (
@@ -70,6 +72,8 @@ class Run:
     claim: Claim
     job: Job
     seconds: dict[str, float] = field(default_factory=dict)
+    others_tell: bool = True
+    """Whether the other materials of its sensor tell how much grasps of one may differ."""
 
     @property
     def total(self) -> float:
@@ -106,14 +110,14 @@ def _load_kernels(detector: str) -> None:
     slipcore.warm_up(detector)
 
 
-def run_job(database: Database, blobs: BlobStore, claim: Claim) -> None:
+def run_job(database: Database, blobs: BlobStore, claim: Claim, scatter_from_other_materials: bool = True) -> None:
     """Do a job to its end: done, or refused where the data do not allow it (or no chain of theirs converges).
 
     Raises ``ClaimLost`` once it is not this runner's any more.
     """
     with database.read() as session:
         job = jobs.get(session, claim.job_id)
-    run = Run(database, blobs, claim, job, dict(job.seconds))
+    run = Run(database, blobs, claim, job, dict(job.seconds), scatter_from_other_materials)
     logs.note(kind=job.kind)
     try:
         with traces.span(job.kind, job.trace, job=job.id):
@@ -190,7 +194,8 @@ def fit_material(run: Run) -> None:
             with run.database.read() as session:
                 material_id = jobs.material_id(session, run.job.id)
                 parts = detections.samples_of_material(session, material_id)
-            models = _fit(run, parts)
+                prior = _scatter_prior(run, session, material_id)
+            models = _fit(run, parts, prior)
         with run.database.write() as session:
             friction_models.lock(session, material_id)
             if detections.samples_of_material(session, material_id) == parts:
@@ -200,7 +205,8 @@ def fit_material(run: Run) -> None:
         material_id = materials.still(session, jobs.material_id(session, run.job.id))
         friction_models.lock(session, material_id)
         with run.timed("friction_model"):
-            models = _fit(run, detections.samples_of_material(session, material_id))
+            parts = detections.samples_of_material(session, material_id)
+            models = _fit(run, parts, _scatter_prior(run, session, material_id))
         _store_models(run, session, material_id, models)
 
 
@@ -216,21 +222,26 @@ def _with_forces(run: Run, log: GraspLog, sensor: str) -> "tuple[GraspLog, Recon
         return with_forces(log, asdict(gel))
 
 
-def _fit(run: Run, parts: Sequence[SamplesOfLog]) -> list[FrictionModel]:
+def _scatter_prior(run: Run, session: Session, material_id: int) -> ScatterPrior:
+    """How much grasps may differ before the material's own tell."""
+    return prior_from_others(session, material_id) if run.others_tell else ScatterPrior()
+
+
+def _fit(run: Run, parts: Sequence[SamplesOfLog], prior: ScatterPrior) -> list[FrictionModel]:
     """The models of the job's methods."""
     if not parts:
         raise Refused("no grasp log of this material has friction samples yet")
     ingested = run.job.kind == "ingest"
-    models = _all_that_fit(run, parts) if ingested else [_fit_by(run, parts, run.job.method, len(parts))]
+    models = _all_that_fit(run, parts, prior) if ingested else [_fit_by(run, parts, run.job.method, len(parts), prior)]
     return with_change(models, [_moments(run, part) for part in parts])
 
 
-def _all_that_fit(run: Run, parts: Sequence[SamplesOfLog]) -> list[FrictionModel]:
+def _all_that_fit(run: Run, parts: Sequence[SamplesOfLog], prior: ScatterPrior) -> list[FrictionModel]:
     """The models of an ingest; what one method cannot fit another may. Raises what was wrong where none can."""
     models, refusals = list[FrictionModel](), list[EstimatorError]()
     for method in INGEST_METHODS:
         try:
-            models.append(_fit_by(run, parts, method, SAMPLED_AT_INGEST))
+            models.append(_fit_by(run, parts, method, SAMPLED_AT_INGEST, prior))
         except EstimatorError as refusal:
             logger.info("no %s fit: %s", method, refusal)
             refusals.append(refusal)
@@ -239,14 +250,18 @@ def _all_that_fit(run: Run, parts: Sequence[SamplesOfLog]) -> list[FrictionModel
     return models
 
 
-def _fit_by(run: Run, parts: Sequence[SamplesOfLog], method: str, most_sampled: int) -> FrictionModel:
+def _fit_by(
+    run: Run, parts: Sequence[SamplesOfLog], method: str, most_sampled: int, prior: ScatterPrior
+) -> FrictionModel:
     """From the moments where the method needs no more, or of more than ``most_sampled`` logs; else from the samples."""
     data: list[Moments] | list[FrictionSamples]
     if len(parts) <= most_sampled and estimators.needs_samples(method, len(parts)):
         data = [decode_samples(run.blobs.path(part.samples_blob)) for part in parts]
     else:
         data = [_moments(run, part) for part in parts]
-    return with_doubts(estimators.fit(data, method=method, seed=run.job.seed), [part.findings for part in parts])
+    prior_or_none = prior if method in SCATTER_METHODS else None
+    model = estimators.fit(data, method=method, seed=run.job.seed, scatter_prior=prior_or_none)
+    return with_doubts(model, [part.findings for part in parts])
 
 
 def _moments(run: Run, part: SamplesOfLog) -> Moments:

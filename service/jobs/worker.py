@@ -24,7 +24,8 @@ _OPEN: dict["StoreConfig", tuple[Database, BlobStore]] = {}
 class StoreConfig:
     """Where a worker finds its work: database, folder of the blobs and, where they are in one, the object store.
 
-    ``job_memory_bytes``: how much memory a job may take beside what the process had before the first.
+    ``job_memory_bytes``: how much memory a job may take beside what the process had before the first;
+    ``scatter_from_other_materials``: whether they tell how much grasps of one may differ.
     """
 
     database_url: str
@@ -32,6 +33,7 @@ class StoreConfig:
     blob_url: str | None = None
     blob_cache_bytes: int = 0
     job_memory_bytes: int = 4 * 2**30
+    scatter_from_other_materials: bool = True
 
 
 def warm_up() -> None:
@@ -62,7 +64,7 @@ def _run(config: StoreConfig, claim: Claim) -> None:
     try:
         pipeline.prepare(database, claim)
         with limits.memory(config.job_memory_bytes):
-            pipeline.run_job(database, blobs, claim)
+            pipeline.run_job(database, blobs, claim, config.scatter_from_other_materials)
     except StorageUnavailable:
         raise
     except ClaimLost as lost:

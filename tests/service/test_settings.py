@@ -50,7 +50,8 @@ def test_parts_without_settings_do_as_with_the_defaults_of_these() -> None:
     for argument, setting in names.items():
         assert readers[argument].default == Settings.model_fields[setting].default
     config = StoreConfig("sqlite:///x", Path("x"))
-    assert config.job_memory_bytes == Settings.model_fields["job_memory_bytes"].default
+    for name in ("job_memory_bytes", "scatter_from_other_materials"):
+        assert getattr(config, name) == Settings.model_fields[name].default
 
 
 def test_a_setting_comes_from_the_environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -1,11 +1,12 @@
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 from sqlalchemy import text
 
 from db.database import Database
-from db.records import NewModel, Scales
-from db.repositories import friction_models, jobs, materials
+from db.records import NewGraspLog, NewModel, Scales
+from db.repositories import friction_models, grasp_logs, jobs, materials
 
 
 @pytest.fixture
@@ -70,3 +71,42 @@ def test_there_may_be_no_current_model(database: Database, material: int) -> Non
     with database.read() as session:
         assert friction_models.current(session, "paper", "ols") is None
         assert friction_models.versions(session, material, None) == []
+
+
+def test_other_materials_count_where_their_logs_are_of_the_same_sensors(
+    database: Database, material: int, new_model: Callable[..., NewModel], new_log: Callable[..., NewGraspLog]
+) -> None:
+    """And where they are materials still, with a current model by the method, fitted to the logs that they have."""
+    sensors = {
+        "same": "s",
+        "first": "s",
+        "another": "st",
+        "partly": "t",
+        "was partly": "u",
+        "outdated": "s",
+        "gone": "s",
+    }
+    with database.write() as session:
+        grasp_logs.add(session, replace(new_log(material), sensor="s"))
+        others = {name: materials.create(session, name, "").id for name in (*sensors, "of no log")}
+        logs = {
+            (name, sensor): grasp_logs.add(session, replace(new_log(others[name]), sensor=sensor))
+            for name, all_ in sensors.items()
+            for sensor in {"s", all_} - ({"s"} if all_ == "st" else set())
+        }
+        grasp_logs.withdraw(session, logs["was partly", "u"], "another sensor", None)
+    for each in (material, *others.values()):
+        store(database, each, new_model("hierarchical"))
+    store(database, others["first"], new_model("hierarchical", mean=0.5))
+    store(database, others["same"], new_model("ols"))
+    with database.write() as session:
+        friction_models.mark_outdated(session, others["outdated"])
+        materials.merge(session, others["outdated"], others["gone"])
+        found = friction_models.of_same_sensors(session, material, "hierarchical", 10)
+        assert [(each.material, each.version) for each in found] == [
+            ("first", 2),
+            ("of no log", 1),
+            ("was partly", 1),
+            ("same", 1),
+        ]
+        assert friction_models.of_same_sensors(session, material, "hierarchical", 2) == found[:2]

@@ -13,13 +13,14 @@ import slipcore
 from db.blobs import BlobStore
 from db.database import Database
 from db.errors import ClaimLost
-from db.records import Claim, Detection, Gel, Job, Material, NewGraspLog, StoredGraspLog
+from db.records import Claim, Detection, Gel, Job, Material, NewGraspLog, StoredGraspLog, StoredModel
 from db.repositories import detections, friction_models, grasp_logs, jobs, materials, runners, sensors
 from db.tables import JobRow, SampleSummaryRow
-from estimators import InvalidSamples, Moments
+from estimators import InvalidSamples, Moments, ScatterPrior
 from service.domain.collect_friction import collect
 from service.domain.recommended import recommended
 from service.domain.stored_results import SAMPLE_ARRAYS, encode_samples, summarise_samples
+from service.domain.surface_change import MARK
 from service.jobs import pipeline
 from slipcore import FrictionSamples, GraspLog, forces
 from slipcore.forces import reconstruct
@@ -373,17 +374,63 @@ def test_a_repeated_fit_is_a_version_of_its_own(shop: Shop, content: bytes) -> N
 
 
 def test_what_one_method_cannot_fit_another_may(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fit_by(_run: Any, _parts: Any, method: str, _most_sampled: int) -> str:
+    def fit_by(_run: Any, _parts: Any, method: str, *_: object) -> str:
         if method in unfit:
             raise InvalidSamples(method, "such that it fits none", "others")
         return method
 
     monkeypatch.setattr(pipeline, "_fit_by", fit_by)
     unfit = {"auto"}
-    assert pipeline._all_that_fit(cast(Any, None), []) == ["ols"]
+    assert pipeline._all_that_fit(cast(Any, None), [], ScatterPrior()) == ["ols"]
     unfit = {"auto", "ols"}
     with pytest.raises(InvalidSamples, match="auto"):
-        pipeline._all_that_fit(cast(Any, None), [])
+        pipeline._all_that_fit(cast(Any, None), [], ScatterPrior())
+
+
+def hierarchical_model(shop: Shop) -> StoredModel:
+    """Paper's current one."""
+    (model,) = [stored for stored in shop.material().models if stored.model.method == "hierarchical"]
+    return model
+
+
+def know_card(shop: Shop, sensor: str = "s", **diagnostics: str) -> None:
+    """Another material of four grasps, with the model of paper."""
+    model = hierarchical_model(shop).model
+    told = model.diagnostics | {"clusters": 4.0, "cluster_kind": "grasp"} | diagnostics
+    log = NewGraspLog("2" * 64, 10, "npz", "strain_rate", None, sensor, 82, 2.7, (8, 8))
+    with shop.database.write() as session:
+        card = materials.create(session, "card", "").id
+        grasp_logs.add(session, replace(log, material_id=card))
+        job = jobs.add(session, "fit", "auto", material_id=card)
+        friction_models.add(session, card, job, replace(model, diagnostics=told))
+        jobs.cancel(session, job, "its model is here")
+
+
+def test_other_materials_of_the_sensor_tell_how_much_grasps_may_differ(shop: Shop, content: bytes) -> None:
+    shop.run(shop.ingest(content)[1])
+    assert "scale 0.07, the default;" in str(hierarchical_model(shop).model.diagnostics["prior"])
+    know_card(shop)
+    shop.run(shop.ingest(content + b"\0")[1])
+    assert "from 1 other material;" in str(hierarchical_model(shop).model.diagnostics["prior"])
+    best = recommended(shop.material().models)
+    assert best is not None
+    assert "expected from 1 other material" in best.because
+    claim = shop.claim(shop.fit("hierarchical"))
+    pipeline.run_job(shop.database, shop.blobs, claim, scatter_from_other_materials=False)
+    stored = hierarchical_model(shop)
+    assert (stored.version, "the default;" in str(stored.model.diagnostics["prior"])) == (3, True)
+    assert "scatter_prior" not in stored.model.diagnostics
+
+
+@pytest.mark.parametrize("of_another_sensor", [True, False])
+def test_materials_of_another_sensor_or_whose_surface_changed_tell_nothing(
+    shop: Shop, content: bytes, of_another_sensor: bool
+) -> None:
+    shop.run(shop.ingest(content)[1])
+    know_card(shop, **{"sensor": "t"} if of_another_sensor else {MARK: "friction is 20% lower"})
+    shop.run(shop.fit("hierarchical"))
+    stored = hierarchical_model(shop)
+    assert (stored.version, "the default;" in str(stored.model.diagnostics["prior"])) == (2, True)
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,6 @@ from pathlib import Path
 
 import pytest
 
-from db.blobs import BlobStore
 from db.database import Database
 from db.errors import ClaimLost, StorageUnavailable
 from db.records import Claim
@@ -28,7 +27,7 @@ def run(database: Database, tmp_path: Path, claim: Claim) -> None:
 def test_a_defect_ends_the_job_with_its_name(
     database: Database, tmp_path: Path, mine: Claim, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(_: Database, __: BlobStore, ___: Claim) -> None:
+    def fail(*_: object) -> None:
         raise ZeroDivisionError("in the numerics")
 
     monkeypatch.setattr(pipeline, "run_job", fail)
@@ -41,7 +40,7 @@ def test_a_defect_ends_the_job_with_its_name(
 def test_storage_that_cannot_be_used_is_for_the_server_to_wait_for(
     database: Database, tmp_path: Path, mine: Claim, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(_: Database, __: BlobStore, ___: Claim) -> None:
+    def fail(*_: object) -> None:
         raise StorageUnavailable("database is locked")
 
     monkeypatch.setattr(pipeline, "run_job", fail)
