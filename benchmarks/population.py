@@ -4,8 +4,8 @@ Of a population of materials whose scatter between grasps τ is log-normal, some
 of new ones there are 1, 2, 3 and 5. Those are fitted by the default prior of τ and by that from 3, 10 and 30 of the
 others. Counted over the new materials: the probability that the contact of a new grasp has less friction than the
 quantile that was told, over the one asked for, and the grip force that this quantile asks for, over that of who knows
-law and scales (median; "none": of a quantile of 0). The same of materials with twice the population's median τ. Grasps
-come from the generator of `benchmarks.scatter`, which is not the model. Writes population.json.
+law and scales (median; "none" where the quantile is 0). The same of materials with twice the population's median τ.
+Grasps come from the generator of `benchmarks.scatter`, which is not the model. Writes population.json.
 """
 
 import os
@@ -34,13 +34,8 @@ SPREAD = 0.4
 MEDIANS = (0.05, 0.12)
 SCORES = np.linspace(-8.0, 8.0, 1601)
 """Of a grasp's effect, over which slips are summed."""
-COLUMNS = (
-    "median τ",
-    "τ",
-    "grasps",
-    "others",
-    *(f"{what} at {asked:g}" for what in ("slips", "force") for asked in ASKED),
-)
+COLUMNS = ("median τ", "τ", "grasps", *(f"{what} at {asked:g}" for what in ("slips", "force") for asked in ASKED))
+"""Of the table, which has in each cell the figures by the prior from each number of others."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,11 +51,10 @@ class Cell:
     slip: np.ndarray
     force: np.ndarray
 
-    def row(self) -> tuple[object, ...]:
-        """Its line in the table."""
+    def figures(self) -> list[str]:
+        """Mean slips and median forces."""
         forces = (f"{value:.2f}" if np.isfinite(value) else "none" for value in np.median(self.force, axis=0))
-        slips = (f"{value:.2f}" for value in self.slip.mean(axis=0))
-        return (f"{self.median:g}", self.tau, self.grasps, self.others, *slips, *forces)
+        return [*(f"{value:.2f}" for value in self.slip.mean(axis=0)), *forces]
 
     def record(self) -> dict[str, object]:
         """The same as numbers, with how often there was no answer."""
@@ -74,6 +68,12 @@ class Cell:
             "force": [value if np.isfinite(value) else None for value in np.median(self.force, axis=0).tolist()],
             "none": np.isinf(self.force).mean(axis=0).tolist(),
         }
+
+
+def row(cells: tuple[Cell, ...]) -> tuple[object, ...]:
+    """A line of the table: of as many grasps, by the prior from each number of others."""
+    columns = zip(*(cell.figures() for cell in cells), strict=True)
+    return (f"{cells[0].median:g}", cells[0].tau, cells[0].grasps, *(" ".join(column) for column in columns))
 
 
 def scatters(tau: float) -> Kind:
@@ -145,14 +145,14 @@ def one(median: float, tau: str, known: list[FrictionModel], seed: tuple[int, in
 def main() -> None:
     """Run all populations, write and print."""
     parser = options(__doc__)
-    parser.add_argument("--materials", type=int, default=40)
+    parser.add_argument("--materials", type=int, default=80)
     parser.add_argument("--medians", type=float, nargs="+", default=MEDIANS)
     parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
     arguments.output.mkdir(parents=True, exist_ok=True)
     materials = range(arguments.materials)
     found = [cell for median in arguments.medians for cell in cells(median, materials, arguments.seed)]
-    rows = table(COLUMNS, [cell.row() for cell in found])
+    rows = table(COLUMNS, map(row, zip(*(found[k :: len(OTHERS)] for k in range(len(OTHERS))), strict=True)))
     write([cell.record() for cell in found], {"population": rows}, arguments, "population.json")
     print(rows)
 

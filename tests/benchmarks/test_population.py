@@ -5,7 +5,7 @@ import pytest
 from scipy import special
 
 from benchmarks import population
-from benchmarks.population import Cell, least, new_material, scatters, slips
+from benchmarks.population import Cell, least, new_material, row, scatters, slips
 from benchmarks.scatter import CONTACT, TRUTH, WORKING_POINT
 from estimators import ScatterPrior
 
@@ -32,5 +32,6 @@ def test_a_sharper_prior_asks_for_less_force(monkeypatch: pytest.MonkeyPatch) ->
 def test_a_quantile_of_none_is_told_as_such() -> None:
     force = np.array([[1.5, np.inf], [1.7, np.inf], [1.6, 3.0]])
     cell = Cell(0.05, "drawn", 1, 3, np.full((3, 2), 0.25), force)
-    assert cell.row() == ("0.05", "drawn", 1, 3, "0.25", "0.25", "1.60", "none")
+    assert cell.figures() == ["0.25", "0.25", "1.60", "none"]
+    assert row((cell, cell)) == ("0.05", "drawn", 1, "0.25 0.25", "0.25 0.25", "1.60 1.60", "none none")
     assert cell.record()["none"] == [0.0, pytest.approx(2 / 3)]
