@@ -3,9 +3,10 @@
 Presses whose forces are known (benchmarks/gel_scenes.py) are seen by simulated sensors, with depth and in the plane
 alone, in several draws of noise. Each factor is varied against one case (20 × 20 markers on the surface of a layer of
 5 mm, ν 0.49, a sphere, 1 µm of noise): gel and noise, contact, depth of the markers, lattice, and the gel's
-description, which is then wrong. In the plane the normal force on a half-space is given. Peers are given the same
-displacements. Errors are those of resultants, of the field of forces on elements, and their growth with noise; how
-often stated intervals of 95 % hold the truth is told for each group.
+description, which is then wrong. It is also learnt from presses (benchmarks/gel_presses.py). In the plane the normal
+force on a half-space is given. Peers are given the same displacements. Errors are those of resultants, of the field of
+forces on elements, and their growth with noise; how often stated intervals of 95 % hold the truth is told for each
+group.
 
 `--export FOLDER` writes the cases on which peers are tried as `.npz`; `--external NAME=FOLDER` scores what another
 method made of them: files of the same names, with `force` [t, n, m, 3] N. Writes forces-GROUP.json, prints a
@@ -17,6 +18,7 @@ import os
 os.environ["OMP_NUM_THREADS"] = "1"  # before numpy is first imported: what is told is the CPU time of one thread
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
+import argparse
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field, replace
@@ -27,7 +29,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.ndimage import uniform_filter
 
+from benchmarks import gel_presses
 from benchmarks.gel_peers import PEERS, export, imported, made
+from benchmarks.gel_presses import calibrated, calibration_table
 from benchmarks.gel_scenes import CONTACTS, LATTICES, Truth, press, repeated, seen
 from benchmarks.pages import options, picture_folder, save, table, write
 from slipcore import GraspLog
@@ -50,7 +54,7 @@ PLACE = (0.21, -0.34)
 NORMAL_95 = 1.959964
 STICTION = "stiction"
 GROUPS = ("gel and noise", "contact", "marker depth", "lattice", "wrong description")
-PEERS_GROUP = "peers"
+PEERS_GROUP, CALIBRATION_GROUP = "peers", "gel calibration"
 
 
 @dataclass(frozen=True, slots=True)
@@ -293,11 +297,20 @@ def against_time(axes: Axes, scores: list[Score]) -> None:
     axes.grid(alpha=0.3)
 
 
+def calibrate(arguments: argparse.Namespace) -> None:
+    """Learn gels from presses, a third as often as noise is drawn else: each takes half a minute."""
+    found = [calibrated(*case, draws=max(1, arguments.draws // 3)) for case in gel_presses.cases()]
+    text = calibration_table(found)
+    print(f"{CALIBRATION_GROUP}\n\n{text}\n", flush=True)
+    write([asdict(each) for each in found], {CALIBRATION_GROUP: text}, arguments, "forces-gel-calibration.json")
+
+
 def main() -> None:
     """Measure, print and write, group by group."""
     parser = options(__doc__)
     parser.add_argument("--draws", type=int, default=5, help="of noise, for each frame")
-    parser.add_argument("--only", nargs="+", choices=(*GROUPS, PEERS_GROUP), default=(*GROUPS, PEERS_GROUP))
+    every = (*GROUPS, PEERS_GROUP, CALIBRATION_GROUP)
+    parser.add_argument("--only", nargs="+", choices=every, default=every)
     parser.add_argument("--quick", action="store_true", help="one draw of the smaller lattice alone")
     parser.add_argument("--export", type=Path, help="write the cases for other methods into this folder, and end")
     parser.add_argument("--external", action="append", default=[], metavar="NAME=FOLDER", help="score others' forces")
@@ -311,6 +324,9 @@ def main() -> None:
         return
     pictures = picture_folder(arguments)
     for group in ("lattice",) if arguments.quick else arguments.only:
+        if group == CALIBRATION_GROUP:
+            calibrate(arguments)
+            continue
         scores = []
         for case in compared() if group == PEERS_GROUP else cases(group):
             scores.append(score(case, draws))

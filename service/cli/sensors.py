@@ -1,4 +1,4 @@
-"""Commands on sensors: list, describe, calibrate."""
+"""Commands on sensors: list, describe, calibrate, calibrate-gel."""
 
 from collections.abc import Mapping, Sequence
 from json import dumps
@@ -15,6 +15,9 @@ from service.formatting import interval, number
 from service.whole_files import write_whole
 
 app = typer.Typer(help="Show sensors, describe their gels, and learn their faults.", no_args_is_help=True)
+
+THICKEST = 1.0
+"""m; what is thicker the service takes for a half-space."""
 
 
 @app.command("list")
@@ -91,6 +94,78 @@ def calibrate(
         rows = [_estimate_cells(each) for each in told["estimates"]]
         version = f", version {told['version']}" if store else ""
         print_table(f"Calibration by {len(logs)} logs{version}", ("", "estimate", "95 % interval", ""), rows)
+
+
+@app.command("calibrate-gel")
+def calibrate_gel(
+    logs: Annotated[list[Path], typer.Argument(help="Logs of a round body pressed straight down on the sensor.")],
+    known_force: Annotated[
+        list[float] | None,
+        typer.Option(help="Normal force of the press where it is held, N: one of all logs, or given once for each."),
+    ] = None,
+    young_modulus: Annotated[float | None, typer.Option(help="Young's modulus, Pa, where it is known.")] = None,
+    poisson_ratio: Annotated[float | None, typer.Option(help="Poisson's ratio, where it is known.")] = None,
+    thickness: Annotated[
+        float | None, typer.Option(help="Surface to rigid base, m, where it is known; inf: thick against any contact.")
+    ] = None,
+    marker_depth: Annotated[float, typer.Option(help="Of the markers below the surface, m.")] = 0.0,
+    noise: Annotated[
+        float | None, typer.Option(help="Standard deviation of a marker's coordinate, m; else by the logs.")
+    ] = None,
+    mapping: MappingFile = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Write the gel to this JSON, for --gel.")
+    ] = None,
+    store: Annotated[bool, typer.Option("--store", help="Describe the sensor's gel in a service so.")] = False,
+    sensor: Annotated[
+        str | None, typer.Option(help="With --store: name of the sensor, where its logs do not give it.")
+    ] = None,
+    url: Url = DEFAULT_URL,
+    key: Key = None,
+    json: Json = False,
+) -> None:
+    """Learn a gel's stiffness, Poisson's ratio and thickness from presses with known forces."""
+    from service import formats
+    from service.cli.progress import patience
+    from slipcore.forces import calibrate_gel as calibrated
+
+    if output is not None:
+        refuse_inputs(output, *logs, mapping)
+    forces = _known_forces(known_force, len(logs))
+    presses = [formats.read(path, mapping=mapping_text(mapping)) for path in logs]
+    name = _sensor_name(sensor, presses[0].sensor) if store else ""
+    with patience("learning the gel"):
+        found = calibrated(presses, forces, young_modulus, poisson_ratio, thickness, marker_depth, noise)
+    told = found.to_json()
+    if output is not None:
+        write_whole(output, lambda beside: beside.write_text(dumps(told["gel"]), encoding="utf-8"))
+    if store:
+        deep = found.gel.thickness if found.gel.thickness <= THICKEST else None
+        with connected(url, key) as client:
+            client.describe_sensor(name, found.gel.young_modulus, found.gel.poisson_ratio, deep, marker_depth)
+    if json:
+        print_json(told)
+    else:
+        rows = [_gel_cells(each) for each in told["estimates"]]
+        stored = f", by which {name} is described" if store else ""
+        print_table(f"Gel by {len(logs)} logs{stored}", ("", "estimate", "95 % interval", "by the presses", ""), rows)
+
+
+def _sensor_name(given: str | None, logged: str) -> str:
+    name = given or logged
+    if name == "unknown":
+        raise typer.BadParameter("--store for logs that name no sensor; needed: --sensor")
+    return name
+
+
+def _gel_cells(estimate: Mapping[str, Any]) -> tuple[str, str, str, str, str]:
+    low, high = estimate["low"], estimate["high"]
+    known = f"at least {number(low, 4)}" if high is None else interval((low, high), 4)
+    value = "thick" if estimate["value"] is None else number(estimate["value"], 4)
+    named = f"{estimate['name']} [{estimate['unit']}]"
+    if low == high:
+        return named, value, "", "", estimate["note"]
+    return named, value, known, f"{estimate['information']:.1%}", estimate["note"]
 
 
 def _learnt(logs: list[Path], forces: list[float] | None, mapping: Path | None) -> dict[str, Any]:

@@ -156,6 +156,73 @@ class ReconstructionDefaults(Options):
     """Taken for the largest given force where all are 0."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GelCalibrationDefaults(Options):
+    """A gel from presses with known forces (``gel_calibration.py``)."""
+
+    least_ratio: Annotated[float, Option(0.0, 0.5, "-", "silicones, gels and foams that bear a press")] = 0.3
+    """Smallest Poisson's ratio; up to 0.5 all are as probable before anything is seen."""
+    first_ratio: Annotated[float, Option(0.0, 0.5, "-", "usual of gels")] = 0.48
+    """Poisson's ratio with which the search begins."""
+    thinnest: Annotated[float, Option(0.1, 100.0, "pitches", "thinner ones move one marker at a time")] = 1.0
+    """Smallest thickness; one over it down to 0 (a half-space), all are as probable before anything is seen."""
+    first_thickness: Annotated[float, Option(0.1, 1000.0, "pitches", "usual of sensors")] = 6.0
+    """Thickness with which the search begins."""
+    factor: Annotated[float, Option(1.0, 10.0, "-", "trials")] = 2.0
+    """Between thicknesses that are tried at first."""
+    thicknesses: Annotated[int, Option(1, 100, "-", "from a pitch to beyond a lattice of 20")] = 6
+    """Tried at first, beside a half-space."""
+    margin: Annotated[int, Option(0, 100, "nodes", "a contact may grow by so many rows under another gel")] = 3
+    """Around all contacts, within which tractions are sought."""
+    pressed: Annotated[float, Option(0.0, 1.0, "-", "Hertz's rim: half on a half-space, less on a layer")] = 0.4
+    """Share of the largest depth to which markers are pressed in where a contact is first taken to be."""
+    still: Annotated[float, Option(0.0, 1.0, "-", "trials")] = 0.95
+    """Share of markers that move less sideways than those at the rim of a contact."""
+    alternations: Annotated[int, Option(1, 100, "-", "bound")] = 3
+    """Of seeking a contact and its prior."""
+    held: Annotated[float, Option(0.0, 1.0, "-", "force sensors' tolerance")] = 0.01
+    """Change of the displacement, as a share of it, up to which frames belong to a press's hold."""
+    simplex: Annotated[float, Option(0.0, 1.0, "-", "trials")] = 0.1
+    """Side of the first simplex, as a share of the larger of a quantity and this share of its range; of each later one,
+    as a share of the last."""
+    gels: Annotated[int, Option(0, 10_000, "gels", "bound")] = 60
+    """Tried on the way to the most probable one, with the same contacts."""
+    climbs: Annotated[int, Option(1, 100, "-", "bound")] = 3
+    """Ways to the most probable gel, between which contacts are sought anew."""
+    step: Annotated[float, Option(0.0, 1.0, "-", "trials")] = 2e-3
+    """First step away from the most probable gel, as a share of the range."""
+    close: Annotated[float, Option(0.0, 1000.0, "nats", "what is left, the Gaussian around the best one tells")] = 10.0
+    """Difference of log probability within which the way to the most probable gel ends."""
+    fall: Annotated[float, Option(0.0, 10.0, "nats", "two standard deviations of a Gaussian")] = 2.0
+    """By which the log probability is to fall over a step."""
+    settled: Annotated[float, Option(0.0, 1.0, "nats", "a step goes at most six times as far as the last")] = 0.05
+    """Fall that is taken for none."""
+    rounds: Annotated[int, Option(1, 100, "steps", "bound")] = 4
+    """Steps tried along each quantity."""
+    near: Annotated[float, Option(0.0, 100.0, "nats", "four standard deviations")] = 8.0
+    """Below the most probable gel, up to which gels decide the shape of the posterior."""
+    reach: Annotated[float, Option(1.0, 100.0, "standard deviations", "all but 1e-6 of a Gaussian")] = 5.0
+    """From the most probable gel, as far as the posterior is followed."""
+    lattice: Annotated[int, Option(3, 10_000, "points", "1e-3 of a quantile")] = 161
+    """Of the posterior, along each quantity."""
+    least_precision: Annotated[float, Option(0.0, 1.0, "-", "trials")] = 1e-6
+    """Of a quantity that nothing tells, in units of the steps tried."""
+    confidence: Annotated[float, Option(0.5, 0.999, "-", "usual")] = 0.95
+    """Of intervals."""
+    half_space: Annotated[float, Option(0.0, 1.0, "-", "two standard deviations of a Gaussian")] = 0.135
+    """Density of a half-space, over the largest, from which a gel may be one."""
+    identified: Annotated[float, Option(0.0, 1.0, "-", "half of its variance before")] = 0.5
+    """Share of a quantity's information from the presses, under which it is said to be the prior's."""
+    young_modulus_error: Annotated[float, Option(0.0, 1.0, "-", "an ellipse, a cone, spheres and the scenes")] = 1e-2
+    """Standard deviation of what bilinear tractions leave wrong of Young's modulus, as a share of it."""
+    poisson_ratio_error: Annotated[float, Option(0.0, 0.1, "-", "an ellipse, a cone, spheres and the scenes")] = 3e-3
+    """The same of Poisson's ratio."""
+    thickness_error: Annotated[float, Option(0.0, 1.0, "-", "an ellipse, a cone, spheres and the scenes")] = 1.2e-2
+    """The same of the thickness, as a share of it."""
+    in_plane: Annotated[float, Option(1.0, 100.0, "-", "an ellipse, a cone, spheres and the scenes")] = 4.0
+    """How many times larger these are where markers are seen in the plane alone."""
+
+
 GEL = GelLimits()
 NODES = NodeDefaults()
 RESPONSE = ResponseDefaults()
@@ -165,6 +232,7 @@ SUPPORT = SupportDefaults()
 FIT = FitDefaults()
 LATTICE = LatticeDefaults()
 RECONSTRUCTION = ReconstructionDefaults()
+GEL_CALIBRATION = GelCalibrationDefaults()
 
-TABLES = (NODES, RESPONSE, PRIOR, STRENGTH, SUPPORT, FIT, LATTICE, RECONSTRUCTION)
+TABLES = (NODES, RESPONSE, PRIOR, STRENGTH, SUPPORT, FIT, LATTICE, RECONSTRUCTION, GEL_CALIBRATION)
 """All tables of forces from displacement."""

@@ -130,10 +130,11 @@ def choose_prior(
     support: BoolArray,
     criterion: Criterion = "evidence",
     first: Smoothness | None = None,
+    strength_alone: bool = False,
 ) -> Prior:
     """The prior that data [m] speak for: its shape by evidence, property by property; its strength by a criterion.
 
-    ``first``: the shape to begin with (None: the usual one).
+    ``first``: the shape to begin with (None: the usual one); with ``strength_alone`` the one that is kept.
     """
     q, r = observation.on(support)
     whitened = data / observation.noise
@@ -147,6 +148,8 @@ def choose_prior(
         return spectrum.log_evidence(y, strength), strength
 
     best = usual() if first is None else first
+    if strength_alone:
+        return Prior(best, judge(best, criterion)[1])
     evidence = judge(best, "evidence")[0]
     for name, values in choices().items():
         for value in values:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from slipcore.errors import InvalidInput
@@ -40,6 +40,10 @@ class Gel:
             return cls(**{name: _number(name, value) for name, value in told.items()})
         except (AttributeError, TypeError) as error:
             raise InvalidInput("gel", str(error)[:120], f"numbers named {', '.join(names)}") from error
+
+    def to_json(self) -> dict[str, float | None]:
+        """As ``from_json`` reads it."""
+        return asdict(self) | {"thickness": self.thickness if math.isfinite(self.thickness) else None}
 
 
 def _number(name: str, told: object) -> float:

@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from slipcore.errors import InvalidInput, UnknownScale
+from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import RECONSTRUCTION
 from slipcore.forces.fit import Fit, Observation, Prior, choose_prior, fit
 from slipcore.forces.gel import Gel
 from slipcore.forces.nodes import Nodes
+from slipcore.forces.recording import Recording
 from slipcore.forces.response import response_matrix
 from slipcore.forces.strength import Criterion
 from slipcore.forces.support import better_support, relevant_nodes, widened
@@ -68,15 +69,13 @@ def reconstruct(
     ``criterion`` that chooses the strength of the prior. Markers whose z never changes count as seen in the plane only.
     Raises ``UnknownScale`` for a log not in metres and ``InvalidInput`` for what does not fit.
     """
-    if not log.is_scaled:
-        raise UnknownScale("forces follow from displacement in m, and the log's scale is unknown")
-    sensor = _Sensor.of(log, gel, _noise(log, noise))
-    recording = _Recording.of(log, sensor, _total_force(total_force, len(log)))
-    result = _no_forces(log, sensor.noise)
-    touched = recording.touched()
+    shown = Recording.of(log, noise)
+    sensor = _Sensor.of(log, gel, shown)
+    recording = _Recording(sensor, shown, _total_force(total_force, len(log)))
+    result = _no_forces(log, shown.noise)
+    touched, strongest = shown.touched(), shown.strongest()
     if not touched.any():
         return result
-    strongest = int(np.argmax(np.where(touched, np.sum(recording.data**2, axis=1), 0.0)))
     tracker = _Tracker.of(sensor, *recording.frame(strongest), criterion)
     result = replace(
         result,
@@ -104,27 +103,14 @@ class _Sensor:
     elements: FloatArray
     load: float
     axes: tuple[int, ...]
-    noise: float
 
     @classmethod
-    def of(cls, log: GraspLog, gel: Gel, noise: float) -> "_Sensor":
-        place = log.position[..., :2].reshape(-1, 2)
+    def of(cls, log: GraspLog, gel: Gel, recording: Recording) -> "_Sensor":
+        place, axes = log.position[..., :2].reshape(-1, 2), recording.axes
         nodes = Nodes.around(place, log.element_area)
-        axes = (0, 1, 2) if log.displacement[..., 2].any() else (0, 1)
         response = response_matrix(gel, nodes, place)[list(axes)].reshape(len(axes) * len(place), 3, len(nodes))
         young = gel.young_modulus
-        return cls(nodes, young * response, young * nodes.over_elements(place), young * nodes.area, axes, noise)
-
-
-def _noise(log: GraspLog, noise: float | None) -> float:
-    if noise is None:
-        from slipcore.noise import estimate_noise  # compiled
-
-        plane = log.displacement[..., :2].reshape(len(log), -1, 2).swapaxes(1, 2)
-        return float(np.nan_to_num(estimate_noise(log.time, plane)))
-    if not 0.0 <= noise < np.inf:
-        raise InvalidInput("noise", noise, "0 m or more, finite")
-    return noise
+        return cls(nodes, young * response, young * nodes.over_elements(place), young * nodes.area, axes)
 
 
 def _total_force(given: ArrayLike | None, frames: int) -> FloatArray:
@@ -140,41 +126,25 @@ def _total_force(given: ArrayLike | None, frames: int) -> FloatArray:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Recording:
-    """Displacements ``data`` [t, m] m along the axes that are seen, one after the other, z into the gel; which are
-    ``seen`` [t, m]; and ``given`` resultants [t, 3] N, NaN where unknown.
-    """
+    """What was ``shown`` to a ``sensor``, and ``given`` resultants [t, 3] N, NaN where unknown."""
 
     sensor: _Sensor
-    data: FloatArray
-    seen: BoolArray
+    shown: Recording
     given: FloatArray
-
-    @classmethod
-    def of(cls, log: GraspLog, sensor: _Sensor, given: FloatArray) -> "_Recording":
-        inwards = np.moveaxis(log.displacement * [1.0, 1.0, -1.0], -1, 1)[:, list(sensor.axes)]
-        shown = np.ones(inwards.shape, bool) if log.observed is None else log.observed[:, None] & (inwards == inwards)
-        return cls(sensor, inwards.reshape(len(log), -1), shown.reshape(len(log), -1), given)
-
-    def touched(self) -> BoolArray:
-        """Frames [t] in which markers moved by more than noise."""
-        count = np.maximum(self.seen.sum(axis=1), 1)
-        power = np.sum(np.where(self.seen, self.data, 0.0) ** 2, axis=1) / count
-        return np.asarray(power > self.sensor.noise**2 * (1.0 + RECONSTRUCTION.significant * np.sqrt(2.0 / count)))
 
     def frame(self, t: int) -> tuple[Observation, FloatArray]:
         """What one frame tells: displacements, then the parts of its resultant that are given."""
-        data, given = self.data[t], self.given[t]
-        largest = np.abs(data[self.seen[t]]).max(initial=0.0)
-        error = np.hypot(self.sensor.noise, RECONSTRUCTION.discretisation * largest)
+        data, given = self.shown.data[t], self.given[t]
+        error = self.shown.error(data, self.shown.seen[t], self.shown.noise)
         known = np.flatnonzero(np.isfinite(given))
-        if not known.size and self.seen[t].all():
-            return Observation(self.sensor.response, np.full(len(data), error)), data
+        if not known.size:
+            return Observation(self.sensor.response, error), data
         rows = np.zeros((len(known), *self.sensor.response.shape[1:]))
         rows[np.arange(len(known)), known] = self.sensor.load
         share = RECONSTRUCTION.force_tolerance
         largest = np.nanmax(np.abs(self.given), initial=RECONSTRUCTION.least_force)
         tolerance = share * np.maximum(np.abs(given[known]), share * largest)
-        noise = np.concatenate((np.where(self.seen[t], error, np.inf), tolerance))
+        noise = np.concatenate((error, tolerance))
         return Observation(np.concatenate((self.sensor.response, rows)), noise), np.concatenate((data, given[known]))
 
 

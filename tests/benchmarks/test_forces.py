@@ -8,9 +8,10 @@ import pytest
 
 from benchmarks.forces import STICTION, Case, compared, coverage, errors, errors_table, picture, pooled, score
 from benchmarks.gel_peers import PEERS, export, imported, pseudo_inverse
+from benchmarks.gel_presses import Calibration, calibration_table
 from benchmarks.gel_scenes import CELL, CONTACTS, FRICTION, LATTICES, TANGENTIAL_SHARE, Lattice, press, repeated, seen
 from slipcore.contact.reference import CattaneoMindlin, HertzContact, half_space
-from slipcore.forces import Gel, reconstruct
+from slipcore.forces import Gel, GelEstimate, reconstruct
 
 FREE = Gel(1e6, 0.5)
 LAYER = Gel(1e6, 0.49, 5e-3)
@@ -130,3 +131,20 @@ def test_a_punch_is_as_wide_as_it_is_and_its_rim_is_known_less_well() -> None:
     assert truth.log.force is not None
     inside = np.abs(found.force - truth.log.force) < 1.96 * found.deviation
     assert inside[found.contact].mean() > 0.85
+
+
+def test_a_learnt_gel_is_tabled_with_its_errors_and_what_its_intervals_hold() -> None:
+    true = Gel(1e6, 0.49, 5e-3)
+    estimates = (
+        GelEstimate("young_modulus", "Pa", 1.02e6, 0.99e6, 1.05e6, 1.0),
+        GelEstimate("poisson_ratio", "-", 0.48, 0.47, 0.5, 0.9),
+        GelEstimate("thickness", "m", 5.5e-3, 5.2e-3, 5.8e-3, 0.9),
+    )
+    forces = {"true": (0.01, 0.02), "wrong": (0.1, 0.2), "learnt": (0.03, 0.04)}
+    layer = Calibration("with z", "5 mm", 1e-6, None, true, [estimates], forces, 20.0)
+    thick = replace(layer, gel="half-space", true=replace(true, thickness=np.inf), given=0.49)
+    first, second = calibration_table([layer, thick]).splitlines()[2:]
+    assert first == (
+        "| with z | 5 mm | 1 | +2 (± 3) | -0.01 (± 0.015) | +10 (± 6) % | 2 of 3 | 1 / 2 | 10 / 20 | 3 / 4 | 20 |"
+    )
+    assert "| given | at least 5.2 mm | 2 of 3 |" in second

@@ -726,6 +726,23 @@ def test_forces_do_not_follow_from_what_tells_no_displacement_in_metres(
     assert (code, "gel is given for a log of forces alone" in err) == (INPUT_REFUSED, True), err
 
 
+def test_a_gel_is_learnt_from_presses_and_describes_the_sensor(run: Run, felt: Path, url: str, tmp_path: Path) -> None:
+    about = ("--known-force", 6.0, "--poisson-ratio", 0.5, "--thickness", "inf", "--noise", 1e-6)
+    code, out, err = run("sensors", "calibrate-gel", felt, *about, "--output", tmp_path / "gel.json")
+    assert code == 0, err
+    assert re.search(r"poisson_ratio \[-\] +0\.5000 +given", out)
+    gel = json.loads((tmp_path / "gel.json").read_text(encoding="utf-8"))
+    assert gel["young_modulus"] == pytest.approx(1e6, rel=0.1)
+    assert gel["thickness"] is None
+    container.write(replace(formats.read(felt), sensor="unknown"), tmp_path / "whose.npz")
+    assert run("sensors", "calibrate-gel", tmp_path / "whose.npz", *about, "--store", "--url", url)[0] == WRONG_USAGE
+    told = run("sensors", "calibrate-gel", felt, *about, "--store", "--sensor", "soft", "--url", url, "--json")[1]
+    with FrictionClient(url) as client:
+        (described,) = (each["gel"] for each in client.sensors() if each["name"] == "soft")
+    assert described == pytest.approx(json.loads(told)["gel"])
+    assert run("sensors", "calibrate-gel", felt)[0] == INPUT_REFUSED
+
+
 def test_a_sensor_is_described_and_listed_from_the_command_line(run: Run, url: str) -> None:
     gel = ("--young-modulus", "2.5e5", "--poisson-ratio", "0.48", "--thickness", "0.004")
     assert run("sensors", "describe", "GelSight Mini", *gel, "--url", url)[0] == 0

@@ -1,0 +1,395 @@
+"""A sensor's gel from a few presses with known forces: Young's modulus, Poisson's ratio and thickness, jointly."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import minimize
+from scipy.special import ndtri
+
+from slipcore.defaults import LIMITS
+from slipcore.errors import InvalidInput
+from slipcore.forces.bounded_gaussian import BoundedGaussian, through
+from slipcore.forces.defaults import GEL, GEL_CALIBRATION
+from slipcore.forces.gel import Gel
+from slipcore.forces.gel_likelihood import Elasticity, Judged, Press, Presses, Seek, first_contacts, judge
+from slipcore.forces.nodes import Nodes
+from slipcore.forces.recording import Recording
+from slipcore.frames import FloatArray, GraspLog
+
+GIVEN, PRIORS = "given", "the prior's: the presses hardly tell it"
+HALF_SPACE = "at least: against these contacts the gel may be as thick as a half-space"
+"""What is said of an estimate."""
+_NORMAL = float(ndtri(0.5 + 0.5 * GEL_CALIBRATION.confidence))
+"""Standard deviations to the end of an interval."""
+
+
+@dataclass(frozen=True, slots=True)
+class GelEstimate:
+    """A property of a gel with its 95 % interval; ``information``: share of what is known of it that the presses tell.
+
+    ``note``: "given"; that it is the prior's; or that the thickness has no upper end. Empty where the presses tell it.
+    """
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    information: float
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GelCalibration:
+    """The ``gel``, and how well the presses tell each of its properties.
+
+    ``correlation`` [3, 3]: between log Young's modulus, Poisson's ratio and the thickness; ``force`` [i] N of each
+    press by this gel; ``misfit``: root mean square of what no gel explains of the displacement over its noise.
+    """
+
+    gel: Gel
+    estimates: tuple[GelEstimate, ...]
+    correlation: FloatArray
+    force: FloatArray
+    misfit: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Of numbers and texts alone; what is infinite is None."""
+        told = [
+            {name: value if value != math.inf else None for name, value in asdict(each).items()}
+            for each in self.estimates
+        ]
+        return {
+            "gel": self.gel.to_json(),
+            "estimates": told,
+            "correlation": self.correlation.tolist(),
+            "force": self.force.tolist(),
+            "misfit": self.misfit,
+        }
+
+
+def calibrate_gel(
+    logs: Sequence[GraspLog],
+    known_force: Sequence[float | None] | None = None,
+    young_modulus: float | None = None,
+    poisson_ratio: float | None = None,
+    thickness: float | None = None,
+    marker_depth: float = 0.0,
+    noise: float | None = None,
+) -> GelCalibration:
+    """A gel from logs of presses on it: what is not given of it, from the displacement and the normal forces.
+
+    ``known_force`` N of each log's hold, None where unknown; at least one unless ``young_modulus`` is given. What is
+    given (Pa, m; ``thickness`` inf: a half-space) is taken as exact. ``noise`` m of a marker's coordinate (None:
+    estimated from each log). Of a log count the frames in which markers moved most. Raises ``InvalidInput`` for what
+    does not fit, also for logs in which nothing touches, and ``UnknownScale`` for a log not in metres.
+    """
+    given = _checked(young_modulus, poisson_ratio, thickness, marker_depth)
+    forces = _forces(logs, known_force, young_modulus)
+    presses = _presses(logs, forces, marker_depth, noise)
+    search = _Search.begun(presses, young_modulus, given)
+    search.climb()
+    search.look_around()
+    return _told(search)
+
+
+def _checked(young: float | None, ratio: float | None, thickness: float | None, depth: float) -> Elasticity:
+    """What is given, NaN where nothing is; raises ``InvalidInput`` for what no gel has."""
+    usual = GEL_CALIBRATION.first_ratio if ratio is None else ratio
+    Gel(1e6 if young is None else young, usual, math.inf if thickness is None else thickness, depth)
+    return Elasticity(math.nan if ratio is None else ratio, math.nan if thickness is None else 1.0 / thickness)
+
+
+def _forces(logs: Sequence[GraspLog], known: Sequence[float | None] | None, young: float | None) -> list[float]:
+    if not logs:
+        raise InvalidInput("logs", "none", "at least one press")
+    given = [None] * len(logs) if known is None else list(known)
+    if len(given) != len(logs):
+        raise InvalidInput("known_force", f"{len(given)} forces", f"one for each of {len(logs)} logs, or None")
+    least, most = LIMITS.press
+    for force in given:
+        if force is not None and not least <= force <= most:
+            raise InvalidInput("known_force", force, f"{least:g} to {most:g} N")
+    if young is None and all(force is None for force in given):
+        raise InvalidInput("known_force", "none", "at least one, or a given young_modulus")
+    return [math.nan if force is None else float(force) for force in given]
+
+
+def _presses(logs: Sequence[GraspLog], forces: list[float], marker_depth: float, noise: float | None) -> Presses:
+    """What the logs' holds tell."""
+    first = logs[0]
+    for log in logs:
+        if not np.array_equal(log.position, first.position) or log.element_area != first.element_area:
+            raise InvalidInput("logs", "of several lattices", "one sensor at a time")
+    position, nodes = _lattice(first)
+    recordings = [Recording.of(log, noise) for log in logs]
+    axes = min((recording.axes for recording in recordings), key=len)
+    each = tuple(_held(*pair, len(axes) * len(position)) for pair in zip(recordings, forces, strict=True))
+    return Presses(position, marker_depth, axes, nodes, each)
+
+
+def _lattice(log: GraspLog) -> tuple[FloatArray, Nodes]:
+    """Markers [j, 2] m and the nodes about them."""
+    position = log.position[..., :2].reshape(-1, 2)
+    nodes = Nodes.around(position, log.element_area)
+    side = np.linalg.svd(position - position.mean(axis=0), compute_uv=False)
+    if len(position) < 2 or side[-1] < nodes.grid.pitch[0]:
+        raise InvalidInput("position", "markers on a line", "markers over an area")
+    return position, nodes
+
+
+def _held(recording: Recording, force: float, used: int) -> Press:
+    """The mean over the frames that are like the one in which markers moved most, of the first ``used`` data."""
+    touched, strongest = recording.touched(), recording.strongest()
+    if not touched.any():
+        raise InvalidInput("logs", "one in which nothing touches", "presses that move markers by more than noise")
+    data, seen = recording.data[:, :used], recording.seen[:, :used]
+    most = np.where(seen[strongest], data[strongest], 0.0)
+    change = np.sum(np.where(seen & seen[strongest], data - most, 0.0) ** 2, axis=1)
+    allowed = GEL_CALIBRATION.held**2 * (most @ most) + 2.0 * used * recording.noise**2
+    frames = touched & (change <= allowed) & (seen == seen[strongest]).all(axis=1)
+    mean = data[frames].mean(axis=0)
+    error = recording.error(mean, seen[strongest], recording.noise / math.sqrt(frames.sum()))
+    return Press(mean, error, force)
+
+
+@dataclass(slots=True, eq=False)
+class _Search:
+    """Gels on which presses were ``tried``; ``given`` is what is not sought, NaN what is."""
+
+    presses: Presses
+    young_modulus: float | None
+    given: Elasticity
+    tried: list[Judged]
+
+    @classmethod
+    def begun(cls, presses: Presses, young_modulus: float | None, given: Elasticity) -> "_Search":
+        """With thicknesses that are far apart."""
+        pitch = presses.nodes.grid.pitch[0]
+        usual = Elasticity(GEL_CALIBRATION.first_ratio, 1.0 / (GEL_CALIBRATION.first_thickness * pitch))
+        first = Elasticity(*(b if math.isnan(a) else a for a, b in zip(given, usual, strict=True)))
+        near, contacts = first_contacts(presses, first)
+        thinnest = 1.0 / _thinnest(near)
+        others = [thinnest / GEL_CALIBRATION.factor**k for k in range(GEL_CALIBRATION.thicknesses)]
+        tried = [*others, 0.0] if math.isnan(given.closeness) else [given.closeness]
+        return cls(
+            near,
+            young_modulus,
+            given,
+            [judge(near, first._replace(closeness=each), contacts, young_modulus) for each in tried],
+        )
+
+    @property
+    def free(self) -> list[int]:
+        """Which of the two are sought."""
+        return [k for k in range(2) if math.isnan(self.given[k])]
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Of what is sought."""
+        low, high = np.array([[GEL_CALIBRATION.least_ratio, 0.0], [0.5, 1.0 / _thinnest(self.presses)]])
+        return low[self.free], high[self.free]
+
+    @property
+    def model_error(self) -> float:
+        """How many times larger than with depth the model's errors are."""
+        return 1.0 if len(self.presses.axes) > 2 else GEL_CALIBRATION.in_plane
+
+    @property
+    def best(self) -> Judged:
+        """The most probable gel so far."""
+        return max(self.tried, key=_probability)
+
+    def point(self, judged: Judged) -> FloatArray:
+        """What is sought, of a gel."""
+        return np.array(judged.elasticity)[self.free]
+
+    def at(self, point: ArrayLike, seek: Seek = "nothing") -> float:
+        """Log probability of a gel, with the contacts of the best one or what is sought about them."""
+        values, (low, high) = list(self.given), self.bounds
+        for k, value in zip(self.free, np.clip(point, low, high), strict=True):
+            values[k] = float(value)
+        found = judge(self.presses, Elasticity(*values), self.best.contacts, self.young_modulus, seek)
+        self.tried.append(found)
+        return found.log_probability
+
+    def climb(self) -> None:
+        """Go to the most probable gel (Nelder and Mead), seek its contacts anew, and go on from there."""
+        side = GEL_CALIBRATION.simplex
+        for _ in range(GEL_CALIBRATION.climbs):
+            if self.free:
+                self._descend(side)
+            self.at(self.point(self.best), "both")
+            before, self.tried = max(map(_probability, self.tried[:-1])), [self.best]
+            side *= GEL_CALIBRATION.simplex
+            if self.best.log_probability - before < GEL_CALIBRATION.close:
+                break
+
+    def _descend(self, share: float) -> None:
+        (low, high), begin = self.bounds, self.point(self.best)
+        side = share * np.maximum(begin, share * (high - low))
+        corners = begin + np.diag(np.where(begin + side > high, -side, side))
+        options: Any = {
+            "initial_simplex": np.concatenate((begin[None], corners)),
+            "maxfev": GEL_CALIBRATION.gels,
+            "fatol": GEL_CALIBRATION.close,
+            "xatol": math.inf,
+        }
+        search: Any = minimize  # whose types know no method by this name with bounds and a simplex
+        search(lambda point: -self.at(point), begin, method="Nelder-Mead", bounds=_pairs(low, high), options=options)
+
+    def look_around(self) -> None:
+        """Try gels about the most probable one, as far from it as the probability falls by a little."""
+        if not self.free:
+            return
+        low, high = self.bounds
+        steps = np.array([self._step(axis) for axis in np.diag(high - low)])
+        centre = self.point(self.best)
+        for signs in product((-1.0, 1.0), repeat=len(steps)):
+            self.at(centre + steps * signs / math.sqrt(len(steps)), "support")
+
+    def _step(self, axis: FloatArray) -> float:
+        """How far along one quantity, whose range is the length of its ``axis``, the probability falls by about
+        ``GEL_CALIBRATION.fall``; both ways from the most probable gel.
+        """
+        share, centre, most = GEL_CALIBRATION.step, self.point(self.best), self.best.log_probability
+        for _ in range(GEL_CALIBRATION.rounds):
+            fall = most - min(self.at(centre + way * share * axis, "support") for way in (-1.0, 1.0))
+            if share == 1.0 or 0.25 * GEL_CALIBRATION.fall < fall < 4.0 * GEL_CALIBRATION.fall:
+                break
+            share = min(1.0, share * math.sqrt(GEL_CALIBRATION.fall / max(fall, GEL_CALIBRATION.settled)))
+        return share * float(axis.sum())
+
+
+def _pairs(low: FloatArray, high: FloatArray) -> list[tuple[float, float]]:
+    return [(float(a), float(b)) for a, b in zip(low, high, strict=True)]
+
+
+def _probability(judged: Judged) -> float:
+    return judged.log_probability
+
+
+def _thinnest(presses: Presses) -> float:
+    """Thickness (m) below which none is sought."""
+    return presses.marker_depth + GEL_CALIBRATION.thinnest * presses.nodes.grid.pitch[0]
+
+
+def _told(search: _Search) -> GelCalibration:
+    """What was found, with what the misfit and the model add to the intervals."""
+    found, properties = _found(search), (_young_modulus, _poisson_ratio, _thickness)
+    estimates = tuple(made(search, found) for made in properties)
+    gel = Elasticity(*found.values[1:]).gel(math.exp(found.values[0]), search.presses.marker_depth)
+    sizes = np.sqrt(np.diag(found.covariance))
+    sign = np.array([1.0, 1.0, -1.0])  # thickness grows as closeness falls
+    scale = np.divide(sign, sizes, out=np.zeros(3), where=sizes > 0.0)
+    best = search.best
+    force = math.exp(best.modulus.logarithm) * best.resultant
+    return GelCalibration(gel, estimates, found.covariance * np.outer(scale, scale), force, math.sqrt(best.misfit))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """``values`` [3] and ``covariance`` of log Young's modulus, Poisson's ratio and one over the thickness; the
+    ``posterior`` of those of the last two that were sought.
+    """
+
+    values: FloatArray
+    covariance: FloatArray
+    posterior: BoundedGaussian | None
+
+
+def _found(search: _Search) -> _Found:
+    """The posterior from all gels that are nearly as probable as the best one; a misfit widens it."""
+    best = search.best
+    values, covariance = np.array([best.modulus.logarithm, *best.elasticity]), np.zeros((3, 3))
+    covariance[0, 0] = max(1.0, best.misfit) * best.modulus.deviation**2
+    if not search.free:
+        return _Found(values, covariance, None)
+    points = np.array([search.point(judged) for judged in search.tried])
+    logarithm = np.array([judged.log_probability for judged in search.tried]) / max(1.0, best.misfit)
+    posterior = through(points, logarithm, *search.bounds)
+    weight = 1.0 / (1.0 + logarithm.max() - logarithm)
+    terms = np.column_stack((np.ones(len(points)), points - posterior.mean))
+    moduli = np.array([judged.modulus.logarithm for judged in search.tried])
+    mean, *slope = np.linalg.lstsq(weight[:, None] * terms, weight * moduli, rcond=None)[0]
+    rows, first = [k + 1 for k in search.free], posterior.covariance @ slope
+    values[rows], values[0] = posterior.mean, mean
+    covariance[np.ix_(rows, rows)] = posterior.covariance
+    covariance[0, rows] = covariance[rows, 0] = first
+    covariance[0, 0] += slope @ first
+    return _Found(values, covariance, posterior)
+
+
+def _young_modulus(search: _Search, found: _Found) -> GelEstimate:
+    value = math.exp(found.values[0])
+    if search.young_modulus is not None:
+        return _given("young_modulus", "Pa", value)
+    if _confounded(search, found):
+        return GelEstimate("young_modulus", "Pa", value, *GEL.young_modulus, 0.0, PRIORS)
+    own = search.model_error * GEL_CALIBRATION.young_modulus_error
+    away = _NORMAL * math.hypot(math.sqrt(found.covariance[0, 0]), own)
+    return GelEstimate("young_modulus", "Pa", value, value * math.exp(-away), value * math.exp(away), 1.0)
+
+
+def _poisson_ratio(search: _Search, found: _Found) -> GelEstimate:
+    value = float(found.values[1])
+    if 0 not in search.free:
+        return _given("poisson_ratio", "-", value)
+    if _confounded(search, found):
+        return GelEstimate("poisson_ratio", "-", value, GEL_CALIBRATION.least_ratio, 0.5, 0.0, PRIORS)
+    (low, high), information = _interval(search, found, 0, GEL_CALIBRATION.poisson_ratio_error)
+    low, high = max(low, GEL_CALIBRATION.least_ratio), min(high, 0.5)
+    return GelEstimate("poisson_ratio", "-", value, low, high, information, _of_the_prior(information))
+
+
+def _thickness(search: _Search, found: _Found) -> GelEstimate:
+    value = 1.0 / float(found.values[2]) if found.values[2] > 0.0 else math.inf
+    if 1 not in search.free:
+        return _given("thickness", "m", value)
+    axis = search.free.index(1)
+    (low, high), information = _interval(search, found, axis, GEL_CALIBRATION.thickness_error * float(found.values[2]))
+    note = _of_the_prior(information)
+    if not note and _may_be_a_half_space(search, found):
+        low, note = 0.0, HALF_SPACE
+    return GelEstimate("thickness", "m", value, 1.0 / high, 1.0 / low if low > 0.0 else math.inf, information, note)
+
+
+def _may_be_a_half_space(search: _Search, found: _Found) -> bool:
+    if 1 not in search.free:
+        return search.given.closeness == 0.0
+    assert found.posterior is not None
+    return found.posterior.density(search.free.index(1), 0.0) > GEL_CALIBRATION.half_space
+
+
+def _confounded(search: _Search, found: _Found) -> bool:
+    """Whether Young's modulus and Poisson's ratio show only together: in the plane a half-space moves in proportion to
+    (1 + ν)(1 − 2ν)/E, and what tells them apart is the prior of shear.
+    """
+    return 0 in search.free and len(search.presses.axes) == 2 and _may_be_a_half_space(search, found)
+
+
+def _interval(search: _Search, found: _Found, axis: int, own: float) -> tuple[tuple[float, float], float]:
+    """Of 95 % with the model's ``own`` error, and the share of information that is not the prior's."""
+    posterior = found.posterior
+    assert posterior is not None
+    middle = float(posterior.mean[axis])
+    tail = 0.5 - 0.5 * GEL_CALIBRATION.confidence
+    ends = [posterior.quantile(axis, share) - middle for share in (tail, 1.0 - tail)]
+    model = _NORMAL * search.model_error * own
+    low, high = (middle + math.copysign(math.hypot(end, model), end) for end in ends)
+    range_of = float(np.subtract(*(bound[axis] for bound in search.bounds)))
+    information = 1.0 - 12.0 * float(posterior.covariance[axis, axis]) / range_of**2  # of a range with equal chances
+    return (max(low, 0.0), high), max(information, 0.0)
+
+
+def _given(name: str, unit: str, value: float) -> GelEstimate:
+    return GelEstimate(name, unit, value, value, value, 0.0, GIVEN)
+
+
+def _of_the_prior(information: float) -> str:
+    return PRIORS if information < GEL_CALIBRATION.identified else ""

@@ -1,0 +1,207 @@
+"""How probable presses with known forces are on a gel, with where they touch sought on each.
+
+In Young's moduli, tractions follow from the displacement by Poisson's ratio and the thickness alone; Young's modulus
+is then what a known force is of the resultant in moduli, and has a closed form.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from slipcore.contact.elasticity.grid import bounding_box
+from slipcore.forces.defaults import GEL, GEL_CALIBRATION, RECONSTRUCTION
+from slipcore.forces.fit import Observation, Prior, choose_prior, fit, log_evidence
+from slipcore.forces.gel import Gel
+from slipcore.forces.nodes import Nodes
+from slipcore.forces.response import response_matrix
+from slipcore.forces.support import better_support, widened
+from slipcore.frames import BoolArray, FloatArray
+
+Seek = Literal["nothing", "support", "both"]
+"""What of contacts is sought anew: where they are, and the priors of their tractions."""
+
+
+class Elasticity(NamedTuple):
+    """What decides the shape of the displacement: ``closeness`` 1/m of the base is one over the thickness, 0 of a
+    half-space.
+    """
+
+    poisson_ratio: float
+    closeness: float
+
+    def gel(self, young_modulus: float, marker_depth: float) -> Gel:
+        """Such a gel."""
+        thickness = 1.0 / self.closeness if self.closeness > 0.0 else np.inf
+        return Gel(young_modulus, self.poisson_ratio, thickness, marker_depth)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Press:
+    """Displacements ``data`` [m] m of one press with their standard deviation ``error`` [m], and its normal ``force``
+    N, NaN where it is not known.
+    """
+
+    data: FloatArray
+    error: FloatArray
+    force: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Presses:
+    """Several on one sensor, whose markers lie at ``position`` [j, 2] m, ``marker_depth`` m below the surface, and are
+    seen along ``axes``; tractions are sought at ``nodes``.
+    """
+
+    position: FloatArray
+    marker_depth: float
+    axes: tuple[int, ...]
+    nodes: Nodes
+    each: tuple[Press, ...]
+
+    def observations(self, elasticity: Elasticity) -> list[Observation]:
+        """How each press's displacement comes from tractions in Young's moduli."""
+        unit = GEL.young_modulus[0]  # of any modulus: the response is in proportion to one over it
+        whole = response_matrix(elasticity.gel(unit, self.marker_depth), self.nodes, self.position)
+        seen = unit * whole[list(self.axes)].reshape(-1, 3, len(self.nodes))
+        return [Observation(seen, press.error) for press in self.each]
+
+
+class Contact(NamedTuple):
+    """Where a press touches, [ny, nx], and the prior of its tractions."""
+
+    support: BoolArray
+    prior: Prior
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Modulus:
+    """Logarithm of Young's modulus (Pa) given Poisson's ratio and the thickness, its standard ``deviation``, and the
+    log probability of the known forces.
+    """
+
+    logarithm: float
+    deviation: float
+    log_probability: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """Presses on one gel: their log probability (without what no gel changes), the contacts with which it is largest,
+    the normal ``resultant`` of each in N by a modulus of 1 Pa, and the mean square ``misfit`` of markers over noise.
+    """
+
+    elasticity: Elasticity
+    log_probability: float
+    contacts: tuple[Contact, ...]
+    modulus: Modulus
+    resultant: FloatArray
+    misfit: float
+
+
+def first_contacts(presses: Presses, elasticity: Elasticity) -> tuple[Presses, tuple[Contact, ...]]:
+    """Where presses touch a gel of about this elasticity, and the presses with nodes about there alone."""
+    found = _pressed(presses) if len(presses.axes) == 3 else _within(presses)
+    box = bounding_box(widened(np.any(found, axis=0), GEL_CALIBRATION.margin))
+    near = replace(presses, nodes=Nodes(presses.nodes.grid.part(box)))
+    contacts = []
+    for press, support, observation in zip(presses.each, found, near.observations(elasticity), strict=True):
+        prior = choose_prior(observation, press.data, near.nodes, support[box].ravel())
+        contacts.append(Contact(support[box], prior))
+    return near, tuple(contacts)
+
+
+def _pressed(presses: Presses) -> list[BoolArray]:
+    """Nodes [ny, nx] whose markers are pressed in by a share of the largest depth, for each press."""
+    places = presses.nodes.places()
+    nearest = np.argmin(np.hypot(*(places[:, None] - presses.position[None]).transpose(2, 0, 1)), axis=1)
+    depths = [np.where(press.error < np.inf, press.data, 0.0)[-len(presses.position) :] for press in presses.each]
+    pressed = [depth[nearest] >= GEL_CALIBRATION.pressed * depth.max() for depth in depths]
+    return [widened(each.reshape(presses.nodes.grid.shape), 1) for each in pressed]
+
+
+def _within(presses: Presses) -> list[BoolArray]:
+    """Nodes [ny, nx] within the circle on which markers move most sideways, as they do at the rim of a round body."""
+    places, found = presses.nodes.places(), []
+    for press in presses.each:
+        moved = np.hypot(*np.where(press.error < np.inf, press.data, 0.0).reshape(2, -1))
+        middle = moved**2 @ presses.position / np.sum(moved**2)
+        most = moved >= np.quantile(moved, GEL_CALIBRATION.still)
+        radius = np.mean(np.hypot(*(presses.position[most] - middle).T))
+        found.append((np.hypot(*(places - middle).T) <= radius).reshape(presses.nodes.grid.shape))
+    return found
+
+
+def judge(
+    presses: Presses,
+    elasticity: Elasticity,
+    contacts: Sequence[Contact],
+    young_modulus: float | None,
+    seek: Seek = "nothing",
+) -> Judged:
+    """Presses on a gel, with these contacts or with what is sought about them: better ones, and priors for them."""
+    found, probability, yields, misfits = [], 0.0, [], []
+    for press, contact, observation in zip(presses.each, contacts, presses.observations(elasticity), strict=True):
+        if seek != "nothing":
+            contact = _better(observation, press.data, presses.nodes, contact, seek)
+        contact = _as_strong(observation, press.data, presses.nodes, contact)
+        found.append(contact)
+        probability += log_evidence(observation, press.data, presses.nodes, contact.support.ravel(), contact.prior)
+        total, deviation, misfit = _resultant(observation, press.data, presses.nodes, contact)
+        yields.append((total, deviation))
+        misfits.append(misfit)
+    modulus = _modulus(np.array(yields), np.array([press.force for press in presses.each]), young_modulus)
+    probability += modulus.log_probability
+    return Judged(elasticity, probability, tuple(found), modulus, np.array(yields)[:, 0], float(np.mean(misfits)))
+
+
+def _better(observation: Observation, data: FloatArray, nodes: Nodes, contact: Contact, seek: Seek) -> Contact:
+    """A contact that explains a press better."""
+    support, prior = contact
+    for _ in range(1 if seek == "support" else GEL_CALIBRATION.alternations):
+        if seek == "both":
+            prior = choose_prior(observation, data, nodes, support.ravel(), first=prior.smoothness)
+        before, support = support, better_support(observation, data, nodes, support, prior)
+        if (before == support).all():
+            break
+    return Contact(support, prior)
+
+
+def _as_strong(observation: Observation, data: FloatArray, nodes: Nodes, contact: Contact) -> Contact:
+    """With tractions as strong as the press is under this gel: how strong is no reason to prefer one."""
+    smoothness, support = contact.prior.smoothness, contact.support.ravel()
+    prior = choose_prior(observation, data, nodes, support, first=smoothness, strength_alone=True)
+    return Contact(contact.support, prior)
+
+
+def _resultant(
+    observation: Observation, data: FloatArray, nodes: Nodes, contact: Contact
+) -> tuple[float, float, float]:
+    """Normal resultant (N, by a modulus of 1 Pa), its standard deviation, and the mean square misfit."""
+    support = contact.support.ravel()
+    posterior = fit(observation, nodes, support, contact.prior)
+    traction = posterior.operator @ data
+    residual = (data - observation.response[:, :, support].reshape(len(data), -1) @ traction) / observation.noise
+    seen = max(int(np.isfinite(observation.noise).sum()), 1)
+    pressure = traction.reshape(3, -1)[2]
+    deviation = float(posterior.deviation(np.ones((1, len(pressure))))[2, 0])
+    total = float(pressure.sum())
+    own = RECONSTRUCTION.resultant_error * abs(total)
+    return nodes.area * total, nodes.area * float(np.hypot(deviation, own)), float(residual @ residual / seen)
+
+
+def _modulus(yields: FloatArray, force: FloatArray, known: float | None) -> Modulus:
+    """Young's modulus by the ratios of known forces to resultants [i, 2] with deviations; all by logarithms."""
+    of_forces = np.isfinite(force)
+    total, deviation = yields[of_forces].T
+    size = np.maximum(np.abs(total), np.finfo(float).tiny)
+    ratio = np.log(force[of_forces] / size)
+    variance = (deviation / size) ** 2 + RECONSTRUCTION.force_tolerance**2
+    weight = 1.0 / variance
+    if known is None:
+        logarithm, own = float(weight @ ratio / weight.sum()), float(weight.sum() ** -0.5)
+    else:
+        logarithm, own = float(np.log(known)), 0.0
+    probability = -0.5 * float(weight @ (ratio - logarithm) ** 2 + np.sum(np.log(variance)))
+    return Modulus(logarithm, own, probability + (float(np.log(own)) if known is None else 0.0))
