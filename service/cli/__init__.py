@@ -8,6 +8,7 @@ from typing import Annotated, NoReturn
 import typer
 
 from service.cli import (
+    accuracy,
     audit,
     benchmark,
     blobs,
@@ -59,6 +60,7 @@ for command in (
     running.worker,
     simulation.simulate,
     simulation.campaign,
+    accuracy.accuracy,
     local.detect,
     local.check,
     local.fit,

@@ -263,6 +263,9 @@ def test_upload_lookup_and_plan_go_through_a_real_service(run: Run, ramps: list[
     assert code == 0
     assert [item["status"] for item in json.loads(out)["uploads"]] == ["done"] * len(ramps)
 
+    code, out, _ = run("accuracy", "paper", "--url", url, "--json")
+    (models,) = json.loads(out)["subjects"]
+    assert (code, "--method hierarchical" in {each["ask"] for each in models["settings"]}) == (0, True)
     code, out, _ = run("lookup", "paper", "--quantile", 0.05, "--url", url, "--json")
     answer = json.loads(out)
     assert code == 0
@@ -753,3 +756,22 @@ def test_a_sensor_is_described_and_listed_from_the_command_line(run: Run, url: s
     (told,) = (each for each in every if each["name"] == "GelSight Mini")
     assert told["gel"] == {"young_modulus": 2.5e5, "poisson_ratio": 0.48, "thickness": 0.004, "marker_depth": 0.0}
     assert run("sensors", "describe", "GelSight Mini", *gel[:-1], "-1", "--url", url)[0] == SERVICE_REFUSED
+
+
+def test_accuracy_says_what_to_ask_for_of_logs(run: Run, ramps: list[Path], tmp_path: Path) -> None:
+    code, out, _ = run("accuracy", *ramps[:2], "--json", "--picture", tmp_path / "accuracy.png")
+    detection, fits = json.loads(out)["subjects"]
+    assert (code, detection["subject"], fits["subject"]) == (0, ramps[0].name, "friction of 2 grasp(s)")
+    assert any(each["worth_asking"] for each in detection["settings"])
+    assert (tmp_path / "accuracy.png").stat().st_size > 10_000
+    code, out, _ = run("accuracy", ramps[0])
+    assert (code, "ask for" in out, "--method hierarchical" in out) == (0, True, True)
+
+
+@pytest.mark.parametrize(
+    ("what", "code", "told"),
+    [("no/file.npz", WRONG_USAGE, "there is no file"), ("no_scene.toml", INPUT_REFUSED, "a TOML file, or one of")],
+)
+def test_accuracy_of_nothing_says_what_is_allowed(run: Run, what: str, code: int, told: str) -> None:
+    ended, _, error = run("accuracy", what)
+    assert (ended, told in " ".join(error.split())) == (code, True)

@@ -88,6 +88,20 @@ def simulate_to(
     return replace(found, seconds=time.perf_counter() - began)
 
 
+def refinements(plan: Plan, seconds: float, progress: Progress = unheard) -> Iterator[Refined]:
+    """Ever finer logs, as long as the next one fits into about ``seconds``; theirs are what a request for that accuracy
+    takes, those of all coarser ones among them.
+    """
+    if not 0.0 < seconds < np.inf:
+        raise InvalidInput("seconds", seconds, "finite and above 0")
+    began = time.perf_counter()
+    for found in _refinements(_sampled(plan), 0.0, _Forecast(began, seconds, progress)):
+        spent = time.perf_counter() - began
+        yield replace(found, seconds=spent)
+        if spent + _next_seconds(found, 0.0) > seconds:
+            return
+
+
 @dataclass(frozen=True, slots=True)
 class _Forecast:
     """Tells ``progress`` the part of the seconds since ``began`` and of those that are left, within a ``budget``."""

@@ -1,0 +1,121 @@
+"""The command that draws what accuracy costs: of a scene, of logs, or of a material of a service."""
+
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from service.cli.local import Mapping, Picture, mapping_text, refuse_inputs
+from service.cli.output import print_json, print_table
+from service.cli.progress import counted, patience
+from service.cli.remote import DEFAULT_URL, Key, Url, connected
+from service.formatting import number
+
+if TYPE_CHECKING:
+    from service.report.work_precision import Setting, WorkPrecision
+
+
+def accuracy(
+    what: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="SCENE|LOG...|MATERIAL",
+            help="A scene file (TOML) or a scene of the library; files of grasp logs of one material; or the name of a "
+            "material of a service.",
+        ),
+    ],
+    seconds: Annotated[float, typer.Option(help="To spend on the grids of a scene, about.")] = 20.0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of a scene's random fields and noise.")] = 0,
+    mapping: Mapping = None,
+    picture: Picture = None,
+    url: Url = DEFAULT_URL,
+    key: Key = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")] = False,
+) -> None:
+    """Draw what accuracy costs in seconds, and say what to ask for: simulating a scene, detecting slip, fitting."""
+    paths = [Path(each) for each in what]
+    if picture is not None:
+        for path in paths:
+            refuse_inputs(picture, path)
+    if len(paths) == 1 and _is_scene(what[0]):
+        found = [_of_scene(what[0], seconds, seed)]
+    elif all(path.exists() for path in paths):
+        found = _of_logs(paths, mapping)
+    elif len(paths) == 1 and len(paths[0].parts) == 1:
+        found = [_of_material(what[0], url, key)]
+    else:
+        missing = next(str(path) for path in paths if not path.exists())
+        raise typer.BadParameter(f"there is no file {missing}; allowed: a scene, grasp logs, or the name of a material")
+    _tell(found, picture, json)
+
+
+def _is_scene(text: str) -> bool:
+    from slipcore.contact import library
+
+    return text.endswith(".toml") or text in library()
+
+
+def _of_scene(name: str, seconds: float, seed: int) -> "WorkPrecision":
+    from service.report import work_precision
+    from slipcore.contact import Scene
+
+    scene = Scene.from_toml(name)
+    with patience(f"simulating {scene.name} ever more finely") as tell:
+        return work_precision.of_scene(scene, seconds, seed, tell)
+
+
+def _of_logs(paths: list[Path], mapping: Path | None) -> "list[WorkPrecision]":
+    """Of detection in the first log, and of a fit to all of them where they have slip enough."""
+    from estimators import TooFewSamples
+    from service import formats
+    from service.report import work_precision
+    from slipcore import InvalidInput, collect_samples, detect_slip
+
+    logs = [formats.read(path, mapping=mapping_text(mapping)) for path in paths]
+    with patience(f"detecting slip in {paths[0].name} by every method") as tell:
+        found = [work_precision.of_detection(logs[0], paths[0].name, tell)]
+    try:
+        grasps = [collect_samples(log, detect_slip(log)) for log in counted(logs, len(logs), "logs looked at")]
+        with patience("fitting by every method") as tell:
+            fits = work_precision.of_fits(grasps, f"friction of {len(logs)} grasp(s)", tell)
+    except (TooFewSamples, InvalidInput) as none:
+        typer.echo(f"no fit: {none}", err=True)
+        return found
+    return [*found, fits]
+
+
+def _of_material(name: str, url: str, key: str | None) -> "WorkPrecision":
+    from service.report import work_precision
+
+    with connected(url, key) as client:
+        methods = sorted(client.material(name).models)
+        return work_precision.of_models(name, [client.model(name, method) for method in methods])
+
+
+def _tell(found: "list[WorkPrecision]", picture: Path | None, json: bool) -> None:
+    if picture is not None:
+        from service.report import work_precision
+        from service.report.pictures import save
+
+        save(work_precision.draw(found), picture)
+    if json:
+        print_json({"subjects": [_record(each) for each in found]})
+        return
+    for each in found:
+        rows = [
+            ("*" if is_worth else "", setting.ask, number(setting.seconds), _error(setting), setting.told)
+            for setting, is_worth in zip(each.settings, each.worth_asking(), strict=True)
+        ]
+        print_table(f"{each.subject}; error: {each.measure}", ("worth it", "ask for", "seconds", "error", ""), rows)
+
+
+def _error(setting: "Setting") -> str:
+    return "–" if math.isnan(setting.error) else number(setting.error)
+
+
+def _record(found: "WorkPrecision") -> dict[str, Any]:
+    worth = found.worth_asking()
+    settings = [asdict(each) | {"worth_asking": is_worth} for each, is_worth in zip(found.settings, worth, strict=True)]
+    return {"subject": found.subject, "error": found.measure, "settings": settings}
