@@ -38,13 +38,17 @@ MOST_HEADERS = 100
 MOST_PARAMETERS = 100
 """In the query of an address; routes have ten at most."""
 
-HANDSHAKE_BYTES = 512
-"""Of a header of a WebSocket's handshake: what asks for it is parsed in Python, byte by byte."""
+OFFER_BYTES = 1024
+"""Of the headers by which another protocol is asked for: they are parsed in Python, some of them byte by byte."""
+
+REFUSAL_SECONDS = 0.5
+"""s until what cannot be is refused: it takes no turn (``fair_starts``), and who sends nothing else is slow so."""
 
 VERSIONS = frozenset({"1.0", "1.1"})
 BODY_HEADERS = frozenset({b"content-length", b"transfer-encoding"})
-HANDSHAKE = frozenset({b"connection", b"upgrade"})
+OFFER_HEADERS = frozenset({b"connection", b"upgrade", b"http2-settings"})
 
+Headers = list[tuple[bytes, bytes]]
 Refusal = tuple[ProblemType, str]
 """What a request is refused as, and why."""
 
@@ -81,6 +85,7 @@ class BoundedConnection(asyncio.Protocol):
     cycle: Any
     scope: Any
     app: Any
+    headers: Headers
     limit_concurrency: int | None
 
     def __init__(self, *given: Any, per_address: int | None = None, **options: Any) -> None:
@@ -92,6 +97,7 @@ class BoundedConnection(asyncio.Protocol):
         self._per_address = per_address
         self._is_beyond = False
         self._held, self._waits_for_turn = b"", False
+        self._is_refused = False
         self.idle_since = self.loop.time()
 
     @property
@@ -152,7 +158,7 @@ class BoundedConnection(asyncio.Protocol):
 
     def _may_parse(self) -> bool:
         """Whether no whole request waits for its answer."""
-        return self._is_open() and (self.is_idle or bool(self.cycle.more_body))
+        return self._is_open() and not self._is_refused and (self.is_idle or bool(self.cycle.more_body))
 
     def _parsed_at_once(self) -> int:
         """Bytes that the parser may be given: by itself it makes requests of all that it has."""
@@ -178,7 +184,13 @@ class BoundedConnection(asyncio.Protocol):
             self.flow.resume_reading()  # which a turn that ended within the handshake has paused
             super().handle_websocket_upgrade(*event)  # type: ignore[misc]  # of the server's protocol
         else:
-            self._end(*(refusal or (BAD_REQUEST, "a WebSocket is asked for before another answer is whole")))
+            self.refuse(*(refusal or (BAD_REQUEST, "a WebSocket is asked for before another answer is whole")))
+
+    def refuse(self, kind: ProblemType, detail: str) -> None:
+        """Answer and close in a while, and read nothing more."""
+        self._is_refused = True
+        self.flow.pause_reading()
+        self.loop.call_later(_seconds_until(kind), self._end, kind, detail)
 
     def on_response_complete(self) -> None:
         """Begin to be idle, or go on with what came behind the request."""
@@ -214,6 +226,8 @@ class BoundedConnection(asyncio.Protocol):
 
     def _end(self, kind: ProblemType, detail: str) -> None:
         """Close; say why where that cannot be taken for the answer to another request."""
+        if self.transport.is_closing():
+            return
         if self.is_idle or self._is_receiving():
             content = _problem(kind, detail)
             status = f"HTTP/1.1 {kind.status} {HTTPStatus(kind.status).phrase}".encode()
@@ -254,6 +268,7 @@ class BoundedConnection(asyncio.Protocol):
         if refusal is None:
             await self._served(scope, receive, send)
         else:
+            await asyncio.sleep(_seconds_until(refusal[0]))
             await _refuse(*refusal, scope, send)
 
     def _refusal(self, scope: Scope) -> Refusal | None:
@@ -263,8 +278,16 @@ class BoundedConnection(asyncio.Protocol):
             return TOO_MANY_CONNECTIONS, "as many connections are open as may be; try again later"
         if len(scope["headers"]) > MOST_HEADERS:
             return HEADERS_TOO_LARGE, f"{len(scope['headers'])} headers; allowed: at most {MOST_HEADERS}"
+        if (length := _length_of_offer(scope["headers"])) > OFFER_BYTES:
+            return HEADERS_TOO_LARGE, f"headers for another protocol of {length} bytes; allowed: at most {OFFER_BYTES}"
         fault = ambiguity(scope) or _excess(scope)
         return None if fault is None else (BAD_REQUEST, fault)
+
+    def _get_upgrade(self) -> Any:
+        """The protocol that is asked for; None where the headers for it are so long that the request is refused."""
+        if _length_of_offer(self.headers) > OFFER_BYTES:
+            return None
+        return super()._get_upgrade()  # type: ignore[misc]  # of the server's protocol
 
 
 def _has_unsent(connection: Any) -> bool:
@@ -317,16 +340,21 @@ def _excess(scope: Scope) -> str | None:
 
 
 def _fault_of_handshake(scope: Scope) -> Refusal | None:
-    """What RFC 6455, 4.1 forbids, or takes long to parse; the WebSocket's own protocol would wait for a body's end."""
+    """What RFC 6455, 4.1 forbids; the WebSocket's own protocol would wait for ever for the end of a body."""
     if scope["http_version"] != "1.1":
         return BAD_REQUEST, f"a WebSocket is asked for by HTTP {scope['http_version']}; allowed: 1.1"
-    for name, value in scope["headers"]:
-        if name in BODY_HEADERS:
-            return BAD_REQUEST, "a WebSocket is asked for with a body; allowed: none"
-        if len(value) > HANDSHAKE_BYTES and (name in HANDSHAKE or name.startswith(b"sec-websocket-")):
-            told = f"a header {name.decode('latin-1')} of {len(value)} bytes; allowed: at most {HANDSHAKE_BYTES}"
-            return HEADERS_TOO_LARGE, told
+    if any(name in BODY_HEADERS for name, _ in scope["headers"]):
+        return BAD_REQUEST, "a WebSocket is asked for with a body; allowed: none"
     return None
+
+
+def _length_of_offer(headers: Headers) -> int:
+    return sum(len(value) for name, value in headers if name in OFFER_HEADERS or name.startswith(b"sec-websocket-"))
+
+
+def _seconds_until(refusal: ProblemType) -> float:
+    """Who comes while there is no room makes room at once."""
+    return 0.0 if refusal is TOO_MANY_CONNECTIONS else REFUSAL_SECONDS
 
 
 async def _refuse(kind: ProblemType, detail: str, scope: Scope, send: Send) -> None:

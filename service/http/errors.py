@@ -203,10 +203,6 @@ async def _on_http_exception(request: Request, error: Exception) -> JSONResponse
 def _allowed_methods(request: Request) -> list[str]:
     """Methods that some route takes for this path: the framework names only those of the first route."""
     router: Router = request.app.router
-    scopes = {method: {**request.scope, "method": method} for method in ("DELETE", "GET", "PATCH", "POST", "PUT")}
-    taken = {
-        method
-        for method, scope in scopes.items()
-        if any(route.matches(scope)[0] is Match.FULL for route in router.routes)
-    }
+    here = [route for route in router.routes if route.matches(request.scope)[0] is not Match.NONE]
+    taken = {method for route in here for method in getattr(route, "methods", None) or ()}
     return sorted(taken | {"HEAD"} if "GET" in taken else taken)

@@ -70,6 +70,10 @@ class HttpToolsConnection(BoundedConnection, HttpToolsProtocol):
         """Whether the request under way offers one that is not spoken here, so that its parser left it."""
         return self.parser.should_upgrade() and self._get_upgrade() is not None and not self._should_upgrade()
 
+    def asks_for_websocket(self) -> bool:
+        """Whether the request under way ends HTTP on this connection."""
+        return self._should_upgrade()
+
     def head_without_offer(self) -> bytes:
         """The request line and headers as they were sent, without the offer."""
         line = b" ".join([self.parser.get_method(), self.url, b"HTTP/" + self.parser.get_http_version().encode()])
@@ -96,8 +100,10 @@ class _PassingParser:
                 self._parser.feed_data(data)
                 return
             except httptools.HttpParserUpgrade as left:
-                if not self._connection.offers_another_protocol():
+                if self._connection.asks_for_websocket():
                     raise
+                if not self._connection.offers_another_protocol():
+                    return  # it is refused
                 head, behind = self._connection.head_without_offer(), data[left.args[0] :]
             self._begin()
             data = head + behind  # where the next request may make the same offer

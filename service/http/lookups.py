@@ -19,7 +19,6 @@ from service.domain.model_cache import KnownModel
 from service.http.authentication import Authenticator
 from service.http.conditional import is_one_of, unchanged, whole
 from service.http.request_middleware import (
-    MOST_HEADER_BYTES,
     Headers,
     id_header,
     request_id_of,
@@ -33,6 +32,9 @@ from service.observability.access_log import AccessLog
 MOST_RESPONSES = 10_000
 """Answers kept of all models together, 3 kB each: planners ask the same again and again. When there are more, all are
 made anew."""
+
+LONGEST_HEADERS = 4096
+"""Bytes; who sends more waits for a turn, as for all else: reading them takes longer than the look-up."""
 
 LONGEST_QUERY = 200
 """Bytes; what is longer is no question that many ask, and is not remembered."""
@@ -90,7 +92,7 @@ class Lookups:
     async def _answer(self, scope: Scope) -> CachedResponse | None:
         found = _PATH.fullmatch(scope["path"])
         asked = _read(scope["query_string"]) if found and len(scope["query_string"]) <= LONGEST_QUERY else None
-        if found is None or asked is None or size_of_headers(scope) > MOST_HEADER_BYTES:
+        if found is None or asked is None or size_of_headers(scope) > LONGEST_HEADERS:
             return None
         connection, (method, question) = HTTPConnection(scope), asked
         known = await self._model(connection, found[1], method)

@@ -1,6 +1,7 @@
 """Connections of somebody who means harm, to a whole server."""
 
 import json
+import re
 import socket
 import time
 from collections import Counter
@@ -11,7 +12,7 @@ import httpx
 import pytest
 
 from service import serving as server
-from service.http import turns
+from service.http import connections, turns
 from service.http.connections import BoundedConnection, H11Connection
 from service.http.httptools_connections import HttpToolsConnection
 from service.http.request_middleware import MOST_HEADER_BYTES
@@ -33,6 +34,7 @@ def address(
     settings = Settings(data_folder=folder, workers=0, max_connections_per_address=MOST_OF_ONE, max_connections=100)
     with pytest.MonkeyPatch.context() as patch, ExitStack() as stack:
         patch.setattr(server, "parsed_connection", lambda: protocol)
+        patch.setattr(connections, "REFUSAL_SECONDS", 0.0)
         client = stack.enter_context(serving(settings))
         yield client.base_url.host, int(client.base_url.port or 0)
 
@@ -104,7 +106,7 @@ def test_what_does_not_end_is_not_kept(address: Address, endless: tuple[bytes, .
 
 
 LOCAL = b"Host: localhost\r\nConnection: close\r\n"
-MANY_OPTIONS = b"Connection: Upgrade" + 300 * b",a" + b"\r\n"
+MANY_OPTIONS = b"Connection: Upgrade" + 600 * b",a" + b"\r\n"
 TO_WEBSOCKET = b"Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n"
 
 
@@ -119,7 +121,7 @@ TO_WEBSOCKET = b"Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocke
         ),
         (
             b"GET /v1/stream HTTP/1.1\r\nHost: a\r\n" + MANY_OPTIONS + TO_WEBSOCKET,
-            "a header connection of 607 bytes; allowed: at most 512",
+            "headers for another protocol of 1242 bytes; allowed: at most 1024",
         ),
     ],
     ids=["headers", "parameters", "parameters of a websocket", "handshake"],
@@ -132,10 +134,26 @@ def test_what_takes_long_to_read_is_refused_before_it_is_known_who_sends_it(
     assert told_of in json.loads(body)["detail"]
 
 
-def test_an_offer_of_another_protocol_grows_no_more_headers_than_were_sent(address: Address) -> None:
-    """Read once more without the offer, its options were a header each: 15 kB became 82 kB."""
+def test_a_long_offer_of_another_protocol_is_not_read_twice(address: Address) -> None:
+    """Read once more without the offer, each of its options was a header: 15 kB became 82 kB."""
     sent = b"GET /healthz HTTP/1.1\r\nHost: a\r\n" + MANY_OPTIONS + b"Upgrade: h2c\r\n\r\n"
-    assert told(address, sent + NEXT).count(b"HTTP/1.1 200") == 2
+    answer = told(address, sent + NEXT)
+    by_parser = [b"HTTP/1.1 431"], 2 * [b"HTTP/1.1 200"]  # h11 has nothing to read twice
+    assert re.findall(rb"HTTP/1\.1 \d+", answer) in by_parser
+
+
+def test_what_cannot_be_is_refused_late_and_other_requests_at_once(
+    address: Address, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Refusals take no turns: a hundred connections that sent nothing else kept all others waiting."""
+    monkeypatch.setattr(connections, "REFUSAL_SECONDS", 0.4)
+    for sent, status in (
+        (b"GET /healthz HTTP/1.1\r\n" + LOCAL + b"a: b\r\n" * 99, b"431"),
+        (b"GET /v1/stream HTTP/1.1\r\nHost: a\r\n" + MANY_OPTIONS + TO_WEBSOCKET, b"431"),
+    ):
+        began = time.monotonic()
+        assert told(address, sent + b"\r\n").split()[1] == status
+        assert time.monotonic() - began >= 0.4
 
 
 OFFERS = (
