@@ -333,7 +333,7 @@ def hops(graph: Mapping[str, Collection[str]], start: str, end: str) -> int:
     [
         ("http.routes.grasp_logs.create_grasp_log", "db.repositories.grasp_logs.add"),
         ("web.routes.uploads.receive_upload", "db.repositories.grasp_logs.add"),
-        ("http.routes.materials.create_fit", "db.repositories.materials.find_id"),
+        ("http.routes.materials.create_fit", "db.repositories.materials.hold"),
         ("http.routes.materials.read_friction", "service.domain.look_up.look_up"),
         ("http.routes.planning.recognise_material", "estimators.recognise"),
         ("http.routes.stream.live_stream", "service.stream.detectors.step"),

@@ -176,8 +176,8 @@ def _changeable(session: Session, material: str, principal: Principal) -> int:
 
 
 def _material_to_change(session: Session, log_id: str, principal: Principal) -> int | None:
-    """The key of a log's material, if it has one; a log without material is for admins to change."""
-    material_id = grasp_logs.material_id(session, log_id)
+    """The key of a log's material, if it has one, held; a log without material is for admins to change."""
+    material_id = materials.hold_of_log(session, log_id)
     if material_id is not None:
         check_may_change(session, material_id, principal)
     elif not principal.is_admin:

@@ -18,9 +18,9 @@ def request_fit(
 
     Raises ``NotFound``, ``NotOwner`` and ``QuotaExceeded``.
     """
-    material_id = materials.find_id(session, material)
-    check_may_add(session, material_id, principal)
     quotas.lock(session, settings, principal.key_id)
+    material_id = materials.hold(session, material)
+    check_may_add(session, material_id, principal)
     quotas.check_job(session, settings, principal.key_id)
     job_id = queue(session, "fit", method, material_id=material_id, seed=seed, requested_by=principal.key_id)
     audit.add(session, principal.actor, "fit.requested", material, {"job": job_id, "method": method, "seed": seed})

@@ -168,21 +168,20 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         detection = replace(detection, calibration=correction.version, corrections=correction.changed)
         summary = summarise_samples(samples, none_because, run.blobs.put(encode_samples(samples)))
     with run.database.write() as session:
+        material_id = materials.hold_of_log(session, log_id)
         jobs.start_stage(session, run.claim, "samples", run.seconds)  # nobody else has stored them meanwhile
         detections.add(session, log_id, detection, summary)
-        _mark_outdated(session, log_id, summary)
+        if material_id is not None:
+            _mark_outdated(session, log_id, material_id, summary)
     return summary
 
 
-def _mark_outdated(session: Session, log_id: str, samples: SampleSummary) -> None:
+def _mark_outdated(session: Session, log_id: str, material_id: int, samples: SampleSummary) -> None:
     """Say that the material's models by other methods than an upload's job fits by lack these samples.
 
     They do not where the log was withdrawn meanwhile; who withdraws it now waits for the rows that refer to it.
     """
-    if samples.none_because is not None or grasp_logs.get(session, log_id).withdrawal is not None:
-        return
-    material_id = grasp_logs.material_id(session, log_id)
-    if material_id is not None:
+    if samples.none_because is None and grasp_logs.get(session, log_id).withdrawal is None:
         friction_models.mark_outdated(session, material_id, besides=FITTED_AT_INGEST)
 
 

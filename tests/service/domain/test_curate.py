@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sqlalchemy import select
 
 import slipcore
 from db.blobs import BlobStore
@@ -13,7 +14,8 @@ from db.database import Database
 from db.errors import NotFound
 from db.paging import Window
 from db.records import AuditFilter, Claim, Job, NewGraspLog
-from db.repositories import audit, grasp_logs, jobs, materials, runners
+from db.repositories import audit, detections, grasp_logs, jobs, materials, runners
+from db.tables import MaterialRow
 from service.domain import curate
 from service.domain.context import Context
 from service.domain.errors import DomainError, InvalidValue, NoModel
@@ -335,6 +337,57 @@ def test_two_merges_against_each_other_leave_one_material(shop: Shop) -> None:
         (left,) = materials.list_all(session)
     assert left.grasp_logs == 2
     assert materials_of(shop) == {left.id}
+
+
+def ingest_the_next(shop: Shop, _log_id: str) -> None:
+    claim = shop.claim()
+    assert claim is not None
+    pipeline.run_job(shop.database, shop.blobs, claim)
+
+
+def withdraw_it(shop: Shop, log_id: str) -> None:
+    curate.withdraw(shop.context, log_id, "wet")
+
+
+def restore_it(shop: Shop, log_id: str) -> None:
+    curate.restore(shop.context, log_id)
+
+
+@pytest.mark.parametrize("change", [withdraw_it, restore_it, ingest_the_next])
+def test_who_changes_a_log_waits_for_a_merge_with_nothing_locked(
+    shop: Shop, change: Callable[[Shop, str], None]
+) -> None:
+    shop.ingest("a", 0)
+    log_id = shop.ingest("b", 1)
+    if change is restore_it:
+        curate.withdraw(shop.context, log_id, "wet")
+        shop.work()
+    if change is ingest_the_next:
+        shop.store("b", 2)
+    ends: list[BaseException | None] = []
+
+    def to_its_end() -> None:
+        try:
+            change(shop, log_id)
+        except Exception as failed:
+            ends.append(failed)
+        else:
+            ends.append(None)
+
+    thread = Thread(target=to_its_end)
+    with shop.database.write() as session:
+        target, source = (materials.find_id(session, name) for name in ("a", "b"))
+        session.execute(select(MaterialRow.id).where(MaterialRow.id.in_((target, source))).with_for_update())
+        thread.start()
+        thread.join(timeout=0.3)  # it is at the material now, which is ours
+        assert thread.is_alive()
+        materials.merge(session, target, source)
+    thread.join()
+    assert ends == [None]
+    shop.work()
+    counted = 1 if change is withdraw_it else 3 if change is ingest_the_next else 2
+    with shop.database.read() as session:
+        assert len(detections.samples_of_material(session, target)) == counted
 
 
 def materials_of(shop: Shop) -> set[int]:
