@@ -102,7 +102,9 @@ def _refuse_foreign(database: Database) -> None:
         raise SchemaMismatch(f"{database} has {found}; allowed: a file of its own")
 
 
+@cache
 def _scripts() -> ScriptDirectory:
+    """The migrations of this version of the code, each of which is a file to load."""
     return ScriptDirectory.from_config(_config())
 
 

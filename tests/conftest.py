@@ -23,6 +23,7 @@ from db import migrate
 from db.database import Database
 from db.records import Claim
 from db.repositories import jobs, runners
+from tests.migrations import Remembered
 
 hypothesis.settings.register_profile("suite", derandomize=True, deadline=None)  # the same cases in each run
 hypothesis.settings.load_profile("suite")
@@ -59,6 +60,26 @@ def template(postgresql: PostgreSQL) -> str:
     return postgresql.migrated()
 
 
+@pytest.fixture(scope="session", autouse=True)
+def migrations() -> Iterator[Remembered]:
+    """What the migrations make of an empty file, and how it compares with the tables of the code, once a process.
+
+    They run where a test asks for ``real_migrations``, on PostgreSQL, and in other processes.
+    """
+    with pytest.MonkeyPatch.context() as patched:
+        remembered = Remembered()
+        patched.setattr("db.migrate.command.upgrade", remembered.upgrade)
+        patched.setattr("db.migrate.compare_metadata", remembered.compare)
+        yield remembered
+
+
+@pytest.fixture
+def real_migrations(migrations: Remembered, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each migration in its turn."""
+    monkeypatch.setattr("db.migrate.command.upgrade", migrations.real_upgrade)
+    monkeypatch.setattr("db.migrate.compare_metadata", migrations.real_compare)
+
+
 @pytest.fixture(scope="session", params=["sqlite", "postgresql"])
 def engine_name(request: pytest.FixtureRequest) -> str:
     """Each database that the service runs on."""
@@ -68,7 +89,7 @@ def engine_name(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture(scope="session")
 def sqlite_template(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A file at the newest revision: a copy takes a millisecond, the migrations 150."""
+    """A file at the newest revision: a copy takes a millisecond, the migrations 250."""
     path = tmp_path_factory.mktemp("template") / "stiction.sqlite3"
     with closing(Database(f"sqlite:///{path}")) as database:
         migrate.upgrade(database)
@@ -166,12 +187,16 @@ class S3:
         return Response(page, media_type="application/xml")
 
 
-@pytest.fixture
-def s3(monkeypatch: pytest.MonkeyPatch) -> Iterator[S3]:
-    """An S3 on loopback whose one bucket is named ``grasps``; the environment leads there."""
-    server = S3()
-    route = Route("/grasps/{key:path}", server.answer, methods=["GET", "HEAD", "PUT", "POST", "DELETE"])
-    bucket = Route("/grasps", server.answer, methods=["GET", "POST"])
+@pytest.fixture(scope="session")
+def s3_server() -> Iterator[tuple[str, dict[str, S3]]]:
+    """The URL of one server for all tests, a tenth of a second to end, and the S3 that answers there now."""
+    serving: dict[str, S3] = {}
+
+    async def answer(request: Request) -> Response:
+        return await serving["now"].answer(request)
+
+    route = Route("/grasps/{key:path}", answer, methods=["GET", "HEAD", "PUT", "POST", "DELETE"])
+    bucket = Route("/grasps", answer, methods=["GET", "POST"])
     app = Starlette(routes=[route, bucket])
     config = uvicorn.Config(app, port=0, log_level="error", ws="none", lifespan="off")
     running = uvicorn.Server(config)
@@ -180,13 +205,20 @@ def s3(monkeypatch: pytest.MonkeyPatch) -> Iterator[S3]:
     while not running.started:
         assert thread.is_alive()
         time.sleep(0.005)
-    port = running.servers[0].sockets[0].getsockname()[1]
-    monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://127.0.0.1:{port}")
-    for name, value in {"ALLOW_HTTP": "true", "ACCESS_KEY_ID": "a", "SECRET_ACCESS_KEY": "b", "REGION": "x"}.items():
-        monkeypatch.setenv(f"AWS_{name}", value)
-    yield server
+    yield f"http://127.0.0.1:{running.servers[0].sockets[0].getsockname()[1]}", serving
     running.should_exit = True
     thread.join()
+
+
+@pytest.fixture
+def s3(s3_server: tuple[str, dict[str, S3]], monkeypatch: pytest.MonkeyPatch) -> S3:
+    """An S3 on loopback, empty, whose one bucket is named ``grasps``; the environment leads there."""
+    url, serving = s3_server
+    monkeypatch.setenv("AWS_ENDPOINT_URL", url)
+    for name, value in {"ALLOW_HTTP": "true", "ACCESS_KEY_ID": "a", "SECRET_ACCESS_KEY": "b", "REGION": "x"}.items():
+        monkeypatch.setenv(f"AWS_{name}", value)
+    serving["now"] = S3()
+    return serving["now"]
 
 
 @pytest.fixture

@@ -26,6 +26,12 @@ def database(new_url: Callable[..., str], tmp_path: Path) -> Iterator[Database]:
 
 
 @pytest.fixture
+def without_pauses(monkeypatch: pytest.MonkeyPatch) -> None:
+    """None between two looks at a file and its log: nobody else writes meanwhile, and a refusal takes 0.4 s of them."""
+    monkeypatch.setattr("db.sqlite_file.BETWEEN_LOOKS", 1e-5)
+
+
+@pytest.fixture
 def new_log() -> Callable[..., NewGraspLog]:
     numbers = itertools.count(1)
 

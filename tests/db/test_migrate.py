@@ -32,6 +32,7 @@ from db.repositories import (
 )
 from db.tables import Base, MaterialOwnerRow, now
 
+pytestmark = pytest.mark.usefixtures("real_migrations")
 ONLY_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
 REVISIONS = [entry.revision for entry in ScriptDirectory.from_config(migrate._config()).walk_revisions()][::-1]
 

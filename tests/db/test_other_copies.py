@@ -18,6 +18,7 @@ from db.migrate import upgrade
 from db.write_ahead_log import headers
 from tests.db.looks import header_of, look
 
+pytestmark = pytest.mark.usefixtures("without_pauses")
 NAME = "stiction.sqlite3"
 
 

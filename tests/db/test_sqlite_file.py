@@ -19,6 +19,8 @@ from db.sqlite_file import SIDE_FILES, SqliteFile
 from db.write_ahead_log import headers
 from tests.db.looks import header_of, look
 
+pytestmark = pytest.mark.usefixtures("without_pauses")
+
 
 @pytest.mark.parametrize("suffix", SIDE_FILES)
 def test_a_look_makes_no_file_in_place_of_one_that_is_gone(tmp_path: Path, suffix: str) -> None:
