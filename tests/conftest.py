@@ -1,5 +1,6 @@
 """A real PostgreSQL server, and a store like S3, for whoever asks for them."""
 
+import asyncio
 import gc
 import os
 import re
@@ -9,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 
 import hypothesis
 import pytest
@@ -71,6 +73,15 @@ def migrations() -> Iterator[Remembered]:
         patched.setattr("db.migrate.command.upgrade", remembered.upgrade)
         patched.setattr("db.migrate.compare_metadata", remembered.compare)
         yield remembered
+
+
+@pytest.fixture(scope="session", autouse=True)
+def prompt_servers() -> Iterator[None]:
+    """uvicorn looks ten times a second whether it shall end, and waits a tenth more then; the tests end hundreds."""
+    hurried = SimpleNamespace(**vars(asyncio) | {"sleep": lambda seconds: asyncio.sleep(seconds / 20.0)})
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("uvicorn.server.asyncio", hurried)
+        yield
 
 
 @pytest.fixture
