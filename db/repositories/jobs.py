@@ -10,8 +10,8 @@ from sqlalchemy.orm import Session
 from db.errors import ClaimLost, NotFound
 from db.paging import Window, windowed
 from db.records import Claim, Job, JobKind, JobStatus
-from db.repositories import turns
-from db.tables import JobRow, MaterialRow, now
+from db.repositories import friction_models, turns
+from db.tables import GraspLogRow, JobRow, MaterialRow, SampleSummaryRow, now
 
 
 def add(
@@ -167,7 +167,11 @@ def count_death(session: Session, claim: Claim) -> Job:
 
 
 def cancel(session: Session, job_id: str, reason: str) -> Job:
-    """End a job that has not ended yet: whoever is at it finds its claim lost. Raises ``NotFound``."""
+    """End a job that has not ended yet: whoever is at it finds its claim lost. Raises ``NotFound``.
+
+    Models of its material that lack its samples say so.
+    """
+    _outdate_models(session, job_id)
     changes = {"status": "cancelled", "reason": reason, "runner_id": None, "finished_at": now()}
     session.execute(update(JobRow).where(JobRow.id == job_id, JobRow.finished_at.is_(None)).values(**changes))
     return get(session, job_id)
@@ -184,8 +188,10 @@ def finish(
 ) -> None:
     """Close a job as done, failed or refused; a failed or refused one keeps the stage in which it ended.
 
-    Raises ``ClaimLost``.
+    Where it made no model, those of its material that lack its samples say so. Raises ``ClaimLost``.
     """
+    if status != "done":
+        _outdate_models(session, claim.job_id)
     changes: dict[str, object] = {"status": status, "reason": reason, "model_version": model_version}
     if status == "done":
         changes["stage"] = None
@@ -220,6 +226,15 @@ def record(row: JobRow, material: str | None) -> Job:
         created_at=row.created_at,
         finished_at=row.finished_at,
     )
+
+
+def _outdate_models(session: Session, job_id: str) -> None:
+    """Say of a material's models that samples are not in them which a job has stored, and will not fit."""
+    of_it = select(GraspLogRow.material_id).join(JobRow, JobRow.grasp_log_id == GraspLogRow.id)
+    counting = of_it.join(SampleSummaryRow).where(SampleSummaryRow.count > 0, GraspLogRow.withdrawn_at.is_(None))
+    material_id = session.scalar(counting.where(JobRow.id == job_id, JobRow.finished_at.is_(None)))
+    if material_id is not None:
+        friction_models.mark_outdated(session, material_id)
 
 
 def _change_claimed(session: Session, claim: Claim, **values: object) -> None:

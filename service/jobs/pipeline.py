@@ -288,6 +288,8 @@ def _store_models(run: Run, session: Session, material_id: int, models: Sequence
         # before the models, of which a job may have one a method
         jobs.start_stage(session, run.claim, "material", run.seconds)
         _note_change(run, session, material_id, models[0])
+        if run.job.kind == "ingest":  # what could not be fitted lacks the job's samples
+            friction_models.mark_outdated(session, material_id)
         versions = [friction_models.add(session, material_id, run.job.id, to_new_model(model)) for model in models]
         if run.job.kind == "ingest":
             queue_cheap_refits(session, material_id, run.job.requested_by)

@@ -1,4 +1,5 @@
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from types import ModuleType
 from typing import Any, cast
@@ -385,6 +386,55 @@ def test_what_one_method_cannot_fit_another_may(monkeypatch: pytest.MonkeyPatch)
     unfit = {"auto", "ols"}
     with pytest.raises(InvalidSamples, match="auto"):
         pipeline._all_that_fit(cast(Any, None), [], ScatterPrior())
+
+
+def refuse(_shop: Shop, _job_id: str) -> None:
+    raise InvalidSamples("samples", "such that nothing fits", "others")
+
+
+def cancel(shop: Shop, job_id: str) -> None:
+    with shop.database.write() as session:
+        jobs.cancel(session, job_id, "nobody wants it")
+
+
+@pytest.mark.parametrize(("end", "status"), [(refuse, "refused"), (cancel, "cancelled")])
+def test_models_say_so_that_lack_the_samples_of_a_job_that_made_none(
+    shop: Shop, content: bytes, end: Callable[[Shop, str], None], status: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shop.run(shop.ingest(content)[1])
+    assert {stored.outdated for stored in shop.material().models} == {False}
+    log_id, job_id = shop.ingest(content + b"\0")
+    fit = estimators.fit
+
+    def ended_meanwhile(*given: Any, **options: Any) -> estimators.FrictionModel:
+        end(shop, job_id)
+        return fit(*given, **options)
+
+    monkeypatch.setattr(estimators, "fit", ended_meanwhile)
+    with suppress(ClaimLost):
+        shop.run(job_id)
+    log = shop.log(log_id)
+    assert (log.job.status, log.samples is None) == (status, False)
+    assert {stored.outdated for stored in shop.material().models} == {True}
+
+
+def test_a_model_by_a_method_that_cannot_fit_all_samples_is_outdated(
+    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shop.run(shop.ingest(content)[1])
+    fit = estimators.fit
+
+    def fit_by(parts: Any, *, method: str, **options: Any) -> estimators.FrictionModel:
+        if method == "ols":
+            raise InvalidSamples(method, "such that it fits none", "others")
+        return fit(parts, method=method, **options)
+
+    monkeypatch.setattr(estimators, "fit", fit_by)
+    shop.run(shop.ingest(content + b"\0")[1])
+    assert {stored.model.method: stored.outdated for stored in shop.material().models} == {
+        "hierarchical": False,
+        "ols": True,
+    }
 
 
 def hierarchical_model(shop: Shop) -> StoredModel:
