@@ -13,6 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from sqlalchemy import URL, Table, func, insert, inspect, select, text, update
+from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session
 
 from db import identity, migrate
@@ -45,7 +46,7 @@ def backup(database: Database, blobs: BlobStore, folder: Path, report: Report) -
     """Copy everything into a folder, as of one moment of the database; blobs that are there already are kept.
 
     May run beside the service. Running jobs are copied as queued ones. Raises ``SchemaMismatch``, ``NotEmpty`` if the
-    folder has another backup, is getting one, or is among the blobs, ``NotFound`` for a file that is missing, and
+    folder has another backup, is getting one, or is the store's own, ``NotFound`` for a file that is missing, and
     ``StorageUnavailable`` on a full disk.
     """
     migrate.check(database)
@@ -101,13 +102,16 @@ def restore(
 
     Every blob must have the bytes that it is named for. A blob store of another database is only filled where it is
     ``taken_over_by`` somebody, as the audit trail then tells; that database is refused there from then on. Raises
-    ``NotEmpty`` for a database that has any rows, ``StoreMismatch``, ``SchemaMismatch``, ``NotFound`` for a blob that
-    is missing: all before anything is changed. ``BlobDamaged``, for a blob whose bytes have changed, leaves tables
-    without rows and the blobs before it, and the same restore can be begun again.
+    ``NotEmpty`` for a database that has any rows and for a backup whose blobs are the store's, ``StoreMismatch``,
+    ``SchemaMismatch``, ``NotFound`` for a blob that is missing: all before anything is changed. ``BlobDamaged``, for a
+    blob whose bytes have changed, and ``NotEmpty`` for a database that somebody else fills meanwhile, leave tables
+    without these rows and the blobs before it, and the same restore can be begun again.
     """
     file = folder / FILE
     if not file.is_file():
         raise FileNotFoundError(f"backup {file} is not there")
+    if blobs.has_within(folder):  # the only copy would be worked in from now on
+        raise NotEmpty(str(blobs), "a data folder other than the backup's")
     source = BlobStore(folder)
     with TemporaryDirectory() as own, closing(_opened(_copied(file, Path(own)))) as copy:
         migrate.check(copy)
@@ -151,26 +155,40 @@ def _opened(file: Path) -> Database:
 
 def _refuse_rows(database: Database) -> None:
     """Of any older schema, or of none; a file that is not there is not made."""
-    if database.is_missing:
-        return
-    with database.read() as session:
-        there = inspect(session.connection()).get_table_names()
-        for table in Base.metadata.sorted_tables:
-            if table.name in LEFT_OUT or table.name not in there:
-                continue
-            if count := session.scalar(select(func.count()).select_from(table)):
-                raise NotEmpty(f"table {table.name} ({count} rows)", "an empty database")
+    if not database.is_missing:
+        with database.read() as session:
+            _refuse_rows_in(session)
+
+
+def _refuse_rows_in(session: Session) -> None:
+    there = inspect(session.connection()).get_table_names()
+    for table in Base.metadata.sorted_tables:
+        if table.name in LEFT_OUT or table.name not in there:
+            continue
+        if count := session.scalar(select(func.count()).select_from(table)):
+            raise NotEmpty(f"table {table.name} ({count} rows)", "an empty database")
 
 
 def _copy_rows(source: Database, target: Database, report: Report, taken_over_by: Actor | None = None) -> None:
     copied: dict[str, int] = {}
-    with source.read() as reading, target.write() as writing:
+    with source.read() as reading, _alone_filling(target) as writing:
         for table in Base.metadata.sorted_tables:
             if table.name not in LEFT_OUT:
                 copied[table.name] = _copy_table(table, reading, writing)
                 report(table.name, copied[table.name])
         if taken_over_by is not None:  # behind the entries of the backup
             audit.add(writing, taken_over_by, "store.taken_over", stores.find_id(writing) or "", {"rows": copied})
+
+
+@contextmanager
+def _alone_filling(database: Database) -> Iterator[Session]:
+    """A transaction that fills an empty database; raises ``NotEmpty`` where another has done so since it was seen."""
+    try:
+        with database.write() as session:
+            _refuse_rows_in(session)
+            yield session
+    except IntegrityError as error:  # PostgreSQL has two writers at once, the rows of the first meet those of the other
+        raise NotEmpty("rows that somebody else has just stored", "an empty database") from error
 
 
 def _copy_table(table: Table, reading: Session, writing: Session) -> int:

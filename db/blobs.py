@@ -127,10 +127,10 @@ class BlobStore:
         return self._remote is not None
 
     def has_within(self, folder: Path) -> bool:
-        """Whether a folder is, or is to be, among the store's own files."""
-        place = folder.resolve()
-        own = (self._blobs, self._spool, self._set_aside)
-        return any(place.is_relative_to(part.resolve()) for part in own)
+        """Whether a folder is, or is to be, among the store's own files, or one whose blobs these are."""
+        own = [part.resolve() for part in (self._blobs, self._spool, self._set_aside)]
+        places = (folder.resolve(), (folder / self._blobs.name).resolve())
+        return any(place.is_relative_to(part) for part in own for place in places)
 
     def spool(self) -> Spool:
         """A new file to write to; use it in a ``with`` statement."""

@@ -108,7 +108,7 @@ def test_a_restored_database_goes_on_with_new_rows(
         assert jobs.claim(session, runners.add(session, "host:2")) is not None
 
 
-@pytest.mark.parametrize("part", ["blobs", "blobs/copy", "spool", "quarantine"])
+@pytest.mark.parametrize("part", ["", "blobs", "blobs/copy", "spool", "quarantine"])
 def test_a_backup_among_the_blobs_themselves_is_refused(
     filled: Database, blobs: BlobStore, tmp_path: Path, part: str
 ) -> None:
@@ -116,6 +116,19 @@ def test_a_backup_among_the_blobs_themselves_is_refused(
         backup(filled, blobs, tmp_path / "data" / part, nothing)
     assert not (tmp_path / "data" / "blobs" / "copy").exists()
     assert not [*(tmp_path / "data").rglob(FILE)]
+
+
+def test_a_backup_whose_blobs_are_the_services_own_is_refused_either_way(
+    filled: Database, blobs: BlobStore, other: Database, tmp_path: Path
+) -> None:
+    (tmp_path / "linked").mkdir()
+    (tmp_path / "linked" / "blobs").symlink_to(tmp_path / "data" / "blobs")
+    with pytest.raises(NotEmpty, match="a folder outside of it"):
+        backup(filled, blobs, tmp_path / "linked", nothing)
+    backup(filled, blobs, tmp_path / "copy", nothing)
+    with pytest.raises(NotEmpty, match="allowed: a data folder other than the backup's"):
+        restore(tmp_path / "copy", other, BlobStore(tmp_path / "copy"), nothing)
+    restore(tmp_path / "copy", other, BlobStore(tmp_path / "again"), nothing)
 
 
 def test_the_next_backup_copies_new_blobs_only(filled: Database, blobs: BlobStore, tmp_path: Path) -> None:
@@ -279,6 +292,21 @@ def test_only_an_empty_database_is_filled_and_only_from_a_backup(
         restore(tmp_path / "copy", filled, blobs, nothing)
     with pytest.raises(FileNotFoundError, match="nowhere"):
         restore(tmp_path / "nowhere", filled, blobs, nothing)
+
+
+@pytest.mark.parametrize(
+    ("unseen", "told"), [(["_refuse_rows"], "rows"), (["_refuse_rows", "_refuse_rows_in"], "just")]
+)
+def test_a_database_that_is_filled_meanwhile_stays_as_it_is(
+    filled: Database, blobs: BlobStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, unseen: list[str], told: str
+) -> None:
+    backup(filled, blobs, tmp_path / "copy", nothing)
+    before = rows(filled)
+    for look in unseen:  # as if it had come before the other's rows
+        monkeypatch.setattr(f"db.backup.{look}", lambda _database: None)
+    with pytest.raises(NotEmpty, match=told):
+        restore(tmp_path / "copy", filled, blobs, nothing)
+    assert rows(filled) == before
 
 
 def test_a_database_of_another_version_is_not_backed_up(
