@@ -23,6 +23,7 @@ from stiction_client import (
 )
 from stiction_client.controller import gains
 from stiction_client.controller.friction import KnownFriction, LearnedFriction, utilisation
+from stiction_client.controller.load import Load
 from tests.clients.point_contact import FRAME, Episode, PointContact, ramp, run
 
 Make = Callable[..., FrictionModel]
@@ -74,13 +75,80 @@ def test_what_sticks_and_is_sampled_as_slip_does_not_press_ever_harder(seed: int
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_known_object_is_held_with_the_planner_s_force(seed: int, make_model: Make) -> None:
+def test_a_known_object_that_tells_no_samples_is_held_with_the_planner_s_force(seed: int, make_model: Make) -> None:
     model = model_of(make_model, 0.45)
-    episode = run(PointContact(LIFT, seed=seed), GraspController.init(SETTINGS, model))
+    episode = run(PointContact(LIFT, sampled_below=0.0, seed=seed), GraspController.init(SETTINGS, model))
     asked = required_normal_force(model, 1.5, contacts=SETTINGS.contact).normal_force
     assert episode.modes() == ["hold"]
     assert episode.plant.slipped == 0.0
     assert episode.normal[-1] == pytest.approx(asked, rel=0.02)  # 10 mN of noise of the load of 1.5 N
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_samples_of_a_grasp_sharpen_what_a_model_knows_of_it(seed: int, make_model: Make) -> None:
+    """As if the grasp's friction were known nearly as well as after learning it, however the grasp differs."""
+    model = dataclasses.replace(model_of(make_model, 0.45), scale=0.04)
+    for friction in (0.42, 0.45, 0.48):
+        episode = run(PointContact(LIFT, friction=friction, seed=seed), GraspController.init(SETTINGS, model))
+        assert episode.modes() == ["hold"]
+        assert episode.plant.slipped == 0.0
+        assert 1.0 < episode.normal[-1] / episode.least < 1.2
+
+
+def test_the_sharpened_quantile_is_the_posterior_s(make_model: Make) -> None:
+    """Of 100,000 contacts and their samples, those whose samples tell the same."""
+    known = KnownFriction.of_model(model_of(make_model, 0.45), SETTINGS)
+    low, high = known.bounds(3.0)
+    mean, scatter = 0.5 * (low + high), 0.5 * (high - low) / known.deviations
+    learned = LearnedFriction((0.43,) * 3, (10,) * 3)
+    generator = np.random.default_rng(0)
+    contacts = mean + scatter * generator.standard_normal(100_000)
+    told = contacts + learned.error(SETTINGS) * 0.43 * generator.standard_normal(100_000)
+    alike = contacts[abs(told - 0.43) < 2e-3]
+    quantile = low * known.sharpen(learned, 3.0, SETTINGS).sharpened
+    assert quantile == pytest.approx(alike.mean() - known.deviations * alike.std(), rel=0.01)
+
+
+def test_what_disagrees_is_few_or_has_nothing_to_add_sharpens_nothing(make_model: Make) -> None:
+    known = KnownFriction.of_model(model_of(make_model, 0.45), SETTINGS)
+    for learned in (LearnedFriction((0.43,) * 2, (10,) * 2), LearnedFriction((0.3, 0.43, 0.6), (10,) * 3)):
+        assert known.sharpen(learned, 3.0, SETTINGS) is known
+    agreed = LearnedFriction((0.43,) * 3, (10,) * 3)
+    assert known.sharpen(agreed, 0.0, SETTINGS) is known
+    in_this_grasp = KnownFriction.learned(0.4, 0.45, SETTINGS.contact)
+    assert in_this_grasp.sharpen(agreed, 3.0, SETTINGS) is in_this_grasp
+    certain = KnownFriction.learned(0.45, 0.45, SETTINGS.contact)
+    certain = dataclasses.replace(certain, of_others=True)
+    assert certain.sharpen(agreed, 3.0, SETTINGS) is certain
+
+
+def test_slip_disproves_samples_that_told_of_more_friction(make_model: Make) -> None:
+    state = GraspController.init(SETTINGS, model_of(make_model, 0.45))
+    slipping = SlipSamples(np.full(10, 0.48), np.full(10, 0.05))
+    for frame in range(1, 60):
+        state, _ = GraspController.step(state, Observation(frame * FRAME, 5.0, 2.0, 0.0, 0.3, slipping))
+    assert state.known is not None
+    assert state.known.sharpened > 1.0
+    for frame in range(60, 62):  # of 0.48, the load would leave a sixth of the contact to spare
+        state, _ = GraspController.step(state, Observation(frame * FRAME, 5.0, 2.0, 0.0, 0.0))
+    assert state.known is not None
+    assert state.known.sharpened == 1.0
+    assert state.learned.values == ()
+
+
+@pytest.mark.parametrize("rate", [0.4, 0.8])
+def test_the_lead_follows_loads_that_grow_slowly(rate: float) -> None:
+    """Slower than the noise of the load lets tell within two frames."""
+    load, generator = Load(), np.random.default_rng(0)
+    leads = []
+    for frame in range(180):
+        size = 0.5 + rate * frame * FRAME
+        load = load.step(
+            Observation(frame * FRAME, 5.0, size + 0.02 * generator.standard_normal(), 0.0), FRAME, SETTINGS
+        )
+        leads.append(load.lead(SETTINGS) - size)
+    dead = SETTINGS.trend_floor * SETTINGS.lead_time
+    assert np.mean(leads[60:]) == pytest.approx(rate * SETTINGS.lead_time - dead, abs=0.01)
 
 
 @pytest.mark.parametrize("error", [-0.4, 0.4])

@@ -116,7 +116,7 @@ def _decide(state: ControllerState, observation: Observation) -> ControllerState
     if state.known is not None and _refuted(state, state.known, observation.normal):
         return _enter(replace(state, known=None, learned=LearnedFriction(), contradictions=0), "alarm")
     if state.known is not None:
-        return _enter(state, "hold")
+        return _enter(_sharpened(state, state.known, observation.normal), "hold")
     if (state.felt.slips(settings) and state.load.size > 0.0) or _blind(state):
         return _enter(replace(state, since=state.time), "alarm")
     if state.mode == "alarm" and state.time - state.since < settings.settle_time:
@@ -133,6 +133,13 @@ def _refuted(state: ControllerState, known: KnownFriction, normal: float) -> boo
     if state.contradictions >= state.settings.contradiction_frames:
         return True
     return normal > 0.0 and known.refuted(state.learned, state.load.size, normal, state.settings)
+
+
+def _sharpened(state: ControllerState, known: KnownFriction, normal: float) -> ControllerState:
+    """With what this grasp's samples add to a model; slip, where they told of more friction than it, disproves them."""
+    if state.felt.slips(state.settings) and state.load.size > 0.0 and known.sharpened > 1.0:
+        return replace(state, known=replace(known, sharpened=1.0), learned=LearnedFriction())
+    return replace(state, known=known.sharpen(state.learned, normal, state.settings))
 
 
 def _enter(state: ControllerState, mode: Mode) -> ControllerState:

@@ -1,7 +1,7 @@
 """What a grip controller knows of friction: a model, or what it learnt in this grasp."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import NormalDist, median
 
 from stiction_client.contacts import Contact
@@ -21,13 +21,16 @@ LEAST_CERTAIN = 0.3
 class KnownFriction:
     """A conservative ``quantile`` of a contact's friction over the normal force of its elements, ``unit``·F^(1/n) N.
 
-    ``deviations``: how many standard deviations it lies below the mean.
+    ``deviations``: how many standard deviations it lies below the mean; ``of_others``: whether other grasps told it, so
+    that samples of this one can sharpen it; ``sharpened``: the quantile of this grasp, by them, over that of any.
     """
 
     contact: Contact
     quantile: FrictionQuantile
     unit: float
     deviations: float = NORMAL_DEVIATIONS
+    of_others: bool = False
+    sharpened: float = 1.0
 
     @classmethod
     def of_model(cls, model: FrictionModel, settings: ControlSettings) -> "KnownFriction":
@@ -40,7 +43,7 @@ class KnownFriction:
         touching = 1.0 if model.scales is None else max(float(contact.elements(settings.least_force, area)), 1.0)
         quantile = FrictionQuantile.of(model, 0.0, settings.slip_probability, touching)
         deviations = -NormalDist().inv_cdf(min(settings.slip_probability, LEAST_CERTAIN))
-        return cls(contact, quantile, float(contact.element_force(1.0, area)), deviations)
+        return cls(contact, quantile, float(contact.element_force(1.0, area)), deviations, of_others=True)
 
     @classmethod
     def learned(cls, low: float, mean: float, contact: Contact) -> "KnownFriction":
@@ -50,7 +53,8 @@ class KnownFriction:
     def required(self, tangential: float, torque: float, most: float) -> float:
         """Least normal force, N, that holds the load; infinite where none up to ``most`` N does."""
         power = self.contact.power
-        loaded = LoadedContact(self.quantile, tangential, self._twist(torque), self.unit, power)
+        factor = self.sharpened
+        loaded = LoadedContact(self.quantile, tangential / factor, self._twist(torque) / factor, self.unit, power)
         least, _, holds = loaded.interval(loaded.root(most))
         return float(loaded.force(least)) if holds else math.inf
 
@@ -69,6 +73,22 @@ class KnownFriction:
         low, mean = self._low_and_mean(force)
         error = math.hypot((mean - low) / self.deviations, learned.error(settings) * mean)
         return mean - max(learned.mean, size / force) > settings.contradiction_deviations * error
+
+    def sharpen(self, learned: "LearnedFriction", force: float, settings: ControlSettings) -> "KnownFriction":
+        """The same with what the samples of this grasp tell under ``force`` N, once ``contradiction_frames`` agree.
+
+        The contact's friction is normal about the model's mean, with the model's scatter; the samples' mean is normal
+        about the contact's, with their error. The quantile becomes that of the contact's friction given the samples.
+        """
+        if not self.of_others or force == 0.0 or not learned.agrees(settings.contradiction_frames, settings):
+            return self
+        low, mean = self._low_and_mean(force)
+        if not 0.0 < low < mean:
+            return self
+        scatter, error = (mean - low) / self.deviations, learned.error(settings) * learned.mean
+        weight = scatter**2 / (scatter**2 + error**2)
+        posterior = mean + weight * (learned.mean - mean) - self.deviations * math.sqrt(weight) * error
+        return replace(self, sharpened=posterior / low) if posterior > 0.0 else self
 
     def _low_and_mean(self, force: float) -> tuple[float, float]:
         element = self.unit * (force if self.contact.power == 1 else force ** (1.0 / 3.0))
@@ -124,9 +144,13 @@ class LearnedFriction:
         squares = sum((value - self.mean) ** 2 * count for value, count in zip(self.values, self.counts, strict=True))
         return math.sqrt(squares / sum(self.counts)) / self.mean
 
+    def agrees(self, frames: int, settings: ControlSettings) -> bool:
+        """Whether there are so many ``frames`` of them, to within ``learn_spread``."""
+        return len(self.values) >= frames and self.mean > 0.0 and self.spread <= settings.learn_spread
+
     def known(self, settings: ControlSettings) -> KnownFriction | None:
         """A model of it, once ``learn_frames`` agree to within ``learn_spread``."""
-        if len(self.values) < settings.learn_frames or self.mean == 0.0 or self.spread > settings.learn_spread:
+        if not self.agrees(settings.learn_frames, settings):
             return None
         low = self.mean * (1.0 - NORMAL_DEVIATIONS * self.error(settings))
         return KnownFriction.learned(low, self.mean, settings.contact) if low > 0.0 else None

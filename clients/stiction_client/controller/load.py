@@ -10,30 +10,40 @@ from stiction_client.errors import InvalidArgument
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """``size`` N of tangential force and torque together, its ``rate`` N/s, and since when it is ``steady`` (s)."""
+    """``size`` N of tangential force and torque together, how fast it grows, and since when it is ``steady`` (s).
+
+    ``rate`` N/s: told soon, and noisy; ``trend`` N/s: the same, told later and more exactly.
+    """
 
     size: float = 0.0
     rate: float = 0.0
+    trend: float = 0.0
     steady: float = math.inf
 
     def step(self, observation: Observation, elapsed: float, settings: ControlSettings) -> "Load":
         """The load after a frame; over a gap its rate is not known, and taken as 0."""
         size = size_of(observation, settings)
         if not elapsed <= settings.dropout_time:
-            return Load(size, 0.0, observation.time)
-        share = elapsed / (elapsed + settings.rate_time)
-        rate = self.rate + share * ((size - self.size) / elapsed - self.rate)
-        moving = Load(size, rate)
+            return Load(size, steady=observation.time)
+        rate = _followed(self.rate, size - self.size, elapsed, settings.rate_time)
+        trend = _followed(self.trend, size - self.size, elapsed, settings.trend_time)
+        moving = Load(size, rate, trend)
         changes = abs(moving.lead(settings) - size) > settings.steady_share * size or size == 0.0
         return replace(moving, steady=math.inf if changes else min(self.steady, observation.time))
 
     def lead(self, settings: ControlSettings) -> float:
         """Size in ``lead_time``, N, if it grows; else as it is."""
-        return self.size + max(self.rate - settings.rate_floor, 0.0) * settings.lead_time
+        rate = max(self.rate - settings.rate_floor, self.trend - settings.trend_floor, 0.0)
+        return self.size + rate * settings.lead_time
 
     def growth(self, settings: ControlSettings) -> float:
         """Factor by which the load will have grown in ``lead_time``."""
         return self.lead(settings) / self.size if self.size > 0.0 else 1.0
+
+
+def _followed(rate: float, change: float, elapsed: float, time: float) -> float:
+    """A rate after a ``change`` of the load, filtered over ``time`` s."""
+    return rate + (change - rate * elapsed) / (elapsed + time)
 
 
 def size_of(observation: Observation, settings: ControlSettings) -> float:

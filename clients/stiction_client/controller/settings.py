@@ -40,6 +40,8 @@ class ControlSettings:
     ] = 0.1
     rate_time: Annotated[float, Gain(0.0, 1.0, "s", "two frames at 60 frames/s; the gripper's lag")] = 0.03
     rate_floor: Annotated[float, Gain(0.0, 1e3, "N/s", "0.02 N of noise at 60 frames/s, filtered so")] = 0.8
+    trend_time: Annotated[float, Gain(0.0, 10.0, "s", "of a slow load: a quarter of the noise of `rate_time`")] = 0.15
+    trend_floor: Annotated[float, Gain(0.0, 1e3, "N/s", "0.02 N of noise at 60 frames/s, filtered so")] = 0.2
     feel_stick_ratio: Annotated[float, Gain(0.05, 0.95, "-", "0.6 of what the contact can hold (Cattaneo-Mindlin)")] = (
         0.55
     )
