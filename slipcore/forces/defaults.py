@@ -157,6 +157,31 @@ class ReconstructionDefaults(Options):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ForceStreamDefaults(Options):
+    """Frames as they come (``stream.py``)."""
+
+    frames: Annotated[int, Option(3, 1000, "frames", "half a second at 30 frames a second")] = 15
+    """First ones, which tell the noise of markers and have no forces; as many latest ones tell it again later."""
+    least_noise: Annotated[float, Option(0.0, 1e-3, "m", "finer than cameras resolve")] = 1e-8
+    """Of a marker's coordinate, where none shows: a sensor that rounds, or a simulated one."""
+    stride: Annotated[int, Option(1, 1000, "frames", "a look takes 50 ms of CPU: 25 ms a frame")] = 2
+    """From one look for the contact to the next, at least, where depth is seen."""
+    stride_in_plane: Annotated[int, Option(1, 1000, "frames", "a look takes 150 to 220 ms of CPU: 28 ms a frame")] = 8
+    """The same where it is not."""
+    growth: Annotated[float, Option(1.0, 100.0, "-", "trials")] = 1.5
+    """Of the displacement, since contact and prior were sought from the beginning, after which they are again, where
+    depth is seen."""
+    growth_in_plane: Annotated[float, Option(1.0, 100.0, "-", "a beginning takes over 1 s of CPU")] = 3.0
+    """The same where it is not."""
+    typical: Annotated[float, Option(1.0, 1e6, "-", "a press of some N on a gel of 1 MPa, 1 µm")] = 30.0
+    """Displacement over noise that is expected before anything touches."""
+    lattice_growth: Annotated[float, Option(1.0, 1e6, "-", "its prior is then half as wide as else")] = 10.0
+    """Of the displacement, over that which the whole lattice's operator was made for, after which it is made anew."""
+    noise_change: Annotated[float, Option(1.0, 1e6, "-", "estimates from 15 frames scatter by far less")] = 2.0
+    """Of the noise, up or down, after which it is made anew."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class GelCalibrationDefaults(Options):
     """A gel from presses with known forces (``gel_calibration.py``)."""
 
@@ -232,7 +257,8 @@ SUPPORT = SupportDefaults()
 FIT = FitDefaults()
 LATTICE = LatticeDefaults()
 RECONSTRUCTION = ReconstructionDefaults()
+FORCE_STREAM = ForceStreamDefaults()
 GEL_CALIBRATION = GelCalibrationDefaults()
 
-TABLES = (NODES, RESPONSE, PRIOR, STRENGTH, SUPPORT, FIT, LATTICE, RECONSTRUCTION, GEL_CALIBRATION)
+TABLES = (NODES, RESPONSE, PRIOR, STRENGTH, SUPPORT, FIT, LATTICE, RECONSTRUCTION, FORCE_STREAM, GEL_CALIBRATION)
 """All tables of forces from displacement."""

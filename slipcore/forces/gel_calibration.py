@@ -18,7 +18,7 @@ from slipcore.forces.defaults import GEL, GEL_CALIBRATION
 from slipcore.forces.gel import Gel
 from slipcore.forces.gel_likelihood import Elasticity, Judged, Press, Presses, Seek, first_contacts, judge
 from slipcore.forces.nodes import Nodes
-from slipcore.forces.recording import Recording
+from slipcore.forces.recording import Recording, error
 from slipcore.frames import FloatArray, GraspLog
 
 GIVEN, PRIORS = "given", "the prior's: the presses hardly tell it"
@@ -154,8 +154,8 @@ def _held(recording: Recording, force: float, used: int) -> Press:
     allowed = GEL_CALIBRATION.held**2 * (most @ most) + 2.0 * used * recording.noise**2
     frames = touched & (change <= allowed) & (seen == seen[strongest]).all(axis=1)
     mean = data[frames].mean(axis=0)
-    error = recording.error(mean, seen[strongest], recording.noise / math.sqrt(frames.sum()))
-    return Press(mean, error, force)
+    spread = error(mean, seen[strongest], recording.noise / math.sqrt(frames.sum()))
+    return Press(mean, spread, force)
 
 
 @dataclass(slots=True, eq=False)

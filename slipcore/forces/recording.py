@@ -27,33 +27,56 @@ class Recording:
         """
         if not log.is_scaled:
             raise UnknownScale("forces follow from displacement in m, and the log's scale is unknown")
-        axes = (0, 1, 2) if log.displacement[..., 2].any() else (0, 1)
-        inwards = np.moveaxis(log.displacement * [1.0, 1.0, -1.0], -1, 1)[:, list(axes)]
-        shown = np.ones(inwards.shape, bool) if log.observed is None else log.observed[:, None] & (inwards == inwards)
-        return cls(inwards.reshape(len(log), -1), shown.reshape(len(log), -1), axes, _noise(log, noise))
+        axes = axes_seen(log.displacement)
+        data, seen = rows(log.displacement, log.observed, axes)
+        if noise is None:
+            return cls(data, seen, axes, noise_of(log.time, log.displacement))
+        check_noise(noise)
+        return cls(data, seen, axes, noise)
 
     def touched(self) -> BoolArray:
         """Frames [t] in which markers moved by more than noise."""
-        count = np.maximum(self.seen.sum(axis=1), 1)
-        power = np.sum(np.where(self.seen, self.data, 0.0) ** 2, axis=1) / count
-        return np.asarray(power > self.noise**2 * (1.0 + RECONSTRUCTION.significant * np.sqrt(2.0 / count)))
+        return moved(self.data, self.seen, self.noise)
 
     def strongest(self) -> int:
         """The frame in which something touches and markers moved most."""
         return int(np.argmax(np.where(self.touched(), np.sum(self.data**2, axis=1), 0.0)))
 
-    def error(self, data: FloatArray, seen: BoolArray, noise: float) -> FloatArray:
-        """Standard deviation [m] of one frame's data about what bilinear tractions can explain; infinite unseen."""
-        largest = np.abs(data[seen]).max(initial=0.0)
-        return np.where(seen, np.hypot(noise, RECONSTRUCTION.discretisation * largest), np.inf)
+
+def axes_seen(displacement: FloatArray) -> tuple[int, ...]:
+    """Along which displacements [..., 3] tell something: markers whose z never changes are seen in the plane only."""
+    return (0, 1, 2) if displacement[..., 2].any() else (0, 1)
 
 
-def _noise(log: GraspLog, noise: float | None) -> float:
-    if noise is None:
-        from slipcore.noise import estimate_noise  # compiled
+def rows(displacement: FloatArray, observed: BoolArray | None, axes: tuple[int, ...]) -> tuple[FloatArray, BoolArray]:
+    """Data [t, m] m of displacements [t, n, m, 3] along some axes, z into the gel, and which of them were seen."""
+    inwards = np.moveaxis(displacement * [1.0, 1.0, -1.0], -1, 1)[:, list(axes)]
+    seen = np.ones(inwards.shape, bool) if observed is None else observed[:, None] & (inwards == inwards)
+    return inwards.reshape(len(inwards), -1), seen.reshape(len(inwards), -1)
 
-        plane = log.displacement[..., :2].reshape(len(log), -1, 2).swapaxes(1, 2)
-        return float(np.nan_to_num(estimate_noise(log.time, plane)))
+
+def moved(data: FloatArray, seen: BoolArray, noise: float) -> BoolArray:
+    """Frames [...] of data [..., m] in which markers moved by more than noise."""
+    count = np.maximum(seen.sum(axis=-1), 1)
+    power = np.sum(np.where(seen, data, 0.0) ** 2, axis=-1) / count
+    return np.asarray(power > noise**2 * (1.0 + RECONSTRUCTION.significant * np.sqrt(2.0 / count)))
+
+
+def error(data: FloatArray, seen: BoolArray, noise: float) -> FloatArray:
+    """Standard deviation [m] of one frame's data about what bilinear tractions can explain; infinite unseen."""
+    largest = np.abs(data[seen]).max(initial=0.0)
+    return np.where(seen, np.hypot(noise, RECONSTRUCTION.discretisation * largest), np.inf)
+
+
+def check_noise(noise: float) -> None:
+    """Raises ``InvalidInput`` for what is none."""
     if not 0.0 <= noise < np.inf:
         raise InvalidInput("noise", noise, "0 m or more, finite")
-    return noise
+
+
+def noise_of(time: FloatArray, displacement: FloatArray) -> float:
+    """Noise (m) of a marker's coordinate in the plane, by displacements [t, n, m, 3] m; 0 where none shows."""
+    from slipcore.noise import estimate_noise  # compiled
+
+    plane = displacement[..., :2].reshape(len(time), -1, 2).swapaxes(1, 2)
+    return float(np.nan_to_num(estimate_noise(time, plane)))

@@ -160,7 +160,7 @@ def test_noise_alone_is_no_reason_to_seek_the_contact_again(pressed: Pressed, mo
         sought.append(1)
         return better_support(*arguments)
 
-    monkeypatch.setattr("slipcore.forces.reconstruction.better_support", counted)
+    monkeypatch.setattr("slipcore.forces.tracking.better_support", counted)
     reconstruct(pressed([0] * 4, noise=3e-6, axes=2, crop=MIDDLE), GEL, noise=3e-6)
     assert len(sought) == 1
 

@@ -1,0 +1,111 @@
+"""Looks for the contact of a stream's frames: what is known, and what is to be found out next."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from slipcore.forces.defaults import FORCE_STREAM
+from slipcore.forces.fit import Observation
+from slipcore.forces.frame_forces import Reader
+from slipcore.forces.nodes import Nodes
+from slipcore.forces.recording import error
+from slipcore.forces.sensor import Sensor
+from slipcore.forces.tracking import Tracker, lattice_of
+from slipcore.forces.whole_lattice import WholeLattice
+from slipcore.frames import BoolArray, FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shown:
+    """What markers show at one ``time`` s: ``data`` [m] m, which of them were ``seen`` [m], and their ``noise`` m."""
+
+    time: float
+    data: FloatArray
+    seen: BoolArray
+    noise: float
+
+    @property
+    def size(self) -> float:
+        """Root mean square of the displacements, m."""
+        return float(np.sqrt(np.mean(self.data**2)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prepared:
+    """The operator by which pressed nodes are found where depth is seen, for this ``noise`` m and ``typical`` m."""
+
+    lattice: WholeLattice
+    noise: float
+    typical: float
+
+    @classmethod
+    def of(cls, sensor: Sensor, noise: float, typical: float) -> "Prepared":
+        """For displacements that are as large as this, or as is expected."""
+        typical = max(typical, FORCE_STREAM.typical * noise)
+        return cls(lattice_of(sensor, noise, typical), noise, typical)
+
+    def fits(self, frame: Shown) -> bool:
+        """Whether it still does for a frame."""
+        change = max(frame.noise / self.noise, self.noise / frame.noise)
+        return change <= FORCE_STREAM.noise_change and frame.size <= FORCE_STREAM.lattice_growth * self.typical
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Insight:
+    """What is known of a ``sensor``, and while something touches, of its contact: ``reader`` of forces by the frame at
+    ``time`` s, and the ``size`` m of displacements by which the ``tracker`` began.
+    """
+
+    sensor: Sensor
+    prepared: Prepared | None = None
+    tracker: Tracker | None = None
+    reader: Reader | None = None
+    time: float = 0.0
+    size: float = 0.0
+
+    def untouched(self) -> "Insight":
+        """Of the sensor alone."""
+        return Insight(self.sensor, self.prepared)
+
+    def next_look(self, frame: Shown, touched: bool) -> "Callable[[], Insight] | None":
+        """What is to be found out next, if anything; it takes its time, and changes nothing that is there."""
+        if self.sensor.sees_depth and (self.prepared is None or not self.prepared.fits(frame)):
+            return partial(self._prepare, frame)
+        if not touched:
+            return None
+        in_plane = not self.sensor.sees_depth
+        growth = FORCE_STREAM.growth_in_plane if in_plane else FORCE_STREAM.growth
+        if self.tracker is None or frame.size > growth * self.size:
+            return partial(self._begin, frame)
+        holds = self.tracker.key.holds(self._observation(frame), frame.data)
+        return None if holds else partial(self._follow, self.tracker, frame)
+
+    def _observation(self, frame: Shown) -> Observation:
+        return Observation(self.sensor.response, error(frame.data, frame.seen, frame.noise))
+
+    def _prepare(self, frame: Shown) -> "Insight":
+        return replace(self, prepared=Prepared.of(self.sensor, frame.noise, frame.size))
+
+    def _begin(self, frame: Shown) -> "Insight":
+        lattice = None if self.prepared is None else self.prepared.lattice
+        tracker = Tracker.of(self.sensor, self._observation(frame), frame.data, "evidence", lattice)
+        return replace(self._by(tracker, frame), size=frame.size)
+
+    def _follow(self, tracker: Tracker, frame: Shown) -> "Insight":
+        return self._by(tracker.at(self._observation(frame), frame.data), frame)
+
+    def _by(self, tracker: Tracker, frame: Shown) -> "Insight":
+        return replace(self, tracker=tracker, reader=Reader.of(self.sensor, tracker.key), time=frame.time)
+
+
+def bytes_needed(position: FloatArray, element_area: float) -> int:
+    """What a sensor with markers at ``position`` [n, m, 3] m takes that sees depth, without a contact's own.
+
+    Raises ``InvalidInput`` where elements are far smaller than the markers lie apart.
+    """
+    place = position[..., :2].reshape(-1, 2)
+    nodes, elements = len(Nodes.around(place, element_area)), len(place)
+    response, over_elements, lattice = 9 * elements * nodes, elements * nodes, 3 * elements * nodes
+    return (response + over_elements + lattice) * position.itemsize

@@ -1,0 +1,174 @@
+"""Forces of frames as they come: by the last contact found at once, while it is sought anew beside the frames."""
+
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from slipcore.errors import InvalidInput
+from slipcore.forces.defaults import FORCE_STREAM
+from slipcore.forces.frame_forces import FrameForces
+from slipcore.forces.gel import Gel
+from slipcore.forces.look import Insight, Shown, bytes_needed
+from slipcore.forces.recording import axes_seen, check_noise, moved, noise_of, rows
+from slipcore.forces.sensor import Sensor
+from slipcore.frames import BoolArray, FloatArray, check_displacement, check_mask
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StreamedForces:
+    """The ``forces`` of a frame, and the ``age`` s of the frame by which its contact was last sought.
+
+    Forces are zero where nothing touches, and where they are not known yet, because they ``wait_for`` what that says:
+    "noise", "set-up" or "contact".
+    """
+
+    forces: FrameForces
+    age: float = 0.0
+    wait_for: str | None = None
+
+
+class ForceStream:
+    """Forces of one sensor's frames as they come, found as ``reconstruct`` finds those of a whole log.
+
+    ``position`` [n, m, 3] m of markers at rest, ``element_area`` m², ``noise`` m of a marker's coordinate (None: the
+    first 15 frames tell it, and have no forces). With an ``executor`` of one thread, frames never wait: contacts are
+    sought there, in the newest frame, and forces are by the last one found. Without, a frame waits where it is time to
+    seek. Raises ``InvalidInput`` for what cannot be a sensor.
+    """
+
+    def __init__(
+        self,
+        position: ArrayLike,
+        element_area: float,
+        gel: Gel,
+        noise: float | None = None,
+        executor: Executor | None = None,
+    ) -> None:
+        place = np.asarray(position, dtype=np.float64)
+        if place.ndim != 3 or place.shape[-1] != 3 or not np.isfinite(place).all():
+            raise InvalidInput("position", f"of shape {list(place.shape)}", "finite, [n, m, 3] m")
+        if not 0.0 < element_area < np.inf:
+            raise InvalidInput("element_area", element_area, "above 0 m², finite")
+        if noise is not None:
+            check_noise(noise)
+        self.held_bytes = bytes_needed(place, element_area)
+        """At most, but for what the contact itself takes."""
+        self._position, self._area, self._gel, self._executor = place, element_area, gel, executor
+        self._given, self._noise = noise, noise
+        self._recent: deque[tuple[float, FloatArray]] = deque(maxlen=FORCE_STREAM.frames)
+        self._axes: tuple[int, ...] = (0, 1)
+        self._data = np.zeros(0)
+        self._touches, self._touched, self._until_look = 0, False, 0
+        self._insight: Insight | None = None
+        self._look: tuple[int, Future[Insight]] | None = None
+
+    def step(self, time: float, displacement: ArrayLike, observed: ArrayLike | None = None) -> StreamedForces:
+        """Forces of the next frame: displacements [n, m, 3] m at ``time`` s, of markers that were ``observed`` [n, m].
+
+        Raises ``InvalidInput`` for what is no such frame, and is then as before.
+        """
+        moved_by, seen = self._checked(time, displacement, observed)
+        self._remember(time, moved_by)
+        if len(axes_seen(moved_by)) > len(self._axes):
+            self._axes, self._insight, self._data = axes_seen(moved_by), None, np.zeros(0)
+        self._until_look -= 1
+        self._collect()
+        if self._insight is None:
+            self._begin_to(self._set_up)
+        if self._noise is None:
+            return self._none("noise")
+        frame = self._shown(time, moved_by, seen)
+        if self._insight is None:
+            return self._none("set-up")
+        self._seek(self._insight, frame)
+        if not self._touched:
+            return self._none()
+        reader = self._insight.reader
+        if reader is None:
+            return self._none("contact")
+        n, m = self._position.shape[:2]
+        return StreamedForces(reader.read(frame.data, (n, m)), time - self._insight.time)
+
+    def _checked(
+        self, time: float, displacement: ArrayLike, observed: ArrayLike | None
+    ) -> tuple[FloatArray, BoolArray | None]:
+        moved_by = np.asarray(displacement, dtype=np.float64)
+        if moved_by.shape != self._position.shape:
+            raise InvalidInput("displacement", f"of shape {list(moved_by.shape)}", f"{list(self._position.shape)}")
+        seen = None if observed is None else check_mask("observed", observed, moved_by.shape[:2])
+        told = moved_by if seen is None else np.where(seen[..., None], moved_by, 0.0)
+        if not np.isfinite(time) or not np.isfinite(told).all():
+            raise InvalidInput("frame", "one with numbers that are not", "finite time and displacement")
+        check_displacement(told, self._position)
+        return told, seen
+
+    def _remember(self, time: float, displacement: FloatArray) -> None:
+        """For the noise. Of two frames whose times do not grow, one is wrong: neither is kept where that is unclear."""
+        if self._recent and time <= self._recent[-1][0]:
+            self._recent.pop()
+        if not self._recent or time > self._recent[-1][0]:
+            self._recent.append((time, displacement))
+        if self._noise is None and len(self._recent) == FORCE_STREAM.frames:
+            self._noise = self._noise_now()
+
+    def _noise_now(self) -> float:
+        if self._given is not None:
+            return self._given
+        return noise_of(np.array([time for time, _ in self._recent]), np.stack([each for _, each in self._recent]))
+
+    def _shown(self, time: float, displacement: FloatArray, observed: BoolArray | None) -> Shown:
+        """The frame, and whether something touches in it; noise is that of the frames just before a touch.
+
+        A marker that is not seen stays where it was, until a contact is sought without it.
+        """
+        (data,), (seen,) = rows(displacement[None], None if observed is None else observed[None], self._axes)
+        self._data = np.where(seen, data, self._data if self._data.size else 0.0)
+        before, self._touched = self._touched, bool(moved(data, seen, self._noise or 0.0))
+        if self._touched and not before:
+            self._noise = self._noise_now()
+            self._touched = bool(moved(data, seen, self._noise))
+            self._touches += self._touched
+        return Shown(time, self._data, seen, max(self._noise or 0.0, FORCE_STREAM.least_noise))
+
+    def _seek(self, insight: Insight, frame: Shown) -> None:
+        """Let the contact be sought, if it is time to; forget it once nothing touches."""
+        if not self._touched:
+            self._insight = insight = insight.untouched()
+        if self._look is not None or self._until_look > 0:
+            return
+        look = insight.next_look(frame, self._touched)
+        if look is not None:
+            self._until_look = FORCE_STREAM.stride_in_plane if len(self._axes) == 2 else FORCE_STREAM.stride
+            self._begin_to(look)
+
+    def _set_up(self) -> Insight:
+        return Insight(Sensor.of(self._position, self._area, self._gel, self._axes))
+
+    def _begin_to(self, look: Callable[[], Insight]) -> None:
+        """Look beside the frames, or at once."""
+        if self._look is not None:
+            return
+        future: Future[Insight] = Future()
+        if self._executor is None:
+            future.set_result(look())
+        else:
+            future = self._executor.submit(look)
+        self._look = self._touches, future
+        self._collect()
+
+    def _collect(self) -> None:
+        """Take what was found, if it is there and still of this contact; raises what it raised."""
+        if self._look is None or not self._look[1].done():
+            return
+        (touch, look), self._look = self._look, None
+        found = look.result()
+        if found.sensor.axes == self._axes:
+            self._insight = found if self._touched and touch == self._touches else found.untouched()
+
+    def _none(self, wait_for: str | None = None) -> StreamedForces:
+        n, m = self._position.shape[:2]
+        return StreamedForces(FrameForces.none((n, m)), wait_for=wait_for)

@@ -1,0 +1,101 @@
+"""The contact followed from frame to frame, and the fit of tractions on it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from slipcore.forces.defaults import RECONSTRUCTION
+from slipcore.forces.fit import Fit, Observation, Prior, choose_prior, fit
+from slipcore.forces.sensor import Sensor
+from slipcore.forces.strength import Criterion
+from slipcore.forces.support import better_support, relevant_nodes, widened
+from slipcore.forces.whole_lattice import WholeLattice, whole_lattice
+from slipcore.frames import BoolArray, FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Key:
+    """A frame at which the contact was sought, and the fit that holds until markers have moved on."""
+
+    observation: Observation
+    data: FloatArray
+    fit: Fit
+
+    def holds(self, observation: Observation, data: FloatArray) -> bool:
+        """Whether a frame sees the same markers and differs by little more than the noise of both."""
+        if len(data) != len(self.data) or ((observation.noise == np.inf) != (self.observation.noise == np.inf)).any():
+            return False
+        change, before = (data - self.data) / self.observation.noise, self.data / self.observation.noise
+        noise = 2.0 * np.isfinite(self.observation.noise).sum()
+        return bool(change @ change <= RECONSTRUCTION.change**2 * (before @ before) + noise)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracker:
+    """The contact followed from frame to frame; ``lattice`` where depth is seen."""
+
+    sensor: Sensor
+    criterion: Criterion
+    prior: Prior
+    key: Key
+    lattice: WholeLattice | None
+
+    @classmethod
+    def of(
+        cls,
+        sensor: Sensor,
+        observation: Observation,
+        data: FloatArray,
+        criterion: Criterion,
+        lattice: WholeLattice | None = None,
+    ) -> "Tracker":
+        """Begin with a frame, which chooses the prior; ``lattice``: one made before, where depth is seen."""
+        nodes, count = sensor.nodes, len(sensor.response)
+        if sensor.sees_depth:
+            if lattice is None:
+                noise = float(np.min(observation.noise[:count]))
+                lattice = lattice_of(sensor, noise, float(np.sqrt(np.mean(data[:count] ** 2))))
+            support = _pressed(lattice, data[:count], nodes.grid.shape)
+        else:
+            support = relevant_nodes(observation, data, np.ones(nodes.grid.shape, dtype=bool))
+        prior = choose_prior(observation, data, nodes, support.ravel(), criterion)
+        key = Key(observation, data, fit(observation, nodes, support.ravel(), prior))
+        begun = cls(sensor, criterion, prior, key, lattice)
+        return begun if lattice is not None else begun._sought_in_the_plane(observation, data)
+
+    def at(self, observation: Observation, data: FloatArray) -> "Tracker":
+        """Go on to another frame; the contact is sought again only where markers have moved on."""
+        if self.key.holds(observation, data):
+            return self
+        if self.lattice is None:
+            return self._sought_in_the_plane(observation, data)
+        support = _pressed(self.lattice, data[: len(self.sensor.response)], self.sensor.nodes.grid.shape)
+        return self._on(observation, data, support, self.prior)
+
+    def _sought_in_the_plane(self, observation: Observation, data: FloatArray) -> "Tracker":
+        """With a better contact for a frame, and before it the frame's own prior: one that allows for the shear of
+        another frame lets shear stand for pressure, and the contact shrinks to where it would.
+        """
+        nodes, before = self.sensor.nodes, self.key.fit.support
+        prior = choose_prior(observation, data, nodes, before, self.criterion, self.prior.smoothness)
+        support = better_support(observation, data, nodes, before.reshape(nodes.grid.shape), prior)
+        return self._on(observation, data, support, prior)
+
+    def _on(self, observation: Observation, data: FloatArray, support: BoolArray, prior: Prior) -> "Tracker":
+        found = fit(observation, self.sensor.nodes, support.ravel(), prior)
+        return replace(self, prior=prior, key=Key(observation, data, found))
+
+
+def lattice_of(sensor: Sensor, noise: float, typical: float) -> WholeLattice:
+    """For markers with this ``noise`` m whose displacements have the root mean square ``typical`` m."""
+    everywhere = Observation(sensor.response, np.full(len(sensor.response), noise))
+    return whole_lattice(everywhere, sensor.nodes, typical)
+
+
+def _pressed(lattice: WholeLattice, data: FloatArray, shape: tuple[int, int]) -> BoolArray:
+    """Nodes [ny, nx] with a pressure that is not noise, and one row around them; never none."""
+    pressure, deviation = lattice.operator @ data, lattice.deviation
+    noise = RECONSTRUCTION.node_significance * deviation
+    least = np.maximum(noise, RECONSTRUCTION.node_share * pressure.max())
+    pressed = (pressure > least) | (pressure == pressure.max())
+    return widened(pressed.reshape(shape), 1)

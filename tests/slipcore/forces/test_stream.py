@@ -1,0 +1,167 @@
+"""Forces of frames as they come, against the forces that an independent solver knows."""
+
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from typing import Any
+
+import numpy as np
+import pytest
+
+from slipcore import GraspLog, InvalidInput
+from slipcore.forces import ForceStream, Gel, StreamedForces
+
+GEL = Gel(young_modulus=1e6, poisson_ratio=0.49, thickness=5e-3)
+LIGHT = [0, 0]
+"""Frames of the scene with 0.5 N, whose contact a lattice of 8 × 8 markers holds."""
+INSIDE = slice(6, 14)
+AROUND = slice(5, 15)
+"""What holds that of the frame with 5 N."""
+NOISE = 1e-6
+Pressed = Callable[..., GraspLog]
+
+
+class Later(Executor):
+    """Does what it was given once it is told to."""
+
+    def __init__(self) -> None:
+        self.given: list[tuple[Future[Any], Callable[..., Any]]] = []
+
+    def submit(self, do: Callable[..., Any], /, *_: Any, **__: Any) -> Future[Any]:
+        self.given.append((Future(), do))
+        return self.given[-1][0]
+
+    def work(self) -> None:
+        """Do it all."""
+        for future, do in self.given:
+            future.set_result(do())
+        self.given.clear()
+
+
+def made(log: GraspLog, **options: Any) -> ForceStream:
+    return ForceStream(log.position, log.element_area, GEL, **options)
+
+
+def still(log: GraspLog, axes: int, k: int) -> np.ndarray:
+    """Displacements of markers that nothing touches."""
+    shown = NOISE * np.random.default_rng(k).standard_normal(log.position.shape)
+    shown[..., axes:] = 0.0
+    return shown
+
+
+def total(log: GraspLog, k: int) -> np.ndarray:
+    assert log.force is not None
+    return log.force[k].sum(axis=(0, 1))
+
+
+def test_forces_are_met_from_the_touch_on_and_end_with_it(pressed: Pressed) -> None:
+    log = pressed([0, 1], noise=NOISE, crop=AROUND)
+    stream = made(log, noise=NOISE)
+    found = [stream.step(0.1 * k, still(log, 3, k)) for k in range(3)]
+    assert all(each.wait_for is None and not each.forces.force.any() for each in found)
+    found += [stream.step(1.0 + 0.1 * k, log.displacement[k // 4]) for k in range(8)]
+    for each, normal in zip(found[6::4], (-0.5, -5.0), strict=True):
+        assert each.wait_for is None
+        np.testing.assert_allclose(each.forces.resultant, [0.0, 0.0, normal], atol=0.02 * abs(normal))
+        assert each.forces.contact.any()
+        assert (each.forces.deviation[each.forces.contact] > 0.0).all()
+        assert (each.forces.resultant_deviation > 0.0).all()
+    lifted = stream.step(10.0, still(log, 3, 99))
+    assert not lifted.forces.force.any()
+    assert lifted.wait_for is None
+
+
+@pytest.mark.long
+def test_in_the_plane_alone_the_contact_is_found_too(pressed: Pressed) -> None:
+    log = pressed([3, 3], noise=NOISE, axes=2)
+    stream = made(log, noise=NOISE)
+    found = [stream.step(0.1 * k, log.displacement[k]) for k in range(2)][-1]
+    np.testing.assert_allclose(found.forces.resultant, total(log, 0), atol=0.3)
+
+
+def test_the_first_frames_tell_the_noise_where_it_is_not_given(pressed: Pressed) -> None:
+    log = pressed(LIGHT, noise=NOISE, crop=INSIDE)
+    stream = made(log)
+    found = [stream.step(k / 30.0, still(log, 3, k)).wait_for for k in range(15)]
+    assert found == ["noise"] * 14 + [None]
+    first = [stream.step(0.5 + k / 30.0, log.displacement[0]) for k in range(3)][-1]
+    assert first.forces.resultant[2] == pytest.approx(total(log, 0)[2], rel=0.01)
+
+
+def test_frames_do_not_wait_for_looks_beside_them(pressed: Pressed) -> None:
+    log, beside = pressed(LIGHT, noise=NOISE, crop=INSIDE), Later()
+    stream = made(log, noise=NOISE, executor=beside)
+    times = iter(0.1 * np.arange(100))
+
+    def step(displacement: np.ndarray) -> StreamedForces:
+        return stream.step(next(times), displacement)
+
+    waits = []
+    for _ in range(3):  # the response to traction in the plane, then, as z is seen, with depth; then the lattice
+        waits.append(step(still(log, 3, 0)).wait_for)
+        beside.work()
+    assert waits[0] == "set-up"
+    assert step(log.displacement[0]).wait_for == "contact"
+    assert step(log.displacement[0]).wait_for == "contact"
+    assert len(beside.given) == 1
+    beside.work()
+    now = step(log.displacement[0])
+    assert now.wait_for is None
+    assert now.age == pytest.approx(0.2)
+    assert now.forces.resultant[2] == pytest.approx(total(log, 0)[2], rel=0.01)
+
+
+def test_a_contact_that_has_ended_meanwhile_is_not_that_of_the_next_touch(pressed: Pressed) -> None:
+    log, beside = pressed(LIGHT, noise=NOISE, crop=INSIDE), Later()
+    stream = made(log, noise=NOISE, executor=beside)
+    for k in range(6):
+        stream.step(0.1 * k, still(log, 3, k))
+        beside.work()
+    stream.step(1.0, log.displacement[0])
+    stream.step(1.1, still(log, 3, 7))
+    stream.step(1.2, log.displacement[0])
+    beside.work()
+    assert stream.step(1.3, log.displacement[0]).wait_for == "contact"
+    beside.work()
+    assert stream.step(1.4, log.displacement[0]).wait_for is None
+
+
+def test_markers_that_are_lost_tell_nothing(pressed: Pressed) -> None:
+    log = pressed([1, 1], noise=NOISE, crop=AROUND)
+    observed = np.random.default_rng(3).random(log.position.shape[:2]) > 0.1
+    shown = np.where(observed[..., None], log.displacement[0], np.nan)
+    stream = made(log, noise=NOISE)
+    found = [stream.step(0.1 * k, shown, observed) for k in range(6)][-1]
+    assert found.forces.resultant[2] == pytest.approx(-5.0, rel=0.03)
+
+
+def test_a_sensor_at_rest_that_shows_no_noise_is_not_touched(pressed: Pressed) -> None:
+    log = pressed(LIGHT, crop=INSIDE)
+    stream = made(log)
+    for k in range(16):
+        found = stream.step(k / 30.0, np.zeros(log.position.shape))
+    assert not found.forces.force.any()
+    found = [stream.step(1.0 + k / 30.0, log.displacement[0]) for k in range(6)][-1]
+    assert found.forces.resultant[2] == pytest.approx(total(log, 0)[2], rel=0.02)
+
+
+def test_what_does_not_fit_is_refused_by_name_and_changes_nothing(pressed: Pressed) -> None:
+    log = pressed(LIGHT, noise=NOISE, crop=INSIDE)
+    for wrong, said in (
+        ({"position": log.position[0]}, "position is of shape"),
+        ({"element_area": -1.0}, "element_area is -1"),
+        ({"element_area": 1e-12}, "an area that needs at most"),
+        ({"noise": -1.0}, "noise is -1"),
+    ):
+        given = {"position": log.position, "element_area": log.element_area, "gel": GEL} | wrong
+        with pytest.raises(InvalidInput, match=said):
+            ForceStream(**given)
+    stream = made(log, noise=NOISE)
+    for time, displacement, said in (
+        (0.0, log.displacement, "displacement is of shape"),
+        (np.nan, log.displacement[0], "finite time"),
+        (0.0, np.full(log.position.shape, np.nan), "finite time"),
+        (0.0, 1e3 * np.ones(log.position.shape), "is it in m"),
+    ):
+        with pytest.raises(InvalidInput, match=said):
+            stream.step(time, displacement)
+    assert stream._insight is None
