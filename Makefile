@@ -17,6 +17,12 @@ SAMPLES := from slipcore.warm_up import warm_up_samples; warm_up_samples()
 # The detectors' kernels take most of it, a minute of a core: all others are left to the second process.
 COMPILE_DETECTORS := $(BIN)/python -c 'import slipcore; slipcore.warm_up()'
 COMPILE_OTHERS := $(BIN)/python -c 'import estimators; estimators.warm_up(); $(CONTACT); $(SAMPLES)'
+# What only tests and benchmarks use: compiled beside lint and types, and not in setting up.
+WORLD := world = reduced.World(friction=np.full((1, 20, 20), 0.4)); load = reduced.Load(0.3, 1.0, (0.0, 0.0)); \
+    reduced.step(world, reduced.init(world, 10.0), 10.0, load, 0.03)
+BEAMS := beams = BeamLattice((2, 2), 1e-3, 1e3, 1e2); drag(beams, unloaded(beams), np.array([1e-6, 0.0, 0.0]), np.ones((2, 2)))
+COMPILE_FOR_TESTS := $(BIN)/python -c 'import numpy as np; from slipcore.contact import reduced; $(WORLD); \
+    from slipcore.contact.reference.beam_chain import BeamLattice, drag, unloaded; $(BEAMS)'
 # Two processes of tests share two cores: threads of BLAS beside them wait for each other, at six times the time.
 PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest
 RESOLUTION := --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate \
@@ -78,7 +84,7 @@ $(VENV)/.installed: pyproject.toml clients/pyproject.toml constraints.txt
 
 kernels: setup  # else both processes of the tests would compile what they need; 3 s where nothing has changed
 	@echo "== kernels"
-	@$(COMPILE_DETECTORS) & compiling=$$!; $(COMPILE_OTHERS) || { kill $$compiling; exit 1; }; wait $$compiling
+	@$(COMPILE_DETECTORS) & compiling=$$!; $(COMPILE_OTHERS) && $(COMPILE_FOR_TESTS) || { kill $$compiling; exit 1; }; wait $$compiling
 
 recordings: $(CACHE)/tac3d.tried
 

@@ -1,5 +1,7 @@
 """The loads that friction can carry, to rounding."""
 
+import numpy as np
+
 from slipcore.contact.defaults import LIMIT_SURFACE
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.limit_surface import Descent, LimitLoad, find_limit_load
@@ -11,4 +13,4 @@ TO_ROUNDING = Descent(
 
 def limit_load(radius: FloatArray, arm: FloatArray, load: FloatArray, given: BoolArray) -> LimitLoad:
     """How far ``load`` [3] is from the limit surface (``slipcore.limit_surface.find_limit_load``)."""
-    return LimitLoad(*find_limit_load(radius, arm, load, given, TO_ROUNDING))
+    return LimitLoad(*find_limit_load(radius, np.ascontiguousarray(arm), load, given, TO_ROUNDING))

@@ -67,7 +67,7 @@ def _marker_motion(log: GraspLog, spans: Spans, weight: FloatArray) -> tuple[Flo
     their centre [k, 2] m.
     """
     fit = np.full((len(spans.frame), 5), np.nan)
-    _fill_fits(spans, weight, for_kernels(log.position), for_kernels(log.displacement), fit)
+    _fill_fits(spans, for_kernels(weight), for_kernels(log.position), for_kernels(log.displacement), fit)
     return fit[:, :3], fit[:, 3:]
 
 

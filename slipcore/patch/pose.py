@@ -19,7 +19,7 @@ def lattice_pose(
     weight. What sticks to the markers stays where it is.
     """
     moments = np.empty((len(spans.frame), 5))
-    _fill_moments(spans, weight, for_kernels(position), moments)
+    _fill_moments(spans, for_kernels(weight), for_kernels(position), moments)
     x, y, xx, xy, yy = moments.T
     difference, mixed, size = xx - yy, 2.0 * xy, xx + yy
     oblong = np.hypot(difference, mixed) > least_anisotropy * size
