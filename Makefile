@@ -49,10 +49,10 @@ types: setup
 
 unit: setup recordings kernels
 	@echo "== tests"
-	$(PYTEST) -m "not long" -n 2
+	$(PYTEST) -m "not long" -n 2 --dist worksteal
 
 coverage: setup recordings kernels  ## the tests again, with the lines that none of them runs; takes a third longer
-	$(PYTEST) -m "not long" -n 2 --cov --cov-report=term
+	$(PYTEST) -m "not long" -n 2 --dist worksteal --cov --cov-report=term
 	@for package in slipcore estimators db service clients; do echo "$$package:"; \
 	    $(BIN)/coverage report --include="$$package/*" --format=total || exit 1; done
 

@@ -73,6 +73,7 @@ def project(
     """
     first = np.zeros(3) if start is None else np.where(given, start, 0.0)
     traction = np.empty_like(point)
+    point = np.ascontiguousarray(point)  # a view of a larger array would be compiled for once more
     constraints, bounds = (point, radius, arm, target, given), (PROJECTION.tight * radius.sum(), max_iterations)
     motion, imbalance, iterations, feasible = _dual_newton(constraints, first, traction, bounds)
     return Projection(traction, motion, imbalance, iterations, feasible)

@@ -71,7 +71,7 @@ class Tab:
             with suppress(AssertionError):  # a page is being left
                 if value := self.run(script):
                     return value
-            time.sleep(0.05)
+            time.sleep(0.01)
         page = self.run("location.href + ' ' + document.body.innerText")
         raise AssertionError(f"{script} does not become true on {page}; errors: {self.errors}")
 
