@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections import defaultdict
 from collections.abc import Collection, Mapping
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -46,13 +47,20 @@ NUMERICS = {"numba", "scipy", "statsmodels", "emcee", "pandas"}
 """What the server process does without until a request needs it: half of its memory, and half of its start."""
 
 
+@cache
+def import_statements(path: Path) -> list[ast.Import | ast.ImportFrom]:
+    """At the top of a file, inside of functions, and for types only."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+
+
 def imported_modules(path: Path) -> set[str]:
     """Every module that a file imports, lazily or not, with its dotted name."""
     names: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in import_statements(path):
         if isinstance(node, ast.Import):
             names.update(alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             assert node.level == 0, f"{path}: relative imports hide where a name comes from"
             names.add(node.module or "")
             names.update(f"{node.module}.{alias.name}" for alias in node.names)
@@ -62,10 +70,10 @@ def imported_modules(path: Path) -> set[str]:
 def imported_here(path: Path, known: Collection[str]) -> set[str]:
     """Which of the ``known`` modules a file imports: at its top, inside of functions, and for types only."""
     found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in import_statements(path):
         if isinstance(node, ast.Import):
             found.update(alias.name for alias in node.names if alias.name in known)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             full = {alias.name: f"{node.module}.{alias.name}" for alias in node.names}
             found.update(name if name in known else str(node.module) for name in full.values())
     return found & set(known)
@@ -317,6 +325,11 @@ def calls(modules: Mapping[str, Path]) -> dict[str, set[str]]:
     return graph
 
 
+@cache
+def calls_in_the_service() -> dict[str, set[str]]:
+    return calls(modules_of(ROOT, "service"))
+
+
 def hops(graph: Mapping[str, Collection[str]], start: str, end: str) -> int:
     """Fewest calls from one function to another; raises ``AssertionError`` where there is no way."""
     count, reached, found = 0, {start}, {start}
@@ -341,8 +354,7 @@ def hops(graph: Mapping[str, Collection[str]], start: str, end: str) -> int:
     ],
 )
 def test_from_a_route_to_repository_or_numerics_there_are_three_calls_at_most(route: str, end: str) -> None:
-    graph = calls(modules_of(ROOT, "service"))
-    assert hops(graph, f"service.{route}", end) <= 3
+    assert hops(calls_in_the_service(), f"service.{route}", end) <= 3
 
 
 def test_nothing_but_the_service_knows_a_web_framework() -> None:
