@@ -75,7 +75,9 @@ def _copy_out(database: Database, blobs: BlobStore, unfinished: Path, report: Re
     with closing(_opened(unfinished)) as copy:
         migrate.upgrade(copy)
         _copy_rows(database, copy, report)
-        _copy_blobs(copy, blobs, BlobStore(unfinished.parent), report)
+        target = BlobStore(unfinished.parent)
+        target.clear_spool()  # of a backup that was killed
+        _copy_blobs(copy, blobs, target, report)
         copy.empty_log()
 
 

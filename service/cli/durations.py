@@ -5,15 +5,20 @@ from datetime import UTC, datetime, timedelta
 
 import typer
 
+LONGEST = timedelta(days=36500)
+"""As the settings have it: a moment so long ago is still a date."""
+
 _UNITS = {"h": timedelta(hours=1), "d": timedelta(days=1)}
 
 
 def duration(name: str, text: str) -> timedelta:
     """Hours or days, such as 12h or 90d; raises ``typer.BadParameter`` with the option's name."""
-    found = re.fullmatch(r"(\d{1,6})([hd])", text)
-    if found is None:
-        raise typer.BadParameter(f"{name} is {text}; allowed: hours or days such as 12h or 90d")
-    return int(found[1]) * _UNITS[found[2]]
+    found = re.fullmatch(r"(\d{1,6})([hd])", text, re.ASCII)
+    if found is None or (length := int(found[1]) * _UNITS[found[2]]) > LONGEST:
+        raise typer.BadParameter(
+            f"{name} is {text}; allowed: hours or days such as 12h or 90d, at most {LONGEST.days}d"
+        )
+    return length
 
 
 def moment_to_come(name: str, text: str, now: datetime) -> datetime:

@@ -155,8 +155,10 @@ def test_a_backup_that_was_killed_is_made_anew_in_the_same_folder(
         left = {suffix: Path(f"{begun}{suffix}").read_bytes() for suffix in SIDE_FILES}
     for suffix, content in left.items():
         Path(f"{begun}{suffix}").write_bytes(content)
+    (tmp_path / "copy" / "spool" / "half of a blob").write_bytes(b"o")
     for _ in range(2):
         backup(filled, blobs, tmp_path / "copy", nothing)
+        assert not [*(tmp_path / "copy" / "spool").iterdir()]
         assert [path.name for path in (tmp_path / "copy").glob("*.*")] == [FILE]
         file.unlink()
 

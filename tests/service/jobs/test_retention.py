@@ -286,7 +286,7 @@ def test_the_command_counts_and_deletes(
     assert shelf.file(log_id).status_code == httpx.codes.OK
     assert run("--older-than", "12h")[1] == f"deleted 1 uploads ({len(content)} bytes)\n"
     assert shelf.file(log_id).status_code == httpx.codes.GONE
-    for wrong in ("90", "-1d", "1w", ""):
+    for wrong in ("90", "-1d", "1w", "", "800000d", "１d"):
         assert run("--older-than", wrong)[0] == 2
     monkeypatch.setenv("STICTION_KEEP_UPLOADS_DAYS", "1")
     for options in ([], ["--dry-run"]):
