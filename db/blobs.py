@@ -129,8 +129,10 @@ class BlobStore:
     def has_within(self, folder: Path) -> bool:
         """Whether a folder is, or is to be, among the store's own files, or one whose blobs these are."""
         own = [part.resolve() for part in (self._blobs, self._spool, self._set_aside)]
-        places = (folder.resolve(), (folder / self._blobs.name).resolve())
-        return any(place.is_relative_to(part) for part in own for place in places)
+        its_own = folder / self._blobs.name
+        if its_own.exists() and its_own.samefile(self._blobs):  # by another mount
+            return True
+        return any(place.is_relative_to(part) for part in own for place in (folder.resolve(), its_own.resolve()))
 
     def spool(self) -> Spool:
         """A new file to write to; use it in a ``with`` statement."""

@@ -4,7 +4,7 @@ import uuid
 from collections.abc import Collection, Mapping
 from datetime import datetime
 
-from sqlalchemy import ColumnElement, false, func, select, update
+from sqlalchemy import ColumnElement, Select, false, func, select, update
 from sqlalchemy.orm import Session
 
 from db.errors import ClaimLost, NotFound
@@ -171,9 +171,11 @@ def cancel(session: Session, job_id: str, reason: str) -> Job:
 
     Models of its material that lack its samples say so.
     """
-    _outdate_models(session, job_id)
+    _lock_models(session, job_id)
     changes = {"status": "cancelled", "reason": reason, "runner_id": None, "finished_at": now()}
-    session.execute(update(JobRow).where(JobRow.id == job_id, JobRow.finished_at.is_(None)).values(**changes))
+    ended = update(JobRow).where(JobRow.id == job_id, JobRow.finished_at.is_(None)).values(**changes)
+    if session.scalar(ended.returning(JobRow.id)) is not None:
+        outdate_models(session, job_id)
     return get(session, job_id)
 
 
@@ -191,13 +193,26 @@ def finish(
     Where it made no model, those of its material that lack its samples say so. Raises ``ClaimLost``.
     """
     if status != "done":
-        _outdate_models(session, claim.job_id)
+        _lock_models(session, claim.job_id)
     changes: dict[str, object] = {"status": status, "reason": reason, "model_version": model_version}
     if status == "done":
         changes["stage"] = None
     if seconds is not None:
         changes["seconds"] = dict(seconds)
     _change_claimed(session, claim, runner_id=None, finished_at=now(), **changes)
+    if status != "done":
+        outdate_models(session, claim.job_id)
+
+
+def outdate_models(session: Session, job_id: str, besides: Collection[str] = ()) -> None:
+    """Say of a material's models, but those by the methods ``besides``, that they lack the samples which a job stored.
+
+    They do not where its log was withdrawn meanwhile; who withdraws it now waits for the rows that refer to it.
+    """
+    of_it = _material_of_log(job_id).join(SampleSummaryRow, SampleSummaryRow.grasp_log_id == GraspLogRow.id)
+    material_id = session.scalar(of_it.where(SampleSummaryRow.count > 0, GraspLogRow.withdrawn_at.is_(None)))
+    if material_id is not None:
+        friction_models.mark_outdated(session, material_id, besides)
 
 
 def refuse_greedy(session: Session, claim: Claim, want: str) -> None:
@@ -228,13 +243,17 @@ def record(row: JobRow, material: str | None) -> Job:
     )
 
 
-def _outdate_models(session: Session, job_id: str) -> None:
-    """Say of a material's models that samples are not in them which a job has stored, and will not fit."""
-    of_it = select(GraspLogRow.material_id).join(JobRow, JobRow.grasp_log_id == GraspLogRow.id)
-    counting = of_it.join(SampleSummaryRow).where(SampleSummaryRow.count > 0, GraspLogRow.withdrawn_at.is_(None))
-    material_id = session.scalar(counting.where(JobRow.id == job_id, JobRow.finished_at.is_(None)))
+def _lock_models(session: Session, job_id: str) -> None:
+    """Lock the models of a job's log, if it has any, before the job: who stores samples or merges does so, too."""
+    material_id = session.scalar(_material_of_log(job_id))
     if material_id is not None:
-        friction_models.mark_outdated(session, material_id)
+        friction_models.lock(session, material_id)
+
+
+def _material_of_log(job_id: str) -> Select[int | None]:
+    return (
+        select(GraspLogRow.material_id).join(JobRow, JobRow.grasp_log_id == GraspLogRow.id).where(JobRow.id == job_id)
+    )
 
 
 def _change_claimed(session: Session, claim: Claim, **values: object) -> None:

@@ -77,17 +77,16 @@ def hold(session: Session, name: str) -> int:
 
 
 def hold_of_log(session: Session, log_id: str) -> int | None:
-    """The key of a log's material, which nobody merges until the transaction ends; None for a log of none.
+    """The key of a log's material, which nobody merges, nor changes its models, until the transaction ends.
 
-    Whoever changes logs, models or jobs of a material holds it first: a merge holds it, and waits for them then. Raises
-    ``NotFound``.
+    Whoever changes logs, models or jobs of a material holds it first, or two would wait for each other. None for a log
+    of none; raises ``NotFound``.
     """
     material_id = grasp_logs.material_id(session, log_id)
     if material_id is None:
         return None
-    query = select(MaterialRow.id).where(MaterialRow.id == material_id)
     with session.begin_nested() as attempt:
-        session.execute(query.with_for_update(read=True, key_share=True))
+        friction_models.lock(session, material_id)
         if grasp_logs.material_id(session, log_id) == material_id:
             return material_id
         attempt.rollback()  # it was merged, and its log with it, while this waited

@@ -9,8 +9,9 @@ from sqlalchemy.orm import Session
 
 from db.blobs import disk_errors_named
 from db.records import Calibration, CalibrationPress, NewCalibration
-from db.repositories import audit, calibrations, grasp_logs, sensors
+from db.repositories import calibrations, grasp_logs, sensors
 from service import formats
+from service.domain.changes import record
 from service.domain.context import Context
 from service.domain.errors import FileDeleted, InsufficientScope, InvalidValue
 from service.domain.principal import Principal
@@ -62,7 +63,7 @@ def _store(context: Context, sensor: str, new: NewCalibration, principal: Princi
         stored = calibrations.add(session, sensor, new)  # the next one waits for the sensor's row
         _check_right(stored.version - 1 or None, principal)
         details = {"version": stored.version, "grasp_logs": [press.grasp_log for press in new.presses]}
-        audit.add(session, principal.actor, "sensor.calibrated", sensor, details)
+        record(session, principal, "sensor.calibrated", sensor, details)
     return stored
 
 

@@ -1,7 +1,8 @@
 """Cancel a job that nobody wants any more."""
 
 from db.records import Job
-from db.repositories import audit, jobs
+from db.repositories import jobs
+from service.domain.changes import record
 from service.domain.context import Context
 from service.domain.errors import JobEnded
 from service.domain.principal import ANONYMOUS, Principal
@@ -15,7 +16,7 @@ def cancel(context: Context, job_id: str, principal: Principal = ANONYMOUS) -> J
         was_running = jobs.get(session, job_id).finished_at is None
         job = jobs.cancel(session, job_id, REASON)
         if was_running and job.status == "cancelled":
-            audit.add(session, principal.actor, "job.cancelled", job_id, {"material": job.material})
+            record(session, principal, "job.cancelled", job_id, {"material": job.material})
     if job.status != "cancelled":
         raise JobEnded(job_id, job.status)
     return job

@@ -6,8 +6,9 @@ from sqlalchemy.orm import Session
 
 from db.errors import NotFound
 from db.records import Job, Material, StoredGraspLog
-from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, owners
+from db.repositories import detections, friction_models, grasp_logs, jobs, materials, owners
 from service.domain import quotas
+from service.domain.changes import record
 from service.domain.context import Context
 from service.domain.errors import InsufficientScope, InvalidValue
 from service.domain.ownership import check_may_change
@@ -32,7 +33,7 @@ def create(session: Session, settings: Settings, name: str, description: str, pr
     for owner in principal.owners:
         owners.add(session, made.id, owner)
     told = {"description": description, "owners": list(principal.owners)}
-    audit.add(session, principal.actor, "material.created", name, told)
+    record(session, principal, "material.created", name, told)
     return made
 
 
@@ -51,9 +52,7 @@ def change(
         description = None if description == before.description else description
         if (name, description) != (None, None):
             quotas.check_change(session, context.settings, principal.key_id)
-            audit.add(
-                session, principal.actor, "material.changed", material, {"name": name, "description": description}
-            )
+            record(session, principal, "material.changed", material, {"name": name, "description": description})
         if description is not None:
             materials.describe(session, material_id, description)
         if name is not None:
@@ -73,7 +72,7 @@ def add_alias(context: Context, material: str, alias: str, principal: Principal 
         changed = materials.get(session, material)
         if is_new:
             _check_aliases(changed)
-            audit.add(session, principal.actor, "alias.added", material, {"alias": alias})
+            record(session, principal, "alias.added", material, {"alias": alias})
     return changed
 
 
@@ -81,7 +80,7 @@ def remove_alias(context: Context, material: str, alias: str, principal: Princip
     """Free an alias; raises as ``change``."""
     with context.database.write() as session:
         materials.remove_alias(session, _changeable(session, material, principal), alias)
-        audit.add(session, principal.actor, "alias.removed", material, {"alias": alias})
+        record(session, principal, "alias.removed", material, {"alias": alias})
     context.models.seen()
 
 
@@ -95,7 +94,7 @@ def merge(context: Context, material: str, source: str, principal: Principal = A
             raise InvalidValue("source", source, "another material than the one in the path")
         methods = friction_models.current_methods(session, [target_id, source_id])
         materials.merge(session, target_id, source_id)
-        audit.add(session, principal.actor, "material.merged", material, {"source": source})
+        record(session, principal, "material.merged", material, {"source": source})
         queued = _queue_refits(session, target_id, methods, principal.key_id)
         merged = materials.get(session, material)
         _check_aliases(merged)
@@ -118,7 +117,7 @@ def begin_epoch(
             raise InvalidValue("first_grasp_log", first_log, f"a log of {material}, or null") from error
         if withdrawn:
             told = {"reason": because, "first_grasp_log": first_log, "withdrawn": len(withdrawn)}
-            audit.add(session, principal.actor, "material.epoch_begun", materials.get(session, material).name, told)
+            record(session, principal, "material.epoch_begun", materials.get(session, material).name, told)
         queued = _refit_without(session, material_id, principal.key_id) if withdrawn else []
         found = materials.get(session, material)
     return found, len(withdrawn), _follow_up(context, queued)
@@ -138,7 +137,7 @@ def withdraw(
             quotas.check_change(session, context.settings, principal.key_id)
         before = grasp_logs.withdraw(session, log_id, because, principal.key_id)
         if before is None or before.because != because:
-            audit.add(session, principal.actor, "grasp_log.withdrawn", log_id, {"reason": because})
+            record(session, principal, "grasp_log.withdrawn", log_id, {"reason": because})
         had_part = before is None and detections.has_samples(session, log_id)
         queued = _refit_without(session, material_id, principal.key_id) if had_part else []
         log = grasp_logs.get(session, log_id)
@@ -153,7 +152,7 @@ def restore(context: Context, log_id: str, principal: Principal = ANONYMOUS) -> 
             quotas.check_change(session, context.settings, principal.key_id)
         was_withdrawn = grasp_logs.restore(session, log_id)
         if was_withdrawn:
-            audit.add(session, principal.actor, "grasp_log.restored", log_id)
+            record(session, principal, "grasp_log.restored", log_id)
         queued: list[Job] = []
         if was_withdrawn and material_id is not None and detections.has_samples(session, log_id):
             methods = friction_models.current_methods(session, [material_id])

@@ -3,8 +3,9 @@
 from sqlalchemy.orm import Session
 
 from db.records import Job
-from db.repositories import audit, jobs, materials
+from db.repositories import jobs, materials
 from service.domain import quotas
+from service.domain.changes import record
 from service.domain.ownership import check_may_add
 from service.domain.principal import ANONYMOUS, Principal
 from service.domain.queueing import queue
@@ -23,5 +24,5 @@ def request_fit(
     check_may_add(session, material_id, principal)
     quotas.check_job(session, settings, principal.key_id)
     job_id = queue(session, "fit", method, material_id=material_id, seed=seed, requested_by=principal.key_id)
-    audit.add(session, principal.actor, "fit.requested", material, {"job": job_id, "method": method, "seed": seed})
+    record(session, principal, "fit.requested", material, {"job": job_id, "method": method, "seed": seed})
     return jobs.get(session, job_id)

@@ -3,8 +3,9 @@
 from sqlalchemy.orm import Session
 
 from db.errors import NotFound
-from db.repositories import access_keys, audit, materials, owners
+from db.repositories import access_keys, materials, owners
 from service.domain import quotas
+from service.domain.changes import record
 from service.domain.context import Context
 from service.domain.errors import InsufficientScope, InvalidValue, NotOwner, UnknownOwner
 from service.domain.principal import Principal
@@ -51,7 +52,7 @@ def add_owner(context: Context, material: str, owner: str, principal: Principal)
         if owners.add(session, material_id, owner):
             if len(known) >= MOST_OWNERS:
                 raise InvalidValue("owners", len(known) + 1, f"at most {MOST_OWNERS} of a material")
-            audit.add(session, principal.actor, "owner.added", material, {"owner": owner})
+            record(session, principal, "owner.added", material, {"owner": owner})
         return owners.of_material(session, material_id)
 
 
@@ -65,7 +66,7 @@ def remove_owner(context: Context, material: str, owner: str, principal: Princip
         check_may_change(session, material_id, principal)
         if not owners.remove(session, material_id, owner):
             raise UnknownOwner("owner", owner, f"an owner of {material}")
-        audit.add(session, principal.actor, "owner.removed", material, {"owner": owner})
+        record(session, principal, "owner.removed", material, {"owner": owner})
 
 
 def _check(principal: Principal, found: list[str]) -> None:

@@ -3,8 +3,9 @@
 from dataclasses import asdict
 
 from db.records import Gel, Sensor
-from db.repositories import audit, sensors
+from db.repositories import sensors
 from service.domain import quotas
+from service.domain.changes import record
 from service.domain.context import Context
 from service.domain.errors import InsufficientScope
 from service.domain.principal import Principal
@@ -29,5 +30,5 @@ def describe(context: Context, name: str, gel: Gel, principal: Principal) -> Sen
         if known.gel is not None and not principal.is_admin:
             raise InsufficientScope("upload", "admin")
         quotas.check_change(session, context.settings, principal.key_id)
-        audit.add(session, principal.actor, "sensor.described", name, asdict(gel))
+        record(session, principal, "sensor.described", name, asdict(gel))
         return sensors.describe(session, name, gel)

@@ -168,21 +168,11 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         detection = replace(detection, calibration=correction.version, corrections=correction.changed)
         summary = summarise_samples(samples, none_because, run.blobs.put(encode_samples(samples)))
     with run.database.write() as session:
-        material_id = materials.hold_of_log(session, log_id)
+        materials.hold_of_log(session, log_id)
         jobs.start_stage(session, run.claim, "samples", run.seconds)  # nobody else has stored them meanwhile
         detections.add(session, log_id, detection, summary)
-        if material_id is not None:
-            _mark_outdated(session, log_id, material_id, summary)
+        jobs.outdate_models(session, run.job.id, besides=FITTED_AT_INGEST)
     return summary
-
-
-def _mark_outdated(session: Session, log_id: str, material_id: int, samples: SampleSummary) -> None:
-    """Say that the material's models by other methods than an upload's job fits by lack these samples.
-
-    They do not where the log was withdrawn meanwhile; who withdraws it now waits for the rows that refer to it.
-    """
-    if samples.none_because is None and grasp_logs.get(session, log_id).withdrawal is None:
-        friction_models.mark_outdated(session, material_id, besides=FITTED_AT_INGEST)
 
 
 def fit_material(run: Run) -> None:
@@ -288,8 +278,7 @@ def _store_models(run: Run, session: Session, material_id: int, models: Sequence
         # before the models, of which a job may have one a method
         jobs.start_stage(session, run.claim, "material", run.seconds)
         _note_change(run, session, material_id, models[0])
-        if run.job.kind == "ingest":  # what could not be fitted lacks the job's samples
-            friction_models.mark_outdated(session, material_id)
+        jobs.outdate_models(session, run.job.id)  # what could not be fitted stays so
         versions = [friction_models.add(session, material_id, run.job.id, to_new_model(model)) for model in models]
         if run.job.kind == "ingest":
             queue_cheap_refits(session, material_id, run.job.requested_by)

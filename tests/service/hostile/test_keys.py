@@ -146,6 +146,37 @@ def test_nothing_is_stored_for_a_key_that_is_revoked_while_the_upload_comes(
         assert not grasp_logs.list_all(session, Window("created_at", descending=True), LogFilter())
 
 
+@pytest.mark.parametrize(
+    ("method", "path", "body"),
+    [
+        ("PATCH", "/v1/materials/paper", {"description": "mine"}),
+        ("POST", "/v1/materials", {"name": "card"}),
+        ("POST", "/v1/materials/paper/fits", {"method": "ols"}),
+        ("POST", "/v1/materials/paper/merges", {"source": "board"}),
+        ("PUT", "/v1/sensors/finger", {"young_modulus": 2e5, "poisson_ratio": 0.48, "thickness": 4e-3}),
+    ],
+)
+def test_nothing_is_changed_by_a_key_that_is_revoked_while_the_request_comes(
+    reach: Reach, make: Make, database: Database, method: str, path: str, body: dict[str, object]
+) -> None:
+    text, content = make("upload"), json.dumps(body).encode()
+    for name in ("paper", "board"):
+        assert reach(key=text).request("POST", "/v1/materials", json={"name": name}).is_success
+
+    async def parts() -> AsyncIterator[bytes]:
+        yield content[:5]
+        with database.write() as session:
+            access_keys.revoke(session, str(keys.key_id(text)))
+        yield content[5:]
+
+    headers = {"Content-Type": "application/json"}
+    answer = reach(key=text).request(method, path, content=parts(), headers=headers)
+    assert (answer.status_code, answer.json()["type"]) == (401, "/problems/invalid-key")
+    with database.read() as session:
+        made = audit.list_all(session, NEWEST, AuditFilter())
+    assert [entry.action for entry in made] == ["material.created"] * 2
+
+
 @pytest.mark.parametrize("expires", [True, False], ids=["expires", "is revoked"])
 def test_who_waits_for_a_job_is_told_nothing_once_the_key_has_ended(
     reach: Reach, make: Make, content: bytes, database: Database, expires: bool
