@@ -2,7 +2,7 @@
 
 import uuid
 
-from sqlalchemy import exists, func, inspect, select, tuple_, update
+from sqlalchemy import and_, exists, func, inspect, select, tuple_, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, aliased, defer
 
@@ -154,6 +154,24 @@ def move(session: Session, source_id: int, target_id: int) -> None:
     is_there = exists().where(there.material_id == target_id, *same)
     moved = update(GraspLogRow).where(GraspLogRow.material_id == source_id, ~is_there).values(material_id=target_id)
     session.execute(moved.execution_options(synchronize_session=False))
+
+
+def lacking_samples_of(session: Session, material_id: int, other_id: int) -> list[str]:
+    """Ids of a material's logs, not withdrawn, that have no samples where the same log of another material has.
+
+    Same by content and detector.
+    """
+    theirs, their_samples, own_samples = aliased(GraspLogRow), aliased(SampleSummaryRow), aliased(SampleSummaryRow)
+    same = (theirs.sha256 == GraspLogRow.sha256, theirs.detector == GraspLogRow.detector)
+    query = (
+        select(GraspLogRow.id)
+        .join(theirs, and_(theirs.material_id == other_id, theirs.withdrawn_at.is_(None), *same))
+        .join(their_samples, and_(their_samples.grasp_log_id == theirs.id, their_samples.count > 0))
+        .outerjoin(own_samples, and_(own_samples.grasp_log_id == GraspLogRow.id, own_samples.count > 0))
+        .where(GraspLogRow.material_id == material_id, GraspLogRow.withdrawn_at.is_(None))
+        .where(own_samples.grasp_log_id.is_(None))
+    )
+    return list(session.scalars(query.order_by(GraspLogRow.id)))
 
 
 def _record(

@@ -101,7 +101,7 @@ def _episodes(folder: Path, data_path: str) -> list[Episode]:
         found = [Episode(int(row["episode_index"]), _file(folder, data_path, row), _task(row)) for row in rows]
     except InvalidInput:
         raise
-    except (pa.ArrowException, OSError, KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+    except (pa.ArrowException, OSError, LookupError, TypeError, ValueError, AttributeError, OverflowError) as error:
         value = f"damaged ({type(error).__name__}: {str(error)[:80]})"
         raise InvalidInput(EPISODES, value, f"a complete table of {', '.join(COLUMNS)}") from error
     if not found:

@@ -121,6 +121,8 @@ class _Columns:
                 raise InvalidInput("episode", chosen, f"a table with a column {EPISODE}")
             return slice(None)
         episodes = self._read("episode", EPISODE)
+        if episodes.ndim != 1:
+            raise InvalidInput("episode", f"a column {EPISODE} of lists", "one number a row")
         present = np.unique(episodes)
         if chosen is None and len(present) == 1:
             return slice(None)

@@ -22,6 +22,9 @@ MILLIMETRE = 1e-3
 REST_TOLERANCE = 1e-4
 """m; a tenth of the marker pitch. In the recordings that ship with the sensor's software it is 0.7 µm at most."""
 
+LARGEST = 2.0**53
+"""Of counters and clocks: up to there each whole number is a number of its own."""
+
 Fields = Mapping[str, NDArray[Any]]
 
 
@@ -93,8 +96,13 @@ def _clock(name: str, array: NDArray[Any]) -> FloatArray:
     allowed = "one strictly increasing number a frame"
     if array.dtype.kind not in "iuf" or array.ndim == 0 or array.size != len(array) or array.size == 0:
         raise InvalidInput(name, f"{array.dtype} of shape {list(array.shape)}", allowed)
-    values = array.reshape(-1).astype(np.float64)
-    wrong = np.flatnonzero(~(np.diff(values) > 0.0))  # NaN is wrong, too
+    with np.errstate(over="ignore"):  # of numbers longer than these
+        values = array.reshape(-1).astype(np.float64)
+    beyond = np.flatnonzero(~(np.abs(values) <= LARGEST))
+    if beyond.size:
+        frame = int(beyond[0])
+        raise InvalidInput(name, f"{values[frame]:.15g} at frame {frame}", f"{allowed}, within ±2⁵³")
+    wrong = np.flatnonzero(~(np.diff(values) > 0.0))
     if wrong.size:
         frame = int(wrong[0]) + 1
         raise InvalidInput(name, f"{values[frame]:.15g} at frame {frame}, after {values[frame - 1]:.15g}", allowed)

@@ -315,6 +315,19 @@ def test_a_merged_material_is_fitted_over_all_its_logs(shop: Shop) -> None:
         curate.merge(shop.context, "paper", "papre")
 
 
+def test_a_log_of_both_counts_once_whichever_of_its_jobs_found_samples(shop: Shop) -> None:
+    shop.ingest("paper", 0)
+    cancelled = shop.store("paper", 1)
+    with shop.database.write() as session:
+        jobs.cancel(session, grasp_logs.get(session, cancelled).job.id, "nobody wants it")
+    shop.ingest("papre", 1)
+    each = shop.model("paper")[1]
+    _, queued = curate.merge(shop.context, "paper", "papre")
+    assert [job.grasp_log_id for job in queued if job.kind == "ingest"] == [cancelled]
+    assert {job.status for job in shop.work()} == {"done"}
+    assert shop.model("paper")[1:] == (2 * each, False)
+
+
 def test_two_merges_against_each_other_leave_one_material(shop: Shop) -> None:
     shop.ingest("a", 0)
     shop.ingest("b", 1)

@@ -215,6 +215,17 @@ def test_an_episode_of_a_lerobot_dataset_is_read(log: GraspLog, write: SimpleNam
         formats.read(path)
 
 
+def test_an_episode_that_is_no_number_is_refused_by_name(
+    robot_log: GraspLog, tmp_path: Path, write: SimpleNamespace
+) -> None:
+    path = write.lerobot(robot_log, tmp_path / "file-000.parquet")
+    table = pq.read_table(path)
+    lists = pa.array([[number, number] for number in table["episode_index"].to_pylist()])
+    pq.write_table(table.set_column(table.column_names.index("episode_index"), "episode_index", lists), path)
+    with pytest.raises(InvalidInput, match="episode is a column episode_index of lists; allowed: one number a row"):
+        formats.read(path, mapping=json.dumps({"episode": 1}))
+
+
 @pytest.mark.parametrize("by", ["columns", "frames"])
 def test_json_is_read_as_columns_or_as_frames(log: GraspLog, write: SimpleNamespace, tmp_path: Path, by: str) -> None:
     path = write.json(log, tmp_path / "log.json")
