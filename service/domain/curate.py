@@ -112,6 +112,7 @@ def begin_epoch(
     """
     with context.database.write() as session:
         material_id = _changeable(session, material, principal)
+        friction_models.lock(session, material_id)  # before the logs, as who withdraws one does
         try:
             withdrawn = grasp_logs.withdraw_before(session, material_id, first_log, because, principal.key_id)
         except NotFound as error:
