@@ -3,10 +3,10 @@
 Presses whose forces are known (benchmarks/gel_scenes.py) are seen by simulated sensors, with depth and in the plane
 alone, in several draws of noise. Each factor is varied against one case (20 × 20 markers on the surface of a layer of
 5 mm, ν 0.49, a sphere, 1 µm of noise): gel and noise, contact, depth of the markers, lattice, and the gel's
-description, which is then wrong. It is also learnt from presses (benchmarks/gel_presses.py). In the plane the normal
-force on a half-space is given. Peers are given the same displacements. Errors are those of resultants, of the field of
-forces on elements, and their growth with noise; how often stated intervals of 95 % hold the truth is told for each
-group.
+description, which is then wrong. It is also learnt from presses (benchmarks/gel_presses.py), and frames are followed as
+they come (benchmarks/gel_stream.py). In the plane the normal force on a half-space is given. Peers are given the same
+displacements. Errors are those of resultants, of the field of forces on elements, and their growth with noise; how
+often stated intervals of 95 % hold the truth is told for each group.
 
 `--export FOLDER` writes the cases on which peers are tried as `.npz`; `--external NAME=FOLDER` scores what another
 method made of them: files of the same names, with `force` [t, n, m, 3] N. Writes forces-GROUP.json, prints a
@@ -29,7 +29,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.ndimage import uniform_filter
 
-from benchmarks import gel_presses
+from benchmarks import gel_presses, gel_stream
 from benchmarks.gel_peers import PEERS, export, imported, made
 from benchmarks.gel_presses import calibrated, calibration_table
 from benchmarks.gel_scenes import CONTACTS, LATTICES, Truth, press, repeated, seen
@@ -54,7 +54,7 @@ PLACE = (0.21, -0.34)
 NORMAL_95 = 1.959964
 STICTION = "stiction"
 GROUPS = ("gel and noise", "contact", "marker depth", "lattice", "wrong description")
-PEERS_GROUP, CALIBRATION_GROUP = "peers", "gel calibration"
+PEERS_GROUP, CALIBRATION_GROUP, STREAM_GROUP = "peers", "gel calibration", "stream"
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,11 +305,19 @@ def calibrate(arguments: argparse.Namespace) -> None:
     write([asdict(each) for each in found], {CALIBRATION_GROUP: text}, arguments, "forces-gel-calibration.json")
 
 
+def follow(arguments: argparse.Namespace) -> None:
+    """Frames as they come, in real time."""
+    found = [gel_stream.measured(*case) for case in gel_stream.CASES]
+    text = gel_stream.stream_table(found)
+    print(f"{STREAM_GROUP}\n\n{text}\n", flush=True)
+    write([asdict(each) for each in found], {STREAM_GROUP: text}, arguments, "forces-stream.json")
+
+
 def main() -> None:
     """Measure, print and write, group by group."""
     parser = options(__doc__)
     parser.add_argument("--draws", type=int, default=5, help="of noise, for each frame")
-    every = (*GROUPS, PEERS_GROUP, CALIBRATION_GROUP)
+    every = (*GROUPS, PEERS_GROUP, CALIBRATION_GROUP, STREAM_GROUP)
     parser.add_argument("--only", nargs="+", choices=every, default=every)
     parser.add_argument("--quick", action="store_true", help="one draw of the smaller lattice alone")
     parser.add_argument("--export", type=Path, help="write the cases for other methods into this folder, and end")
@@ -326,6 +334,9 @@ def main() -> None:
     for group in ("lattice",) if arguments.quick else arguments.only:
         if group == CALIBRATION_GROUP:
             calibrate(arguments)
+            continue
+        if group == STREAM_GROUP:
+            follow(arguments)
             continue
         scores = []
         for case in compared() if group == PEERS_GROUP else cases(group):

@@ -28,8 +28,9 @@ class SlipStream:
     ``position`` [n, m, 3] m at rest, ``element_area`` m². With ``keep`` the frames can be stored as a grasp log of
     ``material`` when they end (``finish``). With ``control``, the settings of a grip controller, each answer has the
     ``command`` of one that runs in the service, and begins with the ``material``'s model unless it is not to be
-    ``known``; frames then need forces. A connection that breaks is taken up again, with the frames that were not
-    answered. Raises ``ConnectionFailed`` with the service's reason where it refuses.
+    ``known``; frames then need forces, or a ``sensor`` whose gel the service knows. A connection that breaks is taken
+    up again, with the frames that were not answered. Raises ``ConnectionFailed`` with the service's reason where it
+    refuses.
     """
 
     def __init__(

@@ -4,6 +4,7 @@ import asyncio
 import logging
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -11,6 +12,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from db.blobs import Spool
 from db.errors import NotFound, StorageUnavailable
+from db.records import Gel
+from db.repositories import sensors
 from service.domain.context import Context
 from service.domain.errors import DomainError, KeyEnded, NoModel
 from service.domain.keys import check_not_ended
@@ -24,6 +27,7 @@ from service.stream.errors import FINISHED, KEY_ENDED, NOT_UNDERSTOOD, REFUSED, 
 from service.stream.messages import (
     DECODE_BINARY,
     DECODE_TEXT,
+    UNNAMED,
     Finish,
     FrameIn,
     Incoming,
@@ -108,7 +112,7 @@ class _Connection:
         if isinstance(first, Open):
             await check_target(self._context, self._upload(first))
             address, model = self._principal.address or "", await self._known(first)
-            return await self._streams.open(first, self._principal.key_id, address, model), []
+            return await self._streams.open(first, self._principal.key_id, address, model, await self._gel(first)), []
         if isinstance(first, Resume):
             session = self._streams.find(first.session, self._principal.key_id)
             return session, session.recent.after(first.last)
@@ -122,6 +126,17 @@ class _Connection:
             known = await self._context.models.get(self._context.database, opening.material, AUTO)
             return await self._context.threads.run(self._principal.share, to_client_model, known.stored)
         return None
+
+    async def _gel(self, opening: Open) -> dict[str, float | None] | None:
+        """Of the sensor, if one is named and described."""
+
+        def find() -> Gel | None:
+            with self._context.database.read() as session:
+                found = sensors.find(session, opening.sensor)
+            return None if found is None else found.gel
+
+        gel = None if opening.sensor == UNNAMED else await self._context.threads.run(self._principal.share, find)
+        return None if gel is None else asdict(gel)
 
     async def _greet(self, session: Session, missed: list[dict[str, Any]]) -> None:
         await self._send({"type": "opened", "session": session.id, "next": session.next})

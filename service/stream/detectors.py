@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +20,7 @@ from service.report.wording import LEVELS
 from service.stream.grip import Grip
 from service.stream.live_frame import pack_frame
 from service.stream.messages import Control
+from service.stream.reconstructing import Reconstructing
 from slipcore import Frame, FrictionSamples, GraspLog, InvalidInput, SlipState, collect_samples
 from slipcore.frames import check_displacement, check_span
 from stiction_client import container
@@ -69,8 +70,8 @@ class Session:
     """A running detector with what it saw: the last frames and answers, all frames if they are ``kept``; and the
     controller of the grip, where one was asked for.
 
-    ``friction`` is what its client is told, ``expected`` what those are who watch it; ``begun``: time of its first
-    frame, s.
+    ``forces`` are reconstructed where its sensor's gel is known and its frames have none. ``friction`` is what its
+    client is told, ``expected`` what those are who watch it; ``begun``: time of its first frame, s.
     """
 
     detector: "SlipDetector"
@@ -80,6 +81,7 @@ class Session:
     room: Room
     kept: list[Frame] | None
     grip: Grip | None = None
+    forces: Reconstructing | None = None
     frames: list[Frame] = field(default_factory=list)
     answers: list[SlipState] = field(default_factory=list)
     until_look: int = WINDOW
@@ -90,6 +92,11 @@ class Session:
     expected: dict[str, float] | None = None
     held_bytes: int = 0
     begun: float | None = None
+
+    @property
+    def all_bytes(self) -> int:
+        """With what its forces take."""
+        return self.held_bytes + (0 if self.forces is None else self.forces.held_bytes)
 
 
 _SESSIONS: dict[str, Session] = {}
@@ -108,10 +115,12 @@ def open_session(
     room: Room,
     control: Control | None = None,
     model: "stiction_client.FrictionModel | None" = None,
+    gel: Mapping[str, float | None] | None = None,
 ) -> None:
     """Begin a session, for which there must be ``room``.
 
-    ``control``: of a grip controller that answers its frames, and begins with ``model`` if there is one. Raises
+    ``control``: of a grip controller that answers its frames, and begins with ``model`` if there is one; ``gel``: of
+    the sensor (``slipcore.forces.Gel.from_json``), by which forces follow where frames have none. Raises
     ``InvalidInput`` for what cannot be a sensor or a controller.
     """
     rows, columns = grid
@@ -123,7 +132,8 @@ def open_session(
     detector, moments = slipcore.SlipDetector(at_rest, area, method), estimators.Moments.empty(area)
     kept: list[Frame] | None = [] if keep else None
     grip = None if control is None else Grip(at_rest, control, model)
-    _SESSIONS[name] = Session(detector, at_rest, area, moments, room, kept, grip, held_bytes=held)
+    forces = None if gel is None else Reconstructing(gel)
+    _SESSIONS[name] = Session(detector, at_rest, area, moments, room, kept, grip, forces, held_bytes=held)
 
 
 def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[str, Any], bytes | None]:
@@ -136,20 +146,23 @@ def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[st
         return session.last[1], None
     frame = _frame(session, given)
     size = 0 if session.kept is None else _kept_bytes(session, frame)
-    state, command = _detected(session, frame)
+    felt, told = _felt(session, frame)
+    state, command = _detected(session, felt)
     session.begun = frame.time if session.begun is None else session.begun
     if session.kept is not None:
         session.kept.append(frame)
         session.held_bytes += size
-    _plan_look(session, frame, state)
+    _plan_look(session, felt, state)
     answer = _answer(session, given.number, state)
+    if told is not None:
+        answer["force"] = told
     if command is not None:
         answer["command"] = command
     session.last = (given.number, answer)
     if not is_shown:
         return answer, None
-    told = answer.get("command", {}).get("normal_force") if given.command is None else given.command
-    return answer, pack_frame(given.number, state, frame.force, told, session.expected)
+    pressed = answer.get("command", {}).get("normal_force") if given.command is None else given.command
+    return answer, pack_frame(given.number, state, felt.force, pressed, session.expected)
 
 
 def _detected(session: Session, frame: Frame) -> tuple[SlipState, dict[str, Any] | None]:
@@ -163,12 +176,26 @@ def _detected(session: Session, frame: Frame) -> tuple[SlipState, dict[str, Any]
         raise
 
 
+def _felt(session: Session, frame: Frame) -> tuple[Frame, dict[str, Any] | None]:
+    """The frame with reconstructed forces where it has none and its sensor's gel is known, and what is told of them."""
+    if session.forces is None:
+        return frame, None
+    if session.begun is None:
+        session.forces.begin(
+            frame, session.position, session.element_area, lambda size: _check_room(size, session.room)
+        )
+    felt, told = session.forces.step(frame)
+    if session.grip is not None and felt.force is None:
+        raise InvalidInput("force", None, f"the elements' forces, for none are reconstructed: {session.forces.refused}")
+    return felt, told
+
+
 def _frame(session: Session, given: PackedFrame) -> Frame:
     """The frame, if a log could have it: one that could not would spoil what is kept."""
     shape, command = session.position.shape, given.command
     if command is not None and not 0.0 <= command <= MOST_COMMAND:
         raise InvalidInput("command", command, f"a normal force of 0 to {MOST_COMMAND:g} N")
-    if session.grip is not None and given.force is None:
+    if session.grip is not None and given.force is None and session.forces is None:
         raise InvalidInput("force", None, "the elements' forces, by which the grip is controlled")
     check_span(given.time if session.begun is None else session.begun, given.time)
     displacement = _array("displacement", given.displacement, shape)
@@ -211,7 +238,7 @@ def _kept_bytes(session: Session, frame: Frame) -> int:
 
 def _check_room(size: int, room: Room) -> None:
     own, others = (
-        sum(each.held_bytes for each in _SESSIONS.values() if (each.room.owner == room.owner) is is_own)
+        sum(each.all_bytes for each in _SESSIONS.values() if (each.room.owner == room.owner) is is_own)
         for is_own in (True, False)
     )
     most = (room.most_bytes - others) // 2
@@ -233,20 +260,26 @@ def _plan_look(session: Session, frame: Frame, state: SlipState) -> None:
         session.until_look = STRIDE
         if session.look is not None:
             wait([session.look])  # where there is so much to do that it is not done yet, frames have to wait, too
-        given = session.frames, session.answers, session.detector.state
+        noise = None if session.forces is None or session.forces.stream is None else session.forces.noise
+        given = session.frames, session.answers, session.detector.state, noise
         session.look = _LOOKS.submit(_look, session, *given)
 
 
-def _look(session: Session, frames: list[Frame], answers: list[SlipState], state: "DetectorState") -> None:
+def _look(
+    session: Session, frames: list[Frame], answers: list[SlipState], state: "DetectorState", noise: float | None
+) -> None:
     try:
-        _find_friction(session, frames, answers, state)
+        _find_friction(session, frames, answers, state, noise)
     except Exception:  # costs the stream this second's friction, and nothing else
         logger.exception("a look for friction failed")
 
 
-def _find_friction(session: Session, frames: list[Frame], answers: list[SlipState], state: "DetectorState") -> None:
-    """The samples since the last look, merged with those before."""
-    samples = collect_samples(_log(session, frames, "", {}), slipcore.collect_history(answers, state))
+def _find_friction(
+    session: Session, frames: list[Frame], answers: list[SlipState], state: "DetectorState", noise: float | None
+) -> None:
+    """The samples since the last look, merged with those before; ``noise`` N of forces that are reconstructed."""
+    options = {} if noise is None else {"force_noise": noise}
+    samples = collect_samples(_log(session, frames, "", {}), slipcore.collect_history(answers, state), **options)
     end = frames[-1].time  # which has no next frame yet, so it is the next look's
     new = (samples.time >= session.looked_until) & (samples.time < end)
     session.looked_until = end

@@ -18,6 +18,10 @@ Number = Annotated[int, msgspec.Meta(ge=-(2**53), le=2**53)]
 """An integer that every JSON library keeps as it is."""
 
 
+UNNAMED = "stream"
+"""The sensor of a stream that names none."""
+
+
 class Control(msgspec.Struct, forbid_unknown_fields=True):
     """A grip controller that answers each frame: the contact of its fingertip, and its ``settings`` by name.
 
@@ -42,7 +46,7 @@ class Open(msgspec.Struct, tag="open", tag_field="type", forbid_unknown_fields=T
     grid: tuple[Number, Number]
     element_area: float
     detector: str = "filter"
-    sensor: str = "stream"
+    sensor: str = UNNAMED
     material: str | None = None
     keep: bool = False
     control: Control | None = None

@@ -3,7 +3,7 @@
 import asyncio
 import uuid
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -92,9 +92,14 @@ class Streams:
         self._turns = PatientQueue(FRAMES_AT_ONCE, "detected", share=FRAMES_OF_ONE)
 
     async def open(
-        self, opening: Open, key_id: str | None, address: str, model: "FrictionModel | None" = None
+        self,
+        opening: Open,
+        key_id: str | None,
+        address: str,
+        model: "FrictionModel | None" = None,
+        gel: Mapping[str, float | None] | None = None,
     ) -> Session:
-        """A new session; ``model``: what a grip controller that was asked for begins with.
+        """A new session; ``model``: what a grip controller that was asked for begins with; ``gel``: of its sensor.
 
         Raises ``InvalidInput`` for what cannot be a sensor or a controller, ``End`` where there are too many.
         """
@@ -105,7 +110,7 @@ class Streams:
         try:
             await self.call(
                 detectors.open_session, session.id, position, opening.grid, opening.element_area, opening.detector,
-                opening.keep, detectors.Room(session.owner, self._most_bytes), opening.control, model,
+                opening.keep, detectors.Room(session.owner, self._most_bytes), opening.control, model, gel,
             )  # fmt: skip
         except BaseException:
             self._forget(session)

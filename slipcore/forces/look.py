@@ -65,6 +65,11 @@ class Insight:
     time: float = 0.0
     size: float = 0.0
 
+    @property
+    def is_ready(self) -> bool:
+        """Whether all is made that is made before a touch."""
+        return self.prepared is not None or not self.sensor.sees_depth
+
     def untouched(self) -> "Insight":
         """Of the sensor alone."""
         return Insight(self.sensor, self.prepared)

@@ -85,6 +85,8 @@ class ForceStream:
         if self._insight is None:
             return self._none("set-up")
         self._seek(self._insight, frame)
+        if not self._insight.is_ready:
+            return self._none("set-up")
         if not self._touched:
             return self._none()
         reader = self._insight.reader

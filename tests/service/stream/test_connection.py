@@ -138,6 +138,20 @@ def test_a_grip_controller_answers_and_begins_with_the_material_s_model(served: 
     assert modes == {("gripped", True): "hold", ("gripped", False): "feel", (None, True): "feel"}
 
 
+def test_a_sensor_whose_gel_is_known_needs_no_forces(served: Served, ramp: GraspLog) -> None:
+    settings = ControlSettings(contact=Contact.round(6e-5, at_force=5.0), least_force=0.5, most_force=30.0)
+    with FrictionClient(served.url) as client, served.connect() as before:
+        ask(before, opening(ramp, sensor="gel"))
+        client.describe_sensor("gel", 1e6, 0.5)
+        assert "force" not in ask(before, frame(ramp, 0, force=None))  # as it was when the stream was opened
+        with SlipStream(served.url, ramp.position, ramp.element_area, sensor="gel", control=settings) as live:
+            answers = [live.step(ramp.time[k], ramp.displacement[k]) for k in range(3)]
+        assert [answer["force"]["wait_for"] for answer in answers] == ["noise"] * 3
+        assert all(answer["command"]["normal_force"] >= 0.5 for answer in answers)
+        with SlipStream(served.url, ramp.position, ramp.element_area, sensor="gel") as live:
+            assert "force" not in live.step(ramp.time[0], ramp.displacement[0], ramp.force[0])
+
+
 def test_a_session_goes_on_after_a_reconnect(served: Served, ramp: GraspLog) -> None:
     history = detect_slip(ramp)
     live = SlipStream(served.url, ramp.position, ramp.element_area)

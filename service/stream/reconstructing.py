@@ -1,0 +1,95 @@
+"""Forces of a live stream whose frames have none, by the gel of its sensor."""
+
+import logging
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipcore import Frame, InvalidInput
+
+if TYPE_CHECKING:
+    from slipcore.forces import ForceStream, StreamedForces
+
+logger = logging.getLogger(__name__)
+
+MOST_MARKERS = 512
+"""Whose forces are reconstructed: to set up as many takes seconds of a core, and some 200 MB for a moment."""
+
+_LOOKS = ThreadPoolExecutor(1)
+"""Sets streams up and looks for their contacts, one after the other, so that frames need not wait for them."""
+
+
+@dataclass(slots=True)
+class Reconstructing:
+    """Forces of one session, by its sensor's ``gel`` (``slipcore.forces.Gel.from_json``).
+
+    The first frame decides: with forces in it none are reconstructed, else there is a ``stream`` of them, or it is
+    ``refused`` with this reason. ``noise`` N of normal forces on elements in contact, as of the last frame with any.
+    """
+
+    gel: Mapping[str, float | None]
+    stream: "ForceStream | None" = None
+    refused: str | None = None
+    noise: float = 0.0
+
+    @property
+    def held_bytes(self) -> int:
+        """What the stream takes."""
+        return 0 if self.stream is None else self.stream.held_bytes
+
+    def begin(
+        self, frame: Frame, position: NDArray[np.float64], area: float, check_room: Callable[[int], None]
+    ) -> None:
+        """Decide by the first frame, of which nothing is computed yet; ``check_room`` raises ``InvalidInput``."""
+        if frame.force is not None:
+            self.stream = self.refused = None
+            return
+        if self.stream is not None:  # the frame before was refused
+            return
+        from slipcore.forces import ForceStream, Gel  # few streams need it, and the server's process never
+
+        count = position.shape[0] * position.shape[1]
+        try:
+            if count > MOST_MARKERS:
+                raise InvalidInput("grid", f"{count} markers", f"at most {MOST_MARKERS}")
+            stream = ForceStream(position, area, Gel.from_json(self.gel), executor=_LOOKS)
+            check_room(stream.held_bytes)
+        except InvalidInput as error:
+            self.refused = f"{error.name} is {error.value}; allowed: {error.allowed}"
+        else:
+            self.stream = stream
+
+    def step(self, frame: Frame) -> tuple[Frame, dict[str, Any] | None]:
+        """The frame with forces, and what its client is told of them; raises ``InvalidInput``."""
+        if (frame.force is None) != (self.stream is not None or self.refused is not None):
+            raise InvalidInput("force", "missing" if frame.force is None else "given", "in every frame or in none")
+        if self.refused is not None:
+            return frame, {"source": "none", "reason": self.refused}
+        if self.stream is None:
+            return frame, None
+        found = self._found(self.stream, frame)
+        forces, touching = found.forces, found.forces.contact
+        if touching.any():
+            self.noise = float(np.median(forces.deviation[..., 2][touching]))
+        told = {
+            "source": "reconstructed",
+            "resultant": forces.resultant.tolist(),
+            "deviation": forces.resultant_deviation.tolist(),
+            "age": found.age,
+            "wait_for": found.wait_for,
+        }
+        normal = np.broadcast_to([0.0, 0.0, 1.0], forces.force.shape)  # loads act on the undeformed plane
+        return frame._replace(force=forces.force, normal=normal), told
+
+    def _found(self, stream: "ForceStream", frame: Frame) -> "StreamedForces":
+        try:
+            return stream.step(frame.time, frame.displacement)
+        except InvalidInput:
+            raise
+        except Exception:  # of a look beside the frames, which costs the stream that look
+            logger.exception("a look for the contact failed")
+            return stream.step(frame.time, frame.displacement)

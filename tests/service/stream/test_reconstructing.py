@@ -1,0 +1,143 @@
+"""Forces of live streams whose frames have none, without the process and the network around them."""
+
+from collections.abc import Iterator
+from concurrent.futures import Executor, Future
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from service.formats import read
+from service.stream import detectors, reconstructing
+from service.stream.detectors import PackedFrame
+from service.stream.messages import Control
+from slipcore import FrictionSamples, GraspLog, InvalidInput, collect_samples, detect_slip
+
+GEL = {"young_modulus": 1e6, "poisson_ratio": 0.5, "thickness": None, "marker_depth": 0.0}
+"""What the ramp is pressed on."""
+ROOM = detectors.Room("me", 2**30)
+GRIP = Control(6e-5, {"least_force": 0.5, "most_force": 30.0}, round_at=5.0)
+
+
+class AtOnce(Executor):
+    """So that answers are the same each time."""
+
+    def submit(self, do: Any, /, *_: Any, **__: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(do())
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+@pytest.fixture(autouse=True)
+def _at_once(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.setattr(reconstructing, "_LOOKS", AtOnce())
+    yield
+    detectors.drop("one")
+
+
+def opened(log: GraspLog, **said: Any) -> detectors.Session:
+    options = {"keep": False, "room": ROOM, "gel": GEL} | said
+    detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", **options)
+    return detectors._SESSIONS["one"]
+
+
+def frame(log: GraspLog, k: int, *, force: bool = False, **changes: Any) -> PackedFrame:
+    assert log.force is not None
+    given = log.force[k].tobytes() if force else None
+    return PackedFrame(k, float(log.time[k]), log.displacement[k].tobytes(), given)._replace(**changes)
+
+
+def fed(log: GraspLog) -> list[dict[str, Any]]:
+    return [detectors.step("one", frame(log, k))[0] for k in range(len(log))]
+
+
+def test_forces_slip_samples_and_commands_follow_from_displacement(
+    ramp: GraspLog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert ramp.force is not None
+    found: list[FrictionSamples] = []
+
+    def collected(*arguments: Any, **options: float) -> FrictionSamples:
+        assert 1e-3 < options["force_noise"] < 1e-2
+        found.append(collect_samples(*arguments))
+        return found[-1]
+
+    monkeypatch.setattr(detectors, "collect_samples", collected)
+    session = opened(ramp, control=GRIP)
+    answers = [detectors.step("one", frame(ramp, k))[0] for k in range(len(ramp))]
+    assert [answer["force"]["wait_for"] for answer in answers[:14]] == ["noise"] * 14
+    history = detect_slip(ramp)
+    for k in (40, 60, 80):
+        told = answers[k]["force"]
+        assert told["source"] == "reconstructed"
+        assert told["age"] < 0.5
+        np.testing.assert_allclose(told["resultant"], ramp.force[k].sum(axis=(0, 1)), atol=0.5)
+        assert answers[k]["stick_ratio"] == pytest.approx(history.stick_ratio[k], abs=0.1)
+    assert answers[-1]["command"]["normal_force"] > 0.5
+    assert session.look is not None
+    session.look.result()
+    assert np.median(found[-1].friction_coefficient) == pytest.approx(0.4, rel=0.05)
+
+
+def test_a_kept_log_is_stored_without_them_for_its_job_finds_better_ones(ramp: GraspLog, tmp_path: Path) -> None:
+    opened(ramp, keep=True)
+    for k in range(2):
+        assert detectors.step("one", frame(ramp, k))[0]["force"]["wait_for"] == "noise"
+    detectors.write("one", tmp_path / "log.npz", "gel sensor")
+    log = read(tmp_path / "log.npz")
+    assert log.force is None
+    assert log.normal is None
+    assert log.sensor == "gel sensor"
+
+
+def test_frames_have_forces_all_or_none_by_the_first_one_that_is_taken(ramp: GraspLog) -> None:
+    session = opened(ramp)
+    detectors.step("one", frame(ramp, 0))
+    assert session.all_bytes > session.held_bytes
+    with pytest.raises(InvalidInput, match="force is given; allowed: in every frame or in none"):
+        detectors.step("one", frame(ramp, 1, force=True))
+    assert detectors.step("one", frame(ramp, 2))[0]["force"]["source"] == "reconstructed"
+    detectors.drop("one")
+    session = opened(ramp)
+    with pytest.raises(InvalidInput, match="object_pose"):
+        detectors.step("one", frame(ramp, 0, object_pose=[np.nan] * 3))
+    assert "force" not in detectors.step("one", frame(ramp, 1, force=True))[0]
+    assert session.all_bytes == session.held_bytes
+    with pytest.raises(InvalidInput, match="force is missing; allowed: in every frame or in none"):
+        detectors.step("one", frame(ramp, 2))
+
+
+def test_without_room_or_with_too_many_markers_there_are_none_and_it_says_why(
+    ramp: GraspLog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened(ramp, room=detectors.Room("me", 3 * 2**20))
+    assert "bytes is" in detectors.step("one", frame(ramp, 0))[0]["force"]["reason"]
+    monkeypatch.setattr(reconstructing, "MOST_MARKERS", 100)
+    opened(ramp)
+    for k in range(2):
+        answer = detectors.step("one", frame(ramp, k))[0]
+        assert answer["force"] == {"source": "none", "reason": "grid is 196 markers; allowed: at most 100"}
+        assert answer["contact"] == 0
+    opened(ramp, control=GRIP)
+    with pytest.raises(InvalidInput, match="none are reconstructed: grid is 196 markers"):
+        detectors.step("one", frame(ramp, 0))
+    assert "command" in detectors.step("one", frame(ramp, 0, force=True))[0]
+
+
+def test_a_look_that_fails_costs_the_stream_that_look(
+    ramp: GraspLog, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    opened(ramp)
+    done = AtOnce.submit
+
+    def fails_once(self: AtOnce, _: Any) -> Future[Any]:
+        monkeypatch.setattr(AtOnce, "submit", done)
+        return done(self, lambda: 1 / 0)
+
+    monkeypatch.setattr(AtOnce, "submit", fails_once)
+    assert detectors.step("one", frame(ramp, 0))[0]["force"]["wait_for"] == "noise"
+    assert "a look for the contact failed" in caplog.text
