@@ -403,6 +403,24 @@ def test_who_changes_a_log_waits_for_a_merge_with_nothing_locked(
         assert len(detections.samples_of_material(session, target)) == counted
 
 
+def test_an_epoch_waits_for_who_withdraws_a_log_with_nothing_locked(shop: Shop) -> None:
+    log_id = shop.ingest("a", 0)
+    ends: list[object] = []
+
+    def begin() -> None:
+        ends.append(curate.begin_epoch(shop.context, "a", "wet", None)[1])
+
+    thread = Thread(target=begin)
+    with shop.database.write() as session:
+        materials.hold_of_log(session, log_id)
+        thread.start()
+        thread.join(timeout=0.3)  # it is at the material now, which is ours
+        assert thread.is_alive()
+        grasp_logs.withdraw(session, log_id, "torn")
+    thread.join()
+    assert ends == [0]
+
+
 def materials_of(shop: Shop) -> set[int]:
     with shop.database.read() as session:
         return {materials.find_id(session, name) for name in ("a", "b")}

@@ -99,6 +99,15 @@ def test_episodes_may_be_in_several_files(folder: Path, logs: list[GraspLog]) ->
     np.testing.assert_array_equal(back.time, logs[2].time)
 
 
+def test_episodes_without_end_are_refused_by_name(folder: Path) -> None:
+    episodes = pq.read_table(folder / EPISODES)
+    numbers = pa.array([0.0, 1.0, np.inf])
+    place = episodes.column_names.index("episode_index")
+    pq.write_table(episodes.set_column(place, "episode_index", numbers), folder / EPISODES)
+    with pytest.raises(InvalidInput, match="OverflowError"):
+        formats.episodes_of(folder)
+
+
 def test_rows_of_other_episodes_are_left_unread(
     exported: Path, logs: list[GraspLog], monkeypatch: pytest.MonkeyPatch
 ) -> None:

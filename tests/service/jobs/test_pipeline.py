@@ -1,6 +1,7 @@
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
+from threading import Thread
 from types import ModuleType
 from typing import Any, cast
 
@@ -416,6 +417,32 @@ def test_models_say_so_that_lack_the_samples_of_a_job_that_made_none(
     log = shop.log(log_id)
     assert (log.job.status, log.samples is None) == (status, False)
     assert {stored.outdated for stored in shop.material().models} == {True}
+
+
+def test_models_lack_samples_that_were_being_stored_when_the_job_was_cancelled(
+    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Who cancels then waits for the worker's transaction, and must see what that has stored."""
+    shop.run(shop.ingest(content)[1])
+    log_id, job_id = shop.ingest(content + b"\0")
+    cancelling, add = Thread(target=cancel, args=(shop, job_id)), detections.add
+
+    def add_meanwhile(*given: Any) -> None:
+        add(*given)
+        cancelling.start()
+        cancelling.join(timeout=0.3)
+        assert cancelling.is_alive()
+
+    monkeypatch.setattr(detections, "add", add_meanwhile)
+    with suppress(ClaimLost):
+        shop.run(job_id)
+    cancelling.join()
+    log = shop.log(log_id)
+    if log.job.status == "cancelled":  # on SQLite the job may be done before the other gets the lock
+        assert log.samples is not None
+        assert {stored.outdated for stored in shop.material().models} == {True}
+    else:
+        assert {(stored.version, stored.outdated) for stored in shop.material().models} == {(2, False)}
 
 
 def test_a_model_by_a_method_that_cannot_fit_all_samples_is_outdated(
