@@ -127,12 +127,14 @@ class BlobStore:
         return self._remote is not None
 
     def has_within(self, folder: Path) -> bool:
-        """Whether a folder is, or is to be, among the store's own files, or one whose blobs these are."""
+        """Whether a folder is among the store's own files, or its blobs are the store's or have these among them."""
         own = [part.resolve() for part in (self._blobs, self._spool, self._set_aside)]
         its_own = folder / self._blobs.name
         if its_own.exists() and its_own.samefile(self._blobs):  # by another mount
             return True
-        return any(place.is_relative_to(part) for part in own for place in (folder.resolve(), its_own.resolve()))
+        there = its_own.resolve()
+        among = any(place.is_relative_to(part) for part in own for place in (folder.resolve(), there))
+        return among or any(part.is_relative_to(there) for part in own)
 
     def spool(self) -> Spool:
         """A new file to write to; use it in a ``with`` statement."""

@@ -68,6 +68,11 @@ def still(session: Session, material_id: int) -> int:
     return still(session, merged_into)
 
 
+def merged_into(session: Session, material_id: int) -> int | None:
+    """The material that this one was merged into, if it was."""
+    return session.scalar(select(MaterialRow.merged_into_id).where(MaterialRow.id == material_id))
+
+
 def hold(session: Session, name: str) -> int:
     """The key of the material of this name or alias, which nobody merges until the transaction ends.
 

@@ -177,13 +177,18 @@ def _changeable(session: Session, material: str, principal: Principal) -> int:
 
 
 def _material_to_change(session: Session, log_id: str, principal: Principal) -> int | None:
-    """The key of a log's material, if it has one, held; a log without material is for admins to change."""
+    """The key of the material in whose fits a log counts or may count, held; of none, the log is for admins to change.
+
+    A copy that a merge left behind counts in no fit, and whose the merged material is now may change it.
+    """
     material_id = materials.hold_of_log(session, log_id)
-    if material_id is not None:
-        check_may_change(session, material_id, principal)
+    merged_into = None if material_id is None else materials.merged_into(session, material_id)
+    belongs_to = merged_into or material_id
+    if belongs_to is not None:
+        check_may_change(session, belongs_to, principal)
     elif not principal.is_admin:
         raise InsufficientScope("upload", "admin")
-    return material_id
+    return None if merged_into else material_id
 
 
 def _refit_without(session: Session, material_id: int | None, key_id: str | None) -> list[Job]:

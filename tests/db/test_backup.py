@@ -128,6 +128,8 @@ def test_a_backup_whose_blobs_are_the_services_own_is_refused_either_way(
     backup(filled, blobs, tmp_path / "copy", nothing)
     with pytest.raises(NotEmpty, match="allowed: a data folder other than the backup's"):
         restore(tmp_path / "copy", other, BlobStore(tmp_path / "copy"), nothing)
+    with pytest.raises(NotEmpty, match="allowed: a data folder other than the backup's"):
+        restore(tmp_path / "copy", other, BlobStore(tmp_path / "copy" / "blobs" / "data"), nothing)
     restore(tmp_path / "copy", other, BlobStore(tmp_path / "again"), nothing)
 
 

@@ -14,12 +14,13 @@ from db.database import Database
 from db.errors import NotFound
 from db.paging import Window
 from db.records import AuditFilter, Claim, Job, NewGraspLog
-from db.repositories import audit, detections, grasp_logs, jobs, materials, runners
+from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, owners, runners
 from db.tables import MaterialRow
 from service.domain import curate
 from service.domain.context import Context
-from service.domain.errors import DomainError, InvalidValue, NoModel
+from service.domain.errors import DomainError, InvalidValue, NoModel, NotOwner
 from service.domain.look_up import Friction, Question, look_up
+from service.domain.principal import Principal
 from service.jobs import pipeline
 from service.settings import Settings
 from slipcore import Finding
@@ -326,6 +327,27 @@ def test_a_log_of_both_counts_once_whichever_of_its_jobs_found_samples(shop: Sho
     assert [job.grasp_log_id for job in queued if job.kind == "ingest"] == [cancelled]
     assert {job.status for job in shop.work()} == {"done"}
     assert shop.model("paper")[1:] == (2 * each, False)
+
+
+def test_a_copy_that_a_merge_left_behind_is_changed_by_the_owners_of_what_it_is_now(shop: Shop) -> None:
+    for name, number in (("paper", 0), ("papre", 0)):
+        left_behind = shop.ingest(name, number)
+    with shop.database.write() as session:
+        of_both = [materials.find_id(session, name) for name in ("paper", "papre")]
+        for material_id, owner in zip(of_both, ("group:new", "group:old"), strict=True):
+            owners.add(session, material_id, owner)
+    curate.merge(shop.context, "paper", "papre")
+    shop.work()
+    before = shop.model("paper")
+    old, new = (Principal(group=name, is_admin=False) for name in ("old", "new"))
+    with pytest.raises(NotOwner):
+        curate.withdraw(shop.context, left_behind, "mine", old)
+    log, queued = curate.withdraw(shop.context, left_behind, "wet", new)
+    assert (log.withdrawal is not None, queued) == (True, [])
+    assert curate.restore(shop.context, left_behind, new)[1] == []
+    assert shop.model("paper") == before
+    with shop.database.read() as session:
+        assert friction_models.current_methods(session, [of_both[1]]) == []
 
 
 def test_two_merges_against_each_other_leave_one_material(shop: Shop) -> None:
