@@ -213,7 +213,7 @@ class _Connection:
             frame.command,
         )
         is_shown = session.broadcast.wants(asyncio.get_running_loop().time())
-        return await self._streams.ask(session, detectors.step, given, is_shown)
+        return await self._streams.detect(session, given, is_shown)
 
     async def _finish(self, session: Session, message: Finish) -> dict[str, Any]:
         """Store the kept frames through the same door as an upload; until the answer is there it may be said again."""

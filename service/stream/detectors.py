@@ -3,7 +3,7 @@
 import logging
 import math
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,6 +16,7 @@ import slipcore
 from db.blobs import disk_errors_named
 from estimators.errors import EstimatorError
 from service.formats.reading import Description, describe
+from service.processes.fair_executor import FairExecutor
 from service.report.wording import LEVELS
 from service.stream.grip import Grip
 from service.stream.live_frame import pack_frame
@@ -101,8 +102,12 @@ class Session:
 
 _SESSIONS: dict[str, Session] = {}
 
-_LOOKS = ThreadPoolExecutor(1)
+_LOOKS = FairExecutor()
 """Does the looks for friction, so that frames need not wait for them."""
+
+
+class StillLooking(Exception):
+    """A session's next look for friction is due, and its last one not done: the frame may come again in a moment."""
 
 
 def open_session(
@@ -132,18 +137,21 @@ def open_session(
     detector, moments = slipcore.SlipDetector(at_rest, area, method), estimators.Moments.empty(area)
     kept: list[Frame] | None = [] if keep else None
     grip = None if control is None else Grip(at_rest, control, model)
-    forces = None if gel is None else Reconstructing(gel)
+    forces = None if gel is None else Reconstructing(gel, room.owner)
     _SESSIONS[name] = Session(detector, at_rest, area, moments, room, kept, grip, forces, held_bytes=held)
 
 
 def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[str, Any], bytes | None]:
-    """Take a frame; the answer, and what those who watch see of it if it ``is_shown``. Raises ``InvalidInput``.
+    """Take a frame; the answer, and what those who watch see of it if it ``is_shown``.
 
-    The same frame again is answered as before.
+    The same frame again is answered as before. Raises ``InvalidInput``, and ``StillLooking`` where frames come faster
+    than they can be looked at: nothing is changed then.
     """
     session = _SESSIONS[name]
     if given.number == session.last[0]:
         return session.last[1], None
+    if session.until_look == 1 and session.look is not None and not session.look.done():
+        raise StillLooking
     frame = _frame(session, given)
     size = 0 if session.kept is None else _kept_bytes(session, frame)
     felt, told = _felt(session, frame)
@@ -222,8 +230,14 @@ def write(name: str, target: Path, sensor: str) -> Description:
 
 
 def drop(name: str) -> None:
-    """Forget a session."""
-    _SESSIONS.pop(name, None)
+    """Forget a session, and what was to be looked for in it."""
+    session = _SESSIONS.pop(name, None)
+    if session is None:
+        return
+    if session.look is not None:
+        session.look.cancel()
+    if session.forces is not None:
+        session.forces.end()
 
 
 def _kept_bytes(session: Session, frame: Frame) -> int:
@@ -258,11 +272,9 @@ def _plan_look(session: Session, frame: Frame, state: SlipState) -> None:
     session.until_look -= 1
     if session.until_look == 0:
         session.until_look = STRIDE
-        if session.look is not None:
-            wait([session.look])  # where there is so much to do that it is not done yet, frames have to wait, too
         noise = None if session.forces is None or session.forces.stream is None else session.forces.noise
         given = session.frames, session.answers, session.detector.state, noise
-        session.look = _LOOKS.submit(_look, session, *given)
+        session.look = _LOOKS.of(session.room.owner).submit(_look, session, *given)
 
 
 def _look(

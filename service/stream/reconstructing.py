@@ -2,13 +2,13 @@
 
 import logging
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from service.processes.fair_executor import FairExecutor
 from slipcore import Frame, InvalidInput
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ logger = logging.getLogger(__name__)
 MOST_MARKERS = 512
 """Whose forces are reconstructed: to set up as many takes seconds of a core, and some 200 MB for a moment."""
 
-_LOOKS = ThreadPoolExecutor(1)
+_LOOKS = FairExecutor()
 """Sets streams up and looks for their contacts, one after the other, so that frames need not wait for them."""
 
 
@@ -28,10 +28,12 @@ class Reconstructing:
     """Forces of one session, by its sensor's ``gel`` (``slipcore.forces.Gel.from_json``).
 
     The first frame decides: with forces in it none are reconstructed, else there is a ``stream`` of them, or it is
-    ``refused`` with this reason. ``noise`` N of normal forces on elements in contact, as of the last frame with any.
+    ``refused`` with this reason. Its contacts are sought in turns with those of other ``owner``s. ``noise`` N of normal
+    forces on elements in contact, as of the last frame with any.
     """
 
     gel: Mapping[str, float | None]
+    owner: str
     stream: "ForceStream | None" = None
     refused: str | None = None
     noise: float = 0.0
@@ -56,12 +58,17 @@ class Reconstructing:
         try:
             if count > MOST_MARKERS:
                 raise InvalidInput("grid", f"{count} markers", f"at most {MOST_MARKERS}")
-            stream = ForceStream(position, area, Gel.from_json(self.gel), executor=_LOOKS)
+            stream = ForceStream(position, area, Gel.from_json(self.gel), executor=_LOOKS.of(self.owner))
             check_room(stream.held_bytes)
         except InvalidInput as error:
             self.refused = f"{error.name} is {error.value}; allowed: {error.allowed}"
         else:
             self.stream = stream
+
+    def end(self) -> None:
+        """Give up what has not begun."""
+        if self.stream is not None:
+            self.stream.close()
 
     def step(self, frame: Frame) -> tuple[Frame, dict[str, Any] | None]:
         """The frame with forces, and what its client is told of them; raises ``InvalidInput``."""

@@ -29,6 +29,9 @@ PATIENCE = 60.0
 FRAMES_AT_ONCE, FRAMES_OF_ONE = 4, 2
 """With the detectors' process, which does one after the other: one is done while the next one of an owner is sent."""
 
+LEAST_PAUSE, MOST_PAUSE = 0.005, 0.1
+"""s until a frame that came too fast is tried again."""
+
 ANSWERS_KEPT, ANSWER_BYTES_KEPT = 256, 256 * 1024
 """Answers that a client who comes back may have missed; fewer where many elements slip."""
 
@@ -186,6 +189,21 @@ class Streams:
         """Do something with a session's detector when it is its owner's turn; raises ``End`` as ``call`` does."""
         async with self._turns.turn(session.owner):
             return await self.call(do, session.id, *arguments)
+
+    async def detect(
+        self, session: Session, frame: detectors.PackedFrame, is_shown: bool
+    ) -> tuple[dict[str, Any], bytes | None]:
+        """The answer to a frame and what watchers see of it; raises ``InvalidInput``, and ``End`` as ``call`` does.
+
+        A frame that comes faster than the last ones are looked at waits, and no other session with it.
+        """
+        pause = LEAST_PAUSE
+        while True:
+            try:
+                return await self.ask(session, detectors.step, frame, is_shown)
+            except detectors.StillLooking:
+                await asyncio.sleep(pause)
+                pause = min(2.0 * pause, MOST_PAUSE)
 
     async def call(self, do: Callable[..., Result], *arguments: Any) -> Result:
         """Do something in the worker; raises ``End`` where it died, and all detectors with it."""

@@ -95,6 +95,11 @@ class ForceStream:
         n, m = self._position.shape[:2]
         return StreamedForces(reader.read(frame.data, (n, m)), time - self._insight.time)
 
+    def close(self) -> None:
+        """Give up the look for a contact that waits for its executor, if one does: no more frames come."""
+        if self._look is not None:
+            self._look[1].cancel()
+
     def _checked(
         self, time: float, displacement: ArrayLike, observed: ArrayLike | None
     ) -> tuple[FloatArray, BoolArray | None]:

@@ -154,6 +154,30 @@ def test_a_frame_waits_for_two_of_another_however_many_that_sends(
     run(go)
 
 
+def test_a_frame_that_comes_faster_than_it_is_looked_at_waits_and_nobody_with_it(
+    make: Callable[..., Streams], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def go() -> None:
+        streams = make()
+        fast, honest = [await streams.open(opening(), owner, "") for owner in ("fast", "honest")]
+        asked: list[str] = []
+
+        async def call(_: object, name: str, *_given: object) -> str:
+            asked.append(name)
+            if name == fast.id and asked.count(name) < 3:
+                raise detectors.StillLooking
+            return name
+
+        monkeypatch.setattr(streams, "call", call)
+        frame = PackedFrame(0, 0.0, b"")
+        found = await asyncio.gather(*(streams.detect(each, frame, False) for each in (fast, honest)))
+        assert found == [fast.id, honest.id]
+        assert asked == [fast.id, honest.id, fast.id, fast.id]
+        monkeypatch.undo()
+
+    run(go)
+
+
 def test_answers_kept_for_a_return_are_bounded_in_bytes() -> None:
     recent = sessions.RecentAnswers()
     for number in range(300):

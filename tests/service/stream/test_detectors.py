@@ -2,12 +2,15 @@
 
 import json
 import struct
+from contextlib import suppress
+from threading import Event
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from service.processes.fair_executor import FairExecutor
 from service.stream import detectors
 from service.stream.detectors import PackedFrame
 from slipcore import GraspLog, InvalidInput, collect_samples, detect_slip
@@ -23,14 +26,30 @@ def unpacked(content: bytes) -> tuple[dict[str, Any], NDArray[np.uint8]]:
     return header, np.frombuffer(content, np.uint8, state["length"], 4 + length + state["offset"])
 
 
+def whole_frame(log: GraspLog, k: int) -> PackedFrame:
+    assert log.force is not None
+    return PackedFrame(k, float(log.time[k]), log.displacement[k].tobytes(), log.force[k].tobytes())
+
+
+def step(given: PackedFrame, *, is_shown: bool = False) -> tuple[dict[str, Any], bytes | None]:
+    """What the session says, once it has looked at the frames before."""
+    with suppress(detectors.StillLooking):
+        return detectors.step("one", given, is_shown)
+    session = detectors._SESSIONS["one"]
+    before = session.detector.state, session.until_look, session.last
+    assert session.look is not None
+    session.look.result()
+    assert (session.detector.state, session.until_look, session.last) == before
+    return detectors.step("one", given, is_shown)
+
+
 def feed(log: GraspLog, *, wait: bool) -> dict[str, object] | None:
     """All frames, with time for the looks between them or only at their end; the friction that was found."""
-    assert log.force is not None
     position = log.position.tobytes()
     detectors.open_session("one", position, log.grid, log.element_area, "filter", keep=False, room=ROOM)
     session = detectors._SESSIONS["one"]
-    for k, time in enumerate(log.time.tolist()):
-        detectors.step("one", PackedFrame(k, time, log.displacement[k].tobytes(), log.force[k].tobytes()))
+    for k in range(len(log)):
+        step(whole_frame(log, k))
         if wait and session.look is not None:
             session.look.result()
     assert session.look is not None
@@ -75,7 +94,7 @@ def test_who_watches_sees_each_element_the_forces_and_the_command(ramp: GraspLog
         arrays = (ramp.displacement, ramp.force, ramp.object_pose, ramp.normal)
         given = [None if array is None else array[k].tobytes() for array in arrays]
         frame = PackedFrame(k, time, *given, command=2.5)  # type: ignore[arg-type]
-        answer, content = detectors.step("one", frame, is_shown=True)
+        answer, content = step(frame, is_shown=True)
         assert content is not None
         header, state = unpacked(content)
         np.testing.assert_array_equal(state.reshape(ramp.grid) == 2, (history.slip & history.contact)[k])
@@ -102,3 +121,20 @@ def test_a_command_that_is_no_force_is_refused_before_the_frame_is_taken(ramp: G
         detectors.step("one", frame)
     assert detectors.step("one", frame._replace(command=None))[0]["type"] == "state"
     detectors.drop("one")
+
+
+def test_who_goes_takes_the_looks_along_that_have_not_begun(ramp: GraspLog, monkeypatch: pytest.MonkeyPatch) -> None:
+    executor, may_go = FairExecutor(), Event()
+    monkeypatch.setattr(detectors, "_LOOKS", executor)
+    executor.of("another").submit(may_go.wait, 30.0)
+    detectors.open_session("one", ramp.position.tobytes(), ramp.grid, ramp.element_area, "filter", False, ROOM)
+    session = detectors._SESSIONS["one"]
+    due = detectors.WINDOW + detectors.STRIDE - 1
+    for k in range(due):
+        detectors.step("one", whole_frame(ramp, k))
+    with pytest.raises(detectors.StillLooking):
+        detectors.step("one", whole_frame(ramp, due))
+    detectors.drop("one")
+    assert session.look is not None
+    assert session.look.cancelled()
+    may_go.set()

@@ -1,6 +1,5 @@
 """Forces of live streams whose frames have none, without the process and the network around them."""
 
-from collections.abc import Iterator
 from concurrent.futures import Executor, Future
 from pathlib import Path
 from typing import Any
@@ -14,29 +13,12 @@ from service.stream.detectors import PackedFrame
 from service.stream.messages import Control
 from slipcore import FrictionSamples, GraspLog, InvalidInput, collect_samples, detect_slip
 
+pytestmark = pytest.mark.usefixtures("looks_at_once")
+
 GEL = {"young_modulus": 1e6, "poisson_ratio": 0.5, "thickness": None, "marker_depth": 0.0}
 """What the ramp is pressed on."""
 ROOM = detectors.Room("me", 2**30)
 GRIP = Control(6e-5, {"least_force": 0.5, "most_force": 30.0}, round_at=5.0)
-
-
-class AtOnce(Executor):
-    """So that answers are the same each time."""
-
-    def submit(self, do: Any, /, *_: Any, **__: Any) -> Future[Any]:
-        future: Future[Any] = Future()
-        try:
-            future.set_result(do())
-        except Exception as error:
-            future.set_exception(error)
-        return future
-
-
-@pytest.fixture(autouse=True)
-def _at_once(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setattr(reconstructing, "_LOOKS", AtOnce())
-    yield
-    detectors.drop("one")
 
 
 def opened(log: GraspLog, **said: Any) -> detectors.Session:
@@ -129,15 +111,15 @@ def test_without_room_or_with_too_many_markers_there_are_none_and_it_says_why(
 
 
 def test_a_look_that_fails_costs_the_stream_that_look(
-    ramp: GraspLog, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    ramp: GraspLog, looks_at_once: Executor, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     opened(ramp)
-    done = AtOnce.submit
+    done = looks_at_once.submit
 
-    def fails_once(self: AtOnce, _: Any) -> Future[Any]:
-        monkeypatch.setattr(AtOnce, "submit", done)
-        return done(self, lambda: 1 / 0)
+    def fails_once(_: Any) -> Future[Any]:
+        monkeypatch.setattr(looks_at_once, "submit", done)
+        return done(lambda: 1 / 0)
 
-    monkeypatch.setattr(AtOnce, "submit", fails_once)
+    monkeypatch.setattr(looks_at_once, "submit", fails_once)
     assert detectors.step("one", frame(ramp, 0))[0]["force"]["wait_for"] == "noise"
     assert "a look for the contact failed" in caplog.text

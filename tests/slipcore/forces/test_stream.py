@@ -125,6 +125,16 @@ def test_a_contact_that_has_ended_meanwhile_is_not_that_of_the_next_touch(presse
     assert stream.step(1.4, log.displacement[0]).wait_for is None
 
 
+def test_who_stops_takes_the_look_along_that_has_not_begun(pressed: Pressed) -> None:
+    log, beside = pressed(LIGHT, noise=NOISE, crop=INSIDE), Later()
+    stream = made(log, noise=NOISE, executor=beside)
+    stream.close()
+    stream.step(0.0, still(log, 3, 0))
+    stream.close()
+    ((future, _),) = beside.given
+    assert future.cancelled()
+
+
 def test_markers_that_are_lost_tell_nothing(pressed: Pressed) -> None:
     log = pressed([1, 1], noise=NOISE, crop=AROUND)
     observed = np.random.default_rng(3).random(log.position.shape[:2]) > 0.1

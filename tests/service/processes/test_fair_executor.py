@@ -1,0 +1,55 @@
+"""A thread for what nobody waits for, of which nobody has all."""
+
+from concurrent.futures import Future, wait
+from threading import Event
+
+import pytest
+
+from service.processes.fair_executor import FairExecutor
+
+
+def held(executor: FairExecutor) -> Event:
+    """What lets the thread go on, which is at work until then."""
+    begun, may_end = Event(), Event()
+
+    def hold() -> None:
+        begun.set()
+        may_end.wait(30.0)
+
+    executor.of("somebody").submit(hold)
+    begun.wait(30.0)
+    return may_end
+
+
+def done(order: list[str], asked: list[tuple[str, str]], cancelled: tuple[str, ...] = ()) -> list[Future[None]]:
+    """Work of owners, each of a name, that is all asked for before any of it begins."""
+    executor = FairExecutor()
+    may_end = held(executor)
+    futures = [executor.of(owner).submit(order.append, name) for owner, name in asked]
+    for future, (_, name) in zip(futures, asked, strict=True):
+        if name in cancelled:
+            assert future.cancel()
+    may_end.set()
+    wait(futures, 30.0)
+    return futures
+
+
+def test_owners_have_their_turns_one_after_the_other_and_each_in_its_order() -> None:
+    order: list[str] = []
+    done(order, [*(("greedy", f"g{k}") for k in range(4)), ("honest", "h0"), ("honest", "h1"), ("third", "t0")])
+    assert order == ["g0", "h0", "t0", "g1", "h1", "g2", "g3"]
+
+
+def test_what_is_cancelled_is_not_done() -> None:
+    order: list[str] = []
+    futures = done(order, [("a", "a0"), ("a", "a1"), ("a", "a2")], cancelled=("a1",))
+    assert order == ["a0", "a2"]
+    assert futures[1].cancelled()
+
+
+def test_an_error_is_that_of_who_asked_and_the_next_one_goes_on() -> None:
+    executor = FairExecutor()
+    failed = executor.of("a").submit(int, "none")
+    assert executor.of("a").submit(int, "12", base=3).result(30.0) == 5
+    with pytest.raises(ValueError, match="none"):
+        failed.result(30.0)
