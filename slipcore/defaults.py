@@ -24,6 +24,10 @@ class Limits:
     """m; no gel moves further."""
     force: float = 1e4
     """N on one element."""
+    gripper_force: float = 1e4
+    """N in all."""
+    gripper_pull: float = 0.1
+    """N; a gripper's zero is no further off. A larger pull than any press has a turned sign."""
     press: tuple[float, float] = (1e-6, 1e4)
     """N in all with which a body is pressed on a sensor to calibrate it."""
     element_area: tuple[float, float] = (1e-12, 1e-2)

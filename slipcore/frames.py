@@ -81,7 +81,9 @@ class GraspLog:
     None; ``normal`` [t, n, m, 3], outward unit vectors, or None (then taken from the deformed shape); ``object_pose``
     [t, 3], x m, y m and yaw rad of the object relative to the sensor, or None; ``contact`` [t, n, m] bool where it is
     known otherwise than from force or shape, or None; ``observed`` [t, n, m] bool, or None for all: where it is False
-    no marker tells of the element, and its displacement is a placeholder that only neighbours' derivatives may see.
+    no marker tells of the element, and its displacement is a placeholder that only neighbours' derivatives may see;
+    ``gripper_force`` [t] N, the normal force on the sensor that the gripper or a wrist reports, positive where the
+    object presses, or None, and its standard ``gripper_force_deviation`` N, or None where that is not known.
     A ``displacement`` of None, of a sensor that tells forces alone, is held as zeros: see ``has_displacement``.
 
     Arrays are held as read-only float64 or bool. Raises ``InvalidInput`` naming the field, its value and what is
@@ -100,6 +102,8 @@ class GraspLog:
     truth: GroundTruth | None = None
     contact: BoolArray | None = None
     observed: BoolArray | None = None
+    gripper_force: FloatArray | None = None
+    gripper_force_deviation: float | None = None
 
     def __post_init__(self) -> None:
         time = _array("time", self.time, (None,))
@@ -115,6 +119,7 @@ class GraspLog:
             "force": _optional("force", self.force, field_shape),
             "normal": _optional("normal", self.normal, field_shape),
             "object_pose": _optional("object_pose", self.object_pose, (len(time), 3)),
+            "gripper_force": _optional("gripper_force", self.gripper_force, (len(time),)),
         }
         for name in ("contact", "observed"):
             mask = getattr(self, name)
@@ -128,6 +133,10 @@ class GraspLog:
         _check_magnitude("force", self.force, LIMITS.force, "N per element")
         _check_pose(self.object_pose)
         _check_normal(self.normal)
+        _check_gripper_force(self.gripper_force)
+        _set(
+            self, "gripper_force_deviation", _gripper_force_deviation(self.gripper_force_deviation, self.gripper_force)
+        )
 
     def __reduce__(self) -> tuple[Callable[..., "GraspLog"], tuple[dict[str, Any]]]:
         """Pickle by value, so that a log can go to a worker process (a read-only mapping can't be pickled)."""
@@ -157,7 +166,7 @@ class GraspLog:
 
         Raises ``InvalidInput`` where fewer are left than a log needs, or not in the order of time.
         """
-        over_time = ("force", "normal", "object_pose", "contact", "observed")
+        over_time = ("force", "normal", "object_pose", "contact", "observed", "gripper_force")
         known = {name: array[frames] for name in over_time if (array := getattr(self, name)) is not None}
         truth = None if self.truth is None else self.truth.take(frames)
         return replace(self, time=self.time[frames], displacement=self.displacement[frames], truth=truth, **known)
@@ -172,6 +181,7 @@ class GraspLog:
             "force": ((*cells, "axis"), self.force, "N"),
             "normal": ((*cells, "axis"), self.normal, "1"),
             "object_pose": (("time", "pose"), self.object_pose, "m, m, rad"),
+            "gripper_force": (("time",), self.gripper_force, "N"),
             "contact": (cells, self.contact, "1"),
             "observed": (cells, self.observed, "1"),
             "position": (("row", "column", "axis"), self.position, "m"),
@@ -187,6 +197,7 @@ class GraspLog:
             "frames": f"{len(self)} in {self.time[-1] - self.time[0]:.3g} s",
             "elements": f"{self.grid[0]} × {self.grid[1]} of {1e6 * self.element_area:.3g} mm²",
             "forces": "none" if self.force is None else "of each element",
+            "gripper's force": "none" if self.gripper_force is None else f"up to {self.gripper_force.max():.3g} N",
             "truth": "none" if self.truth is None else "simulated",
         }
         return summary("Grasp log", rows.items())
@@ -380,6 +391,26 @@ def _check_normal(normal: FloatArray | None) -> None:
         raise InvalidInput("normal", f"of length {worst:.6g}", f"unit vectors, to {LIMITS.normal_length:g}")
     if not (normal[..., 2] > 0.0).all():
         raise InvalidInput("normal", f"z component {normal[..., 2].min():.3g}", "outward, z component above 0")
+
+
+def _check_gripper_force(force: FloatArray | None) -> None:
+    _check_magnitude("gripper_force", force, LIMITS.gripper_force, "N")
+    if force is not None and force.min() < -max(float(force.max()), LIMITS.gripper_pull):
+        value = f"{force.min():.3g} to {force.max():.3g} N"
+        raise InvalidInput("gripper_force", value, "positive where the object presses (is its sign turned?)")
+
+
+def _gripper_force_deviation(value: float | None, force: FloatArray | None) -> float | None:
+    if value is None:
+        return None
+    if force is None:
+        raise InvalidInput(
+            "gripper_force_deviation", "given without gripper_force", "both, gripper_force alone or none"
+        )
+    deviation = float(_array("gripper_force_deviation", value, ()))
+    if not 0.0 < deviation <= LIMITS.gripper_force:
+        raise InvalidInput("gripper_force_deviation", f"{deviation:.3g} N", f"above 0 to {LIMITS.gripper_force:g} N")
+    return deviation
 
 
 def _truth(truth: GroundTruth | None, shape: tuple[int, ...]) -> GroundTruth | None:

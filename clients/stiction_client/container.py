@@ -20,7 +20,8 @@ EPOCH = (1980, 1, 1, 0, 0, 0)
 
 FLOAT32_ALLOWED = {"displacement", "force", "normal"}
 MASKS = ("contact", "observed")
-"""Optional too: a log that was made before there were any need not have them."""
+GRIPPER = ("gripper_force", "gripper_force_deviation")
+"""Optional, as masks are: a log that was made before there were any need not have them."""
 
 
 class GraspLogLike(Protocol):
@@ -110,6 +111,10 @@ def members(log: GraspLogLike) -> dict[str, NDArray[Any]]:
     }
     for name in ("time", "position", "displacement", "element_area", "force", "normal", "object_pose"):
         value = getattr(log, name)
+        if value is not None:
+            arrays[name] = _real(name, value)
+    for name in GRIPPER:
+        value = getattr(log, name, None)
         if value is not None:
             arrays[name] = _real(name, value)
     for name in MASKS:

@@ -32,7 +32,12 @@ def said(reconstruction: "Reconstruction | None") -> "list[Finding]":
 
     told = ", ".join(f"{axis} {share:.0%}" for axis, share in zip("xyz", reconstruction.information, strict=True))
     evidence = (
-        f"forces follow from displacement by the sensor's gel, in effect averaged over "
-        f"{1e3 * reconstruction.kernel_width:.2g} mm; share of the resultant that data tell: {told}"
+        f"forces follow from displacement by the sensor's gel{_by_the_gripper(reconstruction)}, in effect "
+        f"averaged over {1e3 * reconstruction.kernel_width:.2g} mm; share of the resultant that data tell: {told}"
     )
     return [Finding(RECONSTRUCTED, evidence, "friction is as sure as the description of the sensor's gel")]
+
+
+def _by_the_gripper(reconstruction: "Reconstruction") -> str:
+    """That the resultant was given, where it was."""
+    return " and from the normal force that the gripper reports" if reconstruction.given[:, 2].any() else ""

@@ -23,13 +23,13 @@ EPISODES_PATH = "meta/episodes/chunk-000/file-000.parquet"
 FILE_SIZES_MB = {"data_files_size_in_mb": 100, "video_files_size_in_mb": 500}
 CHUNK_SIZE = 1000
 
-VECTORS = ("displacement", "force", "normal", "object_pose")
+FEATURES = ("displacement", "force", "normal", "object_pose", "gripper_force")
 """Members of a log that are features, where it has them."""
 
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 """Statistics by which LeRobot normalises the inputs of some policies."""
 
-OF_A_SENSOR = ("position", "element_area", "sensor")
+OF_A_SENSOR = ("position", "element_area", "gripper_force_deviation", "sensor")
 """Members that all logs of a data set share."""
 
 Columns = dict[str, NDArray[Any]]
@@ -55,18 +55,21 @@ def write(recordings: Sequence[Recording], folder: Path) -> None:
 
 def _check_alike(recordings: Sequence[Recording]) -> None:
     first = recordings[0].log
-    present = list(_vectors(first))
+    present = list(_features(first))
     for recording in recordings[1:]:
         log = recording.log
-        if list(_vectors(log)) != present:
+        if list(_features(log)) != present:
             raise InvalidInput(recording.name, "with other members than the first log", f"those: {', '.join(present)}")
+        if log.gripper_force_deviation != first.gripper_force_deviation:
+            told = f"of a gripper's force known to {log.gripper_force_deviation} N"
+            raise InvalidInput(recording.name, told, f"as the first log's, {first.gripper_force_deviation} N")
         if not np.array_equal(log.position, first.position):
             raise InvalidInput(recording.name, "of a sensor with other markers", "logs of one sensor in a data set")
 
 
-def _vectors(log: GraspLog) -> Columns:
+def _features(log: GraspLog) -> Columns:
     """The features that the log has, by name."""
-    told = {name: getattr(log, name) for name in VECTORS if name != "displacement" or log.has_displacement}
+    told = {name: getattr(log, name) for name in FEATURES if name != "displacement" or log.has_displacement}
     return {name: values for name, values in told.items() if values is not None}
 
 
@@ -85,7 +88,7 @@ def _episode(recording: Recording, number: int, rate: int) -> Columns:
     log, history = recording.log, recording.history
     frames = np.arange(len(log))
     return {
-        **{f"observation.{name}": values.astype(np.float32) for name, values in _vectors(log).items()},
+        **{f"observation.{name}": values.astype(np.float32) for name, values in _features(log).items()},
         "observation.slip_state": element_states(history.contact, history.slip),
         "observation.stick_ratio": np.nan_to_num(history.stick_ratio, nan=1.0).astype(np.float32),
         "observation.time": log.time,

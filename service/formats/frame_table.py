@@ -18,7 +18,7 @@ from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray, GraspLog
 
 MAX_ROWS = 5_000_000
-OF_FRAMES = ("time", "object_pose", "sensor", "metadata", "element_area")
+OF_FRAMES = ("time", "object_pose", "gripper_force", "gripper_force_deviation", "sensor", "metadata", "element_area")
 """Members that are the same for all elements of a frame."""
 
 ANY_NUMBER = "*"

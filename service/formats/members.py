@@ -20,6 +20,8 @@ OPTIONAL = {
     "object_pose": FLOAT64,
     "contact": FLAG,
     "observed": FLAG,
+    "gripper_force": FLOAT64,
+    "gripper_force_deviation": FLOAT64,
     "sensor": TEXT,
     "metadata": TEXT,
 }
@@ -32,7 +34,7 @@ TRUTH = {
 }
 DTYPES = REQUIRED | OPTIONAL | TRUTH
 
-ONCE = ("position", "element_area", "sensor", "metadata", "truth_friction")
+ONCE = ("position", "element_area", "gripper_force_deviation", "sensor", "metadata", "truth_friction")
 """Members of the whole log; of all others there is one entry a frame."""
 
 
@@ -46,11 +48,13 @@ def grasp_log(members: Members) -> GraspLog:
         force=members.get("force"),
         normal=members.get("normal"),
         object_pose=members.get("object_pose"),
-        sensor=scalar(members, "sensor") if "sensor" in members else "unknown",
+        sensor=_scalar_or(members, "sensor", "unknown"),
         metadata=told_metadata(members),
         truth=_truth(members),
         contact=members.get("contact"),
         observed=members.get("observed"),
+        gripper_force=members.get("gripper_force"),
+        gripper_force_deviation=_scalar_or(members, "gripper_force_deviation", None),
     )
 
 
@@ -67,9 +71,14 @@ def scalar(members: Members, name: str) -> Any:
     return value
 
 
+def _scalar_or(members: Members, name: str, otherwise: Any) -> Any:
+    """The single value of a member that need not be there."""
+    return scalar(members, name) if name in members else otherwise
+
+
 def told_metadata(members: Members) -> dict[str, str]:
     """The entries of the metadata, none where there are no metadata."""
-    text = scalar(members, "metadata") if "metadata" in members else "{}"
+    text = _scalar_or(members, "metadata", "{}")
     allowed = "a JSON object of strings"
     try:
         entries = json.loads(text)

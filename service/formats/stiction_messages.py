@@ -17,6 +17,10 @@ from stiction_client.container import members
 FRAME_TYPE, LOG_TYPE = "stiction_msgs/msg/Frame", "stiction_msgs/msg/GraspLog"
 
 
+NUMBERS = ("time", "element_area", "gripper_force", "gripper_force_deviation", "truth_stick_ratio")
+"""Members of which a frame or log has one number."""
+
+
 def definition(once: bool, present: set[str]) -> str:
     """The definition of a message with the ``present`` members: those of the log (``once``), or of a frame."""
     lines = [f"{_kind(name)} {name}" for name in DTYPES if name in present and (name in ONCE) is once]
@@ -44,7 +48,7 @@ def _kind(name: str) -> str:
     """A member as a field: numbers of one frame or log in a row, row-major."""
     if DTYPES[name] == TEXT:
         return "string"
-    if name in ("time", "element_area", "truth_stick_ratio"):
+    if name in NUMBERS:
         return "float64"
     return "bool[]" if DTYPES[name] == FLAG else "float64[]"
 

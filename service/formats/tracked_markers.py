@@ -3,7 +3,7 @@
 import math
 from array import array
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -13,21 +13,22 @@ from numpy.typing import NDArray
 
 from service.formats.delimited import parse_number, rows, split_header, text_lines
 from service.formats.npy import MAX_ARRAY_BYTES
+from slipcore.defaults import LIMITS
 from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 
 ALIASES = {
     "time": "time", "frame": "frame", "marker": "marker", "particle": "marker", "id": "marker", "track_id": "marker",
-    "x": "x", "y": "y", "z": "z", "contact": "contact",
+    "x": "x", "y": "y", "z": "z", "contact": "contact", "gripper_force": "gripper_force",
 }  # fmt: skip
 """Columns that are read, by the names that trackers give them."""
-SETTINGS = ("scale", "frame_rate", "sensor")
+SETTINGS = ("scale", "frame_rate", "sensor", "gripper_force_deviation")
 """What lines before the header may tell: ``# scale: 2.5e-5``."""
 SCALE, FRAME_RATE = (1e-9, 1.0), (1e-3, 1e6)
 """m per pixel (1 where the file is in metres) and frames a second that can be."""
 ASSUMED_WIDTH = 15e-3
 """m that the markers span where their scale is unknown: a fingertip's sensor. Detection depends on it a little."""
-MAX_ROWS, ROW = 5_000_000, 7
+MAX_ROWS, ROW = 5_000_000, 8
 """Rows of a file, and numbers that are kept of each."""
 
 
@@ -45,12 +46,15 @@ class Header:
 
 @dataclass(frozen=True, slots=True)
 class Tracks:
-    """Markers over time: ``time`` [t] s, ``place`` [t, k, 3] as in the file (NaN where lost), ``contact`` [t, k]."""
+    """Markers over time: ``time`` [t] s, ``place`` [t, k, 3] as in the file (NaN where lost), ``contact`` [t, k],
+    ``gripper_force`` [t] N.
+    """
 
     time: FloatArray
     place: FloatArray
     contact: BoolArray | None
     has_height: bool
+    gripper_force: FloatArray | None
 
 
 def read(path: Path, scale: float | None = None, frame_rate: float | None = None) -> GraspLog:
@@ -106,7 +110,9 @@ def _columns(text: str, settings: Mapping[str, str], number: int) -> Header:
         missing.insert(0, "time or frame")
     if missing:
         value = f"a header without {', '.join(missing)} ({text[:60]!r})"
-        raise InvalidInput(f"line {number}", value, "columns time or frame, marker, x, y; optional z, contact")
+        raise InvalidInput(
+            f"line {number}", value, "columns time or frame, marker, x, y; optional z, contact, gripper_force"
+        )
     ignored = tuple(name for name in names if name not in ALIASES)
     return Header(settings, columns, len(names), delimiter, ignored, number)
 
@@ -126,11 +132,12 @@ def _tracks(header: Header, lines: Iterator[str], settings: Mapping[str, str]) -
     contact = None
     if "contact" in header.columns:
         contact = _held(frame, marker, table[:, 5], place.shape[:2])
-    return Tracks(time, place, contact, "z" in header.columns)
+    gripper_force = _one_a_frame(frame, table[:, 6], line) if "gripper_force" in header.columns else None
+    return Tracks(time, place, contact, "z" in header.columns, gripper_force)
 
 
 def _table(header: Header, lines: Iterator[str]) -> tuple[FloatArray, dict[str, int]]:
-    """Rows [r, 7] of moment, marker (its number), x, y, z, contact and line; and the markers by name."""
+    """Rows [r, 8] of moment, marker (its number), x, y, z, contact, gripper's force, line; and the markers by name."""
     names: dict[str, int] = {}
     values = array("d")  # a list of tuples would take five times the memory
     for line, cells in rows(lines, header.delimiter, header.width, header.lines, MAX_ROWS):
@@ -154,7 +161,8 @@ def _row(header: Header, cells: list[str], line: int, names: dict[str, int]) -> 
     touching = parse_number(text["contact"], line, "contact") if "contact" in text else 1.0
     if touching not in (0.0, 1.0) and not math.isnan(touching):
         raise InvalidInput(f"line {line}, contact", repr(text["contact"])[:40], "0 or 1, empty where unknown")
-    return moment, marker, x, y, z, touching, line
+    gripper = parse_number(text["gripper_force"], line, "gripper_force") if "gripper_force" in text else math.nan
+    return moment, marker, x, y, z, touching, gripper, line
 
 
 def _setting(name: str, settings: Mapping[str, str], limits: tuple[float, float], unit: str) -> float:
@@ -185,6 +193,23 @@ def _check_once(
         row = int(order[twice[0] + 1])
         name = list(names)[int(marker[row])]
         raise InvalidInput(f"line {lines[row]:.0f}", f"marker {name[:40]!r} again in one frame", "each marker once")
+
+
+def _one_a_frame(frame: NDArray[np.intp], told: FloatArray, lines: FloatArray) -> FloatArray:
+    """What the rows of each frame tell alike, or one of them tells [t]; raises ``InvalidInput`` where none does."""
+    values = np.full(int(frame.max()) + 1, np.nan)
+    rows_telling = np.flatnonzero(np.isfinite(told))
+    values[frame[rows_telling[::-1]]] = told[rows_telling[::-1]]
+    other = rows_telling[told[rows_telling] != values[frame[rows_telling]]]
+    if other.size:
+        place = f"line {lines[other[0]]:.0f}, gripper_force"
+        raise InvalidInput(
+            place, f"{told[other[0]]:g} N", f"{values[frame[other[0]]]:g} N, as in the frame's other rows"
+        )
+    unknown = np.flatnonzero(np.isnan(values))
+    if unknown.size:
+        raise InvalidInput("gripper_force", f"missing in frame {unknown[0]}", "a number of N in a row of each frame")
+    return values
 
 
 def _held(frame: NDArray[np.intp], marker: NDArray[np.intp], touching: FloatArray, shape: tuple[int, int]) -> BoolArray:
@@ -221,7 +246,15 @@ def _grasp_log(tracks: Tracks, settings: Mapping[str, str], ignored: tuple[str, 
         settings.get("sensor", "unknown"),
         metadata,
     )
-    return log
+    return _with_gripper(log, tracks.gripper_force, settings)
+
+
+def _with_gripper(log: GraspLog, force: FloatArray | None, settings: Mapping[str, str]) -> GraspLog:
+    """The log with what the gripper reported, if it did."""
+    name, deviation = "gripper_force_deviation", None
+    if name in settings:
+        deviation = _setting(name, settings, (0.0, LIMITS.gripper_force), "N")
+    return replace(log, gripper_force=force, gripper_force_deviation=deviation)
 
 
 def _metadata(tracks: Tracks, known: BoolArray, ignored: tuple[str, ...]) -> dict[str, Any]:

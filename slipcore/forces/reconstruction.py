@@ -26,7 +26,8 @@ class Reconstruction:
     ``kernel_width`` m: side of the square over which forces are in effect averaged; ``information`` [3]: share of what
     is known of the resultant's x, y and z that data tell and not the prior; ``condition``: largest over smallest
     singular value of the markers' response to traction on the contact (all three at the frame that moved markers most;
-    NaN and no information without contact); ``noise`` m of a marker's coordinate that was assumed.
+    NaN and no information without contact); ``noise`` m of a marker's coordinate that was assumed; ``given`` [t, 3]
+    says which components of the resultant were known from elsewhere, and so count among data.
     """
 
     force: FloatArray
@@ -38,6 +39,7 @@ class Reconstruction:
     information: FloatArray
     condition: float
     noise: float
+    given: BoolArray
 
     def apply(self, log: GraspLog) -> GraspLog:
         """The log with these forces, which its metadata call reconstructed, and their contact where it knows none."""
@@ -59,18 +61,24 @@ def reconstruct(
     total_force: ArrayLike | None = None,
     noise: float | None = None,
     criterion: Criterion = "evidence",
+    total_force_deviation: float | None = None,
 ) -> Reconstruction:
     """Find the forces that moved a log's markers, by Bayesian inversion of the gel's elastic response.
 
     ``total_force``: what a gripper or a wrist measured, [t] N of normal force (positive where it presses) or [t, 3] N
-    of the object on the sensor, NaN where unknown; ``noise`` m of a marker's coordinate (None: estimated from the log);
-    ``criterion`` that chooses the strength of the prior. Markers whose z never changes count as seen in the plane only.
+    of the object on the sensor, NaN where unknown, and its standard ``total_force_deviation`` N (None: 1 % of it);
+    without it the log's own ``gripper_force`` is taken where it is above 0. ``noise`` m of a marker's coordinate (None:
+    estimated from the log); ``criterion`` that chooses the strength of the prior. Markers whose z never changes count
+    as seen in the plane only.
     Raises ``UnknownScale`` for a log not in metres and ``InvalidInput`` for what does not fit.
     """
     shown = Recording.of(log, noise)
     sensor = Sensor.of(log.position, log.element_area, gel, shown.axes)
-    recording = _Recording(sensor, shown, _total_force(total_force, len(log)))
-    result = _no_forces(log, shown.noise)
+    if total_force is None and total_force_deviation is None and log.gripper_force is not None:
+        total_force = np.where(log.gripper_force > 0.0, log.gripper_force, np.nan)  # 0: it grips not, or reports not
+        total_force_deviation = log.gripper_force_deviation
+    recording = _Recording(sensor, shown, *_total_force(total_force, total_force_deviation, len(log)))
+    result = _no_forces(log, shown.noise, np.isfinite(recording.given))
     touched, strongest = shown.touched(), shown.strongest()
     if not touched.any():
         return result
@@ -92,24 +100,33 @@ def reconstruct(
     return result
 
 
-def _total_force(given: ArrayLike | None, frames: int) -> FloatArray:
-    """Resultant [t, 3] N in the gel's frame (z into it), NaN where it is not known."""
+def _total_force(given: ArrayLike | None, deviation: float | None, frames: int) -> tuple[FloatArray, FloatArray]:
+    """Resultant [t, 3] N in the gel's frame (z into it), NaN where it is not known, and its standard deviation."""
+    if deviation is not None and (given is None or not 0.0 < deviation < np.inf):
+        raise InvalidInput("total_force_deviation", deviation, "above 0 N and finite, beside total_force")
     total = np.full((frames, 3), np.nan)
     if given is not None:
         force = np.asarray(given, dtype=np.float64)
         if force.shape not in {(frames,), (frames, 3)} or np.isinf(force).any():
             raise InvalidInput("total_force", f"of shape {list(force.shape)}", f"finite, [{frames}] or [{frames}, 3] N")
         total[:, 2 if force.ndim == 1 else slice(3)] = force * (1.0 if force.ndim == 1 else [1.0, 1.0, -1.0])
-    return total
+    if deviation is not None:
+        return total, np.full(total.shape, deviation)
+    size, share = np.abs(total), RECONSTRUCTION.force_tolerance
+    largest = np.nanmax(size, initial=RECONSTRUCTION.least_force)
+    return total, share * np.maximum(size, share * largest)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Recording:
-    """What was ``shown`` to a ``sensor``, and ``given`` resultants [t, 3] N, NaN where unknown."""
+    """What was ``shown`` to a ``sensor``, and ``given`` resultants [t, 3] N, NaN where unknown, with their standard
+    ``deviation`` [t, 3] N.
+    """
 
     sensor: Sensor
     shown: Recording
     given: FloatArray
+    deviation: FloatArray
 
     def frame(self, t: int) -> tuple[Observation, FloatArray]:
         """What one frame tells: displacements, then the parts of its resultant that are given."""
@@ -120,14 +137,11 @@ class _Recording:
             return Observation(self.sensor.response, spread), data
         rows = np.zeros((len(known), *self.sensor.response.shape[1:]))
         rows[np.arange(len(known)), known] = self.sensor.load
-        share = RECONSTRUCTION.force_tolerance
-        largest = np.nanmax(np.abs(self.given), initial=RECONSTRUCTION.least_force)
-        tolerance = share * np.maximum(np.abs(given[known]), share * largest)
-        noise = np.concatenate((spread, tolerance))
+        noise = np.concatenate((spread, self.deviation[t, known]))
         return Observation(np.concatenate((self.sensor.response, rows)), noise), np.concatenate((data, given[known]))
 
 
-def _no_forces(log: GraspLog, noise: float) -> Reconstruction:
+def _no_forces(log: GraspLog, noise: float, given: BoolArray) -> Reconstruction:
     """Forces of zero, to be written to."""
     shape = log.displacement.shape
     return Reconstruction(
@@ -140,6 +154,7 @@ def _no_forces(log: GraspLog, noise: float) -> Reconstruction:
         information=np.zeros(3),
         condition=float("nan"),
         noise=noise,
+        given=given,
     )
 
 

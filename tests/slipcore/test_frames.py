@@ -27,6 +27,8 @@ def fields() -> dict[str, Any]:
         "force": generator.normal(scale=0.1, size=(*SHAPE, 3)),
         "normal": normal / np.linalg.norm(normal, axis=-1, keepdims=True),
         "object_pose": generator.normal(scale=1e-3, size=(4, 3)),
+        "gripper_force": np.array([-0.02, 1.0, 5.0, 4.5]),
+        "gripper_force_deviation": 0.05,
         "sensor": "left finger",
         "metadata": {"tier": "closed form"},
         "truth": GroundTruth(
@@ -52,14 +54,16 @@ def changed(array: np.ndarray, place: tuple[int, ...], value: float) -> np.ndarr
 
 def test_a_valid_log_keeps_what_it_was_given(fields: dict[str, Any]) -> None:
     log = GraspLog(**fields)
-    for name in ("time", "position", "displacement", "force", "normal", "object_pose"):
+    for name in ("time", "position", "displacement", "force", "normal", "object_pose", "gripper_force"):
         np.testing.assert_array_equal(getattr(log, name), fields[name], err_msg=name)
     assert (log.grid, len(log), log.sensor, log.metadata["tier"]) == ((3, 5), 4, "left finger", "closed form")
+    assert log.gripper_force_deviation == 0.05
 
 
 def test_the_optional_parts_may_be_absent(fields: dict[str, Any]) -> None:
     log = GraspLog(fields["time"], fields["position"], fields["displacement"], 1e-6)
     assert log.force is log.normal is log.object_pose is log.truth is None
+    assert log.gripper_force is log.gripper_force_deviation is None
     assert (log.sensor, dict(log.metadata)) == ("unknown", {})
 
 
@@ -201,6 +205,9 @@ def test_a_single_marker_and_a_line_of_markers_are_lattices() -> None:
         ("displacement", 1e3, r"displacement is .* m \(is it in m\?\) at its largest"),
         ("force", 1e6, "force is .* N per element at its largest; allowed: at most 10000 N per element"),
         ("object_pose", 1e5, "object_pose"),
+        ("gripper_force", 1e4, "gripper_force is 5e\\+04 N at its largest; allowed: at most 10000 N"),
+        ("gripper_force", -1.0, r"gripper_force is -5 to 0.02 N; allowed: positive where the object presses"),
+        ("gripper_force_deviation", -1.0, "gripper_force_deviation is -0.05 N; allowed: above 0 to 10000 N"),
     ],
 )
 def test_absurd_units_are_refused(fields: dict[str, Any], name: str, factor: float, message: str) -> None:
@@ -225,6 +232,26 @@ def test_a_number_that_is_not_finite_is_named_with_its_place(fields: dict[str, A
 @pytest.mark.parametrize("name", ["displacement", "force", "normal", "object_pose"])
 def test_a_field_of_another_shape_is_named(fields: dict[str, Any], name: str) -> None:
     refused(fields, rf"{name} is of shape \[3, ", **{name: fields[name][:3]})
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"gripper_force": np.ones(3)}, r"gripper_force is of shape \[3\]; allowed: shape \[4\]"),
+        ({"gripper_force": np.array([0.0, np.nan, 1.0, 1.0])}, r"gripper_force is nan at index \[1\] \(1 in all\)"),
+        ({"gripper_force": None}, "gripper_force_deviation is given without gripper_force"),
+        ({"gripper_force_deviation": np.inf}, "gripper_force_deviation is inf"),
+        ({"gripper_force_deviation": np.ones(4)}, r"gripper_force_deviation is of shape \[4\]"),
+    ],
+)
+def test_a_grippers_force_that_is_none_is_named(fields: dict[str, Any], changes: dict[str, Any], message: str) -> None:
+    refused(fields, message, **changes)
+
+
+def test_a_gripper_that_holds_nothing_may_be_off_by_its_zero(fields: dict[str, Any]) -> None:
+    log = GraspLog(**(fields | {"gripper_force": np.full(4, -0.09)}))
+    assert log.gripper_force is not None
+    assert "up to -0.09 N" in log._repr_html_()
 
 
 def test_zero_forces_are_a_log(fields: dict[str, Any]) -> None:
@@ -339,11 +366,12 @@ def test_some_frames_of_a_log_are_those_of_all_it_has(fields: dict[str, Any], fr
             np.testing.assert_array_equal(found, value)
     assert part.truth is not None
     np.testing.assert_array_equal(part.truth.stick_ratio, [1.0, 0.5])
+    np.testing.assert_array_equal(part.gripper_force, [1.0, 5.0])
     assert (part.sensor, part.metadata, part.truth.friction) == (whole.sensor, whole.metadata, fields["truth"].friction)
 
 
 def test_frames_that_are_no_log_are_refused(fields: dict[str, Any]) -> None:
-    without = GraspLog(**fields | {"force": None, "normal": None, "object_pose": None, "truth": None})
+    without = GraspLog(**fields | dict.fromkeys(("force", "normal", "object_pose", "truth")))
     assert without.take(slice(2)).force is None
     with pytest.raises(InvalidInput, match=r"time is 1 frame\(s\)"):
         without.take(slice(1))

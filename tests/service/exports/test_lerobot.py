@@ -119,6 +119,17 @@ def test_statistics_of_each_episode_stand_beside_it(folder: Path, second: Record
     assert episodes["stats/observation.stick_ratio/count"][1].tolist() == [len(second.log)]
 
 
+def test_a_grippers_force_is_a_feature_and_comes_back(recording: Recording, tmp_path: Path) -> None:
+    log = replace(recording.log, gripper_force=np.arange(float(len(recording.log))), gripper_force_deviation=0.5)
+    exports.write([replace(recording, log=log)], tmp_path / "grasp", exports.target_of(tmp_path / "grasp"))
+    back = formats.read(tmp_path / "grasp" / DATA)
+    np.testing.assert_array_equal(back.gripper_force, log.gripper_force)
+    assert back.gripper_force_deviation == 0.5
+    pair = [replace(recording, log=replace(log, gripper_force_deviation=known)) for known in (0.5, 0.6)]
+    with pytest.raises(InvalidInput, match=r"of a gripper's force known to 0.6 N; allowed: as the first log's, 0.5 N"):
+        exports.write(pair, tmp_path / "pair", exports.target_of(tmp_path / "pair"))
+
+
 def test_lerobot_itself_loads_it(folder: Path, recording: Recording, second: Recording) -> None:
     """With what trains on it: where LeRobot is installed, which brings PyTorch."""
     reason = "lerobot is not installed: pip install lerobot"

@@ -73,6 +73,8 @@ def log() -> GraspLog:
         force=generator.normal(scale=0.1, size=(*shape, 3)),
         normal=normal,
         object_pose=generator.normal(scale=1e-3, size=(frames, 3)),
+        gripper_force=np.array([0.0, 1.0, 2.5, 4.0, 4.0]),
+        gripper_force_deviation=0.05,
         sensor="Prüfstand 1",
         metadata={"operator": "Łukasz", "tier": "closed form"},
         truth=truth,
@@ -272,10 +274,11 @@ def write_protobuf_mcap(log: GraspLog, path: Path, **options: Any) -> Path:
 
 def write_hdf5(log: GraspLog, path: Path) -> Path:
     with h5py.File(path, "w") as file:
-        for name in ("time", "position", "displacement", "force", "normal", "object_pose"):
+        for name in ("time", "position", "displacement", "force", "normal", "object_pose", "gripper_force"):
             file.create_dataset(name, data=getattr(log, name), compression="gzip", shuffle=True)
         file.attrs["element_area"] = log.element_area
         file.attrs["sensor"] = log.sensor
+        file.attrs["gripper_force_deviation"] = log.gripper_force_deviation
     return path
 
 
@@ -296,8 +299,9 @@ def write_lerobot(log: GraspLog, path: Path) -> Path:
 
 
 def write_json(log: GraspLog, path: Path) -> Path:
-    names = ("time", "position", "displacement", "force", "object_pose")
-    path.write_text(json.dumps({name: getattr(log, name).tolist() for name in names} | {"sensor": "left"}))
+    names = ("time", "position", "displacement", "force", "object_pose", "gripper_force")
+    told = {name: value.tolist() for name in names if (value := getattr(log, name)) is not None}
+    path.write_text(json.dumps(told | {"sensor": "left"}))
     return path
 
 

@@ -74,6 +74,12 @@ def test_an_array_of_pillars_is_read_from_its_loggers_table(
     assert log.contact.reshape(FRAMES, -1).sum(axis=1).tolist() == [3, 3, 3, 9, 9]
 
 
+def test_a_column_is_the_grippers_force(tmp_path: Path) -> None:
+    told = columns(np.random.default_rng(1)) | {"grip": ["0", "1500", "2500", "2500", "2400"]}
+    log = read(written(tmp_path / "log.csv", told), gripper_force={"field": "grip", "unit": "mN"})
+    np.testing.assert_allclose(log.gripper_force, [0.0, 1.5, 2.5, 2.5, 2.4], rtol=1e-12)
+
+
 def test_a_second_sensors_columns_have_its_number(tmp_path: Path) -> None:
     first, second = (columns(np.random.default_rng(seed)) for seed in (1, 2))
     path = written(tmp_path / "log.csv", first, second)

@@ -25,8 +25,9 @@ def members(log: GraspLog) -> dict[str, bytes]:
 
 def test_a_log_comes_back_as_it_was_written(log: GraspLog, tmp_path: Path) -> None:
     back = npz.read(container.write(log, tmp_path / "log.npz"))
-    for name in ("time", "position", "displacement", "force", "normal", "object_pose"):
+    for name in ("time", "position", "displacement", "force", "normal", "object_pose", "gripper_force"):
         np.testing.assert_array_equal(getattr(back, name), getattr(log, name), err_msg=name)
+    assert back.gripper_force_deviation == log.gripper_force_deviation
     assert (back.element_area, back.sensor, dict(back.metadata)) == (1e-6, "Prüfstand 1", dict(log.metadata))
     assert back.truth is not None
     assert log.truth is not None
@@ -46,7 +47,7 @@ def test_masks_come_back_as_they_were_written(log: GraspLog, tmp_path: Path) -> 
 def test_a_log_without_options_comes_back_without_them(log: GraspLog, tmp_path: Path) -> None:
     bare = GraspLog(log.time, log.position, log.displacement, log.element_area)
     back = npz.read(container.write(bare, tmp_path / "log.npz"))
-    assert back.force is back.normal is back.object_pose is back.truth is None
+    assert back.force is back.normal is back.object_pose is back.truth is back.gripper_force is None
     assert (back.sensor, dict(back.metadata)) == ("unknown", {})
 
 

@@ -29,7 +29,7 @@ from stiction_client import container
 
 def assert_same(back: GraspLog, log: GraspLog, rtol: float = 4e-16) -> None:
     """Equal but for the rounding of a change of units."""
-    for name in ("position", "displacement", "force", "object_pose", "normal"):
+    for name in ("position", "displacement", "force", "object_pose", "normal", "gripper_force"):
         expected = getattr(log, name)
         if expected is None:
             assert getattr(back, name) is None, name
@@ -187,6 +187,7 @@ def test_hdf5_is_read_by_the_members_own_names(log: GraspLog, write: SimpleNames
     assert_same(back, log, rtol=0.0)
     np.testing.assert_array_equal(back.time, log.time)
     assert back.sensor == log.sensor
+    assert back.gripper_force_deviation == log.gripper_force_deviation
 
 
 def test_hdf5_is_read_by_a_mapping_of_paths_and_attributes(log: GraspLog, tmp_path: Path) -> None:
@@ -195,14 +196,29 @@ def test_hdf5_is_read_by_a_mapping_of_paths_and_attributes(log: GraspLog, tmp_pa
         "displacement": {"field": "finger/markers", "unit": "mm"},
         "position": {"field": "finger/rest", "unit": "mm"},
         "element_area": {"field": "finger@area", "unit": "mm²"},
+        "gripper_force": {"field": "gripper/effort", "unit": "mN"},
+        "gripper_force_deviation": {"value": 50.0, "unit": "mN"},
     }
     with h5py.File(tmp_path / "log", "w") as file:
         file["clock"] = 1e3 * log.time
         file["finger/markers"] = 1e3 * log.displacement
         file["finger/rest"] = 1e3 * log.position
+        file["gripper/effort"] = 1e3 * np.asarray(log.gripper_force)
         file["finger"].attrs["area"] = 1e6 * log.element_area
         file.attrs["stiction_mapping"] = json.dumps(mapping)
-    assert_same(formats.read(tmp_path / "log"), replace(log, force=None, normal=None, object_pose=None, truth=None))
+    back = formats.read(tmp_path / "log")
+    assert_same(back, replace(log, force=None, normal=None, object_pose=None, truth=None))
+    assert back.gripper_force_deviation == pytest.approx(0.05, rel=1e-12)
+
+
+def test_a_grippers_force_is_that_of_the_nearest_message(
+    robot_log: GraspLog, write: SimpleNamespace, tmp_path: Path
+) -> None:
+    path = write.bag1(robot_log, tmp_path / "grasp.bag")
+    gripper = {"gripper_force": {"topic": "/object", "field": "x", "unit": "N"}}
+    back = formats.read(path, mapping=json.dumps(write.mapping | gripper))
+    assert robot_log.object_pose is not None
+    np.testing.assert_array_equal(back.gripper_force, robot_log.object_pose[:, 0])
 
 
 def test_an_episode_of_a_lerobot_dataset_is_read(log: GraspLog, write: SimpleNamespace, tmp_path: Path) -> None:
@@ -231,7 +247,7 @@ def test_json_is_read_as_columns_or_as_frames(log: GraspLog, write: SimpleNamesp
     path = write.json(log, tmp_path / "log.json")
     if by == "frames":
         columns = json.loads(path.read_text())
-        named = ("time", "displacement", "force", "object_pose")
+        named = ("time", "displacement", "force", "object_pose", "gripper_force")
         frames = [{name: columns[name][k] for name in named} for k in range(len(log))]
         path.write_text(json.dumps({"frames": frames, "position": columns["position"], "sensor": "left"}))
     back = formats.read(path)
@@ -268,6 +284,8 @@ def test_what_is_written_is_read_back_bit_for_bit(log: GraspLog, tmp_path: Path,
         ({"element_area": {"value": 1.0}}, "element_area is 1 m²"),
         ({"position": {"topic": "/nowhere", "field": "data"}}, r"position is not there \(data of /nowhere\)"),
         ({"contact": {"field": "force"}}, "contact is of dtype float64; allowed: truth values"),
+        ({"gripper_force": "force"}, r"gripper_force is of shape \[5, 36\]; allowed: shape \[5\]"),
+        ({"gripper_force_deviation": {"value": 0.1}}, "gripper_force_deviation is given without gripper_force"),
     ],
 )
 def test_a_mapping_that_does_not_fit_is_refused_by_name(
@@ -470,7 +488,7 @@ def test_any_cut_of_a_recording_is_refused_by_name(robot_log: GraspLog, write: S
 def robot_log_with_normals(log: GraspLog) -> GraspLog:
     normal = np.zeros_like(log.displacement)
     normal[..., 2] = 1.0
-    return replace(log, normal=normal)
+    return replace(log, normal=normal, gripper_force=np.ones(len(log)), gripper_force_deviation=0.1)
 
 
 def test_a_message_of_an_impossible_time_is_refused(tmp_path: Path) -> None:

@@ -126,6 +126,15 @@ def test_contact_holds_while_it_is_not_told(write: Write) -> None:
     assert [bool(mask.all()) for mask in log.contact] == [True, True, False]
 
 
+@pytest.mark.parametrize("rows", ["all", "one"], ids=["in each row", "in one row of a frame"])
+def test_a_column_is_the_grippers_force(write: Write, rows: str) -> None:
+    told = [f"{row},{'' if rows == 'one' and k % 9 else 1.5 * (k // 9)}" for k, row in enumerate(square())]
+    head = "# scale: 1e-4\n# gripper_force_deviation: 0.2\n"
+    log = formats.read(write(table(head=head, header="time,marker,x,y,gripper_force", rows=told)))
+    assert (log.gripper_force_deviation, "columns_left_out" in log.metadata) == (0.2, False)
+    np.testing.assert_array_equal(log.gripper_force, [0.0, 1.5, 3.0])
+
+
 def test_an_unknown_scale_is_told_and_friction_refused(write: Write) -> None:
     log = formats.read(write(table(head="")))
     assert not log.is_scaled
@@ -191,6 +200,18 @@ def npz_log(log: object, tmp_path: Path) -> Path:
         (table(rows=[row for row in square() if "dot 0" in row]), "markers is of shape"),
         (table(rows=["0.0,a,nan,nan", *square()[9:]]), "first frame is without any marker"),
         (table(header="time,marker,x,y,contact", rows=[f"{row},2" for row in square()]), "line 3, contact is '2'"),
+        (
+            table(header="time,marker,x,y,gripper_force", rows=[f"{row},{k // 12}" for k, row in enumerate(square())]),
+            "line 15, gripper_force is 1 N; allowed: 0 N, as in the frame's other rows",
+        ),
+        (
+            table(
+                header="time,marker,x,y,gripper_force", rows=[f"{row},{'' if '0.1' in row else 1}" for row in square()]
+            ),
+            "gripper_force is missing in frame 1; allowed: a number of N in a row of each frame",
+        ),
+        (table(head="# scale: 1e-4\n# gripper_force_deviation: x\n"), "gripper_force_deviation is 'x'; allowed: 0 to"),
+        (table(head="# scale: 1e-4\n# gripper_force_deviation: 1\n"), "given without gripper_force"),
         (table().encode() + b"\xff\xfe\n", "line 30 is not UTF-8"),
         (table() + '0.3,"' + "x" * 200_000 + '",1,1\n', "line 30 is not a row of text"),
     ],

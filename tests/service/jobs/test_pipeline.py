@@ -529,6 +529,19 @@ def test_forces_that_a_described_sensor_lacks_are_reconstructed(shop: Shop, blin
     assert "data tell: x 100%, y 100%, z 100%" in found.findings[0].evidence
 
 
+def test_a_gripper_that_reports_its_force_is_named_beside_the_gel(shop: Shop, blind: GraspLog) -> None:
+    with shop.database.write() as session:
+        sensors.describe(session, "s", Gel(1e6, 0.49, None, 0.0))
+    told = replace(blind, gripper_force=np.linspace(0.0, 1.0, len(blind)))
+    log_id, job_id = shop.ingest(encode(told))
+    shop.run(job_id)
+    found = shop.log(log_id).detection
+    assert found is not None
+    assert found.findings is not None
+    evidence = found.findings[0].evidence
+    assert "by the sensor's gel and from the normal force that the gripper reports, in effect averaged" in evidence
+
+
 def test_without_a_description_a_log_without_forces_is_refused_with_advice(shop: Shop, blind: GraspLog) -> None:
     job = shop.run(shop.ingest(encode(blind))[1])
     assert job.status == "refused"

@@ -68,6 +68,29 @@ def test_what_is_only_the_priors_is_said(pressed: Pressed) -> None:
     np.testing.assert_allclose(given.resultant[:, 2], -10.0, rtol=0.03)
 
 
+def test_the_force_that_the_gripper_reports_is_given(pressed: Pressed) -> None:
+    log = replace(pressed([6, 6], noise=1e-6, axes=2, crop=INSIDE), gripper_force=np.array([9.0, 9.1]))
+    blind = Gel(1e6, 0.5)
+    found, given = reconstruct(log, blind, noise=1e-6), reconstruct(log, blind, np.array([9.0, 9.1]), 1e-6)
+    np.testing.assert_array_equal(found.force, given.force)
+    np.testing.assert_array_equal(found.given, [[False, False, True]] * 2)
+    np.testing.assert_allclose(found.resultant[:, 2], [-9.0, -9.1], rtol=0.03)
+    silent = reconstruct(replace(log, gripper_force=np.zeros(2)), blind, noise=1e-6)
+    assert not silent.given.any(), "a gripper that does not report"
+    assert (silent.resultant_deviation[:, 2] > 0.5).all()
+
+
+def test_a_force_is_as_sure_as_it_is_said_to_be(pressed: Pressed) -> None:
+    log = replace(pressed([6, 6], noise=1e-6, axes=2, crop=INSIDE), gripper_force=np.array([10.0, 10.0]))
+    blind, spread = Gel(1e6, 0.5), []
+    for deviation in (0.1, 1.0):
+        found = reconstruct(replace(log, gripper_force_deviation=deviation), blind, noise=1e-6)
+        spread.append(found.resultant_deviation[:, 2])
+        np.testing.assert_array_less(np.abs(found.resultant[:, 2] + 10.0), 3.0 * spread[-1])
+    np.testing.assert_array_less(0.05, spread[0])
+    np.testing.assert_array_less(3.0 * spread[0], spread[1])
+
+
 def test_nothing_touches_where_nothing_moves_but_noise(pressed: Pressed) -> None:
     still = replace(pressed(LATE, crop=INSIDE), displacement=np.zeros((2, 8, 8, 3)))
     noisy = replace(still, displacement=1e-6 * np.random.default_rng(1).standard_normal((2, 8, 8, 3)))
@@ -213,5 +236,9 @@ def test_what_does_not_fit_is_refused_by_name(pressed: Pressed) -> None:
         reconstruct(log, GEL, noise=-1.0)
     with pytest.raises(InvalidInput, match="total_force is of shape"):
         reconstruct(log, GEL, total_force=np.ones(5))
+    with pytest.raises(InvalidInput, match="total_force_deviation is 0"):
+        reconstruct(log, GEL, total_force=np.ones(len(log)), total_force_deviation=0.0)
+    with pytest.raises(InvalidInput, match=r"total_force_deviation is 1.0; .* beside total_force"):
+        reconstruct(log, GEL, total_force_deviation=1.0)
     with pytest.raises(InvalidInput, match="criterion is l-curve"):
         reconstruct(log, GEL, noise=1e-6, criterion="l-curve")  # type: ignore[arg-type]

@@ -163,6 +163,16 @@ def test_a_log_is_downloaded_in_each_format_bit_for_bit(
     wait_for_empty_spool(client)
 
 
+def test_a_log_with_the_grippers_force_is_returned_as_it_was_sent(
+    client: httpx.Client, ramp: GraspLog, upload: Upload, wait: Wait
+) -> None:
+    log = replace(ramp, gripper_force=np.linspace(0.0, 9.0, len(ramp)), gripper_force_deviation=0.3, sensor="gripped")
+    answer = upload(client, encode(log))
+    assert client.get(f"{answer.headers['location']}/file").content == encode(log)
+    wait(client, answer.json()["job"]["id"])
+    wait_for_empty_spool(client)
+
+
 def test_a_format_that_is_not_written_is_refused(client: httpx.Client, fitted: dict[str, Any]) -> None:
     answer = client.get(f"/v1/grasp-logs/{fitted['id']}/file", params={"format": "csv"})
     assert (answer.status_code, answer.json()["allowed"]) == (422, "npz, parquet, mcap")
