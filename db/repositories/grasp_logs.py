@@ -148,7 +148,12 @@ def restore(session: Session, log_id: str) -> bool:
 
 
 def move(session: Session, source_id: int, target_id: int) -> None:
-    """Give a material's logs to another; those that it has already, by content and detector, stay where they are."""
+    """Give a material's logs to another; those that it has already, by content and detector, stay where they are.
+
+    But where samples were found in one that would stay, and none in the other's own, the two change places.
+    """
+    for own, theirs in _with_samples_in_the_second(session, target_id, source_id):
+        _exchange(session, own, theirs)
     there = aliased(GraspLogRow)
     same = (there.sha256 == GraspLogRow.sha256, there.detector == GraspLogRow.detector)
     is_there = exists().where(there.material_id == target_id, *same)
@@ -156,22 +161,31 @@ def move(session: Session, source_id: int, target_id: int) -> None:
     session.execute(moved.execution_options(synchronize_session=False))
 
 
-def lacking_samples_of(session: Session, material_id: int, other_id: int) -> list[str]:
-    """Ids of a material's logs, not withdrawn, that have no samples where the same log of another material has.
-
-    Same by content and detector.
-    """
-    theirs, their_samples, own_samples = aliased(GraspLogRow), aliased(SampleSummaryRow), aliased(SampleSummaryRow)
-    same = (theirs.sha256 == GraspLogRow.sha256, theirs.detector == GraspLogRow.detector)
+def _with_samples_in_the_second(
+    session: Session, material_id: int, other_id: int
+) -> list[tuple[GraspLogRow, GraspLogRow]]:
+    """Logs that two materials have, not withdrawn from either, where only the second one's has samples."""
+    own, theirs = aliased(GraspLogRow), aliased(GraspLogRow)
+    has_samples = [
+        exists().where(SampleSummaryRow.grasp_log_id == each.id, SampleSummaryRow.count > 0) for each in (own, theirs)
+    ]
     query = (
-        select(GraspLogRow.id)
-        .join(theirs, and_(theirs.material_id == other_id, theirs.withdrawn_at.is_(None), *same))
-        .join(their_samples, and_(their_samples.grasp_log_id == theirs.id, their_samples.count > 0))
-        .outerjoin(own_samples, and_(own_samples.grasp_log_id == GraspLogRow.id, own_samples.count > 0))
-        .where(GraspLogRow.material_id == material_id, GraspLogRow.withdrawn_at.is_(None))
-        .where(own_samples.grasp_log_id.is_(None))
+        select(own, theirs)
+        .join(theirs, and_(theirs.sha256 == own.sha256, theirs.detector == own.detector))
+        .where(own.material_id == material_id, theirs.material_id == other_id)
+        .where(own.withdrawn_at.is_(None), theirs.withdrawn_at.is_(None), ~has_samples[0], has_samples[1])
     )
-    return list(session.scalars(query.order_by(GraspLogRow.id)))
+    return [(own, theirs) for own, theirs in session.execute(query.order_by(own.id).with_for_update())]
+
+
+def _exchange(session: Session, one: GraspLogRow, other: GraspLogRow) -> None:
+    """Let two logs of the same content change their materials, one after the other: no two may be alike meanwhile."""
+    (sha256, material_id), one.sha256 = (one.sha256, one.material_id), uuid.uuid4().hex
+    session.flush()
+    one.material_id, other.material_id = other.material_id, material_id
+    session.flush()
+    one.sha256 = sha256
+    session.flush()
 
 
 def _record(

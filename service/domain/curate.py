@@ -95,8 +95,7 @@ def merge(context: Context, material: str, source: str, principal: Principal = A
         methods = friction_models.current_methods(session, [target_id, source_id])
         materials.merge(session, target_id, source_id)
         record(session, principal, "material.merged", material, {"source": source})
-        again = _detect_again(session, target_id, source_id, principal.key_id)
-        queued = [*_queue_refits(session, target_id, methods, principal.key_id), *again]
+        queued = _queue_refits(session, target_id, methods, principal.key_id)
         merged = materials.get(session, material)
         _check_aliases(merged)
     return merged, _follow_up(context, queued)
@@ -201,18 +200,6 @@ def _refit_without(session: Session, material_id: int | None, key_id: str | None
         friction_models.retire(session, material_id)
         return []
     return _queue_refits(session, material_id, methods, key_id)
-
-
-def _detect_again(session: Session, material_id: int, merged_id: int, key_id: str | None) -> list[Job]:
-    """Jobs of logs that both materials had: the copy that stays has no samples, and the other's count no more."""
-    queued = []
-    for log_id in grasp_logs.lacking_samples_of(session, material_id, merged_id):
-        job = grasp_logs.get(session, log_id).job
-        if job.finished_at is not None:
-            detections.remove(session, log_id)
-            jobs.requeue(session, job.id, requested_by=key_id)
-        queued.append(jobs.get(session, job.id))
-    return queued
 
 
 def _queue_refits(session: Session, material_id: int, methods: Iterable[str], key_id: str | None) -> list[Job]:

@@ -316,17 +316,39 @@ def test_a_merged_material_is_fitted_over_all_its_logs(shop: Shop) -> None:
         curate.merge(shop.context, "paper", "papre")
 
 
-def test_a_log_of_both_counts_once_whichever_of_its_jobs_found_samples(shop: Shop) -> None:
-    shop.ingest("paper", 0)
-    cancelled = shop.store("paper", 1)
+def cancelled(shop: Shop) -> str:
+    """Before anything was found, and its file is deleted as an old upload."""
+    log_id = shop.store("paper", 1)
     with shop.database.write() as session:
-        jobs.cancel(session, grasp_logs.get(session, cancelled).job.id, "nobody wants it")
-    shop.ingest("papre", 1)
+        log = grasp_logs.get(session, log_id)
+        jobs.cancel(session, log.job.id, "nobody wants it")
+    shop.blobs.remove([log.sha256])
+    return log_id
+
+
+def waiting(shop: Shop) -> str:
+    """Its job comes after the merge."""
+    return shop.store("paper", 1)
+
+
+@pytest.mark.parametrize("without_samples", [cancelled, waiting])
+def test_a_log_of_both_counts_once_whichever_of_its_jobs_found_samples(
+    shop: Shop, without_samples: Callable[[Shop], str]
+) -> None:
+    shop.ingest("paper", 0)
+    found = shop.ingest("papre", 1)
     each = shop.model("paper")[1]
-    _, queued = curate.merge(shop.context, "paper", "papre")
-    assert [job.grasp_log_id for job in queued if job.kind == "ingest"] == [cancelled]
+    own = without_samples(shop)
+    with shop.database.read() as session:
+        paper, papre = (materials.find_id(session, name) for name in ("paper", "papre"))
+        before = grasp_logs.get(session, own)
+    curate.merge(shop.context, "paper", "papre")
     assert {job.status for job in shop.work()} == {"done"}
     assert shop.model("paper")[1:] == (2 * each, False)
+    with shop.database.read() as session:
+        assert [grasp_logs.material_id(session, log_id) for log_id in (found, own)] == [paper, papre]
+        assert grasp_logs.get(session, own).sha256 == before.sha256
+        assert friction_models.current_methods(session, [papre]) == []
 
 
 def test_a_copy_that_a_merge_left_behind_is_changed_by_the_owners_of_what_it_is_now(shop: Shop) -> None:
