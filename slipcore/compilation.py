@@ -21,7 +21,7 @@ from numba import njit
 from numba.core import cgutils, config, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.errors import TypingError
-from numba.extending import intrinsic
+from numba.extending import get_cython_function_address, intrinsic
 from numba.np.arrayobj import make_array
 
 _IMPORT = re.compile(r"^\s*(?:from\s+(\S+)\s+import\s+(\([^)]*\)|[^\n#]*)|import\s+([^\n#]*))", re.MULTILINE)
@@ -211,3 +211,8 @@ def _source(root: Path, module: str) -> Path | None:
             if source.is_file():
                 return source
     return None
+
+
+def lapack_address(name: str) -> int:
+    """Where a routine of SciPy's LAPACK is, of which arguments are addresses as Fortran has them."""
+    return int(get_cython_function_address("scipy.linalg.cython_lapack", name))

@@ -1,9 +1,21 @@
-"""Root of the covariance of data, which are noise of variance 1 and what unknowns of variance 1 make of them."""
+"""Root of the covariance of data, which are noise of variance 1 and what unknowns of variance 1 make of them.
+
+By routines that leave other threads the interpreter: a live stream's frames go on while its contact is sought.
+"""
+
+from ctypes import CFUNCTYPE, byref, c_int, c_void_p
 
 import numpy as np
 from scipy.linalg import lapack
 
+from slipcore.compilation import lapack_address
 from slipcore.frames import FloatArray
+
+BLOCK = 32
+"""Columns that are taken at a time; of all sizes about as fast."""
+
+_dtpqrt = CFUNCTYPE(None, *[c_void_p] * 12)(lapack_address("dtpqrt"))
+"""``scipy.linalg.lapack.dtpqrt`` itself keeps the interpreter."""
 
 
 def covariance_root(spread: FloatArray) -> FloatArray:
@@ -12,6 +24,18 @@ def covariance_root(spread: FloatArray) -> FloatArray:
     By QR of the unit matrix on top of Sᵀ (Golub and Van Loan, Matrix Computations, 4th ed., §6.5.3): the sum itself
     would have the square of R's condition number, and lose what is small beside its largest eigenvalue.
     """
-    blocks = min(32, len(spread))  # columns at a time; of all sizes about as fast
-    root, *_ = lapack.dtpqrt(0, blocks, np.eye(len(spread), order="F"), spread.T, overwrite_a=True)
-    return np.asarray(root)
+    m, p = spread.shape
+    block = min(BLOCK, m)
+    root, below = np.eye(m, order="F"), np.array(spread.T, dtype=np.float64, order="F")
+    reflectors, work = np.empty((block, m), order="F"), np.empty(block * m)
+    sizes = [byref(c_int(size)) for size in (p, m, 0, block)]
+    arrays = [(root, m), (below, max(p, 1)), (reflectors, block)]
+    info = c_int()
+    _dtpqrt(*sizes, *(each for array, rows in arrays for each in (array.ctypes.data, byref(c_int(rows)))),
+            work.ctypes.data, byref(info))  # fmt: skip
+    return root
+
+
+def solve_root(root: FloatArray, data: FloatArray, *, transposed: bool = False) -> FloatArray:
+    """R⁻¹ D of data D [m, n], or (Rᵀ)⁻¹ D."""
+    return np.asarray(lapack.dtrtrs(root, data, trans=int(transposed))[0])

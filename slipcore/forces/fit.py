@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
+from slipcore.forces.covariance import solve_root
 from slipcore.forces.defaults import FIT
 from slipcore.forces.nodes import Nodes
 from slipcore.forces.prior import Smoothness, choices, factors, usual
@@ -107,7 +108,7 @@ def fit(observation: Observation, nodes: Nodes, support: BoolArray, prior: Prior
     j = root.shape[1]
     stacked = np.concatenate((_times(r, root), np.eye(3 * j)))
     inner, outer = scipy.linalg.qr(stacked, mode="economic", check_finite=False)
-    whitened = scipy.linalg.solve_triangular(outer, np.column_stack((np.eye(3 * j), inner[: len(r)].T)))
+    whitened = solve_root(np.asarray(outer, dtype=np.float64), np.column_stack((np.eye(3 * j), inner[: len(r)].T)))
     whitened = np.concatenate([part @ rows for part, rows in zip(root, np.split(whitened, 3), strict=True)])
     operator = whitened[:, 3 * j :] @ q.T / observation.noise
     return Fit(support, operator, whitened[:, : 3 * j], root)

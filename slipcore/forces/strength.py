@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import scipy.linalg
 from scipy.optimize import minimize_scalar
 
 from slipcore.errors import InvalidInput
@@ -29,7 +28,7 @@ class Spectrum:
     @classmethod
     def of(cls, whitened: FloatArray) -> "Spectrum":
         """Of data that are already divided by their noise, [m, p]."""
-        u, s, _ = scipy.linalg.svd(whitened, full_matrices=False, check_finite=False)
+        u, s, _ = np.linalg.svd(whitened, full_matrices=False)  # SciPy's stops all other threads meanwhile
         return cls(u, s)
 
     @property

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.linalg
 from scipy.ndimage import binary_closing, binary_dilation, binary_erosion, convolve1d, generate_binary_structure
 
-from slipcore.forces.covariance import covariance_root
+from slipcore.forces.covariance import covariance_root, solve_root
 from slipcore.forces.defaults import STRENGTH, SUPPORT
 from slipcore.forces.fit import Observation, Prior, log_evidence
 from slipcore.forces.nodes import Nodes
@@ -100,6 +100,6 @@ def node_relevance(response: FloatArray, data: FloatArray, deviation: FloatArray
     m, _, k = response.shape
     weighted = (response * deviation).reshape(m, 3 * k)
     root, both = covariance_root(weighted), np.column_stack((data, weighted))
-    seen = scipy.linalg.solve_triangular(root, both, trans="T", overwrite_b=True, check_finite=False)
+    seen = solve_root(root, both, transposed=True)
     mean, share = seen[:, 1:].T @ seen[:, 0], np.sum(seen[:, 1:] ** 2, axis=0)
     return np.sum(mean.reshape(3, k) ** 2, axis=0), np.sum(share.reshape(3, k), axis=0)

@@ -7,9 +7,8 @@ frame where that is. In-plane markers alone need the contact first: shear that s
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
-from slipcore.forces.covariance import covariance_root
+from slipcore.forces.covariance import covariance_root, solve_root
 from slipcore.forces.defaults import LATTICE
 from slipcore.forces.fit import Observation
 from slipcore.forces.nodes import Nodes
@@ -35,7 +34,7 @@ def whole_lattice(observation: Observation, nodes: Nodes, typical: float) -> Who
     strength = LATTICE.concentration * level * np.sqrt(m) / float(np.linalg.norm(spread))
     upper = covariance_root(strength * spread.reshape(m, -1))
     by_pressure, pressure = strength * spread[:, 2], strength * root[2]
-    seen = scipy.linalg.solve_triangular(upper, by_pressure, trans="T", check_finite=False)
-    gain = scipy.linalg.solve_triangular(upper, seen, check_finite=False)
+    seen = solve_root(upper, by_pressure, transposed=True)
+    gain = solve_root(upper, seen)
     variance = np.sum(pressure**2, axis=1) - np.sum((pressure @ seen.T) ** 2, axis=1)
     return WholeLattice(pressure @ gain.T / observation.noise, np.sqrt(np.maximum(variance, 0.0)))
