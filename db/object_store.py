@@ -89,10 +89,12 @@ class ObjectStore:
     def set_aside(self, sha256: str, *, back: bool = False) -> bool:
         """Move a blob into the quarantine, or ``back`` to its place; False where it isn't."""
         source, target = (_aside(sha256), _key(sha256)) if back else (_key(sha256), _aside(sha256))
-        if not self._is_there(source):
-            return False
-        with _answered("blob store", sha256):
-            self._obstore.rename(self._store, source, target)
+        with _answered("blob store"):
+            try:
+                self._obstore.head(self._store, source)
+                self._obstore.rename(self._store, source, target)
+            except FileNotFoundError:  # of the latter where somebody else was faster
+                return False
         return True
 
     def read(self, key: str) -> str | None:

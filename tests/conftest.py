@@ -137,6 +137,9 @@ def new_url(engine_name: str, request: pytest.FixtureRequest) -> Iterator[Callab
         server.drop(url)
 
 
+NO_SUCH_KEY = Response("<Error><Code>NoSuchKey</Code></Error>", 404, media_type="application/xml")
+
+
 class S3:
     """What the blob store asks of S3, in memory: whole and multipart uploads, GET, HEAD, list and bulk deletion."""
 
@@ -151,8 +154,7 @@ class S3:
         key = request.path_params.get("key", "")
         body = await request.body()
         if source := request.headers.get("x-amz-copy-source"):
-            self.objects[key] = self.objects[source.partition("/grasps/")[2] or source.removeprefix("grasps/")]
-            return Response("<CopyObjectResult><ETag>1</ETag></CopyObjectResult>", media_type="application/xml")
+            return self._copy(source.partition("/grasps/")[2] or source.removeprefix("grasps/"), key)
         answers = {"PUT": self._put, "GET": self._get, "HEAD": self._get, "DELETE": self._delete, "POST": self._post}
         return answers[request.method](key, body, request.query_params)
 
@@ -163,11 +165,17 @@ class S3:
             self.objects[key] = body
         return Response(headers={"ETag": '"1"'})
 
+    def _copy(self, source: str, key: str) -> Response:
+        if source not in self.objects:
+            return NO_SUCH_KEY
+        self.objects[key] = self.objects[source]
+        return Response("<CopyObjectResult><ETag>1</ETag></CopyObjectResult>", media_type="application/xml")
+
     def _get(self, key: str, _body: bytes, query: Mapping[str, str]) -> Response:
         if not key:
             return self._list(query.get("prefix", ""))
         if key not in self.objects:
-            return Response("<Error><Code>NoSuchKey</Code></Error>", 404, media_type="application/xml")
+            return NO_SUCH_KEY
         day = "Mon, 03" if "clock/" in key else "Sat, 01"  # all else was written two days before
         headers = {"ETag": '"1"', "Last-Modified": f"{day} Nov 2025 10:00:00 GMT"}
         return Response(self.objects[key], headers=headers)

@@ -53,6 +53,21 @@ def test_a_removed_blob_is_gone_from_its_place_alone(tmp_path: Path) -> None:
     assert list(blobs.quarantine.hashes()) == [aside]
 
 
+@pytest.mark.usefixtures("s3")
+def test_what_another_has_just_set_aside_is_no_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first, other = (open_blobs(tmp_path / name, URL, MIB) for name in ("one", "other"))
+    sha256, rename = first.put(b"tactile"), obstore.rename
+
+    def rename_too_late(*given: Any) -> None:
+        monkeypatch.setattr(obstore, "rename", rename)
+        other.quarantine.put(sha256)
+        rename(*given)
+
+    monkeypatch.setattr(obstore, "rename", rename_too_late)
+    first.quarantine.put(sha256)
+    assert (first.has(sha256), list(first.quarantine.hashes())) == (False, [sha256])
+
+
 def test_what_comes_back_changed_is_not_taken(s3: Any, tmp_path: Path) -> None:
     sha256 = open_blobs(tmp_path / "one", URL, MIB).put(b"tactile")
     s3.objects[f"lab/{sha256[:2]}/{sha256}"] = b"tactilE"
