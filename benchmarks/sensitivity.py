@@ -1,23 +1,31 @@
 """What half and one and a half of each default does: `python -m benchmarks.sensitivity [--page docs/sensitivity.md]`.
 
-Detectors: change of the mean F1 on scenes that no default was chosen on. Patches: change of the error of a contact's
-friction, and of the share of frames whose regime is right. Forces: change of the error of forces from displacement, and
-of how many intervals hold the truth. Contact: change of the largest error against a fine solution, and of the
-operators' applications. Estimators: change of the error of friction at working points and of its interval's width, over
-simulated grasps. Each value is kept in its range.
+Detectors: change of the mean F1 on scenes that no default was chosen on; those for few elements on the same scenes as
+few elements see them. Grip control: change of how many objects are held, and of the force over the least that holds.
+Patches: change of the error of a contact's friction, and of the share of frames whose regime is right. Forces: change
+of the error of forces from displacement, and of how many intervals hold the truth. Contact: change of the largest error
+against a fine solution, and of the operators' applications. Estimators: change of the error of friction at working
+points and of its interval's width, over simulated grasps. Each value is kept in its range.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields, replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 from matplotlib.figure import Figure
 
 import estimators
 from benchmarks import forces as of_gels
+from benchmarks.control_episodes import run as run_task
+from benchmarks.control_episodes import world_of
+from benchmarks.control_outcomes import outcome_of
+from benchmarks.control_strategies import Controlled, model_of, settings_of
+from benchmarks.control_tasks import LIFTS, PAPER
 from benchmarks.detector_accuracy import FORCE_NOISE, INPUTS, score
+from benchmarks.detector_coarse import coarse
 from benchmarks.detector_scenes import Case, cases, observed, phases, scoring, simulated
 from benchmarks.pages import options, picture_folder, save, write
 from benchmarks.patch_grasps import PIVOT, SLIDE, Course
@@ -38,11 +46,19 @@ from slipcore.frames import BoolArray
 from slipcore.options import Option, Options, describe_options
 from slipcore.patch.following import follow_patches
 from slipcore.patch.friction import contact_friction
+from stiction_client import ControlSettings, GraspController, InvalidArgument
+from stiction_client.controller.settings import Gain, gains
 
 MARKER_NOISE = 1e-6
 FACTORS = (0.5, 1.5)
 HELD_OUT = ("lift, hold, set down", "grip tightens", "soft fruit", "stage turns and slides", "slow gel, twisted")
 """Of the scenes that detectors are only scored on: holds, a growing grip, motion, creep, an object that gives way."""
+FEW = (6, 3)
+"""Elements a side of the arrays that have few."""
+TASKS = (LIFTS[1], LIFTS[6], PAPER[0], PAPER[2])
+GRIPS = range(7000, 7003)
+"""Tasks of the grip controller, and seeds of no other benchmark."""
+REFUSALS = (SlipcoreError, estimators.EstimatorError, estimators.NotConverged, InvalidArgument)
 DEAD = 1e-3
 """Relative change below which a default has no effect to speak of."""
 SENSOR = SensorSampling((8, 8), 1.5e-3, 4.0)
@@ -102,7 +118,7 @@ class Row:
         return max((abs(value) for pair in self.changes.values() for value in pair), default=float("nan"))
 
 
-def neighbours(value: float, option: Option) -> Iterator[float]:
+def neighbours(value: float, option: Option | Gain) -> Iterator[float]:
     """Half and one and a half of a value, in its range; a whole number moves by one at least."""
     for factor in FACTORS:
         moved: float = factor * value
@@ -113,15 +129,19 @@ def neighbours(value: float, option: Option) -> Iterator[float]:
 
 
 def rows(
-    label: str, kind: type[Options], measure: Callable[[str, float], Mapping[str, float]], start: Mapping[str, float]
+    label: str,
+    kind: type[Options] | type[ControlSettings],
+    measure: Callable[[str, float], Mapping[str, float]],
+    start: Mapping[str, float],
 ) -> Iterator[Row]:
     """A row for each default of a table; ``measure`` takes a name and a value."""
-    for entry in fields(kind):
-        option, found, failed = describe_options(kind)[entry.name], [], ""
+    ranges = gains() if kind is ControlSettings else describe_options(kind)
+    for entry in (entry for entry in fields(kind) if entry.default is not MISSING):
+        option, found, failed = ranges[entry.name], [], ""
         for value in neighbours(entry.default, option):
             try:
                 found.append(measure(entry.name, value))
-            except (SlipcoreError, estimators.EstimatorError, estimators.NotConverged) as error:
+            except REFUSALS as error:
                 failed = f"{value:g}: {type(error).__name__}"
         changes = {key: tuple(each[key] - start[key] for each in found) for key in start} if len(found) == 2 else {}
         yield Row(label, entry.name, entry.default, option.unit, changes, failed)
@@ -142,14 +162,32 @@ def changed(table: Options, name: str, value: float) -> Iterator[None]:
 
 def of_detectors() -> list[Row]:
     """Options of the two methods that are not there for comparison."""
-    held_out = [Case(each.name, log := simulated(each), phases(log)) for each in scoring() if each.name in HELD_OUT]
     seen = [
         (case, observed(case.log, MARKER_NOISE, FORCE_NOISE, inputs, seed=5))
-        for case in [*cases("reference"), *held_out]
+        for case in held_out()
         for inputs in INPUTS
     ]
+    return of_methods(("filter", "strain_rate"), seen)
+
+
+def of_few_elements() -> list[Row]:
+    """Options of the methods for arrays of few elements."""
+    few = [replace(case, log=coarse(case.log, elements)) for case in held_out() for elements in FEW]
+    seen = [(case, observed(case.log, MARKER_NOISE, FORCE_NOISE, "force", seed=5)) for case in few]
+    return of_methods(("forces_only", "coarse"), seen)
+
+
+@cache
+def held_out() -> list[Case]:
+    """Scenes that detectors are only scored on."""
+    ours = [Case(each.name, log := simulated(each), phases(log)) for each in scoring() if each.name in HELD_OUT]
+    return [*cases("reference"), *ours]
+
+
+def of_methods(methods: Sequence[str], seen: list[tuple[Case, GraspLog]]) -> list[Row]:
+    """Options of some methods."""
     found: list[Row] = []
-    for method in ("filter", "strain_rate"):
+    for method in methods:
         start = f1(seen, method)
         found += rows(
             method, METHODS[method].options, lambda name, value, m=method: f1(seen, m, **{name: value}), start
@@ -160,6 +198,26 @@ def of_detectors() -> list[Row]:
 def f1(seen: list[tuple[Case, GraspLog]], method: str, **chosen: float) -> dict[str, float]:
     """Mean F1 of a method with one option chosen."""
     return {"F1": float(np.mean([score(case, log, detect_slip(log, method, **chosen)).f1 for case, log in seen]))}
+
+
+def gripped(**chosen: float) -> dict[str, float]:
+    """Share of the tasks in which the object is held, with the material's model and without; and of the greatest and
+    the last force over the least that holds, in logarithms of their means."""
+    done = []
+    for task, seed in product(TASKS, GRIPS):
+        world = world_of(task, seed)
+        settings = settings_of(world, task.limit, **chosen)
+        for model in (model_of(task.friction[0], world), None):
+            each = Controlled(GraspController.init(settings, model))
+            done.append(outcome_of(run_task(task, world, [each], seed, 0.0), "", seed))
+    held = [each for each in done if each.held]
+    peak, final = (float(np.log(np.mean([getattr(each, name) for each in held]))) for name in ("peak", "final"))
+    return {"held": len(held) / len(done), "peak": peak, "final": final}
+
+
+def of_control() -> list[Row]:
+    """Settings of the grip controller."""
+    return list(rows("settings", ControlSettings, lambda name, value: gripped(**{name: value}), gripped()))
 
 
 @cache
@@ -293,6 +351,8 @@ def of_fits() -> list[Row]:
 
 PARTS = {
     "detector": of_detectors,
+    "few elements": of_few_elements,
+    "control": of_control,
     "patches": of_patches,
     "forces": of_presses,
     "contact": of_solver,
@@ -335,9 +395,10 @@ def main() -> None:
     arguments = parser.parse_args()
     for part in [arguments.only] if arguments.only else PARTS:
         found = PARTS[part]()
-        save(draw(found), picture_folder(arguments) / f"sensitivity-{part}.png")
+        name = f"sensitivity-{part.replace(' ', '-')}"
+        save(draw(found), picture_folder(arguments) / f"{name}.png")
         numbers = [asdict(row) for row in found]
-        write(numbers, {part: table_of(found)}, arguments, f"sensitivity-{part}.json")
+        write(numbers, {part: table_of(found)}, arguments, f"{name}.json")
         print(table_of(found))
 
 

@@ -7,6 +7,8 @@ import pytest
 from benchmarks.sensitivity import Row, changed, neighbours, rows, table_of
 from slipcore.errors import InvalidInput
 from slipcore.options import Option, Options
+from stiction_client import Contact, ControlSettings
+from stiction_client.controller.settings import gains
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,6 +43,18 @@ def test_a_row_tells_each_change_or_what_failed() -> None:
     assert share.largest == 0.5
     assert (count.changes, count.failed) == ({}, "3: InvalidInput")
     assert math.isnan(count.largest)
+
+
+def test_what_a_controller_must_be_given_has_no_row_and_what_it_refuses_says_so() -> None:
+    def measure(name: str, value: float) -> dict[str, float]:
+        contact = Contact.flat(1e-4)
+        ControlSettings(contact=contact, least_force=1.0, most_force=9.0, **{name: value})  # type: ignore[arg-type]
+        return {"held": 1.0}
+
+    found = {row.name: row for row in rows("settings", ControlSettings, measure, {"held": 1.0})}
+    assert {*gains()} - {*found} == {"least_force", "most_force"}
+    assert found["lead_time"].changes == {"held": (0.0, 0.0)}
+    assert found["feel_stick_ratio"].failed == "0.275: InvalidArgument"
 
 
 def test_the_most_sensitive_comes_first_after_what_fails_and_the_rest_below_the_table() -> None:
