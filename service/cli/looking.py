@@ -1,7 +1,7 @@
 """Look at a log on this machine: corrected by its sensor's calibration, with forces by its gel, and the slip in it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated, Any
@@ -64,8 +64,8 @@ def look(log: "GraspLog", method: str | None = None, sensor_model: Path | None =
 
 
 def comparison(log: "GraspLog", gel: Path | None) -> "ForceComparison | None":
-    """How the log's own forces agree with those by the gel, where there are both; raises ``InvalidInput`` for a log of
-    forces alone.
+    """How the log's own forces agree with those by the gel alone, where there are both; raises ``InvalidInput`` for a
+    log of forces alone.
     """
     if gel is None or log.force is None:
         return None
@@ -74,8 +74,9 @@ def comparison(log: "GraspLog", gel: Path | None) -> "ForceComparison | None":
 
     if not log.has_displacement:
         raise InvalidInput("gel", "given for a log of forces alone", "a log whose displacement tells forces, too")
+    by_gel = replace(log, gripper_force=None, gripper_force_deviation=None)  # which would hide what is wrong of the gel
     with patience("reconstructing forces"):
-        return compare_forces(log, reconstruct(log, Gel.from_json(_told(gel, "gel"))))
+        return compare_forces(log, reconstruct(by_gel, Gel.from_json(_told(gel, "gel"))))
 
 
 def _corrected(log: "GraspLog", sensor_model: Path | None, method: str) -> "tuple[GraspLog, dict[str, float]]":

@@ -705,11 +705,15 @@ def test_a_log_without_forces_is_looked_at_by_its_gel(run: Run, felt: Path, gel:
     assert without["contact_friction"] is None
 
 
-def test_check_tells_how_a_sensors_own_forces_agree_with_those_by_its_gel(run: Run, felt: Path, gel: Path) -> None:
+def test_check_tells_how_a_sensors_own_forces_agree_with_those_by_its_gel(
+    run: Run, felt: Path, gel: Path, tmp_path: Path
+) -> None:
     found = json.loads(run("check", felt, "--gel", gel, "--json")[1])["forces_by_gel"]
     assert found["total_normal"] == {"ratio": pytest.approx(1.0, abs=0.1), "correlation": pytest.approx(1.0, abs=0.01)}
     assert set(found) == {"normal", "tangential", "total_normal", "total_tangential"}
-    assert re.search(r"normal, of the contact +0\.9\d+ +1\.00", run("check", felt, "--gel", gel)[1])
+    log = formats.read(felt)
+    gripped = container.write(replace(log, gripper_force=[1.0] * len(log)), tmp_path / "gripped.npz")
+    assert re.search(r"normal, of the contact +0\.9\d+ +1\.00", run("check", gripped, "--gel", gel)[1])
     assert "forces_by_gel" not in json.loads(run("check", felt, "--json")[1])
     assert "gel.json: slip and friction are by the log's own forces" in run("detect", felt, "--gel", gel)[2]
     code, _, err = run("check", felt, "--gel", felt)
