@@ -6,6 +6,7 @@ import numpy as np
 
 import slipcore
 from slipcore import Collected, ContactFriction, FrictionSamples, GraspLog, SlipHistory
+from slipcore.defaults import SampleOptions
 
 if TYPE_CHECKING:
     from slipcore.forces import Reconstruction
@@ -24,9 +25,22 @@ def collect(
     options = {} if reconstruction is None else {"force_noise": reconstruction.force_noise}
     found = slipcore.collect_friction(log, history, **options)
     if len(found.samples) == 0:
-        because = found.elements_left_out or _without_samples(log, history)
+        because = found.elements_left_out or _unsure(log, reconstruction) or _without_samples(log, history)
         return found, "; ".join(filter(None, (because, _bound(found.contact))))
     return found, None
+
+
+def _unsure(log: GraspLog, reconstruction: "Reconstruction | None") -> str | None:
+    """That elements' reconstructed normal forces are too unsure for any sample, where they are."""
+    if reconstruction is None or log.force is None:
+        return None
+    largest, noise = float(-log.force[..., 2].min()), reconstruction.force_noise
+    if largest >= SampleOptions().force_to_noise * noise:
+        return None
+    return (
+        f"elements' normal forces follow from displacement to ± {1e3 * noise:.2g} mN of at most "
+        f"{1e3 * largest:.2g} mN, too unsure for samples; let all of the contact slide, and tell the object's pose"
+    )
 
 
 def _without_samples(log: GraspLog, history: SlipHistory) -> str:

@@ -565,6 +565,16 @@ def test_samples_carry_the_noise_of_reconstructed_forces(blind: GraspLog) -> Non
     assert collected.elements.normal_force_noise == pytest.approx(found.force_noise / np.sqrt(2.0))
 
 
+def test_of_elements_forces_that_are_too_unsure_it_is_said(blind: GraspLog) -> None:
+    found = reconstruct(blind, forces.Gel(1e6, 0.49))
+    log, found = found.apply(blind), replace(found, deviation=np.full(found.force.shape, 0.05))
+    collected, because = collect(log, slipcore.detect_slip(log), found)
+    assert len(collected.samples) == 0
+    assert because is not None
+    assert because.startswith("elements' normal forces follow from displacement to ± ")
+    assert "tell the object's pose" in because
+
+
 def test_of_forces_alone_it_is_said_that_they_tell_no_velocity(shop: Shop, ramp: GraspLog) -> None:
     _, job_id = shop.ingest(encode(replace(ramp, displacement=None, truth=None)))
     job = shop.run(job_id)
