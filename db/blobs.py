@@ -127,14 +127,14 @@ class BlobStore:
         return self._remote is not None
 
     def has_within(self, folder: Path) -> bool:
-        """Whether a folder is among the store's own files, or its blobs are the store's or have these among them."""
-        own = [part.resolve() for part in (self._blobs, self._spool, self._set_aside)]
-        its_own = folder / self._blobs.name
-        if its_own.exists() and its_own.samefile(self._blobs):  # by another mount
-            return True
-        there = its_own.resolve()
-        among = any(place.is_relative_to(part) for part in own for place in (folder.resolve(), there))
-        return among or any(part.is_relative_to(there) for part in own)
+        """Whether a folder is among the store's own files, or its blobs are the store's or have these among them.
+
+        By whichever way: a link, or another mount.
+        """
+        own, theirs = (self._blobs, self._spool, self._set_aside), folder / self._blobs.name
+        parts = {_identity(part) for part in own}
+        among = any(not parts.isdisjoint(_way_to(place)) for place in (folder, theirs))
+        return among or any(_identity(theirs) in _way_to(part) for part in own)
 
     def spool(self) -> Spool:
         """A new file to write to; use it in a ``with`` statement."""
@@ -362,6 +362,20 @@ class BlobStore:
 def open_blobs(folder: Path, url: str | None = None, cache_bytes: int = 0) -> BlobStore:
     """The blobs in a folder, or those of the object store at ``url`` with the folder as their cache."""
     return BlobStore(folder, None if url is None else ObjectStore(url), cache_bytes)
+
+
+def _identity(path: Path) -> tuple[int, int] | Path:
+    """What a file or folder is by whichever name; one that is not there yet is its name."""
+    with suppress(OSError):
+        told = path.stat()
+        return told.st_dev, told.st_ino
+    return path.resolve()
+
+
+def _way_to(path: Path) -> set[tuple[int, int] | Path]:
+    """The file or folder, and all folders that it is in."""
+    resolved = path.resolve()
+    return {_identity(each) for each in (resolved, *resolved.parents)}
 
 
 def _state(path: Path) -> tuple[int, ...]:

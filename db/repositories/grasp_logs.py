@@ -1,6 +1,7 @@
 """Queries on grasp logs, with their sensors."""
 
 import uuid
+from collections.abc import Sequence
 
 from sqlalchemy import and_, exists, func, inspect, select, tuple_, update
 from sqlalchemy.exc import IntegrityError
@@ -152,8 +153,7 @@ def move(session: Session, source_id: int, target_id: int) -> None:
 
     But where samples were found in one that would stay, and none in the other's own, the two change places.
     """
-    for own, theirs in _with_samples_in_the_second(session, target_id, source_id):
-        _exchange(session, own, theirs)
+    _exchange(session, _with_samples_in_the_second(session, target_id, source_id))
     there = aliased(GraspLogRow)
     same = (there.sha256 == GraspLogRow.sha256, there.detector == GraspLogRow.detector)
     is_there = exists().where(there.material_id == target_id, *same)
@@ -178,13 +178,17 @@ def _with_samples_in_the_second(
     return [(own, theirs) for own, theirs in session.execute(query.order_by(own.id).with_for_update())]
 
 
-def _exchange(session: Session, one: GraspLogRow, other: GraspLogRow) -> None:
-    """Let two logs of the same content change their materials, one after the other: no two may be alike meanwhile."""
-    (sha256, material_id), one.sha256 = (one.sha256, one.material_id), uuid.uuid4().hex
+def _exchange(session: Session, pairs: Sequence[tuple[GraspLogRow, GraspLogRow]]) -> None:
+    """Let the logs of each pair, alike but for it, change their materials: no two may be alike meanwhile."""
+    contents = [one.sha256 for one, _ in pairs]
+    for one, _ in pairs:
+        one.sha256 = uuid.uuid4().hex
     session.flush()
-    one.material_id, other.material_id = other.material_id, material_id
+    for one, other in pairs:
+        one.material_id, other.material_id = other.material_id, one.material_id
     session.flush()
-    one.sha256 = sha256
+    for (one, _), sha256 in zip(pairs, contents, strict=True):
+        one.sha256 = sha256
     session.flush()
 
 

@@ -1,10 +1,10 @@
-"""A thread beside those that answer, for work that nobody waits for: shared out fairly among those who ask."""
+"""Threads beside those that answer, for work that nobody waits for: shared out fairly among those who ask."""
 
 from collections import OrderedDict, deque
 from collections.abc import Callable
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future
 from functools import partial
-from threading import Lock
+from threading import Condition, Thread
 from typing import Any, ParamSpec, TypeVar
 
 Arguments = ParamSpec("Arguments")
@@ -12,31 +12,52 @@ Result = TypeVar("Result")
 
 
 class FairExecutor:
-    """One thread: owners have their turns one after the other, each owner's work in the order in which it came.
+    """So many threads, of which each owner has one at once: owners have their turns one after the other.
 
-    So a piece of work waits for those of its own owner and for one of each other owner's, however many that has.
+    Each owner's work is done in the order in which it came, and waits for a piece of another's at most while there are
+    no more owners than threads. What has not been done is given up when the process ends.
     """
 
-    def __init__(self) -> None:
-        self._thread, self._lock = ThreadPoolExecutor(1), Lock()
+    def __init__(self, threads: int = 1) -> None:
+        self._most, self._begun, self._changed = threads, 0, Condition()
         self._waiting: OrderedDict[str, deque[Callable[[], None]]] = OrderedDict()
+        self._served: set[str] = set()
 
     def of(self, owner: str) -> Executor:
-        """The thread as this owner has it."""
+        """The threads as this owner has them."""
         return _Share(partial(self._add, owner))
 
     def _add(self, owner: str, do: Callable[[], None]) -> None:
-        with self._lock:
+        with self._changed:
             self._waiting.setdefault(owner, deque()).append(do)
-        self._thread.submit(self._do_next)
+            if self._begun < self._most:
+                self._begun += 1
+                Thread(target=self._work, daemon=True).start()
+            self._changed.notify()
 
-    def _do_next(self) -> None:
-        with self._lock:
-            owner, waiting = self._waiting.popitem(last=False)
-            do = waiting.popleft()
-            if waiting:
-                self._waiting[owner] = waiting  # behind all others
-        do()
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._next() is not None)
+                owner, do = self._take()
+            do()
+            del do  # with all that it refers to, before the next one comes
+            with self._changed:
+                self._served.remove(owner)
+                self._changed.notify()
+
+    def _next(self) -> str | None:
+        return next((owner for owner in self._waiting if owner not in self._served), None)
+
+    def _take(self) -> tuple[str, Callable[[], None]]:
+        owner = self._next()
+        assert owner is not None
+        waiting = self._waiting.pop(owner)
+        do = waiting.popleft()
+        if waiting:
+            self._waiting[owner] = waiting  # behind all others
+        self._served.add(owner)
+        return owner, do
 
 
 class _Share(Executor):

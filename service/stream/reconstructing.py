@@ -19,8 +19,9 @@ logger = logging.getLogger(__name__)
 MOST_MARKERS = 512
 """Whose forces are reconstructed: to set up as many takes seconds of a core, and some 200 MB for a moment."""
 
-_LOOKS = FairExecutor()
-"""Sets streams up and looks for their contacts, one after the other, so that frames need not wait for them."""
+_LOOKS = FairExecutor(threads=2)
+"""Sets streams up and looks for their contacts, so that frames need not wait for them: with 500 markers that takes
+seconds, for which another owner's must not wait."""
 
 
 @dataclass(slots=True)

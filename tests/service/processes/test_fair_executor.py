@@ -1,5 +1,8 @@
-"""A thread for what nobody waits for, of which nobody has all."""
+"""Threads for what nobody waits for, of which nobody has all."""
 
+import subprocess
+import sys
+import textwrap
 from concurrent.futures import Future, wait
 from threading import Event
 
@@ -53,3 +56,25 @@ def test_an_error_is_that_of_who_asked_and_the_next_one_goes_on() -> None:
     assert executor.of("a").submit(int, "12", base=3).result(30.0) == 5
     with pytest.raises(ValueError, match="none"):
         failed.result(30.0)
+
+
+def test_another_does_not_wait_for_what_takes_long_and_its_owner_does() -> None:
+    executor = FairExecutor(threads=2)
+    may_end = held(executor)
+    next_of_it = executor.of("somebody").submit(int, "1")
+    assert [executor.of("another").submit(int, number).result(30.0) for number in "23"] == [2, 3]
+    assert not next_of_it.done()
+    may_end.set()
+    assert next_of_it.result(30.0) == 1
+
+
+def test_what_waits_keeps_no_process_from_its_end() -> None:
+    waits = """
+        import threading
+        from service.processes.fair_executor import FairExecutor
+        executor, begun = FairExecutor(), threading.Event()
+        for _ in range(3):
+            executor.of("a").submit(lambda: (begun.set(), threading.Event().wait()))
+        begun.wait()
+    """
+    subprocess.run([sys.executable, "-c", textwrap.dedent(waits)], check=True, timeout=30.0)
