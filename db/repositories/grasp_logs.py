@@ -151,9 +151,10 @@ def restore(session: Session, log_id: str) -> bool:
 def move(session: Session, source_id: int, target_id: int) -> None:
     """Give a material's logs to another; those that it has already, by content and detector, stay where they are.
 
-    But where samples were found in one that would stay, and none in the other's own, the two change places.
+    But where samples were found in one that would stay, or may be found yet, and none in the other's own, the two
+    change places.
     """
-    _exchange(session, _with_samples_in_the_second(session, target_id, source_id))
+    _exchange(session, _to_exchange(session, target_id, source_id))
     there = aliased(GraspLogRow)
     same = (there.sha256 == GraspLogRow.sha256, there.detector == GraspLogRow.detector)
     is_there = exists().where(there.material_id == target_id, *same)
@@ -161,21 +162,26 @@ def move(session: Session, source_id: int, target_id: int) -> None:
     session.execute(moved.execution_options(synchronize_session=False))
 
 
-def _with_samples_in_the_second(
-    session: Session, material_id: int, other_id: int
-) -> list[tuple[GraspLogRow, GraspLogRow]]:
-    """Logs that two materials have, not withdrawn from either, where only the second one's has samples."""
+def _to_exchange(session: Session, material_id: int, other_id: int) -> list[tuple[GraspLogRow, GraspLogRow]]:
+    """Logs that two materials have, not withdrawn from either, of which only the second one's has samples.
+
+    Or may have them yet: its job has not ended, and the first one's has.
+    """
     own, theirs = aliased(GraspLogRow), aliased(GraspLogRow)
+    own_job, their_job = aliased(JobRow), aliased(JobRow)
     has_samples = [
         exists().where(SampleSummaryRow.grasp_log_id == each.id, SampleSummaryRow.count > 0) for each in (own, theirs)
     ]
+    may_have = own_job.finished_at.is_not(None) & their_job.finished_at.is_(None)
     query = (
         select(own, theirs)
         .join(theirs, and_(theirs.sha256 == own.sha256, theirs.detector == own.detector))
+        .join(own_job, own_job.grasp_log_id == own.id)
+        .join(their_job, their_job.grasp_log_id == theirs.id)
         .where(own.material_id == material_id, theirs.material_id == other_id)
-        .where(own.withdrawn_at.is_(None), theirs.withdrawn_at.is_(None), ~has_samples[0], has_samples[1])
+        .where(own.withdrawn_at.is_(None), theirs.withdrawn_at.is_(None), ~has_samples[0], has_samples[1] | may_have)
     )
-    return [(own, theirs) for own, theirs in session.execute(query.order_by(own.id).with_for_update())]
+    return [(own, theirs) for own, theirs in session.execute(query.order_by(own.id).with_for_update(of=(own, theirs)))]
 
 
 def _exchange(session: Session, pairs: Sequence[tuple[GraspLogRow, GraspLogRow]]) -> None:

@@ -141,11 +141,16 @@ def start_stage(session: Session, claim: Claim, stage: str, seconds: Mapping[str
 
 
 def requeue(session: Session, job_id: str, requested_by: str | None = None) -> None:
-    """Put a job that has ended back into the queue, as if it had just been added; nothing happens to another."""
+    """Put a job that has ended back into the queue, as if it had just been added; nothing happens to another.
+
+    One of a log is about the material that the log is of by now, which may have been merged.
+    """
     changes = {"status": "queued", "stage": None, "reason": None, "deaths": 0, "finished_at": None}
     row = session.get_one(JobRow, job_id)
-    changes |= {"requested_by": requested_by}
-    changes |= turns.new(session, requested_by, row.material_id, is_long=row.is_long)
+    log = None if row.grasp_log_id is None else session.get_one(GraspLogRow, row.grasp_log_id)
+    material_id = row.material_id if log is None else log.material_id
+    changes |= {"requested_by": requested_by, "material_id": material_id}
+    changes |= turns.new(session, requested_by, material_id, is_long=row.is_long)
     session.execute(update(JobRow).where(JobRow.id == job_id, JobRow.finished_at.is_not(None)).values(**changes))
 
 

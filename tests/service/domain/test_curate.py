@@ -351,6 +351,33 @@ def test_a_log_of_both_counts_once_whichever_of_its_jobs_found_samples(
         assert friction_models.current_methods(session, [papre]) == []
 
 
+def test_a_log_counts_whose_job_comes_after_the_merge_where_that_of_its_copy_has_ended(shop: Shop) -> None:
+    shop.ingest("paper", 0)
+    each = shop.model("paper")[1]
+    cancelled(shop)
+    later = shop.store("papre", 1)
+    curate.merge(shop.context, "paper", "papre")
+    assert {job.status for job in shop.work()} == {"done"}
+    assert shop.model("paper")[1:] == (2 * each, False)
+    with shop.database.read() as session:
+        assert grasp_logs.material_id(session, later) == materials.find_id(session, "paper")
+
+
+def test_a_job_that_is_done_again_is_of_the_material_that_its_log_was_merged_into(shop: Shop) -> None:
+    shop.ingest("papre", 0)
+    each = shop.model("papre")[1]
+    with shop.database.write() as session:
+        materials.create(session, "paper", "")
+    log_id = cancelled(shop)
+    curate.merge(shop.context, "papre", "paper")
+    shop.work()
+    with shop.database.write() as session:
+        jobs.requeue(session, grasp_logs.get(session, log_id).job.id)
+    shop.blobs.put(shop.contents[1])
+    assert {(job.status, job.material) for job in shop.work()} == {("done", "papre")}
+    assert shop.model("papre")[1:] == (2 * each, False)
+
+
 def test_a_copy_that_a_merge_left_behind_is_changed_by_the_owners_of_what_it_is_now(shop: Shop) -> None:
     for name, number in (("paper", 0), ("papre", 0)):
         left_behind = shop.ingest(name, number)
