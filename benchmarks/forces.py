@@ -3,8 +3,9 @@
 Presses whose forces are known (benchmarks/gel_scenes.py) are seen by simulated sensors, with depth and in the plane
 alone, in several draws of noise. Each factor is varied against one case (20 × 20 markers on the surface of a layer of
 5 mm, ν 0.49, a sphere, 1 µm of noise): gel and noise, contact, depth of the markers, lattice, and the gel's
-description, which is then wrong. It is also learnt from presses (benchmarks/gel_presses.py), and frames are followed as
-they come (benchmarks/gel_stream.py). In the plane the normal force on a half-space is given. Peers are given the same
+description, which is then wrong. It is also learnt from presses (benchmarks/gel_presses.py), frames are followed as
+they come (benchmarks/gel_stream.py), and grasps are taken to friction and slip with the gripper's force alone
+(benchmarks/gel_friction.py). In the plane the normal force on a half-space is given. Peers are given the same
 displacements. Errors are those of resultants, of the field of forces on elements, and their growth with noise; how
 often stated intervals of 95 % hold the truth is told for each group.
 
@@ -29,7 +30,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.ndimage import uniform_filter
 
-from benchmarks import gel_presses, gel_stream
+from benchmarks import gel_friction, gel_presses, gel_stream
 from benchmarks.gel_peers import PEERS, export, imported, made
 from benchmarks.gel_presses import calibrated, calibration_table
 from benchmarks.gel_scenes import CONTACTS, LATTICES, Truth, press, repeated, seen
@@ -54,7 +55,7 @@ PLACE = (0.21, -0.34)
 NORMAL_95 = 1.959964
 STICTION = "stiction"
 GROUPS = ("gel and noise", "contact", "marker depth", "lattice", "wrong description")
-PEERS_GROUP, CALIBRATION_GROUP, STREAM_GROUP = "peers", "gel calibration", "stream"
+PEERS_GROUP, CALIBRATION_GROUP, STREAM_GROUP, FRICTION_GROUP = "peers", "gel calibration", "stream", "friction"
 
 
 @dataclass(frozen=True, slots=True)
@@ -313,12 +314,26 @@ def follow(arguments: argparse.Namespace) -> None:
     write([asdict(each) for each in found], {STREAM_GROUP: text}, arguments, "forces-stream.json")
 
 
+def grip(arguments: argparse.Namespace) -> None:
+    """Grasps to friction and slip, each taking seconds; lines of forces-friction.jsonl are not made again."""
+    pictures = picture_folder(arguments)
+    seeds = dict(zip((gel_friction.WITH_DEPTH, gel_friction.IN_PLANE), arguments.seeds, strict=True))
+    found = gel_friction.campaign(arguments.output / "forces-friction.jsonl", seeds)
+    tables = {FRICTION_GROUP: gel_friction.friction_table(found), "slip": gel_friction.slip_table(found)}
+    save(gel_friction.picture(found), pictures / "forces-friction.png")
+    for name, text in tables.items():
+        print(f"{name}\n\n{text}\n", flush=True)
+    write([asdict(replace(each, moments="")) for each in found], tables, arguments, "forces-friction.json")
+
+
 def main() -> None:
     """Measure, print and write, group by group."""
     parser = options(__doc__)
     parser.add_argument("--draws", type=int, default=5, help="of noise, for each frame")
-    every = (*GROUPS, PEERS_GROUP, CALIBRATION_GROUP, STREAM_GROUP)
+    alone = {CALIBRATION_GROUP: calibrate, STREAM_GROUP: follow, FRICTION_GROUP: grip}
+    every = (*GROUPS, PEERS_GROUP, *alone)
     parser.add_argument("--only", nargs="+", choices=every, default=every)
+    parser.add_argument("--seeds", nargs=2, type=int, default=(40, 20), help="of friction: with depth, in the plane")
     parser.add_argument("--quick", action="store_true", help="one draw of the smaller lattice alone")
     parser.add_argument("--export", type=Path, help="write the cases for other methods into this folder, and end")
     parser.add_argument("--external", action="append", default=[], metavar="NAME=FOLDER", help="score others' forces")
@@ -332,11 +347,8 @@ def main() -> None:
         return
     pictures = picture_folder(arguments)
     for group in ("lattice",) if arguments.quick else arguments.only:
-        if group == CALIBRATION_GROUP:
-            calibrate(arguments)
-            continue
-        if group == STREAM_GROUP:
-            follow(arguments)
+        if group in alone:
+            alone[group](arguments)
             continue
         scores = []
         for case in compared() if group == PEERS_GROUP else cases(group):
