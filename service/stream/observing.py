@@ -50,8 +50,12 @@ class Observer:
             return None
         velocity = np.nan_to_num(np.mean([state.velocity for state in self.last], axis=0))
         pressed = forces.pressing > LEAST_SHARE * forces.pressing.max()
-        use = slips & pressed & (np.hypot(velocity[..., 0], velocity[..., 1]) > LEAST_SPEED)
-        return SlipSamples(forces.tangential[use] / forces.pressing[use], forces.pressing[use]) if use.any() else None
+        slips &= pressed
+        use = slips & (np.hypot(velocity[..., 0], velocity[..., 1]) > LEAST_SPEED)
+        if not use.any():
+            return None
+        moving = float(use.sum() / slips.sum())
+        return SlipSamples(forces.tangential[use] / forces.pressing[use], forces.pressing[use], moving)
 
 
 def _torque(place: FloatArray, force: FloatArray) -> float:

@@ -84,6 +84,30 @@ def test_a_known_object_that_tells_no_samples_is_held_with_the_planner_s_force(s
     assert episode.normal[-1] == pytest.approx(asked, rel=0.02)  # 10 mN of noise of the load of 1.5 N
 
 
+@pytest.mark.parametrize("moving", [1.0, 0.1])
+def test_what_rests_and_is_told_to_slip_does_not_stop_the_force_from_falling(moving: float) -> None:
+    """It bears what the contact bears; of a ring that slips, most moves."""
+    state, normal = GraspController.init(SETTINGS), 0.5
+    for frame in range(1, 200):
+        few = SlipSamples(np.array([1.0 / normal]), np.array([0.05]), moving)
+        state, command = GraspController.step(state, Observation(frame * FRAME, normal, 1.0, 0.0, 0.8, few))
+        normal = command.normal_force
+    assert normal > 4.5 if moving == 1.0 else normal < 1.5
+    assert (state.learned.sampled == ()) == (moving < 1.0)
+
+
+def test_what_was_learnt_is_renewed_by_later_samples() -> None:
+    state = GraspController.init(SETTINGS)
+    for frame in range(1, 80):
+        told = SlipSamples(np.full(10, 0.45 if frame < 40 else 0.43), np.full(10, 0.05))
+        state, _ = GraspController.step(state, Observation(frame * FRAME, 5.0, 1.5, 0.0, 0.5, told))
+        if frame == 39:
+            before = state.known
+    assert before is not None
+    assert state.known is not None
+    assert state.known.bounds(5.0)[0] == pytest.approx(before.bounds(5.0)[0] * 0.43 / 0.45, rel=1e-6)
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_samples_of_a_grasp_sharpen_what_a_model_knows_of_it(seed: int, make_model: Make) -> None:
     """As if the grasp's friction were known nearly as well as after learning it, however the grasp differs."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from stiction_client.controller.friction import KnownFriction, LearnedFriction, utilisation
 from stiction_client.controller.load import Load
-from stiction_client.controller.records import Command, Mode, Observation, check
+from stiction_client.controller.records import Command, Mode, Observation, SlipSamples, check
 from stiction_client.controller.settings import ControlSettings
 from stiction_client.controller.stick_ratio import Felt
 from stiction_client.model import FrictionModel
@@ -68,8 +68,9 @@ def _sense(state: ControllerState, observation: Observation, elapsed: float) -> 
     agrees = not math.isnan(sampled) and _agrees(sampled, observation.normal, felt, load.size, state.settings)
     friction = sampled if agrees else math.nan
     learned = state.learned
-    if observation.slip_samples is not None and not math.isnan(sampled):
-        learned = learned.with_frame(sampled, observation.slip_samples.normal_force.size, agrees, state.settings)
+    samples = observation.slip_samples
+    if samples is not None and not math.isnan(sampled) and _counts(state, samples, agrees):
+        learned = learned.with_frame(sampled, samples.normal_force.size, agrees, state.settings)
     against = _contradicts(state, felt, observation.normal, load.size, friction)
     contradictions = state.contradictions if against is None else state.contradictions + 1 if against else 0
     return replace(state, time=observation.time, load=load, felt=felt, learned=learned, contradictions=contradictions)
@@ -92,6 +93,15 @@ def _agrees(friction: float, normal: float, felt: Felt, size: float, settings: C
     What sticks bears less than its friction: taken for slip, it would make the contact slip more than it does.
     """
     return friction >= settings.agreement_share * size / (normal * utilisation(felt.stick_ratio))
+
+
+def _counts(state: ControllerState, samples: SlipSamples, agrees: bool) -> bool:
+    """Whether a frame's samples are of a ring that moves, and not of elements that rest, of which noise moves some.
+
+    What rests bears its friction just before all of a contact slips. To a model that is then wrong it is a warning.
+    """
+    warns = agrees and state.known is not None and state.known.of_others
+    return warns or samples.moving >= state.settings.moving_share
 
 
 def _contradicts(state: ControllerState, felt: Felt, normal: float, size: float, friction: float) -> bool | None:
@@ -136,7 +146,9 @@ def _refuted(state: ControllerState, known: KnownFriction, normal: float) -> boo
 
 
 def _sharpened(state: ControllerState, known: KnownFriction, normal: float) -> ControllerState:
-    """With what this grasp's samples add to a model; slip, where they told of more friction than it, disproves them."""
+    """With what this grasp's samples add; slip, where they told of more friction than a model, disproves them."""
+    if not known.of_others:
+        return replace(state, known=state.learned.known(state.settings) or known)
     if state.felt.slips(state.settings) and state.load.size > 0.0 and known.sharpened > 1.0:
         return replace(state, known=replace(known, sharpened=1.0), learned=LearnedFriction())
     return replace(state, known=known.sharpen(state.learned, normal, state.settings))

@@ -134,7 +134,7 @@ class LearnedFriction:
         It counts all samples, those among them that the stick ratio contradicts: a detector that misses slip makes the
         stick ratio contradict samples that are right.
         """
-        if len(self.sampled) < settings.contradiction_frames:
+        if len(self.sampled) < settings.learn_frames:
             return math.nan
         return median(self.sampled) * (1.0 - NORMAL_DEVIATIONS * settings.learned_error)
 

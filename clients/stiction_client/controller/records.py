@@ -14,10 +14,14 @@ sampled; hold: by a friction model; alarm: slip, evidence against the model, or 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SlipSamples:
-    """Friction at the elements that slip in one frame: ``friction_coefficient`` [k] -, ``normal_force`` [k] N."""
+    """Friction at the elements that slip in one frame: ``friction_coefficient`` [k] -, ``normal_force`` [k] N.
+
+    ``moving``: how many of all elements that are told to slip these are, 0 to 1, the others of which are at rest.
+    """
 
     friction_coefficient: FloatArray
     normal_force: FloatArray
+    moving: float = 1.0
 
     def contact_friction(self) -> float:
         """What the contact's friction would be if all elements were like these: Σ μf / Σ f; NaN without samples."""
@@ -64,6 +68,8 @@ def check(observation: Observation, last: float) -> None:
 
 
 def _check_samples(samples: SlipSamples) -> None:
+    if not 0.0 <= samples.moving <= 1.0:
+        raise InvalidArgument("slip_samples.moving", samples.moving, "0 to 1")
     for name in ("friction_coefficient", "normal_force"):
         values = getattr(samples, name)
         if values.shape != samples.friction_coefficient.shape or values.ndim != 1:

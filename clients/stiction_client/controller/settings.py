@@ -54,6 +54,9 @@ class ControlSettings:
     agreement_share: Annotated[
         float, Gain(0.0, 1.0, "-", "stick taken for slip has half of it; 0.1 of the stick ratio makes 0.8")
     ] = 0.7
+    moving_share: Annotated[
+        float, Gain(0.0, 1.0, "-", "a ring that slips moves as one; noise moves one in ninety of what rests")
+    ] = 0.2
     reflex_stick_ratio: Annotated[
         float, Gain(0.0, 0.5, "-", "0.97 of what it can hold; detectors err by 0.1 in the stick ratio")
     ] = 0.1

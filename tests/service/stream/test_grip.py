@@ -1,5 +1,6 @@
 """The grip controller beside a live detector, without the process and the network around it."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from service.stream import detectors
 from service.stream.detectors import PackedFrame
 from service.stream.grip import settings_of
 from service.stream.messages import Control
-from service.stream.observing import Observer
+from service.stream.observing import LEAST_SHARE, LEAST_SPEED, WINDOW, Observer
 from slipcore import Frame, GraspLog, InvalidInput, SlipDetector
 from stiction_client import GraspController, InvalidArgument
 
@@ -114,6 +115,21 @@ def test_torque_is_about_what_presses_wherever_places_are_counted_from(log: Gras
         shear[..., 1] = -arm * shear[..., 2] * found.contact
         _, turned = Observer(shifted).step(Frame(0.0, log.displacement[40], shear, None), found)
         assert turned.torque > 1e-5
+
+
+def test_samples_tell_how_many_of_what_slips_is_seen_to_move(log: GraspLog) -> None:
+    assert log.force is not None
+    found = SlipDetector(log.position, log.element_area).step(0.0, log.displacement[40], log.force[40])
+    pressing = np.where(found.contact, -log.force[40][..., 2], 0.0)
+    pressed = pressing > LEAST_SHARE * pressing.max()
+    velocity = np.zeros((*log.grid, 2))
+    velocity[tuple(np.argwhere(pressed)[0])] = 3.0 * LEAST_SPEED
+    slides, observer = replace(found, slip=found.contact, velocity=velocity), Observer(log.position)
+    for k in range(WINDOW):
+        observer, seen = observer.step(Frame(float(k), log.displacement[40], log.force[40], None), slides)
+    assert seen.slip_samples is not None
+    assert seen.slip_samples.normal_force.size == 1
+    assert seen.slip_samples.moving == pytest.approx(1.0 / pressed.sum())
 
 
 def test_a_frame_without_forces_is_refused_and_leaves_all_as_it_was(log: GraspLog) -> None:
