@@ -26,6 +26,8 @@ class Limits:
     """N on one element."""
     gripper_force: float = 1e4
     """N in all."""
+    gripper_deviation: float = 1e-6
+    """N; no gripper knows its force any better, nor reports a smaller one."""
     gripper_pull: float = 0.1
     """N; a gripper's zero is no further off. A larger pull than any press has a turned sign."""
     press: tuple[float, float] = (1e-6, 1e4)

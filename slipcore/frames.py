@@ -408,8 +408,9 @@ def _gripper_force_deviation(value: float | None, force: FloatArray | None) -> f
             "gripper_force_deviation", "given without gripper_force", "both, gripper_force alone or none"
         )
     deviation = float(_array("gripper_force_deviation", value, ()))
-    if not 0.0 < deviation <= LIMITS.gripper_force:
-        raise InvalidInput("gripper_force_deviation", f"{deviation:.3g} N", f"above 0 to {LIMITS.gripper_force:g} N")
+    least, most = LIMITS.gripper_deviation, LIMITS.gripper_force
+    if not least <= deviation <= most:
+        raise InvalidInput("gripper_force_deviation", f"{deviation:.3g} N", f"{least:g} to {most:g} N")
     return deviation
 
 

@@ -10,6 +10,9 @@ if TYPE_CHECKING:
 RECONSTRUCTED = "reconstructed forces"
 """The finding of a log whose forces follow from its sensor's gel."""
 
+CONTRADICTED = "gripper's force contradicted"
+"""That of one whose gel tells another normal force than the gripper."""
+
 
 def needs_forces(log: "GraspLog") -> bool:
     """Whether a log has none, and displacements in metres from which they would follow."""
@@ -29,13 +32,20 @@ def said(reconstruction: "Reconstruction | None") -> "list[Finding]":
     if reconstruction is None:
         return []
     from slipcore import Finding
+    from slipcore.forces.defaults import RECONSTRUCTION
 
     told = ", ".join(f"{axis} {share:.0%}" for axis, share in zip("xyz", reconstruction.information, strict=True))
     evidence = (
         f"forces follow from displacement by the sensor's gel{_by_the_gripper(reconstruction)}, in effect "
         f"averaged over {1e3 * reconstruction.kernel_width:.2g} mm; share of the resultant that data tell: {told}"
     )
-    return [Finding(RECONSTRUCTED, evidence, "friction is as sure as the description of the sensor's gel")]
+    findings = [Finding(RECONSTRUCTED, evidence, "friction is as sure as the description of the sensor's gel")]
+    if reconstruction.contradicted > RECONSTRUCTION.contradicted_share:
+        evidence = f"in {reconstruction.contradicted:.0%} of the frames that touch the gel's shape tells another force"
+        findings.append(
+            Finding(CONTRADICTED, evidence, "make sure that it is this finger's, in N, and the gel's description")
+        )
+    return findings
 
 
 def _by_the_gripper(reconstruction: "Reconstruction") -> str:

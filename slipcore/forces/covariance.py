@@ -11,9 +11,6 @@ from scipy.linalg import lapack
 from slipcore.compilation import lapack_address
 from slipcore.frames import FloatArray
 
-BLOCK = 32
-"""Columns that are taken at a time; of all sizes about as fast."""
-
 _dtpqrt = CFUNCTYPE(None, *[c_void_p] * 12)(lapack_address("dtpqrt"))
 """``scipy.linalg.lapack.dtpqrt`` itself keeps the interpreter."""
 
@@ -25,7 +22,7 @@ def covariance_root(spread: FloatArray) -> FloatArray:
     would have the square of R's condition number, and lose what is small beside its largest eigenvalue.
     """
     m, p = spread.shape
-    block = min(BLOCK, m)
+    block = min(32, m)  # columns at a time; of all sizes about as fast
     root, below = np.eye(m, order="F"), np.array(spread.T, dtype=np.float64, order="F")
     reflectors, work = np.empty((block, m), order="F"), np.empty(block * m)
     sizes = [byref(c_int(size)) for size in (p, m, 0, block)]

@@ -154,6 +154,14 @@ class ReconstructionDefaults(Options):
     """Standard deviation of a given total force, as a share of it, and of this share of the largest given one."""
     least_force: Annotated[float, Option(0.0, 1e-3, "N", "far below what force sensors resolve")] = 1e-9
     """Taken for the largest given force where all are 0."""
+    largest_pressure: Annotated[float, Option(0.1, 1e3, "-", "linear elasticity ends far below")] = 10.0
+    """Largest given total force, over Young's modulus times the area of all elements."""
+    contradiction: Annotated[float, Option(1.0, 100.0, "standard deviations", "3 σ")] = 3.0
+    """From which on a given total force and the one that is found are not alike."""
+    contradicted_share: Annotated[
+        float, Option(0.0, 1.0, "-", "of sure forces 0.3 %, of heavy-tailed ones some more")
+    ] = 0.1
+    """Of the frames that touch, in which that must be so for it to be told."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,10 +1,12 @@
 """Forces on micro-elements from the displacement of markers (stage 2 of logs that have no forces)."""
 
+import math
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from slipcore.defaults import LIMITS
 from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import RECONSTRUCTION
 from slipcore.forces.fit import Observation
@@ -27,7 +29,8 @@ class Reconstruction:
     is known of the resultant's x, y and z that data tell and not the prior; ``condition``: largest over smallest
     singular value of the markers' response to traction on the contact (all three at the frame that moved markers most;
     NaN and no information without contact); ``noise`` m of a marker's coordinate that was assumed; ``given`` [t, 3]
-    says which components of the resultant were known from elsewhere, and so count among data.
+    says which components of the resultant were known from elsewhere, and so count among data, and ``contradiction``
+    [t, 3] by how many standard deviations they differ from what is found where something touches (else NaN).
     """
 
     force: FloatArray
@@ -40,6 +43,14 @@ class Reconstruction:
     condition: float
     noise: float
     given: BoolArray
+    contradiction: FloatArray
+
+    @property
+    def contradicted(self) -> float:
+        """Share of the frames that touch in which what was given and what is found are not alike."""
+        known = np.isfinite(self.contradiction).any(axis=1)
+        wrong = (self.contradiction > RECONSTRUCTION.contradiction).any(axis=1)
+        return float(wrong.sum() / known.sum()) if known.any() else 0.0
 
     def apply(self, log: GraspLog) -> GraspLog:
         """The log with these forces, which its metadata call reconstructed, and their contact where it knows none."""
@@ -75,9 +86,11 @@ def reconstruct(
     shown = Recording.of(log, noise)
     sensor = Sensor.of(log.position, log.element_area, gel, shown.axes)
     if total_force is None and total_force_deviation is None and log.gripper_force is not None:
-        total_force = np.where(log.gripper_force > 0.0, log.gripper_force, np.nan)  # 0: it grips not, or reports not
-        total_force_deviation = log.gripper_force_deviation
+        reports = log.gripper_force >= LIMITS.gripper_deviation  # or it grips not
+        total_force, total_force_deviation = np.where(reports, log.gripper_force, np.nan), log.gripper_force_deviation
     recording = _Recording(sensor, shown, *_total_force(total_force, total_force_deviation, len(log)))
+    bearable = RECONSTRUCTION.largest_pressure * gel.young_modulus * log.element_area * math.prod(log.grid)
+    _check_pressure(recording.given, bearable)
     result = _no_forces(log, shown.noise, np.isfinite(recording.given))
     touched, strongest = shown.touched(), shown.strongest()
     if not touched.any():
@@ -97,7 +110,18 @@ def reconstruct(
                 now = now.at(observation, data)
                 reader = reader if reader.key is now.key else Reader.of(sensor, now.key)
                 _write_frame(result, t, reader.read(data, log.grid))
-    return result
+    outward = recording.given * [1.0, 1.0, -1.0]
+    away = np.abs(result.resultant - outward) / np.hypot(result.resultant_deviation, recording.deviation)
+    return replace(result, contradiction=np.where(touched[:, None], away, np.nan))
+
+
+def _check_pressure(given: FloatArray, bearable: float) -> None:
+    largest = np.nanmax(np.abs(given), initial=0.0)
+    if largest > bearable:
+        why = (
+            f"{RECONSTRUCTION.largest_pressure:g} times Young's modulus on all elements (is it in N, and of this gel?)"
+        )
+        raise InvalidInput("total_force", f"up to {largest:.3g} N", f"at most {bearable:.3g} N, {why}")
 
 
 def _total_force(given: ArrayLike | None, deviation: float | None, frames: int) -> tuple[FloatArray, FloatArray]:
@@ -155,6 +179,7 @@ def _no_forces(log: GraspLog, noise: float, given: BoolArray) -> Reconstruction:
         condition=float("nan"),
         noise=noise,
         given=given,
+        contradiction=np.full((len(log), 3), np.nan),
     )
 
 

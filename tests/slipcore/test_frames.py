@@ -207,7 +207,7 @@ def test_a_single_marker_and_a_line_of_markers_are_lattices() -> None:
         ("object_pose", 1e5, "object_pose"),
         ("gripper_force", 1e4, "gripper_force is 5e\\+04 N at its largest; allowed: at most 10000 N"),
         ("gripper_force", -1.0, r"gripper_force is -5 to 0.02 N; allowed: positive where the object presses"),
-        ("gripper_force_deviation", -1.0, "gripper_force_deviation is -0.05 N; allowed: above 0 to 10000 N"),
+        ("gripper_force_deviation", -1.0, "gripper_force_deviation is -0.05 N; allowed: 1e-06 to 10000 N"),
     ],
 )
 def test_absurd_units_are_refused(fields: dict[str, Any], name: str, factor: float, message: str) -> None:

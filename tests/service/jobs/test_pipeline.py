@@ -538,8 +538,11 @@ def test_a_gripper_that_reports_its_force_is_named_beside_the_gel(shop: Shop, bl
     found = shop.log(log_id).detection
     assert found is not None
     assert found.findings is not None
-    evidence = found.findings[0].evidence
-    assert "by the sensor's gel and from the normal force that the gripper reports, in effect averaged" in evidence
+    told_by, contradicted = found.findings[:2]
+    assert (
+        "by the sensor's gel and from the normal force that the gripper reports, in effect averaged" in told_by.evidence
+    )
+    assert contradicted.name == "gripper's force contradicted"  # it is by far too small
 
 
 def test_without_a_description_a_log_without_forces_is_refused_with_advice(shop: Shop, blind: GraspLog) -> None:

@@ -80,6 +80,25 @@ def test_the_force_that_the_gripper_reports_is_given(pressed: Pressed) -> None:
     assert (silent.resultant_deviation[:, 2] > 0.5).all()
 
 
+def test_a_force_that_the_gels_shape_contradicts_is_told(pressed: Pressed) -> None:
+    log = pressed([6, 6], noise=1e-6, crop=INSIDE)
+    alone = reconstruct(log, GEL, noise=1e-6)
+    assert (alone.contradicted, np.isnan(alone.contradiction).all()) == (0.0, True)
+    true = -alone.resultant[:, 2]
+    assert reconstruct(replace(log, gripper_force=true), GEL, noise=1e-6).contradicted == 0.0
+    wrong = reconstruct(replace(log, gripper_force=true * [1.0, 1.3]), GEL, noise=1e-6)
+    assert wrong.contradicted == 0.5
+    assert np.isnan(wrong.contradiction[:, :2]).all()
+
+
+def test_newtons_that_are_none_are_refused(pressed: Pressed) -> None:
+    log = pressed([6, 6], noise=1e-6, axes=2, crop=INSIDE)
+    bearable = 10.0 * GEL.young_modulus * log.element_area * 64
+    assert reconstruct(replace(log, gripper_force=np.full(2, 1e-9)), GEL, noise=1e-6).given.sum() == 0
+    with pytest.raises(InvalidInput, match=r"total_force is up to .* \(is it in N, and of this gel\?\)"):
+        reconstruct(log, GEL, total_force=np.full(2, 1.01 * bearable), noise=1e-6)
+
+
 def test_a_force_is_as_sure_as_it_is_said_to_be(pressed: Pressed) -> None:
     log = replace(pressed([6, 6], noise=1e-6, axes=2, crop=INSIDE), gripper_force=np.array([10.0, 10.0]))
     blind, spread = Gel(1e6, 0.5), []
