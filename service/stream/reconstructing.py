@@ -12,12 +12,18 @@ from service.processes.fair_executor import FairExecutor
 from slipcore import Frame, InvalidInput
 
 if TYPE_CHECKING:
-    from slipcore.forces import ForceStream, StreamedForces
+    from slipcore.forces import ForceStream
 
 logger = logging.getLogger(__name__)
 
 MOST_MARKERS = 512
 """Whose forces are reconstructed: to set up as many takes seconds of a core, and some 200 MB for a moment."""
+
+MOST_NODES = 1500
+"""Elements' areas side by side under the markers and around them: with more it takes minutes, and gigabytes."""
+
+MOST_FAILURES = 3
+"""Looks that may fail before no forces are looked for any more."""
 
 _LOOKS = FairExecutor(threads=2)
 """Sets streams up and looks for their contacts, so that frames need not wait for them: with 500 markers that takes
@@ -38,6 +44,7 @@ class Reconstructing:
     stream: "ForceStream | None" = None
     refused: str | None = None
     noise: float = 0.0
+    failures: int = 0
 
     @property
     def held_bytes(self) -> int:
@@ -60,6 +67,9 @@ class Reconstructing:
             if count > MOST_MARKERS:
                 raise InvalidInput("grid", f"{count} markers", f"at most {MOST_MARKERS}")
             stream = ForceStream(position, area, Gel.from_json(self.gel), executor=_LOOKS.of(self.owner))
+            if stream.nodes > MOST_NODES:
+                allowed = f"an area of which at most {MOST_NODES} cover the markers and what is around them"
+                raise InvalidInput("element_area", f"{area:.3g} m²", allowed)
             check_room(stream.held_bytes)
         except InvalidInput as error:
             self.refused = f"{error.name} is {error.value}; allowed: {error.allowed}"
@@ -79,7 +89,12 @@ class Reconstructing:
             return frame, {"source": "none", "reason": self.refused}
         if self.stream is None:
             return frame, None
-        found = self._found(self.stream, frame)
+        try:
+            found = self.stream.step(frame.time, frame.displacement)
+        except InvalidInput:
+            raise
+        except Exception:  # of a look beside the frames
+            return self._without_look(frame)
         forces, touching = found.forces, found.forces.contact
         if touching.any():
             self.noise = float(np.median(forces.deviation[..., 2][touching]))
@@ -93,11 +108,10 @@ class Reconstructing:
         normal = np.broadcast_to([0.0, 0.0, 1.0], forces.force.shape)  # loads act on the undeformed plane
         return frame._replace(force=forces.force, normal=normal), told
 
-    def _found(self, stream: "ForceStream", frame: Frame) -> "StreamedForces":
-        try:
-            return stream.step(frame.time, frame.displacement)
-        except InvalidInput:
-            raise
-        except Exception:  # of a look beside the frames, which costs the stream that look
-            logger.exception("a look for the contact failed")
-            return stream.step(frame.time, frame.displacement)
+    def _without_look(self, frame: Frame) -> tuple[Frame, dict[str, Any] | None]:
+        """A look that fails costs the stream that look, and the last of some its forces."""
+        logger.exception("a look for the contact failed")
+        self.failures += 1
+        if self.failures == MOST_FAILURES:
+            self.stream, self.refused = None, "looking for the contact failed"
+        return self.step(frame)

@@ -13,6 +13,7 @@ from slipcore.forces.defaults import FORCE_STREAM
 from slipcore.forces.frame_forces import FrameForces
 from slipcore.forces.gel import Gel
 from slipcore.forces.look import Insight, Shown, bytes_needed
+from slipcore.forces.nodes import Nodes
 from slipcore.forces.recording import axes_seen, check_noise, moved, noise_of, rows
 from slipcore.forces.sensor import Sensor
 from slipcore.frames import BoolArray, FloatArray, check_displacement, check_mask
@@ -55,6 +56,8 @@ class ForceStream:
             raise InvalidInput("element_area", element_area, "above 0 m², finite")
         if noise is not None:
             check_noise(noise)
+        self.nodes = len(Nodes.around(place[..., :2].reshape(-1, 2), element_area))
+        """On which traction is sought: a look takes time with their cube, and memory with their square."""
         self.held_bytes = bytes_needed(place, element_area)
         """At most, but for what the contact itself takes."""
         self._position, self._area, self._gel, self._executor = place, element_area, gel, executor

@@ -98,6 +98,10 @@ def test_without_room_or_with_too_many_markers_there_are_none_and_it_says_why(
 ) -> None:
     opened(ramp, room=detectors.Room("me", 3 * 2**20))
     assert "bytes is" in detectors.step("one", frame(ramp, 0))[0]["force"]["reason"]
+    monkeypatch.setattr(reconstructing, "MOST_NODES", 300)
+    opened(ramp)
+    reason = detectors.step("one", frame(ramp, 0))[0]["force"]["reason"]
+    assert "of which at most 300 cover the markers and what is around them" in reason
     monkeypatch.setattr(reconstructing, "MOST_MARKERS", 100)
     opened(ramp)
     for k in range(2):
@@ -123,3 +127,14 @@ def test_a_look_that_fails_costs_the_stream_that_look(
     monkeypatch.setattr(looks_at_once, "submit", fails_once)
     assert detectors.step("one", frame(ramp, 0))[0]["force"]["wait_for"] == "noise"
     assert "a look for the contact failed" in caplog.text
+
+
+def test_looks_that_go_on_failing_end_the_stream_s_forces(
+    ramp: GraspLog, looks_at_once: Executor, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    opened(ramp)
+    done = looks_at_once.submit
+    monkeypatch.setattr(looks_at_once, "submit", lambda _: done(lambda: 1 / 0))
+    told = [detectors.step("one", frame(ramp, k))[0]["force"] for k in range(6)]
+    assert told[-1] == {"source": "none", "reason": "looking for the contact failed"}
+    assert caplog.text.count("a look for the contact failed") == reconstructing.MOST_FAILURES
