@@ -19,7 +19,7 @@ logger = logging.getLogger(__name__)
 MOST_MARKERS = 512
 """Whose forces are reconstructed: to set up as many takes seconds of a core, and some 200 MB for a moment."""
 
-MOST_NODES = 1500
+MOST_NODES = 1000
 """Elements' areas side by side under the markers and around them: with more it takes minutes, and gigabytes."""
 
 MOST_FAILURES = 3
