@@ -11,7 +11,7 @@ from db.errors import ClaimLost, NotFound
 from db.paging import Window, windowed
 from db.records import Claim, Job, JobKind, JobStatus
 from db.repositories import friction_models, turns
-from db.tables import GraspLogRow, JobRow, MaterialRow, SampleSummaryRow, now
+from db.tables import FrictionModelRow, GraspLogRow, JobRow, MaterialRow, SampleSummaryRow, now
 
 
 def add(
@@ -148,10 +148,25 @@ def requeue(session: Session, job_id: str, requested_by: str | None = None) -> N
     changes = {"status": "queued", "stage": None, "reason": None, "deaths": 0, "finished_at": None}
     row = session.get_one(JobRow, job_id)
     log = None if row.grasp_log_id is None else session.get_one(GraspLogRow, row.grasp_log_id)
+    _leave_models(session, row)
     material_id = row.material_id if log is None else log.material_id
     changes |= {"requested_by": requested_by, "material_id": material_id}
     changes |= turns.new(session, requested_by, material_id, is_long=row.is_long)
     session.execute(update(JobRow).where(JobRow.id == job_id, JobRow.finished_at.is_not(None)).values(**changes))
+
+
+def _leave_models(session: Session, job: JobRow) -> None:
+    """Give the models of a job that is done again to a fit that has ended as it has: a job has one by each method."""
+    made = FrictionModelRow.job_id == job.id
+    if job.finished_at is None or session.scalar(select(FrictionModelRow.id).where(made).limit(1)) is None:
+        return
+    past = JobRow(id=uuid.uuid4().hex, kind="fit")
+    for name in ("status", "reason", "method", "material_id", "seed", "model_version", "trace", "requested_by"):
+        setattr(past, name, getattr(job, name))
+    past.seconds, past.created_at, past.finished_at = dict(job.seconds), job.created_at, job.finished_at
+    session.add(past)
+    session.flush()
+    session.execute(update(FrictionModelRow).where(made).values(job_id=past.id))
 
 
 def release(session: Session, claim: Claim) -> None:

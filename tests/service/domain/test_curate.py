@@ -378,6 +378,20 @@ def test_a_job_that_is_done_again_is_of_the_material_that_its_log_was_merged_int
     assert shop.model("papre")[1:] == (2 * each, False)
 
 
+def test_a_log_that_is_looked_at_again_gives_its_material_its_next_models(shop: Shop) -> None:
+    log_id = shop.ingest("paper", 0)
+    version, samples, _ = shop.model("paper")
+    with shop.database.write() as session:
+        detections.remove(session, log_id)
+        jobs.requeue(session, grasp_logs.get(session, log_id).job.id)
+    assert {each.status for each in shop.work()} == {"done"}
+    assert shop.model("paper") == (version + 1, samples, False)
+    with shop.database.read() as session:
+        versions = friction_models.versions(session, materials.find_id(session, "paper"), "ols")
+        assert [each.version for each in versions] == [version + 1, version]
+        assert sorted(job.kind for job in jobs.list_all(session, Window("created_at"))) == ["fit", "ingest"]
+
+
 def test_a_copy_that_a_merge_left_behind_is_changed_by_the_owners_of_what_it_is_now(shop: Shop) -> None:
     for name, number in (("paper", 0), ("papre", 0)):
         left_behind = shop.ingest(name, number)
