@@ -1,11 +1,18 @@
 """Threads beside those that answer, for work that nobody waits for: shared out fairly among those who ask."""
 
+import time
 from collections import OrderedDict, deque
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from functools import partial
 from threading import Condition, Thread
 from typing import Any, ParamSpec, TypeVar
+
+LONG_SECONDS = 1.0
+"""Of CPU time, from which on a piece of work is long."""
+
+MOST_NOTED = 1000
+"""Owners of whom it is known that theirs is, the last ones."""
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
@@ -14,14 +21,15 @@ Result = TypeVar("Result")
 class FairExecutor:
     """So many threads, of which each owner has one at once: owners have their turns one after the other.
 
-    Each owner's work is done in the order in which it came, and waits for a piece of another's at most while there are
-    no more owners than threads. What has not been done is given up when the process ends.
+    Each owner's work is done in the order in which it came. Owners whose last piece took long leave one thread to the
+    others, of two or more. What has not been done is given up when the process ends.
     """
 
     def __init__(self, threads: int = 1) -> None:
         self._most, self._begun, self._changed = threads, 0, Condition()
         self._waiting: OrderedDict[str, deque[Callable[[], None]]] = OrderedDict()
         self._served: set[str] = set()
+        self._long: OrderedDict[str, None] = OrderedDict()
 
     def of(self, owner: str) -> Executor:
         """The threads as this owner has them."""
@@ -40,14 +48,25 @@ class FairExecutor:
             with self._changed:
                 self._changed.wait_for(lambda: self._next() is not None)
                 owner, do = self._take()
+            begun = time.thread_time()
             do()
             del do  # with all that it refers to, before the next one comes
             with self._changed:
                 self._served.remove(owner)
-                self._changed.notify()
+                self._note(owner, time.thread_time() - begun)
+                self._changed.notify_all()
+
+    def _note(self, owner: str, seconds: float) -> None:
+        self._long.pop(owner, None)
+        if seconds > LONG_SECONDS:
+            self._long[owner] = None
+        if len(self._long) > MOST_NOTED:
+            self._long.popitem(last=False)
 
     def _next(self) -> str | None:
-        return next((owner for owner in self._waiting if owner not in self._served), None)
+        are_full = self._most > 1 and len(self._served & self._long.keys()) >= self._most - 1
+        passed = self._served | (self._long.keys() if are_full else set())
+        return next((owner for owner in self._waiting if owner not in passed), None)
 
     def _take(self) -> tuple[str, Callable[[], None]]:
         owner = self._next()

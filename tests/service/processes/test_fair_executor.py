@@ -8,6 +8,7 @@ from threading import Event
 
 import pytest
 
+from service.processes import fair_executor
 from service.processes.fair_executor import FairExecutor
 
 
@@ -66,6 +67,19 @@ def test_another_does_not_wait_for_what_takes_long_and_its_owner_does() -> None:
     assert not next_of_it.done()
     may_end.set()
     assert next_of_it.result(30.0) == 1
+
+
+def test_owners_whose_work_takes_long_leave_a_thread_to_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fair_executor, "LONG_SECONDS", 0.0)
+    executor, may_end = FairExecutor(threads=2), Event()
+    for owner in ("long", "as long"):
+        executor.of(owner).submit(int).result(30.0)
+    begun = [executor.of(owner).submit(may_end.wait, 30.0) for owner in ("long", "as long")]
+    monkeypatch.setattr(fair_executor, "LONG_SECONDS", 1.0)
+    assert [executor.of("short").submit(int, number).result(30.0) for number in "12"] == [1, 2]
+    assert [future.running() for future in begun] == [True, False]
+    may_end.set()
+    assert [future.result(30.0) for future in begun] == [True, True]
 
 
 def test_what_waits_keeps_no_process_from_its_end() -> None:
