@@ -85,12 +85,14 @@ def reconstruct(
     """
     shown = Recording.of(log, noise)
     sensor = Sensor.of(log.position, log.element_area, gel, shown.axes)
+    name = "total_force"
     if total_force is None and total_force_deviation is None and log.gripper_force is not None:
+        name = "gripper_force"
         reports = log.gripper_force >= LIMITS.gripper_deviation  # or it grips not
         total_force, total_force_deviation = np.where(reports, log.gripper_force, np.nan), log.gripper_force_deviation
     recording = _Recording(sensor, shown, *_total_force(total_force, total_force_deviation, len(log)))
     bearable = RECONSTRUCTION.largest_pressure * gel.young_modulus * log.element_area * math.prod(log.grid)
-    _check_pressure(recording.given, bearable)
+    _check_pressure(name, recording.given, bearable)
     result = _no_forces(log, shown.noise, np.isfinite(recording.given))
     touched, strongest = shown.touched(), shown.strongest()
     if not touched.any():
@@ -115,13 +117,13 @@ def reconstruct(
     return replace(result, contradiction=np.where(touched[:, None], away, np.nan))
 
 
-def _check_pressure(given: FloatArray, bearable: float) -> None:
+def _check_pressure(name: str, given: FloatArray, bearable: float) -> None:
     largest = np.nanmax(np.abs(given), initial=0.0)
     if largest > bearable:
         why = (
             f"{RECONSTRUCTION.largest_pressure:g} times Young's modulus on all elements (is it in N, and of this gel?)"
         )
-        raise InvalidInput("total_force", f"up to {largest:.3g} N", f"at most {bearable:.3g} N, {why}")
+        raise InvalidInput(name, f"up to {largest:.3g} N", f"at most {bearable:.3g} N, {why}")
 
 
 def _total_force(given: ArrayLike | None, deviation: float | None, frames: int) -> tuple[FloatArray, FloatArray]:

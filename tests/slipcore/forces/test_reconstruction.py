@@ -97,6 +97,8 @@ def test_newtons_that_are_none_are_refused(pressed: Pressed) -> None:
     assert reconstruct(replace(log, gripper_force=np.full(2, 1e-9)), GEL, noise=1e-6).given.sum() == 0
     with pytest.raises(InvalidInput, match=r"total_force is up to .* \(is it in N, and of this gel\?\)"):
         reconstruct(log, GEL, total_force=np.full(2, 1.01 * bearable), noise=1e-6)
+    with pytest.raises(InvalidInput, match="gripper_force is up to"):
+        reconstruct(replace(log, gripper_force=np.full(2, 1.01 * bearable)), GEL, noise=1e-6)
 
 
 def test_a_force_is_as_sure_as_it_is_said_to_be(pressed: Pressed) -> None:
