@@ -46,9 +46,9 @@ def matched_student(weight: FloatArray, mean: FloatArray, deviation: FloatArray)
     mirrors.
     """
     levels = np.array([GRID.middle, GRID.extreme])
-    inner, outer = 0.5 * (
-        mixture_quantile(weight, mean, deviation, levels) - mixture_quantile(weight, mean, deviation, 1.0 - levels)
-    )
+    above = mixture_quantile(weight, mean, deviation, levels)
+    below = mixture_quantile(weight, mean, deviation, 1.0 - levels) if mean.any() else -above
+    inner, outer = 0.5 * (above - below)
     if not inner > 0.0:
         return Student(0.0, GRID.most_freedom)
     low, high = 0.0, float(np.log(GRID.most_freedom))

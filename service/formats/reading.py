@@ -32,6 +32,9 @@ from stiction_client import container
 MEMORY_BYTES = 2 * 2**30
 """Address space that a reader may take beyond what it has when it starts: eight times what it may read of a file."""
 
+LIBRARIES = ("h5py", "pyarrow.parquet", "rosbags.typesys")
+"""What readers import first, where it is installed: it takes address space of its own."""
+
 LEAST_SECONDS, SLOWEST = 5.0, 1e6
 """s that any file may take, and bytes that earn it another; a table of markers, the slowest to read, does 3e6 a second.
 A damaged file can keep a library busy for ever."""
@@ -260,7 +263,7 @@ def rewrite(source: Path, target: Path, name: str) -> None:
 
 def _bound() -> None:
     """Bound the memory of this process."""
-    for name in ("h5py", "pyarrow.parquet", "rosbags.typesys"):  # their libraries take address space of their own
+    for name in LIBRARIES:
         _import_if_there(name)
     with open("/proc/self/statm", encoding="ascii") as stream:
         now = int(stream.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")

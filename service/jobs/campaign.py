@@ -6,7 +6,6 @@ and seed, written whole or not at all. Whoever starts it again gets what is miss
 
 import hashlib
 import json
-import multiprocessing
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
@@ -57,7 +56,7 @@ def workers(processes: int, dask_address: str | None = None) -> Iterator[Executo
     if dask_address is not None:
         yield from _cluster(dask_address)
         return
-    pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), spawned.start, (logs.current(),))
+    pool = ProcessPoolExecutor(processes, spawned.CONTEXT, spawned.start, (logs.current(),))
     try:
         yield pool
     except BaseException:  # nobody waits for what is under way

@@ -5,7 +5,6 @@ a tenth of a millisecond cost more than the call. Here it is one message each wa
 """
 
 import asyncio
-import multiprocessing
 import pickle
 import socket
 import struct
@@ -47,8 +46,7 @@ class SideProcess:
     async def start(cls) -> "SideProcess":
         """A new process."""
         ours, theirs = socket.socketpair()
-        context = multiprocessing.get_context("spawn")
-        process = context.Process(target=_work, args=(theirs, logs.current()), daemon=True)
+        process = spawned.CONTEXT.Process(target=_work, args=(theirs, logs.current()), daemon=True)
         with theirs:
             await asyncio.to_thread(process.start)
         return cls(process, *await asyncio.open_connection(sock=ours))

@@ -11,13 +11,16 @@ from multiprocessing.connection import wait
 from service.observability import logs, traces
 from service.processes import freed_memory
 
+CONTEXT = multiprocessing.get_context("spawn")
+"""How they begin: as new interpreters, without the server's threads, locks and connections."""
+
 NICENESS = 5
 """Of the processes that do jobs: on a busy machine the server gets three times as much of a core as each of them."""
 
 
 def process(prepare: Callable[[], None] | None = None) -> ProcessPoolExecutor:
     """One process for numerics, or for what else the server keeps out of its own; it begins with ``prepare``."""
-    return ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), start, (logs.current(), prepare))
+    return ProcessPoolExecutor(1, CONTEXT, start, (logs.current(), prepare))
 
 
 def kill(pool: Executor | None) -> None:

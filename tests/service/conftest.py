@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
+import typer.main
 import uvicorn
 from fastapi import FastAPI
 
@@ -31,6 +33,7 @@ from service.settings import Settings
 from slipcore import GraspLog
 from slipcore.contact.tiers.ramp import RampSchedule, tangential_ramp
 from stiction_client.container import encode
+from tests import forking
 from tests.waiting import wait_until
 
 NPZ = "application/vnd.stiction.grasp-log+npz"
@@ -42,6 +45,7 @@ Members = dict[str, Any]
 @contextmanager
 def serve(settings: Settings) -> Iterator[httpx.Client]:
     """A real server on a free loopback port, in a thread of this process (its workers are processes)."""
+    forking.begin()
     server = uvicorn.Server(configuration(settings.model_copy(update={"port": 0}), log_level="warning"))
     thread = threading.Thread(target=server.run)
     thread.start()
@@ -98,6 +102,22 @@ class Caller:
         if sent[0]["type"] == "websocket.accept":
             return httpx.Response(101)
         return httpx.Response(sent[0]["status"], headers=sent[0]["headers"], content=sent[1]["body"])
+
+
+@pytest.fixture(scope="session", autouse=True)
+def quick_processes() -> Iterator[None]:
+    """Processes of servers in this process begin in no time; those of ``stiction serve`` begin from nothing."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("service.processes.spawned.CONTEXT", forking.Context())
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_command_tree() -> Iterator[None]:
+    """Typer makes all commands anew at each call; the tests call hundreds of times."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("typer.main.get_command", cache(typer.main.get_command))
+        yield
 
 
 @pytest.fixture(autouse=True)

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from service.whole_files import write_whole
+from tests.forking import ForkedProcess
 
 
 def half_a_file(path: Path) -> None:
@@ -76,16 +77,17 @@ def test_two_writers_of_one_name_do_not_meet(tmp_path: Path) -> None:
     assert {each.name: each.read_text() for each in tmp_path.iterdir()} == {"file": "first, whole"}
 
 
-def test_what_a_killed_writer_left_is_hidden_and_does_not_stand_in_the_way(tmp_path: Path) -> None:
-    def killed(beside: Path) -> None:
-        beside.write_text("half")
-        os._exit(9)
+def killed(beside: Path) -> None:
+    beside.write_text("half")
+    os._exit(9)
 
+
+def test_what_a_killed_writer_left_is_hidden_and_does_not_stand_in_the_way(tmp_path: Path) -> None:
     path = tmp_path / "file"
-    child = os.fork()
-    if child == 0:
-        write_whole(path, killed)
-    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 9
+    writer = ForkedProcess(target=write_whole, args=(path, killed))
+    writer.start()
+    writer.join()
+    assert writer.exitcode == 9
     (left,) = tmp_path.iterdir()
     assert left.name.startswith(".")
     write_whole(path, lambda beside: beside.write_text("new"))

@@ -162,6 +162,8 @@ def test_a_student_is_matched_to_its_own_mixture() -> None:
     deviation = 0.3 * np.sqrt(9.0 / stats.chi2(9).ppf(rank))
     found = matched_student(np.full(4000, 1 / 4000), np.zeros(4000), deviation)
     np.testing.assert_allclose(found, (0.3, 9.0), rtol=0.03)
+    moved = matched_student(np.full(4000, 1 / 4000), np.full(4000, 0.1), deviation)
+    np.testing.assert_allclose(moved, found, rtol=1e-6)
 
 
 def test_the_quantile_of_a_mixture_is_where_its_distribution_says() -> None:

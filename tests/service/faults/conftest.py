@@ -33,7 +33,7 @@ from service.jobs import garbage
 from slipcore import GraspLog
 from slipcore.contact.tiers.ramp import RampSchedule, tangential_ramp
 from stiction_client.container import encode
-from tests import waiting
+from tests import forking, waiting
 
 NPZ = "application/vnd.stiction.grasp-log+npz"
 SHORT = RampSchedule(rest=0.2, press=0.5, settle=0.3, shear=1.5, hold=0.2)
@@ -138,8 +138,8 @@ class Fleet:
         self.database = Database(database_url)
         self.servers: dict[Server, BaseProcess] = {}
         self.workers: list[BaseProcess] = []
+        forking.begin()
         self._context = multiprocessing.get_context("forkserver")
-        self._context.set_forkserver_preload(["service.cli", "service.cli.running", "service.serving"])
         self.environment = {
             "STICTION_DATA_FOLDER": str(folder),
             "STICTION_DATABASE_URL": database_url,

@@ -1,5 +1,4 @@
 import asyncio
-import multiprocessing
 from collections.abc import Callable
 from contextlib import closing
 from datetime import timedelta
@@ -15,6 +14,7 @@ from db.records import NewGraspLog
 from db.repositories import grasp_logs, jobs, materials
 from db.tables import GraspLogRow, IdempotencyKeyRow, JobRow, MaterialRow
 from service.http.idempotency import IdempotencyKey, RepeatableResponse, respond_once
+from tests.forking import Context
 
 Reach = Callable[..., Any]
 NPZ = {"Content-Type": "application/vnd.stiction.grasp-log+npz"}
@@ -116,7 +116,7 @@ def test_processes_that_ask_the_same_at_once_do_it_once(database: Database, blob
     assert blobs  # the database's folder
     with database.write() as session:
         materials.create(session, "paper", "")
-    context = multiprocessing.get_context("fork")
+    context = Context()
     together, answers = context.Barrier(3), context.Queue()
     key = IdempotencyKey("", "k", timedelta(hours=1), "0" * 64)
     processes = [context.Process(target=store, args=(database.url, together, key, answers)) for _ in range(3)]

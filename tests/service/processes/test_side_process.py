@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import signal
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
@@ -54,8 +55,10 @@ def test_who_waits_no_longer_takes_nobody_elses_answer() -> None:
 
 def test_a_process_that_ends_is_told_to_all_who_wait_and_who_come_later() -> None:
     async def body(process: SideProcess) -> None:
-        answers = [process.call(time.sleep, 0.0), process.call(os._exit, 1), process.call(time.sleep, 0.0)]
-        first, *lost = await asyncio.gather(*answers, return_exceptions=True)
+        end = process.call(signal.raise_signal, signal.SIGKILL)
+        first, *lost = await asyncio.gather(
+            process.call(time.sleep, 0.0), end, process.call(time.sleep, 0.0), return_exceptions=True
+        )
         assert first is None
         assert [type(each) for each in lost] == [ProcessEnded, ProcessEnded]
         with pytest.raises(ProcessEnded):
