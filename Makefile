@@ -119,4 +119,4 @@ notices: $(SHIPPED)/.installed  ## write THIRD-PARTY-NOTICES.txt, the licences o
 	    --with-notice-file --no-license-path --ignore-packages stiction stiction-client --output-file THIRD-PARTY-NOTICES.txt
 
 clean:
-	rm -rf $(VENV) $(CACHE) demo-output site sbom.cdx.json THIRD-PARTY-NOTICES.txt .mypy_cache .ruff_cache .pytest_cache .coverage
+	rm -rf $(VENV) $(CACHE) demo-output site sbom.cdx.json THIRD-PARTY-NOTICES.txt .mypy_cache .ruff_cache .pytest_cache .coverage*

@@ -54,6 +54,8 @@ def test_both_clients_offer_the_same_calls() -> None:
 def test_everything_public_is_there() -> None:
     for name in stiction_client.__all__:
         assert hasattr(stiction_client, name)
+    with pytest.raises(AttributeError, match="'stiction_client' has no attribute 'Friction'"):
+        stiction_client.Friction  # noqa: B018
 
 
 def test_a_material_comes_with_its_models(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
@@ -470,6 +472,22 @@ def test_materials_are_renamed_and_merged_and_logs_withdrawn(
     assert json.loads(server.requests[0].content) == {"reason": "mislabelled"}
 
 
+def test_a_sensor_is_described_and_calibrated(ask: Ask, service: Service) -> None:
+    server = service({"items": [{"name": "tac 1", "gel": None}], "next": None})
+    assert ask(server, "sensors") == [{"name": "tac 1", "gel": None}]
+    server = service({"name": "tac 1", "calibration": None})
+    assert ask(server, "describe_sensor", "tac 1", 2e5, 0.48, marker_depth=1e-3)["name"] == "tac 1"
+    gel = {"young_modulus": 2e5, "poisson_ratio": 0.48, "thickness": None, "marker_depth": 1e-3}
+    assert (server.requests[0].method, json.loads(server.requests[0].content)) == ("PUT", gel)
+    server = service({"version": 2})
+    assert ask(server, "calibrate_sensor", "tac 1", {"g1": 5.0, "g2": None}) == {"version": 2}
+    presses = [{"grasp_log": "g1", "known_force": 5.0}, {"grasp_log": "g2", "known_force": None}]
+    assert json.loads(server.requests[0].content) == {"presses": presses}
+    server = service({"items": [{"version": 2}, {"version": 1}]})
+    assert ask(server, "calibrations", "tac 1") == [{"version": 2}, {"version": 1}]
+    assert server.requests[0].url.raw_path == b"/v1/sensors/tac%201/calibrations"
+
+
 def test_the_newest_logs_of_a_material_are_asked_for(ask: Ask, service: Service, answers: SimpleNamespace) -> None:
     server = service({"items": [answers.grasp_log], "next": "more"})
     assert [log.id for log in ask(server, "grasp_logs", "paper", 1)] == [answers.grasp_log["id"]]
@@ -527,6 +545,9 @@ def test_a_grasp_is_recognised_by_its_log_or_by_its_samples(
     ask(server, "recognise", "g1", method="ols")
     assert json.loads(server.requests[-1].content)["method"] == "ols"
     assert sent[2]["samples"]["weight"] == [1.0, 1.0]
+    samples.velocity_is_relative = np.array([False, True])
+    ask(server, "recognise", samples)
+    assert json.loads(server.requests[-1].content)["samples"]["velocity_is_relative"] == [False, True]
     with pytest.raises(InvalidArgument, match="time is not finite"):
         ask(server, "recognise", SimpleNamespace(**vars(samples) | {"time": np.array([np.nan])}))
 

@@ -16,6 +16,7 @@ from stiction_client import (
     InvalidArgument,
     NoFeasibleForce,
     antipodal,
+    grasp,
     n_fingers,
     required_normal_force,
 )
@@ -36,6 +37,14 @@ CONTACTS = {
 
 def coulomb(make_model: Make) -> FrictionModel:
     return make_model((0.4, 0.0, 0.0), ZERO, scale=0.0)
+
+
+def test_a_grasp_told_by_numbers_is_made_of_the_contacts_that_they_tell() -> None:
+    assert grasp(AREA) == Contacts(CONTACTS["flat"])
+    assert grasp(AREA, fingers=2) == CONTACTS["two flat"]
+    assert grasp(AREA, 5.0, 3, 0.03) == CONTACTS["three round"]
+    with pytest.raises(InvalidArgument, match="fingers is 101"):
+        grasp(AREA, fingers=101)
 
 
 def test_torque_alone_asks_for_its_share_of_the_limit_surface(make_model: Make) -> None:

@@ -44,6 +44,18 @@ def test_the_interval_of_the_scatter_holds_it_and_widens_with_fewer_degrees_of_f
     assert stats.chi2.cdf(freedom * (made.scale / low) ** 2, freedom) == pytest.approx(0.95, abs=1e-9)
 
 
+def test_a_scatter_that_is_known_has_no_width(make_model: Any) -> None:
+    made = make_model(scatter_degrees_of_freedom=np.inf)
+    assert made.scale_interval() == (made.scale, made.scale)
+
+
+def test_a_table_without_its_library_names_the_extra(make_model: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ModuleNotFoundError) as found:
+        make_model().to_dataframe()
+    assert found.value.__notes__ == ["pandas comes with the extra `notebook` of stiction-client"]
+
+
 def test_the_client_loads_neither_pandas_nor_xarray_until_it_is_asked() -> None:
     code = "import stiction_client, sys; print({'pandas', 'xarray'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -6,6 +6,7 @@ import httpx
 import numpy as np
 import pytest
 
+from service.domain import plan
 from slipcore import GraspLog
 from stiction_client import FrictionClient, grasp, required_normal_force
 from stiction_client.container import encode
@@ -124,6 +125,14 @@ def test_a_grasp_is_recognised_from_its_log_and_from_its_samples(
     assert of_samples.json()["candidates"][0]["material"] == "fitted"
     with FrictionClient(str(client.base_url)) as planner:
         assert planner.recognise(fitted["id"], ["fitted"]).probability == {"fitted": candidate["probability"]}
+
+
+def test_more_candidates_than_are_compared_at_once_are_to_be_named(
+    client: httpx.Client, fitted: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(plan, "MOST_CANDIDATES", 0)
+    answer = client.post("/v1/recognise", json={"grasp_log": fitted["id"], "materials": ["fitted"]})
+    assert (answer.status_code, "name those that it may be" in answer.text) == (422, True), answer.text
 
 
 def test_a_surface_that_is_none_of_them_is_unknown(client: httpx.Client, fitted: dict[str, Any]) -> None:
