@@ -263,6 +263,18 @@ class FilterOptions(ContactOptions):
         float, Option(0.0, 100.0, "standard deviations", "tuning scenes: 3 to 6 differ by 0.001")
     ] = 4.0
     """How far the fitted pose may stray before it counts as motion."""
+    surroundings_reach: Annotated[
+        float, Option(0.0, 100.0, "contact radii", "½ of the motion on a half-space; 30 scenes of other phrases")
+    ] = 0.5
+    """So far from all that touches, markers tell how the camera shakes."""
+    surroundings_least: Annotated[int, Option(1, 1_000_000, "markers", "their mean is to be surer than one marker")] = 8
+    """With fewer the camera is taken to stand still."""
+    surroundings_memory: Annotated[float, Option(1.0, 1e6, "frames", "a second at 30 fps")] = 30.0
+    """Over so many frames it is told how much of their motion is jitter."""
+    surroundings_jitter: Annotated[float, Option(0.0, 1.0, "-", "a camera that stands still is left out of it")] = 0.5
+    """Least share of jitter in their motion at which this is the camera's."""
+    surroundings_outlier: Annotated[float, Option(1.0, 1e6, "median absolute deviations", "4 σ")] = 6.0
+    """Such a marker tells nothing in that step."""
     following_weight: Annotated[float, Option(0.0, 1000000.0, "-", "all of the motion, ± 0.2")] = 30.0
     """Prior weight of a surface that follows all of a given motion."""
     following_variance: Annotated[float, Option(0.0, 1.0, "-", "5 % of the motion")] = 0.0025

@@ -9,7 +9,9 @@ that it began to slip if it stuck and that it stuck again if it slipped.
 share in which the surface follows the known motion (the same); the pose from which motion counts; for how long there
 has been none, s; and of a given pose: how it was corrected for noise, how far the markers' pose lay from it in the
 last two frames, of how many frames that is known, and what second differences of it say of the noise of place, m, and
-yaw, rad; and in how many frames of contact there were forces, and pulled.
+yaw, rad; in how many frames of contact there were forces, and pulled; how far the camera has moved, x, y m; and of
+the markers around the contact the last step, x, y m, by how much it differed from the one before, and what such
+differences say of jitter, m².
 """
 
 from slipcore.defaults import NOISE
@@ -24,4 +26,6 @@ CORRECTION, LAST_OFFSETS, OFFSET_FRAMES, NOISE_OF_PLACE = 19, 22, 28, 29
 NOISE_OF_YAW = NOISE_OF_PLACE + 1 + NOISE.memory
 FORCE_FRAMES = NOISE_OF_YAW + 1 + NOISE.memory
 PULLED_FRAMES = FORCE_FRAMES + 1
-COMMON = PULLED_FRAMES + 1
+SHIFT = PULLED_FRAMES + 1
+STEP, BEND, JITTER = SHIFT + 2, SHIFT + 4, SHIFT + 6
+COMMON = JITTER + 2

@@ -27,6 +27,7 @@ from slipcore.detection.filter.state import (
     STILL,
 )
 from slipcore.detection.filter.surface_motion import step_pose, store_pose, stored_pose
+from slipcore.detection.filter.surroundings import shift_of_surroundings
 from slipcore.detection.filter.tuning import Tuning, tuning_of
 from slipcore.detection.shared.observe import same
 from slipcore.detection.shared.records import Decision, FrameArrays, Memory, Sensor, Workspace
@@ -79,7 +80,10 @@ def step_elements(
     last_pose = stored_pose(common, POSE)
     places = room.places[: find_places(elements, surface.stays, room.places)]
     anchors, motion, deeper, change, told = rooms_of(room.rows, len(places))
-    find_anchors(elements, places, position, frame.displacement, anchors)
+    shift = shift_of_surroundings(
+        last, frame, before.contact, after.contact, room.weight, room.rows, tuning, after.common
+    )
+    find_anchors(elements, places, position, frame.displacement, shift, anchors)
     pose, spread = step_pose(anchors, last_pose, last, frame, variance, tuning, after.common)
     reference = stored_pose(common, REFERENCE)
     reference = object_motion(anchors, reference, pose, spread, tuning.motion_play, motion)
@@ -98,7 +102,7 @@ def step_elements(
         weigh_forces(elements, places, force_noise, interval, tuning, after.elements, after.common, told)
     else:
         told[:] = 0.0
-    start_elements(position, frame.displacement, after.contact, surface.stays, pose, variance, after.elements)
+    start_elements(position, frame.displacement, shift, surface.stays, pose, variance, after)
     increment = Increment(interval, variance, restick, after.common[STILL] > tuning.hold_time)
     for e in range(len(places)):
         i, j = places[e]
@@ -145,15 +149,20 @@ def find_places(elements: FloatArray, stays: BoolArray, places: NDArray[np.int64
 
 @compiled
 def find_anchors(
-    elements: FloatArray, places: NDArray[np.int64], position: FloatArray, displacement: FloatArray, anchors: Anchors
+    elements: FloatArray,
+    places: NDArray[np.int64],
+    position: FloatArray,
+    displacement: FloatArray,
+    shift: tuple[float, float],
+    anchors: Anchors,
 ) -> None:
-    """Fill what the fit of the pose needs, at these places."""
+    """Fill what the fit of the pose needs, at these places; of markers from which the camera's ``shift`` is taken."""
     for e in range(len(places)):
         i, j = places[e]
         anchors.x[e], anchors.y[e] = elements[STICK_X, i, j], elements[STICK_Y, i, j]
         anchors.variance[e] = elements[STICK_VARIANCE, i, j]
-        anchors.marker_x[e] = position[i, j, 0] + displacement[i, j, 0]
-        anchors.marker_y[e] = position[i, j, 1] + displacement[i, j, 1]
+        anchors.marker_x[e] = position[i, j, 0] + displacement[i, j, 0] - shift[0]
+        anchors.marker_y[e] = position[i, j, 1] + displacement[i, j, 1] - shift[1]
         anchors.stick[e] = 1.0 - elements[PROBABILITY, i, j]
 
 
@@ -178,13 +187,14 @@ def force_change(places: NDArray[np.int64], before: FloatArray, now: FloatArray,
 def start_elements(
     position: FloatArray,
     displacement: FloatArray,
-    contact: BoolArray,
+    shift: tuple[float, float],
     stays: BoolArray,
     pose: Pose,
     variance: float,
-    after: FloatArray,
+    memory: Memory,
 ) -> None:
     """Elements that have just touched stick where they are; of those that do not touch nothing is known."""
+    contact, after = memory.contact, memory.elements
     after[STICK_X : SLIP_VARIANCE + 1] = 0.0
     n, m = contact.shape
     for i in range(n):
@@ -195,7 +205,7 @@ def start_elements(
                 after[END, i, j] = 1.0
             if contact[i, j] and not stays[i, j]:
                 x, y = position[i, j, 0] + displacement[i, j, 0], position[i, j, 1] + displacement[i, j, 1]
-                x, y = place_on_object(pose, x, y)
+                x, y = place_on_object(pose, x - shift[0], y - shift[1])
                 after[STICK_X, i, j], after[STICK_Y, i, j] = x, y
                 after[SLIP_X, i, j], after[SLIP_Y, i, j] = x, y
                 after[STICK_VARIANCE, i, j] = after[SLIP_VARIANCE, i, j] = variance

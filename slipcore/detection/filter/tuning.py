@@ -31,6 +31,11 @@ class Tuning(NamedTuple):
     outlier_gate: float
     outlier_spread: float
     motion_play: float
+    surroundings_reach: float
+    surroundings_least: float
+    surroundings_memory: float
+    surroundings_jitter: float
+    surroundings_outlier: float
     following_weight: float
     pose_noise_least: float
     following_variance: float

@@ -72,27 +72,54 @@ def reach_rim(pressing: FloatArray, bend: FloatArray, least: float, hollow: floa
     """Let the contact reach to where the shape bends by ``hollow``, m, from what was found.
 
     Elements pressed by ``least`` join that hang together with those found: a bonded gel is so flat at the rim that this
-    lies far under half of the depth.
+    lies far under half of the depth. None do where no rim is met: around a contact of many elements on a half-space the
+    shape bends by little from one to the next.
     """
     n, m = contact.shape
-    grows = True
+    found, grows = contact.copy(), True
     while grows:
         grows = False
         for i in range(n):
             for j in range(m):
                 if not contact[i, j] and bend[i, j] <= hollow and pressing[i, j] > least and beside(contact, i, j):
                     contact[i, j] = grows = True
+    if not is_rimmed(contact, found, bend, hollow):
+        contact[:] = found
+
+
+@compiled
+def is_rimmed(contact: BoolArray, found: BoolArray, bend: FloatArray, hollow: float) -> bool:
+    """Whether the shape bends by ``hollow`` along half or more of the outline.
+
+    The lattice's edge is no rim where the contact has come to it from what was ``found``.
+    """
+    n, m = contact.shape
+    outline = rim = 0
+    for i in range(n):
+        for j in range(m):
+            if contact[i, j] and not found[i, j]:
+                outline += not (0 < i < n - 1 and 0 < j < m - 1)
+            elif not contact[i, j] and neighbours(contact, i, j):
+                outline += 1
+                rim += bend[i, j] > hollow
+    return 2 * rim >= outline > 0
 
 
 @compiled
 def beside(contact: BoolArray, i: int, j: int) -> bool:
     """Whether three of the eight neighbours touch: those along a straight edge, more than show through a single gap."""
+    return neighbours(contact, i, j) >= 3
+
+
+@compiled
+def neighbours(contact: BoolArray, i: int, j: int) -> int:
+    """How many of the eight neighbours touch."""
     n, m = contact.shape
     count = 0
     for a in range(max(i - 1, 0), min(i + 2, n)):
         for b in range(max(j - 1, 0), min(j + 2, m)):
             count += contact[a, b]
-    return bool(count - contact[i, j] >= 3)
+    return int(count - contact[i, j])
 
 
 @compiled

@@ -68,13 +68,17 @@ def test_a_noisy_first_frame_touches_nothing() -> None:
     assert len(history.events.release) < 0.2 * len(history.events.touch)
 
 
+def hertzian(r: np.ndarray) -> np.ndarray:
+    """Indentation at r contact radii over the deepest (Hertz): beyond the contact the surface follows it down."""
+    outside = np.maximum(r, 1.0)
+    beyond = ((2.0 - outside**2) * np.arcsin(1.0 / outside) + np.sqrt(outside**2 - 1.0)) / np.pi
+    return np.where(r <= 1.0, 1.0 - r**2 / 2.0, beyond)
+
+
 def test_beyond_the_rim_the_shape_is_hollow() -> None:
     x, y = np.meshgrid(np.arange(-9.0, 10.0), np.arange(-9.0, 10.0))
     r = np.hypot(x, y) / 5.0
-    outside = np.maximum(r, 1.0)
-    indentation = np.where(
-        r <= 1.0, 1.0 - r**2 / 2.0, ((2.0 - outside**2) * np.arcsin(1.0 / outside) + np.sqrt(outside**2 - 1.0)) / np.pi
-    )  # Hertz: the surface beyond the contact follows it down
+    indentation = hertzian(r)
     found = contact_from_shape(
         1e-3 * indentation, np.nan, None, replace(OPTIONS, contact_depth_share=0.3, rim_curvature=0.008)
     )
@@ -93,6 +97,15 @@ def test_on_a_bonded_gel_the_contact_is_followed_to_its_rim_while_noise_allows(n
     assert np.count_nonzero(found & (r < 1.0)) > part * np.count_nonzero(r < 1.0)
     assert np.count_nonzero(found & (r < 1.0)) < (part + 0.15) * np.count_nonzero(r < 1.0)
     assert not found[r >= 1.1].any()
+
+
+@pytest.mark.parametrize("radius", [4.0, 8.0, 10.0, 12.0])
+def test_a_wide_contact_on_a_half_space_ends_at_its_rim(radius: float) -> None:
+    """The wider, the less does the shape bend from one element to the next: the rim has gaps."""
+    x, y = np.meshgrid(np.arange(-15.0, 16.0), np.arange(-15.0, 16.0))
+    r = np.hypot(x, y) / radius
+    found = contact_from_shape(1e-3 * hertzian(r), np.nan, None, FilterOptions())
+    assert np.count_nonzero(found ^ (r <= 1.0)) <= 0.25 * np.count_nonzero(r <= 1.0)
 
 
 def test_a_contact_does_not_leak_through_a_single_gap_of_its_rim() -> None:

@@ -1,0 +1,131 @@
+"""How the gel around the contact moves: under a camera that shakes all markers do, and the object seems to."""
+
+import math
+
+from slipcore.compilation import compiled
+from slipcore.detection.filter.state import BEND, JITTER, SHIFT, STEP
+from slipcore.detection.filter.tuning import Tuning
+from slipcore.detection.shared.records import FrameArrays
+from slipcore.frames import BoolArray, FloatArray
+from slipcore.noise import median
+
+
+@compiled
+def shift_of_surroundings(
+    last: FrameArrays,
+    frame: FrameArrays,
+    was: BoolArray,
+    contact: BoolArray,
+    distance: FloatArray,
+    rows: FloatArray,
+    tuning: Tuning,
+    common: FloatArray,
+) -> tuple[float, float]:
+    """How far the camera has moved since the first frame, x and y m, as markers around the contact tell; in ``common``.
+
+    It moves as they do in the mean while ``surroundings_jitter`` of their motion is jitter. Those count that lie
+    ``surroundings_reach`` contact radii or more from what touches, without outliers: the mean of the same markers adds
+    up to no random walk. Fewer than ``surroundings_least`` tell nothing, nor do any where the object's pose is given:
+    their motion has the gel's own in it, too. ``distance`` [n, m], ``rows``: room.
+    """
+    if not frame.object_pose.size:
+        touching = distance_from(was, contact, distance)
+        reach = max(1.0, tuning.surroundings_reach * math.sqrt(touching / math.pi))
+        count = find_steps(last.displacement, frame.displacement, distance, reach, rows)
+        if count >= tuning.surroundings_least:
+            u, v = usual_step(rows[:, :count], tuning.surroundings_outlier)
+            if share_of_jitter(u, v, tuning, common) >= tuning.surroundings_jitter:
+                common[SHIFT] += u
+                common[SHIFT + 1] += v
+    return common[SHIFT], common[SHIFT + 1]
+
+
+@compiled
+def share_of_jitter(u: float, v: float, tuning: Tuning, common: FloatArray) -> float:
+    """What share of the steps (this one is u, v m) white noise of place has, by their changes b: −3/2 Σb·b′/Σb².
+
+    White noise of variance σ² gives Σb² = 6σ² and, of each with the one before it, Σb·b′ = −4σ²; an even motion gives
+    neither. Both sums fade over ``surroundings_memory`` frames.
+    """
+    kept = 1.0 - 1.0 / tuning.surroundings_memory
+    bend_u, bend_v = u - common[STEP], v - common[STEP + 1]
+    common[JITTER] = kept * common[JITTER] + bend_u**2 + bend_v**2
+    common[JITTER + 1] = kept * common[JITTER + 1] + bend_u * common[BEND] + bend_v * common[BEND + 1]
+    common[STEP], common[STEP + 1], common[BEND], common[BEND + 1] = u, v, bend_u, bend_v
+    share = -1.5 * common[JITTER + 1] / (common[JITTER] + tuning.displacement_floor**2)
+    return float(min(max(share, 0.0), 1.0))
+
+
+@compiled
+def distance_from(was: BoolArray, contact: BoolArray, distance: FloatArray) -> int:
+    """Fill how far each element is from those that touch or did, in elements; how many of these there are.
+
+    In two passes, by steps of 1 and √2 (Borgefors, Comput. Vis. Graph. Image Process. 34 (1986) 344): 8 % too far at
+    most.
+    """
+    n, m = contact.shape
+    aslant, touching = math.sqrt(2.0), 0
+    for i in range(n):
+        for j in range(m):
+            if contact[i, j] or was[i, j]:
+                distance[i, j] = 0.0
+                touching += 1
+                continue
+            least = distance[i, j - 1] + 1.0 if j > 0 else math.inf
+            if i > 0:
+                least = min(least, distance[i - 1, j] + 1.0)
+                least = min(least, distance[i - 1, j - 1] + aslant) if j > 0 else least
+                least = min(least, distance[i - 1, j + 1] + aslant) if j < m - 1 else least
+            distance[i, j] = least
+    for i in range(n - 1, -1, -1):
+        for j in range(m - 1, -1, -1):
+            least = distance[i, j]
+            least = min(least, distance[i, j + 1] + 1.0) if j < m - 1 else least
+            if i < n - 1:
+                least = min(least, distance[i + 1, j] + 1.0)
+                least = min(least, distance[i + 1, j - 1] + aslant) if j > 0 else least
+                least = min(least, distance[i + 1, j + 1] + aslant) if j < m - 1 else least
+            distance[i, j] = least
+    return touching
+
+
+@compiled
+def find_steps(before: FloatArray, now: FloatArray, distance: FloatArray, reach: float, steps: FloatArray) -> int:
+    """Fill the steps, x and y m, of the markers at this ``distance`` or farther into ``steps`` [3, k]; their number."""
+    n, m = distance.shape
+    count = 0
+    for i in range(n):
+        for j in range(m):
+            if distance[i, j] >= reach:
+                steps[0, count] = now[i, j, 0] - before[i, j, 0]
+                steps[1, count] = now[i, j, 1] - before[i, j, 1]
+                count += 1
+    return count
+
+
+@compiled
+def usual_step(steps: FloatArray, outlier: float) -> tuple[float, float]:
+    """Mean of ``steps`` x and y m, [3, k], without those ``outlier`` median absolute deviations off the median.
+
+    The third row is room.
+    """
+    u, far_u = middle_and_spread(steps[0], steps[2])
+    v, far_v = middle_and_spread(steps[1], steps[2])
+    along = across = 0.0
+    count = 0
+    for k in range(steps.shape[1]):
+        if abs(steps[0, k] - u) <= outlier * far_u and abs(steps[1, k] - v) <= outlier * far_v:
+            along += steps[0, k]
+            across += steps[1, k]
+            count += 1
+    return (along / count, across / count) if count else (u, v)
+
+
+@compiled
+def middle_and_spread(values: FloatArray, room: FloatArray) -> tuple[float, float]:
+    """Median of the values [k], and their median absolute deviation from it."""
+    room[:] = values
+    middle = median(room)
+    for k in range(len(values)):
+        room[k] = abs(values[k] - middle)
+    return middle, median(room)
