@@ -163,7 +163,7 @@ class TangentialDefaults(Options):
     coarse_tolerance: Annotated[float, Option(1e-8, 0.5, "-", "below the discretisation error of coarse grids")] = 1e-3
     limit_margin: Annotated[float, Option(0.0, 1e-3, "-", "rounding")] = 1e-12
     """Loads this close to the limit surface, relative to it, are on it: all slides."""
-    balance: Annotated[float, Option(1e-14, 1e-3, "-", "rounding of the sums, with room")] = 1e-10
+    balance: Annotated[float, Option(1e-14, 1e-3, "-", "1.1e-10 on the limit surface, with room")] = 1e-9
     """Of the summed limits: a load that tractions miss by more is not carried, however small the residual."""
     circle_rounding: Annotated[float, Option(0.0, 1e-3, "-", "rounding")] = 1e-12
     """Of its limit, by which a traction may fall short and still lie on it."""
@@ -234,13 +234,17 @@ class StepDefaults(Options):
     """The share where motion is given and the increment of load not known."""
     box_multiple: Annotated[int, Option(1, 64, "cells", "a growing contact meets few new operators")] = 4
     """Boxes grow by so many cells."""
-    outer_iterations: Annotated[int, Option(1, 1000, "iterations", "bound")] = 60
+    outer_iterations: Annotated[int, Option(1, 1000, "iterations", "bound")] = 100
     """Of coupling and of velocity-dependent friction."""
+    mixing_depth: Annotated[int, Option(1, 20, "points", "trials, 1 to 8: thin layers need 4, others no more")] = 4
+    """Earlier points that the next one of such an iteration is mixed of."""
+    mixing_rank: Annotated[float, Option(1e-15, 1e-3, "-", "rounding of products")] = 1e-10
+    """Share of the largest eigenvalue from which a combination of these points counts."""
     pressure_by_lift: Annotated[float, Option(0.1, 100.0, "-", "π²/2 for a sphere (Hertz)")] = 5.0
     """Change of pressure, as a share of its largest, by a lift as a share of the indentation."""
     coupling_start: Annotated[float, Option(1e-8, 1.0, "-", "order of Dundurs' β at ν = 0.49")] = 1e-2
     """What the first guess of the lift is taken to be off by, in the same measure."""
-    inexact: Annotated[float, Option(1e-3, 1.0, "-", "usual of inexact Newton methods")] = 0.3
+    inexact: Annotated[float, Option(1e-4, 1.0, "-", "trials: 0.3 misled the mixing, and took twice the work")] = 0.01
     """Of the last change of the lift: how far contact is solved under one that will change again."""
     coupling_margin: Annotated[float, Option(1.0, 1000.0, "-", "what a fixed point has still to go, with room")] = 10.0
     """Changes of the lift must be so much smaller than the tolerance."""

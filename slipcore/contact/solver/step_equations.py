@@ -1,5 +1,6 @@
 """The equations of one load step: normal contact, tangential contact, and what ties them together."""
 
+from collections import deque
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -19,23 +20,31 @@ from slipcore.frames import FloatArray
 
 
 class Mixing:
-    """Anderson's acceleration of a fixed point, of depth one (J. ACM 12 (1965) 547)."""
+    """Anderson's acceleration of a fixed point (J. ACM 12 (1965) 547): of the last points that combination is taken
+    which the map would change least if it were linear.
+    """
 
     def __init__(self) -> None:
-        self._last: tuple[FloatArray, FloatArray] | None = None
+        self._last = deque[tuple[FloatArray, FloatArray]](maxlen=STEP.mixing_depth + 1)
 
     def next(self, point: FloatArray, mapped: FloatArray) -> FloatArray:
         """The next point, given the last and what the map made of it."""
-        change, share = mapped - point, 0.0
-        if self._last is not None:
-            bend = change - self._last[0]
-            size = inner(bend, bend)
-            share = float(np.clip(inner(change, bend) / size, -1.0, 1.0)) if size > 0.0 else 0.0
-            following = mapped - share * (mapped - self._last[1])
-        else:
-            following = mapped
-        self._last = (change, mapped)
+        self._last.append((mapped - point, mapped))
+        *earlier, (change, _) = self._last
+        bends = [change - before for before, _ in earlier]
+        following = mapped
+        for share, (_, before) in zip(_least_squares(bends, change), earlier, strict=True):
+            following = following - share * (mapped - before)
         return following
+
+
+def _least_squares(columns: list[FloatArray], right: FloatArray) -> FloatArray:
+    """Shares of the columns that add up to the right side as nearly as can be; columns alike count as one."""
+    products = np.array([[inner(a, b) for b in columns] for a in columns]).reshape(len(columns), len(columns))
+    sizes = np.sqrt(products.diagonal())
+    sizes = np.where(sizes > 0.0, sizes, 1.0)
+    along = np.array([inner(column, right) for column in columns])
+    return np.asarray(np.linalg.pinv(products / np.outer(sizes, sizes), STEP.mixing_rank) @ (along / sizes) / sizes)
 
 
 class StepSolution(NamedTuple):
@@ -78,18 +87,21 @@ class StepEquations:
         if not self.problem.coupled:
             return self._once(pressure, traction, self.height, self.tolerance)
         lift, change, iterations, mixing = self._lift(traction), STEP.coupling_start, 0, Mixing()
+        goal = max(self.tolerance, STEP.inexact * change)
         for _ in range(STEP.outer_iterations):
-            goal = max(self.tolerance, STEP.inexact * change)
             solution = self._once(pressure, traction, self.height + lift, goal)
             pressure, traction = solution.normal.pressure, self._whole(solution)
             iterations += solution.iterations
             if not pressure.any():
                 return solution
+            if solution.iterations == 0 and goal > self.tolerance:  # too coarse to tell what this lift leads to
+                goal = max(self.tolerance, STEP.inexact * goal)
+                continue
             mapped = self._lift(traction)
             change = STEP.pressure_by_lift * float(np.abs(mapped - lift).max() / solution.normal.displacement.max())
             if max(STEP.coupling_margin * change, goal) <= self.tolerance:
                 return solution._replace(iterations=iterations)
-            lift = mixing.next(lift, mapped)
+            lift, goal = mixing.next(lift, mapped), max(self.tolerance, STEP.inexact * change)
         raise NotConverged("normal-tangential coupling", change, self.tolerance, STEP.outer_iterations)
 
     def pressed(self, guess: Stress) -> NormalContact:
