@@ -24,7 +24,7 @@ def read(path: Path, mapping: FieldMapping | None = None) -> GraspLog:
     own = mappings.parse(json.dumps(document["mapping"])) if "mapping" in document else mappings.UNMAPPED
     defaults = default_origins()
     if isinstance(document.get("frames"), list):
-        defaults |= {name: Origin((f"frames.{name}",), explicit=False) for name in DTYPES if name not in ONCE}
+        defaults |= {name: Origin((f"frames.{name}",), explicit=False) for name in _of_frames(document)}
     return assemble(_Document(document), (mapping or own).over(defaults))
 
 
@@ -37,7 +37,19 @@ class _Document:
     def column(self, name: str, _topic: str | None, field: str, _once: bool) -> NDArray[Any] | None:
         """What a dotted path leads to."""
         value = follow(self._document, field)
-        return None if value is None else as_array(name, value)
+        if value is None:
+            self._check_absent(name, field)
+            return None
+        return as_array(name, value)
+
+    def _check_absent(self, name: str, field: str) -> None:
+        """Raises ``InvalidInput`` for what some frames have and others do not: it would be left out of all."""
+        within, _, rest = field.partition(".")
+        frames = self._document.get(within)
+        if isinstance(frames, list) and rest:
+            having = sum(follow(frame, rest) is not None for frame in frames)
+            if having:
+                raise InvalidInput(name, f"in {having} of {len(frames)} frames", "in each of them, or in none")
 
     def grid(self) -> None:
         """Told by the arrays' shapes alone."""
@@ -45,6 +57,15 @@ class _Document:
     def contents(self) -> str:
         """The object's keys."""
         return f"the keys {', '.join(self._document)}"[:300]
+
+
+def _of_frames(document: dict[str, Any]) -> list[str]:
+    """Members that are looked for in each of the frames: those that the object itself does not have."""
+    named = [name for name in DTYPES if name not in ONCE]
+    for name in named:
+        if name in document and any(follow(frame, name) is not None for frame in document["frames"]):
+            raise InvalidInput(name, "in the object and in its frames", "in one of the two")
+    return [name for name in named if name not in document]
 
 
 def _document(path: Path) -> dict[str, Any]:

@@ -118,6 +118,8 @@ def _origin(name: str, given: Any, topic: str | None) -> Origin:
         raise InvalidInput(f"mapping of {name}", repr(given)[:60], _ALLOWED_ORIGIN)
     factors = _factors(name, entry["unit"]) if "unit" in entry else None
     if "value" in entry:
+        if entry["value"] is None:
+            raise InvalidInput(f"mapping of {name}", "a value of null", "a value, or no mapping of this member")
         return Origin(value=entry["value"], factors=factors)
     fields = entry["field"] if isinstance(entry["field"], list) else [entry["field"]]
     if not fields or len(fields) > 10_000:

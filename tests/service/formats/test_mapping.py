@@ -95,6 +95,7 @@ def test_what_is_named_goes_before_what_is_usual() -> None:
         ({"time": {}}, "mapping of time"),
         ({"time": {"field": "a", "value": 1}}, "mapping of time"),
         ({"time": {"unit": "s"}}, "mapping of time"),
+        ({"time": {"value": None}}, "mapping of time"),
         ({"time": {"field": "a", "units": "s"}}, "mapping of time"),
         ({"time": ["a"] * 10_001}, "mapping of time"),
         ({"time": {"field": "a", "unit": "min"}}, "unit of time"),

@@ -255,6 +255,37 @@ def test_json_is_read_as_columns_or_as_frames(log: GraspLog, write: SimpleNamesp
     assert back.sensor == "left"
 
 
+@pytest.mark.parametrize("member", ["force", "gripper_force", "contact"])
+@pytest.mark.parametrize("is_null", [True, False])
+def test_json_with_a_member_in_some_frames_alone_is_refused_by_name(
+    log: GraspLog, write: SimpleNamespace, tmp_path: Path, member: str, is_null: bool
+) -> None:
+    """Without it in all of them, friction might come from what was not measured."""
+    columns = json.loads(write.json(log, tmp_path / "log.json").read_text())
+    columns["contact"] = np.ones(log.displacement.shape[:3], bool).tolist()
+    frames = [{name: columns[name][k] for name in ("time", "displacement", member)} for k in range(len(log))]
+    if is_null:
+        frames[1][member] = None
+    else:
+        del frames[1][member]
+    path = tmp_path / "frames.json"
+    path.write_text(json.dumps({"frames": frames, "position": columns["position"], "element_area": 1e-6}))
+    with pytest.raises(InvalidInput, match=f"{member} is in 4 of 5 frames; allowed: in each of them, or in none"):
+        formats.read(path)
+
+
+def test_json_frames_may_lack_what_the_object_has(log: GraspLog, write: SimpleNamespace, tmp_path: Path) -> None:
+    path = write.json(log, tmp_path / "log.json")
+    columns = json.loads(path.read_text())
+    frames = [{name: columns[name][k] for name in ("time", "displacement")} for k in range(len(log))]
+    path.write_text(json.dumps({**columns, "frames": frames, "time": columns["time"]}))
+    with pytest.raises(InvalidInput, match="time is in the object and in its frames; allowed: in one of the two"):
+        formats.read(path)
+    del columns["time"], columns["displacement"]
+    path.write_text(json.dumps({**columns, "frames": frames}))
+    assert_same(formats.read(path), replace(log, normal=None), rtol=0.0)
+
+
 def same_bytes(log: GraspLog) -> bytes:
     return container.encode(log)
 
@@ -452,6 +483,104 @@ def test_a_table_of_uneven_rows_is_refused_by_row(log: GraspLog, tmp_path: Path)
     pq.write_table(pa.table({"time": log.time, "displacement": pa.array(rows)}), tmp_path / "log")
     with pytest.raises(InvalidInput, match="displacement is a list of another length at row 3"):
         formats.read(tmp_path / "log")
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "message"),
+    [
+        ("displacement", [None, *[[0.0] * 3] * 4], "displacement is null in the rows from 0 on; allowed: a list in"),
+        ("displacement", [b"x"] * 5, "displacement is of type binary; allowed: numbers, truth values or moments"),
+        ("displacement", ["x"] * 5, "displacement is of dtype <U1; allowed: an array of real numbers"),
+        ("time", ["now"] * 5, r"time is <U3 of shape \[5\]; allowed: one number a frame"),
+        ("episode_index", [[0]] * 5, "episode is a column episode_index of lists; allowed: one number a row"),
+    ],
+)
+def test_a_column_of_something_else_is_refused_by_name(
+    log: GraspLog, tmp_path: Path, name: str, column: list[Any], message: str
+) -> None:
+    table = {"time": log.time, "displacement": log.displacement.reshape(5, -1).tolist()}
+    pq.write_table(pa.table(table | {name: pa.array(column)}), tmp_path / "log")
+    with pytest.raises(InvalidInput, match=message):
+        formats.read(tmp_path / "log")
+
+
+@pytest.mark.parametrize(
+    ("notes", "mapping", "message"),
+    [
+        ("{", None, "stiction_log is not JSON .*; allowed: a JSON object"),
+        ("[]", None, r"stiction_log is \[\]; allowed: a JSON object"),
+        ("{}", '{"episode": 1}', "episode is 1; allowed: a table with a column episode_index"),
+        ("{}", None, "time is without rows; allowed: at least 2 frames"),
+    ],
+)
+def test_a_table_that_is_no_log_is_refused(tmp_path: Path, notes: str, mapping: str | None, message: str) -> None:
+    empty = {"time": pa.array([], pa.float64()), "displacement": pa.array([], pa.list_(pa.float64()))}
+    pq.write_table(pa.table(empty, metadata={parquet.LOG_KEY: notes}), tmp_path / "log")
+    with pytest.raises(InvalidInput, match=message):
+        formats.read(tmp_path / "log", mapping=mapping)
+
+
+@pytest.mark.parametrize(
+    ("kind", "message"),
+    [
+        ("a group", r"time is a group \(time\); allowed: a dataset"),
+        ("packed", "time is packed by filter 6; allowed: gzip, lzf, shuffle, fletcher32"),
+        ("text", "time is of dtype .*; allowed: numbers, truth values or one text"),
+        ("nothing", "time is not there.* the file has the datasets and groups displacement"),
+        ("long", "sensor is 70.* bytes; allowed: at most 65536"),
+    ],
+)
+def test_hdf5_of_something_else_is_refused_by_name(log: GraspLog, tmp_path: Path, kind: str, message: str) -> None:
+    with h5py.File(tmp_path / "log", "w", libver="latest") as file:
+        file["displacement"] = log.displacement
+        if kind == "a group":
+            file.create_group("time")
+        elif kind == "packed":
+            file.create_dataset("time", data=np.arange(5), scaleoffset=0)
+        elif kind == "text":
+            file["time"] = ["now"] * 5
+        elif kind == "long":
+            file["time"], file["position"] = log.time, log.position
+            file.attrs["sensor"] = np.full(70_000, b"x")
+    with pytest.raises(InvalidInput, match=message):
+        formats.read(tmp_path / "log")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("[1]", "file is JSON of a list; allowed: a JSON object"), ('{"time": [0]}', "the file has the keys time")],
+)
+def test_json_of_something_else_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "log.json").write_text(text)
+    with pytest.raises(InvalidInput, match=message):
+        formats.read(tmp_path / "log.json", formats.FORMATS["json"].content_type)
+
+
+@pytest.mark.parametrize(
+    ("messages", "mapping", "told"),
+    [
+        ([{"d": [0.0] * 12}, {}], {}, "displacement is in 1 of 2 messages of /tactile; allowed: d in each of them"),
+        (
+            [{"d": [0.0] * 12}, {"d": [0.0] * 9}],
+            {},
+            r"displacement is float64 of shape \[9\] at frame 1; allowed: float64 of shape \[12\], as at frame 0",
+        ),
+        ([{}], {"topic": None}, "mapping of displacement is d of no topic; allowed: a field with the topic it is in"),
+    ],
+)
+def test_messages_that_make_no_column_are_refused_by_name(
+    tmp_path: Path, messages: list[dict[str, Any]], mapping: dict[str, Any], told: str
+) -> None:
+    with (tmp_path / "log").open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start()
+        channel = writer.register_channel("/tactile", "json", writer.register_schema("tactile", "jsonschema", b"{}"))
+        for received, message in enumerate(messages):
+            writer.add_message(channel, received, json.dumps(message).encode(), received)
+        writer.finish()
+    wanted = {name: value for name, value in ({"topic": "/tactile"} | mapping).items() if value is not None}
+    with pytest.raises(InvalidInput, match=told):
+        formats.read(tmp_path / "log", mapping=json.dumps({"displacement": "d", "grid": [2, 2], **wanted}))
 
 
 def test_messages_that_never_come_are_told_with_the_frame(
