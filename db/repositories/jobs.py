@@ -115,10 +115,12 @@ def claim(session: Session, runner_id: str, besides: Collection[str] = (), *, on
 
     ``besides``: jobs that the runner is still at, whatever a database that crashed remembers of its claims.
     """
-    job_id = turns.first(session, JobRow.id.not_in(besides), *_of_size(only_short=only_short))
-    if job_id is None:
+    found = turns.first(session, JobRow.id.not_in(besides), *_of_size(only_short=only_short))
+    if found is None:
         return None
-    claimed = update(JobRow).where(JobRow.id == job_id).values(status="running", runner_id=runner_id)
+    job_id, turn = found
+    # once: of a row that is changed again PostgreSQL asks for the material anew, which a merge may hold
+    claimed = update(JobRow).where(JobRow.id == job_id).values(status="running", runner_id=runner_id, turn=turn)
     is_long = session.scalar(claimed.returning(JobRow.is_long))
     return Claim(job_id, runner_id, bool(is_long))
 

@@ -10,7 +10,7 @@ the second which of theirs.
 
 from typing import Any
 
-from sqlalchemy import ColumnElement, func, select, update
+from sqlalchemy import ColumnElement, false, func, select, update
 from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from db.tables import JobRow
@@ -25,23 +25,24 @@ def new(session: Session, key_id: str | None, material_id: int | None, *, is_lon
     """The turns of a job that comes into the queue, by column."""
     of_key = JobRow.requested_by == key_id
     of_group = (of_key, JobRow.material_id == material_id, JobRow.is_long == is_long)
-    step = LONG_STEP if is_long else STEP
     return {
-        "turn": _after(session, JobRow.turn, (), (of_key,), step),
-        "turn_within_key": _after(session, JobRow.turn_within_key, (of_key,), of_group, step),
+        "turn": _after(session, JobRow.turn, (), (of_key,), is_long=is_long),
+        "turn_within_key": _after(session, JobRow.turn_within_key, (of_key,), of_group, is_long=is_long),
     }
 
 
-def first(session: Session, *among: ColumnElement[bool]) -> str | None:
-    """The id of the queued job whose turn it is; locked, and passed over where another transaction has locked it."""
+def first(session: Session, *among: ColumnElement[bool]) -> tuple[str, int] | None:
+    """The id of the queued job whose turn it is, and the turn that it takes, which the caller stores.
+
+    It is locked, and passed over where another transaction has locked it.
+    """
     head = _least(session, JobRow.turn, among)
     if head is None:
         return None
     chosen = _least(session, JobRow.turn_within_key, (*among, JobRow.requested_by == head.requested_by)) or head
     if chosen.id != head.id:  # it takes the turn of its key's first one, which gets its own
-        _give_turn(session, head.id, chosen.turn)
-        _give_turn(session, chosen.id, head.turn)
-    return str(chosen.id)
+        session.execute(update(JobRow).where(JobRow.id == head.id).values(turn=chosen.turn))
+    return str(chosen.id), int(head.turn)
 
 
 def _after(
@@ -49,16 +50,32 @@ def _after(
     turn: Turn,
     whole: tuple[ColumnElement[bool], ...],
     group: tuple[ColumnElement[bool], ...],
-    step: int,
+    *,
+    is_long: bool,
 ) -> int:
     """A step after the last of the group; a group that has nobody comes before the second of the others."""
-    served = _extreme(session, func.max(turn), "running", whole)
-    if served is None:
-        head = _extreme(session, func.min(turn), "queued", whole)
-        served = 0 if head is None else head - STEP + 1  # so that it comes with the head, which is older
+    served = _served(session, turn, whole)
+    if not is_long:  # short jobs may be served before long ones of an earlier turn
+        served = max(served, _served(session, turn, (*whole, JobRow.is_long == false())))
     ends = [_extreme(session, func.max(turn), status, group) for status in ("queued", "running")]
     last = max((end for end in ends if end is not None), default=None)
+    step = LONG_STEP if is_long else STEP
     return served + step - 1 if last is None else max(last, served) + step
+
+
+def _served(session: Session, turn: Turn, among: tuple[ColumnElement[bool], ...]) -> int:
+    """The turn that is served now among some jobs: that of the last one that runs and is not before its turn.
+
+    A job that takes long may have begun in a turn long past: the next one's is at most a long step away.
+    """
+    head = _extreme(session, func.min(turn), "queued", among)
+    in_turn = () if head is None else (turn <= head,)
+    served = _extreme(session, func.max(turn), "running", (*among, *in_turn))
+    if head is None:
+        return served or 0
+    if served is None:
+        return head - STEP + 1  # who comes now comes with the head, which is older
+    return max(served, head - LONG_STEP)
 
 
 def _extreme(session: Session, wanted: Any, status: str, among: tuple[ColumnElement[bool], ...]) -> int | None:
@@ -69,7 +86,3 @@ def _least(session: Session, turn: Turn, among: tuple[ColumnElement[bool], ...])
     query = select(JobRow.id, JobRow.requested_by, JobRow.turn).where(JobRow.status == "queued", *among)
     ordered = query.order_by(turn, JobRow.created_at, JobRow.id).limit(1).with_for_update(skip_locked=True)
     return session.execute(ordered).one_or_none()
-
-
-def _give_turn(session: Session, job_id: str, turn: int) -> None:
-    session.execute(update(JobRow).where(JobRow.id == job_id).values(turn=turn))

@@ -1,13 +1,13 @@
 from time import perf_counter
 
 import pytest
-from sqlalchemy import insert
+from sqlalchemy import insert, select, text
 from sqlalchemy.orm import Session
 
 from db.database import Database
 from db.records import Claim
 from db.repositories import access_keys, jobs, materials, runners
-from db.tables import JobRow
+from db.tables import JobRow, MaterialRow
 
 SMALL, LARGE = "a" * 12, "b" * 12
 WAITING = 10_000
@@ -90,6 +90,61 @@ def test_a_claim_of_short_jobs_passes_over_long_ones_of_every_key(database: Data
         rest = jobs.claim(session, runner)
         assert rest is not None
         assert rest.is_long
+
+
+def test_a_short_job_that_is_served_before_its_turn_keeps_no_other_key_back(database: Database, paper: int) -> None:
+    with database.write() as session:
+        many, runner = add(session, paper, 20, LARGE, is_long=True), runners.add(session, "host:1")
+        add(session, paper, 5, LARGE)
+        assert jobs.claim(session, runner) == Claim(many[0], runner, is_long=True)
+        assert jobs.claim(session, runner, only_short=True) is not None
+        (one,) = add(session, paper, 1, SMALL, is_long=True)
+        assert one in served(session)[:2]
+
+
+@pytest.mark.parametrize("long_ones_wait", [0, 3])
+@pytest.mark.parametrize("one_runs", [True, False])
+def test_nor_does_a_long_one_let_a_new_key_overtake_those_whose_short_jobs_were_served_meanwhile(
+    database: Database, paper: int, long_ones_wait: int, one_runs: bool
+) -> None:
+    with database.write() as session:
+        runner = runners.add(session, "host:1")
+        add(session, paper, 1 + long_ones_wait, is_long=True)
+        assert jobs.claim(session, runner) is not None
+        many = add(session, paper, 60, LARGE)
+        for _ in range(50):
+            claim = jobs.claim(session, runner, only_short=True)
+            assert claim is not None
+            jobs.finish(session, claim, "done")
+        if one_runs:
+            assert jobs.claim(session, runner, only_short=True) is not None
+        new = add(session, paper, 20, SMALL)
+        (long,) = add(session, paper, 1, SMALL, is_long=True)
+        done = []
+        while claim := jobs.claim(session, runner, only_short=True):
+            done.append(claim.job_id)
+            jobs.finish(session, claim, "done")
+        assert sum(job in many for job in done[:10]) >= 4
+        assert sum(job in new for job in done[:10]) >= 4
+        assert long in served(session)
+
+
+@pytest.mark.parametrize("engine_name", ["postgresql"], indirect=True)
+def test_a_claim_does_not_wait_for_a_merge(database: Database, paper: int) -> None:
+    """It would, with a job's row locked for which the merge waits in turn."""
+    with database.write() as session:
+        felt = materials.create(session, "felt", "").id
+        runner = runners.add(session, "host:1")
+        add(session, paper, 3)
+        add(session, felt, 1)
+        assert jobs.claim(session, runner) is not None
+    with database.write() as merging:
+        merging.execute(select(MaterialRow).with_for_update()).all()
+        with database.write() as session:
+            session.execute(text("SET LOCAL lock_timeout = '2s'"))
+            claim = jobs.claim(session, runner)
+            assert claim is not None
+            assert jobs.get(session, claim.job_id).material == "felt"  # that changed turns with one of paper
 
 
 def test_a_job_that_is_tried_again_waits_as_a_new_one(database: Database, paper: int) -> None:
