@@ -1,16 +1,15 @@
 """Queries on grasp logs, with their sensors."""
 
 import uuid
-from collections.abc import Sequence
 
-from sqlalchemy import and_, exists, func, inspect, select, tuple_, update
+from sqlalchemy import exists, func, inspect, select, tuple_, update
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Session, aliased, defer
 
 from db.errors import AlreadyExists, NotFound
 from db.paging import Window, windowed
 from db.records import LogFilter, NewGraspLog, StoredGraspLog, Withdrawal
-from db.repositories import calibrations, detections, jobs, sensors
+from db.repositories import calibrations, copies, detections, jobs, sensors
 from db.tables import DetectionRow, GraspLogRow, JobRow, MaterialRow, SampleSummaryRow, SensorRow, now
 
 _WHOLE = (
@@ -151,51 +150,14 @@ def restore(session: Session, log_id: str) -> bool:
 def move(session: Session, source_id: int, target_id: int) -> None:
     """Give a material's logs to another; those that it has already, by content and detector, stay where they are.
 
-    But where samples were found in one that would stay, or may be found yet, and none in the other's own, the two
-    change places.
+    But those that have samples change places with the other's own that have none (``copies``).
     """
-    _exchange(session, _to_exchange(session, target_id, source_id))
+    copies.exchange(session, target_id, source_id)
     there = aliased(GraspLogRow)
     same = (there.sha256 == GraspLogRow.sha256, there.detector == GraspLogRow.detector)
     is_there = exists().where(there.material_id == target_id, *same)
     moved = update(GraspLogRow).where(GraspLogRow.material_id == source_id, ~is_there).values(material_id=target_id)
     session.execute(moved.execution_options(synchronize_session=False))
-
-
-def _to_exchange(session: Session, material_id: int, other_id: int) -> list[tuple[GraspLogRow, GraspLogRow]]:
-    """Logs that two materials have, not withdrawn from either, of which only the second one's has samples.
-
-    Or may have them yet: its job has not ended, and the first one's has.
-    """
-    own, theirs = aliased(GraspLogRow), aliased(GraspLogRow)
-    own_job, their_job = aliased(JobRow), aliased(JobRow)
-    has_samples = [
-        exists().where(SampleSummaryRow.grasp_log_id == each.id, SampleSummaryRow.count > 0) for each in (own, theirs)
-    ]
-    may_have = own_job.finished_at.is_not(None) & their_job.finished_at.is_(None)
-    query = (
-        select(own, theirs)
-        .join(theirs, and_(theirs.sha256 == own.sha256, theirs.detector == own.detector))
-        .join(own_job, own_job.grasp_log_id == own.id)
-        .join(their_job, their_job.grasp_log_id == theirs.id)
-        .where(own.material_id == material_id, theirs.material_id == other_id)
-        .where(own.withdrawn_at.is_(None), theirs.withdrawn_at.is_(None), ~has_samples[0], has_samples[1] | may_have)
-    )
-    return [(own, theirs) for own, theirs in session.execute(query.order_by(own.id).with_for_update(of=(own, theirs)))]
-
-
-def _exchange(session: Session, pairs: Sequence[tuple[GraspLogRow, GraspLogRow]]) -> None:
-    """Let the logs of each pair, alike but for it, change their materials: no two may be alike meanwhile."""
-    contents = [one.sha256 for one, _ in pairs]
-    for one, _ in pairs:
-        one.sha256 = uuid.uuid4().hex
-    session.flush()
-    for one, other in pairs:
-        one.material_id, other.material_id = other.material_id, one.material_id
-    session.flush()
-    for (one, _), sha256 in zip(pairs, contents, strict=True):
-        one.sha256 = sha256
-    session.flush()
 
 
 def _record(

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 from db.errors import ClaimLost, NotFound
 from db.paging import Window, windowed
 from db.records import Claim, Job, JobKind, JobStatus
-from db.repositories import friction_models, turns
+from db.repositories import copies, friction_models, turns
 from db.tables import FrictionModelRow, GraspLogRow, JobRow, MaterialRow, SampleSummaryRow, now
 
 
@@ -197,7 +197,7 @@ def cancel(session: Session, job_id: str, reason: str) -> Job:
     changes = {"status": "cancelled", "reason": reason, "runner_id": None, "finished_at": now()}
     ended = update(JobRow).where(JobRow.id == job_id, JobRow.finished_at.is_(None)).values(**changes)
     if session.scalar(ended.returning(JobRow.id)) is not None:
-        outdate_models(session, job_id)
+        _account_for(session, job_id)
     return get(session, job_id)
 
 
@@ -223,7 +223,7 @@ def finish(
         changes["seconds"] = dict(seconds)
     _change_claimed(session, claim, runner_id=None, finished_at=now(), **changes)
     if status != "done":
-        outdate_models(session, claim.job_id)
+        _account_for(session, claim.job_id)
 
 
 def outdate_models(session: Session, job_id: str, besides: Collection[str] = ()) -> None:
@@ -263,6 +263,15 @@ def record(row: JobRow, material: str | None) -> Job:
         created_at=row.created_at,
         finished_at=row.finished_at,
     )
+
+
+def _account_for(session: Session, job_id: str) -> None:
+    """Let the material of a job that has ended, but not as done, count its log's samples, or those of a copy of it."""
+    outdate_models(session, job_id)
+    row = session.get_one(JobRow, job_id)
+    copy_id = None if row.grasp_log_id is None else copies.stand_in(session, row.grasp_log_id)
+    if copy_id is not None:
+        outdate_models(session, session.scalars(select(JobRow.id).where(JobRow.grasp_log_id == copy_id)).one())
 
 
 def _lock_models(session: Session, job_id: str) -> None:

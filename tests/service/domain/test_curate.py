@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from sqlalchemy import select
+from sqlalchemy import select, update
 
 import slipcore
 from db.blobs import BlobStore
@@ -15,7 +15,7 @@ from db.errors import NotFound
 from db.paging import Window
 from db.records import AuditFilter, Claim, Job, NewGraspLog
 from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, owners, runners
-from db.tables import MaterialRow
+from db.tables import JobRow, MaterialRow, SampleSummaryRow
 from service.domain import curate
 from service.domain.context import Context
 from service.domain.errors import DomainError, InvalidValue, NoModel, NotOwner
@@ -316,6 +316,12 @@ def test_a_merged_material_is_fitted_over_all_its_logs(shop: Shop) -> None:
         curate.merge(shop.context, "paper", "papre")
 
 
+def of_each(shop: Shop, *log_ids: str) -> list[int | None]:
+    """The keys of the logs' materials."""
+    with shop.database.read() as session:
+        return [grasp_logs.material_id(session, log_id) for log_id in log_ids]
+
+
 def cancelled(shop: Shop) -> str:
     """Before anything was found, and its file is deleted as an old upload."""
     log_id = shop.store("paper", 1)
@@ -339,15 +345,15 @@ def test_a_log_of_both_counts_once_whichever_of_its_jobs_found_samples(
     found = shop.ingest("papre", 1)
     each = shop.model("paper")[1]
     own = without_samples(shop)
+    paper, papre = before = of_each(shop, own, found)
     with shop.database.read() as session:
-        paper, papre = (materials.find_id(session, name) for name in ("paper", "papre"))
-        before = grasp_logs.get(session, own)
+        content = grasp_logs.get(session, own).sha256
     curate.merge(shop.context, "paper", "papre")
     assert {job.status for job in shop.work()} == {"done"}
     assert shop.model("paper")[1:] == (2 * each, False)
+    assert of_each(shop, own, found) == ([papre, paper] if without_samples is cancelled else before)
     with shop.database.read() as session:
-        assert [grasp_logs.material_id(session, log_id) for log_id in (found, own)] == [paper, papre]
-        assert grasp_logs.get(session, own).sha256 == before.sha256
+        assert grasp_logs.get(session, own).sha256 == content
         assert friction_models.current_methods(session, [papre]) == []
 
 
@@ -361,6 +367,77 @@ def test_a_log_counts_whose_job_comes_after_the_merge_where_that_of_its_copy_has
     assert shop.model("paper")[1:] == (2 * each, False)
     with shop.database.read() as session:
         assert grasp_logs.material_id(session, later) == materials.find_id(session, "paper")
+
+
+def test_the_samples_of_a_log_that_is_looked_at_again_come_from_that_look(shop: Shop) -> None:
+    """Its copy has those of the time before, by an older description of the sensor, say."""
+    shop.ingest("paper", 0)
+    each = shop.model("paper")[1]
+    own, copy = shop.ingest("paper", 1), shop.ingest("papre", 1)
+    with shop.database.write() as session:
+        detections.remove(session, own)
+        jobs.requeue(session, grasp_logs.get(session, own).job.id)
+    before = of_each(shop, own, copy)
+    curate.merge(shop.context, "paper", "papre")
+    assert {job.status for job in shop.work()} == {"done"}
+    assert shop.model("paper")[1:] == (2 * each, False)
+    assert of_each(shop, own, copy) == before
+
+
+def cancel_job(shop: Shop, log_id: str) -> None:
+    with shop.database.write() as session:
+        jobs.cancel(session, grasp_logs.get(session, log_id).job.id, "nobody wants it")
+
+
+@pytest.mark.parametrize("is_cancelled_first", [True, False])
+def test_a_log_whose_job_is_cancelled_after_a_merge_leaves_its_place_to_its_copy(
+    shop: Shop, is_cancelled_first: bool
+) -> None:
+    shop.ingest("paper", 0)
+    each = shop.model("paper")[1]
+    own, copy = shop.store("paper", 1), shop.store("papre", 1)
+    before = of_each(shop, own, copy)
+    curate.merge(shop.context, "paper", "papre")
+    if not is_cancelled_first:
+        under_way = shop.claim()
+        assert {job.status for job in shop.work()} == {"done"}
+        assert shop.model("paper")[1] == each
+        assert under_way is not None
+    cancel_job(shop, own)
+    shop.work()
+    if not is_cancelled_first:
+        assert shop.model("paper")[2]  # says that it lacks them
+        shop.fit("paper", "ols")
+    assert shop.model("paper")[1:] == (2 * each, False)
+    assert of_each(shop, copy, own) == before
+
+
+@pytest.mark.parametrize("which", [0, 1], ids=["the material's own", "the copy"])
+def test_of_two_copies_with_other_samples_the_one_that_was_looked_at_later_counts(shop: Shop, which: int) -> None:
+    """Their sensor was described anew between the two."""
+    order = [("paper", 1), ("papre", 1)]
+    found = {name: shop.ingest(name, number) for name, number in (order[::-1] if which == 0 else order)}
+    own, copy = found["paper"], found["papre"]
+    first = SampleSummaryRow.grasp_log_id == (copy if which == 0 else own)
+    with shop.database.write() as session:
+        session.execute(update(SampleSummaryRow).where(first).values(samples_blob="0" * 64))
+    before = of_each(shop, own, copy)
+    curate.merge(shop.context, "paper", "papre")
+    assert of_each(shop, own, copy) == (before if which == 0 else before[::-1])
+
+
+def test_a_log_whose_last_look_found_nothing_takes_no_earlier_samples_of_its_copy(shop: Shop) -> None:
+    shop.ingest("paper", 0)
+    each = shop.model("paper")[1]
+    copy, own = shop.ingest("papre", 1), shop.ingest("paper", 1)
+    before = of_each(shop, own, copy)
+    with shop.database.write() as session:
+        detections.remove(session, own)
+        session.execute(update(JobRow).where(JobRow.grasp_log_id == own).values(status="refused", reason="no slip"))
+    curate.merge(shop.context, "paper", "papre")
+    assert {job.status for job in shop.work()} == {"done"}
+    assert shop.model("paper")[1:] == (each, False)
+    assert of_each(shop, own, copy) == before
 
 
 def test_a_job_that_is_done_again_is_of_the_material_that_its_log_was_merged_into(shop: Shop) -> None:
