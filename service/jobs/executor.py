@@ -16,6 +16,11 @@ class LimitReached(WorkerDied):
     """The worker process was ended, for its job took more than it may; the message says what."""
 
 
+def reason_of(error: Exception) -> str:
+    """What the record of a job that failed tells of the error: its first line, as others may hold an SQL statement."""
+    return f"{type(error).__name__}: {error}".splitlines()[0]
+
+
 class JobExecutor(Protocol):
     """One job at a time.
 

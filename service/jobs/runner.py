@@ -21,7 +21,7 @@ from db.database import Database
 from db.errors import ClaimLost, SchemaMismatch, StorageUnavailable, StoreMismatch
 from db.records import Claim
 from db.repositories import jobs, runners, stores
-from service.jobs.executor import JobExecutor, LimitReached, WorkerDied
+from service.jobs.executor import JobExecutor, LimitReached, WorkerDied, reason_of
 from service.observability import logs
 
 logger = logging.getLogger(__name__)
@@ -85,7 +85,9 @@ class JobRunner:
         self._watch = Watch(LOOKS)
         self._id = ""
         self._at: dict[str, Claim] = {}  # jobs in the executors
+        self._executor_of: dict[str, JobExecutor] = {}
         self._orphans: set[str] = set()  # jobs that were ours in the database at the last beat, but in no executor
+        self._lost: set[str] = set()  # jobs in an executor that were not ours in the database at the last beat
         self._warming = len(executors)
         self._hiring: set[asyncio.Task[None]] = set()
         self._outdated: SchemaMismatch | None = None
@@ -251,7 +253,7 @@ class JobRunner:
         return claim
 
     async def _do(self, executor: JobExecutor, claim: Claim) -> None:
-        is_lost = False
+        is_lost, self._executor_of[claim.job_id] = False, executor
         try:
             await executor.run(claim)
         except LimitReached as limit:
@@ -266,9 +268,10 @@ class JobRunner:
             await asyncio.sleep(RETRY_SECONDS)
         except Exception as error:  # an executor outlives whatever one job throws at it
             logger.exception("job %s failed outside its stages", claim.job_id)
-            reason = f"{type(error).__name__}: {error}"
+            reason = reason_of(error)
             await self._try(lambda: self._fail(claim, reason))
         finally:
+            del self._executor_of[claim.job_id]
             self._at.pop(claim.job_id, None)  # where it is still ours in the database, it is an orphan
             if (ending := self._endings.pop(claim.job_id, None)) is not None:
                 ending.set()
@@ -313,11 +316,14 @@ class JobRunner:
 
     def _beat_once(self) -> bool:
         """Say that we live, and take the jobs away from runners that do not; True if there are jobs to claim."""
+        at = set(self._at)  # before the database is asked: who ends a job there does so first
         with self._database.write(durable=False) as session:
             alive = runners.beat(session, self._id)
             living = runners.list_all(session)
             beats = {runner.id: runner.beats for runner in living if runner.id != self._id}
-            freed = self._free_orphans(session)
+            claimed = jobs.claimed(session, self._id)
+            freed = self._free_orphans(session, claimed)
+        self._end_lost(at - claimed)
         self._leads = alive and living[0].id == self._id
         if not alive and not self._stopping:
             logger.error("runner %s was taken for dead; it goes on under a new name", self._id)
@@ -327,15 +333,26 @@ class JobRunner:
             self._remove(runner)
         return freed or bool(dead)
 
-    def _free_orphans(self, session: Session) -> bool:
+    def _free_orphans(self, session: Session, claimed: set[str]) -> bool:
         """Put jobs that the database says are ours, but that no executor does, back: a commit's answer can be lost."""
-        orphans = jobs.claimed(session, self._id) - self._at.keys()
+        orphans = claimed - self._at.keys()
         stay = orphans & self._orphans
         self._orphans = orphans - stay  # who claims one of these anew is given time as with any
         for job_id in stay:
             logger.warning("job %s is queued again: nobody is at it", job_id)
             jobs.release(session, Claim(job_id, self._id))
         return bool(stay)
+
+    def _end_lost(self, lost: set[str]) -> None:
+        """End the workers of jobs that are not ours any more, as the last look saw too: they keep others waiting.
+
+        Such a job was cancelled or given to another runner, and learns of it only where its stage ends.
+        """
+        for job_id in lost & self._lost:
+            if (executor := self._executor_of.get(job_id)) is not None:
+                logger.warning("the worker of job %s is ended: nobody wants it any more", job_id)
+                executor.kill()
+        self._lost = lost - self._lost
 
     def _register(self) -> str:
         with self._database.write(durable=False) as session:

@@ -12,6 +12,7 @@ from db.errors import BlobDamaged, ClaimLost, StorageUnavailable
 from db.records import Claim
 from db.repositories import jobs
 from service.domain.damage import record_damage
+from service.jobs.executor import reason_of
 from service.observability import logs
 from service.processes import limits
 
@@ -78,7 +79,7 @@ def _run(config: StoreConfig, claim: Claim) -> None:
     except Exception as error:
         logger.exception("job failed")
         with database.write() as session, suppress(ClaimLost):
-            jobs.finish(session, claim, "failed", reason=f"{type(error).__name__}: {error}")
+            jobs.finish(session, claim, "failed", reason=reason_of(error))
 
 
 def _refuse(database: Database, claim: Claim, want: str) -> None:

@@ -26,7 +26,7 @@ class ThreadExecutor:
     """An executor whose worker is a thread that does what it is told to."""
 
     def __init__(self, do: Do) -> None:
-        self._do = do
+        self._do, self.killed = do, Event()
         self.started = self.closed = 0
         self.missing = None
 
@@ -37,7 +37,7 @@ class ThreadExecutor:
         await asyncio.to_thread(self._do, claim)
 
     def kill(self) -> None:
-        pass
+        self.killed.set()
 
     async def close(self) -> None:
         self.closed += 1
@@ -203,7 +203,7 @@ def test_a_job_that_nobody_is_at_is_queued_again_at_the_second_look_of_each_clai
         assert claim.job_id == queued[0]
         for freed in (False, True):
             with database.write() as session:
-                assert runner._free_orphans(session) is freed
+                assert runner._free_orphans(session, jobs.claimed(session, runner._id)) is freed
         assert get(database, queued[0]).status == "queued"
 
 
@@ -303,12 +303,55 @@ def test_an_executor_outlives_what_a_job_throws_at_it(
 ) -> None:
     def do(claim: Claim) -> None:
         if claim.job_id == queued[0]:
-            raise RuntimeError("database disk image is malformed")
+            raise RuntimeError("database disk image is malformed\n[SQL: SELECT secret]")
         finish(database, claim)
 
     working(do, until_finished(database, queued), workers=1)
     assert [get(database, job_id).status for job_id in queued] == ["failed", "done", "done", "done"]
-    assert "malformed" in (get(database, queued[0]).reason or "")
+    assert get(database, queued[0]).reason == "RuntimeError: database disk image is malformed"
+
+
+def test_the_worker_of_a_job_that_was_cancelled_is_ended_where_it_does_not_end_by_itself(
+    database: Database, queued: list[str]
+) -> None:
+    given = {"attempts": ATTEMPTS, "lease_seconds": LEASE_SECONDS, "poll_seconds": 0.01, "shutdown_seconds": 5.0}
+
+    def do(claim: Claim) -> None:
+        if claim.job_id == queued[0]:
+            with database.write() as session:
+                jobs.cancel(session, claim.job_id, "it takes for ever")
+            assert executor.killed.wait(timeout=60.0)
+            raise WorkerDied
+        finish(database, claim)
+
+    executor = ThreadExecutor(do)
+
+    async def live() -> None:
+        runner = JobRunner(database, [executor], **given)  # type: ignore[arg-type]
+        await runner.start()
+        await asyncio.to_thread(until_finished(database, queued))
+        await runner.stop()
+
+    asyncio.run(live())
+    ends = [(job.status, job.deaths) for job in (get(database, job_id) for job_id in queued)]
+    assert ends == [("cancelled", 0), *[("done", 0)] * 3]
+    assert executor.started == 2  # the next jobs have a worker of their own
+
+
+def test_the_worker_of_a_job_that_ends_is_given_time(database: Database, queued: list[str]) -> None:
+    given = {"attempts": ATTEMPTS, "lease_seconds": 1.0, "poll_seconds": 1.0, "shutdown_seconds": 1.0}
+    executor = ThreadExecutor(lambda _: None)
+    runner = JobRunner(database, [executor], **given)  # type: ignore[arg-type]
+    runner._executor_of[queued[0]] = executor
+    for lost, is_ended in (
+        (set[str](), False),
+        ({queued[0]}, False),
+        (set(), False),
+        ({queued[0]}, False),
+        ({queued[0]}, True),
+    ):
+        runner._end_lost(lost)
+        assert executor.killed.is_set() is is_ended
 
 
 def test_a_runner_takes_no_jobs_of_a_newer_schema_and_says_so(
