@@ -271,6 +271,15 @@ def check_displacement(displacement: FloatArray, position: FloatArray) -> None:
     _check_magnitude("displacement", displacement, _largest_displacement(position), "m (is it in m?)")
 
 
+def check_gripper_report(force: float | None, deviation: float | None, largest: float = 0.0) -> None:
+    """What a gripper reports of one frame, N, with the checks that a whole log gets whose ``largest`` force so far was
+    this.
+    """
+    told = None if force is None else np.append(_array("gripper_force", force, ()), largest)
+    _check_gripper_force(told)
+    _gripper_force_deviation(deviation, told)
+
+
 def check_mask(name: str, value: ArrayLike, shape: tuple[int, ...]) -> BoolArray:
     """One truth value an element, of exactly this shape."""
     mask = np.array(value, order="C")  # kernels are compiled for one layout: half a minute for another

@@ -12,11 +12,15 @@ from numpy.typing import ArrayLike
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.sync.client import ClientConnection, connect
 
+from stiction_client.arguments import within
 from stiction_client.controller import ControlSettings, gains
 from stiction_client.errors import ConnectionFailed, UnexpectedAnswer
 
 RESUMABLE = (1001, 1006, 1012, 4503)
 """Codes of a connection after whose end its session goes on: the server stops or cannot store now."""
+
+MOST_FORCE = 1e4
+"""N that a gripper may report."""
 
 ANSWER_TIMEOUT = 30.0
 """s; the first session of a service starts its detectors' process."""
@@ -84,10 +88,14 @@ class SlipStream:
         object_pose: ArrayLike | None = None,
         normal: ArrayLike | None = None,
         command: float | None = None,
+        gripper_force: float | None = None,
+        gripper_force_deviation: float | None = None,
     ) -> int:
         """Send a frame (s, m, N; m, m, rad; outward unit normals) and return its number.
 
-        ``command``: the normal force that the gripper is told, N; those who watch the stream see it.
+        ``command``: the normal force that the gripper is told, N; those who watch the stream see it. ``gripper_force``:
+        the one that it reports, N, with its standard ``gripper_force_deviation`` N: forces that the service
+        reconstructs add up to it. Raises ``InvalidArgument`` for what is no force.
         """
         frame: dict[str, Any] = {"type": "frame", "number": self._number, "time": float(time)}
         given = {"displacement": displacement, "force": force, "object_pose": object_pose, "normal": normal}
@@ -96,6 +104,10 @@ class SlipStream:
                 frame[name] = np.asarray(value, dtype="<f8").tobytes()
         if command is not None:
             frame["command"] = float(command)
+        reports = {"gripper_force": gripper_force, "gripper_force_deviation": gripper_force_deviation}
+        for name, reported in reports.items():
+            if reported is not None:
+                frame[name] = within(name, reported, -MOST_FORCE, MOST_FORCE, "N")
         self._waiting.append((self._number, msgspec.msgpack.encode(frame)))
         self._number += 1
         self._try(lambda: self._connection.send(self._waiting[-1][1]))
@@ -117,9 +129,12 @@ class SlipStream:
         object_pose: ArrayLike | None = None,
         normal: ArrayLike | None = None,
         command: float | None = None,
+        gripper_force: float | None = None,
+        gripper_force_deviation: float | None = None,
     ) -> dict[str, Any]:
         """Send a frame and wait for its answer."""
-        number = self.send(time, displacement, force, object_pose, normal, command)
+        given = force, object_pose, normal, command, gripper_force, gripper_force_deviation
+        number = self.send(time, displacement, *given)
         while (answer := self.receive())["number"] != number:
             pass
         return answer

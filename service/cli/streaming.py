@@ -83,9 +83,11 @@ def _replay(live: "SlipStream", log: "GraspLog", speed: float) -> Iterator[dict[
     """Each frame when it is due, and its answer."""
     began, first = perf_counter(), float(log.time[0])
     arrays = (log.displacement, log.force, log.object_pose, log.normal)
+    gripper, deviation = log.gripper_force, log.gripper_force_deviation
     for k, time in enumerate(log.time.tolist()):
         sleep(max(began + (time - first) / speed - perf_counter(), 0.0))
-        yield live.step(time, *(None if array is None else array[k] for array in arrays))  # type: ignore[arg-type]
+        told = {} if gripper is None else {"gripper_force": gripper[k], "gripper_force_deviation": deviation}
+        yield live.step(time, *(None if array is None else array[k] for array in arrays), **told)  # type: ignore[arg-type]
 
 
 def _summary(answers: list[dict[str, Any]]) -> dict[str, Any]:

@@ -32,20 +32,25 @@ def said(reconstruction: "Reconstruction | None") -> "list[Finding]":
     if reconstruction is None:
         return []
     from slipcore import Finding
-    from slipcore.forces.defaults import RECONSTRUCTION
 
     told = ", ".join(f"{axis} {share:.0%}" for axis, share in zip("xyz", reconstruction.information, strict=True))
     evidence = (
         f"forces follow from displacement by the sensor's gel{_by_the_gripper(reconstruction)}, in effect "
         f"averaged over {1e3 * reconstruction.kernel_width:.2g} mm; share of the resultant that data tell: {told}"
     )
-    findings = [Finding(RECONSTRUCTED, evidence, "friction is as sure as the description of the sensor's gel")]
-    if reconstruction.contradicted > RECONSTRUCTION.contradicted_share:
-        evidence = f"in {reconstruction.contradicted:.0%} of the frames that touch the gel's shape tells another force"
-        findings.append(
-            Finding(CONTRADICTED, evidence, "make sure that it is this finger's, in N, and the gel's description")
-        )
-    return findings
+    by_gel = Finding(RECONSTRUCTED, evidence, "friction is as sure as the description of the sensor's gel")
+    return [by_gel, *contradicted(reconstruction.contradicted)]
+
+
+def contradicted(share: float) -> "list[Finding]":
+    """That the gripper's force is, where it is in such a share of the frames that touch."""
+    from slipcore import Finding
+    from slipcore.forces.defaults import RECONSTRUCTION
+
+    if share <= RECONSTRUCTION.contradicted_share:
+        return []
+    evidence = f"in {share:.0%} of the frames that touch the gel's shape tells another force"
+    return [Finding(CONTRADICTED, evidence, "make sure that it is this finger's, in N, and the gel's description")]
 
 
 def _by_the_gripper(reconstruction: "Reconstruction") -> str:

@@ -211,6 +211,8 @@ class _Connection:
             packed_or_none("object_pose", frame.object_pose),
             packed_or_none("normal", frame.normal),
             frame.command,
+            frame.gripper_force,
+            frame.gripper_force_deviation,
         )
         is_shown = session.broadcast.wants(asyncio.get_running_loop().time())
         return await self._streams.detect(session, given, is_shown)

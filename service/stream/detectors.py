@@ -4,7 +4,7 @@ import logging
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -23,7 +23,7 @@ from service.stream.live_frame import pack_frame
 from service.stream.messages import Control
 from service.stream.reconstructing import Reconstructing
 from slipcore import Frame, FrictionSamples, GraspLog, InvalidInput, SlipState, collect_samples
-from slipcore.frames import check_displacement, check_span
+from slipcore.frames import check_displacement, check_gripper_report, check_span
 from stiction_client import container
 
 if TYPE_CHECKING:
@@ -48,7 +48,9 @@ Numbers = bytes | Sequence[float]
 
 
 class PackedFrame(NamedTuple):
-    """A frame as it comes from the server's process; ``command`` is the normal force that the gripper is told, N."""
+    """A frame as it comes from the server's process; ``command`` is the normal force that the gripper is told, N, and
+    ``gripper_force`` the one that it reports, with its standard ``gripper_force_deviation``.
+    """
 
     number: int
     time: float
@@ -57,6 +59,8 @@ class PackedFrame(NamedTuple):
     object_pose: Numbers | None = None
     normal: Numbers | None = None
     command: float | None = None
+    gripper_force: float | None = None
+    gripper_force_deviation: float | None = None
 
 
 class Room(NamedTuple):
@@ -68,8 +72,8 @@ class Room(NamedTuple):
 
 @dataclass(slots=True)
 class Session:
-    """A running detector with what it saw: the last frames and answers, all frames if they are ``kept``; and the
-    controller of the grip, where one was asked for.
+    """A running detector with what it saw: the last frames and answers, all frames if they are ``kept``, with what the
+    gripper ``reported`` in them; and the controller of the grip, where one was asked for.
 
     ``forces`` are reconstructed where its sensor's gel is known and its frames have none. ``friction`` is what its
     client is told, ``expected`` what those are who watch it; ``begun``: time of its first frame, s.
@@ -81,6 +85,9 @@ class Session:
     moments: "Moments"
     room: Room
     kept: list[Frame] | None
+    reported: list[float | None] = field(default_factory=list)
+    report_deviation: float | None = None
+    most_reported: float = 0.0
     grip: Grip | None = None
     forces: Reconstructing | None = None
     frames: list[Frame] = field(default_factory=list)
@@ -138,7 +145,7 @@ def open_session(
     kept: list[Frame] | None = [] if keep else None
     grip = None if control is None else Grip(at_rest, control, model)
     forces = None if gel is None else Reconstructing(gel, room.owner)
-    _SESSIONS[name] = Session(detector, at_rest, area, moments, room, kept, grip, forces, held_bytes=held)
+    _SESSIONS[name] = Session(detector, at_rest, area, moments, room, kept, grip=grip, forces=forces, held_bytes=held)
 
 
 def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[str, Any], bytes | None]:
@@ -154,12 +161,10 @@ def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[st
         raise StillLooking
     frame = _frame(session, given)
     size = 0 if session.kept is None else _kept_bytes(session, frame)
-    felt, told = _felt(session, frame)
+    felt, told = _felt(session, frame, given)
     state, command = _detected(session, felt)
     session.begun = frame.time if session.begun is None else session.begun
-    if session.kept is not None:
-        session.kept.append(frame)
-        session.held_bytes += size
+    _keep(session, frame, given, size)
     _plan_look(session, felt, state)
     answer = _answer(session, given.number, state)
     if told is not None:
@@ -173,6 +178,18 @@ def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[st
     return answer, pack_frame(given.number, state, felt.force, pressed, session.expected)
 
 
+def _keep(session: Session, frame: Frame, given: PackedFrame, size: int) -> None:
+    """Keep a frame of this size for the log, where one is wanted, and in any case how much its gripper reported."""
+    session.most_reported = max(session.most_reported, given.gripper_force or 0.0)
+    if session.kept is None:
+        return
+    session.kept.append(frame)
+    session.reported.append(given.gripper_force)
+    session.held_bytes += size
+    if given.gripper_force_deviation is not None:
+        session.report_deviation = max(session.report_deviation or 0.0, given.gripper_force_deviation)
+
+
 def _detected(session: Session, frame: Frame) -> tuple[SlipState, dict[str, Any] | None]:
     """The slip state after a frame, and what is then commanded; the session is as it was where one is refused."""
     before = session.detector.state
@@ -184,7 +201,7 @@ def _detected(session: Session, frame: Frame) -> tuple[SlipState, dict[str, Any]
         raise
 
 
-def _felt(session: Session, frame: Frame) -> tuple[Frame, dict[str, Any] | None]:
+def _felt(session: Session, frame: Frame, given: PackedFrame) -> tuple[Frame, dict[str, Any] | None]:
     """The frame with reconstructed forces where it has none and its sensor's gel is known, and what is told of them."""
     if session.forces is None:
         return frame, None
@@ -192,7 +209,7 @@ def _felt(session: Session, frame: Frame) -> tuple[Frame, dict[str, Any] | None]
         session.forces.begin(
             frame, session.position, session.element_area, lambda size: _check_room(size, session.room)
         )
-    felt, told = session.forces.step(frame)
+    felt, told = session.forces.step(frame, given.gripper_force, given.gripper_force_deviation)
     if session.grip is not None and felt.force is None:
         raise InvalidInput("force", None, f"the elements' forces, for none are reconstructed: {session.forces.refused}")
     return felt, told
@@ -205,6 +222,7 @@ def _frame(session: Session, given: PackedFrame) -> Frame:
         raise InvalidInput("command", command, f"a normal force of 0 to {MOST_COMMAND:g} N")
     if session.grip is not None and given.force is None and session.forces is None:
         raise InvalidInput("force", None, "the elements' forces, by which the grip is controlled")
+    check_gripper_report(given.gripper_force, given.gripper_force_deviation, session.most_reported)
     check_span(given.time if session.begun is None else session.begun, given.time)
     displacement = _array("displacement", given.displacement, shape)
     check_displacement(displacement, session.position)
@@ -223,10 +241,20 @@ def write(name: str, target: Path, sensor: str) -> Description:
     frames = session.kept or []
     if len(frames) < 2:
         raise InvalidInput("frames", len(frames), "at least 2, for a log")
-    log = _log(session, frames, sensor, {"session": name})
+    log = _with_reports(session, _log(session, frames, sensor, {"session": name}))
     with disk_errors_named():
         container.write(log, target)
     return describe("stream", log)
+
+
+def _with_reports(session: Session, log: GraspLog) -> GraspLog:
+    """With the gripper's force, where any frame told it; of others 0, which tells nothing. It is as sure as the least
+    sure.
+    """
+    if all(force is None for force in session.reported):
+        return log
+    told = np.array([0.0 if force is None else force for force in session.reported])
+    return replace(log, gripper_force=told, gripper_force_deviation=session.report_deviation)
 
 
 def drop(name: str) -> None:

@@ -60,7 +60,9 @@ class Resume(msgspec.Struct, tag="resume", tag_field="type", forbid_unknown_fiel
 
 
 class FrameIn(msgspec.Struct, tag="frame", tag_field="type", forbid_unknown_fields=True):
-    """A frame; numbers grow from 0. ``command``: the normal force that the gripper is told, N, for those who watch."""
+    """A frame; numbers grow from 0. ``command``: the normal force that the gripper is told, N, for those who watch;
+    ``gripper_force`` N and its standard ``gripper_force_deviation`` N: as of a log, by which forces are reconstructed.
+    """
 
     number: Number
     time: float
@@ -69,6 +71,8 @@ class FrameIn(msgspec.Struct, tag="frame", tag_field="type", forbid_unknown_fiel
     object_pose: Numbers | None = None
     normal: Numbers | None = None
     command: float | None = None
+    gripper_force: float | None = None
+    gripper_force_deviation: float | None = None
 
 
 class Finish(msgspec.Struct, tag="finish", tag_field="type", forbid_unknown_fields=True):

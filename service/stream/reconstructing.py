@@ -2,12 +2,14 @@
 
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from math import isnan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from service.domain.reconstruct import contradicted
 from service.processes.fair_executor import FairExecutor
 from slipcore import Frame, InvalidInput
 
@@ -81,8 +83,13 @@ class Reconstructing:
         if self.stream is not None:
             self.stream.close()
 
-    def step(self, frame: Frame) -> tuple[Frame, dict[str, Any] | None]:
-        """The frame with forces, and what its client is told of them; raises ``InvalidInput``."""
+    def step(
+        self, frame: Frame, gripper_force: float | None = None, deviation: float | None = None
+    ) -> tuple[Frame, dict[str, Any] | None]:
+        """The frame with forces, and what its client is told of them; raises ``InvalidInput``.
+
+        ``gripper_force`` N, and its standard ``deviation`` N: what the gripper reports.
+        """
         if (frame.force is None) != (self.stream is not None or self.refused is not None):
             raise InvalidInput("force", "missing" if frame.force is None else "given", "in every frame or in none")
         if self.refused is not None:
@@ -90,11 +97,11 @@ class Reconstructing:
         if self.stream is None:
             return frame, None
         try:
-            found = self.stream.step(frame.time, frame.displacement)
+            found = self.stream.step(frame.time, frame.displacement, None, gripper_force, deviation)
         except InvalidInput:
             raise
         except Exception:  # of a look beside the frames
-            return self._without_look(frame)
+            return self._without_look(frame, gripper_force, deviation)
         forces, touching = found.forces, found.forces.contact
         if touching.any():
             self.noise = float(np.median(forces.deviation[..., 2][touching]))
@@ -104,14 +111,19 @@ class Reconstructing:
             "deviation": forces.resultant_deviation.tolist(),
             "age": found.age,
             "wait_for": found.wait_for,
+            "given": found.given,
+            "contradiction": None if isnan(found.contradiction) else found.contradiction,
+            "findings": [asdict(finding) for finding in contradicted(self.stream.contradicted)],
         }
         normal = np.broadcast_to([0.0, 0.0, 1.0], forces.force.shape)  # loads act on the undeformed plane
         return frame._replace(force=forces.force, normal=normal), told
 
-    def _without_look(self, frame: Frame) -> tuple[Frame, dict[str, Any] | None]:
+    def _without_look(
+        self, frame: Frame, gripper_force: float | None, deviation: float | None
+    ) -> tuple[Frame, dict[str, Any] | None]:
         """A look that fails costs the stream that look, and the last of some its forces."""
         logger.exception("a look for the contact failed")
         self.failures += 1
         if self.failures == MOST_FAILURES:
             self.stream, self.refused = None, "looking for the contact failed"
-        return self.step(frame)
+        return self.step(frame, gripper_force, deviation)

@@ -187,6 +187,8 @@ class ForceStreamDefaults(Options):
     """Of the displacement, over that which the whole lattice's operator was made for, after which it is made anew."""
     noise_change: Annotated[float, Option(1.0, 1e6, "-", "estimates from 15 frames scatter by far less")] = 2.0
     """Of the noise, up or down, after which it is made anew."""
+    compared: Annotated[int, Option(1, 10_000, "frames", "a second at 30 frames a second")] = 30
+    """With a gripper's force, before it is said to be contradicted."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -38,7 +38,7 @@ class Observation:
         """Of the whitened response of some nodes; infinite where data are fewer than tractions."""
         _, r = self.on(nodes)
         square = r.reshape(len(r), -1)
-        return Spectrum.of(square).condition if len(r) == square.shape[1] else np.inf
+        return Spectrum.of(square).condition if np.isfinite(self.noise).sum() >= square.shape[1] else np.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,12 +140,12 @@ def choose_prior(
     q, r = observation.on(support)
     whitened = data / observation.noise
     y = q.T @ whitened
-    rest = max(float(whitened @ whitened - y @ y), 0.0)
+    rest, count = max(float(whitened @ whitened - y @ y), 0.0), int(np.isfinite(observation.noise).sum())
     places, pitch = nodes.places()[support], nodes.grid.pitch[0]
 
     def judge(shape: Smoothness, by: Criterion) -> tuple[float, float]:
         spectrum = Spectrum.of(_times(r, factors(places, pitch, shape)))
-        strength = spectrum.choose(y, rest, len(data), by)
+        strength = spectrum.choose(y, rest, count, by)
         return spectrum.log_evidence(y, strength), strength
 
     best = usual() if first is None else first

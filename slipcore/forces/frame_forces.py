@@ -36,8 +36,8 @@ class FrameForces:
 class Reader:
     """Reads forces from frames by one ``key``'s fit.
 
-    ``response`` [m, 3 j] m and ``elements`` [e, j] N of the j nodes in contact; before any misfit, ``deviation`` [3, e]
-    N of elements' forces, and ``total`` [3] N of the resultant.
+    ``response`` [m, 3 j] of what is observed and ``elements`` [e, j] N of the j nodes in contact; before any misfit,
+    ``deviation`` [3, e] N of elements' forces, and ``total`` [3] N of the resultant.
     """
 
     sensor: Sensor
@@ -55,6 +55,11 @@ class Reader:
         elements = sensor.elements[:, support]
         total = sensor.load * key.fit.deviation(np.ones((1, elements.shape[1])))[:, 0]
         return cls(sensor, key, response, elements, key.fit.deviation(elements), total)
+
+    @property
+    def given(self) -> bool:
+        """Whether the normal resultant was known from elsewhere."""
+        return bool(np.isfinite(self.key.observation.noise[-1]))
 
     def read(self, data: FloatArray, grid: tuple[int, int]) -> FrameForces:
         """Forces of a frame's ``data`` [m] m on elements of this grid; what the fit leaves unexplained beyond noise

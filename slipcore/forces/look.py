@@ -9,6 +9,7 @@ import numpy as np
 from slipcore.forces.defaults import FORCE_STREAM
 from slipcore.forces.fit import Observation
 from slipcore.forces.frame_forces import Reader
+from slipcore.forces.known import Known
 from slipcore.forces.nodes import Nodes
 from slipcore.forces.recording import error
 from slipcore.forces.sensor import Sensor
@@ -19,17 +20,25 @@ from slipcore.frames import BoolArray, FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shown:
-    """What markers show at one ``time`` s: ``data`` [m] m, which of them were ``seen`` [m], and their ``noise`` m."""
+    """What markers show at one ``time`` s: ``moved`` [m] m, which of them were ``seen`` [m], and their ``noise`` m; and
+    what is ``known`` of the resultant. ``data`` [m + 3] are both, with the last ones of what is not there.
+    """
 
     time: float
     data: FloatArray
     seen: BoolArray
     noise: float
+    known: Known
+
+    @property
+    def moved(self) -> FloatArray:
+        """Displacements, m."""
+        return self.data[: len(self.seen)]
 
     @property
     def size(self) -> float:
         """Root mean square of the displacements, m."""
-        return float(np.sqrt(np.mean(self.data**2)))
+        return float(np.sqrt(np.mean(self.moved**2)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,11 +93,14 @@ class Insight:
         growth = FORCE_STREAM.growth_in_plane if in_plane else FORCE_STREAM.growth
         if self.tracker is None or frame.size > growth * self.size:
             return partial(self._begin, frame)
-        holds = self.tracker.key.holds(self._observation(frame), frame.data)
-        return None if holds else partial(self._follow, self.tracker, frame)
+        return None if self.holds(frame) else partial(self._follow, self.tracker, frame)
+
+    def holds(self, frame: Shown) -> bool:
+        """Whether the contact is that of a frame in which something touches, too."""
+        return self.tracker is not None and self.tracker.key.holds(self._observation(frame), frame.data)
 
     def _observation(self, frame: Shown) -> Observation:
-        return Observation(self.sensor.response, error(frame.data, frame.seen, frame.noise))
+        return self.sensor.observation(error(frame.moved, frame.seen, frame.noise), frame.known)
 
     def _prepare(self, frame: Shown) -> "Insight":
         return replace(self, prepared=Prepared.of(self.sensor, frame.noise, frame.size))
@@ -112,5 +124,5 @@ def bytes_needed(position: FloatArray, element_area: float) -> int:
     """
     place = position[..., :2].reshape(-1, 2)
     nodes, elements = len(Nodes.around(place, element_area)), len(place)
-    response, over_elements, lattice = 9 * elements * nodes, elements * nodes, 3 * elements * nodes
-    return (response + over_elements + lattice) * position.itemsize
+    observed, over_elements, lattice = 9 * (elements + 1) * nodes, elements * nodes, 3 * elements * nodes
+    return (observed + over_elements + lattice) * position.itemsize

@@ -24,11 +24,13 @@ class Nodes:
         """
         pitch = float(np.sqrt(element_area))
         low, high = position.min(axis=0), position.max(axis=0)
-        nx, ny = (round(side / pitch) + 1 + 2 * NODES.margin for side in high - low)
-        if nx * ny > NODES.most:
+        with np.errstate(over="ignore"):  # too many are too many
+            along = np.rint((high - low) / pitch) + 1 + 2 * NODES.margin
+        if not along.prod() <= NODES.most:
             raise InvalidInput(
                 "element_area", f"{element_area:.3g} m²", f"an area that needs at most {NODES.most} nodes"
             )
+        nx, ny = map(int, along)
         x, y = 0.5 * (low + high)
         return cls(Grid((ny, nx), (pitch, pitch), (float(x), float(y))))
 

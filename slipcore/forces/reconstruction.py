@@ -6,12 +6,11 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from slipcore.defaults import LIMITS
 from slipcore.errors import InvalidInput
-from slipcore.forces.defaults import RECONSTRUCTION
 from slipcore.forces.fit import Observation
 from slipcore.forces.frame_forces import FrameForces, Reader
 from slipcore.forces.gel import Gel
+from slipcore.forces.known import Known, contradicts, reported
 from slipcore.forces.recording import Recording, error
 from slipcore.forces.sensor import Sensor
 from slipcore.forces.strength import Criterion
@@ -49,11 +48,10 @@ class Reconstruction:
     def contradicted(self) -> float:
         """Share of the frames that touch in which what was given and what is found are not alike."""
         known = np.isfinite(self.contradiction).any(axis=1)
-        wrong = (self.contradiction > RECONSTRUCTION.contradiction).any(axis=1)
-        return float(wrong.sum() / known.sum()) if known.any() else 0.0
+        return float(contradicts(self.contradiction).sum() / known.sum()) if known.any() else 0.0
 
     def apply(self, log: GraspLog) -> GraspLog:
-        """The log with these forces, which its metadata call reconstructed, and their contact where it knows none."""
+        """The log with these forces, which its metadata call reconstructed; a detector finds the contact by them."""
         if self.force.shape != log.displacement.shape:
             raise InvalidInput("log", f"of shape {list(log.displacement.shape)}", f"{list(self.force.shape)}")
         normal = np.broadcast_to([0.0, 0.0, 1.0], self.force.shape)  # linear theory: loads act on the undeformed plane
@@ -87,13 +85,12 @@ def reconstruct(
     sensor = Sensor.of(log.position, log.element_area, gel, shown.axes)
     name = "total_force"
     if total_force is None and total_force_deviation is None and log.gripper_force is not None:
-        name = "gripper_force"
-        reports = log.gripper_force >= LIMITS.gripper_deviation  # or it grips not
-        total_force, total_force_deviation = np.where(reports, log.gripper_force, np.nan), log.gripper_force_deviation
-    recording = _Recording(sensor, shown, *_total_force(total_force, total_force_deviation, len(log)))
-    bearable = RECONSTRUCTION.largest_pressure * gel.young_modulus * log.element_area * math.prod(log.grid)
-    _check_pressure(name, recording.given, bearable)
-    result = _no_forces(log, shown.noise, np.isfinite(recording.given))
+        name, total_force = "gripper_force", reported(log.gripper_force)
+        total_force_deviation = log.gripper_force_deviation
+    known = Known.of(total_force, total_force_deviation, len(log))
+    known.check(name, gel, log.element_area * math.prod(log.grid))
+    recording = _Recording(sensor, shown, known)
+    result = _no_forces(log, shown.noise, known.given)
     touched, strongest = shown.touched(), shown.strongest()
     if not touched.any():
         return result
@@ -112,59 +109,23 @@ def reconstruct(
                 now = now.at(observation, data)
                 reader = reader if reader.key is now.key else Reader.of(sensor, now.key)
                 _write_frame(result, t, reader.read(data, log.grid))
-    outward = recording.given * [1.0, 1.0, -1.0]
-    away = np.abs(result.resultant - outward) / np.hypot(result.resultant_deviation, recording.deviation)
+    away = known.away(result.resultant, result.resultant_deviation)
     return replace(result, contradiction=np.where(touched[:, None], away, np.nan))
-
-
-def _check_pressure(name: str, given: FloatArray, bearable: float) -> None:
-    largest = np.nanmax(np.abs(given), initial=0.0)
-    if largest > bearable:
-        why = (
-            f"{RECONSTRUCTION.largest_pressure:g} times Young's modulus on all elements (is it in N, and of this gel?)"
-        )
-        raise InvalidInput(name, f"up to {largest:.3g} N", f"at most {bearable:.3g} N, {why}")
-
-
-def _total_force(given: ArrayLike | None, deviation: float | None, frames: int) -> tuple[FloatArray, FloatArray]:
-    """Resultant [t, 3] N in the gel's frame (z into it), NaN where it is not known, and its standard deviation."""
-    if deviation is not None and (given is None or not 0.0 < deviation < np.inf):
-        raise InvalidInput("total_force_deviation", deviation, "above 0 N and finite, beside total_force")
-    total = np.full((frames, 3), np.nan)
-    if given is not None:
-        force = np.asarray(given, dtype=np.float64)
-        if force.shape not in {(frames,), (frames, 3)} or np.isinf(force).any():
-            raise InvalidInput("total_force", f"of shape {list(force.shape)}", f"finite, [{frames}] or [{frames}, 3] N")
-        total[:, 2 if force.ndim == 1 else slice(3)] = force * (1.0 if force.ndim == 1 else [1.0, 1.0, -1.0])
-    if deviation is not None:
-        return total, np.full(total.shape, deviation)
-    size, share = np.abs(total), RECONSTRUCTION.force_tolerance
-    largest = np.nanmax(size, initial=RECONSTRUCTION.least_force)
-    return total, share * np.maximum(size, share * largest)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Recording:
-    """What was ``shown`` to a ``sensor``, and ``given`` resultants [t, 3] N, NaN where unknown, with their standard
-    ``deviation`` [t, 3] N.
-    """
+    """What was ``shown`` to a ``sensor``, and resultants that are ``known``."""
 
     sensor: Sensor
     shown: Recording
-    given: FloatArray
-    deviation: FloatArray
+    known: Known
 
     def frame(self, t: int) -> tuple[Observation, FloatArray]:
-        """What one frame tells: displacements, then the parts of its resultant that are given."""
-        data, given = self.shown.data[t], self.given[t]
+        """What one frame tells: displacements, then its resultant."""
+        data = self.shown.data[t]
         spread = error(data, self.shown.seen[t], self.shown.noise)
-        known = np.flatnonzero(np.isfinite(given))
-        if not known.size:
-            return Observation(self.sensor.response, spread), data
-        rows = np.zeros((len(known), *self.sensor.response.shape[1:]))
-        rows[np.arange(len(known)), known] = self.sensor.load
-        noise = np.concatenate((spread, self.deviation[t, known]))
-        return Observation(np.concatenate((self.sensor.response, rows)), noise), np.concatenate((data, given[known]))
+        return self.sensor.observation(spread, self.known[t]), self.sensor.data(data, self.known[t])
 
 
 def _no_forces(log: GraspLog, noise: float, given: BoolArray) -> Reconstruction:

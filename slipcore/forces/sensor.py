@@ -2,7 +2,11 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from slipcore.forces.fit import Observation
 from slipcore.forces.gel import Gel
+from slipcore.forces.known import Known
 from slipcore.forces.nodes import Nodes
 from slipcore.forces.response import response_matrix
 from slipcore.frames import FloatArray
@@ -10,12 +14,13 @@ from slipcore.frames import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensor:
-    """For tractions in Young's moduli: the ``response`` [m, 3, k] m of markers along the ``axes`` that are seen,
-    ``elements`` [e, k] N of theirs by tractions at nodes, and ``load`` N, the force by a traction of 1 at one node.
+    """For tractions in Young's moduli: ``observed`` [m + 3, 3, k], what markers move by along the ``axes`` that are
+    seen, m, and the resultant, N; ``elements`` [e, k] N of theirs by tractions at nodes, and ``load`` N, the force by a
+    traction of 1 at one node.
     """
 
     nodes: Nodes
-    response: FloatArray
+    observed: FloatArray
     elements: FloatArray
     load: float
     axes: tuple[int, ...]
@@ -24,12 +29,29 @@ class Sensor:
     def of(cls, position: FloatArray, element_area: float, gel: Gel, axes: tuple[int, ...]) -> "Sensor":
         """With markers at ``position`` [n, m, 3] m."""
         place = position[..., :2].reshape(-1, 2)
-        nodes = Nodes.around(place, element_area)
-        response = response_matrix(gel, nodes, place)[list(axes)].reshape(len(axes) * len(place), 3, len(nodes))
-        young = gel.young_modulus
-        return cls(nodes, young * response, young * nodes.over_elements(place), young * nodes.area, axes)
+        nodes, young, markers = Nodes.around(place, element_area), gel.young_modulus, len(axes) * len(place)
+        load = young * nodes.area
+        observed = np.empty((markers + 3, 3, len(nodes)))
+        response = response_matrix(gel, nodes, place)[list(axes)]
+        np.multiply(young, response.reshape(markers, 3, len(nodes)), out=observed[:markers])
+        observed[markers:] = load * np.eye(3)[..., None]
+        return cls(nodes, observed, young * nodes.over_elements(place), load, axes)
+
+    @property
+    def response(self) -> FloatArray:
+        """Of markers alone, [m, 3, k] m."""
+        return self.observed[:-3]
 
     @property
     def sees_depth(self) -> bool:
         """Whether its markers also tell how deep they are pressed."""
         return len(self.axes) == 3
+
+    def observation(self, spread: FloatArray, known: Known) -> Observation:
+        """Of a frame whose displacements have the standard deviations ``spread`` [m] m, and what is known of it."""
+        return Observation(self.observed, np.concatenate((spread, known.noise)))
+
+    @staticmethod
+    def data(displacement: FloatArray, known: Known) -> FloatArray:
+        """What it tells [m + 3]."""
+        return np.concatenate((displacement, np.nan_to_num(known.force)))

@@ -12,11 +12,12 @@ from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import FORCE_STREAM
 from slipcore.forces.frame_forces import FrameForces
 from slipcore.forces.gel import Gel
+from slipcore.forces.known import Known, contradicts, reported
 from slipcore.forces.look import Insight, Shown, bytes_needed
 from slipcore.forces.nodes import Nodes
 from slipcore.forces.recording import axes_seen, check_noise, moved, noise_of, rows
 from slipcore.forces.sensor import Sensor
-from slipcore.frames import BoolArray, FloatArray, check_displacement, check_mask
+from slipcore.frames import BoolArray, FloatArray, check_displacement, check_gripper_report, check_mask
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,12 +25,16 @@ class StreamedForces:
     """The ``forces`` of a frame, and the ``age`` s of the frame by which its contact was last sought.
 
     Forces are zero where nothing touches, and where they are not known yet, because they ``wait_for`` what that says:
-    "noise", "set-up" or "contact".
+    "noise", "set-up" or "contact". ``given``: whether they are by the gripper's force, too, and ``contradiction`` by
+    how many standard deviations this differs from what is found; NaN without one, and while markers have moved on from
+    where the contact was last sought.
     """
 
     forces: FrameForces
     age: float = 0.0
     wait_for: str | None = None
+    given: bool = False
+    contradiction: float = float("nan")
 
 
 class ForceStream:
@@ -65,16 +70,35 @@ class ForceStream:
         self._recent: deque[tuple[float, FloatArray]] = deque(maxlen=FORCE_STREAM.frames)
         self._axes: tuple[int, ...] = (0, 1)
         self._data = np.zeros(0)
+        self._largest, self._compared, self._contradicted = 0.0, 0, 0
         self._touches, self._touched, self._until_look = 0, False, 0
         self._insight: Insight | None = None
         self._look: tuple[int, Future[Insight]] | None = None
 
-    def step(self, time: float, displacement: ArrayLike, observed: ArrayLike | None = None) -> StreamedForces:
-        """Forces of the next frame: displacements [n, m, 3] m at ``time`` s, of markers that were ``observed`` [n, m].
+    @property
+    def contradicted(self) -> float:
+        """Share of the frames that could be compared in which the gripper's force and what is found are not alike; 0
+        while these are few.
+        """
+        few = self._compared < FORCE_STREAM.compared
+        return 0.0 if few else self._contradicted / self._compared
+
+    def step(
+        self,
+        time: float,
+        displacement: ArrayLike,
+        observed: ArrayLike | None = None,
+        gripper_force: float | None = None,
+        gripper_force_deviation: float | None = None,
+    ) -> StreamedForces:
+        """Forces of the next frame: displacements [n, m, 3] m at ``time`` s, of markers that were ``observed`` [n, m],
+        and the ``gripper_force`` N with its standard deviation N, as a ``GraspLog`` has them.
 
         Raises ``InvalidInput`` for what is no such frame, and is then as before.
         """
         moved_by, seen = self._checked(time, displacement, observed)
+        known = self._reported(gripper_force, gripper_force_deviation)
+        self._largest = max(self._largest, gripper_force or 0.0)
         self._remember(time, moved_by)
         if len(axes_seen(moved_by)) > len(self._axes):
             self._axes, self._insight, self._data = axes_seen(moved_by), None, np.zeros(0)
@@ -84,7 +108,7 @@ class ForceStream:
             self._begin_to(self._set_up)
         if self._noise is None:
             return self._none("noise")
-        frame = self._shown(time, moved_by, seen)
+        frame = self._shown(time, moved_by, seen, known)
         if self._insight is None:
             return self._none("set-up")
         self._seek(self._insight, frame)
@@ -96,7 +120,8 @@ class ForceStream:
         if reader is None:
             return self._none("contact")
         n, m = self._position.shape[:2]
-        return StreamedForces(reader.read(frame.data, (n, m)), time - self._insight.time)
+        forces = reader.read(frame.data, (n, m))
+        return StreamedForces(forces, time - self._insight.time, None, reader.given, self._compare(frame, forces))
 
     def close(self) -> None:
         """Give up the look for a contact that waits for its executor, if one does: no more frames come."""
@@ -116,6 +141,22 @@ class ForceStream:
         check_displacement(told, self._position)
         return told, seen
 
+    def _reported(self, force: float | None, deviation: float | None) -> Known:
+        check_gripper_report(force, deviation, self._largest)
+        told = None if force is None else reported(np.array([force]))
+        known = Known.of(told, deviation, 1, self._largest)
+        known.check("gripper_force", self._gel, self._area * self._position[..., 0].size)
+        return known[0]
+
+    def _compare(self, frame: Shown, found: FrameForces) -> float:
+        """The contradiction of a frame, which is counted."""
+        if not frame.known.given.any() or self._insight is None or not self._insight.holds(frame):
+            return float("nan")
+        away = frame.known.away(found.resultant, found.resultant_deviation)
+        self._compared += 1
+        self._contradicted += bool(contradicts(away))
+        return float(away[2])
+
     def _remember(self, time: float, displacement: FloatArray) -> None:
         """For the noise. Of two frames whose times do not grow, one is wrong: neither is kept where that is unclear."""
         if self._recent and time <= self._recent[-1][0]:
@@ -130,19 +171,21 @@ class ForceStream:
             return self._given
         return noise_of(np.array([time for time, _ in self._recent]), np.stack([each for _, each in self._recent]))
 
-    def _shown(self, time: float, displacement: FloatArray, observed: BoolArray | None) -> Shown:
+    def _shown(self, time: float, displacement: FloatArray, observed: BoolArray | None, known: Known) -> Shown:
         """The frame, and whether something touches in it; noise is that of the frames just before a touch.
 
-        A marker that is not seen stays where it was, until a contact is sought without it.
+        A marker that is not seen stays where it was, until a contact is sought without it; so does a gripper's force.
         """
         (data,), (seen,) = rows(displacement[None], None if observed is None else observed[None], self._axes)
-        self._data = np.where(seen, data, self._data if self._data.size else 0.0)
-        before, self._touched = self._touched, bool(moved(data, seen, self._noise or 0.0))
+        there = np.concatenate((seen, known.given))
+        self._data = np.where(there, Sensor.data(data, known), self._data if self._data.size else 0.0)
+        data, before = self._data[: len(seen)], self._touched
+        self._touched = bool(moved(data, seen, self._noise or 0.0))
         if self._touched and not before:
             self._noise = self._noise_now()
             self._touched = bool(moved(data, seen, self._noise))
             self._touches += self._touched
-        return Shown(time, self._data, seen, max(self._noise or 0.0, FORCE_STREAM.least_noise))
+        return Shown(time, self._data, seen, max(self._noise or 0.0, FORCE_STREAM.least_noise), known)
 
     def _seek(self, insight: Insight, frame: Shown) -> None:
         """Let the contact be sought, if it is time to; forget it once nothing touches."""

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from benchmarks.presses import Faults, pressed
@@ -312,8 +313,11 @@ def test_a_frame_is_sent_when_it_is_due(ramps: list[Path], monkeypatch: pytest.M
 
     monkeypatch.setattr(streaming, "perf_counter", lambda: now[0])
     monkeypatch.setattr(streaming, "sleep", pass_time)
-    live: Any = SimpleNamespace(step=lambda *_: due.append(now[0]))
-    assert len(list(streaming._replay(live, log, speed=2.0))) == len(log)
+    told = []
+    live: Any = SimpleNamespace(step=lambda *_, **more: (due.append(now[0]), told.append(more)))
+    gripped = replace(log, gripper_force=np.arange(float(len(log))), gripper_force_deviation=0.3)
+    assert len(list(streaming._replay(live, gripped, speed=2.0))) == len(log)
+    assert told[2] == {"gripper_force": 2.0, "gripper_force_deviation": 0.3}
     assert due == pytest.approx((100.0 + (log.time - log.time[0]) / 2.0).tolist(), rel=1e-12)
 
 

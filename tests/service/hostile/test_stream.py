@@ -248,6 +248,7 @@ def test_an_opening_without_numbers_is_refused_by_name(make: Callable[..., Strea
     "message",
     [
         json.dumps(frame(time=0)).replace('"time": 0', '"time": true'),
+        json.dumps(frame(gripper_force=True)),
         json.dumps(frame(number=True)),
         json.dumps(frame(number=2**80)),
         json.dumps(frame()).replace('"time": 0.0', '"time": 1' + "0" * 400),
@@ -255,7 +256,7 @@ def test_an_opening_without_numbers_is_refused_by_name(make: Callable[..., Strea
         "[" * 100_000,
         '{"type": "open"}',
     ],
-    ids=["time true", "number true", "number 2^80", "time 10^400", "900 deep and wrong", "100,000 deep", "no field"],
+    ids=["time", "force", "number", "number 2^80", "time 10^400", "900 deep and wrong", "100,000 deep", "no field"],
 )
 def test_a_message_that_is_none_has_its_documented_code(make: Callable[..., Streams], message: str) -> None:
     closed = converse(make(), json.dumps(first()), message, raw=True).closed
@@ -281,8 +282,11 @@ def test_a_message_that_is_none_has_its_documented_code(make: Callable[..., Stre
         ({"force": [-1e308] * 48}, "force"),
         ({"object_pose": [1e308, 0.0, 0.0]}, "object_pose x, y"),
         ({"command": 1e308}, "command"),
+        ({"gripper_force": 1e308}, "gripper_force"),
+        ({"gripper_force": -1.0}, "gripper_force"),
+        ({"gripper_force_deviation": 1.0}, "gripper_force_deviation"),
     ],
-    ids=["nested", "large", "truth values", "half", "text", "truth value", "-1", "-2^53", *["huge"] * 7],
+    ids=["nested", "large", "truths", "half", "text", "truth", "-1", "-2^53", *["huge"] * 8, "pulls", "alone"],
 )
 def test_a_wrong_frame_is_answered_by_name_and_the_next_is_taken(
     make: Callable[..., Streams], wrong: dict[str, Any], name: str

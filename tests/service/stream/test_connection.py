@@ -28,7 +28,7 @@ from service.settings import Settings
 from service.stream import connection as stream
 from slipcore import GraspLog, detect_slip
 from stiction_client import Contact, ControlSettings, FrictionClient
-from stiction_client.errors import ConnectionFailed
+from stiction_client.errors import ConnectionFailed, InvalidArgument
 from stiction_client.stream import SlipStream
 
 FORCES = {"least_force": 1, "most_force": 30}
@@ -145,7 +145,9 @@ def test_a_sensor_whose_gel_is_known_needs_no_forces(served: Served, ramp: Grasp
         client.describe_sensor("gel", 1e6, 0.5)
         assert "force" not in ask(before, frame(ramp, 0, force=None))  # as it was when the stream was opened
         with SlipStream(served.url, ramp.position, ramp.element_area, sensor="gel", control=settings) as live:
-            answers = [live.step(ramp.time[k], ramp.displacement[k]) for k in range(3)]
+            answers = [live.step(ramp.time[k], ramp.displacement[k], gripper_force=0.5) for k in range(3)]
+            with pytest.raises(InvalidArgument, match="gripper_force"):
+                live.send(ramp.time[3], ramp.displacement[3], gripper_force=True)
         assert [answer["force"]["wait_for"] for answer in answers] == ["noise"] * 3
         assert all(answer["command"]["normal_force"] >= 0.5 for answer in answers)
         with SlipStream(served.url, ramp.position, ramp.element_area, sensor="gel") as live:

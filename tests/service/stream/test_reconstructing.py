@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from service.domain.reconstruct import CONTRADICTED
 from service.formats import read
 from service.stream import detectors, reconstructing
 from service.stream.detectors import PackedFrame
 from service.stream.messages import Control
 from slipcore import FrictionSamples, GraspLog, InvalidInput, collect_samples, detect_slip
+from slipcore.forces import ForceStream
 
 pytestmark = pytest.mark.usefixtures("looks_at_once")
 
@@ -50,15 +52,20 @@ def test_forces_slip_samples_and_commands_follow_from_displacement(
 
     monkeypatch.setattr(detectors, "collect_samples", collected)
     session = opened(ramp, control=GRIP)
-    answers = [detectors.step("one", frame(ramp, k))[0] for k in range(len(ramp))]
+    reports = -ramp.force[..., 2].sum(axis=(1, 2))
+    answers = [detectors.step("one", frame(ramp, k, gripper_force=reports[k]))[0] for k in range(len(ramp))]
     assert [answer["force"]["wait_for"] for answer in answers[:14]] == ["noise"] * 14
     history = detect_slip(ramp)
     for k in (40, 60, 80):
         told = answers[k]["force"]
         assert told["source"] == "reconstructed"
         assert told["age"] < 0.5
+        assert told["given"]
+        assert told["findings"] == []
         np.testing.assert_allclose(told["resultant"], ramp.force[k].sum(axis=(0, 1)), atol=0.5)
         assert answers[k]["stick_ratio"] == pytest.approx(history.stick_ratio[k], abs=0.1)
+    contradictions = [told for answer in answers if (told := answer["force"]["contradiction"]) is not None]
+    assert 0.0 < np.median(contradictions) < 3.0
     assert answers[-1]["command"]["normal_force"] > 0.5
     assert session.look is not None
     session.look.result()
@@ -67,13 +74,30 @@ def test_forces_slip_samples_and_commands_follow_from_displacement(
 
 def test_a_kept_log_is_stored_without_them_for_its_job_finds_better_ones(ramp: GraspLog, tmp_path: Path) -> None:
     opened(ramp, keep=True)
-    for k in range(2):
-        assert detectors.step("one", frame(ramp, k))[0]["force"]["wait_for"] == "noise"
+    for k, (force, deviation) in enumerate(((0.5, 0.2), (None, None), (0.4, 0.1))):
+        given = frame(ramp, k, gripper_force=force, gripper_force_deviation=deviation)
+        told = detectors.step("one", given)[0]["force"]
+        assert (told["wait_for"], told["given"], told["contradiction"]) == ("noise", False, None)
     detectors.write("one", tmp_path / "log.npz", "gel sensor")
     log = read(tmp_path / "log.npz")
     assert log.force is None
     assert log.normal is None
     assert log.sensor == "gel sensor"
+    np.testing.assert_array_equal(log.gripper_force, [0.5, 0.0, 0.4])
+    assert log.gripper_force_deviation == 0.2
+
+
+def test_a_grippers_force_that_is_none_is_refused_and_one_that_is_contradicted_told(
+    ramp: GraspLog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened(ramp)
+    bearable = 10.0 * GEL["young_modulus"] * ramp.element_area * 14**2
+    for force, deviation in ((np.nan, None), (-0.2, None), (1.01 * bearable, None), (1.0, -1.0), (None, 1.0)):
+        with pytest.raises(InvalidInput, match="gripper_force"):
+            detectors.step("one", frame(ramp, 0, gripper_force=force, gripper_force_deviation=deviation))
+    monkeypatch.setattr(ForceStream, "contradicted", 0.5)
+    (finding,) = detectors.step("one", frame(ramp, 0, gripper_force=1.0))[0]["force"]["findings"]
+    assert (finding["name"], "in 50% of the frames" in finding["evidence"]) == (CONTRADICTED, True)
 
 
 def test_frames_have_forces_all_or_none_by_the_first_one_that_is_taken(ramp: GraspLog) -> None:

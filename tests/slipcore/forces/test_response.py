@@ -23,9 +23,10 @@ def test_nodes_reach_beyond_the_markers_and_share_their_area_among_elements() ->
     np.testing.assert_allclose(between.sum(axis=1), PITCH**2, rtol=1e-12)
 
 
-def test_too_fine_elements_are_refused() -> None:
+@pytest.mark.parametrize("reach", [1.0, 1e305], ids=["millimetres", "past the range of floats"])
+def test_too_fine_elements_are_refused(reach: float) -> None:
     with pytest.raises(InvalidInput, match="element_area is 1e-12"):
-        Nodes.around(MARKERS, 1e-12)
+        Nodes.around(MARKERS * reach, 1e-12)
 
 
 def test_hertzian_pressure_moves_markers_as_a_sphere_does() -> None:

@@ -2,13 +2,15 @@
 
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from slipcore import GraspLog, InvalidInput
-from slipcore.forces import ForceStream, Gel, StreamedForces
+from slipcore.forces import ForceStream, Gel, StreamedForces, reconstruct
+from slipcore.forces.defaults import FORCE_STREAM
 
 GEL = Gel(young_modulus=1e6, poisson_ratio=0.49, thickness=5e-3)
 LIGHT = [0, 0]
@@ -67,6 +69,7 @@ def test_forces_are_met_from_the_touch_on_and_end_with_it(pressed: Pressed) -> N
         assert (each.forces.resultant_deviation > 0.0).all()
     lifted = stream.step(10.0, still(log, 3, 99))
     assert not lifted.forces.force.any()
+    assert lifted.forces.force.shape == found[-1].forces.force.shape
     assert lifted.wait_for is None
 
 
@@ -152,6 +155,71 @@ def test_a_sensor_at_rest_that_shows_no_noise_is_not_touched(pressed: Pressed) -
     assert not found.forces.force.any()
     found = [stream.step(1.0 + k / 30.0, log.displacement[0]) for k in range(6)][-1]
     assert found.forces.resultant[2] == pytest.approx(total(log, 0)[2], rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("axes", "gel", "report", "deviation"),
+    [(3, GEL, 0.5, 0.2), (3, GEL, 0.8, None), (2, Gel(1e6, 0.5), 0.8, None)],
+    ids=["as sure as said", "sure", "in the plane"],
+)
+def test_a_grippers_force_does_in_a_stream_what_it_does_in_a_log(
+    pressed: Pressed, axes: int, gel: Gel, report: float, deviation: float | None
+) -> None:
+    shown = pressed(LIGHT, noise=NOISE, axes=axes, crop=INSIDE)
+    same = np.stack([shown.displacement[0]] * 6)
+    log = replace(shown, time=0.1 * np.arange(6), displacement=same, force=None, gripper_force=np.full(6, report))
+    batch = reconstruct(replace(log, gripper_force_deviation=deviation), gel, noise=NOISE)
+    stream = ForceStream(log.position, log.element_area, gel, noise=NOISE)
+    found = [stream.step(time, same[0], None, report, deviation) for time in log.time][-1]
+    assert found.given
+    for name in ("force", "deviation", "resultant", "resultant_deviation"):
+        np.testing.assert_allclose(getattr(found.forces, name), getattr(batch, name)[-1], rtol=1e-6, atol=1e-9)
+    np.testing.assert_array_equal(found.forces.contact, batch.contact[-1])
+    assert found.contradiction == pytest.approx(batch.contradiction[-1, 2], rel=1e-6)
+
+
+def test_a_grippers_force_is_no_longer_used_where_it_is_no_longer_told(pressed: Pressed) -> None:
+    log = pressed(LIGHT, noise=NOISE, crop=INSIDE)
+    stream = made(log, noise=NOISE)
+    told = [0.5] * 4 + [None] * 4 + [0.0] * 4 + [0.6] * 4
+    found = [stream.step(0.1 * k, log.displacement[0], None, force) for k, force in enumerate(told)]
+    assert [each.given for each in found[3::4]] == [True, False, False, True]
+    assert [np.isnan(each.contradiction) for each in found[3::4]] == [False, True, True, False]
+    known, unknown = found[3].forces.resultant_deviation[2], found[7].forces.resultant_deviation[2]
+    assert known < unknown
+
+
+def test_a_grippers_force_that_the_gels_shape_contradicts_is_told(pressed: Pressed) -> None:
+    log = pressed(LIGHT, noise=NOISE, crop=INSIDE)
+    for force, said in ((0.5, 0.0), (0.8, 1.0)):
+        stream, shares = made(log, noise=NOISE), []
+        for k in range(FORCE_STREAM.compared + 4):
+            stream.step(0.1 * k, log.displacement[0], None, force)
+            shares.append(stream.contradicted)
+        assert (shares[FORCE_STREAM.compared - 2], shares[-1]) == (0.0, said)
+
+
+@pytest.mark.parametrize(
+    ("force", "deviation", "said"),
+    [
+        (np.nan, None, "gripper_force is nan"),
+        (True, None, "gripper_force is of dtype bool"),
+        (-0.2, None, "positive where the object presses"),
+        (360.5, None, r"gripper_force is up to 360 N; allowed: at most 360 N, 10 times Young's modulus"),
+        (2e4, None, "gripper_force is 2e.04 N at its largest"),
+        (1.0, 0.0, "gripper_force_deviation is 0 N"),
+        (1.0, np.nan, "gripper_force_deviation is nan"),
+        (None, 0.1, "gripper_force_deviation is given without gripper_force"),
+    ],
+)
+def test_what_no_gripper_reports_is_refused_by_name(
+    pressed: Pressed, force: float | None, deviation: float | None, said: str
+) -> None:
+    log = pressed(LIGHT, crop=INSIDE)
+    stream = made(log)
+    with pytest.raises(InvalidInput, match=said):
+        stream.step(0.0, log.displacement[0], None, force, deviation)
+    assert not stream._recent
 
 
 def test_what_does_not_fit_is_refused_by_name_and_changes_nothing(pressed: Pressed) -> None:
