@@ -214,12 +214,14 @@ def _evaluate_block(
 def _solve(hessian: FloatArray, gradient: FloatArray, given: BoolArray) -> FloatArray:
     """Newton's step in the directions whose load is given (Cholesky), with a ridge where φ is flat."""
     lower, step = np.zeros((3, 3)), np.zeros(3)
+    # Where all disks are left exactly along an axis φ has no curvature at all along it: its step is to stay finite.
+    least = max(_RIDGE**2 * max(hessian[0, 0], hessian[1, 1], hessian[2, 2]), _TINY)
     for i in range(3):
         for j in range(i):
             lower[i, j] = (hessian[i, j] * given[i] * given[j] - (lower[i, :j] * lower[j, :j]).sum()) / lower[j, j]
         diagonal = hessian[i, i] if given[i] else 1.0
         pivot = diagonal - (lower[i, :i] ** 2).sum()
-        lower[i, i] = np.sqrt(max(pivot, _RIDGE * diagonal, _TINY))
+        lower[i, i] = np.sqrt(max(pivot, _RIDGE * diagonal, least))
     for i in range(3):
         step[i] = (gradient[i] * given[i] - (lower[i, :i] * step[:i]).sum()) / lower[i, i]
     for i in range(2, -1, -1):

@@ -80,6 +80,20 @@ def test_projection_holds_close_to_full_sliding(short: float) -> None:
     assert np.abs(got.imbalance).max() <= 1e-13 * radius.sum()
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_disks_that_are_all_left_along_one_axis_are_projected_on(axis: int) -> None:
+    """φ has no curvature along that axis at first, to the last digit, and its slope there is large."""
+    radius, arm, _ = disks()
+    point, load = np.zeros((2, radius.size)), np.zeros(3)
+    radius *= 1e6
+    point[axis], load[axis] = -2e6, 0.5 * radius.sum()
+    got = project(point, radius, arm, load, GIVEN)
+    assert got.feasible
+    assert got.iterations <= 10
+    np.testing.assert_allclose(got.traction, on_disks(point + rigid_displacement(arm, got.motion), radius), rtol=1e-12)
+    assert np.abs(got.imbalance).max() <= 1e-13 * radius.sum()
+
+
 @pytest.mark.parametrize("load", [(1.001, 0.0, 0.0), (0.8, 0.0, 0.4), (0.0, 0.0, 2.0), (-3.0, 4.0, 0.0)])
 def test_loads_outside_the_limit_surface_are_recognised(load: tuple[float, float, float]) -> None:
     radius, arm, point = disks()
