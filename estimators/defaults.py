@@ -164,6 +164,10 @@ class ChainSettings(Options):
     """Probability beyond the quantiles, one on either side, whose error is watched."""
     candidates: Annotated[int, Option(1, 1000, "proposals", "trials")] = 8
     """A walker, of which its start is chosen."""
+    nearer: Annotated[float, Option(0.001, 0.9, "-", "six times it leave a millionth of the proposals' width")] = 0.1
+    """Share of their distance from the mode at which candidates are looked at next, where none is possible."""
+    nearer_starts: Annotated[int, Option(1, 100, "looks", "as above")] = 7
+    """At candidates, before it is said that none is possible."""
     tail_error: Annotated[float, Option(0.1, 100.0, "-", "√(0.05 · 0.95)/φ(z₀.₀₅) for a normal density")] = 2.1
     """Standard error of the watched quantiles times the root of the effective sample size."""
     expected_time: Annotated[float, Option(1.0, 1000.0, "steps", "at an acceptance of 0.88")] = 1.4

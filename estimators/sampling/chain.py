@@ -169,13 +169,19 @@ def _walkers(goal: float, slowness: float) -> int:
 
 
 def _start(task: _Task, random: np.random.RandomState) -> FloatArray:
-    """Walkers [w, d] near the posterior already: proposals resampled by their importance, never all of them one."""
+    """Walkers [w, d] near the posterior already: proposals resampled by their importance, never all of them one.
+
+    Where none of these is possible, as next to a bound, they are taken nearer to 0, where the mode is.
+    """
     candidates = task.proposal.draw(random, SAMPLING.candidates * task.walkers)
-    log_weight = task.log_probability(candidates) - task.proposal.log_density(candidates)
-    if not np.isfinite(log_weight.max()):
-        raise InvalidSamples("mean friction", "0 or less with near certainty", "above 0 over the range of the data")
-    weight = flattened(log_weight)
-    return np.asarray(candidates[random.choice(len(weight), task.walkers, p=weight / weight.sum())])
+    drawn = task.proposal.log_density(candidates)
+    for _ in range(SAMPLING.nearer_starts):
+        log_weight = task.log_probability(candidates) - drawn
+        if np.isfinite(log_weight.max()):
+            weight = flattened(log_weight)
+            return np.asarray(candidates[random.choice(len(weight), task.walkers, p=weight / weight.sum())])
+        candidates = SAMPLING.nearer * candidates
+    raise InvalidSamples("mean friction", "0 or less with near certainty", "above 0 over the range of the data")
 
 
 def _acceptance_too_low(chain: Chain) -> bool:

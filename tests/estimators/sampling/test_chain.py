@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from estimators.defaults import SAMPLING
+from estimators.errors import InvalidSamples
 from estimators.sampling import chain as sampling
 from estimators.sampling.proposal import standard
 
@@ -55,6 +56,21 @@ def test_a_target_far_from_the_proposal_falls_back_to_differential_evolution() -
     assert np.isnan(chain.split_rhat)
     np.testing.assert_allclose(chain.flat().std(axis=0), scale, rtol=0.1)
     assert len(chain.draws) >= SAMPLING.chain_lengths * chain.autocorrelation_time.max()
+
+
+def test_a_target_that_no_proposal_hits_is_sampled_from_its_mode_on() -> None:
+    """A hundred thousandth of the proposals' width."""
+
+    def density(x: np.ndarray) -> np.ndarray:
+        return np.where((np.abs(x) < 1e-4).all(axis=1), -0.5 * ((x / 1e-5) ** 2).sum(axis=1), -np.inf)
+
+    assert np.isneginf(density(standard(5).draw(np.random.RandomState(0), 10_000))).all()
+    assert sampling.sample(density, standard(5)).flat().std() == pytest.approx(1e-5, rel=0.2)
+
+
+def test_a_density_that_is_nowhere_is_told() -> None:
+    with pytest.raises(InvalidSamples, match="mean friction is 0 or less with near certainty"):
+        sampling.sample(lambda x: np.full(len(x), -np.inf), standard(5))
 
 
 def test_more_accuracy_takes_more_steps_and_is_reached() -> None:
