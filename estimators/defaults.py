@@ -320,7 +320,9 @@ class RobustSettings(Options):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterSettings(Options):
-    """Errors that samples share (``linear/{cluster_errors,shared_errors,observations,grasp_statistics}.py``)."""
+    """Errors that samples share (``linear/``: ``cluster_errors``, ``shared_errors``, ``observations``,
+    ``grasp_statistics``, ``within_places``).
+    """
 
     few: Annotated[int, Option(1, 100, "clusters", "9 for the three coefficients")] = 3
     """A direction, from which the cluster-robust variance stands alone."""
@@ -331,7 +333,9 @@ class ClusterSettings(Options):
     shared_level: Annotated[float, Option(1e-12, 0.5, "-", "one false alarm in a thousand fits")] = 1e-3
     """Level of the test that errors are shared within the elements of a grasp."""
     time_blocks: Annotated[int, Option(2, 1000, "blocks", "enough for a variance, long enough to be independent")] = 20
-    """That the record of a single element is cut into."""
+    """That the record of a single element, or of a grasp, is cut into."""
+    by_chance: Annotated[float, Option(0.0, 10.0, "standard errors", "usual of what is told from chance")] = 2.0
+    """Of a variance of so many blocks: larger by less than that shows no errors that go together."""
     most_places: Annotated[int, Option(2, 1_000_000, "places", "32 bytes each: less than 16 kB a grasp")] = 480
     """That are kept one by one."""
     most_groups: Annotated[int, Option(2, 1_000_000, "groups", "88 bytes each")] = 170

@@ -93,6 +93,7 @@ def _contact_samples(log: GraspLog, patches: Sequence[Patch], elements: Friction
         weight=np.ones(len(on)),
         element_area=log.element_area,
         normal_force_noise=elements.normal_force_noise,
+        velocity_noise=elements.velocity_noise,
         kind=np.full(len(on), "contact", KIND),
     )
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from slipcore.defaults import SampleOptions, choose_options
 from slipcore.element_forces import ElementForces, element_forces
@@ -25,6 +25,9 @@ KIND = "<U7"
 UNITS = {"tangential_velocity": "m/s", "normal_force": "N", "tangential_force": "N", "time": "s"}
 """Of the arrays that have one."""
 
+NUMBERS = ("element_area", "normal_force_noise", "velocity_noise")
+"""What is one number for all samples."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrictionSamples:
@@ -32,8 +35,9 @@ class FrictionSamples:
 
     ``friction_coefficient`` f_t/f_n [-], ``tangential_velocity`` m/s (≥ 0), ``normal_force`` N and
     ``tangential_force`` N of the element (paper, eq. 38–39, as magnitudes), ``time`` s, ``element`` row-major index,
-    ``weight`` probability that the element did slip, ``element_area`` m², ``normal_force_noise`` N: standard deviation
-    of the noise that is still in ``normal_force``. ``kind``: "element", or "contact" where the whole of a patch slid or
+    ``weight`` probability that the element did slip, ``element_area`` m², ``normal_force_noise`` N and
+    ``velocity_noise`` m/s: standard deviations of the noise that is still in ``normal_force`` and in
+    ``tangential_velocity``. ``kind``: "element", or "contact" where the whole of a patch slid or
     pivoted: its ``normal_force`` is then the mean of its elements, weighted by force, and its ``element`` lies beyond
     the lattice. ``velocity_is_relative``: whether the velocity is that relative to what seems to stick, for want of the
     object's motion; once all of the contact slides evenly that is far too small.
@@ -48,6 +52,7 @@ class FrictionSamples:
     weight: FloatArray
     element_area: float
     normal_force_noise: float = 0.0
+    velocity_noise: float = 0.0
     kind: NDArray[np.str_] = field(default_factory=lambda: np.empty(0, KIND))
     velocity_is_relative: BoolArray = field(default_factory=lambda: np.empty(0, bool))
 
@@ -65,7 +70,7 @@ class FrictionSamples:
     @classmethod
     def arrays(cls) -> tuple[str, ...]:
         """Names of the arrays [k]."""
-        return tuple(entry.name for entry in fields(cls) if entry.name not in {"element_area", "normal_force_noise"})
+        return tuple(entry.name for entry in fields(cls) if entry.name not in NUMBERS)
 
     def __len__(self) -> int:
         return len(self.friction_coefficient)
@@ -79,14 +84,15 @@ class FrictionSamples:
         from slipcore.labelled import table
 
         columns = {name: getattr(self, name) for name in self.arrays()}
-        return table(columns, element_area=self.element_area, normal_force_noise=self.normal_force_noise)
+        return table(columns, **{name: getattr(self, name) for name in NUMBERS})
 
     def to_xarray(self) -> "Dataset":
         """Labelled arrays with units; raises ``ModuleNotFoundError`` where xarray is not installed."""
         from slipcore.labelled import dataset
 
         variables = {name: (("sample",), getattr(self, name), UNITS.get(name, "1")) for name in self.arrays()}
-        return dataset(variables, {}, element_area_m2=self.element_area, normal_force_noise_N=self.normal_force_noise)
+        numbers = zip(("element_area_m2", "normal_force_noise_N", "velocity_noise_m_per_s"), NUMBERS, strict=True)
+        return dataset(variables, {}, **{label: getattr(self, name) for label, name in numbers})
 
     def _repr_html_(self) -> str:
         from slipcore.notebook import summary
@@ -116,9 +122,13 @@ class FrictionSamples:
         area = min(part.element_area for part in parts)
         alike = [part.at_element_area(area) for part in parts]
         joined = {name: np.concatenate([getattr(part, name) for part in alike]) for name in cls.arrays()}
-        squares = sum(len(part) * part.normal_force_noise**2 for part in alike)
-        noise = math.sqrt(squares / max(sum(map(len, alike)), 1))
-        return cls(**joined, element_area=area, normal_force_noise=noise)
+        count = [len(part) for part in alike]
+        return cls(
+            **joined,
+            element_area=area,
+            normal_force_noise=_root_mean_square([part.normal_force_noise for part in alike], count),
+            velocity_noise=_root_mean_square([part.velocity_noise for part in alike], count),
+        )
 
 
 def element_samples(log: GraspLog, history: SlipHistory, **options: float) -> FrictionSamples:
@@ -155,6 +165,7 @@ def element_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
         & _pressed_enough(steady, forces.pressing, noise.normal, chosen)
     )
     frame, element = np.nonzero(keep.reshape(len(log), -1))
+    velocity_noise = _velocity_noise(log, history.noise)[frame]
     friction = _ratio(forces.tangential[keep], forces.normal[keep], noise)
     return FrictionSamples(
         friction_coefficient=friction,
@@ -166,6 +177,7 @@ def element_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
         weight=weight[keep],
         element_area=log.element_area,
         normal_force_noise=noise.normal / math.sqrt(2.0),  # the mean of two frames
+        velocity_noise=_root_mean_square(velocity_noise, np.ones(len(frame))),
         velocity_is_relative=np.full(len(friction), log.object_pose is None),
     )
 
@@ -212,12 +224,23 @@ def _of_neighbouring_frames(time: FloatArray, field: FloatArray) -> FloatArray:
     return between
 
 
-def _fast_enough(log: GraspLog, marker_noise: float, speed: FloatArray, options: SampleOptions) -> BoolArray:
-    interval = np.full(len(log), -np.inf)
+def _velocity_noise(log: GraspLog, marker_noise: float) -> FloatArray:
+    """Of a component of the velocity from the frame before to the next [t], m/s; 0 in the first and last frame."""
+    interval = np.full(len(log), np.inf)
     interval[1:-1] = log.time[2:] - log.time[:-2]
-    noise = np.sqrt(2.0) * np.nan_to_num(marker_noise) / interval[:, None, None]
-    fast: BoolArray = speed > np.maximum(options.least_velocity, options.velocity_to_noise * noise)
+    return np.asarray(math.sqrt(2.0) * np.nan_to_num(marker_noise) / interval)
+
+
+def _fast_enough(log: GraspLog, marker_noise: float, speed: FloatArray, options: SampleOptions) -> BoolArray:
+    least = np.maximum(options.least_velocity, options.velocity_to_noise * _velocity_noise(log, marker_noise))
+    fast: BoolArray = speed > least[:, None, None]
     return fast
+
+
+def _root_mean_square(values: ArrayLike, count: ArrayLike) -> float:
+    """Of values, each of which counts so often; 0 of none."""
+    total = np.sum(count)
+    return math.sqrt(float(np.dot(np.square(values), count) / total)) if total > 0 else 0.0
 
 
 class _ForceNoise(NamedTuple):

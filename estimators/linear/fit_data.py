@@ -162,8 +162,8 @@ def _statistics_of_samples(observations: Observations) -> tuple[GraspStatistics,
     ends = np.flatnonzero(np.diff(observations.grasp[order])) + 1
     return tuple(
         GraspStatistics.from_columns(
-            Columns(values[rows], observations.weight[rows], codes_of(place[rows])),
-            float(observations.normal_force_noise[observations.grasp[rows[0]]]),
+            Columns(values[rows], observations.weight[rows], codes_of(place[rows]), observations.time[rows]),
+            observations.noise[observations.grasp[rows[0]]],
             bool(observations.velocity_is_relative[rows[0]]),
         )
         for rows in np.split(order, ends)

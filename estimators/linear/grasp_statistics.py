@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from estimators.defaults import CLUSTERS, ROUNDING
 from estimators.errors import InvalidSamples
-from estimators.linear.least_squares import factorise, upper_triangle
+from estimators.linear.least_squares import upper_triangle
+from estimators.linear.within_places import within_places
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -19,14 +20,18 @@ HEADER = struct.Struct("<2I8d")
 POOLED, UNKNOWN = 1, 2
 """Flags in its second number: places in groups, velocity unknown."""
 UPPER = np.triu_indices(3)
+NO_NOISE = np.zeros(2)
 
 
 class Columns(NamedTuple):
-    """Samples of one grasp: ``values`` [k, 3] of (v, f_n, μ), ``weight`` [k] > 0 and ``place`` [k], codes from 0."""
+    """Samples of one grasp: ``values`` [k, 3] of (v, f_n, μ), ``weight`` [k] > 0, ``place`` [k], codes from 0, and
+    ``time`` [k] s.
+    """
 
     values: FloatArray
     weight: FloatArray
     place: IntArray
+    time: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,7 +40,8 @@ class GraspStatistics:
 
     Groups [g] of places: ``count`` places of about the same ``weight`` Σw each, the weighted ``mean`` [g, 3] of
     (v, f_n, μ), and the triangular factor ``spread`` [g, 3, 3] of the places' means about it, which is zero where a
-    group is one place. ``within`` [3, 3]: triangular factor of all samples about the means of their places.
+    group is one place. ``within`` [3, 3]: triangular factor of all samples about the means of their places,
+    freed of noise and of errors that go together.
     ``total_weight`` Σw and ``weight_square`` Σw² give the effective number of samples. ``velocity_unknown``: v is
     that relative to what seems to stick, and counts as 0.
 
@@ -53,27 +59,27 @@ class GraspStatistics:
 
     @classmethod
     def from_columns(
-        cls, columns: Columns, normal_force_noise: float = 0.0, velocity_unknown: bool = False
+        cls, columns: Columns, noise: FloatArray = NO_NOISE, velocity_unknown: bool = False
     ) -> "GraspStatistics":
-        """Statistics of samples whose f_n carries noise of the standard deviation given, N.
+        """Statistics of samples whose v and f_n carry ``noise`` [2] of these standard deviations, m/s and N.
 
-        The places' means average that noise away; the deviations from them are regressed towards what v says of f_n
-        (regression calibration; Carroll et al., 2006, §4), or noise would pass for a slope within places.
+        The places' means average that noise away; the deviations from them are freed of it (``within_places``), or it
+        would pass for slopes.
         """
-        values, weight, place = columns
+        values, weight, place, time = columns
         centre = weight @ values / weight.sum()
         offset = values - centre
         sums = np.bincount(place, weight).astype(float)
         mean = np.stack([np.bincount(place, weight * column) for column in offset.T], axis=1) / sums[:, None]
-        within = factorise(offset - mean[place], weight, intercept=False).triangle.astype(float)
-        freedom = max(1.0 - len(sums) / len(weight), 0.0)
+        left = weight.sum() * max(1.0 - len(sums) / len(weight), 0.0)
+        within = within_places(values, offset - mean[place], weight, time, noise * np.sqrt(left))
         count, sums, mean, spread = _pooled(sums, mean)
         return cls(
             count=count,
             weight=sums,
             mean=mean + centre,
             spread=spread,
-            within=calibrated(within, float(weight.sum()) * freedom, normal_force_noise),
+            within=within,
             total_weight=float(weight.sum()),
             weight_square=float(weight @ weight),
             velocity_unknown=velocity_unknown,
@@ -115,21 +121,6 @@ class GraspStatistics:
         if pooled:
             spread[:, UPPER[0], UPPER[1]] = table[:, 5:]
         return cls(count, table[:, 0], table[:, 1:4], spread, triangle, total, square, unknown), content[end:]
-
-
-def calibrated(within: FloatArray, weight: float, noise: float) -> FloatArray:
-    """Triangle [3, 3] of (v, f_n, μ) about places with f_n replaced by what is expected of it without its noise.
-
-    Of the part of f_n that v does not tell, whose variance is the square of the diagonal entry over the ``weight`` that
-    is left after the means, the part ``noise``² is noise. Its regression on the measured values shrinks that entry and
-    nothing else.
-    """
-    square = float(within[1, 1]) ** 2
-    if not (noise > 0.0 and square > 0.0):
-        return within
-    shrunk = within.copy()
-    shrunk[1, 1] *= 1.0 - min(noise**2 * weight / square, 1.0)
-    return shrunk
 
 
 def _pooled(weight: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

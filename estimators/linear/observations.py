@@ -21,10 +21,10 @@ IntArray = NDArray[np.int64]
 class Observations:
     """Samples of positive weight, all grasps joined: arrays [k].
 
-    ``friction`` μ [-], ``tangential_velocity`` m/s, ``normal_force`` N, ``tangential_force`` N; ``weight`` relative,
-    scaled so that it sums to the effective number of samples (Kish); ``element`` as labelled in its grasp; ``grasp``
-    and ``cluster``: codes from 0, where a cluster is what errors are taken to be shared in (``cluster_kind``);
-    ``element_area`` m²; ``normal_force_noise`` [grasps] N, that still in the normal forces of each;
+    ``friction`` μ [-], ``tangential_velocity`` m/s, ``normal_force`` N, ``tangential_force`` N; ``time`` s; ``weight``
+    relative, scaled so that it sums to the effective number of samples (Kish); ``element`` as labelled in its grasp;
+    ``grasp`` and ``cluster``: codes from 0, where a cluster is what shares errors (``cluster_kind``);
+    ``element_area`` m²; ``noise`` [grasps, 2], that still in the velocities, m/s, and normal forces, N, of each;
     ``velocity_is_relative``: where the velocity is unknown, and 0 in ``tangential_velocity`` (``known_velocity``).
     """
 
@@ -32,13 +32,14 @@ class Observations:
     tangential_velocity: FloatArray
     normal_force: FloatArray
     tangential_force: FloatArray
+    time: FloatArray
     weight: FloatArray
     element: IntArray
     grasp: IntArray
     cluster: IntArray
     cluster_kind: str
     element_area: float
-    normal_force_noise: FloatArray
+    noise: FloatArray
     velocity_is_relative: NDArray[np.bool_]
 
     def __len__(self) -> int:
@@ -62,6 +63,7 @@ class Observations:
             tangential_velocity=self.tangential_velocity[rows],
             normal_force=self.normal_force[rows],
             tangential_force=self.tangential_force[rows],
+            time=self.time[rows],
             weight=weight,
             element=self.element[rows],
             grasp=self.grasp[rows],
@@ -103,13 +105,14 @@ def observe(samples: "FrictionSamples | Sequence[FrictionSamples]") -> Observati
     columns = {names.get(name, name): value[used] for name, value in values.items()}
     return Observations(
         **columns,
+        time=joined([part.time for part in parts])[used],
         weight=weight,
         element=element,
         grasp=grasp,
         cluster=cluster,
         cluster_kind=kind,
         element_area=area,
-        normal_force_noise=np.array([part.normal_force_noise for part in parts]),
+        noise=np.array([noise_of(part) for part in parts]),
         velocity_is_relative=relative,
     )
 
@@ -152,6 +155,11 @@ def velocity_unknown(grasp: "FrictionSamples") -> bool:
 def known_velocity(grasp: "FrictionSamples") -> FloatArray:
     """Velocity [k] m/s of a grasp's samples, 0 where it is not known: β₁ is then not told by them."""
     return np.zeros(len(grasp)) if velocity_unknown(grasp) else np.asarray(grasp.tangential_velocity, dtype=float)
+
+
+def noise_of(grasp: "FrictionSamples") -> FloatArray:
+    """Standard deviations [2] of the noise in a grasp's velocities, m/s (0 where they are not known), and forces, N."""
+    return np.array([0.0 if velocity_unknown(grasp) else grasp.velocity_noise, grasp.normal_force_noise])
 
 
 def joined(arrays: Sequence[NDArray[np.generic]]) -> FloatArray:

@@ -11,7 +11,14 @@ from estimators.errors import InvalidSamples
 from estimators.friction_model import Domain
 from estimators.linear.grasp_statistics import Columns, GraspStatistics
 from estimators.linear.least_squares import Factor, factorise, merge
-from estimators.linear.observations import check_columns, codes_of, common_element_area, positive, velocity_unknown
+from estimators.linear.observations import (
+    check_columns,
+    codes_of,
+    common_element_area,
+    noise_of,
+    positive,
+    velocity_unknown,
+)
 
 if TYPE_CHECKING:
     from slipcore.samples import FrictionSamples
@@ -60,8 +67,9 @@ class SufficientStatistics:
             return cls.empty(area)
         unknown = velocity_unknown(samples)
         domain = Domain(NOTHING if unknown else (float(v.min()), float(v.max())), (float(f_n.min()), float(f_n.max())))
-        columns_of_grasp = Columns(np.stack([v, f_n, mu]).T, weight, codes_of(samples.element[used]))
-        grasp = GraspStatistics.from_columns(columns_of_grasp, samples.normal_force_noise, unknown)
+        place, time = codes_of(samples.element[used]), np.asarray(samples.time, dtype=float)[used]
+        columns_of_grasp = Columns(np.stack([v, f_n, mu]).T, weight, place, time)
+        grasp = GraspStatistics.from_columns(columns_of_grasp, noise_of(samples), unknown)
         return cls(
             factorise(columns_of_grasp.values, weight),
             float(weight @ weight),

@@ -92,23 +92,25 @@ def _patch_arrays(patches: Sequence[Patch]) -> list[NDArray[Any]]:
 
 def encode_samples(samples: FrictionSamples) -> bytes:
     """Samples as bytes, the same for the same samples."""
-    common = np.array([samples.element_area, samples.normal_force_noise, samples.velocity_is_relative.any()])
+    is_relative = float(samples.velocity_is_relative.any())
+    common = np.array([samples.element_area, samples.normal_force_noise, is_relative, samples.velocity_noise])
     numbers = [getattr(samples, name) for name in SAMPLE_ARRAYS[:-2]]
     return _pack([*numbers, samples.kind == "contact", common])
 
 
 def decode_samples(path: Path) -> FrictionSamples:
-    """The samples in a blob; those stored by older versions tell no noise of f_n, and are all of elements whose
-    velocities count as the object's own: nobody noted whether its motion was known.
+    """The samples in a blob; those stored by older versions tell no noise of f_n and of v, and are all of elements
+    whose velocities count as the object's own: nobody noted whether its motion was known.
     """
     *arrays, common = _unpack(path)
     of_contact = arrays.pop() if len(arrays) == len(SAMPLE_ARRAYS) - 1 else np.zeros(len(arrays[0]), bool)
-    element_area, noise, is_relative = (*np.atleast_1d(common).tolist(), 0.0, 0.0)[:3]
+    element_area, noise, is_relative, velocity_noise = (*np.atleast_1d(common).tolist(), 0.0, 0.0, 0.0)[:4]
     derived = [np.where(of_contact, "contact", "element"), ~of_contact & bool(is_relative)]
     return FrictionSamples(
         **dict(zip(SAMPLE_ARRAYS, [*arrays, *derived], strict=True)),
         element_area=element_area,
         normal_force_noise=noise,
+        velocity_noise=velocity_noise,
     )
 
 

@@ -35,7 +35,8 @@ def test_samples_are_a_table_with_a_row_each(samples: FrictionSamples) -> None:
     assert list(table.columns) == list(samples.arrays())
     for name in samples.arrays():
         assert np.array_equal(table[name].to_numpy(), getattr(samples, name))
-    assert table.attrs == {"element_area": samples.element_area, "normal_force_noise": samples.normal_force_noise}
+    numbers = ("element_area", "normal_force_noise", "velocity_noise")
+    assert table.attrs == {name: getattr(samples, name) for name in numbers}
 
 
 def test_samples_are_labelled_with_their_units(samples: FrictionSamples) -> None:

@@ -128,6 +128,20 @@ def test_noise_of_the_normal_force_makes_no_slope_of_friction_over_it() -> None:
     assert abs(np.mean(slopes)) < 0.15
 
 
+def test_samples_tell_the_noise_of_their_velocities() -> None:
+    """Against the same frames without noise, of elements that slide."""
+    quiet = tangential_ramp(seed=33)
+    rng = np.random.default_rng(33)
+    noisy = replace(quiet, displacement=quiet.displacement + 1e-6 * rng.standard_normal(quiet.displacement.shape))
+    history = detect_slip(noisy)
+    samples = element_samples(noisy, history)
+    true = detect_slip(quiet).velocity
+    at = np.searchsorted(noisy.time, samples.time), samples.element // 20, samples.element % 20
+    steady = 0.5 * (true[at] + true[at[0] + 1, at[1], at[2]])  # frames are evenly spaced
+    error = samples.tangential_velocity - np.hypot(*steady.T)
+    assert samples.velocity_noise == pytest.approx(error.std(), rel=0.2)  # of neighbouring frames it is shared
+
+
 def test_no_slip_gives_an_empty_set_of_samples() -> None:
     schedule = RampSchedule(rest=0.2, press=0.5, settle=0.3, shear=0.0, hold=0.5)
     log = tangential_ramp(tangential_force=0.0, schedule=schedule)
@@ -193,9 +207,12 @@ def test_samples_join_as_the_same_pressures_on_the_smallest_elements(ramp: tuple
 
 def test_joined_samples_carry_the_noise_of_all() -> None:
     one, none = np.ones(1), np.zeros(1, dtype=np.int64)
-    first, second = (FrictionSamples(one, one, one, one, one, none, one, 1e-6, noise) for noise in (3e-3, 4e-3))
+    noises = ((3e-3, 6e-5), (4e-3, 8e-5))
+    first, second = (FrictionSamples(one, one, one, one, one, none, one, 1e-6, *noise) for noise in noises)
     joined = FrictionSamples.concatenate([first, second])
     assert joined.normal_force_noise == pytest.approx(np.sqrt(12.5) * 1e-3)
+    assert joined.velocity_noise == pytest.approx(np.sqrt(50.0) * 1e-5)
+    assert joined.at_element_area(2e-6).velocity_noise == joined.velocity_noise
     assert joined.at_element_area(2e-6).normal_force_noise == pytest.approx(2.0 * joined.normal_force_noise)
 
 

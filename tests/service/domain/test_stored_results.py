@@ -163,7 +163,7 @@ def test_samples_stored_without_their_noise_are_still_read(samples: FrictionSamp
     arrays = [getattr(samples, name) for name in stored_results.SAMPLE_ARRAYS[:-2]]
     path.write_bytes(stored_results._pack([*arrays, np.array(samples.element_area)]))
     found = stored_results.decode_samples(path)
-    assert (found.element_area, found.normal_force_noise) == (samples.element_area, 0.0)
+    assert (found.element_area, found.normal_force_noise, found.velocity_noise) == (samples.element_area, 0.0, 0.0)
     assert set(found.kind) == {"element"}
     assert not found.velocity_is_relative.any()
     np.testing.assert_array_equal(found.normal_force, samples.normal_force)

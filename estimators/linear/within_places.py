@@ -1,0 +1,75 @@
+"""What samples tell about the means of their places: freed of noise, and of errors that go together over time."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimators.defaults import CLUSTERS, ROUNDING
+from estimators.linear.least_squares import upper_triangle
+
+FloatArray = NDArray[np.float64]
+
+
+def within_places(
+    values: FloatArray, deviation: FloatArray, weight: FloatArray, time: FloatArray, noise: FloatArray
+) -> FloatArray:
+    """Triangular factor [3, 3] of the ``deviation`` [k, 3] of (v, f_n, μ) from the means of their places, as one
+    without noise and of independent errors would be that tells as much of slopes.
+
+    ``values`` [k, 3]: what deviates, at ``time`` [k] s; ``noise`` [2]: roots of the sums of squares that noise in v and
+    f_n adds.
+    """
+    root = np.sqrt(weight)[:, None]
+    rows = root * deviation
+    axes = _axes(rows[:, :2], ROUNDING * np.linalg.norm(root * values[:, :2], axis=0))
+    told = axes.T @ rows
+    residual = rows[:, 2] - axes @ told[:, 2]
+    left = np.append(np.zeros(2), np.linalg.norm(residual))
+    told[:, :2] = calibrated(told[:, :2], noise)
+    if axes.size and left[2] > ROUNDING * np.linalg.norm(root[:, 0] * values[:, 2]):
+        told = _fewer(axes * (residual / left[2])[:, None], time) @ told
+    return np.asarray(upper_triangle(np.vstack([told, left])), dtype=float)
+
+
+def calibrated(regressors: FloatArray, noise: FloatArray) -> FloatArray:
+    """Rows [d, 2] of (v, f_n) replaced by what is expected of them without noise (regression calibration; Carroll et
+    al., 2006, §4).
+
+    Of measured X those expected are X(1 − (XᵀX)⁻¹N) = (1 − AAᵀ)X, with the noise's part N = D² of XᵀX, D = diag(noise),
+    and A = (X⁺)ᵀD, whose squared singular values are the noise's shares in X: all of it at most.
+    """
+    size = np.linalg.norm(regressors, axis=0)
+    if not (noise * size).any():
+        return regressors
+    size[size == 0.0] = np.inf  # what does not vary has no noise
+    axes, parts, _ = np.linalg.svd(np.linalg.pinv(regressors / size).T * (noise / size), full_matrices=False)
+    return np.asarray(regressors - (axes * np.minimum(parts, 1.0) ** 2) @ axes.T @ regressors)
+
+
+def _axes(rows: FloatArray, rounding: FloatArray) -> FloatArray:
+    """Orthonormal columns [k, ≤ 2] that span those of ``rows`` [k, 2] which are more than ``rounding`` [2]."""
+    size = np.linalg.norm(rows, axis=0)
+    varies = size > rounding
+    axes, parts, _ = np.linalg.svd(rows[:, varies] / size[varies], full_matrices=False)
+    return np.asarray(axes[:, parts > CLUSTERS.alone])
+
+
+def _fewer(scores: FloatArray, time: FloatArray) -> FloatArray:
+    """Root [d, d] of the share of the samples that tell of each slope as independent ones would.
+
+    A slope is told by the sum of its ``scores`` [k, d]; those of all have the sum of squares 1/k. Where errors go
+    together, the variance of sums over stretches of time, which all places share (Liang & Zeger, 1986), is larger than
+    that: so many times fewer samples tell of it (Kish, 1965, ch. 8). What chance makes of independent ones is none.
+    """
+    stretch = _stretches(time)
+    sums = np.stack([np.bincount(stretch, column) for column in scores.T])
+    count = sums.shape[1]
+    times, directions = np.linalg.eigh(sums @ sums.T * len(scores) * count / max(count - 1, 1))
+    times = np.where(times > 1.0 + CLUSTERS.by_chance * np.sqrt(2.0 / count), times, 1.0)
+    return np.asarray((directions / np.sqrt(times)) @ directions.T)
+
+
+def _stretches(time: FloatArray) -> NDArray[np.int64]:
+    """Codes [k] from 0 of stretches with about as many samples each; those of one moment are in one stretch."""
+    ordered = np.sort(time)
+    starts = ordered[np.arange(CLUSTERS.time_blocks) * len(time) // CLUSTERS.time_blocks]
+    return np.searchsorted(np.unique(starts), time, side="right") - 1
