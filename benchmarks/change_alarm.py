@@ -63,9 +63,10 @@ def delays(kind: str, between: float, before: int, series: int) -> np.ndarray:
 def main() -> None:
     """Run the campaign and print it as a table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--output", type=Path, default=Path("docs/images"))
+    parser.add_argument("--output", type=Path, default=Path("benchmarks/results"))
     parser.add_argument("--series", type=int, default=100)
     options = parser.parse_args()
+    options.output.mkdir(parents=True, exist_ok=True)
     rows: list[dict[str, Any]] = []
     for kind in KINDS:
         for between in BETWEEN:

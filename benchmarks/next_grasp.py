@@ -130,9 +130,10 @@ def same(model: estimators.FrictionModel, grasps: int) -> Grasp:
 def main() -> None:
     """Run the campaign and print it as a table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--output", type=Path, default=Path("docs/images"))
+    parser.add_argument("--output", type=Path, default=Path("benchmarks/results"))
     parser.add_argument("--materials", type=int, default=200)
     options = parser.parse_args()
+    options.output.mkdir(parents=True, exist_ok=True)
     population = [Material.drawn(np.random.default_rng([1, number])) for number in range(options.materials)]
     rows = {}
     for name in ("next_grasp", "schedule", "same grasp"):

@@ -152,10 +152,11 @@ def line(row: dict[str, Any]) -> str:
 def main() -> None:
     """Run the campaign and print it as a table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--output", type=Path, default=Path("docs/images"))
+    parser.add_argument("--output", type=Path, default=Path("benchmarks/results"))
     parser.add_argument("--seeds", type=int, default=400)
     parser.add_argument("--only", nargs="+", choices=KINDS, default=list(KINDS))
     options = parser.parse_args()
+    options.output.mkdir(parents=True, exist_ok=True)
     rows = []
     print("| scatter | grasps | method | covered | width | achieved/asked at 1e-2, 1e-3 |\n|---|---|---|---|---|---|")
     for name in options.only:
