@@ -311,6 +311,8 @@ class AccuracyDefaults(Options):
     """Points a side at which logs of a scene without a sensor are compared."""
     frames: Annotated[int, Option(2, 100_000, "frames", "two seconds at 30 frames a second")] = 60
     """Frames of a scene without a sensor."""
+    flattest: Annotated[float, Option(1e-9, 1e-2, "-", "rounding of the squares that it divides")] = 1e-5
+    """Of a field across a front (``tiers/fronts.py``): least slope, as a share of that in the other direction."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -54,8 +54,9 @@ class State:
 class StepResult:
     """What happened in one step; fields on the whole grid [ny, nx], z into the finger.
 
-    ``displacement`` [3, ny, nx] m of the finger's surface; ``force`` [3, ny, nx] N on each cell by the object;
-    ``slip`` [2, ny, nx] m of the finger against the object within this step, zero outside contact; ``contact``,
+    ``displacement`` [3, ny, nx] m of the finger's surface; ``force`` [3, ny, nx] N on each cell by the object, and
+    ``limit`` [ny, nx] N what friction lets it be along the surface; ``slip`` [2, ny, nx] m of the finger against the
+    object within this step, zero outside contact; ``contact``,
     ``at_limit`` (contact factor) and ``moved`` (kinematic slip); ``pose`` [3] and ``approach`` of the object;
     ``sliding``: nothing sticks; ``residual`` of the natural map (share of the largest limit), ``normal_residual``
     (share of the indentation), ``imbalance`` (share of μF_N); ``iterations`` (Newton steps), ``applications`` of
@@ -64,6 +65,7 @@ class StepResult:
 
     displacement: FloatArray
     force: FloatArray
+    limit: FloatArray
     slip: FloatArray
     contact: BoolArray
     at_limit: BoolArray
@@ -265,6 +267,7 @@ class QuasiStatic:
         return StepResult(
             displacement=after.elastic + creep,
             force=np.stack((*after.stress.traction, after.stress.pressure)) * self.grid.cell_area,
+            limit=after.stress.limit * self.grid.cell_area,
             slip=slip,
             contact=contact,
             at_limit=at_limit,

@@ -15,6 +15,7 @@ from slipcore.contact.progress import Progress, unheard
 from slipcore.contact.solver.normal import solve_normal
 from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
 from slipcore.contact.solver.resolution import summary
+from slipcore.contact.tiers.free_grid import FreeSensorGrid, free_grid
 from slipcore.contact.tiers.load_steps import load_steps
 from slipcore.contact.tiers.sampling import (
     FrameRecord,
@@ -35,11 +36,17 @@ class Fidelity:
 
     Where pressing moves the surface sideways there are more load steps: in none the contact becomes wider by more than
     such a cell, or than a ``substeps``-th of it.
+
+    ``aligned``: cells are so small a part of a sensor element, an odd one, that points are cell centres, and there may
+    be more of them than ``cells``; the truth at a point is then exact, and the stick ratio counts cells. Otherwise
+    there are as many as said: displacement is interpolated, forces are shared by area, a point is what the cell around
+    it is, and the stick ratio is that of areas within their fronts. Without a sensor every cell is a point.
     """
 
     cells: int = FIDELITY.cells
     substeps: int = FIDELITY.substeps
     tolerance: float = FIDELITY.tolerance
+    aligned: bool = True
 
     def __post_init__(self) -> None:
         if self.cells < 4 or self.substeps < 1 or not 0.0 < self.tolerance < 1.0:
@@ -53,7 +60,7 @@ def run(plan: Plan, fidelity: Fidelity | None = None, progress: Progress = unhea
     """
     fidelity = Fidelity() if fidelity is None else fidelity
     began = time.perf_counter()
-    where = sensor_grid(plan.sampling, PROBE.room * contact_reach(plan), fidelity.cells)
+    where = grid_of(plan, fidelity)
     gap_tolerance = FIDELITY.normal_share * fidelity.tolerance
     solver = QuasiStatic(plan.problem, where.grid, fidelity.tolerance, gap_tolerance, second_order=True)
     times = frame_times(plan)
@@ -70,8 +77,21 @@ def run(plan: Plan, fidelity: Fidelity | None = None, progress: Progress = unhea
     return grasp_log(plan, where, times, frames, metadata)
 
 
+def grid_of(plan: Plan, fidelity: Fidelity) -> SensorGrid | FreeSensorGrid:
+    """The grid of a run, with the sensor's points on it."""
+    reach = PROBE.room * contact_reach(plan)
+    if fidelity.aligned or plan.sampling is None:
+        return sensor_grid(plan.sampling, reach, fidelity.cells)
+    return free_grid(plan.sampling, reach, fidelity.cells)
+
+
 def _frames(
-    plan: Plan, solver: QuasiStatic, where: SensorGrid, times: FloatArray, fidelity: Fidelity, progress: Progress
+    plan: Plan,
+    solver: QuasiStatic,
+    where: SensorGrid | FreeSensorGrid,
+    times: FloatArray,
+    fidelity: Fidelity,
+    progress: Progress,
 ) -> tuple[list[FrameRecord], list[tuple[str, ...]]]:
     """Records of all frames, and of each load step what the grid does not resolve."""
     state, growth = solver.start(), 1.0 / (fidelity.cells * fidelity.substeps)

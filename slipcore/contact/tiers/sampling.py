@@ -9,6 +9,7 @@ from slipcore.contact.defaults import ACCURACY, CHEAP_TIERS
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.plan.plan import Plan, SamplingPlan
 from slipcore.contact.solver.quasi_static import StepResult
+from slipcore.contact.tiers.free_grid import FreeSensorGrid
 from slipcore.frames import BoolArray, FloatArray, GraspLog, GroundTruth
 
 
@@ -27,11 +28,19 @@ class SensorGrid:
         """Distance of points, m."""
         return self.cells * self.grid.pitch[0]
 
-    def at_points(self, field: FloatArray | BoolArray) -> FloatArray | BoolArray:
+    def at_points(self, field: FloatArray) -> FloatArray:
         """Values [..., n, m] of a field [..., ny, nx] at the points, x along the first axis."""
         inside = field[..., *self._inside()]
         middle = self.cells // 2
         return np.swapaxes(inside[..., middle :: self.cells, middle :: self.cells], -1, -2)
+
+    def holds_at_points(self, mask: BoolArray) -> BoolArray:
+        """Whether a mask [..., ny, nx] holds at the points [..., n, m]."""
+        return self.at_points(mask.view(np.uint8)).astype(bool)
+
+    def stick_ratio(self, result: StepResult) -> float:
+        """Stick area over contact area, by cells."""
+        return result.stick_ratio
 
     def over_elements(self, field: FloatArray) -> FloatArray:
         """Sums [..., n, m] of a field [..., ny, nx] over the elements around the points."""
@@ -90,7 +99,7 @@ class FrameRecord:
     stick_ratio: float
 
 
-def frame_record(grid: SensorGrid, steps: Sequence[StepResult]) -> FrameRecord:
+def frame_record(grid: SensorGrid | FreeSensorGrid, steps: Sequence[StepResult]) -> FrameRecord:
     """What the sensor sees at the end of the steps since the last frame; a point moved if it did in any of them."""
     last = steps[-1]
     outward = np.array([1.0, 1.0, -1.0])
@@ -99,21 +108,25 @@ def frame_record(grid: SensorGrid, steps: Sequence[StepResult]) -> FrameRecord:
         displacement=np.moveaxis(grid.at_points(last.displacement), 0, -1) * outward,
         force=np.moveaxis(grid.over_elements(last.force), 0, -1) * outward,
         pose=last.pose,
-        contact=np.asarray(grid.at_points(last.contact), dtype=bool),
-        moved=np.asarray(grid.at_points(moved), dtype=bool),
-        at_limit=np.asarray(grid.at_points(last.at_limit), dtype=bool),
-        stick_ratio=last.stick_ratio,
+        contact=grid.holds_at_points(last.contact),
+        moved=grid.holds_at_points(moved),
+        at_limit=grid.holds_at_points(last.at_limit),
+        stick_ratio=grid.stick_ratio(last),
     )
 
 
-def untouched(grid: SensorGrid) -> FrameRecord:
+def untouched(grid: SensorGrid | FreeSensorGrid) -> FrameRecord:
     """A frame before anything touches."""
     nothing, none = np.zeros((*grid.points, 3)), np.zeros(grid.points, dtype=bool)
     return FrameRecord(nothing, nothing, np.zeros(3), none, none, none, float("nan"))
 
 
 def grasp_log(
-    plan: Plan, grid: SensorGrid, time: FloatArray, frames: Sequence[FrameRecord], metadata: dict[str, str]
+    plan: Plan,
+    grid: SensorGrid | FreeSensorGrid,
+    time: FloatArray,
+    frames: Sequence[FrameRecord],
+    metadata: dict[str, str],
 ) -> GraspLog:
     """The log of all frames, with truth and before any observation effect."""
     force = np.stack([frame.force for frame in frames])
