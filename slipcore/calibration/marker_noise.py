@@ -49,7 +49,11 @@ def _bounded(name: tuple[str, str], value: float, half: float, most: float) -> E
 
 
 def _mean_squares(presses: list[Press]) -> FloatArray:
-    """Mean square of each element's change over 1 … lags frames, [lags, k] m², of all presses."""
+    """Mean square of each element's change over 1 … lags frames, [lags, k] m², of all presses.
+
+    Only up to the first lag that no two free frames lie apart, as where as many are free before a press as after it.
+    What is taken off as common, the mean over k elements, holds a share 1/k of the variance of their own noise.
+    """
     lags = max(1, min(ESTIMATE.noise_lags, *(_longest_lag(press) for press in presses)))
     elements = presses[0].log.grid[0] * presses[0].log.grid[1]
     sums, pairs = np.zeros((lags, elements)), np.zeros(lags)
@@ -59,7 +63,9 @@ def _mean_squares(presses: list[Press]) -> FloatArray:
         each = [_change(still, press.free, lag) for lag in range(1, lags + 1)]
         sums += [total for total, _ in each]
         pairs += [count for _, count in each]
-    shared: FloatArray = sums / np.maximum(pairs, 1.0)[:, None]
+    known = max(1, int(np.cumprod(pairs > 0.0).sum()))
+    own = max(1.0 - 1.0 / elements, 1.0 / elements)
+    shared: FloatArray = sums[:known] / np.maximum(pairs[:known], 1.0)[:, None] / own
     return shared
 
 

@@ -86,7 +86,9 @@ def find_press(log: GraspLog) -> Press:
     level, noise = _level(field.reshape(len(log), -1))
     touched = level > max(PRESS.free_share * level.max(), PRESS.free_noise * noise)
     for _ in range(PRESS.guard):
-        touched[1:], touched[:-1] = touched[1:] | touched[:-1], touched[:-1] | touched[1:]
+        before = touched.copy()
+        touched[1:] |= before[:-1]
+        touched[:-1] |= before[1:]
     return Press(log, level, ~touched)
 
 
