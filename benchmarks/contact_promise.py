@@ -37,7 +37,7 @@ LEAST_KEPT, LARGEST_RATIO = 0.95, 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Promise:
+class AccuracyRequest:
     """One request: the accuracy ``asked``, ``estimated`` and ``true``, and the processor ``seconds`` it took."""
 
     case: str
@@ -72,18 +72,18 @@ def cases() -> Iterator[tuple[str, Plan, Callable[[], GraspLog]]]:
         yield name, plan, lambda plan=plan: boundary_elements.run(plan, FINE)
 
 
-def ask(name: str, plan: Plan, truth: GraspLog, asked: float) -> Promise:
+def ask(name: str, plan: Plan, truth: GraspLog, asked: float) -> AccuracyRequest:
     """One request against the truth."""
     began = time.process_time()
     found = simulate_to(plan, accuracy=asked)
     seconds = time.process_time() - began
     true = difference(found.log, truth).largest
-    return Promise(name, asked, found.error.largest, true, seconds, found.fidelity.cells)
+    return AccuracyRequest(name, asked, found.error.largest, true, seconds, found.fidelity.cells)
 
 
-def campaign(path: Path) -> list[Promise]:
+def campaign(path: Path) -> list[AccuracyRequest]:
     """All requests; those in ``path`` are not made again."""
-    known = [Promise(**entry) for entry in json.loads(path.read_text())] if path.exists() else []
+    known = [AccuracyRequest(**entry) for entry in json.loads(path.read_text())] if path.exists() else []
     done = {(promise.case, promise.asked) for promise in known}
     for name, plan, truth in cases():
         wanted = ASKED if name.startswith("sphere ") else ASKED[:-1]
@@ -98,7 +98,7 @@ def campaign(path: Path) -> list[Promise]:
     return known
 
 
-def table(promises: list[Promise]) -> str:
+def table(promises: list[AccuracyRequest]) -> str:
     """For each accuracy and kind of truth: how often it was kept, how far the worst was off, what it took."""
     lines = ["| truth | asked | cases | kept | worst true/asked | median true/asked | median seconds |"]
     lines.append("|---|---|---|---|---|---|---|")
@@ -114,7 +114,7 @@ def table(promises: list[Promise]) -> str:
     return "\n".join(lines)
 
 
-def picture(promises: list[Promise]) -> Figure:
+def picture(promises: list[AccuracyRequest]) -> Figure:
     """True error over the asked one, with what is promised."""
     figure = Figure(figsize=(7.0, 4.2), layout="constrained")
     axes = figure.subplots()

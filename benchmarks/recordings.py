@@ -70,7 +70,7 @@ class Found:
 
 
 @dataclass(frozen=True, slots=True)
-class Compared:
+class ThicknessComparison:
     """How forces agree by a gel of some thickness, m; ``totals`` [2, t] N: own normal force and that by the gel."""
 
     recording: str
@@ -134,15 +134,15 @@ def find(name: str, log: GraspLog, history: SlipHistory) -> Found:
     )
 
 
-def compare(name: str, log: GraspLog, thickness: float) -> Compared:
+def compare(name: str, log: GraspLog, thickness: float) -> ThicknessComparison:
     """A sensor's own forces beside those by a gel of some thickness."""
     assert log.force is not None
     found = reconstruct(log, Gel(YOUNG_MODULUS, POISSON_RATIO, thickness))
     totals = np.stack([-force[..., 2].sum(axis=(1, 2)) for force in (log.force, found.force)])
-    return Compared(name, thickness, compare_forces(log, found), totals)
+    return ThicknessComparison(name, thickness, compare_forces(log, found), totals)
 
 
-def draw_totals(compared: list[Compared]) -> Figure:
+def draw_totals(compared: list[ThicknessComparison]) -> Figure:
     """Normal force over frames: the sensor's own, and by the gel that agrees best, to the same scale."""
     figure = Figure(figsize=(9.0, 3.2), layout="constrained")
     names = list(dict.fromkeys(each.recording for each in compared))
@@ -177,7 +177,7 @@ def share(value: float) -> str:
     return "–" if np.isnan(value) else f"{value:.1%}"
 
 
-def tables(met: list[Met], found: list[Found], compared: list[Compared]) -> dict[str, str]:
+def tables(met: list[Met], found: list[Found], compared: list[ThicknessComparison]) -> dict[str, str]:
     """What was met, what was found and how forces agree, in Markdown."""
     columns = ("recording", "frames", "seconds", "dropped", "largest gap, s", "gated frames", "largest normal force, N")
     rows = [list(asdict(entry).values()) for entry in met]

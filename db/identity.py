@@ -25,7 +25,7 @@ REMEDY = "name the database and the data folder (or object store) of one service
 
 
 @dataclass(frozen=True, slots=True)
-class Adopted:
+class AdoptedStore:
     """What was joined by hand: how many files are there, to how many the database refers, and how many of them miss."""
 
     store_id: str
@@ -98,7 +98,7 @@ def _known_in_any_schema(database: Database) -> str | None:
         return stores.find_id(session) if stores.has_table(session) else None
 
 
-def adopt(database: Database, blobs: BlobStore, actor: Actor | None) -> Adopted:
+def adopt(database: Database, blobs: BlobStore, actor: Actor | None) -> AdoptedStore:
     """Join two because somebody says so, under a new id: whatever else worked with either is refused from then on.
 
     The audit trail tells that ``actor`` did so; None: the caller, who is about to fill the tables, adds that entry.
@@ -112,7 +112,7 @@ def adopt(database: Database, blobs: BlobStore, actor: Actor | None) -> Adopted:
         if actor is not None:
             audit.add(session, actor, "store.adopted", store_id, {"referenced": referenced, "missing": missing})
     database.store_id = blobs.store_id = store_id
-    return Adopted(store_id, present, referenced, missing)
+    return AdoptedStore(store_id, present, referenced, missing)
 
 
 def count_files(session: Session, blobs: BlobStore) -> tuple[int, int, int]:

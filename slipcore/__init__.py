@@ -27,14 +27,14 @@ from slipcore.slip_state import EventList, SlipEvents, SlipHistory, SlipState
 from slipcore.warm_up import warm_up
 
 if TYPE_CHECKING:
-    from slipcore.calibration import Estimate, ImpurePress, SensorModel, calibrate_sensor
+    from slipcore.calibration import Estimate, InvalidPress, SensorModel, calibrate_sensor
     from slipcore.detection.batch import FixedLagSmoother, collect_history, detect_slip
     from slipcore.detection.detector import DetectorState, SlipDetector
     from slipcore.detection.methods import METHODS
 
 _LAZY = {
     "Estimate": "slipcore.calibration",
-    "ImpurePress": "slipcore.calibration",
+    "InvalidPress": "slipcore.calibration",
     "SensorModel": "slipcore.calibration",
     "calibrate_sensor": "slipcore.calibration",
     "FixedLagSmoother": "slipcore.detection.batch",
@@ -45,7 +45,7 @@ _LAZY = {
     "METHODS": "slipcore.detection.methods",
 }
 """Names whose modules load compiled kernels, a second of work: who only holds logs and results goes without."""
-_DEPRECATED = {"Hindsight": "FixedLagSmoother"}
+_DEPRECATED = {"Hindsight": "FixedLagSmoother", "ImpurePress": "InvalidPress"}
 """Former names, understood until the next version."""
 
 __version__ = version("stiction")
@@ -68,8 +68,8 @@ __all__ = [
     "FrictionSamples",
     "GraspLog",
     "GroundTruth",
-    "ImpurePress",
     "InvalidInput",
+    "InvalidPress",
     "NoForces",
     "Option",
     "Patch",

@@ -11,7 +11,7 @@ from service.cli.output import plain, print_json, print_table, printable
 from service.cli.progress import counted, patience
 
 if TYPE_CHECKING:
-    from service.slip_benchmark.running import Ran
+    from service.slip_benchmark.running import PredictionRun
     from service.slip_benchmark.scoring import Scores
 
 app = typer.Typer(help="The open slip benchmark, of simulated grasps (docs/slip-benchmark.md).", no_args_is_help=True)
@@ -87,7 +87,7 @@ def run(
         raise typer.Exit(INPUT_REFUSED)
 
 
-def _print_run(ran: "list[Ran]", count: int) -> None:
+def _print_run(ran: "list[PredictionRun]", count: int) -> None:
     methods = dict.fromkeys(each.method for each in ran)
     own = {method: [each for each in ran if each.method == method] for method in methods}
     rows = [

@@ -25,7 +25,7 @@ GelFile = Annotated[
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class InspectedLog:
     """A log as it was looked at, the slip in it, the ``seconds`` of detection, and what is known of forces that are
     not the sensor's own.
     """
@@ -50,7 +50,9 @@ class Seen:
         return [*said(self.reconstruction), *check_log(self.log, self.history)]
 
 
-def look(log: "GraspLog", method: str | None = None, sensor_model: Path | None = None, gel: Path | None = None) -> Seen:
+def look(
+    log: "GraspLog", method: str | None = None, sensor_model: Path | None = None, gel: Path | None = None
+) -> InspectedLog:
     """Correct a log, reconstruct forces that it lacks, and detect slip in it."""
     from slipcore import LOOKAHEAD, detect_slip
     from slipcore.defaults import DEFAULT_METHOD
@@ -60,7 +62,7 @@ def look(log: "GraspLog", method: str | None = None, sensor_model: Path | None =
     log, reconstruction = _with_forces(log, gel)
     begin = perf_counter()
     history = detect_slip(log, method=method, lookahead=LOOKAHEAD, sensor_model=None, **options)
-    return Seen(log, history, perf_counter() - begin, reconstruction)
+    return InspectedLog(log, history, perf_counter() - begin, reconstruction)
 
 
 def comparison(log: "GraspLog", gel: Path | None) -> "ForceComparison | None":

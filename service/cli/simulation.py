@@ -84,12 +84,12 @@ def campaign(
     json: Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")] = False,
 ) -> None:
     """Simulate many grasps, each scene with many seeds, on all cores or on a Dask cluster."""
-    from service.jobs.campaign import Promise, run, workers
+    from service.jobs.campaign import RequestedAccuracy, run, workers
     from slipcore.contact import Scene
 
     wanted = [Scene.from_toml(scene) for scene in scenes]
     with workers(processes or os.cpu_count() or 1, dask_address) as executor:
-        outcomes = run(executor, wanted, range(seeds), output, Promise(accuracy, seconds, tier))
+        outcomes = run(executor, wanted, range(seeds), output, RequestedAccuracy(accuracy, seconds, tier))
         made = list(counted(outcomes, len(wanted) * seeds, "logs"))
     _print_campaign(made, output, json)
     if any(outcome.refused for outcome in made):

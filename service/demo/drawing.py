@@ -14,7 +14,7 @@ from stiction_client import FrictionModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class DetectedGrasp:
     """A demo log with what is detected in it."""
 
     entry: DemoLog
@@ -22,23 +22,23 @@ class Seen:
     samples: FrictionSamples
 
 
-def see(logs: Sequence[DemoLog], progress: Progress) -> list[Seen]:
+def see(logs: Sequence[DemoLog], progress: Progress) -> list[DetectedGrasp]:
     """Detect slip in every log and collect its samples."""
     seen = []
     for entry in progress.track(logs, description="detect again, for the pictures"):
         history = detect_slip(entry.log, lookahead=LOOKAHEAD)
-        seen.append(Seen(entry, history, collect_samples(entry.log, history)))
+        seen.append(DetectedGrasp(entry, history, collect_samples(entry.log, history)))
     return seen
 
 
-def draw_grasps(seen: Sequence[Seen]) -> list[Picture]:
+def draw_grasps(seen: Sequence[DetectedGrasp]) -> list[Picture]:
     """Stick-slip maps and stick ratio of every real recording and of one simulated grasp a material."""
     simulated = {grasp.entry.material: grasp for grasp in seen if grasp.entry.truth is not None}
     shown = [*(grasp for grasp in seen if grasp.entry.truth is None), *simulated.values()]
     return [_draw_grasp(grasp) for grasp in shown]
 
 
-def draw_models(answers: Sequence[Answer], seen: Sequence[Seen]) -> list[Picture]:
+def draw_models(answers: Sequence[Answer], seen: Sequence[DetectedGrasp]) -> list[Picture]:
     """The models that the tables tell of: by the first method over the samples, by the last one as what it believes."""
     pictures = []
     for answer in answers:
@@ -48,12 +48,12 @@ def draw_models(answers: Sequence[Answer], seen: Sequence[Seen]) -> list[Picture
     return pictures
 
 
-def _draw_grasp(grasp: Seen) -> Picture:
+def _draw_grasp(grasp: DetectedGrasp) -> Picture:
     figure = slip_over_time(grasp.entry.log, grasp.history, "")
     return Picture(f"{grasp.entry.name}: contact, stick and slip over time, and the stick ratio.", figure)
 
 
-def _draw_model(method: str, model: FrictionModel, grasps: Sequence[Seen]) -> Picture:
+def _draw_model(method: str, model: FrictionModel, grasps: Sequence[DetectedGrasp]) -> Picture:
     material, truth = grasps[0].entry.material, grasps[0].entry.truth
     if method == METHODS[0]:
         samples = FrictionSamples.concatenate([grasp.samples for grasp in grasps])

@@ -134,8 +134,8 @@ def _hashes(context: Context, sensor: str, presses: Sequence[CalibrationPress], 
 
 def _with_ids(error: SlipcoreError, presses: Sequence[CalibrationPress]) -> str:
     """What was wrong, with the ids of the logs in which it was seen."""
-    from slipcore import ImpurePress
+    from slipcore import InvalidPress
 
-    if not isinstance(error, ImpurePress):
+    if not isinstance(error, InvalidPress):
         return str(error)
     return "; ".join(f"{presses[number].grasp_log}: {seen}" for number, seen in error.evidence.items())

@@ -11,7 +11,7 @@ Averaged = Literal["element", "contact"]
 
 
 @dataclass(frozen=True, slots=True)
-class Question:
+class FrictionQuery:
     """Tangential velocity m/s, normal force of an element N, and a quantile in (0, 1) or None for the mean.
 
     ``of``: one "element", or the mean over the ``elements`` of a "contact".
@@ -48,7 +48,7 @@ class Friction(NamedTuple):
     advice: str
 
 
-def look_up(known: KnownModel, question: Question) -> Friction:
+def look_up(known: KnownModel, question: FrictionQuery) -> Friction:
     """The answer of a material's current model."""
     v, f_n = question.tangential_velocity, question.normal_force
     stored, model = known.stored, known.model

@@ -28,7 +28,7 @@ from service.http.problems import (
     Problem,
 )
 from service.http.rate_limit import RateLimit
-from service.processes.fair_queue import PatientQueue
+from service.processes.fair_queue import UnboundedFairQueue
 from service.settings import Settings
 
 KEPT_SECONDS = 2.0
@@ -52,7 +52,7 @@ class KeyCache:
     def __init__(self) -> None:
         self._kept: dict[str, tuple[AccessKey, float]] = {}
         self._sessions: dict[str, tuple[AccessKey, float]] = {}
-        self._looks = PatientQueue(LOOKS_AT_ONCE, "looked up", share=LOOKS_AT_ONCE // 2)
+        self._looks = UnboundedFairQueue(LOOKS_AT_ONCE, "looked up", share=LOOKS_AT_ONCE // 2)
 
     async def find(self, database: Database, text: str, address: str) -> AccessKey | None:
         """The key with this text, if it is a valid one."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from service.domain.context import Context
 from service.jobs.scrub import Scrub
 from service.observability.store_watch import StoreWatch
-from service.processes.fair_queue import FairQueue, OpenEndedQueue, PatientQueue
+from service.processes.fair_queue import AdaptiveShareQueue, FairQueue, UnboundedFairQueue
 from service.stream.sessions import Streams
 
 LONG_ANSWERS = 16
@@ -20,15 +20,15 @@ LONG_BODIES = 4
 
 
 def _room_for_answers() -> FairQueue:
-    return OpenEndedQueue(LONG_ANSWERS, "answered")
+    return AdaptiveShareQueue(LONG_ANSWERS, "answered")
 
 
 def _turns_of_routes() -> FairQueue:
-    return PatientQueue(ROUTES_AT_ONCE, "answered", share=1)
+    return UnboundedFairQueue(ROUTES_AT_ONCE, "answered", share=1)
 
 
 def _turns_of_bodies() -> FairQueue:
-    return PatientQueue(LONG_BODIES, "parsed", share=1)
+    return UnboundedFairQueue(LONG_BODIES, "parsed", share=1)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from service.http.authentication import Authenticator
-from service.processes.fair_queue import PatientQueue
+from service.processes.fair_queue import UnboundedFairQueue
 
 START_SECONDS = 0.001
 """s at least between the starts of two requests of one client, of which none then begins in the other's round."""
@@ -32,7 +32,7 @@ class FairStarts:
     def __init__(self, app: ASGIApp, authenticator: Authenticator) -> None:
         self.app = app
         self._client = authenticator.starts_as
-        self._turns = PatientQueue(CLIENTS_AT_ONCE, "begun", share=1)
+        self._turns = UnboundedFairQueue(CLIENTS_AT_ONCE, "begun", share=1)
         self._next: dict[str, float] = {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

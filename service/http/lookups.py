@@ -14,7 +14,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from db.errors import NotFound, StorageUnavailable
 from service.domain.context import Context
 from service.domain.errors import NoModel
-from service.domain.look_up import Question, look_up
+from service.domain.look_up import FrictionQuery, look_up
 from service.domain.model_cache import KnownModel
 from service.http.authentication import Authenticator
 from service.http.conditional import is_one_of, unchanged, whole
@@ -116,7 +116,7 @@ class Lookups:
         except (NotFound, NoModel, StorageUnavailable):
             return None
 
-    def _kept_or_made(self, known: KnownModel, question: Question | None, scope: Scope) -> CachedResponse:
+    def _kept_or_made(self, known: KnownModel, question: FrictionQuery | None, scope: Scope) -> CachedResponse:
         """The answer to a question, made where nobody asked it yet so; without one, to who has the answer already."""
         key = known.tag, None if question is None else scope["query_string"], scope["scheme"]
         answer = self._kept.get(key)
@@ -132,7 +132,7 @@ class Lookups:
 
 
 @lru_cache(maxsize=4096)
-def _read(query: bytes) -> tuple[str, Question] | None:
+def _read(query: bytes) -> tuple[str, FrictionQuery] | None:
     """Method and question of a query, None for one that has to be refused."""
     if b"%00" in query:
         return None
@@ -140,4 +140,4 @@ def _read(query: bytes) -> tuple[str, Question] | None:
         asked = LookUpQuery.model_validate(dict(parse_qsl(query.decode("latin-1"), keep_blank_values=True)))
     except ValueError:  # pydantic's, or of the address
         return None
-    return asked.method, Question(asked.v, asked.fn, asked.quantile, *asked.averaged())
+    return asked.method, FrictionQuery(asked.v, asked.fn, asked.quantile, *asked.averaged())

@@ -3,188 +3,188 @@
 from typing import NamedTuple
 
 
-class Meaning(NamedTuple):
+class Explanation(NamedTuple):
     """When a problem comes, and what to do about it; the latter may go without saying."""
 
     when: str
     remedy: str
 
 
-MEANINGS: dict[str, Meaning] = {
-    "bad-request": Meaning(
+MEANINGS: dict[str, Explanation] = {
+    "bad-request": Explanation(
         "The request cannot be understood as HTTP for this service.",
         "Mend the request.",
     ),
-    "upload-interrupted": Meaning(
+    "upload-interrupted": Explanation(
         "The connection ended before the whole body was there. Nothing is stored.",
         "Send it again.",
     ),
-    "key-required": Meaning(
+    "key-required": Explanation(
         "No access key was sent.",
         "`Authorization: Bearer KEY` (api.md).",
     ),
-    "invalid-key": Meaning(
+    "invalid-key": Explanation(
         "The access key is unknown, revoked, expired or garbled.",
         "Ask for a new one.",
     ),
-    "insufficient-scope": Meaning(
+    "insufficient-scope": Explanation(
         "The key may do less than this; `detail` says what it is for and what is needed.",
         "Use a key with that scope.",
     ),
-    "cross-site-request": Meaning(
+    "cross-site-request": Explanation(
         "A request without a key would change something or open a stream, and a browser sent it for a "
         "page of another site (`Sec-Fetch-Site`, `Origin`).",
         "Ask from the service's own pages or from a program; send a key.",
     ),
-    "not-owner": Meaning(
+    "not-owner": Explanation(
         "The material has owners (`owners` lists them), and the key is none of them.",
         "Let one of them, or an admin, add the key or its group (api.md).",
     ),
-    "unknown-route": Meaning(
+    "unknown-route": Explanation(
         "There is nothing under this path.",
         "See api.md.",
     ),
-    "unknown-material": Meaning(
+    "unknown-material": Explanation(
         "No material has this name or alias.",
         "`POST /v1/materials` first; `stiction upload --create` and the form of an upload can make it, too.",
     ),
-    "unknown-alias": Meaning(
+    "unknown-alias": Explanation(
         "The material has no such alias (its own name is none).",
         "",
     ),
-    "unknown-owner": Meaning(
+    "unknown-owner": Explanation(
         "The material has no such owner.",
         "",
     ),
-    "unknown-calibration": Meaning(
+    "unknown-calibration": Explanation(
         "The sensor has no calibration of this version.",
         "`GET /v1/sensors/{name}/calibrations` lists them.",
     ),
-    "unknown-sensor": Meaning(
+    "unknown-sensor": Explanation(
         "No sensor has this name: no log came from it, and nobody described it.",
         "",
     ),
-    "unknown-grasp-log": Meaning(
+    "unknown-grasp-log": Explanation(
         "No grasp log has this id.",
         "",
     ),
-    "unknown-job": Meaning(
+    "unknown-job": Explanation(
         "No job has this id.",
         "",
     ),
-    "method-not-allowed": Meaning(
+    "method-not-allowed": Explanation(
         "The path exists but not for this method; `Allow` lists those it takes.",
         "",
     ),
-    "material-exists": Meaning(
+    "material-exists": Explanation(
         "A material of this name, or with such an alias, is there already.",
         "Use it, or choose another name.",
     ),
-    "no-model": Meaning(
+    "no-model": Explanation(
         "The material has no model by this method yet.",
         "Upload logs with slip and forces, or ask for a fit; look at the jobs' `reason`.",
     ),
-    "no-feasible-force": Meaning(
+    "no-feasible-force": Explanation(
         "No normal force holds the load; `largest_load` is the most that is held, at `normal_force` N; "
         "`cause` says whether physics, the limit, the range of the data (up to `largest_observed` N an element) "
         "or ignorance is why (client).",
         "Do not lift it so: more contact area, more fingers; or record what the cause asks for.",
     ),
-    "job-ended": Meaning(
+    "job-ended": Explanation(
         "The job has ended, so it cannot be cancelled any more.",
         "Look at its `status`.",
     ),
-    "not-ready": Meaning(
+    "not-ready": Explanation(
         "The log's job has not got to this result, or failed before it.",
         "Look at the job; ask again once it is done.",
     ),
-    "request-timeout": Meaning(
+    "request-timeout": Explanation(
         "The body came too slowly: less than 10 kB/s beyond 20 s of patience. Nothing is stored.",
         "Send it over a better connection.",
     ),
-    "file-deleted": Meaning(
+    "file-deleted": Explanation(
         "The log is known, but its upload was old and is deleted.",
         "Send the same file again, which brings it back.",
     ),
-    "upload-too-large": Meaning(
+    "upload-too-large": Explanation(
         "The body is larger than the service takes, or unpacks to more or to too many times its size (settings.md).",
         "Cut the recording.",
     ),
-    "unsupported-format": Meaning(
+    "unsupported-format": Explanation(
         "The content type, content encoding or the file itself is none that the service reads, or its "
         "library is not installed (`allowed` names the extra that brings it).",
         "See formats.md.",
     ),
-    "misdirected-request": Meaning(
+    "misdirected-request": Explanation(
         "A request without a key from this machine names another host: a web page may have made its name lead here.",
         "Ask `localhost` or `127.0.0.1`; send a key.",
     ),
-    "invalid-grasp-log": Meaning(
+    "invalid-grasp-log": Explanation(
         "The file is of a known format, but its content cannot be a grasp log: wrong shapes, numbers "
         "that are not finite, time that runs backwards, a single frame, absurd units, a truncated file.",
         "`name`, `value` and `allowed` say what is wrong.",
     ),
-    "invalid-samples": Meaning(
+    "invalid-samples": Explanation(
         "Friction samples of which nothing can be told: too few, or of no slip.",
         "`detail` says what is wrong.",
     ),
-    "invalid-request": Meaning(
+    "invalid-request": Explanation(
         "A parameter or a field of the body is missing or outside its range.",
         "`name`, `value` and `allowed` say what is wrong.",
     ),
-    "idempotency-key-reused": Meaning(
+    "idempotency-key-reused": Explanation(
         "Something else was asked under this `Idempotency-Key`. Nothing is done.",
         "Use a new key for a new request.",
     ),
-    "too-many-requests": Meaning(
+    "too-many-requests": Explanation(
         "One key, or one address, asks more often than is set (settings.md).",
         "Try again after `Retry-After` seconds.",
     ),
-    "quota-exceeded": Meaning(
+    "quota-exceeded": Explanation(
         "One key has as many jobs queued, or logs or changes of the last day, as it may (settings.md).",
         "Try again after `Retry-After` seconds.",
     ),
-    "headers-too-large": Meaning(
+    "headers-too-large": Explanation(
         "The headers have more than 16 kB.",
         "Send fewer.",
     ),
-    "file-damaged": Meaning(
+    "file-damaged": Explanation(
         "A stored file has other bytes than those that it was stored with (operations.md); nothing of it is sent.",
         "Send the same upload again, or take the file from a backup.",
     ),
-    "internal-error": Meaning(
+    "internal-error": Explanation(
         "A defect of the service.",
         "Its log has the traceback.",
     ),
-    "too-many-connections": Meaning(
+    "too-many-connections": Explanation(
         "`STICTION_MAX_CONNECTIONS` are open already.",
         "Try again after `Retry-After` seconds, and keep connections open in place of making new ones.",
     ),
-    "too-many-uploads": Meaning(
+    "too-many-uploads": Explanation(
         "Too many files wait to be read already, or the server found no room for this one within 30 s "
         "(settings.md, `STICTION_READERS` and `STICTION_READING_BYTES`); or as many answers with long arrays or "
         "with files made for them are being sent as may be.",
         "Try again after `Retry-After` seconds, with fewer requests at once.",
     ),
-    "stopping": Meaning(
+    "stopping": Explanation(
         "The server was told to stop, and the request was not done within `STICTION_SHUTDOWN_SECONDS`. "
         "What it was to store may be stored.",
         "Ask again; an upload of the same content is stored once.",
     ),
-    "workers-not-ready": Meaning(
+    "workers-not-ready": Explanation(
         "Of `/readyz`: the workers are still warming up, or they take no jobs any more because the "
         "database is of a newer version.",
         "Wait; or run the newer version.",
     ),
-    "file-missing": Meaning(
+    "file-missing": Explanation(
         "A file that a row refers to is not where files are kept: somebody or something deleted it.",
         "Restore it from a backup, or send the same upload again; `stiction db check` lists all that are missing.",
     ),
-    "storage-unavailable": Meaning(
+    "storage-unavailable": Explanation(
         "The database or the blob folder cannot be used now: locked, full, gone.",
         "Try again after `Retry-After` seconds.",
     ),
-    "storage-quota-exceeded": Meaning(
+    "storage-quota-exceeded": Explanation(
         "One key has as many bytes of uploads stored as it may (settings.md).",
         "Ask for a larger quota, or for old uploads to be deleted.",
     ),

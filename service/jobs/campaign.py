@@ -29,7 +29,7 @@ CONNECT_SECONDS = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class Promise:
+class RequestedAccuracy:
     """What each log is simulated to, as ``slipcore.contact.simulate`` takes it: ``seconds`` in s."""
 
     accuracy: float | None = None
@@ -80,7 +80,7 @@ def _cluster(address: str) -> Iterator[Executor]:
 
 
 def run(
-    executor: Executor, scenes: Sequence[Scene], seeds: Sequence[int], folder: Path, promise: Promise
+    executor: Executor, scenes: Sequence[Scene], seeds: Sequence[int], folder: Path, promise: RequestedAccuracy
 ) -> Iterator[Outcome]:
     """Simulate each scene with each seed that the folder lacks; what is there comes first, the others as they are made.
 
@@ -111,7 +111,7 @@ def _kept(done: Future[GraspLog], outcome: Outcome) -> Outcome:
     return outcome
 
 
-def _write_plan(folder: Path, scenes: Sequence[Scene], promise: Promise) -> None:
+def _write_plan(folder: Path, scenes: Sequence[Scene], promise: RequestedAccuracy) -> None:
     """Tell what the folder holds; more scenes may come to it, but none may change."""
     names = [_file_name(scene) for scene in scenes]
     for name in names:

@@ -59,7 +59,7 @@ SAMPLED_AT_INGEST = 30
 logs it takes their moments as they are, 0.2 ms a log, until a fit is asked for."""
 
 
-class Refused(Exception):
+class InsufficientData(Exception):
     """The data do not allow what the job is for; the message says why."""
 
 
@@ -122,7 +122,7 @@ def run_job(database: Database, blobs: BlobStore, claim: Claim, scatter_from_oth
     try:
         with traces.span(job.kind, job.trace, job=job.id):
             _take_through_the_stages(run)
-    except (Refused, SlipcoreError, EstimatorError) as refusal:
+    except (InsufficientData, SlipcoreError, EstimatorError) as refusal:
         with database.write() as session:
             jobs.finish(session, claim, "refused", reason=str(refusal), seconds=run.seconds)
         logger.info("job refused: %s", refusal, extra=logs.of(seconds=run.total))
@@ -138,7 +138,7 @@ def _take_through_the_stages(run: Run) -> None:
             jobs.finish(session, run.claim, "done", seconds=run.seconds)
         return
     if samples is not None and samples.none_because is not None:
-        raise Refused(samples.none_because)
+        raise InsufficientData(samples.none_because)
     fit_material(run)
 
 
@@ -176,7 +176,7 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
 
 
 def fit_material(run: Run) -> None:
-    """Moments or samples of all logs of a material → friction_model → material; raises ``Refused``."""
+    """Moments or samples of all logs of a material → friction_model → material; raises ``InsufficientData``."""
     _note_missing_moments(run)
     for _ in range(FITS_BESIDE_OTHERS):
         with run.stage("friction_model"):
@@ -219,7 +219,7 @@ def _scatter_prior(run: Run, session: Session, material_id: int) -> ScatterPrior
 def _fit(run: Run, parts: Sequence[SamplesOfLog], prior: ScatterPrior) -> list[FrictionModel]:
     """The models of the job's methods."""
     if not parts:
-        raise Refused("no grasp log of this material has friction samples yet")
+        raise InsufficientData("no grasp log of this material has friction samples yet")
     ingested = run.job.kind == "ingest"
     models = _all_that_fit(run, parts, prior) if ingested else [_fit_by(run, parts, run.job.method, len(parts), prior)]
     return with_change(models, [_moments(run, part) for part in parts])

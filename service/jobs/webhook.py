@@ -37,7 +37,7 @@ TIMEOUT = 10.0
 """s that a sending may take in all, whatever the address does: a process that ends waits for it."""
 
 
-class NotTaken(Exception):
+class DeliveryFailed(Exception):
     """The address did not take what it was sent."""
 
 
@@ -64,7 +64,7 @@ class Webhook:
         await self._thread.stop()
 
     def send_new(self) -> int:
-        """Send what is new and settled; returns how many entries the address took. Raises ``NotTaken``."""
+        """Send what is new and settled; returns how many entries the address took. Raises ``DeliveryFailed``."""
         self._begin()
         settled, taken = self._settled(), 0
         while not self._thread.is_stopping and self._leads():
@@ -104,7 +104,7 @@ class Webhook:
         try:
             self.send_new()
             self._pause = 0.0
-        except (NotTaken, DatabaseError) as reason:
+        except (DeliveryFailed, DatabaseError) as reason:
             self._pause = min(max(2.0 * self._pause, LOOK_SECONDS), LONGEST_PAUSE)
             self._next = time.monotonic() + self._pause
             logger.warning("webhook: %s; the next attempt is in %g s", reason, self._pause)
@@ -116,11 +116,11 @@ class Webhook:
             headers["stiction-signature"] = f"sha256={hmac.new(self._secret, content, hashlib.sha256).hexdigest()}"
         status = asyncio.run(_answer(str(self._url), content, headers))
         if not 200 <= status < 300:
-            raise NotTaken(f"the address answered {status} to entry {entry.id} of the audit trail")
+            raise DeliveryFailed(f"the address answered {status} to entry {entry.id} of the audit trail")
 
 
 async def _answer(url: str, content: bytes, headers: Mapping[str, str]) -> int:
-    """The status that the address answers a POST with; whatever else it says is not read. Raises ``NotTaken``."""
+    """The status that the address answers a POST with; whatever else it says is not read. Raises ``DeliveryFailed``."""
     import httpx  # a server without a webhook needs none
 
     try:
@@ -131,9 +131,9 @@ async def _answer(url: str, content: bytes, headers: Mapping[str, str]) -> int:
         ):
             return answer.status_code
     except TimeoutError as error:
-        raise NotTaken(f"the address took longer than {TIMEOUT:g} s") from error
+        raise DeliveryFailed(f"the address took longer than {TIMEOUT:g} s") from error
     except (httpx.HTTPError, httpx.InvalidURL) as error:  # whose texts may tell the address
-        raise NotTaken(f"the address cannot be reached ({type(error).__name__})") from error
+        raise DeliveryFailed(f"the address cannot be reached ({type(error).__name__})") from error
 
 
 def told(store: str | None, entry: AuditEntry) -> bytes:

@@ -22,7 +22,7 @@ OVERLAP = timedelta(seconds=60)
 """How long before another one a job may have ended and be seen after it: transactions end in their own order."""
 
 
-class Compared(Protocol):
+class ScrubProgress(Protocol):
     """What was compared of the stored files: bytes, and how often all of them."""
 
     bytes: int
@@ -74,7 +74,7 @@ class Metrics:
         self._horizon = now()
         self._counted: dict[str, datetime] = {}
 
-    def expose(self, database: Database, scrub: Compared | None = None) -> bytes:
+    def expose(self, database: Database, scrub: ScrubProgress | None = None) -> bytes:
         """Everything, as of now."""
         with self._lock:
             with database.read() as session:

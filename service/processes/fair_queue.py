@@ -112,7 +112,7 @@ class FairQueue:
             del self._waiting[owner]
 
 
-class OpenEndedQueue(FairQueue):
+class AdaptiveShareQueue(FairQueue):
     """For work that lasts as long as its owner likes, in pieces of one unit: an owner has half of what others leave.
 
     So there is some left for the next one, however many pieces the first few ask for and however long they keep them.
@@ -122,7 +122,7 @@ class OpenEndedQueue(FairQueue):
         return (self._taken[owner] + self._free + 1) // 2
 
 
-class PatientQueue(FairQueue):
+class UnboundedFairQueue(FairQueue):
     """For short work of requests, of which there are no more than connections: nobody is refused."""
 
     async def _wait(self, owner: str, turn: asyncio.Future[None]) -> None:  # noqa: ARG002

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from typing import TypeVar
 
-from service.processes.fair_queue import PatientQueue
+from service.processes.fair_queue import UnboundedFairQueue
 
 SHORT_AT_ONCE, LONG_AT_ONCE = 6, 2
 """Pieces of work that take some ms each, of which an owner has half at most, and of such as take seconds, of which each
@@ -25,7 +25,7 @@ class FairThreads:
     """
 
     def __init__(self) -> None:
-        self._short, self._long = (PatientQueue(many, "worked on") for many in (SHORT_AT_ONCE, LONG_AT_ONCE))
+        self._short, self._long = (UnboundedFairQueue(many, "worked on") for many in (SHORT_AT_ONCE, LONG_AT_ONCE))
         self._executor = ThreadPoolExecutor(SHORT_AT_ONCE + LONG_AT_ONCE, "for_clients")
 
     async def run(self, owner: str, do: Callable[..., Result], *arguments: object, is_long: bool = False) -> Result:

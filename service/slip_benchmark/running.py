@@ -34,7 +34,7 @@ MOST_SAID = 300
 
 
 @dataclass(frozen=True, slots=True)
-class Ran:
+class PredictionRun:
     """One method on one scene: ``seconds`` that it took, and why there is no prediction (``refused``)."""
 
     method: str
@@ -90,7 +90,7 @@ class Program:
             raise InvalidInput(self.name, f"ended by code {running.returncode}; it said: {told}", "code 0")
 
 
-def run(executor: Executor, folder: Path, detectors: Sequence[str], program: Program | None) -> Iterator[Ran]:
+def run(executor: Executor, folder: Path, detectors: Sequence[str], program: Program | None) -> Iterator[PredictionRun]:
     """Let each method predict each scene; what it said before is replaced.
 
     Raises ``InvalidInput`` for unknown detectors and a folder that does not hold all of its scenes.
@@ -105,7 +105,7 @@ def run(executor: Executor, folder: Path, detectors: Sequence[str], program: Pro
     for method in methods:
         shutil.rmtree(folder / files.RESULTS / _name(method), ignore_errors=True)
     tasks = [executor.submit(predict, folder, scene, methods) for scene in scenes]
-    ran: list[Ran] = []
+    ran: list[PredictionRun] = []
     for done in as_completed(tasks):
         ran += done.result()
         yield from done.result()
@@ -117,7 +117,7 @@ def _name(method: str | Program) -> str:
     return method if isinstance(method, str) else method.name
 
 
-def predict(folder: Path, scene: str, methods: Sequence[str | Program]) -> list[Ran]:
+def predict(folder: Path, scene: str, methods: Sequence[str | Program]) -> list[PredictionRun]:
     """What each method says of a scene, written; what one refuses is told."""
     ran = []
     for method in methods:
@@ -130,7 +130,7 @@ def predict(folder: Path, scene: str, methods: Sequence[str | Program]) -> list[
                 method.predict(seen, prediction)
         except (SlipcoreError, OSError) as error:
             refused = str(error)
-        ran.append(Ran(_name(method), scene, perf_counter() - began, refused))
+        ran.append(PredictionRun(_name(method), scene, perf_counter() - began, refused))
     return ran
 
 
@@ -155,7 +155,7 @@ def _friction(log: GraspLog, history: SlipHistory) -> dict[str, NDArray[Any]]:
     return {"friction": np.array(np.median(samples))} if len(samples) else {}
 
 
-def _tell(folder: Path, method: str | Program, ran: Sequence[Ran]) -> None:
+def _tell(folder: Path, method: str | Program, ran: Sequence[PredictionRun]) -> None:
     """What was run, beside its results."""
     record = {
         "method": _name(method),

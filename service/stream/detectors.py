@@ -63,7 +63,7 @@ class PackedFrame(NamedTuple):
     gripper_force_deviation: float | None = None
 
 
-class Room(NamedTuple):
+class MemoryLimit(NamedTuple):
     """Of all sessions together ``most_bytes``, of which one ``owner`` has half of what the others leave."""
 
     owner: str
@@ -83,7 +83,7 @@ class Session:
     position: NDArray[np.float64]
     element_area: float
     moments: "Moments"
-    room: Room
+    room: MemoryLimit
     kept: list[Frame] | None
     reported: list[float | None] = field(default_factory=list)
     report_deviation: float | None = None
@@ -113,7 +113,7 @@ _LOOKS = FairExecutor()
 """Does the looks for friction, so that frames need not wait for them."""
 
 
-class StillLooking(Exception):
+class FitInProgress(Exception):
     """A session's next look for friction is due, and its last one not done: the frame may come again in a moment."""
 
 
@@ -124,7 +124,7 @@ def open_session(
     area: float,
     method: str,
     keep: bool,
-    room: Room,
+    room: MemoryLimit,
     control: Control | None = None,
     model: "stiction_client.FrictionModel | None" = None,
     gel: Mapping[str, float | None] | None = None,
@@ -151,14 +151,14 @@ def open_session(
 def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[str, Any], bytes | None]:
     """Take a frame; the answer, and what those who watch see of it if it ``is_shown``.
 
-    The same frame again is answered as before. Raises ``InvalidInput``, and ``StillLooking`` where frames come faster
+    The same frame again is answered as before. Raises ``InvalidInput``, and ``FitInProgress`` where frames come faster
     than they can be looked at: nothing is changed then.
     """
     session = _SESSIONS[name]
     if given.number == session.last[0]:
         return session.last[1], None
     if session.until_look == 1 and session.look is not None and not session.look.done():
-        raise StillLooking
+        raise FitInProgress
     frame = _frame(session, given)
     size = 0 if session.kept is None else _kept_bytes(session, frame)
     felt, told = _felt(session, frame, given)
@@ -278,7 +278,7 @@ def _kept_bytes(session: Session, frame: Frame) -> int:
     return size
 
 
-def _check_room(size: int, room: Room) -> None:
+def _check_room(size: int, room: MemoryLimit) -> None:
     own, others = (
         sum(each.all_bytes for each in _SESSIONS.values() if (each.room.owner == room.owner) is is_own)
         for is_own in (True, False)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 
-from service.processes.fair_queue import PatientQueue
+from service.processes.fair_queue import UnboundedFairQueue
 from service.processes.side_process import ProcessEnded, SideProcess
 from service.stream import detectors
 from service.stream.broadcast import Broadcast, Watchers
@@ -92,7 +92,7 @@ class Streams:
         self._sessions: dict[str, Session] = {}
         self._dropping: set[asyncio.Task[None]] = set()
         self._watchers = Watchers()
-        self._turns = PatientQueue(FRAMES_AT_ONCE, "detected", share=FRAMES_OF_ONE)
+        self._turns = UnboundedFairQueue(FRAMES_AT_ONCE, "detected", share=FRAMES_OF_ONE)
 
     async def open(
         self,
@@ -113,7 +113,7 @@ class Streams:
         try:
             await self.call(
                 detectors.open_session, session.id, position, opening.grid, opening.element_area, opening.detector,
-                opening.keep, detectors.Room(session.owner, self._most_bytes), opening.control, model, gel,
+                opening.keep, detectors.MemoryLimit(session.owner, self._most_bytes), opening.control, model, gel,
             )  # fmt: skip
         except BaseException:
             self._forget(session)
@@ -201,7 +201,7 @@ class Streams:
         while True:
             try:
                 return await self.ask(session, detectors.step, frame, is_shown)
-            except detectors.StillLooking:
+            except detectors.FitInProgress:
                 await asyncio.sleep(pause)
                 pause = min(2.0 * pause, MOST_PAUSE)
 

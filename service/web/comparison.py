@@ -16,16 +16,16 @@ MOST_COMPARED = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Compared:
+class ComparedModel:
     """A model, and its friction where all of them are compared."""
 
     stored: StoredModel
     friction: Friction
 
 
-def compare(models: Sequence[StoredModel], normal_force: float) -> list[Compared]:
+def compare(models: Sequence[StoredModel], normal_force: float) -> list[ComparedModel]:
     """Each with its friction at the beginning of slip under this normal force, N an element."""
-    return [Compared(stored, friction_at(stored, normal_force)) for stored in models]
+    return [ComparedModel(stored, friction_at(stored, normal_force)) for stored in models]
 
 
 def common_force(models: Sequence[StoredModel]) -> float:

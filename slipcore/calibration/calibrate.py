@@ -11,7 +11,7 @@ from slipcore.calibration.gain import gain
 from slipcore.calibration.kernel import kernel_width, squared_width
 from slipcore.calibration.marker_noise import marker_noise
 from slipcore.calibration.model import AXES, SensorModel
-from slipcore.calibration.press import ImpurePress, Press, find_press, impurity
+from slipcore.calibration.press import InvalidPress, Press, find_press, press_fault
 from slipcore.calibration.zero import drifts, offsets
 from slipcore.defaults import LIMITS
 from slipcore.errors import InvalidInput, UnknownScale
@@ -23,13 +23,13 @@ def calibrate_sensor(logs: Sequence[GraspLog], known_force: Sequence[float | Non
 
     ``known_force``: for each log the total normal force of its hold, N, or None. Each quantity has its interval, or
     says why it is not identified. Raises ``InvalidInput`` for logs of several sensors or lattices, ``UnknownScale`` for
-    lengths that are not in metres, ``ImpurePress`` for logs that are not pure presses, with what was seen in each.
+    lengths that are not in metres, ``InvalidPress`` for logs that are not pure presses, with what was seen in each.
     """
     known = _checked(logs, known_force)
     presses = [find_press(log) for log in logs]
-    impure = {number: seen for number, press in enumerate(presses) if (seen := impurity(press)) is not None}
-    if impure:
-        raise ImpurePress(impure)
+    faulty = {number: seen for number, press in enumerate(presses) if (seen := press_fault(press)) is not None}
+    if faulty:
+        raise InvalidPress(faulty)
     first = logs[0]
     return SensorModel(
         sensor=first.sensor,

@@ -13,7 +13,7 @@ from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.surface.log_normals import normals_of
 
 
-class ImpurePress(InvalidInput):
+class InvalidPress(InvalidInput):
     """Logs that are no pure presses; ``evidence`` tells by the log's number what was seen."""
 
     def __init__(self, evidence: dict[int, str]) -> None:
@@ -24,7 +24,7 @@ class ImpurePress(InvalidInput):
     def __str__(self) -> str:
         return f"no pure press is {self.value}; allowed: {self.allowed}"
 
-    def __reduce__(self) -> tuple[type["ImpurePress"], tuple[dict[int, str]]]:
+    def __reduce__(self) -> tuple[type["InvalidPress"], tuple[dict[int, str]]]:
         return type(self), (self.evidence,)
 
 
@@ -109,7 +109,7 @@ def _split(log: GraspLog, zero: Zero | None) -> FloatArray | None:
     return np.concatenate([(force - along * normal)[..., :2], -along], axis=-1)
 
 
-def impurity(press: Press) -> str | None:
+def press_fault(press: Press) -> str | None:
     """What makes a press unfit to calibrate by; None where nothing does."""
     return next(_impurities(press), None)
 

@@ -143,21 +143,21 @@ def choose_prior(
     rest, count = max(float(whitened @ whitened - y @ y), 0.0), int(np.isfinite(observation.noise).sum())
     places, pitch = nodes.places()[support], nodes.grid.pitch[0]
 
-    def judge(shape: Smoothness, by: Criterion) -> tuple[float, float]:
+    def evaluate(shape: Smoothness, by: Criterion) -> tuple[float, float]:
         spectrum = Spectrum.of(_times(r, factors(places, pitch, shape)))
         strength = spectrum.choose(y, rest, count, by)
         return spectrum.log_evidence(y, strength), strength
 
     best = usual() if first is None else first
     if strength_alone:
-        return Prior(best, judge(best, criterion)[1])
-    evidence = judge(best, "evidence")[0]
+        return Prior(best, evaluate(best, criterion)[1])
+    evidence = evaluate(best, "evidence")[0]
     for name, values in choices().items():
         for value in values:
             other = best._replace(**{name: value})
-            if other != best and (found := judge(other, "evidence")[0]) > evidence:
+            if other != best and (found := evaluate(other, "evidence")[0]) > evidence:
                 best, evidence = other, found
-    return Prior(best, judge(best, criterion)[1])
+    return Prior(best, evaluate(best, criterion)[1])
 
 
 def _times(r: FloatArray, root: FloatArray) -> FloatArray:

@@ -16,7 +16,7 @@ from slipcore.errors import InvalidInput
 from slipcore.forces.bounded_gaussian import BoundedGaussian, through
 from slipcore.forces.defaults import GEL, GEL_CALIBRATION
 from slipcore.forces.gel import Gel
-from slipcore.forces.gel_likelihood import Elasticity, Judged, Press, Presses, Seek, first_contacts, judge
+from slipcore.forces.gel_likelihood import Elasticity, EvaluatedGel, Press, Presses, Seek, evaluate_gel, first_contacts
 from slipcore.forces.nodes import Nodes
 from slipcore.forces.recording import Recording, error
 from slipcore.frames import FloatArray, GraspLog
@@ -165,7 +165,7 @@ class _Search:
     presses: Presses
     young_modulus: float | None
     given: Elasticity
-    tried: list[Judged]
+    tried: list[EvaluatedGel]
 
     @classmethod
     def begun(cls, presses: Presses, young_modulus: float | None, given: Elasticity) -> "_Search":
@@ -181,7 +181,7 @@ class _Search:
             near,
             young_modulus,
             given,
-            [judge(near, first._replace(closeness=each), contacts, young_modulus) for each in tried],
+            [evaluate_gel(near, first._replace(closeness=each), contacts, young_modulus) for each in tried],
         )
 
     @property
@@ -201,20 +201,20 @@ class _Search:
         return 1.0 if len(self.presses.axes) > 2 else GEL_CALIBRATION.in_plane
 
     @property
-    def best(self) -> Judged:
+    def best(self) -> EvaluatedGel:
         """The most probable gel so far."""
         return max(self.tried, key=_probability)
 
-    def point(self, judged: Judged) -> FloatArray:
+    def point(self, evaluated: EvaluatedGel) -> FloatArray:
         """What is sought, of a gel."""
-        return np.array(judged.elasticity)[self.free]
+        return np.array(evaluated.elasticity)[self.free]
 
     def at(self, point: ArrayLike, seek: Seek = "nothing") -> float:
         """Log probability of a gel, with the contacts of the best one or what is sought about them."""
         values, (low, high) = list(self.given), self.bounds
         for k, value in zip(self.free, np.clip(point, low, high), strict=True):
             values[k] = float(value)
-        found = judge(self.presses, Elasticity(*values), self.best.contacts, self.young_modulus, seek)
+        found = evaluate_gel(self.presses, Elasticity(*values), self.best.contacts, self.young_modulus, seek)
         self.tried.append(found)
         return found.log_probability
 
@@ -270,8 +270,8 @@ def _pairs(low: FloatArray, high: FloatArray) -> list[tuple[float, float]]:
     return [(float(a), float(b)) for a, b in zip(low, high, strict=True)]
 
 
-def _probability(judged: Judged) -> float:
-    return judged.log_probability
+def _probability(evaluated: EvaluatedGel) -> float:
+    return evaluated.log_probability
 
 
 def _thinnest(presses: Presses) -> float:
@@ -310,12 +310,12 @@ def _found(search: _Search) -> _Found:
     covariance[0, 0] = max(1.0, best.misfit) * best.modulus.deviation**2
     if not search.free:
         return _Found(values, covariance, None)
-    points = np.array([search.point(judged) for judged in search.tried])
-    logarithm = np.array([judged.log_probability for judged in search.tried]) / max(1.0, best.misfit)
+    points = np.array([search.point(evaluated) for evaluated in search.tried])
+    logarithm = np.array([evaluated.log_probability for evaluated in search.tried]) / max(1.0, best.misfit)
     posterior = through(points, logarithm, *search.bounds)
     weight = 1.0 / (1.0 + logarithm.max() - logarithm)
     terms = np.column_stack((np.ones(len(points)), points - posterior.mean))
-    moduli = np.array([judged.modulus.logarithm for judged in search.tried])
+    moduli = np.array([evaluated.modulus.logarithm for evaluated in search.tried])
     mean, *slope = np.linalg.lstsq(weight[:, None] * terms, weight * moduli, rcond=None)[0]
     rows, first = [k + 1 for k in search.free], posterior.covariance @ slope
     values[rows], values[0] = posterior.mean, mean

@@ -87,7 +87,7 @@ class Modulus:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Judged:
+class EvaluatedGel:
     """Presses on one gel: their log probability (without what no gel changes), the contacts with which it is largest,
     the normal ``resultant`` of each in N by a modulus of 1 Pa, and the mean square ``misfit`` of markers over noise.
     """
@@ -133,13 +133,13 @@ def _within(presses: Presses) -> list[BoolArray]:
     return found
 
 
-def judge(
+def evaluate_gel(
     presses: Presses,
     elasticity: Elasticity,
     contacts: Sequence[Contact],
     young_modulus: float | None,
     seek: Seek = "nothing",
-) -> Judged:
+) -> EvaluatedGel:
     """Presses on a gel, with these contacts or with what is sought about them: better ones, and priors for them."""
     found, probability, yields, misfits = [], 0.0, [], []
     for press, contact, observation in zip(presses.each, contacts, presses.observations(elasticity), strict=True):
@@ -153,7 +153,7 @@ def judge(
         misfits.append(misfit)
     modulus = _modulus(np.array(yields), np.array([press.force for press in presses.each]), young_modulus)
     probability += modulus.log_probability
-    return Judged(elasticity, probability, tuple(found), modulus, np.array(yields)[:, 0], float(np.mean(misfits)))
+    return EvaluatedGel(elasticity, probability, tuple(found), modulus, np.array(yields)[:, 0], float(np.mean(misfits)))
 
 
 def _better(observation: Observation, data: FloatArray, nodes: Nodes, contact: Contact, seek: Seek) -> Contact:

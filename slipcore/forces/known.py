@@ -16,7 +16,7 @@ OUTWARD = np.array([1.0, 1.0, -1.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Known:
+class KnownForce:
     """``force`` [..., 3] N by the object in the gel's frame (z into it), NaN where it is not known, and its standard
     ``deviation`` [..., 3] N.
     """
@@ -25,7 +25,9 @@ class Known:
     deviation: FloatArray
 
     @classmethod
-    def of(cls, total_force: ArrayLike | None, deviation: float | None, frames: int, largest: float = 0.0) -> "Known":
+    def of(
+        cls, total_force: ArrayLike | None, deviation: float | None, frames: int, largest: float = 0.0
+    ) -> "KnownForce":
         """Of normal forces [t] N or forces [t, 3] N on the sensor, NaN where unknown; without a ``deviation`` N they
         are known to a share of each, and of the ``largest`` N there is or was before. Raises ``InvalidInput``.
         """
@@ -44,9 +46,9 @@ class Known:
         most = np.nanmax(size, initial=max(largest, RECONSTRUCTION.least_force))
         return cls(total, share * np.maximum(size, share * most))
 
-    def __getitem__(self, frame: int) -> "Known":
+    def __getitem__(self, frame: int) -> "KnownForce":
         """Of one frame."""
-        return Known(self.force[frame], self.deviation[frame])
+        return KnownForce(self.force[frame], self.deviation[frame])
 
     @property
     def given(self) -> BoolArray:

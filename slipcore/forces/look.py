@@ -9,7 +9,7 @@ import numpy as np
 from slipcore.forces.defaults import FORCE_STREAM
 from slipcore.forces.fit import Observation
 from slipcore.forces.frame_forces import Reader
-from slipcore.forces.known import Known
+from slipcore.forces.known import KnownForce
 from slipcore.forces.nodes import Nodes
 from slipcore.forces.recording import error
 from slipcore.forces.sensor import Sensor
@@ -19,7 +19,7 @@ from slipcore.frames import BoolArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shown:
+class MarkerFrame:
     """What markers show at one ``time`` s: ``moved`` [m] m, which of them were ``seen`` [m], and their ``noise`` m; and
     what is ``known`` of the resultant. ``data`` [m + 3] are both, with the last ones of what is not there.
     """
@@ -28,7 +28,7 @@ class Shown:
     data: FloatArray
     seen: BoolArray
     noise: float
-    known: Known
+    known: KnownForce
 
     @property
     def moved(self) -> FloatArray:
@@ -55,14 +55,14 @@ class Prepared:
         typical = max(typical, FORCE_STREAM.typical * noise)
         return cls(lattice_of(sensor, noise, typical), noise, typical)
 
-    def fits(self, frame: Shown) -> bool:
+    def fits(self, frame: MarkerFrame) -> bool:
         """Whether it still does for a frame."""
         change = max(frame.noise / self.noise, self.noise / frame.noise)
         return change <= FORCE_STREAM.noise_change and frame.size <= FORCE_STREAM.lattice_growth * self.typical
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Insight:
+class ContactTracking:
     """What is known of a ``sensor``, and while something touches, of its contact: ``reader`` of forces by the frame at
     ``time`` s, and the ``size`` m of displacements by which the ``tracker`` began.
     """
@@ -79,11 +79,11 @@ class Insight:
         """Whether all is made that is made before a touch."""
         return self.prepared is not None or not self.sensor.sees_depth
 
-    def untouched(self) -> "Insight":
+    def untouched(self) -> "ContactTracking":
         """Of the sensor alone."""
-        return Insight(self.sensor, self.prepared)
+        return ContactTracking(self.sensor, self.prepared)
 
-    def next_look(self, frame: Shown, touched: bool) -> "Callable[[], Insight] | None":
+    def next_look(self, frame: MarkerFrame, touched: bool) -> "Callable[[], ContactTracking] | None":
         """What is to be found out next, if anything; it takes its time, and changes nothing that is there."""
         if self.sensor.sees_depth and (self.prepared is None or not self.prepared.fits(frame)):
             return partial(self._prepare, frame)
@@ -95,25 +95,25 @@ class Insight:
             return partial(self._begin, frame)
         return None if self.holds(frame) else partial(self._follow, self.tracker, frame)
 
-    def holds(self, frame: Shown) -> bool:
+    def holds(self, frame: MarkerFrame) -> bool:
         """Whether the contact is that of a frame in which something touches, too."""
         return self.tracker is not None and self.tracker.key.holds(self._observation(frame), frame.data)
 
-    def _observation(self, frame: Shown) -> Observation:
+    def _observation(self, frame: MarkerFrame) -> Observation:
         return self.sensor.observation(error(frame.moved, frame.seen, frame.noise), frame.known)
 
-    def _prepare(self, frame: Shown) -> "Insight":
+    def _prepare(self, frame: MarkerFrame) -> "ContactTracking":
         return replace(self, prepared=Prepared.of(self.sensor, frame.noise, frame.size))
 
-    def _begin(self, frame: Shown) -> "Insight":
+    def _begin(self, frame: MarkerFrame) -> "ContactTracking":
         lattice = None if self.prepared is None else self.prepared.lattice
         tracker = Tracker.of(self.sensor, self._observation(frame), frame.data, "evidence", lattice)
         return replace(self._by(tracker, frame), size=frame.size)
 
-    def _follow(self, tracker: Tracker, frame: Shown) -> "Insight":
+    def _follow(self, tracker: Tracker, frame: MarkerFrame) -> "ContactTracking":
         return self._by(tracker.at(self._observation(frame), frame.data), frame)
 
-    def _by(self, tracker: Tracker, frame: Shown) -> "Insight":
+    def _by(self, tracker: Tracker, frame: MarkerFrame) -> "ContactTracking":
         return replace(self, tracker=tracker, reader=Reader.of(self.sensor, tracker.key), time=frame.time)
 
 

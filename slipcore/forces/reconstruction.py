@@ -10,7 +10,7 @@ from slipcore.errors import InvalidInput
 from slipcore.forces.fit import Observation
 from slipcore.forces.frame_forces import FrameForces, Reader
 from slipcore.forces.gel import Gel
-from slipcore.forces.known import Known, contradicts, reported
+from slipcore.forces.known import KnownForce, contradicts, reported
 from slipcore.forces.recording import Recording, error
 from slipcore.forces.sensor import Sensor
 from slipcore.forces.strength import Criterion
@@ -87,7 +87,7 @@ def reconstruct(
     if total_force is None and total_force_deviation is None and log.gripper_force is not None:
         name, total_force = "gripper_force", reported(log.gripper_force)
         total_force_deviation = log.gripper_force_deviation
-    known = Known.of(total_force, total_force_deviation, len(log))
+    known = KnownForce.of(total_force, total_force_deviation, len(log))
     known.check(name, gel, log.element_area * math.prod(log.grid))
     recording = _Recording(sensor, shown, known)
     result = _no_forces(log, shown.noise, known.given)
@@ -119,7 +119,7 @@ class _Recording:
 
     sensor: Sensor
     shown: Recording
-    known: Known
+    known: KnownForce
 
     def frame(self, t: int) -> tuple[Observation, FloatArray]:
         """What one frame tells: displacements, then its resultant."""

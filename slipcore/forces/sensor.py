@@ -6,7 +6,7 @@ import numpy as np
 
 from slipcore.forces.fit import Observation
 from slipcore.forces.gel import Gel
-from slipcore.forces.known import Known
+from slipcore.forces.known import KnownForce
 from slipcore.forces.nodes import Nodes
 from slipcore.forces.response import response_matrix
 from slipcore.frames import FloatArray
@@ -47,11 +47,11 @@ class Sensor:
         """Whether its markers also tell how deep they are pressed."""
         return len(self.axes) == 3
 
-    def observation(self, spread: FloatArray, known: Known) -> Observation:
+    def observation(self, spread: FloatArray, known: KnownForce) -> Observation:
         """Of a frame whose displacements have the standard deviations ``spread`` [m] m, and what is known of it."""
         return Observation(self.observed, np.concatenate((spread, known.noise)))
 
     @staticmethod
-    def data(displacement: FloatArray, known: Known) -> FloatArray:
+    def data(displacement: FloatArray, known: KnownForce) -> FloatArray:
         """What it tells [m + 3]."""
         return np.concatenate((displacement, np.nan_to_num(known.force)))

@@ -12,8 +12,8 @@ from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import FORCE_STREAM
 from slipcore.forces.frame_forces import FrameForces
 from slipcore.forces.gel import Gel
-from slipcore.forces.known import Known, contradicts, reported
-from slipcore.forces.look import Insight, Shown, bytes_needed
+from slipcore.forces.known import KnownForce, contradicts, reported
+from slipcore.forces.look import ContactTracking, MarkerFrame, bytes_needed
 from slipcore.forces.nodes import Nodes
 from slipcore.forces.recording import axes_seen, check_noise, moved, noise_of, rows
 from slipcore.forces.sensor import Sensor
@@ -72,8 +72,8 @@ class ForceStream:
         self._data = np.zeros(0)
         self._largest, self._compared, self._contradicted = 0.0, 0, 0
         self._touches, self._touched, self._until_look = 0, False, 0
-        self._insight: Insight | None = None
-        self._look: tuple[int, Future[Insight]] | None = None
+        self._tracking: ContactTracking | None = None
+        self._look: tuple[int, Future[ContactTracking]] | None = None
 
     @property
     def contradicted(self) -> float:
@@ -101,27 +101,27 @@ class ForceStream:
         self._largest = max(self._largest, gripper_force or 0.0)
         self._remember(time, moved_by)
         if len(axes_seen(moved_by)) > len(self._axes):
-            self._axes, self._insight, self._data = axes_seen(moved_by), None, np.zeros(0)
+            self._axes, self._tracking, self._data = axes_seen(moved_by), None, np.zeros(0)
         self._until_look -= 1
         self._collect()
-        if self._insight is None:
+        if self._tracking is None:
             self._begin_to(self._set_up)
         if self._noise is None:
             return self._none("noise")
-        frame = self._shown(time, moved_by, seen, known)
-        if self._insight is None:
+        frame = self._marker_frame(time, moved_by, seen, known)
+        if self._tracking is None:
             return self._none("set-up")
-        self._seek(self._insight, frame)
-        if not self._insight.is_ready:
+        self._seek(self._tracking, frame)
+        if not self._tracking.is_ready:
             return self._none("set-up")
         if not self._touched:
             return self._none()
-        reader = self._insight.reader
+        reader = self._tracking.reader
         if reader is None:
             return self._none("contact")
         n, m = self._position.shape[:2]
         forces = reader.read(frame.data, (n, m))
-        return StreamedForces(forces, time - self._insight.time, None, reader.given, self._compare(frame, forces))
+        return StreamedForces(forces, time - self._tracking.time, None, reader.given, self._compare(frame, forces))
 
     def close(self) -> None:
         """Give up the look for a contact that waits for its executor, if one does: no more frames come."""
@@ -141,16 +141,16 @@ class ForceStream:
         check_displacement(told, self._position)
         return told, seen
 
-    def _reported(self, force: float | None, deviation: float | None) -> Known:
+    def _reported(self, force: float | None, deviation: float | None) -> KnownForce:
         check_gripper_report(force, deviation, self._largest)
         told = None if force is None else reported(np.array([force]))
-        known = Known.of(told, deviation, 1, self._largest)
+        known = KnownForce.of(told, deviation, 1, self._largest)
         known.check("gripper_force", self._gel, self._area * self._position[..., 0].size)
         return known[0]
 
-    def _compare(self, frame: Shown, found: FrameForces) -> float:
+    def _compare(self, frame: MarkerFrame, found: FrameForces) -> float:
         """The contradiction of a frame, which is counted."""
-        if not frame.known.given.any() or self._insight is None or not self._insight.holds(frame):
+        if not frame.known.given.any() or self._tracking is None or not self._tracking.holds(frame):
             return float("nan")
         away = frame.known.away(found.resultant, found.resultant_deviation)
         self._compared += 1
@@ -171,7 +171,9 @@ class ForceStream:
             return self._given
         return noise_of(np.array([time for time, _ in self._recent]), np.stack([each for _, each in self._recent]))
 
-    def _shown(self, time: float, displacement: FloatArray, observed: BoolArray | None, known: Known) -> Shown:
+    def _marker_frame(
+        self, time: float, displacement: FloatArray, observed: BoolArray | None, known: KnownForce
+    ) -> MarkerFrame:
         """The frame, and whether something touches in it; noise is that of the frames just before a touch.
 
         A marker that is not seen stays where it was, until a contact is sought without it; so does a gripper's force.
@@ -185,27 +187,27 @@ class ForceStream:
             self._noise = self._noise_now()
             self._touched = bool(moved(data, seen, self._noise))
             self._touches += self._touched
-        return Shown(time, self._data, seen, max(self._noise or 0.0, FORCE_STREAM.least_noise), known)
+        return MarkerFrame(time, self._data, seen, max(self._noise or 0.0, FORCE_STREAM.least_noise), known)
 
-    def _seek(self, insight: Insight, frame: Shown) -> None:
+    def _seek(self, tracking: ContactTracking, frame: MarkerFrame) -> None:
         """Let the contact be sought, if it is time to; forget it once nothing touches."""
         if not self._touched:
-            self._insight = insight = insight.untouched()
+            self._tracking = tracking = tracking.untouched()
         if self._look is not None or self._until_look > 0:
             return
-        look = insight.next_look(frame, self._touched)
+        look = tracking.next_look(frame, self._touched)
         if look is not None:
             self._until_look = FORCE_STREAM.stride_in_plane if len(self._axes) == 2 else FORCE_STREAM.stride
             self._begin_to(look)
 
-    def _set_up(self) -> Insight:
-        return Insight(Sensor.of(self._position, self._area, self._gel, self._axes))
+    def _set_up(self) -> ContactTracking:
+        return ContactTracking(Sensor.of(self._position, self._area, self._gel, self._axes))
 
-    def _begin_to(self, look: Callable[[], Insight]) -> None:
+    def _begin_to(self, look: Callable[[], ContactTracking]) -> None:
         """Look beside the frames, or at once."""
         if self._look is not None:
             return
-        future: Future[Insight] = Future()
+        future: Future[ContactTracking] = Future()
         if self._executor is None:
             future.set_result(look())
         else:
@@ -220,7 +222,7 @@ class ForceStream:
         (touch, look), self._look = self._look, None
         found = look.result()
         if found.sensor.axes == self._axes:
-            self._insight = found if self._touched and touch == self._touches else found.untouched()
+            self._tracking = found if self._touched and touch == self._touches else found.untouched()
 
     def _none(self, wait_for: str | None = None) -> StreamedForces:
         n, m = self._position.shape[:2]

@@ -11,7 +11,7 @@ from slipcore.patch.motion import Motion
 from slipcore.patch.spans import IntArray, for_kernels
 
 
-class Plateaus(NamedTuple):
+class SteadySliding(NamedTuple):
     """Frames [k] in which patches pivot, and in which they slide, under a load that grows no more."""
 
     pivoting: BoolArray
@@ -40,7 +40,7 @@ def find_plateaus(
     held: BoolArray,
     pitch: float,
     options: PatchOptions,
-) -> Plateaus:
+) -> SteadySliding:
     """Of patches with this ``motion`` under loads of this ``ratio`` [k] and tangential ``force`` [k, 2] N, one patch
     from each of the ``bounds`` up to the next.
 
@@ -60,7 +60,7 @@ def find_plateaus(
     way = speed * _intervals(time, bounds) * motion.travels
     on_plateaus, whole = (np.add.reduceat(each, bounds[:-1]) for each in (np.where(sliding, way, 0.0), way))
     slides_on = np.repeat(on_plateaus >= options.sliding_share * whole, np.diff(bounds))
-    return Plateaus(pivoting, sliding & slides_on)
+    return SteadySliding(pivoting, sliding & slides_on)
 
 
 def _intervals(time: FloatArray, bounds: IntArray) -> FloatArray:

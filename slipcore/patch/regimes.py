@@ -9,13 +9,13 @@ from slipcore.compilation import compiled
 from slipcore.defaults import PatchOptions
 from slipcore.frames import BoolArray
 from slipcore.patch.motion import Motion
-from slipcore.patch.plateau import Plateaus
+from slipcore.patch.plateau import SteadySliding
 from slipcore.patch.spans import IntArray, Spans, elements_at, for_kernels
 from slipcore.patch_record import MACRO_SLIP, REGIMES, Patch, frames_of, joined
 
 
 def regimes(
-    spans: Spans, slip: BoolArray, motion: Motion, plateaus: Plateaus, options: PatchOptions
+    spans: Spans, slip: BoolArray, motion: Motion, steady: SteadySliding, options: PatchOptions
 ) -> NDArray[np.str_]:
     """One of ``REGIMES`` for each frame of the patches, [k], of whose elements some ``slip`` [t, n, m].
 
@@ -27,8 +27,8 @@ def regimes(
     elements, slipping = counts.T
     cases = {
         "none": elements == 0,
-        "pivoting": plateaus.pivoting,
-        "sliding": plateaus.sliding,
+        "pivoting": steady.pivoting,
+        "sliding": steady.sliding,
         "rolling": motion.wanders & ~motion.turns,
         "incipient": (slipping > options.slip_share * elements) | motion.turns | motion.travels,
     }

@@ -8,7 +8,7 @@ from stiction_client.controller.friction import KnownFriction, LearnedFriction, 
 from stiction_client.controller.load import Load
 from stiction_client.controller.records import Command, Mode, Observation, SlipSamples, check
 from stiction_client.controller.settings import ControlSettings
-from stiction_client.controller.stick_ratio import Felt
+from stiction_client.controller.stick_ratio import StickRatioEstimate
 from stiction_client.model import FrictionModel
 
 
@@ -27,7 +27,7 @@ class ControllerState:
     time: float = -math.inf
     since: float = -math.inf
     load: Load = field(default_factory=Load)
-    felt: Felt = field(default_factory=Felt)
+    felt: StickRatioEstimate = field(default_factory=StickRatioEstimate)
     learned: LearnedFriction = field(default_factory=LearnedFriction)
     contradictions: int = 0
 
@@ -76,7 +76,7 @@ def _sense(state: ControllerState, observation: Observation, elapsed: float) -> 
     return replace(state, time=observation.time, load=load, felt=felt, learned=learned, contradictions=contradictions)
 
 
-def _sampled(observation: Observation, felt: Felt, settings: ControlSettings) -> float:
+def _sampled(observation: Observation, felt: StickRatioEstimate, settings: ControlSettings) -> float:
     """The contact's friction by the elements that slip; NaN without any."""
     if (
         observation.slip_samples is None
@@ -87,7 +87,7 @@ def _sampled(observation: Observation, felt: Felt, settings: ControlSettings) ->
     return observation.slip_samples.contact_friction()
 
 
-def _agrees(friction: float, normal: float, felt: Felt, size: float, settings: ControlSettings) -> bool:
+def _agrees(friction: float, normal: float, felt: StickRatioEstimate, size: float, settings: ControlSettings) -> bool:
     """Whether the stick ratio says no otherwise of the contact's ``friction``.
 
     What sticks bears less than its friction: taken for slip, it would make the contact slip more than it does.
@@ -104,7 +104,9 @@ def _counts(state: ControllerState, samples: SlipSamples, agrees: bool) -> bool:
     return warns or samples.moving >= state.settings.moving_share
 
 
-def _contradicts(state: ControllerState, felt: Felt, normal: float, size: float, friction: float) -> bool | None:
+def _contradicts(
+    state: ControllerState, felt: StickRatioEstimate, normal: float, size: float, friction: float
+) -> bool | None:
     """Whether a frame speaks against the friction that is known; None where it tells nothing of it.
 
     Friction of slipping elements outside of what the model permits, or slip under a load that it says is held.

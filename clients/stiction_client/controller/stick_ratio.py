@@ -9,7 +9,7 @@ from stiction_client.controller.settings import ControlSettings
 
 
 @dataclass(frozen=True, slots=True)
-class Felt:
+class StickRatioEstimate:
     """The stick ratio as it was last ``told`` (s), and the ``friction`` that it speaks for; NaN before it told any.
 
     ``slipping``: frames in a row in which next to nothing stuck.
@@ -20,19 +20,19 @@ class Felt:
     friction: float = math.nan
     slipping: int = 0
 
-    def step(self, observation: Observation, size: float, settings: ControlSettings) -> "Felt":
+    def step(self, observation: Observation, size: float, settings: ControlSettings) -> "StickRatioEstimate":
         """The same after a frame under a load of ``size`` N.
 
         A contact of which all sticks, or that bears nothing, tells no friction: what was felt before then stands.
         """
         ratio = observation.stick_ratio
         if math.isnan(ratio):
-            return Felt(self.told, math.nan, self.friction, 0)
+            return StickRatioEstimate(self.told, math.nan, self.friction, 0)
         friction = self.friction
         if ratio < settings.told_stick_ratio and size > 0.0 and observation.normal > 0.0:
             friction = size / (observation.normal * utilisation(ratio))
         slipping = self.slipping + 1 if ratio <= settings.reflex_stick_ratio else 0
-        return Felt(observation.time, ratio, friction, slipping)
+        return StickRatioEstimate(observation.time, ratio, friction, slipping)
 
     def required(self, load: float, stick_ratio: float) -> float:
         """Normal force, N, under which ``load`` N leaves so much sticking; 0 while no friction was felt."""

@@ -16,7 +16,7 @@ Options = TypeVar("Options", bound=ContactOptions)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SinceTouch:
+class MeasureAtTouch:
     """The measure [..., n, m] of each element when it touched, or now where it does not touch; zero at first."""
 
     measure: FloatArray
@@ -26,20 +26,22 @@ def threshold_method(
     options: type[Options],
     measure: Callable[[Lattice, Observation], FloatArray],
     slips: Callable[[Lattice, Observation, FloatArray, Options], BoolArray],
-) -> Method[SinceTouch, Options]:
+) -> Method[MeasureAtTouch, Options]:
     """A method without memory of its own: ``slips`` judges how ``measure`` [..., n, m] changed since the touch.
 
     The whole field is measured before the difference is taken: elements touch at different times, and a gradient of
     differences would see steps between them. The probability is 0 or 1.
     """
 
-    def init(_: Lattice, __: Options) -> SinceTouch:
-        return SinceTouch(np.zeros(()))
+    def init(_: Lattice, __: Options) -> MeasureAtTouch:
+        return MeasureAtTouch(np.zeros(()))
 
-    def step(state: SinceTouch, lattice: Lattice, seen: Observation, chosen: Options) -> tuple[SinceTouch, Decision]:
+    def step(
+        state: MeasureAtTouch, lattice: Lattice, seen: Observation, chosen: Options
+    ) -> tuple[MeasureAtTouch, Decision]:
         now = measure(lattice, seen)
         start = np.where(seen.stays, state.measure, now)
         slip = slips(lattice, seen, now - start, chosen)
-        return SinceTouch(start), Decision(slip, slip.astype(float))
+        return MeasureAtTouch(start), Decision(slip, slip.astype(float))
 
     return Method(options, init, step)

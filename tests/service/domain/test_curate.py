@@ -19,14 +19,14 @@ from db.tables import JobRow, MaterialRow, SampleSummaryRow
 from service.domain import curate
 from service.domain.context import Context
 from service.domain.errors import DomainError, InvalidValue, NoModel, NotOwner
-from service.domain.look_up import Friction, Question, look_up
+from service.domain.look_up import Friction, FrictionQuery, look_up
 from service.domain.principal import Principal
 from service.jobs import pipeline
 from service.settings import Settings
 from slipcore import Finding
 
 Repack = Callable[..., bytes]
-ANYWHERE = Question(0.0, 0.1, None)
+ANYWHERE = FrictionQuery(0.0, 0.1, None)
 
 
 class Shop:

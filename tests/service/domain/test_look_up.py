@@ -9,7 +9,7 @@ import estimators
 import slipcore
 from db.database import Database
 from db.repositories import friction_models, jobs, materials
-from service.domain.look_up import Question, look_up
+from service.domain.look_up import FrictionQuery, look_up
 from service.domain.model_cache import ModelCache
 from service.domain.stored_results import to_new_model
 from slipcore import GraspLog
@@ -21,11 +21,11 @@ def model(ramp: GraspLog) -> estimators.FrictionModel:
 
 
 @pytest.fixture
-def ask(database: Database) -> Callable[[estimators.FrictionModel, Question], Any]:
+def ask(database: Database) -> Callable[[estimators.FrictionModel, FrictionQuery], Any]:
     with database.write() as session:
         material = materials.create(session, "paper", "").id
 
-    def answer(model: estimators.FrictionModel, question: Question) -> Any:
+    def answer(model: estimators.FrictionModel, question: FrictionQuery) -> Any:
         with database.write() as session:
             job = jobs.add(session, "fit", "ols", material_id=material)
             friction_models.add(session, material, job, to_new_model(model))
@@ -36,7 +36,7 @@ def ask(database: Database) -> Callable[[estimators.FrictionModel, Question], An
 
 def test_the_answer_is_the_models(ask: Callable[..., Any], model: estimators.FrictionModel) -> None:
     f_n = sum(model.domain.normal_force) / 2.0
-    answer = ask(model, Question(1e-5, f_n, 0.05))
+    answer = ask(model, FrictionQuery(1e-5, f_n, 0.05))
     assert answer.mean == float(model.predict(1e-5, f_n))
     assert answer.friction_coefficient == float(model.predict(1e-5, f_n, quantile=0.05))
     assert (answer.within_domain, answer.warning, answer.version) == (True, None, 1)
@@ -49,7 +49,7 @@ def test_a_quantile_is_of_what_was_asked_for(
     scales = estimators.Scales(*(estimators.Scale(value, 9.0) for value in (0.07, 0.02, 0.03)))
     scattering = replace(model, scales=scales)
     f_n = sum(model.domain.normal_force) / 2.0
-    answer = ask(scattering, Question(1e-5, f_n, 0.05, of, elements))
+    answer = ask(scattering, FrictionQuery(1e-5, f_n, 0.05, of, elements))
     assert answer.friction_coefficient == float(scattering.predict(1e-5, f_n, 0.05, of=of, elements=elements))
     assert (answer.of, answer.elements) == (of, elements)
 
@@ -60,9 +60,9 @@ def test_slower_than_the_samples_is_inside_and_faster_is_not(
     low, high = model.domain.tangential_velocity
     f_n = model.domain.normal_force[1]
     assert low > 0.0
-    assert ask(model, Question(0.0, f_n, None)).within_domain
-    assert ask(model, Question(high, f_n, None)).within_domain
-    assert not ask(model, Question(1.001 * high, f_n, None)).within_domain
+    assert ask(model, FrictionQuery(0.0, f_n, None)).within_domain
+    assert ask(model, FrictionQuery(high, f_n, None)).within_domain
+    assert not ask(model, FrictionQuery(1.001 * high, f_n, None)).within_domain
 
 
 @pytest.mark.parametrize("edge", [0, 1])
@@ -70,14 +70,14 @@ def test_forces_beyond_the_samples_are_outside_on_both_sides(
     ask: Callable[..., Any], model: estimators.FrictionModel, edge: int
 ) -> None:
     bound = model.domain.normal_force[edge]
-    answer = ask(model, Question(0.0, bound * (0.999 if edge == 0 else 1.001), None))
-    assert ask(model, Question(0.0, bound, None)).within_domain
+    answer = ask(model, FrictionQuery(0.0, bound * (0.999 if edge == 0 else 1.001), None))
+    assert ask(model, FrictionQuery(0.0, bound, None)).within_domain
     assert not answer.within_domain
     assert "normal force" in answer.warning
 
 
 def test_an_answer_that_is_no_friction_warns(ask: Callable[..., Any], model: estimators.FrictionModel) -> None:
-    answer = ask(replace(model, scale=10.0), Question(0.0, model.domain.normal_force[1], 0.05))
+    answer = ask(replace(model, scale=10.0), FrictionQuery(0.0, model.domain.normal_force[1], 0.05))
     assert answer.friction_coefficient == 0.0
     assert answer.within_domain
     assert "not above 0" in answer.warning
@@ -85,9 +85,9 @@ def test_an_answer_that_is_no_friction_warns(ask: Callable[..., Any], model: est
 
 def test_an_answer_says_what_it_rests_on(ask: Callable[..., Any], model: estimators.FrictionModel) -> None:
     f_n = sum(model.domain.normal_force) / 2.0
-    assert ask(model, Question(1e-5, f_n, 0.05)).support == "supported"
-    assert ask(model, Question(1e-5, 3.0 * f_n, 0.05)).support == "extrapolated"
-    unknown = ask(replace(model, identifiable=np.zeros(3, bool)), Question(1e-5, f_n, 0.05))
+    assert ask(model, FrictionQuery(1e-5, f_n, 0.05)).support == "supported"
+    assert ask(model, FrictionQuery(1e-5, 3.0 * f_n, 0.05)).support == "extrapolated"
+    unknown = ask(replace(model, identifiable=np.zeros(3, bool)), FrictionQuery(1e-5, f_n, 0.05))
     assert (unknown.support, unknown.within_domain) == ("not identified", True)
     assert unknown.warning == unknown.advice
 
@@ -101,8 +101,8 @@ def test_methods_that_disagree_are_told_of(
         material = materials.find_id(session, "paper")
         job = jobs.add(session, "fit", "robust", material_id=material)
         friction_models.add(session, material, job, to_new_model(higher))
-    answer = ask(model, Question(1e-5, f_n, 0.05))
+    answer = ask(model, FrictionQuery(1e-5, f_n, 0.05))
     assert "methods disagree by more than their intervals allow: robust expects 0.6" in answer.warning
     with database.write() as session:
         friction_models.mark_outdated(session, material, besides=("ols",))
-    assert look_up(ModelCache().read(database, "paper", "ols"), Question(1e-5, f_n, 0.05)).warning is None
+    assert look_up(ModelCache().read(database, "paper", "ols"), FrictionQuery(1e-5, f_n, 0.05)).warning is None

@@ -165,7 +165,7 @@ def test_a_frame_that_comes_faster_than_it_is_looked_at_waits_and_nobody_with_it
         async def call(_: object, name: str, *_given: object) -> str:
             asked.append(name)
             if name == fast.id and asked.count(name) < 3:
-                raise detectors.StillLooking
+                raise detectors.FitInProgress
             return name
 
         monkeypatch.setattr(streams, "call", call)

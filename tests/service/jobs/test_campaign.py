@@ -8,12 +8,12 @@ import pytest
 
 from service import formats
 from service.jobs import campaign
-from service.jobs.campaign import Promise
+from service.jobs.campaign import RequestedAccuracy
 from service.processes import spawned
 from slipcore.contact import Scene
 from slipcore.errors import InvalidInput
 
-QUICK = Promise()
+QUICK = RequestedAccuracy()
 
 
 class Here(Executor):
@@ -82,7 +82,7 @@ def test_what_fails_otherwise_is_told(tmp_path: Path, monkeypatch: pytest.Monkey
 def test_a_folder_holds_one_campaign(tmp_path: Path) -> None:
     list(campaign.run(Here(), [scene()], [0], tmp_path, QUICK))
     with pytest.raises(InvalidInput, match=r"is accuracy 0\.1; allowed: no accuracy, or another folder"):
-        list(campaign.run(Here(), [scene()], [0], tmp_path, Promise(accuracy=0.1)))
+        list(campaign.run(Here(), [scene()], [0], tmp_path, RequestedAccuracy(accuracy=0.1)))
     with pytest.raises(InvalidInput, match="another 'A press' than that in"):
         list(campaign.run(Here(), [scene(friction=0.5)], [0], tmp_path, QUICK))
     list(campaign.run(Here(), [scene("More")], [0], tmp_path, QUICK))

@@ -127,7 +127,7 @@ def test_a_campaign_runs_on_a_cluster(cluster: Cluster, tmp_path: Path) -> None:
     sampling = {"kind": "SensorSampling", "frame_rate": 3.0, "points": [4, 4]}
     scene = Scene.from_mapping({"name": "press", "effect": [sampling]})
     with campaign.workers(1, cluster.address) as executor:
-        made = list(campaign.run(executor, [scene], range(2), tmp_path / "logs", campaign.Promise()))
+        made = list(campaign.run(executor, [scene], range(2), tmp_path / "logs", campaign.RequestedAccuracy()))
     assert [outcome.refused for outcome in made] == [None, None]
     assert {path.name for path in (tmp_path / "logs").glob("*.npz")} == {"press-0.npz", "press-1.npz"}
 

@@ -17,7 +17,7 @@ from db.errors import StorageUnavailable
 from db.repositories import audit, stores
 from db.tables import AuditEntryRow, now
 from service.jobs import webhook
-from service.jobs.webhook import NotTaken, Webhook
+from service.jobs.webhook import DeliveryFailed, Webhook
 from service.settings import Settings
 from tests.waiting import wait_until
 
@@ -141,7 +141,7 @@ def test_what_is_not_taken_comes_again_before_what_follows(stored: Database, rec
     found(stored, "paper")
     found(stored, "felt")
     for receiver.status in (500, 404, 301):
-        with pytest.raises(NotTaken, match=f"answered {receiver.status} to entry 1 "):
+        with pytest.raises(DeliveryFailed, match=f"answered {receiver.status} to entry 1 "):
             sender.send_new()
     receiver.status = 200
     assert Webhook(stored, receiver.url, None, lambda: True).send_new() == 2  # after a restart
@@ -152,7 +152,7 @@ def test_no_other_address_is_asked_where_one_sends_on(stored: Database, receiver
     sender = hook(stored, receiver)
     found(stored, "paper")
     receiver.status, receiver.headers = 307, {"location": "/elsewhere"}
-    with pytest.raises(NotTaken, match="answered 307"):
+    with pytest.raises(DeliveryFailed, match="answered 307"):
         sender.send_new()
     assert len(receiver.got) == 1
 
@@ -219,7 +219,7 @@ def test_an_address_that_never_ends_its_answer_is_left(
         sender = Webhook(stored, f"http://127.0.0.1:{listening.getsockname()[1]}/", None, lambda: True)
         assert sender.send_new() == 0
         found(stored, "paper")
-        with pytest.raises(NotTaken, match=r"took longer than 0\.5 s"):
+        with pytest.raises(DeliveryFailed, match=r"took longer than 0\.5 s"):
             sender.send_new()
         ended.set()
         thread.join()

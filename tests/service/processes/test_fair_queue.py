@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from service.processes import fair_queue
-from service.processes.fair_queue import FairQueue, OpenEndedQueue, QueueFull
+from service.processes.fair_queue import AdaptiveShareQueue, FairQueue, QueueFull
 
 
 class Crew:
@@ -154,7 +154,7 @@ def test_nobody_waits_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_of_what_lasts_as_long_as_one_likes_some_is_left_for_the_next() -> None:
     async def check() -> None:
-        crew = Crew(16, OpenEndedQueue)
+        crew = Crew(16, AdaptiveShareQueue)
         for owner in "abcd":
             await crew.start(*(f"{owner}{k}" for k in range(10)))
         assert [sum(name[0] == owner for name in crew.begun) for owner in "abcd"] == [8, 4, 2, 1]

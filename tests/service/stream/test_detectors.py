@@ -15,7 +15,7 @@ from service.stream import detectors
 from service.stream.detectors import PackedFrame
 from slipcore import GraspLog, InvalidInput, collect_samples, detect_slip
 
-ROOM = detectors.Room("me", 2**30)
+ROOM = detectors.MemoryLimit("me", 2**30)
 
 
 def unpacked(content: bytes) -> tuple[dict[str, Any], NDArray[np.uint8]]:
@@ -33,7 +33,7 @@ def whole_frame(log: GraspLog, k: int) -> PackedFrame:
 
 def step(given: PackedFrame, *, is_shown: bool = False) -> tuple[dict[str, Any], bytes | None]:
     """What the session says, once it has looked at the frames before."""
-    with suppress(detectors.StillLooking):
+    with suppress(detectors.FitInProgress):
         return detectors.step("one", given, is_shown)
     session = detectors._SESSIONS["one"]
     before = session.detector.state, session.until_look, session.last
@@ -132,7 +132,7 @@ def test_who_goes_takes_the_looks_along_that_have_not_begun(ramp: GraspLog, monk
     due = detectors.WINDOW + detectors.STRIDE - 1
     for k in range(due):
         detectors.step("one", whole_frame(ramp, k))
-    with pytest.raises(detectors.StillLooking):
+    with pytest.raises(detectors.FitInProgress):
         detectors.step("one", whole_frame(ramp, due))
     detectors.drop("one")
     assert session.look is not None

@@ -17,7 +17,7 @@ from stiction_client import GraspController, InvalidArgument
 FORCES = {"least_force": 0.5, "most_force": 30.0}
 ROUND = Control(6e-5, FORCES, round_at=5.0)
 
-ROOM = detectors.Room("me", 2**30)
+ROOM = detectors.MemoryLimit("me", 2**30)
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.usefixtures("looks_at_once")
 
 GEL = {"young_modulus": 1e6, "poisson_ratio": 0.5, "thickness": None, "marker_depth": 0.0}
 """What the ramp is pressed on."""
-ROOM = detectors.Room("me", 2**30)
+ROOM = detectors.MemoryLimit("me", 2**30)
 GRIP = Control(6e-5, {"least_force": 0.5, "most_force": 30.0}, round_at=5.0)
 
 
@@ -120,7 +120,7 @@ def test_frames_have_forces_all_or_none_by_the_first_one_that_is_taken(ramp: Gra
 def test_without_room_or_with_too_many_markers_there_are_none_and_it_says_why(
     ramp: GraspLog, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    opened(ramp, room=detectors.Room("me", 3 * 2**20))
+    opened(ramp, room=detectors.MemoryLimit("me", 3 * 2**20))
     assert "bytes is" in detectors.step("one", frame(ramp, 0))[0]["force"]["reason"]
     monkeypatch.setattr(reconstructing, "MOST_NODES", 300)
     opened(ramp)

@@ -13,8 +13,8 @@ from benchmarks.patch_grasps import PIVOT, grasp
 from benchmarks.presses import Faults, pressed
 from slipcore import (
     GraspLog,
-    ImpurePress,
     InvalidInput,
+    InvalidPress,
     SensorModel,
     SlipHistory,
     UnknownScale,
@@ -146,7 +146,7 @@ IMPURE: dict[str, tuple[Callable[[GraspLog], GraspLog], str]] = {
 @pytest.mark.parametrize("fault", IMPURE)
 def test_a_press_that_is_not_pure_is_refused_with_what_was_seen(ball: GraspLog, fault: str) -> None:
     change, seen = IMPURE[fault]
-    with pytest.raises(ImpurePress, match=f"log 2: .*{seen}") as refusal:
+    with pytest.raises(InvalidPress, match=f"log 2: .*{seen}") as refusal:
         calibrate_sensor([FAULTS.put_into(ball, 1), FAULTS.put_into(change(ball), 2)])
     assert list(refusal.value.evidence) == [1]
     assert str(pickle.loads(pickle.dumps(refusal.value))) == str(refusal.value)

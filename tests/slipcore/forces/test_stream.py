@@ -242,4 +242,4 @@ def test_what_does_not_fit_is_refused_by_name_and_changes_nothing(pressed: Press
     ):
         with pytest.raises(InvalidInput, match=said):
             stream.step(time, displacement)
-    assert stream._insight is None
+    assert stream._tracking is None
