@@ -1,7 +1,7 @@
 """A live stream of tactile frames to the service: slip states and friction come back (extra ``stream``)."""
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from types import TracebackType
 from typing import Any, Self
@@ -32,9 +32,9 @@ class SlipStream:
     ``position`` [n, m, 3] m at rest, ``element_area`` m². With ``keep`` the frames can be stored as a grasp log of
     ``material`` when they end (``finish``). With ``control``, the settings of a grip controller, each answer has the
     ``command`` of one that runs in the service, and begins with the ``material``'s model unless it is not to be
-    ``known``; frames then need forces, or a ``sensor`` whose gel the service knows. A connection that breaks is taken
-    up again, with the frames that were not answered. Raises ``ConnectionFailed`` with the service's reason where it
-    refuses.
+    ``known``, and where it has none recognises which of ``materials`` this is; frames then need forces, or a ``sensor``
+    whose gel the service knows. A connection that breaks is taken up again, with the frames that were not answered.
+    Raises ``ConnectionFailed`` with the service's reason where it refuses.
     """
 
     def __init__(
@@ -50,6 +50,7 @@ class SlipStream:
         keep: bool = False,
         control: ControlSettings | None = None,
         known: bool = True,
+        materials: Sequence[str] = (),
     ) -> None:
         rest = np.asarray(position, dtype="<f8")
         self._url = f"{url.rstrip('/').replace('http', 'ws', 1)}/v1/stream"
@@ -57,10 +58,13 @@ class SlipStream:
         self._open = ExitStack()
         self._session, self._number, self._answered = "", 0, -1
         self._waiting: deque[tuple[int, bytes]] = deque()
-        opening = {"type": "open", "position": rest.tobytes(), "grid": rest.shape[:2], "element_area": element_area}
-        opening |= {"detector": detector, "sensor": sensor, "material": material, "keep": keep}
+        opening: dict[str, Any] = {"type": "open", "position": rest.tobytes(), "grid": rest.shape[:2]}
+        opening |= {"element_area": element_area, "detector": detector, "sensor": sensor}
+        opening |= {"material": material, "keep": keep}
         if control is not None:
             opening["control"] = _control(control) | {"known": known}
+            if materials:
+                opening["control"] |= {"materials": list(materials)}
         self._connection = self._connect(opening)
 
     def __enter__(self) -> Self:

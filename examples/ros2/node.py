@@ -4,8 +4,10 @@
         -p least_force:=0.5 -p most_force:=30.0 -p model:=cardboard.json -r ~/wrench:=/finger/wrench
 
 It takes geometry_msgs/WrenchStamped from `~/wrench` and std_msgs/Float64 from `~/stick_ratio` (of a Stiction detector
-or stream), and publishes std_msgs/Float64 on `~/grip_force`, N. `model` is a file of `FrictionModel.save`; without it
-the controller learns. Any other setting of docs/control.md is a parameter of its name.
+or stream) and, for what slips, std_msgs/Float64MultiArray from `~/slip_samples` (the share of it that moves, then
+friction coefficient and normal force of each element that does), and publishes std_msgs/Float64 on `~/grip_force`, N.
+`model` is a file of `FrictionModel.save`, `materials` a list of such files: without a model the controller recognises
+one of these by samples of slip, or else learns. Any other setting of docs/control.md is a parameter of its name.
 """
 
 import sys
@@ -14,7 +16,7 @@ from pathlib import Path
 import rclpy
 from geometry_msgs.msg import WrenchStamped
 from rclpy.node import Node
-from std_msgs.msg import Float64
+from std_msgs.msg import Float64, Float64MultiArray
 
 sys.path.insert(0, str(Path(__file__).parent))
 from grip import Grip, seconds, settings_of
@@ -29,15 +31,24 @@ class GripNode(Node):
         super().__init__("stiction_grip", automatically_declare_parameters_from_overrides=True)
         given = {name: parameter.value for name, parameter in self.get_parameters_by_prefix("").items()}
         model = FrictionModel.load(given["model"]) if given.get("model") else None
-        self._grip, self._mode = Grip(settings_of(given), model), ""
+        others = [FrictionModel.load(file) for file in given.get("materials") or ()]
+        self._grip, self._mode = Grip(settings_of(given), model, {each.material: each for each in others}), ""
         self._publisher = self.create_publisher(Float64, "~/grip_force", 10)
         self.create_subscription(WrenchStamped, "~/wrench", self.on_wrench, 10)
         self.create_subscription(Float64, "~/stick_ratio", self.on_stick_ratio, 10)
+        self.create_subscription(Float64MultiArray, "~/slip_samples", self.on_slip_samples, 10)
 
     def on_stick_ratio(self, message: Float64) -> None:
         """Such a message has no stamp: it is of now."""
+        self._grip.on_stick_ratio(self._now(), message.data)
+
+    def on_slip_samples(self, message: Float64MultiArray) -> None:
+        """Neither has this one."""
+        self._grip.on_slip_samples(self._now(), message.data)
+
+    def _now(self) -> float:
         now = self.get_clock().now().to_msg()
-        self._grip.on_stick_ratio(seconds(now.sec, now.nanosec), message.data)
+        return seconds(now.sec, now.nanosec)
 
     def on_wrench(self, message: WrenchStamped) -> None:
         """Command, and log each change of the mode."""
@@ -49,7 +60,8 @@ class GripNode(Node):
         self._publisher.publish(Float64(data=command.normal_force))
         if command.mode != self._mode:
             self._mode = command.mode
-            self.get_logger().info(f"{command.mode}: {command.normal_force:.2f} N, {command.reason}")
+            of = f" of {command.material}" if command.material else ""
+            self.get_logger().info(f"{command.mode}{of}: {command.normal_force:.2f} N, {command.reason}")
 
 
 def main() -> None:

@@ -112,7 +112,8 @@ class _Connection:
         if isinstance(first, Open):
             await check_target(self._context, self._upload(first))
             address, model = self._principal.address or "", await self._known(first)
-            return await self._streams.open(first, self._principal.key_id, address, model, await self._gel(first)), []
+            gel, materials = await self._gel(first), await self._candidates(first)
+            return await self._streams.open(first, self._principal.key_id, address, model, gel, materials), []
         if isinstance(first, Resume):
             session = self._streams.find(first.session, self._principal.key_id)
             return session, session.recent.after(first.last)
@@ -123,9 +124,19 @@ class _Connection:
         if opening.control is None or not opening.control.known or opening.material is None:
             return None
         with suppress(NoModel):
-            known = await self._context.models.get(self._context.database, opening.material, AUTO)
-            return await self._context.threads.run(self._principal.share, to_client_model, known.stored)
+            return await self._model(opening.material)
         return None
+
+    async def _candidates(self, opening: Open) -> "dict[str, FrictionModel]":
+        """What a grip controller recognises, by the materials' own names; raises ``NoModel`` and ``NotFound``."""
+        names = [] if opening.control is None else opening.control.materials
+        models = [await self._model(name) for name in names]
+        return {model.material: model for model in models}
+
+    async def _model(self, material: str) -> "FrictionModel":
+        """The recommended one."""
+        known = await self._context.models.get(self._context.database, material, AUTO)
+        return await self._context.threads.run(self._principal.share, to_client_model, known.stored)
 
     async def _gel(self, opening: Open) -> dict[str, float | None] | None:
         """Of the sensor, if one is named and described."""

@@ -128,12 +128,13 @@ def open_session(
     control: Control | None = None,
     model: "stiction_client.FrictionModel | None" = None,
     gel: Mapping[str, float | None] | None = None,
+    materials: "Mapping[str, stiction_client.FrictionModel] | None" = None,
 ) -> None:
     """Begin a session, for which there must be ``room``.
 
-    ``control``: of a grip controller that answers its frames, and begins with ``model`` if there is one; ``gel``: of
-    the sensor (``slipcore.forces.Gel.from_json``), by which forces follow where frames have none. Raises
-    ``InvalidInput`` for what cannot be a sensor or a controller.
+    ``control``: of a grip controller that answers its frames, and begins with ``model`` if there is one, or else
+    recognises one of ``materials``; ``gel``: of the sensor (``slipcore.forces.Gel.from_json``), by which forces follow
+    where frames have none. Raises ``InvalidInput`` for what cannot be a sensor or a controller.
     """
     rows, columns = grid
     if not 0 < rows * columns <= MAX_MARKERS or rows < 1:
@@ -143,7 +144,7 @@ def open_session(
     _check_room(held, room)
     detector, moments = slipcore.SlipDetector(at_rest, area, method), estimators.Moments.empty(area)
     kept: list[Frame] | None = [] if keep else None
-    grip = None if control is None else Grip(at_rest, control, model)
+    grip = None if control is None else Grip(at_rest, control, model, materials)
     forces = None if gel is None else Reconstructing(gel, room.owner)
     _SESSIONS[name] = Session(detector, at_rest, area, moments, room, kept, grip=grip, forces=forces, held_bytes=held)
 

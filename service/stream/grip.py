@@ -1,8 +1,8 @@
 """The grip controller beside a live detector: what a stream's frames command (docs/control.md)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any
 
 from service.stream.messages import Control
@@ -17,12 +17,20 @@ CONTACT_RANGES = {"pressure_square": (0.1, 1e6, "-"), "torque_arm": (1e-9, 1.0, 
 
 
 class Grip:
-    """A controller on one sensor's frames. Raises ``InvalidInput`` for settings and a model that it cannot take."""
+    """A controller on one sensor's frames, with what it may be of. Raises ``InvalidInput`` for settings and models that
+    it cannot take.
+    """
 
-    def __init__(self, position: FloatArray, control: Control, model: FrictionModel | None) -> None:
+    def __init__(
+        self,
+        position: FloatArray,
+        control: Control,
+        model: FrictionModel | None,
+        materials: Mapping[str, FrictionModel] | None = None,
+    ) -> None:
         self._observer = Observer(position)
         with _named():
-            self._state = GraspController.init(settings_of(control), model)
+            self._state = GraspController.init(settings_of(control), model, materials)
 
     def step(self, frame: Frame, found: SlipState) -> dict[str, Any]:
         """The command after a frame, as it is told; raises ``InvalidInput`` for what the controller cannot take."""
@@ -30,7 +38,7 @@ class Grip:
             observer, seen = self._observer.step(frame, found)
             self._state, command = GraspController.step(self._state, seen)
         self._observer = observer
-        return {"normal_force": command.normal_force, "mode": command.mode, "reason": command.reason}
+        return asdict(command)
 
 
 @contextmanager

@@ -18,6 +18,9 @@ Number = Annotated[int, msgspec.Meta(ge=-(2**53), le=2**53)]
 """An integer that every JSON library keeps as it is."""
 
 
+MOST_MATERIALS = 100
+"""Among which a controller recognises a grasp's."""
+
 UNNAMED = "stream"
 """The sensor of a stream that names none."""
 
@@ -27,6 +30,7 @@ class Control(msgspec.Struct, forbid_unknown_fields=True):
 
     ``contact_area`` m² at any force, or under ``round_at`` N of a round fingertip; ``pressure_square`` and
     ``torque_arm`` m where they are neither Hertz's nor uniform pressure's. ``known``: begin with the material's model.
+    ``materials``: where it begins with none, those among which it recognises the grasp's, by name.
     """
 
     contact_area: float
@@ -35,6 +39,7 @@ class Control(msgspec.Struct, forbid_unknown_fields=True):
     pressure_square: Annotated[float, msgspec.Meta(gt=0.0)] | None = None
     torque_arm: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] | None = None
     known: bool = True
+    materials: Annotated[list[str], msgspec.Meta(max_length=MOST_MATERIALS)] = []
 
 
 class Open(msgspec.Struct, tag="open", tag_field="type", forbid_unknown_fields=True):

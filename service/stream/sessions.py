@@ -101,8 +101,10 @@ class Streams:
         address: str,
         model: "FrictionModel | None" = None,
         gel: Mapping[str, float | None] | None = None,
+        materials: "Mapping[str, FrictionModel] | None" = None,
     ) -> Session:
-        """A new session; ``model``: what a grip controller that was asked for begins with; ``gel``: of its sensor.
+        """A new session; ``model``: what a grip controller that was asked for begins with, ``materials``: what it
+        recognises; ``gel``: of its sensor.
 
         Raises ``InvalidInput`` for what cannot be a sensor or a controller, ``End`` where there are too many.
         """
@@ -114,6 +116,7 @@ class Streams:
             await self.call(
                 detectors.open_session, session.id, position, opening.grid, opening.element_area, opening.detector,
                 opening.keep, detectors.MemoryLimit(session.owner, self._most_bytes), opening.control, model, gel,
+                materials,
             )  # fmt: skip
         except BaseException:
             self._forget(session)

@@ -11,10 +11,18 @@ from benchmarks import control
 from benchmarks.control import campaign, episode
 from benchmarks.control_episodes import FRAME, START, Episode, least_force, run, world_of
 from benchmarks.control_outcomes import SIGNATURES, outcome_of, scores
-from benchmarks.control_strategies import EXPLORED_SLIP, Fixed, Reflex, exploration, settings_of
-from benchmarks.control_tasks import ALL, LIFTS, PAPER, STEP, TASKS
+from benchmarks.control_strategies import (
+    EXPLORED_SLIP,
+    Controlled,
+    Fixed,
+    Reflex,
+    exploration,
+    model_of,
+    settings_of,
+)
+from benchmarks.control_tasks import ALL, LIFT, LIFTS, PAPER, STEP, TASKS, lift
 from slipcore.contact.reduced import GRAVITY, Load
-from stiction_client import Contact, Observation
+from stiction_client import Contact, GraspController, Observation
 
 TASK = LIFTS[4]
 
@@ -41,6 +49,19 @@ def test_the_controller_holds_a_lift_seen_by_the_real_detector(name: str) -> Non
     score = scores(name, [outcome_of(episode(dataclasses.replace(TASK, seconds=2.5), name, 0), name, 0)])
     assert score["held"] == "1/1"
     assert 1.0 < float(str(score["final"])) < 2.6
+
+
+@pytest.mark.parametrize(("friction", "name"), [(0.45, "paper"), (0.57, None)])
+def test_the_controller_recognises_in_the_reduced_world(friction: float, name: str | None) -> None:
+    """Within a second of the load, where its first touch lets some slip; a stranger stays unknown, and is held, too."""
+    task = dataclasses.replace(lift(0.05, friction), seconds=1.4)
+    world = world_of(task, 1000)
+    materials = {"paper": model_of(0.45, world), "rubber": model_of(0.7, world)}
+    strategy = Controlled(GraspController.init(settings_of(world), materials=materials))
+    lifted = run(task, world, [strategy], 1000)
+    assert strategy.state.material == name
+    assert lifted.time[-1] < LIFT + 1.0
+    assert lifted.slipped[-1, 0] < 1e-5
 
 
 def test_a_detector_that_misses_all_slip_tells_that_all_sticks() -> None:

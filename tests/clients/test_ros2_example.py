@@ -3,13 +3,15 @@
 import math
 import runpy
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
-from stiction_client import GraspController, InvalidArgument, Observation
+from stiction_client import FrictionModel, GraspController, InvalidArgument, Observation
 
 FOLDER = Path(__file__).parents[2] / "examples" / "ros2"
 PARAMETERS = {"contact_area": 6e-5, "round_at": 5.0, "least_force": 0.5, "most_force": 30.0, "learn_frames": 6.0}
@@ -75,6 +77,29 @@ def test_an_old_stick_ratio_says_nothing() -> None:
     assert [answer.mode == "alarm" for answer in answers] == [False, True]
 
 
+def test_samples_of_slip_are_read_off_their_message() -> None:
+    told = EXAMPLE.samples_of([0.5, 0.3, 0.05, 0.4, 0.06])
+    assert told.friction_coefficient.tolist() == [0.3, 0.4]
+    assert told.normal_force.tolist() == [0.05, 0.06]
+    assert told.moving == 0.5
+    for none in ([], [1.0], [1.0, 0.3], [1.0, math.nan, 0.05], [1.0, 0.3, -0.05], [1.1, 0.3, 0.05]):
+        assert EXAMPLE.samples_of(none) is None
+
+
+def test_the_node_recognises_a_material_by_samples_and_takes_each_message_once(
+    make_model: Callable[..., FrictionModel],
+) -> None:
+    flat = make_model(coefficients=(0.45, 0.0, 0.0), covariance=np.diag([1e-5, 0.0, 0.0]), scale=0.02)
+    once, often = (EXAMPLE.Grip(EXAMPLE.settings_of(PARAMETERS), None, {"paper": flat}) for _ in range(2))
+    for count in range(1, 20):
+        for node, heard in ((once, count == 1), (often, True)):
+            node.on_stick_ratio(count / 60.0, 0.7)
+            if heard:
+                node.on_slip_samples(count / 60.0, [1.0, *[0.45, 0.05] * 8])
+        answers = [node.on_wrench(count / 60.0, (0.1, 0.0, -0.5), STILL) for node in (once, often)]
+    assert [answer.material for answer in answers] == [None, "paper"]
+
+
 class StandInNode:
     """As much of rclpy's as the node uses."""
 
@@ -115,13 +140,14 @@ def test_the_node_publishes_a_force_for_each_wrench(monkeypatch: pytest.MonkeyPa
         module("geometry_msgs"),
         module("geometry_msgs.msg", WrenchStamped=SimpleNamespace),
         module("std_msgs"),
-        module("std_msgs.msg", Float64=Number),
+        module("std_msgs.msg", Float64=Number, Float64MultiArray=Number),
     ):
         monkeypatch.setitem(sys.modules, each.__name__, each)
     monkeypatch.setattr(sys, "path", [*sys.path])
     node = runpy.run_path(str(FOLDER / "node.py"))["GripNode"]()
     vector = SimpleNamespace(x=0.0, y=1.0, z=-6.0)
     node.subscribed["~/stick_ratio"](Number(data=0.9))
+    node.subscribed["~/slip_samples"](Number(data=[1.0, 0.3, 0.05]))
     for count in range(3):
         header = SimpleNamespace(stamp=SimpleNamespace(sec=7, nanosec=20_000_000 * count))
         wrench = SimpleNamespace(force=vector, torque=SimpleNamespace(x=0.0, y=0.0, z=0.0))

@@ -1,11 +1,13 @@
 """The grip controller as pure functions: ``init`` and ``step`` (Li et al., Fig. 18)."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from stiction_client.controller.friction import KnownFriction, LearnedFriction, utilisation
 from stiction_client.controller.load import Load
+from stiction_client.controller.recognition import UNKNOWN, Recognition
 from stiction_client.controller.records import Command, Mode, Observation, SlipSamples, check
 from stiction_client.controller.settings import ControlSettings
 from stiction_client.controller.stick_ratio import StickRatioEstimate
@@ -17,7 +19,8 @@ class ControllerState:
     """A controller between two frames, never written to.
 
     ``known``: the friction that ``hold`` goes by, None while there is none; ``learned``: what slipping elements told;
-    ``contradictions``: frames in a row that speak against ``known``; ``since``: when ``mode`` began, s.
+    ``contradictions``: frames in a row that speak against ``known``; ``since``: when ``mode`` began, s;
+    ``recognition``: the materials that it may be of; ``material``: which it was taken for, and its ``probability``.
     """
 
     settings: ControlSettings
@@ -30,6 +33,9 @@ class ControllerState:
     felt: StickRatioEstimate = field(default_factory=StickRatioEstimate)
     learned: LearnedFriction = field(default_factory=LearnedFriction)
     contradictions: int = 0
+    recognition: Recognition | None = None
+    material: str | None = None
+    probability: float = 0.0
 
 
 class _Demand(NamedTuple):
@@ -39,10 +45,20 @@ class _Demand(NamedTuple):
     reason: str
 
 
-def init(settings: ControlSettings, model: FrictionModel | None = None) -> ControllerState:
-    """A controller that has seen nothing; ``model``: of the object's material, where that is known."""
-    known = None if model is None else KnownFriction.of_model(model, settings)
-    return ControllerState(settings, known, "feel" if known is None else "hold", settings.least_force)
+def init(
+    settings: ControlSettings,
+    model: FrictionModel | None = None,
+    materials: Mapping[str, FrictionModel] | None = None,
+) -> ControllerState:
+    """A controller that has seen nothing; ``model``: of the object's material, where that is known.
+
+    ``materials``: without a ``model``, those among which the object's is to be recognised, by name. Raises
+    ``InvalidArgument`` for one that is called "unknown".
+    """
+    if model is not None:
+        return ControllerState(settings, KnownFriction.of_model(model, settings), "hold", settings.least_force)
+    among = Recognition.among(materials or {}, settings)
+    return ControllerState(settings, None, "feel", settings.least_force, recognition=among)
 
 
 def step(state: ControllerState, observation: Observation) -> tuple[ControllerState, Command]:
@@ -57,7 +73,7 @@ def step(state: ControllerState, observation: Observation) -> tuple[ControllerSt
     force = _limited(seen, demand.force, elapsed)
     limited = demand.force > state.settings.most_force
     reason = f"{demand.reason}, more than most_force" if limited else demand.reason
-    return replace(seen, normal_force=force), Command(force, seen.mode, reason)
+    return replace(seen, normal_force=force), Command(force, seen.mode, reason, seen.material, seen.probability)
 
 
 def _sense(state: ControllerState, observation: Observation, elapsed: float) -> ControllerState:
@@ -67,13 +83,18 @@ def _sense(state: ControllerState, observation: Observation, elapsed: float) -> 
     sampled = _sampled(observation, felt, state.settings)
     agrees = not math.isnan(sampled) and _agrees(sampled, observation.normal, felt, load.size, state.settings)
     friction = sampled if agrees else math.nan
-    learned = state.learned
-    samples = observation.slip_samples
-    if samples is not None and not math.isnan(sampled) and _counts(state, samples, agrees):
+    learned, recognition, samples = state.learned, state.recognition, observation.slip_samples
+    counts = samples is not None and not math.isnan(sampled) and _counts(state, samples, agrees)
+    if samples is not None and counts:
         learned = learned.with_frame(sampled, samples.normal_force.size, agrees, state.settings)
+    if recognition is not None:
+        told = friction if counts else math.nan
+        count = 0 if samples is None else samples.normal_force.size
+        recognition = recognition.step(observation.time, _loaded(load, state.settings), told, count, state.settings)
     against = _contradicts(state, felt, observation.normal, load.size, friction)
     contradictions = state.contradictions if against is None else state.contradictions + 1 if against else 0
-    return replace(state, time=observation.time, load=load, felt=felt, learned=learned, contradictions=contradictions)
+    seen = replace(state, time=observation.time, load=load, felt=felt, learned=learned, recognition=recognition)
+    return replace(seen, contradictions=contradictions)
 
 
 def _sampled(observation: Observation, felt: StickRatioEstimate, settings: ControlSettings) -> float:
@@ -126,18 +147,24 @@ def _decide(state: ControllerState, observation: Observation) -> ControllerState
     """The mode after a frame. Evidence against what is known discards it, and all that was learnt with it."""
     settings = state.settings
     if state.known is not None and _refuted(state, state.known, observation.normal):
-        return _enter(replace(state, known=None, learned=LearnedFriction(), contradictions=0), "alarm")
+        return _enter(_forgotten(state), "alarm")
     if state.known is not None:
         return _enter(_sharpened(state, state.known, observation.normal), "hold")
     if (state.felt.slips(settings) and state.load.size > 0.0) or _blind(state):
-        return _enter(replace(state, since=state.time), "alarm")
+        return _enter(replace(state, since=state.time, recognition=None), "alarm")
     if state.mode == "alarm" and state.time - state.since < settings.settle_time:
         return state
-    known = state.learned.known(settings)
+    state = _recognised(state, observation.normal)
+    known = state.known or state.learned.known(settings)
     if known is not None:
         return _enter(replace(state, known=known), "hold")
-    settled = _loaded(state) and state.time - state.load.steady >= settings.settle_time
+    settled = _loaded(state.load, state.settings) and state.time - state.load.steady >= settings.settle_time
     return _enter(state, "learn" if settled and observation.stick_ratio >= 0.0 else "feel")
+
+
+def _forgotten(state: ControllerState) -> ControllerState:
+    """Without what was known, and all that was learnt with it."""
+    return replace(state, known=None, learned=LearnedFriction(), contradictions=0, material=None, probability=0.0)
 
 
 def _refuted(state: ControllerState, known: KnownFriction, normal: float) -> bool:
@@ -145,6 +172,19 @@ def _refuted(state: ControllerState, known: KnownFriction, normal: float) -> boo
     if state.contradictions >= state.settings.contradiction_frames:
         return True
     return normal > 0.0 and known.refuted(state.learned, state.load.size, normal, state.settings)
+
+
+def _recognised(state: ControllerState, normal: float) -> ControllerState:
+    """With the material that the samples of the first second speak for; once they speak for none, no more is tried."""
+    settings, among = state.settings, state.recognition
+    if among is None or among.frames < settings.contradiction_frames or normal == 0.0:
+        return state
+    name, probability = among.likeliest(normal, settings)
+    if name == UNKNOWN:
+        return replace(state, recognition=None)
+    if among.frames < settings.recognise_frames or probability < settings.recognise_probability:
+        return state
+    return replace(state, known=among.materials[name], material=name, probability=probability, recognition=None)
 
 
 def _sharpened(state: ControllerState, known: KnownFriction, normal: float) -> ControllerState:
@@ -162,12 +202,16 @@ def _enter(state: ControllerState, mode: Mode) -> ControllerState:
 
 def _blind(state: ControllerState) -> bool:
     """Whether neither a model nor the stick ratio tells how hard to hold a load."""
-    return state.known is None and _loaded(state) and state.time - state.felt.told > state.settings.dropout_time
+    return (
+        state.known is None
+        and _loaded(state.load, state.settings)
+        and state.time - state.felt.told > state.settings.dropout_time
+    )
 
 
-def _loaded(state: ControllerState) -> bool:
+def _loaded(load: Load, settings: ControlSettings) -> bool:
     """Whether the load needs more than the least force, were friction low."""
-    return state.load.size > state.settings.unknown_friction * state.settings.least_force
+    return load.size > settings.unknown_friction * settings.least_force
 
 
 def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
@@ -182,13 +226,19 @@ def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
         asked = state.known.required(observation.tangential * growth, observation.torque * growth, settings.most_force)
         return [*demands, _Demand(asked, "friction model" if growth == 1.0 else "friction model, growing load")]
     load = state.load.size * growth
+    among = state.recognition
+    waits = among is not None and among.waits(state.time, settings) and state.mode == "feel"
     target = settings.learn_stick_ratio if state.mode == "learn" else settings.feel_stick_ratio
     demands.append(_Demand(state.felt.required(load, target), "stick ratio"))
     lowest = state.learned.lowest(settings)
     if state.mode == "learn" and lowest > 0.0:
         believed = max(lowest, settings.unknown_friction)  # what sticks, taken for slip, would ask for ever more
         demands.append(_Demand(load / believed, "samples of slip"))
-    if state.mode != "learn":
+    if among is not None and waits:
+        slippery = max(among.least_friction(observation.normal), settings.unknown_friction)
+        asked = load / slippery
+        demands += [_Demand(each, "to be recognised") for each in (asked, state.normal_force)]
+    elif state.mode != "learn":
         why = "no stick ratio" if _blind(state) else "friction unknown"
         demands += [_Demand(load / settings.unknown_friction, why), _Demand(state.normal_force, why)]
     return demands

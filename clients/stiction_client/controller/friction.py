@@ -126,7 +126,7 @@ class LearnedFriction:
 
     def error(self, settings: ControlSettings) -> float:
         """Of the mean, relative: one standard deviation, of which the bias common to all samples is a part."""
-        return math.hypot(settings.learned_error, settings.sample_error / math.sqrt(sum(self.counts)))
+        return error_of_mean(sum(self.counts), settings)
 
     def lowest(self, settings: ControlSettings) -> float:
         """The least friction to expect while the force is being lowered; NaN while there are few samples.
@@ -154,6 +154,11 @@ class LearnedFriction:
             return None
         low = self.mean * (1.0 - NORMAL_DEVIATIONS * self.error(settings))
         return KnownFriction.learned(low, self.mean, settings.contact) if low > 0.0 else None
+
+
+def error_of_mean(count: int, settings: ControlSettings) -> float:
+    """Of friction by the samples of ``count`` elements, relative: one standard deviation."""
+    return math.hypot(settings.learned_error, settings.sample_error / math.sqrt(count))
 
 
 def utilisation(stick_ratio: float) -> float:

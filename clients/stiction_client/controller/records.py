@@ -46,11 +46,16 @@ class Observation:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """``normal_force`` N that the contact shall be pressed with, the controller's ``mode``, and the ``reason``."""
+    """``normal_force`` N that the contact shall be pressed with, the controller's ``mode``, and the ``reason``.
+
+    ``material``: the one among those known that the grasp was recognised for, and its ``probability``; 0 without one.
+    """
 
     normal_force: float
     mode: Mode
     reason: str
+    material: str | None = None
+    probability: float = 0.0
 
 
 def check(observation: Observation, last: float) -> None:

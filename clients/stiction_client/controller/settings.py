@@ -78,6 +78,14 @@ class ControlSettings:
     sample_error: Annotated[
         float, Gain(0.0, 1.0, "-", "relative, of the friction of one slipping element, one standard deviation")
     ] = 0.13
+    recognise_time: Annotated[
+        float,
+        Gain(0.0, 10.0, "s", "how long a load is gripped for the most slippery one, and samples add up"),
+    ] = 1.0
+    recognise_frames: Annotated[int, Gain(1, 100, "frames", "the first ones have few elements, and the same ones")] = 5
+    recognise_probability: Annotated[
+        float, Gain(0.5, 1.0, "-", "one in ten may be wrong: its own samples sharpen or refute it")
+    ] = 0.9
     contradiction_deviations: Annotated[
         float, Gain(0.5, 10.0, "-", "of both errors: of 700 right models one is doubted for its samples")
     ] = 3.0

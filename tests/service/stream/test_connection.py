@@ -138,6 +138,20 @@ def test_a_grip_controller_answers_and_begins_with_the_material_s_model(served: 
     assert modes == {("gripped", True): "hold", ("gripped", False): "feel", (None, True): "feel"}
 
 
+def test_a_grip_controller_recognises_one_of_the_service_s_materials(served: Served, ramp: GraspLog) -> None:
+    settings = ControlSettings(contact=Contact.round(6e-5, at_force=5.0), least_force=0.5, most_force=30.0)
+    with FrictionClient(served.url) as client:
+        client.ensure_material("recognised")
+        client.wait(client.upload(ramp, material="recognised").job).raise_for_status()
+    with SlipStream(served.url, ramp.position, ramp.element_area, control=settings, materials=["recognised"]) as live:
+        commands = [live.step(time_, *parts(ramp, k))["command"] for k, time_ in enumerate(ramp.time)]
+        live.finish()
+    assert commands[0]["material"] is None
+    assert "recognised" in {command["material"] for command in commands}
+    with pytest.raises(ConnectionFailed, match="nothing"):
+        SlipStream(served.url, ramp.position, ramp.element_area, control=settings, materials=["nothing"])
+
+
 def test_a_sensor_whose_gel_is_known_needs_no_forces(served: Served, ramp: GraspLog) -> None:
     settings = ControlSettings(contact=Contact.round(6e-5, at_force=5.0), least_force=0.5, most_force=30.0)
     with FrictionClient(served.url) as client, served.connect() as before:
