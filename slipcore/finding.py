@@ -12,3 +12,13 @@ class Finding:
     name: str
     evidence: str
     remedy: str
+
+    @property
+    def code(self) -> str:
+        """The ``name``, as the contract of names spells it."""
+        return self.name
+
+    @property
+    def severity(self) -> str:
+        """Always "warning": each makes friction doubtful, none stops an evaluation."""
+        return "warning"

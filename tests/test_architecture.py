@@ -116,13 +116,36 @@ def third_party(path: Path) -> set[str]:
     return {name.split(".")[0] for name in imported_modules(path)} - set(sys.stdlib_module_names)
 
 
+def not_allowed(root: Path, package: str) -> dict[str, set[str]]:
+    """The files of a package that import what it may not, each with that."""
+    files = {str(path.relative_to(root)): path for path in sorted((root / package).rglob("*.py"))}
+    assert files
+    found = {name: third_party(path) - ALLOWED[package] - OPTIONAL.get(name, set()) for name, path in files.items()}
+    return {name: extra for name, extra in found.items() if extra}
+
+
 @pytest.mark.parametrize("package", ALLOWED)
 def test_imports_run_one_way(package: str) -> None:
-    files = sorted((ROOT / package).rglob("*.py"))
-    assert files
-    for path in files:
-        extra = third_party(path) - ALLOWED[package] - OPTIONAL.get(str(path.relative_to(ROOT)), set())
-        assert not extra, f"{path.relative_to(ROOT)} imports {sorted(extra)}"
+    assert not_allowed(ROOT, package) == {}
+
+
+@pytest.mark.parametrize(
+    ("package", "text"),
+    [
+        ("slipcore", "import estimators.fitting"),
+        ("slipcore", "def lazily():\n    from db import records"),
+        ("estimators", "if TYPE_CHECKING:\n    from service.domain import fit"),
+        ("db", "import numpy as np"),
+        (CLIENT, "from slipcore.samples import FrictionSamples"),
+        (CLIENT, "import websockets"),
+    ],
+)
+def test_an_import_that_runs_back_is_found(tmp_path: Path, package: str, text: str) -> None:
+    path = tmp_path / package / "room.py"
+    path.parent.mkdir(parents=True)
+    (path.parent / "plain.py").write_text("import json")
+    path.write_text(text)
+    assert set(not_allowed(tmp_path, package)) == {f"{package}/room.py"}
 
 
 def test_estimators_know_of_slipcore_only_its_samples_compiler_options_and_references() -> None:
@@ -132,11 +155,76 @@ def test_estimators_know_of_slipcore_only_its_samples_compiler_options_and_refer
         assert all(name.startswith(known) for name in modules), path
 
 
-def test_estimators_know_of_the_client_only_its_model_and_how_far_that_is_to_be_trusted() -> None:
-    known = tuple(f"stiction_client.{name}" for name in ("model", "linear_friction", "support"))
-    for path in sorted((ROOT / "estimators").rglob("*.py")):
-        modules = {name for name in imported_modules(path) if name.split(".")[0] == "stiction_client"}
-        assert all(name.startswith(known) for name in modules), path
+MODEL, CONTAINER = {"linear_friction", "model"}, {"container"}
+PLANNER = {"contacts", "planner", "errors"}
+
+CLIENT_PARTS = {
+    "slipcore": set[str](),
+    "db": set[str](),
+    "migrations": set[str](),
+    "estimators": MODEL,
+    "service/domain": MODEL | CONTAINER | PLANNER | {"support"},
+    "service/exports": CONTAINER,
+    "service/formats": CONTAINER,
+    "service/http": set[str](),
+    "service/jobs": CONTAINER,
+    "service/observability": set[str](),
+    "service/processes": set[str](),
+    "service/report": MODEL | {"records", "support"},
+    "service/slip_benchmark": CONTAINER,
+    "service/stream": MODEL | CONTAINER | {"arguments", "contacts", "controller", "errors"},
+    "service/web": {"records", "support"},
+}
+"""Which modules of the client each package or room may use: one model, one container and one planner for both sides.
+Commands and the demo are clients of the service, and may use all.
+"""
+
+
+def client_parts(path: Path) -> set[str]:
+    """The modules of the client that a file uses, by the names of the package as well."""
+    import stiction_client
+
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    nodes = [node for node in import_statements(path) if isinstance(node, ast.ImportFrom)]
+    names = {alias.name for node in nodes if node.module == "stiction_client" for alias in node.names}
+    names |= {
+        node.attr
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "stiction_client"
+    }
+    submodules = {module.stem for module in (ROOT / CLIENT).iterdir()}
+    homes = {name if name in submodules else getattr(stiction_client, name).__module__.split(".")[1] for name in names}
+    return (
+        homes | {name.split(".")[1] for name in imported_modules(path) if name.startswith("stiction_client.")} - names
+    )
+
+
+@pytest.mark.parametrize("room", CLIENT_PARTS)
+def test_each_room_knows_of_the_client_only_what_both_sides_share(room: str) -> None:
+    found = {path: client_parts(path) - CLIENT_PARTS[room] for path in sorted((ROOT / room).rglob("*.py"))}
+    assert found
+    assert {path: parts for path, parts in found.items() if parts} == {}
+
+
+def test_every_room_of_the_service_has_its_rule_of_the_client() -> None:
+    rooms = {f"service/{path.name}" for path in (ROOT / "service").iterdir() if (path / "__init__.py").exists()}
+    assert rooms - set(CLIENT_PARTS) == {"service/cli", "service/demo"}
+    assert {path.name for path in (ROOT / "service").glob("*.py") if client_parts(path)} == set()
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("from stiction_client import FrictionClient", {"client"}),
+        ("def lazily():\n    import stiction_client\n    stiction_client.required_normal_force()", {"planner"}),
+        ("from stiction_client.support import Kind", {"support"}),
+        ("from stiction_client import container", {"container"}),
+        ("import stiction_client.stream", {"stream"}),
+    ],
+)
+def test_a_part_of_the_client_is_found_however_it_is_named(tmp_path: Path, text: str, parts: set[str]) -> None:
+    (tmp_path / "room.py").write_text(text)
+    assert client_parts(tmp_path / "room.py") == parts
 
 
 def test_one_module_decides_how_kernels_are_compiled_and_kept() -> None:
@@ -152,7 +240,7 @@ def test_no_modules_import_one_another_in_a_circle(package: str) -> None:
     assert circle(graph_of(modules)) == []
 
 
-@pytest.mark.parametrize("package", ["slipcore", "estimators", "migrations", CLIENT])
+@pytest.mark.parametrize("package", [*ALLOWED, "service"])
 def test_no_folders_import_one_another_in_a_circle(package: str) -> None:
     folder = ROOT / package
     modules = modules_of(folder.parent, folder.name)
@@ -357,6 +445,18 @@ def test_from_a_route_to_repository_or_numerics_there_are_three_calls_at_most(ro
     assert hops(calls_in_the_service(), f"service.{route}", end) <= 3
 
 
+def test_a_route_with_more_calls_on_its_way_is_seen(tmp_path: Path) -> None:
+    chain = {"route": "middle", "middle": "inner", "inner": "inmost", "inmost": "end", "end": ""}
+    for name, other in chain.items():
+        call = f"from {other} import {other}\ndef {name}(): {other}()" if other else f"def {name}(): ..."
+        (tmp_path / f"{name}.py").write_text(call)
+    graph = calls({name: tmp_path / f"{name}.py" for name in chain})
+    assert hops(graph, "route.route", "end.end") == 4
+    assert hops(graph, "middle.middle", "end.end") == 3
+    with pytest.raises(AssertionError, match="no way"):
+        hops(graph, "end.end", "route.route")
+
+
 def test_nothing_but_the_service_knows_a_web_framework() -> None:
     for package in ("slipcore", "estimators", "db", "migrations"):
         for path in (ROOT / package).rglob("*.py"):
@@ -407,6 +507,65 @@ def test_every_public_name_is_there(package: str) -> None:
     assert set(module.__all__) <= set(dir(module))
     with pytest.raises(AttributeError, match="'unheard_of'"):
         module.unheard_of  # noqa: B018
+
+
+CONTRACT = {
+    "slipcore": "GraspLog GroundTruth detect_slip SlipHistory SlipDetector SlipState collect_samples FrictionSamples"
+    " check_log Finding SensorModel calibrate_sensor",
+    "slipcore.contact": "Scene simulate",
+    "slipcore.contact.reduced": "init step",
+    "slipcore.forces": "Gel reconstruct Reconstruction",
+    "estimators": "fit FrictionModel Moments recognise next_grasp ChangeAlarm",
+    "stiction_client": "FrictionClient AsyncFrictionClient FrictionModel GraspController required_normal_force"
+    " mujoco_pair drake_friction physx_material friction_cone",
+}
+"""Names that users and checks call: they stay importable from these modules."""
+
+
+@pytest.mark.parametrize(
+    ("module", "name"), [(module, name) for module, all_ in CONTRACT.items() for name in all_.split()]
+)
+def test_each_name_of_the_contract_is_importable(module: str, name: str) -> None:
+    assert callable(getattr(importlib.import_module(module), name))
+
+
+MEMBERS = {
+    "slipcore.GraspLog": "time position normal element_area displacement force object_pose sensor metadata truth",
+    "slipcore.GroundTruth": "contact slip_kinematic slip_contact_factor stick_ratio friction",
+    "slipcore.SlipHistory": "contact slip probability stick_ratio velocity macro_slip events noise patches findings",
+    "slipcore.SlipDetector": "step",
+    "slipcore.FrictionSamples": "friction_coefficient tangential_velocity normal_force tangential_force time element"
+    " weight element_area kind",
+    "slipcore.Finding": "code severity evidence remedy",
+    "slipcore.contact.Scene": "explain from_toml",
+    "slipcore.forces.Gel": "young_modulus poisson_ratio thickness marker_depth",
+    "slipcore.forces.Reconstruction": "force deviation resultant resultant_deviation contact kernel_width information"
+    " apply",
+    "estimators.FrictionModel": "coefficients covariance scale n domain identifiable diagnostics cost draws predict"
+    " scales support advice",
+    "estimators.Moments": "from_samples merge fit",
+    "estimators.ChangeAlarm": "init step",
+    "stiction_client.FrictionClient": "upload material friction recognise wait",
+    "stiction_client.AsyncFrictionClient": "upload material friction recognise wait",
+    "stiction_client.GraspController": "init step",
+    "stiction_client.FrictionModel": "save load",
+}
+
+
+@pytest.mark.parametrize("record", MEMBERS)
+def test_each_record_of_the_contract_has_its_members(record: str) -> None:
+    module, _, name = record.rpartition(".")
+    kind = getattr(importlib.import_module(module), name)
+    assert [member for member in MEMBERS[record].split() if not hasattr(kind, member)] == []
+
+
+def test_each_method_of_the_contract_is_offered() -> None:
+    from estimators.method_names import METHODS as ESTIMATORS
+    from slipcore import METHODS as DETECTORS
+
+    detectors = "filter strain_rate strain_rate_literal rigid_fit local_deformation deformation_gradient force_ratio"
+    assert set(DETECTORS) >= {*detectors.split(), "forces_only"}
+    assert set(ESTIMATORS) >= {"ols", "robust", "conjugate", "bayes", "auto"}
 
 
 def test_no_file_names_a_package_registry_or_this_machine() -> None:
