@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slipcore.calibration.press import Press, _noise, find_press, impurity, load_terms, marker_motion
+from slipcore.calibration.press import Press, _noise, find_press, load_terms, marker_motion, press_fault
 from slipcore.frames import GraspLog
 from tests.slipcore.calibration.straight_press import DEPTH, LOAD, STEP, places, press, shares, straight
 
@@ -51,7 +51,7 @@ def test_without_forces_the_level_is_the_load() -> None:
     assert seen.zero is None
     np.testing.assert_array_equal(seen.normal_force, seen.level)
     assert not seen.tangential_force.any()
-    assert impurity(seen) is None
+    assert press_fault(seen) is None
 
 
 def tilted(log: GraspLog) -> GraspLog:
@@ -94,13 +94,13 @@ def test_load_sideways_beyond_a_twentieth_is_impure() -> None:
     terms, load = load_terms(seen)
     stray = load - terms @ np.linalg.lstsq(terms, load)[0]
     size = float(np.abs(stray).max() / seen.normal_force.max())  # of a load of 1; all is linear
-    assert impurity(bent(0.049 / size)) is None
-    assert "the load sideways changes by" in str(impurity(bent(0.051 / size)))
+    assert press_fault(bent(0.049 / size)) is None
+    assert "the load sideways changes by" in str(press_fault(bent(0.051 / size)))
 
 
 @pytest.mark.parametrize(("share", "is_pure"), [(0.099, True), (0.101, False)])
 def test_motion_sideways_beyond_a_tenth_is_impure(share: float, is_pure: bool) -> None:
-    found = impurity(press(moved=(0.6 * share, 0.8 * share)))
+    found = press_fault(press(moved=(0.6 * share, 0.8 * share)))
     assert (found is None) is is_pure
     assert is_pure or f"{1e3 * share:.3g} µm sideways" in str(found)
 
@@ -118,9 +118,9 @@ def test_terms_of_the_load_are_those_that_free_frames_tell() -> None:
 def test_a_press_within_its_noise_is_none() -> None:
     noise = np.zeros((len(LOAD), 8, 8, 3))
     noise[..., 2] = 0.04 * np.random.default_rng(1).standard_normal(noise.shape[:3])
-    assert "nothing presses: " in str(impurity(press(added=noise)))
-    assert impurity(press(added=0.02 * noise)) is None
-    assert impurity(press(load=0.0 * LOAD)) == "nothing presses"
+    assert "nothing presses: " in str(press_fault(press(added=noise)))
+    assert press_fault(press(added=0.02 * noise)) is None
+    assert press_fault(press(load=0.0 * LOAD)) == "nothing presses"
 
 
 def test_noise_is_told_by_second_differences() -> None:
