@@ -47,7 +47,7 @@ TOLERANCES = {
 }
 TARGETS = (1e-3, 1e-4, 1e-6)
 ROUNDS = 3
-PATIENCE = 20.0
+TIME_LIMIT = 20.0
 """Seconds of one solution, after which a solver is asked for nothing tighter on that grid."""
 FEATURES = (
     ("normal contact, free space", "yes", "yes", "yes", "yes"),
@@ -211,7 +211,7 @@ def compare(
                     fields[name] = field
         for name, field in fields.items():
             seconds = float(np.median([run["seconds"] for run in times[name]]))
-            if seconds > PATIENCE:
+            if seconds > TIME_LIMIT:
                 del solvers[name]
             yield Run(
                 problem,
@@ -235,18 +235,18 @@ def measure(worker: Worker, present: dict[str, str], grids: list[int]) -> list[R
     for cells in (cells for cells in grids if 128 <= cells <= 256):
         _, tight = ours.friction(cells, 1e-11)
         exact = closed.traction(np.hypot(*ours.prepared(cells)[0].points()))
-        runs += _told(compare("partial slip", cells, slip, tight, exact, ROUNDS if cells < 256 else 1))
+        runs += _printed(compare("partial slip", cells, slip, tight, exact, ROUNDS if cells < 256 else 1))
     ours.known.clear()  # set-up is timed too
     for cells in grids:
         grid, operators, height = ours.prepared(cells)
         tight = solve_normal(operators, grid, height, force=FORCE, tolerance=1e-12).pressure
         del ours.known[cells]
         exact = HERTZ.pressure(np.hypot(*grid.points()))
-        runs += _told(compare("normal contact", cells, normal, tight, exact, ROUNDS if cells < 512 else 1))
+        runs += _printed(compare("normal contact", cells, normal, tight, exact, ROUNDS if cells < 512 else 1))
     return [replace(run, solver=run.solver.removesuffix(" friction")) for run in runs]
 
 
-def _told(runs: Iterator[Run]) -> Iterator[Run]:
+def _printed(runs: Iterator[Run]) -> Iterator[Run]:
     for run in runs:
         print(
             f"{run.problem:15} {run.solver:18} {run.cells:4} {run.tolerance:7.0e} {1e3 * run.seconds:9.2f} ms "

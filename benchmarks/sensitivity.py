@@ -263,8 +263,8 @@ def pressed() -> dict[str, float]:
     scores = [of_gels.score(case, 1) for case in PRESSES]
     held = np.sum([pair for each in scores for pair in each.inside.values()], axis=0)
     of_resultants, of_fields = (np.mean([getattr(each, name) for each in scores]) for name in ("resultant", "elements"))
-    told = {"resultants": np.log(of_resultants), "fields": np.log(of_fields), "intervals": held[0] / held[1]}
-    return {name: float(value) for name, value in told.items()}
+    error_and_cost = {"resultants": np.log(of_resultants), "fields": np.log(of_fields), "intervals": held[0] / held[1]}
+    return {name: float(value) for name, value in error_and_cost.items()}
 
 
 def of_presses() -> list[Row]:
@@ -282,15 +282,15 @@ def solved() -> dict[str, float]:
     """Largest error over the scenes at the default fidelity, and applications of operators, in logarithms."""
     chosen = of_contact.FIDELITY
     fidelity = Fidelity(chosen.cells, chosen.substeps, chosen.tolerance)
-    return told({name: run(scene.plan(), fidelity) for name, scene in SCENES.items()})
+    return error_and_cost({name: run(scene.plan(), fidelity) for name, scene in SCENES.items()})
 
 
 def asked() -> dict[str, float]:
     """The same of a scene that asks for an accuracy."""
-    return told({"shear": simulate_to(SCENES["shear"].plan(), accuracy=0.1).log})
+    return error_and_cost({"shear": simulate_to(SCENES["shear"].plan(), accuracy=0.1).log})
 
 
-def told(logs: Mapping[str, GraspLog]) -> dict[str, float]:
+def error_and_cost(logs: Mapping[str, GraspLog]) -> dict[str, float]:
     """Error and cost of some logs; changes of logarithms are relative."""
     error = max(difference(log, fine(name)).largest for name, log in logs.items())
     applications = sum(int(log.metadata["applications"]) for log in logs.values())

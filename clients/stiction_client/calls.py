@@ -69,7 +69,7 @@ NOT_MODIFIED = 304
 class Request:
     """One HTTP request, which may be sent again: it is harmless twice, or done once under its ``idempotency_key``.
 
-    ``patience``: s for which the service is asked to keep its answer back; ``tag``: that of the answer it gave before.
+    ``wait_seconds``: for which the service is asked to keep its answer back; ``tag``: that of its answer before.
     """
 
     method: str
@@ -79,7 +79,7 @@ class Request:
     content: bytes | None = None
     content_type: str | None = None
     idempotency_key: str | None = None
-    patience: float = 0.0
+    wait_seconds: float = 0.0
     tag: str | None = None
 
 
@@ -362,8 +362,8 @@ def wait(job_id: str, timeout: float) -> Call[Job]:
     pause = FIRST_POLL
     while True:
         asked = time.monotonic()
-        patience = min(max(deadline - asked, 0.0), LONGEST_POLL)
-        request = Request("GET", f"/v1/jobs/{_part(job_id)}", {"wait": patience}, patience=patience)
+        wait_seconds = min(max(deadline - asked, 0.0), LONGEST_POLL)
+        request = Request("GET", f"/v1/jobs/{_part(job_id)}", {"wait": wait_seconds}, wait_seconds=wait_seconds)
         current = _record(Job.from_json, (yield from _ask(request)))
         now = time.monotonic()
         if current.ended:

@@ -497,7 +497,7 @@ def _http_request(http: httpx.Client | httpx.AsyncClient, request: Request) -> h
     headers = {name: value for name, value in given.items() if value is not None}
     limits = http.timeout.as_dict()
     if limits["read"] is not None:
-        limits["read"] += request.patience
+        limits["read"] += request.wait_seconds
     with _address_checked(request.path):
         return http.build_request(
             request.method,

@@ -134,10 +134,11 @@ class LoadedContact:
     def _growth(self, x: float) -> tuple[float, float]:
         """Sign of the growth with x of the load that is held, φ = q·(n + relief) + unit·x·q', and its slope."""
         f = self.unit * x
-        (friction, slope), bend, relief = self.quantile(f), self.quantile.bend(f), self._relief(x, self._load(x))
+        (friction, slope), relief = self.quantile(f), self._relief(x, self._load(x))
+        curvature = self.quantile.second_derivative(f)
         growth = friction * (self.power + relief) + f * slope
         relieving = -2.0 * relief * (1.0 - relief) / x
-        bent = self.unit * (slope * (self.power + relief + 1.0) + f * bend) + friction * relieving
+        bent = self.unit * (slope * (self.power + relief + 1.0) + f * curvature) + friction * relieving
         return float(growth), float(bent)
 
     def _turning_point(self, below: float, above: float) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from stiction_client.elementwise import Number, hypot, plain, select
 from stiction_client.errors import InvalidArgument
 from stiction_client.model import FrictionModel
-from stiction_client.support import bend, beyond_velocity
+from stiction_client.support import beyond_velocity, extrapolation_scale
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +60,7 @@ class FrictionQuantile:
         k, g = error * (along + v * along_v), error * growth
         if model.scales is not None:
             s, k, g = _joined(s, k, g, shared * level, shared * b2)
-        each = -plain(special.ndtri(probability)) * bend(model)
+        each = -plain(special.ndtri(probability)) * extrapolation_scale(model)
         low, high = model.domain.normal_force
         below, above = (each / bound if bound > 0.0 else 0.0 * each for bound in (low, high))
         s = hypot(s, each * beyond_velocity(model.domain, v))
@@ -80,7 +80,7 @@ class FrictionQuantile:
         slope = (self.g * axis + growth * outside) / (spread + (spread == 0.0))
         return self.a + self.c * force - spread, self.c - slope
 
-    def bend(self, force: Number) -> Number:
+    def second_derivative(self, force: Number) -> Number:
         """Second derivative, 1/N²; never positive."""
         axis = self.k + self.g * force
         outside, growth = self._outside(force)

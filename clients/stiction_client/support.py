@@ -89,9 +89,9 @@ class Support:
 
 def support(model: Model, tangential_velocity: float, normal_force: float, stale: str | None = None) -> Support:
     """What the answer at v (m/s) and f_n (N an element) rests on; ``stale``: why the model is, if it is."""
-    doubt = _implausible(model)
-    if doubt is not None:
-        return Support("implausible", doubt)
+    reason = _implausible(model)
+    if reason is not None:
+        return Support("implausible", reason)
     changed = model.diagnostics.get("surface_change")
     if changed:
         return Support("stale", f"{changed}: clean the surface; if it stays so, begin a new epoch")
@@ -172,10 +172,12 @@ def beyond_force(domain: Domain, normal_force: Number) -> Number:
 def widening(model: Model, tangential_velocity: ArrayLike, normal_force: ArrayLike) -> FloatArray:
     """Standard deviation of what the law bends away from its line at v and f_n outside the data; 0 inside."""
     v, f_n = np.asarray(tangential_velocity, float), np.asarray(normal_force, float)
-    return np.asarray(bend(model) * np.hypot(beyond_velocity(model.domain, v), beyond_force(model.domain, f_n)))
+    return np.asarray(
+        extrapolation_scale(model) * np.hypot(beyond_velocity(model.domain, v), beyond_force(model.domain, f_n))
+    )
 
 
-def bend(model: Model) -> float:
+def extrapolation_scale(model: Model) -> float:
     """The same at a distance of 1 (``BEND``, ``beyond_velocity``, ``beyond_force``)."""
     (slowest, fastest), (low, high) = model.domain.tangential_velocity, model.domain.normal_force
     b0, b1, b2 = model.coefficients.tolist()

@@ -237,7 +237,7 @@ def outdate_models(session: Session, job_id: str, besides: Collection[str] = ())
         friction_models.mark_outdated(session, material_id, besides)
 
 
-def refuse_greedy(session: Session, claim: Claim, want: str) -> None:
+def refuse_over_limit(session: Session, claim: Claim, want: str) -> None:
     """Refuse a job that wants more than it may have, and say in which stage; raises ``ClaimLost``."""
     stage = get(session, claim.job_id).stage or "first"
     finish(session, claim, "refused", reason=f"stage {stage} wants {want}")

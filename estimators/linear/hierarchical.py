@@ -137,7 +137,7 @@ class Hierarchical:
         mean = 0.5 * (np.log(0.5 * total) - special.digamma(shape))
         return np.asarray(mean), float(0.5 * np.sqrt(special.polygamma(1, shape)))
 
-    def about(self, coefficients: FloatArray) -> "Hierarchical":
+    def centred_at(self, coefficients: FloatArray) -> "Hierarchical":
         """The same with another b̂ [3]."""
         return replace(self, direction=_direction(self.pooled, coefficients))
 
@@ -181,8 +181,8 @@ def hierarchical(
     )
 
 
-def _direction(pooled: NormalInverseGamma, about: FloatArray) -> FloatArray:
-    return np.asarray(np.linalg.solve(pooled.root, about))
+def _direction(pooled: NormalInverseGamma, coefficients: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.solve(pooled.root, coefficients))
 
 
 def _group_squares(grasp: GraspStatistics, pooled: NormalInverseGamma) -> FloatArray:

@@ -80,7 +80,7 @@ def posterior_grid(data: FitData, scatter_prior: ScatterPrior = WEAK) -> Posteri
         box = closer
         mean, covariance = grid.nodes.moments()
         offset = offset_variance(data.mean_friction, float(mean[1]), float(covariance[1, 1]))
-        model = replace(model.about(mean), offset=offset)
+        model = replace(model.centred_at(mean), offset=offset)
     return grid
 
 

@@ -8,7 +8,7 @@ from estimators.linear.fit_data import FitData
 from estimators.linear.mixture_summary import summarise
 from estimators.linear.posterior_grid import posterior_grid
 from estimators.linear.priors import WEAK, ScatterPrior, structured
-from estimators.methods.reporting import Diagnostics, borrowed, by_coefficient, report
+from estimators.methods.reporting import Diagnostics, by_coefficient, pooled_prior, report
 
 
 def fit(data: FitData, scatter_prior: ScatterPrior = WEAK) -> FrictionModel:
@@ -21,7 +21,7 @@ def fit(data: FitData, scatter_prior: ScatterPrior = WEAK) -> FrictionModel:
     found = summarise(grid.nodes, data.mean_row())
     diagnostics: Diagnostics = {"prior": structured(scatter_prior), "nodes": float(len(grid.nodes.weight))}
     diagnostics |= by_coefficient("prior_sensitivity", grid.prior_shift())
-    diagnostics |= borrowed(grid.nodes, scatter_prior)
+    diagnostics |= pooled_prior(grid.nodes, scatter_prior)
     summary = Summary(
         found.coefficients,
         found.covariance,

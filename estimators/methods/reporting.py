@@ -28,7 +28,7 @@ def by_coefficient(name: str, values: FloatArray) -> Diagnostics:
     return {f"{name}_beta{k}": float(value) for k, value in enumerate(values)}
 
 
-def borrowed(nodes: Nodes, scatter_prior: ScatterPrior) -> Diagnostics:
+def pooled_prior(nodes: Nodes, scatter_prior: ScatterPrior) -> Diagnostics:
     """Of a prior of τ that is not the default: where it is from, in a sentence, and what the data tell without it."""
     if scatter_prior == ScatterPrior():
         return {}
@@ -72,7 +72,7 @@ def report(
     if found.scales is None and data.unknown_velocity > 0.0:
         found = widened(found, data, linear)
     if found.scales is not None:
-        diagnostics = diagnostics | _told(found.scales)
+        diagnostics = diagnostics | _scale_diagnostics(found.scales)
     effect = effects(found.covariance, found.degrees_of_freedom, data)
     effect[1] *= slope_inflation(data, linear)
     prior_shift = np.array([float(diagnostics.get(f"prior_sensitivity_beta{k}", 0.0)) for k in range(3)])
@@ -94,7 +94,7 @@ def report(
     )
 
 
-def _told(scales: Scales) -> Diagnostics:
+def _scale_diagnostics(scales: Scales) -> Diagnostics:
     """Scales as diagnostics, under names that JSON can carry."""
     told: Diagnostics = {}
     for name in ("between_grasps", "between_places", "within"):

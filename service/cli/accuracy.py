@@ -9,7 +9,7 @@ import typer
 
 from service.cli.local import Mapping, Picture, mapping_text, refuse_inputs
 from service.cli.output import print_json, print_table
-from service.cli.progress import counted, patience
+from service.cli.progress import counted, shown_progress
 from service.cli.remote import DEFAULT_URL, Key, Url, connected
 from service.formatting import number
 
@@ -62,7 +62,7 @@ def _of_scene(name: str, seconds: float, seed: int) -> "WorkPrecision":
     from slipcore.contact import Scene
 
     scene = Scene.from_toml(name)
-    with patience(f"simulating {scene.name} ever more finely") as tell:
+    with shown_progress(f"simulating {scene.name} ever more finely") as tell:
         return work_precision.of_scene(scene, seconds, seed, tell)
 
 
@@ -74,11 +74,11 @@ def _of_logs(paths: list[Path], mapping: Path | None) -> "list[WorkPrecision]":
     from slipcore import InvalidInput, collect_samples, detect_slip
 
     logs = [formats.read(path, mapping=mapping_text(mapping)) for path in paths]
-    with patience(f"detecting slip in {paths[0].name} by every method") as tell:
+    with shown_progress(f"detecting slip in {paths[0].name} by every method") as tell:
         found = [work_precision.of_detection(logs[0], paths[0].name, tell)]
     try:
         grasps = [collect_samples(log, detect_slip(log)) for log in counted(logs, len(logs), "logs looked at")]
-        with patience("fitting by every method") as tell:
+        with shown_progress("fitting by every method") as tell:
             fits = work_precision.of_fits(grasps, f"friction of {len(logs)} grasp(s)", tell)
     except (TooFewSamples, InvalidInput) as none:
         typer.echo(f"no fit: {none}", err=True)

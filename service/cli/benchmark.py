@@ -8,7 +8,7 @@ import typer
 
 from service.cli.exit_codes import INPUT_REFUSED
 from service.cli.output import plain, print_json, print_table, printable
-from service.cli.progress import counted, patience
+from service.cli.progress import counted, shown_progress
 
 if TYPE_CHECKING:
     from service.slip_benchmark.running import PredictionRun
@@ -117,7 +117,7 @@ def score(
     from service.slip_benchmark.scoring import PAGE, SCORE
     from service.slip_benchmark.scoring import score as score_folder
 
-    with patience(f"scoring {folder}") as tell:
+    with shown_progress(f"scoring {folder}") as tell:
         scores = score_folder(folder, tell)
     record = plain(scores.as_json())
     write_json(folder / SCORE, record)

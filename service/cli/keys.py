@@ -50,7 +50,7 @@ def create(
         _prepare(database)
         with database.write() as session:
             stored = access_keys.add(session, key_id, name, scope, digest(text), expires_at=ends, group=group)
-            audit.add(session, command_actor(), "key.created", key_id, _told(stored))
+            audit.add(session, command_actor(), "key.created", key_id, _audit_details(stored))
     if json:
         print_json(_shown(stored) | {"key": text})
     else:
@@ -85,7 +85,7 @@ def revoke(
         _prepare(database)
         with database.write() as session:
             stored = access_keys.revoke(session, key_id)
-            audit.add(session, command_actor(), "key.revoked", key_id, _told(stored))
+            audit.add(session, command_actor(), "key.revoked", key_id, _audit_details(stored))
     typer.echo(f"key {stored.id} ({stored.name}) is revoked")
 
 
@@ -99,7 +99,7 @@ def _prepare(database: "Database") -> None:
         migrate.check(database)
 
 
-def _told(key: "AccessKey") -> dict[str, str | None]:
+def _audit_details(key: "AccessKey") -> dict[str, str | None]:
     """What the audit trail says of a key."""
     return {"name": key.name, "scope": key.scope, "group": key.group, "expires_at": _iso(key.expires_at)}
 

@@ -9,7 +9,7 @@ import typer
 from estimators.method_names import METHODS
 from service.cli.looking import GelFile, SensorModelFile, comparison, look
 from service.cli.output import print_json, print_lines, print_table
-from service.cli.progress import counted, patience
+from service.cli.progress import counted, shown_progress
 from service.formatting import interval, number
 from service.whole_files import write_whole
 
@@ -58,7 +58,7 @@ def detect(
     from service import formats
 
     grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
-    with patience(f"looking at {log.name}"):
+    with shown_progress(f"looking at {log.name}"):
         seen = look(grasp, method, sensor_model, gel)
     if picture is not None:
         from service.report.pictures import save, slip_over_time
@@ -85,7 +85,7 @@ def check(
     from service import formats
 
     grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
-    with patience(f"looking at {log.name}"):
+    with shown_progress(f"looking at {log.name}"):
         seen = look(grasp, method, sensor_model, gel)
     findings, contact = seen.findings(), _contact_record(seen.log, seen.history)
     compared = None if seen.reconstruction else comparison(seen.log, gel)
@@ -126,7 +126,7 @@ def fit(
     for path, (_, findings) in zip(logs, seen, strict=True):
         for finding in findings:
             typer.echo(f"{path.name}: {finding.name}: {finding.evidence}", err=True)
-    with patience(f"fitting by {method}"):
+    with shown_progress(f"fitting by {method}"):
         model = fit_model([samples for samples, _ in seen], method=method, seed=seed)
     model = with_doubts(model, [[finding.name for finding in findings] for _, findings in seen])
     if json:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.progress import patience
+from service.cli.progress import shown_progress
 
 if TYPE_CHECKING:
     from slipcore import Finding, FrictionSamples, GraspLog, SlipHistory
@@ -44,10 +44,10 @@ class InspectedLog:
 
     def findings(self) -> "list[Finding]":
         """What makes friction from it doubtful."""
-        from service.domain.reconstruct import said
+        from service.domain.reconstruct import reconstruction_findings
         from slipcore import check_log
 
-        return [*said(self.reconstruction), *check_log(self.log, self.history)]
+        return [*reconstruction_findings(self.reconstruction), *check_log(self.log, self.history)]
 
 
 def look(
@@ -77,8 +77,8 @@ def comparison(log: "GraspLog", gel: Path | None) -> "ForceComparison | None":
     if not log.has_displacement:
         raise InvalidInput("gel", "given for a log of forces alone", "a log whose displacement tells forces, too")
     by_gel = replace(log, gripper_force=None, gripper_force_deviation=None)  # which would hide what is wrong of the gel
-    with patience("reconstructing forces"):
-        return compare_forces(log, reconstruct(by_gel, Gel.from_json(_told(gel, "gel"))))
+    with shown_progress("reconstructing forces"):
+        return compare_forces(log, reconstruct(by_gel, Gel.from_json(_read_json(gel, "gel"))))
 
 
 def _corrected(log: "GraspLog", sensor_model: Path | None, method: str) -> "tuple[GraspLog, dict[str, float]]":
@@ -89,7 +89,7 @@ def _corrected(log: "GraspLog", sensor_model: Path | None, method: str) -> "tupl
         return log, {}
     from slipcore import SensorModel
 
-    found, changed, options = SensorModel.from_json(_told(sensor_model, "sensor model")).apply(log, method)
+    found, changed, options = SensorModel.from_json(_read_json(sensor_model, "sensor model")).apply(log, method)
     typer.echo(f"{sensor_model.name}: {'; '.join(changed) or 'nothing to correct'}", err=True)
     return found, dict(options)
 
@@ -103,10 +103,10 @@ def _with_forces(log: "GraspLog", gel: Path | None) -> "tuple[GraspLog, Reconstr
     if log.force is not None:
         typer.echo(f"{gel.name}: slip and friction are by the log's own forces", err=True)
         return log, None
-    return with_forces(log, _told(gel, "gel"))
+    return with_forces(log, _read_json(gel, "gel"))
 
 
-def _told(path: Path, name: str) -> Mapping[str, Any]:
+def _read_json(path: Path, name: str) -> Mapping[str, Any]:
     from json import loads
 
     from slipcore import InvalidInput

@@ -44,14 +44,14 @@ class Line:
 
 def counted(things: Iterable[Thing], total: int, name: str) -> Iterator[Thing]:
     """The same things, while it is said how many are done and how long the others will take."""
-    with patience(f"0 of {total} {name}") as tell:
+    with shown_progress(f"0 of {total} {name}") as tell:
         for count, thing in enumerate(things, 1):
             tell(count / total, f"{count} of {total} {name}")
             yield thing
 
 
 @contextmanager
-def patience(doing: str) -> Iterator[Callable[..., None]]:
+def shown_progress(doing: str) -> Iterator[Callable[..., None]]:
     """Say on standard error what is being done, once a second; nothing if it is done in a moment.
 
     Gives whom to tell the part that is done (``Line.tell``).

@@ -126,7 +126,7 @@ def calibrate_gel(
 ) -> None:
     """Learn a gel's stiffness, Poisson's ratio and thickness from presses with known forces."""
     from service import formats
-    from service.cli.progress import patience
+    from service.cli.progress import shown_progress
     from slipcore.forces import calibrate_gel as calibrated
 
     if output is not None:
@@ -134,7 +134,7 @@ def calibrate_gel(
     forces = _known_forces(known_force, len(logs))
     presses = [formats.read(path, mapping=mapping_text(mapping)) for path in logs]
     name = _sensor_name(sensor, presses[0].sensor) if store else ""
-    with patience("learning the gel"):
+    with shown_progress("learning the gel"):
         found = calibrated(presses, forces, young_modulus, poisson_ratio, thickness, marker_depth, noise)
     told = found.to_json()
     if output is not None:

@@ -12,7 +12,7 @@ import typer
 from service.cli.exit_codes import INPUT_REFUSED
 from service.cli.local import Picture, refuse_inputs
 from service.cli.output import print_json, print_lines, print_table
-from service.cli.progress import counted, patience
+from service.cli.progress import counted, shown_progress
 from service.formatting import number
 from service.whole_files import write_whole
 
@@ -54,7 +54,7 @@ def simulate(
         return
     from slipcore.contact import simulate as simulate_scene
 
-    with patience(f"simulating {wanted.name}") as tell:
+    with shown_progress(f"simulating {wanted.name}") as tell:
         log = simulate_scene(wanted, accuracy=accuracy, seconds=seconds, seed=seed, tier=tier, progress=tell)
     if output is not None:
         from stiction_client import container
@@ -106,7 +106,7 @@ def _print_campaign(made: "Iterable[Outcome]", folder: Path, json: bool) -> None
 
 
 def _explain(scene: "Scene", seed: int, json: bool) -> None:
-    with patience(f"explaining {scene.name}") as tell:
+    with shown_progress(f"explaining {scene.name}") as tell:
         explanation = scene.explain(seed, progress=tell)
     if json:
         print_json(asdict(explanation))

@@ -22,7 +22,7 @@ class DetectedGrasp:
     samples: FrictionSamples
 
 
-def see(logs: Sequence[DemoLog], progress: Progress) -> list[DetectedGrasp]:
+def detect_all(logs: Sequence[DemoLog], progress: Progress) -> list[DetectedGrasp]:
     """Detect slip in every log and collect its samples."""
     seen = []
     for entry in progress.track(logs, description="detect again, for the pictures"):

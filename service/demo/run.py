@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from service.demo import tables
-from service.demo.drawing import draw_grasps, draw_models, see
+from service.demo.drawing import detect_all, draw_grasps, draw_models
 from service.demo.inputs import DemoLog, recorded_logs, simulated_logs
 from service.demo.server import starting_server
 from service.demo.tables import METHODS, Answer, Upload
@@ -102,7 +102,7 @@ def _sections(
     progress: Progress,
 ) -> list[Section]:
     logs = [upload.log for upload in uploads]
-    seen = see(logs, progress)
+    seen = detect_all(logs, progress)
     return [
         Section(
             "Friction of each material",

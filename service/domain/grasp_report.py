@@ -11,7 +11,7 @@ from service import formats
 from service.domain.collect_friction import collect
 from service.domain.doubtful_logs import with_doubts
 from service.domain.stored_results import StoredHistory, decode_history, decode_samples, summarise_history
-from service.report.grasp import SeenGrasp, about, grasp_report
+from service.report.grasp import InspectedGrasp, grasp_facts, grasp_report
 from service.report.page import Fact, Report
 from service.report.pictures import SlipOverTime, detected
 from slipcore import LOOKAHEAD, FrictionSamples, GraspLog, check_log, detect_slip
@@ -26,10 +26,10 @@ def report_of_log(log: GraspLog, name: str, method: str | None = None) -> Report
 
     Raises what ``detect_slip`` raises.
     """
-    return grasp_report(see(log, name, method))
+    return grasp_report(inspect_grasp(log, name, method))
 
 
-def see(log: GraspLog, name: str, method: str | None = None) -> SeenGrasp:
+def inspect_grasp(log: GraspLog, name: str, method: str | None = None) -> InspectedGrasp:
     """What is found in a log."""
     begin = perf_counter()
     history = detect_slip(log, method=method or DEFAULT_METHOD, lookahead=LOOKAHEAD)
@@ -37,21 +37,21 @@ def see(log: GraspLog, name: str, method: str | None = None) -> SeenGrasp:
     found, none_because = collect(log, history, None)
     findings = check_log(log, history, found.elements)
     detection = summarise_history(history, seconds, "", findings, found.contact, is_scaled=log.is_scaled)
-    said = about(log.sensor, len(log), float(log.time[-1] - log.time[0]), log.grid)
+    said = grasp_facts(log.sensor, len(log), float(log.time[-1] - log.time[0]), log.grid)
     model, refusal = _fitted(found.samples, [finding.name for finding in findings], none_because)
-    return SeenGrasp(name, said, detection, detected(log, history), found.samples, model, refusal)
+    return InspectedGrasp(name, said, detection, detected(log, history), found.samples, model, refusal)
 
 
 def report_of_stored(log: StoredGraspLog, history: Path, samples: Path, upload: Path | None) -> Report:
     """The report of a stored log with these results; ``upload`` is the log itself, None where it was deleted."""
     assert log.detection is not None
     assert log.samples is not None
-    said = Fact("Material", log.material or "none"), *about(log.sensor, log.frames, log.duration, log.grid)
+    said = Fact("Material", log.material or "none"), *grasp_facts(log.sensor, log.frames, log.duration, log.grid)
     slip = _stored_slip(decode_history(history), upload, log.detection.method)
     name = f"Grasp log of {log.created_at:%Y-%m-%d %H:%M:%S} UTC"
     found, names = decode_samples(samples), [finding.name for finding in log.detection.findings or ()]
     model, refusal = _fitted(found, names, log.samples.none_because)
-    return grasp_report(SeenGrasp(name, said, log.detection, slip, found, model, refusal))
+    return grasp_report(InspectedGrasp(name, said, log.detection, slip, found, model, refusal))
 
 
 def _fitted(

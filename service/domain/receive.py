@@ -130,11 +130,11 @@ async def unless_gone(gone: Coroutine[Any, Any, None]) -> AsyncIterator[None]:
     watch, loop = asyncio.create_task(gone), asyncio.get_running_loop()
     is_waiting = True
     try:
-        async with asyncio.timeout(None) as patience:
+        async with asyncio.timeout(None) as limit:
 
             def end(_: object) -> None:
                 if is_waiting:  # the loop may call this when all is over
-                    patience.reschedule(loop.time())
+                    limit.reschedule(loop.time())
 
             watch.add_done_callback(end)
             try:
@@ -142,7 +142,7 @@ async def unless_gone(gone: Coroutine[Any, Any, None]) -> AsyncIterator[None]:
             finally:
                 is_waiting = False
     except TimeoutError as error:
-        if not patience.expired():
+        if not limit.expired():
             raise
         raise UploadInterrupted("the connection ended before there was an answer") from error
     finally:

@@ -27,7 +27,7 @@ def with_forces(log: "GraspLog", gel: Mapping[str, float | None]) -> "tuple[Gras
     return found.apply(log), found
 
 
-def said(reconstruction: "Reconstruction | None") -> "list[Finding]":
+def reconstruction_findings(reconstruction: "Reconstruction | None") -> "list[Finding]":
     """That forces are reconstructed, and how well they are known; nothing where they are the sensor's."""
     if reconstruction is None:
         return []

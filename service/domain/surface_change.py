@@ -21,11 +21,11 @@ def with_change(models: Sequence[FrictionModel], logs: Sequence[Moments]) -> lis
     alarm = watched(law, [grasp for log in logs for grasp in log.at_element_area(law.element_area).grasps])
     if not alarm.changed:
         return list(models)
-    told = _told(alarm)
+    told = _sentence(alarm)
     return [replace(model, diagnostics={**model.diagnostics, MARK: told}) for model in models]
 
 
-def _told(alarm: ChangeAlarm) -> str:
+def _sentence(alarm: ChangeAlarm) -> str:
     before = alarm.since or 0
     after = len(alarm.levels) - before
     way = "lower" if alarm.change < 0.0 else "higher"

@@ -81,7 +81,7 @@ class StoredUpload:
     is_new: bool
 
 
-async def never() -> None:
+async def wait_forever() -> None:
     """Wait for somebody who does not go."""
     await asyncio.Event().wait()
 
@@ -91,7 +91,7 @@ async def received(
     context: Context,
     chunks: AsyncIterator[bytes],
     request: UploadRequest,
-    gone: Callable[[], Coroutine[Any, Any, None]] = never,
+    gone: Callable[[], Coroutine[Any, Any, None]] = wait_forever,
 ) -> AsyncIterator[ReceivedLog]:
     """Take a log in, which is forgotten at the end unless it is stored.
 

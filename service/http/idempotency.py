@@ -50,7 +50,7 @@ class IdempotencyKey:
     lifetime: timedelta
     fingerprint: str
 
-    def about(self, body_digest: str) -> "IdempotencyKey":
+    def for_body(self, body_digest: str) -> "IdempotencyKey":
         """The same with a body that was not there yet."""
         return replace(self, fingerprint=_digest(self.fingerprint.encode(), body_digest.encode()))
 
@@ -90,7 +90,7 @@ KeyWithoutBody = Annotated[IdempotencyKey | None, Depends(_key_without_body)]
 
 
 async def _key_with_body(request: Request, key: KeyWithoutBody) -> IdempotencyKey | None:
-    return None if key is None else key.about(_digest(await request.body()))
+    return None if key is None else key.for_body(_digest(await request.body()))
 
 
 KeyWithBody = Annotated[IdempotencyKey | None, Depends(_key_with_body)]

@@ -121,7 +121,9 @@ def _write_plan(folder: Path, scenes: Sequence[Scene], promise: RequestedAccurac
     path, asked = folder / PLAN, asdict(promise)
     known = _read_plan(path) if path.exists() else {"scenes": {}, "promise": asked}
     if known["promise"] != asked:
-        raise InvalidInput(f"campaign in {folder}", _told(asked), f"{_told(known['promise'])}, or another folder")
+        raise InvalidInput(
+            f"campaign in {folder}", _plan_text(asked), f"{_plan_text(known['promise'])}, or another folder"
+        )
     for scene in scenes:
         digest = hashlib.sha256(repr(scene).encode()).hexdigest()
         if known["scenes"].setdefault(_file_name(scene), digest) != digest:
@@ -141,5 +143,5 @@ def _file_name(scene: Scene) -> str:
     return re.sub(r"\W+", "_", scene.name.strip().lower()) or "scene"
 
 
-def _told(promise: Mapping[str, object]) -> str:
+def _plan_text(promise: Mapping[str, object]) -> str:
     return ", ".join(f"{name} {value}" for name, value in promise.items() if value is not None) or "no accuracy"

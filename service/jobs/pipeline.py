@@ -29,7 +29,7 @@ from service.domain.collect_friction import collect
 from service.domain.doubtful_logs import with_doubts
 from service.domain.other_materials import prior_from_others
 from service.domain.queueing import INGEST_METHODS, queue_cheap_refits
-from service.domain.reconstruct import needs_forces, said, with_forces
+from service.domain.reconstruct import needs_forces, reconstruction_findings, with_forces
 from service.domain.stored_results import (
     decode_samples,
     encode_history,
@@ -160,7 +160,7 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
     with run.stage("samples"):
         found, none_because = collect(log, history, reconstruction)
         samples, findings = found.samples, slipcore.check_log(log, history, found.elements)
-        findings = [*said(reconstruction), *findings]
+        findings = [*reconstruction_findings(reconstruction), *findings]
         blob = run.blobs.put(encode_history(history))
         detection = summarise_history(
             history, run.seconds["slip_state"], blob, findings, found.contact, is_scaled=log.is_scaled

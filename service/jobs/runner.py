@@ -189,7 +189,7 @@ class JobRunner:
             return False
         if claim.is_long:  # what waits behind it may be short
             self._wake_executors()
-        with logs.about(job=claim.job_id):
+        with logs.log_context(job=claim.job_id):
             await self._do(executor, claim)
         return True
 
@@ -288,7 +288,7 @@ class JobRunner:
     def _refuse(self, claim: Claim, want: str) -> None:
         logger.warning("job %s is refused: it wants %s", claim.job_id, want)
         with self._database.write() as session, suppress(ClaimLost):
-            jobs.refuse_greedy(session, claim, want)
+            jobs.refuse_over_limit(session, claim, want)
 
     def _count_death(self, claim: Claim) -> None:
         """Note that the job lost its worker, and end it if that was once too often."""

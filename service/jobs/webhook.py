@@ -110,7 +110,7 @@ class Webhook:
             logger.warning("webhook: %s; the next attempt is in %g s", reason, self._pause)
 
     def _send(self, store: str | None, entry: AuditEntry) -> None:
-        content = told(store, entry)
+        content = message_body(store, entry)
         headers = {"content-type": "application/json", "user-agent": "stiction"}
         if self._secret is not None:
             headers["stiction-signature"] = f"sha256={hmac.new(self._secret, content, hashlib.sha256).hexdigest()}"
@@ -136,7 +136,7 @@ async def _answer(url: str, content: bytes, headers: Mapping[str, str]) -> int:
         raise DeliveryFailed(f"the address cannot be reached ({type(error).__name__})") from error
 
 
-def told(store: str | None, entry: AuditEntry) -> bytes:
+def message_body(store: str | None, entry: AuditEntry) -> bytes:
     """What the address is sent of an entry: JSON, in UTF-8."""
     record = {
         "store": store,

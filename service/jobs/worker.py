@@ -54,7 +54,7 @@ def warm_up() -> None:
 
 def run_job(config: StoreConfig, claim: Claim) -> None:
     """Do a job and leave its end in the database; raises ``StorageUnavailable``, for then nobody can write there."""
-    with logs.about(job=claim.job_id):
+    with logs.log_context(job=claim.job_id):
         _run(config, claim)
 
 
@@ -84,7 +84,7 @@ def _run(config: StoreConfig, claim: Claim) -> None:
 
 def _refuse(database: Database, claim: Claim, want: str) -> None:
     with database.write() as session, suppress(ClaimLost):
-        jobs.refuse_greedy(session, claim, want)
+        jobs.refuse_over_limit(session, claim, want)
     logger.warning("job refused: it wants %s", want)
 
 

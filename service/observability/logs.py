@@ -59,7 +59,7 @@ def current() -> Logs | None:
 
 
 @contextmanager
-def about(**fields: object) -> Iterator[None]:
+def log_context(**fields: object) -> Iterator[None]:
     """Meanwhile, give every record these fields, and those of ``note``."""
     token = ABOUT.set({**ABOUT.get(), **fields})
     try:
@@ -69,7 +69,7 @@ def about(**fields: object) -> Iterator[None]:
 
 
 def note(**fields: object) -> None:
-    """Give every record these fields, until the end of what ``about`` has begun."""
+    """Give every record these fields, until the end of what ``log_context`` has begun."""
     ABOUT.set({**ABOUT.get(), **fields})
 
 

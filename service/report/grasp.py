@@ -19,13 +19,13 @@ MAP = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SeenGrasp:
-    """A grasp log with what was found in it: ``about`` it, the ``detection``, its ``samples`` of friction, the
+class InspectedGrasp:
+    """A grasp log with what was found in it: ``grasp_facts`` of it, the ``detection``, its ``samples`` of friction, the
     ``model`` that these alone allow, and where there is none, why (``refusal``); ``slip``: None where no map was kept.
     """
 
     name: str
-    about: Sequence[Fact]
+    grasp_facts: Sequence[Fact]
     detection: Detection
     slip: SlipOverTime | None
     samples: FrictionSamples
@@ -33,13 +33,13 @@ class SeenGrasp:
     refusal: str | None
 
 
-def about(sensor: str, frames: int, duration: float, grid: tuple[int, int]) -> list[Fact]:
+def grasp_facts(sensor: str, frames: int, duration: float, grid: tuple[int, int]) -> list[Fact]:
     """What a log holds."""
     held = f"{frames} in {number(duration)} s, of {grid[0]} × {grid[1]} elements"
     return [Fact("Sensor", sensor or NOTHING), Fact("Frames", held)]
 
 
-def grasp_report(seen: SeenGrasp) -> Report:
+def grasp_report(seen: InspectedGrasp) -> Report:
     """The report of a grasp."""
     model = seen.model
     facts, support = ([], None) if model is None else wording.friction_facts(model)
@@ -50,7 +50,7 @@ def grasp_report(seen: SeenGrasp) -> Report:
     return Report(seen.name, lead, [*facts, *_seen_facts(seen)], _steps(seen), _sections(seen))
 
 
-def _steps(seen: SeenGrasp) -> list[str]:
+def _steps(seen: InspectedGrasp) -> list[str]:
     """What to do next: first what was found against the log, which more grasps of the kind do not mend."""
     found = seen.detection.findings or ()
     steps = [f"{finding.name}: {finding.remedy}." for finding in found]
@@ -62,7 +62,7 @@ def _steps(seen: SeenGrasp) -> list[str]:
     return [*steps, wording.record_next(told), "Upload it with others of its material, and ask how hard to grip that."]
 
 
-def _seen_facts(seen: SeenGrasp) -> list[Fact]:
+def _seen_facts(seen: InspectedGrasp) -> list[Fact]:
     found = seen.detection
     facts = [
         Fact("Friction samples", str(len(seen.samples))),
@@ -70,10 +70,10 @@ def _seen_facts(seen: SeenGrasp) -> list[Fact]:
         Fact("Frames of gross slip", f"{found.macro_slip_frames} of {found.contact_frames} in contact"),
         Fact("Findings against it", str(len(found.findings or ()))),
     ]
-    return [*facts, *seen.about]
+    return [*facts, *seen.grasp_facts]
 
 
-def _sections(seen: SeenGrasp) -> list[Section]:
+def _sections(seen: InspectedGrasp) -> list[Section]:
     sections = []
     if seen.slip is not None:
         picture = Picture(MAP, draw_slip(seen.slip))

@@ -94,7 +94,7 @@ def hysteresis(size: float) -> Fault:
     return fault
 
 
-def reforced(change: Callable[[FloatArray], FloatArray]) -> Fault:
+def changed_forces(change: Callable[[FloatArray], FloatArray]) -> Fault:
     """With other forces, where there are any."""
     return lambda log, _: log if log.force is None else replace(log, force=change(log.force))
 
@@ -102,10 +102,10 @@ def reforced(change: Callable[[FloatArray], FloatArray]) -> Fault:
 def tilted(angle: float) -> Fault:
     """Forces are told in a frame that is turned about y by an angle in degrees: all normals err by so much."""
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-    return reforced(lambda force: force @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]))
+    return changed_forces(lambda force: force @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]))
 
 
-def domed(angle: float) -> Fault:
+def dome_forces(angle: float) -> Fault:
     """Forces on a dome are told as if it were flat: they are tilted outwards by an angle in degrees at its edge."""
 
     def fault(log: GraspLog, _: np.random.Generator) -> GraspLog:
@@ -132,7 +132,7 @@ def faded(components: slice) -> Fault:
         faint[..., components] *= np.linspace(1.0, 0.5, len(force))[:, None, None, None]
         return faint
 
-    return reforced(change)
+    return changed_forces(change)
 
 
 def late(time: float) -> Fault:
@@ -153,7 +153,9 @@ def stuck(force: FloatArray) -> FloatArray:
 
 def crosstalk(share: float) -> Fault:
     """A share of each element's normal force appears along x as well."""
-    return reforced(lambda force: force + share * np.stack([force[..., 2], *np.zeros((2, *force.shape[:3]))], axis=-1))
+    return changed_forces(
+        lambda force: force + share * np.stack([force[..., 2], *np.zeros((2, *force.shape[:3]))], axis=-1)
+    )
 
 
 def dropped(share: float) -> Fault:

@@ -36,7 +36,7 @@ from service.stream.messages import (
     packed,
     packed_or_none,
 )
-from service.stream.sessions import PATIENCE, Session, Streams
+from service.stream.sessions import RECONNECT_SECONDS, Session, Streams
 from service.stream.sockets import KEY_SECONDS, close, until_one_ends
 from slipcore.errors import InvalidInput
 
@@ -96,9 +96,9 @@ class _Connection:
 
     async def run(self) -> None:
         try:
-            first = _decoded(*await asyncio.wait_for(self._receive(), PATIENCE))
+            first = _decoded(*await asyncio.wait_for(self._receive(), RECONNECT_SECONDS))
         except TimeoutError as error:
-            raise End(NOT_UNDERSTOOD, f"nothing was said for {PATIENCE:g} s") from error
+            raise End(NOT_UNDERSTOOD, f"nothing was said for {RECONNECT_SECONDS:g} s") from error
         session, missed = await self._begin(first)
         self._streams.join(session)
         try:

@@ -331,10 +331,10 @@ def _find_friction(
         model = session.moments.fit()
     except EstimatorError:  # too few samples yet
         return
-    session.friction, session.expected = _told(model), _expected(model)
+    session.friction, session.expected = _summary(model), _expected(model)
 
 
-def _told(model: "FrictionModel") -> dict[str, Any]:
+def _summary(model: "FrictionModel") -> dict[str, Any]:
     return {
         "coefficients": model.coefficients.tolist(),
         "standard_errors": [value if math.isfinite(value) else None for value in model.standard_errors.tolist()],

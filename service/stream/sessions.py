@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from stiction_client import FrictionModel
 
 MOST_SESSIONS = 200
-PATIENCE = 60.0
+RECONNECT_SECONDS = 60.0
 """s that a session waits for its client to come back, and a new connection may take to say what it wants."""
 
 FRAMES_AT_ONCE, FRAMES_OF_ONE = 4, 2
@@ -140,7 +140,7 @@ class Streams:
         """No connection does; the session is forgotten unless there is one in time."""
         session.connected = False
         if session.id in self._sessions:
-            session.expiry = asyncio.get_running_loop().call_later(PATIENCE, self._forget, session)
+            session.expiry = asyncio.get_running_loop().call_later(RECONNECT_SECONDS, self._forget, session)
 
     def find(self, name: str, key_id: str | None) -> Session:
         """The session to go on with, of the same key; raises ``End``."""
@@ -178,7 +178,7 @@ class Streams:
         """The same at once, with the detector dropped soon after."""
         if self._sessions.pop(session.id, None) is None:
             return
-        session.broadcast.end(pack_end(f"The sensor has not come back for {PATIENCE:g} s.", None))
+        session.broadcast.end(pack_end(f"The sensor has not come back for {RECONNECT_SECONDS:g} s.", None))
         if self._process is not None:
             task = asyncio.create_task(self._drop(session.id))
             self._dropping.add(task)

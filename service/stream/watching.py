@@ -16,7 +16,7 @@ MOST_ON_THE_WAY, READ_TOGETHER = 16, 8
 Beyond the first, frames are left out: a slow network would keep minutes of old ones in its buffers.
 """
 
-PATIENCE = 60.0
+READ_SECONDS = 60.0
 """s that a watcher may read nothing."""
 
 
@@ -52,11 +52,11 @@ class _Watcher:
         while not (self._broadcast.is_over and count == self._broadcast.count):
             count, content = await self._broadcast.newer(count)
             try:
-                async with asyncio.timeout(PATIENCE):
+                async with asyncio.timeout(READ_SECONDS):
                     await self._socket.send_bytes(content)
                     await self._until_read()
             except TimeoutError:
-                raise End(SLOW_READER, f"nothing was read for {PATIENCE:g} s") from None
+                raise End(SLOW_READER, f"nothing was read for {READ_SECONDS:g} s") from None
         raise End(FINISHED, "the session has ended")
 
     async def _until_read(self) -> None:

@@ -88,8 +88,8 @@ def _moments(field: FloatArray, arm: FloatArray, inside: BoolArray, noise: float
     force = field.sum(axis=1)
     square = 0.5 * (arm**2).sum(axis=-1)
     moment = (field * square).sum(axis=1) / force
-    strays = np.where(inside, square - moment[:, None], 0.0)
-    error = np.hypot(noise * np.sqrt((strays**2).sum(axis=1)) / force, ESTIMATE.kernel_shape_error * moment)
+    deviations = np.where(inside, square - moment[:, None], 0.0)
+    error = np.hypot(noise * np.sqrt((deviations**2).sum(axis=1)) / force, ESTIMATE.kernel_shape_error * moment)
     return _Growth(force, moment, error)
 
 

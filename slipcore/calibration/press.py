@@ -130,10 +130,10 @@ def _impurities(press: Press) -> Iterator[str]:
 def _load_sideways(press: Press) -> Iterator[str]:
     """Tangential load that is no share of the normal load."""
     largest, (terms, load) = press.normal_force.max(), load_terms(press)
-    stray = np.hypot(*(load - terms @ np.linalg.lstsq(terms, load)[0]).T)
+    residual = np.hypot(*(load - terms @ np.linalg.lstsq(terms, load)[0]).T)
     limit = max(PRESS.load_change * largest, PRESS.stray_noise * _noise(press.tangential_force.T))
-    if stray.max() > limit:
-        yield f"the load sideways changes by {stray.max():.3g} N beside a normal load of {largest:.3g} N"
+    if residual.max() > limit:
+        yield f"the load sideways changes by {residual.max():.3g} N beside a normal load of {largest:.3g} N"
 
 
 def load_terms(press: Press) -> tuple[FloatArray, FloatArray]:

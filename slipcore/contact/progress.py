@@ -6,5 +6,5 @@ Progress = Callable[[float], None]
 """Is told which part is done, from 0 to 1."""
 
 
-def unheard(part: float) -> None:
+def no_progress(part: float) -> None:
     """Nobody is told."""

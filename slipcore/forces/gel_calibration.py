@@ -95,7 +95,7 @@ def calibrate_gel(
     search = _Search.begun(presses, young_modulus, given)
     search.climb()
     search.look_around()
-    return _told(search)
+    return _calibration(search)
 
 
 def _checked(young: float | None, ratio: float | None, thickness: float | None, depth: float) -> Elasticity:
@@ -279,7 +279,7 @@ def _thinnest(presses: Presses) -> float:
     return presses.marker_depth + GEL_CALIBRATION.thinnest * presses.nodes.grid.pitch[0]
 
 
-def _told(search: _Search) -> GelCalibration:
+def _calibration(search: _Search) -> GelCalibration:
     """What was found, with what the misfit and the model add to the intervals."""
     found, properties = _found(search), (_young_modulus, _poisson_ratio, _thickness)
     estimates = tuple(made(search, found) for made in properties)

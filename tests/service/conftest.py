@@ -130,7 +130,7 @@ def no_open_stores() -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def own_log_fields() -> Iterator[None]:
     """Jobs that a test does in its own process note fields for the log, which are no other test's."""
-    with logs.about():
+    with logs.log_context():
         yield
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from service.cli import main, progress
 from service.cli.exit_codes import INTERRUPTED
-from service.cli.progress import counted, patience
+from service.cli.progress import counted, shown_progress
 from slipcore.contact import Scene, simulate
 
 
@@ -23,11 +23,11 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_command_says_how_long_it_has_been_at_it_and_stays_quiet_if_quick(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with patience("thinking"):
+    with shown_progress("thinking"):
         pass
     assert capsys.readouterr() == ("", "")
     monkeypatch.setattr(progress, "MOMENT", 0.05)
-    with patience("thinking"):
+    with shown_progress("thinking"):
         time.sleep(0.2)
     out, err = capsys.readouterr()
     assert out == ""

@@ -140,7 +140,7 @@ async def create_grasp_log(
         principal,
     )
     async with received(context, chunks(request), asked, partial(gone, request)) as log:
-        about = key and key.about(log.body_sha256)
+        about = key and key.for_body(log.body_sha256)
         answer = await context.store_threads.run(principal.share, _store, context, log, about)
     return answer.response()
 

@@ -10,7 +10,7 @@ from slipcore.contact.defaults import EXPLAIN
 from slipcore.contact.effects.finite_layer import FiniteLayer
 from slipcore.contact.plan.description import SceneDescription
 from slipcore.contact.plan.plan import Effect, Plan, SamplingPlan
-from slipcore.contact.progress import Progress, unheard
+from slipcore.contact.progress import Progress, no_progress
 from slipcore.contact.scene.simulate import observe
 from slipcore.contact.tiers.accuracy import Difference, difference
 from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach, run
@@ -88,7 +88,7 @@ class Measured:
     applications: int
 
 
-def explain(scene: SceneDescription, seed: int = 0, progress: Progress = unheard) -> Explanation:
+def explain(scene: SceneDescription, seed: int = 0, progress: Progress = no_progress) -> Explanation:
     """Run a scene coarsely, with all its effects and without each in turn. Raises what ``simulate`` raises."""
     sampling, effects, reports = _few_frames(scene.plan(seed)), scene.present(), list[EffectReport]()
     _measure(scene, sampling, seed)  # compiles what is compiled at its first use

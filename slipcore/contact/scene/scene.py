@@ -9,7 +9,7 @@ from typing import Any, Self, TypeVar
 from slipcore.contact.effects import EFFECTS
 from slipcore.contact.plan.description import Finger, Press, SceneDescription
 from slipcore.contact.plan.plan import Effect
-from slipcore.contact.progress import Progress, unheard
+from slipcore.contact.progress import Progress, no_progress
 from slipcore.contact.scene.explain import Explanation, explain
 from slipcore.errors import InvalidInput
 
@@ -42,7 +42,7 @@ class Scene(SceneDescription):
         parts = {name: _record(kind, entries.pop(name)) for name, kind in _PARTS.items() if name in entries}
         return _record(cls, entries | parts | {"effects": effects})
 
-    def explain(self, seed: int = 0, progress: Progress = unheard) -> Explanation:
+    def explain(self, seed: int = 0, progress: Progress = no_progress) -> Explanation:
         """What each effect is there for, what it costs and what leaving it out would change, by coarse runs."""
         return explain(self, seed, progress)
 

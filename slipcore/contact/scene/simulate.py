@@ -7,7 +7,7 @@ import numpy as np
 
 from slipcore.contact.plan.description import SceneDescription
 from slipcore.contact.plan.plan import Plan
-from slipcore.contact.progress import Progress, unheard
+from slipcore.contact.progress import Progress, no_progress
 from slipcore.contact.tiers import boundary_elements
 from slipcore.contact.tiers.accuracy import simulate_to
 from slipcore.contact.tiers.boundary_elements import Fidelity
@@ -23,7 +23,7 @@ def simulate(
     seed: int = 0,
     fidelity: Fidelity | None = None,
     tier: str | None = None,
-    progress: Progress = unheard,
+    progress: Progress = no_progress,
 ) -> GraspLog:
     """Simulate a scene to an ``accuracy``, within ``seconds``, or at a ``fidelity``; with none of them, at the default
     one. For an accuracy the cheapest tier is taken that has it, unless ``tier`` names one: "closed form", "beams" (the

@@ -9,7 +9,7 @@ import numpy as np
 from slipcore.contact.defaults import ACCURACY, PROBE
 from slipcore.contact.errors import NotConverged
 from slipcore.contact.plan.plan import Plan, SamplingPlan
-from slipcore.contact.progress import Progress, unheard
+from slipcore.contact.progress import Progress, no_progress
 from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach, run
 from slipcore.contact.tiers.sampling import sensor_grid
 from slipcore.errors import InvalidInput
@@ -66,7 +66,7 @@ class Refined:
 
 
 def simulate_to(
-    plan: Plan, accuracy: float | None = None, seconds: float | None = None, progress: Progress = unheard
+    plan: Plan, accuracy: float | None = None, seconds: float | None = None, progress: Progress = no_progress
 ) -> Refined:
     """The cheapest log that is estimated to be as accurate as asked, or the best one within about ``seconds``.
 
@@ -88,7 +88,7 @@ def simulate_to(
     return replace(found, seconds=time.perf_counter() - began)
 
 
-def refinements(plan: Plan, seconds: float, progress: Progress = unheard) -> Iterator[Refined]:
+def refinements(plan: Plan, seconds: float, progress: Progress = no_progress) -> Iterator[Refined]:
     """Ever finer logs, as long as the next one fits into about ``seconds``; theirs are what a request for that accuracy
     takes, those of all coarser ones among them.
     """
@@ -123,7 +123,7 @@ def _refinements(plan: Plan, target: float, forecast: _Forecast) -> Iterator[Ref
     tolerance = min(ACCURACY.loosest, ACCURACY.solver_share * target) if target > 0.0 else ACCURACY.timed_tolerance
     fidelity, step_error, coarse = _steps(plan, Fidelity(ACCURACY.coarsest_cells, 1, tolerance), target)
     cells, error = _across(plan, reach, ACCURACY.coarsest_cells), np.inf
-    tell: Progress = unheard
+    tell: Progress = no_progress
     while error == np.inf or cells < ACCURACY.finest_cells:
         fidelity = replace(fidelity, cells=_next_cells(cells, error, target))
         began = time.perf_counter()

@@ -11,7 +11,7 @@ from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import Scaled
 from slipcore.contact.elasticity.operator import Operators
 from slipcore.contact.plan.plan import Plan
-from slipcore.contact.progress import Progress, unheard
+from slipcore.contact.progress import Progress, no_progress
 from slipcore.contact.solver.normal import solve_normal
 from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
 from slipcore.contact.solver.resolution import summary
@@ -53,7 +53,7 @@ class Fidelity:
             raise InvalidInput("fidelity", self, "4 cells or more, 1 substep or more, a tolerance between 0 and 1")
 
 
-def run(plan: Plan, fidelity: Fidelity | None = None, progress: Progress = unheard) -> GraspLog:
+def run(plan: Plan, fidelity: Fidelity | None = None, progress: Progress = no_progress) -> GraspLog:
     """Simulate a plan; the log has no observation effects yet. ``progress`` is told after each frame.
 
     Raises ``InfeasibleLoad``, ``NotConverged`` and ``InvalidInput``.

@@ -63,7 +63,7 @@ def test_density_and_coefficients_are_those_of_the_dense_model(count: int, unkno
     pooled = exact_posterior(data)
     about = np.array([0.42, 6.0, -0.5])
     spans = weak_spans(data.domain, data.element_area)
-    model = hierarchical(data.grasp_statistics(), pooled, spans, data.mean_row()).about(about)
+    model = hierarchical(data.grasp_statistics(), pooled, spans, data.mean_row()).centred_at(about)
     points = [(0.03, 0.05, 0.02), (0.02, 0.2, 0.001), (0.05, 0.001, 0.05), (0.03, 0.5, 0.3)]
     ours, theirs = [], []
     for sigma, tau, omega in points:

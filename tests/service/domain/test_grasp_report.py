@@ -11,7 +11,7 @@ from db.records import Finding
 from service.domain.doubtful_logs import with_doubts
 from service.domain.grasp_report import report_of_stored, see
 from service.domain.stored_results import encode_history, encode_samples
-from service.report.grasp import SeenGrasp, grasp_report
+from service.report.grasp import InspectedGrasp, grasp_report
 from service.report.page import render
 from slipcore import GraspLog, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
@@ -26,11 +26,11 @@ def log() -> GraspLog:
 
 
 @pytest.fixture(scope="module")
-def seen(log: GraspLog) -> SeenGrasp:
+def seen(log: GraspLog) -> InspectedGrasp:
     return see(log, "grasp.npz")
 
 
-def test_a_grasp_that_slips_is_told_with_its_friction_and_what_to_record_next(seen: SeenGrasp) -> None:
+def test_a_grasp_that_slips_is_told_with_its_friction_and_what_to_record_next(seen: InspectedGrasp) -> None:
     report = grasp_report(seen)
     facts = {fact.name: fact.value for fact in report.facts}
     assert facts["Friction samples"] == str(len(seen.samples)) != "0"
@@ -41,7 +41,7 @@ def test_a_grasp_that_slips_is_told_with_its_friction_and_what_to_record_next(se
     assert len(list(report.pictures)) == 3
 
 
-def test_terms_are_explained_on_the_page_that_uses_them(seen: SeenGrasp) -> None:
+def test_terms_are_explained_on_the_page_that_uses_them(seen: InspectedGrasp) -> None:
     page = render(grasp_report(seen))
     for term in ("The stick ratio is", "β₁ [s/m] its change with", "† marks a coefficient"):
         assert page.count(term) == 1
@@ -64,7 +64,7 @@ def test_what_makes_friction_doubtful_is_told_with_what_to_do(log: GraspLog) -> 
     assert "Upload" not in report.steps[-1]
 
 
-def test_what_speaks_against_friction_is_mended_before_more_is_recorded(seen: SeenGrasp) -> None:
+def test_what_speaks_against_friction_is_mended_before_more_is_recorded(seen: InspectedGrasp) -> None:
     doubt = Finding("friction follows force", "seen", "believe the whole contact")
     assert seen.model is not None
     doubted = with_doubts(seen.model, [[doubt.name]])
@@ -76,7 +76,9 @@ def test_what_speaks_against_friction_is_mended_before_more_is_recorded(seen: Se
     assert "implausible" in report.lead
 
 
-def test_of_a_deleted_upload_the_maps_are_drawn_on_the_lattice(seen: SeenGrasp, log: GraspLog, tmp_path: Path) -> None:
+def test_of_a_deleted_upload_the_maps_are_drawn_on_the_lattice(
+    seen: InspectedGrasp, log: GraspLog, tmp_path: Path
+) -> None:
     history = detect_slip(log)
     (tmp_path / "history").write_bytes(encode_history(history))
     (tmp_path / "samples").write_bytes(encode_samples(seen.samples))
@@ -92,7 +94,7 @@ def test_of_a_deleted_upload_the_maps_are_drawn_on_the_lattice(seen: SeenGrasp, 
         assert "&lt;i&gt;" in page
 
 
-def test_without_a_map_the_rest_is_told(seen: SeenGrasp) -> None:
+def test_without_a_map_the_rest_is_told(seen: InspectedGrasp) -> None:
     report = grasp_report(replace(seen, slip=None))
     assert "Slip over time" not in [section.heading for section in report.sections]
     assert np.isfinite(len(render(report)))

@@ -37,11 +37,11 @@ from tests import forking, waiting
 
 NPZ = "application/vnd.stiction.grasp-log+npz"
 SHORT = RampSchedule(rest=0.2, press=0.5, settle=0.3, shear=1.5, hold=0.2)
-PATIENCE = 600.0
+TIMEOUT = 600.0
 """s; only against waiting for ever: a busy machine may take a minute to start a process."""
 
 
-wait_until = partial(waiting.wait_until, seconds=PATIENCE)
+wait_until = partial(waiting.wait_until, seconds=TIMEOUT)
 
 
 def worker_processes(pid: int) -> list[int]:
@@ -94,7 +94,7 @@ class Server:
             probe.bind(("127.0.0.1", 0))
             self.port = int(probe.getsockname()[1])
         self.url = f"http://127.0.0.1:{self.port}"
-        self.client = httpx.Client(base_url=self.url, timeout=PATIENCE)
+        self.client = httpx.Client(base_url=self.url, timeout=TIMEOUT)
 
     def upload(self, content: bytes, client: httpx.Client | None = None, **headers: str) -> httpx.Response:
         """The answer; threads need clients of their own."""

@@ -27,7 +27,7 @@ KINDS = ("server", "runner", "worker process")
 EARLIEST, LATEST = 1e-3, 0.5
 """s from the beginning of an upload to the kill, of which each power of ten is as likely."""
 
-PATIENCE = 600.0
+TIMEOUT = 600.0
 """s; only against waiting for ever."""
 
 MOST_UNFINISHED = 3
@@ -145,7 +145,7 @@ class Campaign:
         wrong = self.fleet.folder.parent / "wrong.sqlite3"
         self.fleet.begin_serving(server, STICTION_DATABASE_URL=f"sqlite:///{wrong}")
         process = self.fleet.servers.pop(server)
-        process.join(PATIENCE)
+        process.join(TIMEOUT)
         assert process.exitcode == INPUT_REFUSED
         assert set(BlobStore(self.fleet.folder).hashes()) >= before
         self.refused += 1

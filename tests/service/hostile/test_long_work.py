@@ -21,7 +21,7 @@ NPZ = {"content-type": "application/vnd.stiction.grasp-log+npz"}
 MANY = 50
 """Requests at once, more than there are threads of any kind."""
 
-PATIENCE = 30.0
+TIMEOUT = 30.0
 """s after which a test has failed; nothing waits for so long otherwise."""
 
 
@@ -36,7 +36,7 @@ class Block:
     def wait(self) -> None:
         self.begun += 1
         self.one_has_begun.set()
-        self.may_end.wait(PATIENCE)
+        self.may_end.wait(TIMEOUT)
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def beside(block: Block, attack: Callable[[], Awaitable[Any]], *asked: Callable[
         try:
             while not block.one_has_begun.is_set():
                 await asyncio.sleep(0.001)
-            return [(await asyncio.wait_for(question(), PATIENCE / 6)).status_code for question in asked]
+            return [(await asyncio.wait_for(question(), TIMEOUT / 6)).status_code for question in asked]
         finally:
             block.may_end.set()
             await asyncio.gather(*attacks, return_exceptions=True)
@@ -176,7 +176,7 @@ def test_who_has_gone_gives_up_its_place(
             asked = asyncio.ensure_future(attacker.app(scope, receive, send))
             await asyncio.sleep(0.01)
             has_gone.set()
-            await asyncio.wait_for(asked, PATIENCE / 6)
+            await asyncio.wait_for(asked, TIMEOUT / 6)
         finally:
             hashing.may_end.set()
             await asyncio.gather(*before)

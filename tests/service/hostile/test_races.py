@@ -24,7 +24,7 @@ SOMEBODY = Principal(is_admin=False)
 MEANWHILE = 0.2
 """s that the first waits for the second, which may be waiting for the first."""
 
-PATIENCE = 30.0
+TIMEOUT = 30.0
 
 
 @pytest.fixture
@@ -68,7 +68,7 @@ def test_a_new_sensor_is_described_by_one_of_two(context: Context, second: Secon
     late = second(quotas, "check_change", lambda: sensor_cases.describe(context, "s", ANOTHER, SOMEBODY))
     assert sensor_cases.describe(context, "s", GEL, SOMEBODY).gel == GEL
     with pytest.raises(InsufficientScope):
-        late.result(PATIENCE)
+        late.result(TIMEOUT)
     assert sensor_cases.find(context, "s").gel == GEL
 
 
@@ -79,7 +79,7 @@ def test_a_sensor_is_calibrated_by_one_of_two(context: Context, second: Second) 
     late = second(calibrations, "newest_version", store)
     assert store().version == 1
     with pytest.raises(InsufficientScope):
-        late.result(PATIENCE)
+        late.result(TIMEOUT)
 
 
 def test_a_material_is_not_merged_into_another_while_it_is_renamed(context: Context, second: Second) -> None:
@@ -88,7 +88,7 @@ def test_a_material_is_not_merged_into_another_while_it_is_renamed(context: Cont
             materials.create(session, name, "")
     late = second(materials, "rename", lambda: curate.merge(context, "b", "a"))
     curate.change(context, "a", "c", None)
-    merged, _ = late.result(PATIENCE)
+    merged, _ = late.result(TIMEOUT)
     assert (merged.name, merged.aliases) == ("b", ("a", "c"))
 
 
@@ -109,4 +109,4 @@ def test_an_upload_into_a_merged_material_does_not_keep_the_next_merge_waiting(d
             late = threads.submit(upload)
             wait([late], MEANWHILE)
             assert session.scalar(row.where(MaterialRow.id == other)) == other
-        assert late.result(PATIENCE) == one
+        assert late.result(TIMEOUT) == one

@@ -92,7 +92,7 @@ def test_who_is_refused_holds_no_place(make: Callable[..., Streams]) -> None:
 def test_an_abandoned_session_is_forgotten_though_nobody_opens_another(
     make: Callable[..., Streams], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sessions, "PATIENCE", 0.05)
+    monkeypatch.setattr(sessions, "RECONNECT_SECONDS", 0.05)
 
     async def go() -> None:
         streams = make()

@@ -19,7 +19,7 @@ from service.http.connections import BoundedConnection, H11Connection
 from service.http.httptools_connections import HttpToolsConnection
 from service.http.request_middleware import MOST_HEADER_BYTES
 
-PATIENCE = 0.2
+TIMEOUT = 0.2
 MOST, MOST_OF_ONE = 60, 100
 LARGE = bytes(2**25)
 """More than the system keeps of what a client does not read."""
@@ -35,7 +35,7 @@ async def hello(scope: Scope, receive: Receive, send: Send) -> None:
         message = await receive()
         received, is_read = received + len(message.get("body", b"")), not message.get("more_body")
     if scope["path"] == "/slow":
-        await asyncio.sleep(PATIENCE)
+        await asyncio.sleep(TIMEOUT)
     body = LARGE if scope["path"] == "/large" else b"hello"
     told = {b"content-length": str(len(body)).encode(), b"path": scope["raw_path"], b"received": b"%d" % received}
     headers = [*told.items()]
@@ -58,7 +58,7 @@ def most_of_one() -> int:
 
 @pytest.fixture
 def connect(monkeypatch: pytest.MonkeyPatch, protocol: type[BoundedConnection], most_of_one: int) -> Iterator[Connect]:
-    monkeypatch.setattr(connections, "HEADER_SECONDS", PATIENCE)
+    monkeypatch.setattr(connections, "HEADER_SECONDS", TIMEOUT)
     server = uvicorn.Server(
         uvicorn.Config(
             hello,
@@ -105,7 +105,7 @@ def test_who_does_not_finish_his_headers_is_let_go(connect: Connect, sent: bytes
     began, connection = time.monotonic(), connect()
     connection.sendall(sent)
     assert rest(connection) == b""
-    assert PATIENCE * 0.9 < time.monotonic() - began < 5.0
+    assert TIMEOUT * 0.9 < time.monotonic() - began < 5.0
 
 
 def test_who_goes_on_with_a_body_after_its_answer_is_let_go(connect: Connect) -> None:
@@ -115,7 +115,7 @@ def test_who_goes_on_with_a_body_after_its_answer_is_let_go(connect: Connect) ->
     began = time.monotonic()
     connection.sendall(b"x")  # which ends the server's own clock for idle connections
     rest(connection)
-    assert PATIENCE * 0.9 < time.monotonic() - began < 5.0
+    assert TIMEOUT * 0.9 < time.monotonic() - began < 5.0
 
 
 def test_who_trickles_headers_is_let_go_all_the_same(connect: Connect) -> None:
@@ -124,7 +124,7 @@ def test_who_trickles_headers_is_let_go_all_the_same(connect: Connect) -> None:
     with suppress(OSError):
         while time.monotonic() - began < 5.0:
             connection.sendall(b"X: y\r\n")
-            time.sleep(PATIENCE / 10.0)
+            time.sleep(TIMEOUT / 10.0)
     assert time.monotonic() - began < 3.0
 
 
@@ -143,7 +143,7 @@ def test_many_slow_ones_keep_nobody_waiting_and_are_all_gone_in_the_end(connect:
 def test_a_request_may_take_its_time_once_its_headers_are_there(connect: Connect) -> None:
     connection = connect()
     connection.sendall(b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 2\r\nConnection: close\r\n\r\nx")
-    time.sleep(2.0 * PATIENCE)
+    time.sleep(2.0 * TIMEOUT)
     connection.sendall(b"y")
     assert rest(connection).endswith(b"hello")
 
@@ -156,7 +156,7 @@ def test_the_clock_starts_anew_for_the_next_request_of_a_connection(connect: Con
         answer = b""
         while not answer.endswith(b"hello"):
             answer += connection.recv(65536)
-        time.sleep(2.0 * PATIENCE)  # idle between requests is what keep-alive is for
+        time.sleep(2.0 * TIMEOUT)  # idle between requests is what keep-alive is for
     connection.sendall(request[:10])
     began = time.monotonic()
     assert rest(connection) == b""
@@ -212,7 +212,7 @@ def test_whoever_comes_when_all_connections_are_taken_is_told_so(connect: Connec
     assert json.loads(body).items() >= {"type": "/problems/too-many-connections", "instance": "/hello"}.items()
     for other in others:
         other.close()
-    time.sleep(PATIENCE)
+    time.sleep(TIMEOUT)
     again = connect()
     again.sendall(b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n")
     assert rest(again).endswith(b"hello")
@@ -226,7 +226,7 @@ def test_whose_answers_are_not_read_makes_room_for_the_next(connect: Connect, en
         unread.append(connect())
         unread[-1].sendall(b"GET /large HTTP/1.1\r\nHost: a\r\n" + end + b"\r\n")
         assert unread[-1].recv(8).startswith(b"HTTP/1.1")
-        time.sleep(PATIENCE)
+        time.sleep(TIMEOUT)
     another = connect()
     another.sendall(b"GET / HTTP/1.1\r\nHost: a\r\nConnection: close\r\n\r\n")
     assert rest(another).endswith(b"hello")
@@ -235,11 +235,11 @@ def test_whose_answers_are_not_read_makes_room_for_the_next(connect: Connect, en
 
 
 def test_whose_answer_under_way_is_not_read_is_let_go(connect: Connect, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(joined_writes, "UNREAD_SECONDS", PATIENCE)
+    monkeypatch.setattr(joined_writes, "UNREAD_SECONDS", TIMEOUT)
     connection = connect()
     connection.sendall(b"GET /large HTTP/1.1\r\nHost: a\r\n\r\n")
     assert connection.recv(8).startswith(b"HTTP/1.1")
-    time.sleep(5.0 * PATIENCE)
+    time.sleep(5.0 * TIMEOUT)
     received = len(rest(connection))
     assert received < len(LARGE)
 
@@ -276,7 +276,7 @@ def test_requests_that_wait_for_others_of_their_connection_are_not_parsed(connec
     with suppress(BlockingIOError):
         connection.sendall(kind % 1 * (2**20 // len(kind)))
     began = time.monotonic()
-    while time.monotonic() - began < PATIENCE:
+    while time.monotonic() - began < TIMEOUT:
         after = max(after, parsed_requests() - before)
     assert after < 100
 

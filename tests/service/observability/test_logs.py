@@ -30,7 +30,7 @@ def record(message: str, *values: object, error: Exception | None = None, **fiel
 
 
 def test_a_record_is_one_object_on_one_line() -> None:
-    with logs.about(request_id="r1"):
+    with logs.log_context(request_id="r1"):
         logs.note(kind="fit")
         line = JsonLines().format(record("%s came\nlate", "job", job="j1", seconds=0.25))
     found = json.loads(line)

@@ -110,7 +110,7 @@ def test_a_tilt_turns_all_forces_by_its_angle_about_y(log: GraspLog) -> None:
 
 def test_a_dome_tilts_forces_outwards_the_more_the_nearer_its_edge(log: GraspLog) -> None:
     pulled = np.broadcast_to([0.0, 0.0, 1.0], log.displacement.shape)
-    told = forces(seen(faults.domed(20.0), replace(log, force=pulled)))[0]
+    told = forces(seen(faults.dome_forces(20.0), replace(log, force=pulled)))[0]
     angle = np.radians(20.0)
     np.testing.assert_allclose(told[2, 2], [0.0, 0.0, 1.0], rtol=0.0, atol=1e-15)
     corner = [np.sin(angle) / np.sqrt(2.0)] * 2
@@ -118,7 +118,7 @@ def test_a_dome_tilts_forces_outwards_the_more_the_nearer_its_edge(log: GraspLog
     np.testing.assert_allclose(
         told[4, 2], [np.sin(angle / 2**0.5), 0.0, np.cos(angle / 2**0.5)], rtol=1e-12, atol=1e-15
     )
-    assert seen(faults.domed(20.0), replace(log, force=None)).force is None
+    assert seen(faults.dome_forces(20.0), replace(log, force=None)).force is None
 
 
 def test_a_gain_fades_evenly_to_a_half_of_what_it_was(log: GraspLog) -> None:

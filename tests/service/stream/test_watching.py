@@ -93,7 +93,7 @@ def test_who_reads_gets_each_frame_and_how_it_ended() -> None:
 
 
 def test_who_reads_nothing_is_sent_no_more_than_a_few_frames_and_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(watching, "PATIENCE", 0.2)
+    monkeypatch.setattr(watching, "READ_SECONDS", 0.2)
     reader = Reader(reads=False)
     watched(reader, 100)
     assert reader.got == [str(number).encode() for number in range(MOST_ON_THE_WAY)]

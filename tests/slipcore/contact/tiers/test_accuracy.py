@@ -9,7 +9,7 @@ from slipcore.contact.defaults import ACCURACY
 from slipcore.contact.effects import LoadPath, SensorSampling, TangentialLoad, Torsion
 from slipcore.contact.errors import NotConverged
 from slipcore.contact.plan.plan import Plan
-from slipcore.contact.progress import Progress, unheard
+from slipcore.contact.progress import Progress, no_progress
 from slipcore.contact.scene import Press, Scene, simulate
 from slipcore.contact.tiers import accuracy
 from slipcore.contact.tiers.accuracy import Difference, difference, simulate_to
@@ -52,7 +52,7 @@ class Clock:
     def perf_counter(self) -> float:
         return self.now
 
-    def run(self, plan: Plan, fidelity: Fidelity, progress: Progress = unheard) -> GraspLog:
+    def run(self, plan: Plan, fidelity: Fidelity, progress: Progress = no_progress) -> GraspLog:
         log = run(plan, fidelity, progress)
         self.now += (fidelity.cells / 100.0) ** ACCURACY.cost_order * fidelity.substeps
         return log
