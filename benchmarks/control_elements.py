@@ -12,8 +12,8 @@ import numpy as np
 
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import HalfSpace
-from slipcore.contact.errors import InfeasibleLoad
 from slipcore.contact.reduced import Load, World
+from slipcore.contact.solver.macro_slip import FreeObject
 from slipcore.contact.solver.problem import Problem, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic, State, StepResult
 from slipcore.contact.tiers.sampling import SensorGrid, frame_record
@@ -24,21 +24,17 @@ CELLS = 3
 """Of the solver's grid along an element, so that a contact under 2 N is 21 cells wide."""
 TOLERANCE = 1e-3
 """Of tractions, as a share of what a step changes."""
-SLIDING_STEPS = 12
-"""In a frame in which the object slides: 1.4 ms each."""
 
 
 class ElementsState(NamedTuple):
-    """The world between two frames: its ``contact`` and the step's ``result`` before it; ``velocity`` [3] of the
-    object (m/s, m/s, 1/s), ``load`` [3] that acted last, and by how much the contact's middle slid, ``offset`` [2] m.
+    """The world between two frames: its ``contact`` and the step's ``result`` before it, and by how much the contact's
+    middle slid, ``offset`` [2] m.
     """
 
     time: float
     normal_force: FloatArray
     contact: State
     result: StepResult
-    velocity: FloatArray
-    load: FloatArray
     offset: FloatArray
 
     @property
@@ -58,68 +54,23 @@ def init(world: World, normal_force: float) -> ElementsState:
         raise InvalidInput("world", f"{len(world.friction)} fingers", "one finger")
     solver = _solver(world).quasi_static
     contact, result = solver.step(solver.start(), StepLoad(normal_force))
-    nothing = np.zeros(3)
-    return ElementsState(0.0, np.array([normal_force]), contact, result, nothing, nothing, np.zeros(2))
+    return ElementsState(0.0, np.array([normal_force]), contact, result, np.zeros(2))
 
 
 def step(world: World, state: ElementsState, command: FloatArray, load: Load, duration: float) -> ElementsState:
     """The world ``duration`` s later, as ``reduced.step`` has it."""
-    if not state.velocity.any():
-        try:
-            return _rested(world, state, _pressed(world, state, command, duration), load, duration)
-        except InfeasibleLoad:
-            pass
-    short = duration / SLIDING_STEPS
-    before, after = state.load, np.asarray(load.resultant())
-    for count in range(1, SLIDING_STEPS + 1):
-        drive = before + count / SLIDING_STEPS * (after - before)
-        state = _slid(world, state, _pressed(world, state, command, short), load.mass, drive, short)
-        if not state.velocity.any():
-            break
-    left = duration * (1.0 - count / SLIDING_STEPS)
-    return state if left < 0.5 * short else step(world, state, command, load, left)
-
-
-def _rested(world: World, state: ElementsState, normal: FloatArray, load: Load, duration: float) -> ElementsState:
-    """After a step in which friction carries the load; raises ``InfeasibleLoad`` where it does not."""
-    tangential = np.asarray(load.resultant())
-    asked = StepLoad(float(normal[0]), tangential=tangential, duration=duration)
-    contact, result = _solver(world).quasi_static.step(state.contact, asked)
-    return _after(world, state, normal, contact, result, duration)._replace(load=tangential)
-
-
-def _slid(
-    world: World, state: ElementsState, normal: FloatArray, mass: float, drive: FloatArray, duration: float
-) -> ElementsState:
-    """After a step of an object that ``drive`` [3] moves against what its contact bore; at rest when it turns back."""
-    inertia = mass * np.array([1.0, 1.0, world.gyration**2])
-    velocity = state.velocity + duration * (drive - _borne(world, state.result)) / inertia
-    if state.velocity @ (inertia * velocity) < 0.0:
-        velocity = np.zeros(3)
-    asked = StepLoad(float(normal[0]), motion=duration * velocity, given=(False, False, False), duration=duration)
-    contact, result = _solver(world).quasi_static.step(state.contact, asked)
-    return _after(world, state, normal, contact, result, duration)._replace(velocity=velocity, load=drive)
-
-
-def _borne(world: World, result: StepResult) -> FloatArray:
-    """Force and moment on the finger, [3] N, N, N·m."""
-    x, y = _solver(world).sensor.grid.points()
-    along, across = result.force[:2]
-    return np.array([along.sum(), across.sum(), (x * across - y * along).sum()])
+    normal = _pressed(world, state, command, duration)
+    asked = StepLoad(float(normal[0]), tangential=np.asarray(load.resultant()), duration=duration)
+    free = FreeObject(load.mass, world.gyration)
+    contact, result = _solver(world).quasi_static.step(state.contact, asked, free)
+    y, x = (size // 2 for size in _solver(world).sensor.grid.shape)
+    offset = state.offset + result.slip[:, y, x]
+    return ElementsState(state.time + duration, normal, contact, result, offset)
 
 
 def _pressed(world: World, state: ElementsState, command: FloatArray, duration: float) -> FloatArray:
     """The gripper's force after it has followed its command for a while, [1] N."""
     return np.asarray(command + (state.normal_force - command) * np.exp(-duration / world.gripper_lag))
-
-
-def _after(
-    world: World, state: ElementsState, normal: FloatArray, contact: State, result: StepResult, duration: float
-) -> ElementsState:
-    y, x = (size // 2 for size in _solver(world).sensor.grid.shape)
-    offset = state.offset + result.slip[:, y, x]
-    time = state.time + duration
-    return state._replace(time=time, normal_force=normal, contact=contact, result=result, offset=offset)
 
 
 def observe(world: World, state: ElementsState, finger: int = 0, generator: np.random.Generator | None = None) -> Frame:

@@ -256,6 +256,10 @@ class StepDefaults(Options):
     """Change of a load's rate, as a share of it, up to which the rate of slip goes on, too."""
     rounding: Annotated[float, Option(0.0, 1e-3, "-", "rounding")] = 1e-12
     """Change of a load, as a share of it, that is none."""
+    sliding_step: Annotated[float, Option(1e-6, 1.0, "s", "a light object on a soft finger turns back in 5 ms")] = (
+        1.4e-3
+    )
+    """Longest step of an object that moves by itself (``solver/macro_slip.py``)."""
     longest_step: Annotated[float, Option(1.0, 2.4, "-", "backward differences are stable up to 1 + √2")] = 2.0
     """Longest step, in units of the one before, to which its rate of slip goes on."""
     contact_cells: Annotated[float, Option(1.0, 100.0, "cells", "pressures are off by 2 to 6 % below")] = 6.0

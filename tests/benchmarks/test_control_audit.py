@@ -45,7 +45,7 @@ def test_what_friction_does_not_carry_falls_with_what_is_left_of_its_weight() ->
     state = before
     for _ in range(6):
         state = control_elements.step(world, state, np.array([FORCE]), Load(HEAVY), FRAME)
-    assert state.velocity[0] - before.velocity[0] == pytest.approx(0.2 * GRAVITY * 6 * FRAME, rel=1e-3)
+    assert state.contact.velocity[0] - before.contact.velocity[0] == pytest.approx(0.2 * GRAVITY * 6 * FRAME, rel=1e-3)
     assert control_elements.stick_ratio(world, state) == 0.0
     assert state.slipped[0] > 3e-3
 
@@ -56,7 +56,7 @@ def test_what_slides_is_caught_by_a_harder_grip() -> None:
     for _ in range(20):
         state = control_elements.step(world, state, np.array([2.0 * FORCE]), Load(HEAVY), FRAME)
     slipped = state.slipped[0]
-    assert not state.velocity.any()
+    assert not state.contact.velocity.any()
     assert state.time == pytest.approx(26 * FRAME)
     state = control_elements.step(world, state, np.array([2.0 * FORCE]), Load(HEAVY), FRAME)
     assert state.slipped[0] == pytest.approx(slipped, abs=1e-7)

@@ -5,7 +5,7 @@
 
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from slipcore.contact.elasticity.influence import Scaled
 from slipcore.contact.elasticity.operator import Count, Operators
 from slipcore.contact.solver.creep import creep_compliance, creep_recalled, creep_step
 from slipcore.contact.solver.extrapolation import Stress, continuation, extrapolated
+from slipcore.contact.solver.macro_slip import FreeObject, moving
 from slipcore.contact.solver.normal import NormalContact
 from slipcore.contact.solver.problem import Problem, StepLoad
 from slipcore.contact.solver.resolution import unresolved
@@ -33,7 +34,8 @@ class State:
     the object's own surface; ``elastic`` [3, ny, nx] m, the finger's displacement without creep; ``creep`` m, one
     [3, ny, nx] a branch; ``pose`` [3] of the object (m, m, rad); ``speed`` [ny, nx] m/s of slip, where friction depends
     on it; ``slip`` [2, ny, nx] m within the last step of cells that slid in all of it, zero elsewhere; ``load``: the
-    last; ``drive`` [3]: how it differed from the one before; ``rate`` [4] at which it and the pressing changed, 1/s.
+    last; ``drive`` [3]: how it differed from the one before; ``rate`` [4] at which it and the pressing changed, 1/s;
+    ``velocity`` [3] of an object that moves by itself (m/s, m/s, 1/s).
     """
 
     normal: NormalContact | None
@@ -48,6 +50,7 @@ class State:
     load: StepLoad
     drive: FloatArray
     rate: FloatArray
+    velocity: FloatArray = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,9 +134,21 @@ class QuasiStatic:
             state, result = self.step(state, load)
             yield result
 
-    def step(self, state: State, load: StepLoad) -> tuple[State, StepResult]:
-        """The next state and what happened; raises ``InfeasibleLoad``, ``NotConverged`` and ``InvalidInput``."""
+    def step(self, state: State, load: StepLoad, free: FreeObject | None = None) -> tuple[State, StepResult]:
+        """The next state and what happened; raises ``InfeasibleLoad``, ``NotConverged`` and ``InvalidInput``.
+
+        ``free``: the object, where what friction does not carry shall move it instead of being refused.
+        """
         began, counted = time.perf_counter(), replace(self.count)
+        if free is None:
+            after, result = self._balanced(state, load)
+        else:
+            after, result = moving(self._balanced, self.grid, state, load, free)
+        seconds = time.perf_counter() - began
+        return after, replace(result, applications=self.count.since(counted), seconds=seconds)
+
+    def _balanced(self, state: State, load: StepLoad) -> tuple[State, StepResult]:
+        """The same for an object at rest, or one whose motion is given."""
         recalled = creep_recalled(self.problem.creep, state.creep, state.elastic, load.duration)
         drive = _drive(state.load, load)
         equations = StepEquations(
@@ -154,9 +169,7 @@ class QuasiStatic:
             equations = from_touch(equations, state.normal, guess)
         solution = solve_carrying(equations, self._carried(state, load, drive), guess)
         after = self._advance(equations, state, load, drive, solution, recalled)
-        result = self._result(equations, state, after, solution)
-        seconds = time.perf_counter() - began
-        return after, replace(result, applications=self.count.since(counted), seconds=seconds)
+        return after, self._result(equations, state, after, solution)
 
     def _pressed_alike(self, state: State, load: StepLoad) -> bool:
         """Whether nothing that pressure depends on has changed since the last step."""
