@@ -3,7 +3,8 @@
 Each material is seen in four ramps of different normal force (1 µm marker noise, 2 mN force noise), detected by each
 method, fitted by each estimator, over several seeds of the noise. Then grasps whose friction depends on velocity and
 normal force and scatters from place to place: how often do intervals hold the truth, with and without the object's
-motion? Writes JSON and pictures, prints Markdown tables.
+motion? And the same grasps without noise or scatter: what is left of the law? (``--only bias`` prints this alone, in
+half a minute.) Writes JSON and pictures, prints Markdown tables.
 """
 
 import argparse
@@ -28,6 +29,7 @@ NORMAL_FORCES = (4.0, 6.0, 9.0, 13.0)
 DETECTORS = ("filter", "strain_rate", "strain_rate_literal")
 ESTIMATORS = ("ols", "bayes")
 LAW_ESTIMATORS = ("auto", *ESTIMATORS)
+BIAS_ESTIMATORS = ("ols", "robust", "conjugate", "hierarchical", "bayes", "auto")
 MARKER_NOISE, FORCE_NOISE = 1e-6, 2e-3
 LAW = (0.45, 8.0, -0.8)
 """β₀, β₁ s/m and β₂ 1/N of the grasps whose friction depends on velocity and normal force."""
@@ -164,6 +166,39 @@ def law_findings(seeds: int, estimators: tuple[str, ...]) -> Iterator[LawFinding
                 )
 
 
+@dataclass(frozen=True, slots=True)
+class Bias:
+    """Errors of β₀, β₁ and β₂ of grasps without noise or scatter, and the largest of μ over the samples' domain."""
+
+    estimator: str
+    error: list[float]
+    largest: float
+
+
+def biases(estimators: tuple[str, ...] = BIAS_ESTIMATORS) -> list[Bias]:
+    """Fits to the grasps as they are: what detection, samples and methods leave of the law."""
+    grasps = law_grasps()
+    samples = [collect_samples(log, detect_slip(log, "filter", lookahead=LOOKAHEAD)) for log in grasps]
+    return [_bias(estimator, samples) for estimator in estimators]
+
+
+def _bias(estimator: str, samples: list[FrictionSamples]) -> Bias:
+    model = fit(samples, method=estimator, seed=0)
+    error = model.coefficients - LAW
+    v, f_n = np.meshgrid(model.domain.tangential_velocity, model.domain.normal_force)
+    largest = np.abs(error[0] + error[1] * v + error[2] * f_n).max()  # of a plane, at a corner
+    return Bias(estimator, [float(each) for each in error], float(largest))
+
+
+def bias_markdown(found: list[Bias]) -> str:
+    """A row a method."""
+    lines = ["| estimator | error of β₀ | of β₁, s/m | of β₂, 1/N | largest of μ |", "|---|---|---|---|---|"]
+    for each in found:
+        b0, b1, b2 = each.error
+        lines.append(f"| {each.estimator} | {b0:+.5f} | {b1:+.3f} | {b2:+.4f} | {each.largest:.5f} |")
+    return "\n".join(lines)
+
+
 def law_markdown(found: list[LawFinding]) -> str:
     """Mean and scatter of each coefficient, and how often its interval holds the truth."""
     lines = [
@@ -234,7 +269,12 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("benchmarks/results"))
     parser.add_argument("--seeds", type=int, default=20, help="of the ramps")
     parser.add_argument("--law-seeds", type=int, default=200, help="of the grasps whose friction follows a law")
+    parser.add_argument("--only", choices=("bias",), help="the grasps without noise alone")
     arguments = parser.parse_args()
+    bias = bias_markdown(biases())
+    if arguments.only:
+        print(bias)
+        return
     found = list(findings(arguments.seeds))
     arguments.output.mkdir(parents=True, exist_ok=True)
     (arguments.output / "known_truth.json").write_text(json.dumps([asdict(f) for f in found], indent=1))
@@ -243,6 +283,7 @@ def main() -> None:
     laws = list(law_findings(arguments.law_seeds, LAW_ESTIMATORS))
     (arguments.output / "known_law.json").write_text(json.dumps([asdict(f) for f in laws], indent=1))
     print(law_markdown(laws))
+    print(bias)
 
 
 if __name__ == "__main__":

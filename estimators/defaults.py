@@ -400,6 +400,8 @@ class Automatic(Options):
     """From which that loss gives a sample less than half weight."""
     far: Annotated[float, Option(1.0, 10.0, "standard deviations", "0.3 % of normal errors")] = 3.0
     """From which samples are left out where too many lie far off."""
+    least_scatter: Annotated[float, Option(0.0, 0.1, "-", "three of them, 1 % of friction, matter to no grip")] = 0.0033
+    """Of samples, in parts of friction, below which a deviation is not taken to lie: what is nearer is not far off."""
     fewest: Annotated[int, Option(2, 1000, "samples", "a median to 0.4 of their deviation")] = 8
     """Of a place, from which its median says what is the place's."""
 

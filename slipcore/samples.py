@@ -34,7 +34,8 @@ class FrictionSamples:
     """Friction observed at slipping micro-elements, one entry an element and frame, or of whole contacts: arrays [k].
 
     ``friction_coefficient`` f_t/f_n [-], ``tangential_velocity`` m/s (≥ 0), ``normal_force`` N and
-    ``tangential_force`` N of the element (paper, eq. 38–39, as magnitudes), ``time`` s, ``element`` row-major index,
+    ``tangential_force`` N of the element (paper, eq. 38–39, as magnitudes; the normal force as friction averages it,
+    see ``element_samples``), ``time`` s, ``element`` row-major index,
     ``weight`` probability that the element did slip, ``element_area`` m², ``normal_force_noise`` N and
     ``velocity_noise`` m/s: standard deviations of the noise that is still in ``normal_force`` and in
     ``tangential_velocity``. ``kind``: "element", or "contact" where the whole of a patch slid or
@@ -140,7 +141,9 @@ def element_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
     slip front crosses a part still sticks, so that its f_t/f_n is too low (by 4 % on average). Noise must not choose
     samples nor stand on both sides of a fit: an element is chosen by the frame before, its velocity is that from the
     frame before to the next, and its normal force is what these two say; f_t/f_n alone is of the frame itself, freed of
-    what noise adds to a magnitude and to a quotient. A log without (observable) slip gives no samples, of length 0.
+    what noise adds to a magnitude and to a quotient. Where pressure p differs over an element, friction that goes with
+    it is that of ∫p²/∫p, not of the mean (``_as_friction_averages``). A log without (observable) slip gives no samples,
+    of length 0.
     ``options``: see ``defaults.SampleOptions``.
     Raises ``NoForces`` for a log without forces, ``UnknownScale`` for one whose lengths and velocities are not in
     metres, ``InvalidInput`` for a history of another log and for bad options.
@@ -167,11 +170,12 @@ def element_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
     frame, element = np.nonzero(keep.reshape(len(log), -1))
     velocity_noise = _velocity_noise(log, history.noise)[frame]
     friction = _ratio(forces.tangential[keep], forces.normal[keep], noise)
+    normal = _as_friction_averages(steady, keep, noise.normal / math.sqrt(2.0))
     return FrictionSamples(
         friction_coefficient=friction,
         tangential_velocity=speed[keep],
-        normal_force=steady[keep],
-        tangential_force=friction * steady[keep],
+        normal_force=normal,
+        tangential_force=friction * normal,
         time=log.time[frame],
         element=element.astype(np.int64),
         weight=weight[keep],
@@ -222,6 +226,18 @@ def _of_neighbouring_frames(time: FloatArray, field: FloatArray) -> FloatArray:
     share = ((time[1:-1] - time[:-2]) / (time[2:] - time[:-2]))[:, None, None]
     between[1:-1] = (1.0 - share) * field[:-2] + share * field[2:]
     return between
+
+
+def _as_friction_averages(force: FloatArray, keep: BoolArray, noise: float) -> FloatArray:
+    """Normal forces [k] of the elements to ``keep``, as a law that is linear in pressure p averages them.
+
+    What an element bears is ∫ μ(p) p dA, so that f_t/f_n is μ at ∫p²/∫p: its mean f_n and its variance over f_n. Of
+    pressure with the slope g over a square element that is |g|²/12. Slopes are those between the neighbours, whose
+    ``noise`` adds half of its variance to the square of each.
+    """
+    slope = [np.gradient(force, axis=axis)[keep] for axis in (1, 2) if force.shape[axis] > 1]
+    square = np.sum([each**2 - 0.5 * noise**2 for each in slope], axis=0)
+    return np.asarray(force[keep] + square / (12.0 * force[keep]))
 
 
 def _velocity_noise(log: GraspLog, marker_noise: float) -> FloatArray:

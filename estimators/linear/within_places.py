@@ -20,7 +20,9 @@ def within_places(
     """
     root = np.sqrt(weight)[:, None]
     rows = root * deviation
-    axes = _axes(rows[:, :2], ROUNDING * np.linalg.norm(root * values[:, :2], axis=0))
+    varies = np.linalg.norm(rows[:, :2], axis=0) > ROUNDING * np.linalg.norm(root * values[:, :2], axis=0)
+    rows[:, :2] *= varies  # else the noise of a force that stays as it is would stand in the same direction as velocity
+    axes = _axes(rows[:, :2])
     told = axes.T @ rows
     residual = rows[:, 2] - axes @ told[:, 2]
     left = np.append(np.zeros(2), np.linalg.norm(residual))
@@ -45,10 +47,10 @@ def calibrated(regressors: FloatArray, noise: FloatArray) -> FloatArray:
     return np.asarray(regressors - (axes * np.minimum(parts, 1.0) ** 2) @ axes.T @ regressors)
 
 
-def _axes(rows: FloatArray, rounding: FloatArray) -> FloatArray:
-    """Orthonormal columns [k, ≤ 2] that span those of ``rows`` [k, 2] which are more than ``rounding`` [2]."""
+def _axes(rows: FloatArray) -> FloatArray:
+    """Orthonormal columns [k, ≤ 2] that span those of ``rows`` [k, 2] which are not 0."""
     size = np.linalg.norm(rows, axis=0)
-    varies = size > rounding
+    varies = size > 0.0
     axes, parts, _ = np.linalg.svd(rows[:, varies] / size[varies], full_matrices=False)
     return np.asarray(axes[:, parts > CLUSTERS.alone])
 

@@ -45,7 +45,8 @@ def distances(data: FitData, observations: Observations) -> FloatArray:
     """How far each sample [k] lies from the robust plane, in standard deviations, what is its place's taken away.
 
     Where most samples are of places with many, the others count as near; else all are judged by their distance from
-    the plane: a place that few samples tell of cannot be told from them.
+    the plane: a place that few samples tell of cannot be told from them. Where hardly anything scatters, what lies off
+    by less than a grip could notice is near (``least_scatter``).
     """
     linear = m_estimate(data, observations, LOSSES["tukey"]).linear
     residual = observations.friction - plane(linear, observations)
@@ -57,6 +58,7 @@ def distances(data: FitData, observations: Observations) -> FloatArray:
     else:
         known = np.ones(len(known), dtype=bool)
     scale = float(np.median(np.abs(residual[known]))) / NORMAL_MAD if known.any() else 0.0
+    scale = max(scale, AUTOMATIC.least_scatter * float(np.median(np.abs(observations.friction))))
     return np.asarray(np.abs(residual) / scale if scale > 0.0 else np.zeros(len(residual)))
 
 

@@ -13,7 +13,7 @@ from slipcore import (
     detect_slip,
 )
 from slipcore.contact import RampSchedule, Scene, simulate, tangential_ramp
-from slipcore.samples import element_samples
+from slipcore.samples import _as_friction_averages, element_samples
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +48,57 @@ def test_elements_that_slip_in_part_do_not_lower_friction() -> None:
     samples = element_samples(log, detect_slip(log))
     assert len(samples) > 100
     np.testing.assert_allclose(samples.friction_coefficient, 0.4, rtol=0, atol=5e-4)  # with those in part 0.3966
+
+
+def evenly_sliding(friction: np.ndarray, slope: tuple[float, float]) -> tuple[GraspLog, SlipHistory]:
+    """Ten frames of 8 × 8 elements that all slide; the mean normal force falls by ``slope`` N an element each way, and
+    ``friction`` (β₀, β₂) acts on the pressure at each point of an element.
+    """
+    row, column = np.mgrid[:8, :8]
+    normal = 0.1 + slope[0] * (row - 3.5) + slope[1] * (column - 3.5)
+    square = normal**2 + (slope[0] ** 2 + slope[1] ** 2) / 12.0  # mean of the square of linear pressure over a square
+    time = np.arange(10) / 30.0
+    force = np.zeros((10, 8, 8, 3))
+    force[..., 0], force[..., 2] = friction[0] * normal + friction[1] * square, -normal
+    moved = np.zeros((10, 8, 8, 3))
+    log = GraspLog(
+        time=time,
+        position=1e-3 * np.stack([column, row, np.zeros((8, 8))], axis=-1),
+        displacement=moved,
+        normal=np.broadcast_to([0.0, 0.0, 1.0], moved.shape).copy(),
+        element_area=1e-6,
+        force=force,
+        object_pose=np.zeros((10, 3)),
+    )
+    everywhere = np.ones((10, 8, 8), bool)
+    history = replace(
+        detect_slip(log),
+        contact=everywhere,
+        slip=everywhere,
+        probability=everywhere.astype(float),
+        velocity=np.full((10, 8, 8, 2), 1e-3),
+        noise=0.0,
+    )
+    return log, history
+
+
+@pytest.mark.parametrize("slope", [(0.0, 0.0), (0.02, 0.0), (0.012, -0.009)])
+def test_friction_is_that_of_the_pressure_that_an_element_averages(slope: tuple[float, float]) -> None:
+    friction = np.array([0.45, -0.8])
+    log, history = evenly_sliding(friction, slope)
+    samples = element_samples(log, history, force_noise=0.0)
+    inside = (samples.element // 8 % 7 > 0) & (samples.element % 8 % 7 > 0)
+    assert inside.sum() == 8 * 36
+    expected = friction[0] + friction[1] * samples.normal_force
+    np.testing.assert_allclose(samples.friction_coefficient[inside], expected[inside], rtol=1e-12)  # rounding
+
+
+def test_noise_of_forces_is_no_slope_of_pressure() -> None:
+    force = 1.0 + 0.1 * np.random.default_rng(0).standard_normal((400, 8, 8))
+    inside = np.zeros(force.shape, bool)
+    inside[:, 1:-1, 1:-1] = True
+    added = _as_friction_averages(force, inside, 0.1) - force[inside]
+    assert abs(added.mean()) < 0.1 * 0.1**2 / 12.0  # a tenth of what noise would add if it were not taken off
 
 
 def check_samples(samples: FrictionSamples, log: GraspLog, history: SlipHistory) -> None:

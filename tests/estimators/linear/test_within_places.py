@@ -55,6 +55,16 @@ def test_what_is_all_noise_says_nothing() -> None:
     np.testing.assert_array_equal(calibrated(level, np.array([0.0, 1.0])), level)
 
 
+def test_noise_of_a_force_that_stays_as_it_is_takes_nothing_from_velocity() -> None:
+    """Of places pressed evenly, f_n deviates by the rounding of its mean alone."""
+    v = np.random.default_rng(0).uniform(1e-3, 5e-3, (MOMENTS, PLACES))
+    f_n = np.linspace(0.03, 0.17, PLACES) + 1e-17 * v / v.max()
+    values = np.stack([v, np.broadcast_to(f_n, v.shape), 0.4 + 8.0 * v], axis=-1)
+    values[..., 1] += np.spacing(values[..., 1]) * (v > 3e-3)
+    told = triangle(values, (1e-7, 1e-3))
+    assert told[0, 2] / told[0, 0] == pytest.approx(8.0, rel=1e-6)  # 1e-7 m/s of noise takes a part of 1e-8
+
+
 def information(error: np.ndarray, seed: int = 0) -> float:
     """Of the slope of v, which all places share; the error [moments, 1 or places] is no part of it."""
     rng = np.random.default_rng(seed)

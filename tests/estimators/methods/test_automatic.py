@@ -57,6 +57,13 @@ def test_outliers_in_few_grasps_leave_the_scatter_between_them_its_say(samples: 
     assert model.standard_errors[0] > 5.0 * estimators.fit(heavy, method="robust").standard_errors[0]
 
 
+def test_what_lies_off_by_less_than_a_grip_notices_is_kept(samples: Make) -> None:
+    """Without noise whatever is off a little, here by 0.5 % of friction, lies many of the others' deviations away."""
+    noise = np.where(np.random.default_rng(0).random(800) < 0.1, -1.0, 1e-3)
+    for size, kept in ((0.002, 800), (0.02, int((noise > 0.0).sum()))):
+        assert choose(gather(samples(800, scale=size, noise=noise))).data.n == kept
+
+
 def test_places_that_differ_are_no_outliers(samples: Make) -> None:
     """A twentieth of the places lies ten times farther off than a sample's scatter: that is what places do."""
     data = samples(3000, elements=100)
