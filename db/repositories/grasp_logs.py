@@ -97,14 +97,6 @@ def list_all(session: Session, window: Window, wanted: LogFilter) -> list[Stored
     return [_record(*row, with_moments=False) for row in found]
 
 
-def material_id(session: Session, log_id: str) -> int | None:
-    """The key of a log's material, if it has one; raises ``NotFound``."""
-    found = session.execute(select(GraspLogRow.material_id).where(GraspLogRow.id == log_id)).one_or_none()
-    if found is None:
-        raise NotFound("grasp log", log_id)
-    return found[0]
-
-
 def withdraw(session: Session, log_id: str, because: str, by: str | None = None) -> Withdrawal | None:
     """Take a log out of the fits, or only renew the reason; returns its earlier withdrawal. Raises ``NotFound``.
 

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 from db.errors import ClaimLost, NotFound
 from db.paging import Window, windowed
 from db.records import Claim, Job, JobKind, JobStatus
-from db.repositories import copies, friction_models, turns
+from db.repositories import copies, friction_models, materials_of_logs, turns
 from db.tables import FrictionModelRow, GraspLogRow, JobRow, MaterialRow, SampleSummaryRow, now
 
 
@@ -193,7 +193,7 @@ def cancel(session: Session, job_id: str, reason: str) -> Job:
 
     Models of its material that lack its samples say so.
     """
-    _lock_models(session, job_id)
+    _hold_material(session, job_id)
     changes = {"status": "cancelled", "reason": reason, "runner_id": None, "finished_at": now()}
     ended = update(JobRow).where(JobRow.id == job_id, JobRow.finished_at.is_(None)).values(**changes)
     if session.scalar(ended.returning(JobRow.id)) is not None:
@@ -215,7 +215,7 @@ def finish(
     Where it made no model, those of its material that lack its samples say so. Raises ``ClaimLost``.
     """
     if status != "done":
-        _lock_models(session, claim.job_id)
+        _hold_material(session, claim.job_id)
     changes: dict[str, object] = {"status": status, "reason": reason, "model_version": model_version}
     if status == "done":
         changes["stage"] = None
@@ -274,11 +274,11 @@ def _account_for(session: Session, job_id: str) -> None:
         outdate_models(session, session.scalars(select(JobRow.id).where(JobRow.grasp_log_id == copy_id)).one())
 
 
-def _lock_models(session: Session, job_id: str) -> None:
-    """Lock the models of a job's log, if it has any, before the job: who stores samples or merges does so, too."""
-    material_id = session.scalar(_material_of_log(job_id))
-    if material_id is not None:
-        friction_models.lock(session, material_id)
+def _hold_material(session: Session, job_id: str) -> None:
+    """Hold the material of a job's log, if it has one, before the job: who stores samples or merges does so, too."""
+    log_id = session.scalar(select(JobRow.grasp_log_id).where(JobRow.id == job_id))
+    if log_id is not None:
+        materials_of_logs.hold(session, log_id)
 
 
 def _material_of_log(job_id: str) -> Select[int | None]:

@@ -81,23 +81,6 @@ def hold(session: Session, name: str) -> int:
     return still(session, find_id(session, name))
 
 
-def hold_of_log(session: Session, log_id: str) -> int | None:
-    """The key of a log's material, which nobody merges, nor changes its models, until the transaction ends.
-
-    Whoever changes logs, models or jobs of a material holds it first, or two would wait for each other. None for a log
-    of none; raises ``NotFound``.
-    """
-    material_id = grasp_logs.material_id(session, log_id)
-    if material_id is None:
-        return None
-    with session.begin_nested() as attempt:
-        friction_models.lock(session, material_id)
-        if grasp_logs.material_id(session, log_id) == material_id:
-            return material_id
-        attempt.rollback()  # it was merged, and its log with it, while this waited
-    return hold_of_log(session, log_id)
-
-
 def describe(session: Session, material_id: int, description: str) -> None:
     """Change a material's description."""
     session.execute(update(MaterialRow).where(MaterialRow.id == material_id).values(description=description))

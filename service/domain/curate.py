@@ -6,7 +6,7 @@ from sqlalchemy.orm import Session
 
 from db.errors import NotFound
 from db.records import Job, Material, StoredGraspLog
-from db.repositories import detections, friction_models, grasp_logs, jobs, materials, owners
+from db.repositories import detections, friction_models, grasp_logs, jobs, materials, materials_of_logs, owners
 from service.domain import quotas
 from service.domain.changes import record
 from service.domain.context import Context
@@ -180,7 +180,7 @@ def _material_to_change(session: Session, log_id: str, principal: Principal) -> 
 
     A copy that a merge left behind counts in no fit, and whose the merged material is now may change it.
     """
-    material_id = materials.hold_of_log(session, log_id)
+    material_id = materials_of_logs.hold(session, log_id)
     merged_into = None if material_id is None else materials.merged_into(session, material_id)
     belongs_to = merged_into or material_id
     if belongs_to is not None:

@@ -20,7 +20,7 @@ import slipcore
 from db.blobs import BlobStore, disk_errors_named
 from db.database import Database
 from db.records import Claim, Job, SamplesOfLog, SampleSummary
-from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, sensors
+from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, materials_of_logs, sensors
 from estimators import EstimatorError, FrictionModel, Moments, ScatterPrior
 from estimators.method_names import SCATTER_METHODS
 from service import formats
@@ -168,7 +168,7 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         detection = replace(detection, calibration=correction.version, corrections=correction.changed)
         summary = summarise_samples(samples, none_because, run.blobs.put(encode_samples(samples)))
     with run.database.write() as session:
-        materials.hold_of_log(session, log_id)
+        materials_of_logs.hold(session, log_id)
         jobs.start_stage(session, run.claim, "samples", run.seconds)  # nobody else has stored them meanwhile
         detections.add(session, log_id, detection, summary)
         jobs.outdate_models(session, run.job.id, besides=FITTED_AT_INGEST)

@@ -5,7 +5,7 @@ import pytest
 from db.database import Database
 from db.errors import AlreadyExists, NotFound
 from db.records import NewGraspLog, NewModel
-from db.repositories import friction_models, grasp_logs, jobs, materials
+from db.repositories import friction_models, grasp_logs, jobs, materials, materials_of_logs
 
 
 def test_a_material_is_found_by_name(database: Database) -> None:
@@ -130,7 +130,7 @@ def test_a_merged_material_leaves_its_logs_names_and_unfinished_jobs(
         assert (merged.name, merged.aliases, merged.grasp_logs, merged.models) == ("paper", ("papre", "pepar"), 2, ())
         assert materials.get(session, "papre") == merged
         assert materials.still(session, papre) == materials.still(session, pepar) == paper
-        assert [grasp_logs.material_id(session, log) for log in logs] == [paper, paper, pepar]
+        assert [materials_of_logs.get(session, log) for log in logs] == [paper, paper, pepar]
         assert [jobs.get(session, job).material for job in (waiting, done)] == ["paper", "papre"]
 
 

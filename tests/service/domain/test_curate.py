@@ -1,3 +1,4 @@
+import time
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
@@ -14,7 +15,17 @@ from db.database import Database
 from db.errors import NotFound
 from db.paging import Window
 from db.records import AuditFilter, Claim, Job, NewGraspLog
-from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, owners, runners
+from db.repositories import (
+    audit,
+    detections,
+    friction_models,
+    grasp_logs,
+    jobs,
+    materials,
+    materials_of_logs,
+    owners,
+    runners,
+)
 from db.tables import JobRow, MaterialRow, SampleSummaryRow
 from service.domain import curate
 from service.domain.context import Context
@@ -319,7 +330,7 @@ def test_a_merged_material_is_fitted_over_all_its_logs(shop: Shop) -> None:
 def of_each(shop: Shop, *log_ids: str) -> list[int | None]:
     """The keys of the logs' materials."""
     with shop.database.read() as session:
-        return [grasp_logs.material_id(session, log_id) for log_id in log_ids]
+        return [materials_of_logs.get(session, log_id) for log_id in log_ids]
 
 
 def cancelled(shop: Shop) -> str:
@@ -366,7 +377,7 @@ def test_a_log_counts_whose_job_comes_after_the_merge_where_that_of_its_copy_has
     assert {job.status for job in shop.work()} == {"done"}
     assert shop.model("paper")[1:] == (2 * each, False)
     with shop.database.read() as session:
-        assert grasp_logs.material_id(session, later) == materials.find_id(session, "paper")
+        assert materials_of_logs.get(session, later) == materials.find_id(session, "paper")
 
 
 def test_the_samples_of_a_log_that_is_looked_at_again_come_from_that_look(shop: Shop) -> None:
@@ -528,7 +539,20 @@ def restore_it(shop: Shop, log_id: str) -> None:
     curate.restore(shop.context, log_id)
 
 
-@pytest.mark.parametrize("change", [withdraw_it, restore_it, ingest_the_next])
+def cancel_the_next(shop: Shop, _log_id: str) -> None:
+    with shop.database.write() as session:
+        (waits,) = jobs.list_all(session, Window("created_at"), "queued")
+        jobs.cancel(session, waits.id, "nobody wants it")
+
+
+def fail_the_next(shop: Shop, _log_id: str) -> None:
+    claim = shop.claim()
+    assert claim is not None
+    with shop.database.write() as session:
+        jobs.finish(session, claim, "failed", reason="torn")
+
+
+@pytest.mark.parametrize("change", [withdraw_it, restore_it, ingest_the_next, cancel_the_next, fail_the_next])
 def test_who_changes_a_log_waits_for_a_merge_with_nothing_locked(
     shop: Shop, change: Callable[[Shop, str], None]
 ) -> None:
@@ -537,7 +561,7 @@ def test_who_changes_a_log_waits_for_a_merge_with_nothing_locked(
     if change is restore_it:
         curate.withdraw(shop.context, log_id, "wet")
         shop.work()
-    if change is ingest_the_next:
+    if change in (ingest_the_next, cancel_the_next, fail_the_next):
         shop.store("b", 2)
     ends: list[BaseException | None] = []
 
@@ -565,6 +589,48 @@ def test_who_changes_a_log_waits_for_a_merge_with_nothing_locked(
         assert len(detections.samples_of_material(session, target)) == counted
 
 
+@pytest.mark.parametrize("end", [cancel_the_next, fail_the_next])
+def test_who_ends_a_job_waits_for_a_merge_of_what_its_material_was_merged_into(
+    shop: Shop, end: Callable[[Shop, str], None]
+) -> None:
+    for number, name in enumerate(("a", "b")):
+        log_id = shop.ingest(name, number)
+    with shop.database.write() as session:
+        materials.create(session, "c", "")
+        jobs.requeue(session, grasp_logs.get(session, log_id).job.id)  # so it ends with samples that it found before
+    ends: list[BaseException | None] = []
+
+    def note(step: Callable[[], None]) -> None:
+        try:
+            step()
+        except Exception as failed:
+            ends.append(failed)
+        else:
+            ends.append(None)
+
+    def merge_again() -> None:
+        with shop.database.write() as session:
+            two = [materials.find_id(session, name) for name in ("c", "a")]
+            session.execute(select(MaterialRow.id).where(MaterialRow.id.in_(two)).with_for_update())
+            time.sleep(0.3)  # the other one is at this material now
+            materials.merge(session, *two)
+
+    threads = [Thread(target=note, args=(step,)) for step in (lambda: end(shop, log_id), merge_again)]
+    with shop.database.write() as session:
+        two = [materials.find_id(session, name) for name in ("a", "b")]
+        session.execute(select(MaterialRow.id).where(MaterialRow.id.in_(two)).with_for_update())
+        for thread in threads:
+            thread.start()
+        threads[0].join(timeout=0.3)  # both wait for us
+        assert threads[0].is_alive()
+        materials.merge(session, *two)
+    for thread in threads:
+        thread.join()
+    assert ends == [None, None]
+    with shop.database.read() as session:
+        assert materials_of_logs.get(session, log_id) == materials.find_id(session, "c")
+
+
 def test_an_epoch_waits_for_who_withdraws_a_log_with_nothing_locked(shop: Shop) -> None:
     log_id = shop.ingest("a", 0)
     ends: list[object] = []
@@ -574,7 +640,7 @@ def test_an_epoch_waits_for_who_withdraws_a_log_with_nothing_locked(shop: Shop) 
 
     thread = Thread(target=begin)
     with shop.database.write() as session:
-        materials.hold_of_log(session, log_id)
+        materials_of_logs.hold(session, log_id)
         thread.start()
         thread.join(timeout=0.3)  # it is at the material now, which is ours
         assert thread.is_alive()
