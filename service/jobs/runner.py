@@ -88,6 +88,7 @@ class JobRunner:
         self._executor_of: dict[str, JobExecutor] = {}
         self._orphans: set[str] = set()  # jobs that were ours in the database at the last beat, but in no executor
         self._lost: set[str] = set()  # jobs in an executor that were not ours in the database at the last beat
+        self._ended: set[str] = set()  # jobs in an executor whose worker was ended because of that
         self._warming = len(executors)
         self._hiring: set[asyncio.Task[None]] = set()
         self._outdated: SchemaMismatch | None = None
@@ -272,6 +273,9 @@ class JobRunner:
             await self._try(lambda: self._fail(claim, reason))
         finally:
             del self._executor_of[claim.job_id]
+            if claim.job_id in self._ended:  # the job may have been done at that very moment, and the worker is gone
+                self._ended.remove(claim.job_id)
+                is_lost = True
             self._at.pop(claim.job_id, None)  # where it is still ours in the database, it is an orphan
             if (ending := self._endings.pop(claim.job_id, None)) is not None:
                 ending.set()
@@ -323,7 +327,7 @@ class JobRunner:
             beats = {runner.id: runner.beats for runner in living if runner.id != self._id}
             claimed = jobs.claimed(session, self._id)
             freed = self._free_orphans(session, claimed)
-        self._end_lost(at - claimed)
+        self._loop.call_soon_threadsafe(self._end_lost, at - claimed)
         self._leads = alive and living[0].id == self._id
         if not alive and not self._stopping:
             logger.error("runner %s was taken for dead; it goes on under a new name", self._id)
@@ -346,11 +350,13 @@ class JobRunner:
     def _end_lost(self, lost: set[str]) -> None:
         """End the workers of jobs that are not ours any more, as the last look saw too: they keep others waiting.
 
-        Such a job was cancelled or given to another runner, and learns of it only where its stage ends.
+        Such a job was cancelled or given to another runner, and learns of it only where its stage ends. Runs in the
+        event loop, or the executor could have gone on to another job before its worker is ended.
         """
         for job_id in lost & self._lost:
             if (executor := self._executor_of.get(job_id)) is not None:
                 logger.warning("the worker of job %s is ended: nobody wants it any more", job_id)
+                self._ended.add(job_id)
                 executor.kill()
         self._lost = lost - self._lost
 

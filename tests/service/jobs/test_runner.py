@@ -338,6 +338,44 @@ def test_the_worker_of_a_job_that_was_cancelled_is_ended_where_it_does_not_end_b
     assert executor.started == 2  # the next jobs have a worker of their own
 
 
+def test_a_worker_is_ended_only_while_it_is_at_the_job_that_nobody_wants(
+    database: Database, queued: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = {"attempts": ATTEMPTS, "lease_seconds": LEASE_SECONDS, "poll_seconds": 0.01, "shutdown_seconds": 5.0}
+    begun, may_end, has_gone_on = [], Event(), Event()
+
+    def do(claim: Claim) -> None:
+        begun.append(claim.job_id)
+        if claim.job_id == queued[0]:
+            with database.write() as session:
+                jobs.cancel(session, claim.job_id, "it takes for ever")
+            assert may_end.wait(timeout=60.0)  # by itself, at the moment when its worker is to be ended
+        else:
+            has_gone_on.set()
+            finish(database, claim)
+
+    executor = ThreadExecutor(do)
+    begun_at_kill: list[list[str]] = []
+    monkeypatch.setattr(executor, "kill", lambda: begun_at_kill.append([*begun]))
+
+    def warned(*_: object) -> None:
+        may_end.set()
+        has_gone_on.wait(timeout=0.3)
+
+    monkeypatch.setattr("service.jobs.runner.logger.warning", warned)
+
+    async def live() -> None:
+        runner = JobRunner(database, [executor], **given)  # type: ignore[arg-type]
+        await runner.start()
+        await asyncio.to_thread(until_finished(database, queued))
+        await runner.stop()
+
+    asyncio.run(live())
+    assert begun_at_kill[0] == [queued[0]]
+    assert executor.started == 2  # the others have a worker that lives
+    assert {get(database, job_id).deaths for job_id in queued} == {0}
+
+
 def test_the_worker_of_a_job_that_ends_is_given_time(database: Database, queued: list[str]) -> None:
     given = {"attempts": ATTEMPTS, "lease_seconds": 1.0, "poll_seconds": 1.0, "shutdown_seconds": 1.0}
     executor = ThreadExecutor(lambda _: None)
