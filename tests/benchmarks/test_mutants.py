@@ -207,6 +207,17 @@ def test_a_mutant_is_killed_survives_or_never_ends(copy: ScratchCopy, court: Cou
     assert (copy.root / "slipcore/program.py").read_text() == PROGRAM
 
 
+def test_no_bytecode_of_a_change_is_taken_for_that_of_the_next(copy: ScratchCopy) -> None:
+    """Python knows it by the size of the source and the second of its last change."""
+    path, stamps = copy.root / "slipcore/program.py", list[int]()
+    before = path.stat().st_mtime_ns
+    for new in ("4", "5", "6"):
+        with copy.changed(replace(change(copy, "3", "4"), new=new)):
+            stamps.append(int(path.stat().st_mtime))
+    assert len(set(stamps)) == 3
+    assert path.stat().st_mtime_ns == before
+
+
 def test_where_nothing_is_known_of_lines_the_files_nearby_are_tried(copy: ScratchCopy) -> None:
     copy.data.unlink()
     with closing(Court(copy, ["slipcore/program.py"], libraries="", least=2.0)) as court:
