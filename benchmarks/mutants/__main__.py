@@ -4,7 +4,8 @@ Draws mutants of the code, tries each with the tests that run its line, and writ
 below `--work`, whose verdicts stay: a run that was stopped goes on, `--again` tries survivors once more. The first run,
 or `--cover`, runs all tests once to know what they cover; `--cover tests/a.py` adds those of new tests. `--near` goes
 without: a mutant is tried with the test files that have the name of its module or import it, and what survives these
-may be killed by others, in a run `--again`. `--seconds` ends a run early. `--only slipcore/frames.py:12` tries every
+may be killed by others, in a run `--again`. `--seconds` ends a run early. `--part 1/2` and `--part 2/2` share one, each
+with a `--work` of its own; the files of verdicts are put together by hand. `--only slipcore/frames.py:12` tries every
 mutant of a file or of one of its lines, and only prints.
 """
 
@@ -49,6 +50,8 @@ def _try_sample(copy: ScratchCopy, options: argparse.Namespace) -> None:
     path = options.work / f"verdicts-{options.seed}.jsonl"
     found = verdicts.known(path)
     waiting = [edit for edit in drawn if edit.key not in found or (options.again and not found[edit.key].is_killed)]
+    part, parts = map(int, options.part.split("/"))
+    waiting = waiting[part - 1 :: parts]
     end = time.monotonic() + options.seconds
     with _court(copy) as try_mutant:
         for number, edit in enumerate(waiting, 1):
@@ -65,6 +68,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--count", type=int, default=320, help="how many mutants are drawn, at least")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=float, default=math.inf, help="no mutant is begun after so many")
+    parser.add_argument("--part", default="1/1", metavar="K/N", help="every N-th of those that wait, from the K-th on")
     parser.add_argument("--work", type=Path, default=ROOT / ".cache" / "mutants", help="the copy and all verdicts")
     parser.add_argument("--cover", nargs="*", metavar="TESTS", help="run the tests with coverage first")
     parser.add_argument("--near", action="store_true", help="do not ask first which tests run which line")

@@ -81,6 +81,8 @@ def _moved(lines: dict[int, set[str]], before: Path, now: Path) -> dict[int, set
     """The same for the source as it is now; a new line is in no test."""
     if not (before.exists() and now.exists()):
         return {}
+    if before.read_bytes() == now.read_bytes():
+        return lines
     matcher = SequenceMatcher(None, before.read_text().splitlines(), now.read_text().splitlines(), autojunk=False)
     moved = {b + i + 1: a + i + 1 for a, b, size in matcher.get_matching_blocks() for i in range(size)}
     return {new: lines[old] for new, old in moved.items() if old in lines}
