@@ -38,6 +38,16 @@ AuditAction = Literal[
 
 
 @dataclass(frozen=True, slots=True)
+class JobOrigin:
+    """Where a job comes from: the place in a ``trace`` at which it was asked for (W3C traceparent), and the id of the
+    access key with which it was ``requested_by``; None where there is none.
+    """
+
+    trace: str | None = None
+    requested_by: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Scale:
     """A standard deviation, and the degrees of freedom of the Student-t that it scales, None where infinite."""
 

@@ -9,7 +9,7 @@ from sqlalchemy.orm import Session
 
 from db.errors import ClaimLost, NotFound
 from db.paging import Window, windowed
-from db.records import Claim, Job, JobKind, JobStatus
+from db.records import Claim, Job, JobKind, JobOrigin, JobStatus
 from db.repositories import copies, friction_models, materials_of_logs, turns
 from db.tables import FrictionModelRow, GraspLogRow, JobRow, MaterialRow, SampleSummaryRow, now
 
@@ -22,15 +22,11 @@ def add(
     material_id: int | None,
     grasp_log_id: str | None = None,
     seed: int = 0,
-    trace: str | None = None,
-    requested_by: str | None = None,
+    origin: JobOrigin | None = None,
     is_long: bool = False,
 ) -> str:
-    """Store a queued job and return its id; ``trace`` tells where in a trace it was asked for (W3C traceparent).
-
-    ``requested_by`` is the id of the access key with which it was asked for; a job that ``is_long`` lets more of
-    others go before it.
-    """
+    """Store a queued job and return its id; one that ``is_long`` lets more of others go before it."""
+    origin = origin or JobOrigin()
     row = JobRow(
         id=uuid.uuid4().hex,
         kind=kind,
@@ -40,10 +36,10 @@ def add(
         grasp_log_id=grasp_log_id,
         seed=seed,
         seconds={},
-        trace=trace,
-        requested_by=requested_by,
+        trace=origin.trace,
+        requested_by=origin.requested_by,
         is_long=is_long,
-        **turns.new(session, requested_by, material_id, is_long=is_long),
+        **turns.new(session, origin.requested_by, material_id, is_long=is_long),
     )
     session.add(row)
     session.flush()

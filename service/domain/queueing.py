@@ -4,7 +4,7 @@ import logging
 
 from sqlalchemy.orm import Session
 
-from db.records import JobKind
+from db.records import JobKind, JobOrigin
 from db.repositories import friction_models, jobs
 from service.observability import logs, traces
 
@@ -41,8 +41,7 @@ def queue(
         material_id=material_id,
         grasp_log_id=grasp_log_id,
         seed=seed,
-        trace=traces.place(),
-        requested_by=requested_by,
+        origin=JobOrigin(traces.place(), requested_by),
         is_long=is_long or (kind == "fit" and method not in CHEAP_METHODS),
     )
     logger.info("job queued", extra=logs.of(job=job_id, kind=kind))

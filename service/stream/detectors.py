@@ -70,6 +70,20 @@ class MemoryLimit(NamedTuple):
     most_bytes: int
 
 
+class SessionOptions(NamedTuple):
+    """What a session has beside its detector, each where it was asked for or is known.
+
+    ``control``: of a grip controller that answers its frames, and begins with ``model`` if there is one, or else
+    recognises one of ``materials``; ``gel``: of the sensor (``slipcore.forces.Gel.from_json``), by which forces follow
+    where frames have none.
+    """
+
+    control: Control | None = None
+    model: "stiction_client.FrictionModel | None" = None
+    gel: Mapping[str, float | None] | None = None
+    materials: "Mapping[str, stiction_client.FrictionModel] | None" = None
+
+
 @dataclass(slots=True)
 class Session:
     """A running detector with what it saw: the last frames and answers, all frames if they are ``kept``, with what the
@@ -83,7 +97,7 @@ class Session:
     position: NDArray[np.float64]
     element_area: float
     moments: "Moments"
-    room: MemoryLimit
+    limit: MemoryLimit
     kept: list[Frame] | None
     reported: list[float | None] = field(default_factory=list)
     report_deviation: float | None = None
@@ -124,29 +138,25 @@ def open_session(
     area: float,
     method: str,
     keep: bool,
-    room: MemoryLimit,
-    control: Control | None = None,
-    model: "stiction_client.FrictionModel | None" = None,
-    gel: Mapping[str, float | None] | None = None,
-    materials: "Mapping[str, stiction_client.FrictionModel] | None" = None,
+    limit: MemoryLimit,
+    options: SessionOptions | None = None,
 ) -> None:
-    """Begin a session, for which there must be ``room``.
+    """Begin a session within the memory ``limit``.
 
-    ``control``: of a grip controller that answers its frames, and begins with ``model`` if there is one, or else
-    recognises one of ``materials``; ``gel``: of the sensor (``slipcore.forces.Gel.from_json``), by which forces follow
-    where frames have none. Raises ``InvalidInput`` for what cannot be a sensor or a controller.
+    Raises ``InvalidInput`` for what cannot be a sensor or a controller, or has no room.
     """
+    control, model, gel, materials = options or SessionOptions()
     rows, columns = grid
     if not 0 < rows * columns <= MAX_MARKERS or rows < 1:
         raise InvalidInput("grid", list(grid), f"1 to {MAX_MARKERS} markers")
     at_rest = _array("position", position, (rows, columns, 3))
     held = WINDOW * 3 * at_rest.nbytes  # of the frames that are looked at, each with forces and normals
-    _check_room(held, room)
+    _check_room(held, limit)
     detector, moments = slipcore.SlipDetector(at_rest, area, method), estimators.Moments.empty(area)
     kept: list[Frame] | None = [] if keep else None
     grip = None if control is None else Grip(at_rest, control, model, materials)
-    forces = None if gel is None else Reconstructing(gel, room.owner)
-    _SESSIONS[name] = Session(detector, at_rest, area, moments, room, kept, grip=grip, forces=forces, held_bytes=held)
+    forces = None if gel is None else Reconstructing(gel, limit.owner)
+    _SESSIONS[name] = Session(detector, at_rest, area, moments, limit, kept, grip=grip, forces=forces, held_bytes=held)
 
 
 def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[str, Any], bytes | None]:
@@ -208,7 +218,7 @@ def _felt(session: Session, frame: Frame, given: PackedFrame) -> tuple[Frame, di
         return frame, None
     if session.begun is None:
         session.forces.begin(
-            frame, session.position, session.element_area, lambda size: _check_room(size, session.room)
+            frame, session.position, session.element_area, lambda size: _check_room(size, session.limit)
         )
     felt, told = session.forces.step(frame, given.gripper_force, given.gripper_force_deviation)
     if session.grip is not None and felt.force is None:
@@ -275,16 +285,16 @@ def _kept_bytes(session: Session, frame: Frame) -> int:
     count = len(session.kept or ()) + 1
     if count * size > MAX_KEPT_BYTES:
         raise InvalidInput("frames", count, f"{MAX_KEPT_BYTES // size} of this size, where they are kept")
-    _check_room(size, session.room)
+    _check_room(size, session.limit)
     return size
 
 
-def _check_room(size: int, room: MemoryLimit) -> None:
+def _check_room(size: int, limit: MemoryLimit) -> None:
     own, others = (
-        sum(each.all_bytes for each in _SESSIONS.values() if (each.room.owner == room.owner) is is_own)
+        sum(each.all_bytes for each in _SESSIONS.values() if (each.limit.owner == limit.owner) is is_own)
         for is_own in (True, False)
     )
-    most = (room.most_bytes - others) // 2
+    most = (limit.most_bytes - others) // 2
     if own + size > most:
         allowed = (
             f"{most} of one client's live streams, half of what others leave; finish one, or set STICTION_STREAM_BYTES"
@@ -303,7 +313,7 @@ def _plan_look(session: Session, frame: Frame, state: SlipState) -> None:
         session.until_look = STRIDE
         noise = None if session.forces is None or session.forces.stream is None else session.forces.noise
         given = session.frames, session.answers, session.detector.state, noise
-        session.look = _LOOKS.of(session.room.owner).submit(_look, session, *given)
+        session.look = _LOOKS.of(session.limit.owner).submit(_look, session, *given)
 
 
 def _look(

@@ -115,8 +115,8 @@ class Streams:
         try:
             await self.call(
                 detectors.open_session, session.id, position, opening.grid, opening.element_area, opening.detector,
-                opening.keep, detectors.MemoryLimit(session.owner, self._most_bytes), opening.control, model, gel,
-                materials,
+                opening.keep, detectors.MemoryLimit(session.owner, self._most_bytes),
+                detectors.SessionOptions(opening.control, model, gel, materials),
             )  # fmt: skip
         except BaseException:
             self._forget(session)

@@ -1,12 +1,12 @@
 """Grasp logs and what was found in them."""
 
 from functools import partial
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, TypeVar
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import FileResponse
 
-from db.records import JobStatus, LogFilter, StoredGraspLog
+from db.records import LogFilter, StoredGraspLog
 from db.repositories import grasp_logs, materials
 from service import formats
 from service.domain.context import Context
@@ -15,7 +15,6 @@ from service.domain.export import export
 from service.domain.stored_results import EVENT_KINDS, SAMPLE_ARRAYS, StoredHistory, decode_history, decode_samples
 from service.domain.upload import ReceivedLog, StoredUpload, UploadRequest, accept, received, store
 from service.formats import writing
-from service.formats.tracked_markers import FRAME_RATE, SCALE
 from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.bodies import chunks
 from service.http.dependencies import CurrentContext
@@ -25,7 +24,7 @@ from service.http.fair_route import FairRoute, gone
 from service.http.idempotency import IdempotencyKey, KeyWithoutBody, RepeatableResponse, respond_once
 from service.http.long_answers import LONG_ANSWER, Room
 from service.http.long_json import long_json
-from service.http.paging import USUAL, CursorText, Limit, Page, link_next
+from service.http.paging import Page, link_next
 from service.http.problems import (
     FILE_DAMAGED,
     FILE_DELETED,
@@ -45,9 +44,8 @@ from service.http.problems import (
     UPLOAD_TOO_LARGE,
     Problem,
 )
-from service.http.schemas.grasp_logs import GraspLogOut, GraspLogsOut
+from service.http.schemas.grasp_logs import GraspLogOut, GraspLogsOut, GraspLogsQuery, UploadQuery
 from service.http.schemas.results import EventsOut, SamplesOut, StickRatioOut
-from slipcore.defaults import DEFAULT_METHOD, METHOD_NAMES
 
 router = APIRouter(prefix="/v1/grasp-logs", tags=["grasp logs"], route_class=FairRoute)
 
@@ -102,44 +100,24 @@ async def create_grasp_log(
     request: Request,
     key: KeyWithoutBody,
     principal: CurrentPrincipal,
-    material: Annotated[
-        str | None, Query(description="What was held; without it slip is only detected", examples=["paper"])
-    ] = None,
-    sensor: Annotated[str | None, Query(description="In place of the sensor that the log names")] = None,
-    detector: Annotated[
-        str, Query(description="Method of detection", json_schema_extra={"enum": list(METHOD_NAMES)})
-    ] = DEFAULT_METHOD,
-    scale: Annotated[
-        float | None, Query(description="Of tracked markers: m per pixel", ge=SCALE[0], le=SCALE[1])
-    ] = None,
-    frame_rate: Annotated[
-        float | None,
-        Query(description="Of tracked markers whose file counts frames: 1/s", ge=FRAME_RATE[0], le=FRAME_RATE[1]),
-    ] = None,
-    mapping: Annotated[
-        str | None,
-        Query(
-            description="Of formats with topics, fields or columns: which of them is what, as JSON (docs/formats.md)",
-            examples=['{"topic": "/tactile", "displacement": {"field": "markers", "unit": "mm"}, "grid": [20, 20]}'],
-        ),
-    ] = None,
+    asked: Annotated[UploadQuery, Query()],
 ) -> Response:
     """Stored once it is answered; slip, samples and, with a material, its refit follow in the job.
 
     The body is streamed to disk, up to the largest size that is set; `Content-Encoding` may be gzip or zstd.
     """
     length = request.headers.get("content-length", "")
-    asked = UploadRequest(
-        material,
-        sensor,
-        detector,
+    wanted = UploadRequest(
+        asked.material,
+        asked.sensor,
+        asked.detector,
         request.headers.get("content-type"),
         int(length) if length.isdecimal() else None,
         ",".join(request.headers.getlist("content-encoding")),
-        {"scale": scale, "frame_rate": frame_rate, "mapping": mapping},
+        {"scale": asked.scale, "frame_rate": asked.frame_rate, "mapping": asked.mapping},
         principal,
     )
-    async with received(context, chunks(request), asked, partial(gone, request)) as log:
+    async with received(context, chunks(request), wanted, partial(gone, request)) as log:
         about = key and key.for_body(log.body_sha256)
         answer = await context.store_threads.run(principal.share, _store, context, log, about)
     return answer.response()
@@ -166,21 +144,13 @@ def list_grasp_logs(
     context: CurrentContext,
     request: Request,
     response: Response,
-    material: Annotated[str | None, Query(description="Only those of this material")] = None,
-    sensor: Annotated[str | None, Query(max_length=200, description="Only those of this sensor")] = None,
-    status: Annotated[JobStatus | None, Query(description="Only those whose job is so")] = None,
-    withdrawn: Annotated[bool | None, Query(description="Only those that are withdrawn, or are not")] = None,
-    sort: Annotated[
-        Literal["created_at", "-created_at"], Query(description="By what; `-` for the last ones first")
-    ] = "-created_at",
-    limit: Limit = USUAL,
-    cursor: CursorText = None,
+    asked: Annotated[GraspLogsQuery, Query()],
 ) -> GraspLogsOut:
     """Each with its job and, once there, what was found in it."""
-    page = Page(sort, limit, cursor, identity="hex")
+    page = Page(asked.sort, asked.limit, asked.cursor, identity="hex")
     with context.database.read() as session:
-        material_id = None if material is None else materials.find_id(session, material)
-        wanted = LogFilter(material_id, sensor, status, withdrawn)
+        material_id = None if asked.material is None else materials.find_id(session, asked.material)
+        wanted = LogFilter(material_id, asked.sensor, asked.status, asked.withdrawn)
         found, after = page.cut(grasp_logs.list_all(session, page.window(), wanted))
     return GraspLogsOut(items=[GraspLogOut.of(each) for each in found], next=link_next(request, response, after))
 

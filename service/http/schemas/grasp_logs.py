@@ -2,14 +2,17 @@
 
 from dataclasses import asdict
 from datetime import datetime
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.config import JsonDict
 
-from db.records import Detection, StoredGraspLog, Withdrawal
+from db.records import Detection, JobStatus, StoredGraspLog, Withdrawal
+from service.formats.tracked_markers import FRAME_RATE, SCALE
+from service.http.paging import USUAL, CursorText, Limit
 from service.http.schemas.common import MOMENT_EXAMPLE, Body, Next, Reason
 from service.http.schemas.jobs import JOB_EXAMPLE, JobOut
+from slipcore.defaults import DEFAULT_METHOD, METHOD_NAMES
 
 FINDING_EXAMPLE: JsonDict = {
     "name": "no rest",
@@ -223,3 +226,43 @@ class WithdrawnOut(BaseModel):
 
     grasp_log: GraspLogOut
     jobs: list[JobOut]
+
+
+class UploadQuery(BaseModel):
+    """What is told of an upload beside its body: the parameters of its address."""
+
+    material: Annotated[
+        str | None, Field(description="What was held; without it slip is only detected", examples=["paper"])
+    ] = None
+    sensor: Annotated[str | None, Field(description="In place of the sensor that the log names")] = None
+    detector: Annotated[
+        str, Field(description="Method of detection", json_schema_extra={"enum": list(METHOD_NAMES)})
+    ] = DEFAULT_METHOD
+    scale: Annotated[float | None, Field(description="Of tracked markers: m per pixel", ge=SCALE[0], le=SCALE[1])] = (
+        None
+    )
+    frame_rate: Annotated[
+        float | None,
+        Field(description="Of tracked markers whose file counts frames: 1/s", ge=FRAME_RATE[0], le=FRAME_RATE[1]),
+    ] = None
+    mapping: Annotated[
+        str | None,
+        Field(
+            description="Of formats with topics, fields or columns: which of them is what, as JSON (docs/formats.md)",
+            examples=['{"topic": "/tactile", "displacement": {"field": "markers", "unit": "mm"}, "grid": [20, 20]}'],
+        ),
+    ] = None
+
+
+class GraspLogsQuery(BaseModel):
+    """Which grasp logs are listed, and how: the parameters of the list's address."""
+
+    material: Annotated[str | None, Field(description="Only those of this material")] = None
+    sensor: Annotated[str | None, Field(max_length=200, description="Only those of this sensor")] = None
+    status: Annotated[JobStatus | None, Field(description="Only those whose job is so")] = None
+    withdrawn: Annotated[bool | None, Field(description="Only those that are withdrawn, or are not")] = None
+    sort: Annotated[Literal["created_at", "-created_at"], Field(description="By what; `-` for the last ones first")] = (
+        "-created_at"
+    )
+    limit: Limit = USUAL
+    cursor: CursorText = None

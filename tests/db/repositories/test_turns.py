@@ -6,7 +6,7 @@ from sqlalchemy import event, insert, select, text
 from sqlalchemy.orm import Session
 
 from db.database import Database
-from db.records import Claim
+from db.records import Claim, JobOrigin
 from db.repositories import access_keys, jobs, materials, runners
 from db.tables import JobRow, MaterialRow
 
@@ -26,7 +26,8 @@ def paper(database: Database) -> int:
 
 def add(session: Session, material: int, count: int, key: str | None = None, *, is_long: bool = False) -> list[str]:
     return [
-        jobs.add(session, "fit", "ols", material_id=material, requested_by=key, is_long=is_long) for _ in range(count)
+        jobs.add(session, "fit", "ols", material_id=material, origin=JobOrigin(None, key), is_long=is_long)
+        for _ in range(count)
     ]
 
 

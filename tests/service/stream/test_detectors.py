@@ -46,7 +46,7 @@ def step(given: PackedFrame, *, is_shown: bool = False) -> tuple[dict[str, Any],
 def feed(log: GraspLog, *, wait: bool) -> dict[str, object] | None:
     """All frames, with time for the looks between them or only at their end; the friction that was found."""
     position = log.position.tobytes()
-    detectors.open_session("one", position, log.grid, log.element_area, "filter", keep=False, room=ROOM)
+    detectors.open_session("one", position, log.grid, log.element_area, "filter", keep=False, limit=ROOM)
     session = detectors._SESSIONS["one"]
     for k in range(len(log)):
         step(whole_frame(log, k))
@@ -89,7 +89,7 @@ def test_who_watches_sees_each_element_the_forces_and_the_command(ramp: GraspLog
     assert ramp.force is not None
     history = detect_slip(ramp)
     position = ramp.position.tobytes()
-    detectors.open_session("one", position, ramp.grid, ramp.element_area, "filter", keep=False, room=ROOM)
+    detectors.open_session("one", position, ramp.grid, ramp.element_area, "filter", keep=False, limit=ROOM)
     for k, time in enumerate(ramp.time.tolist()):
         arrays = (ramp.displacement, ramp.force, ramp.object_pose, ramp.normal)
         given = [None if array is None else array[k].tobytes() for array in arrays]
@@ -115,7 +115,7 @@ def test_who_watches_sees_each_element_the_forces_and_the_command(ramp: GraspLog
 @pytest.mark.parametrize("command", [-1.0, float("nan"), float("inf")])
 def test_a_command_that_is_no_force_is_refused_before_the_frame_is_taken(ramp: GraspLog, command: float) -> None:
     position = ramp.position.tobytes()
-    detectors.open_session("one", position, ramp.grid, ramp.element_area, "filter", keep=False, room=ROOM)
+    detectors.open_session("one", position, ramp.grid, ramp.element_area, "filter", keep=False, limit=ROOM)
     frame = PackedFrame(0, 0.0, ramp.displacement[0].tobytes(), command=command)
     with pytest.raises(InvalidInput, match="command"):
         detectors.step("one", frame)

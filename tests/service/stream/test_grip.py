@@ -20,6 +20,11 @@ ROUND = Control(6e-5, FORCES, round_at=5.0)
 ROOM = detectors.MemoryLimit("me", 2**30)
 
 
+def open_session(log: GraspLog, control: Control | None, keep: bool = False) -> None:
+    options = detectors.SessionOptions(control)
+    detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", keep, ROOM, options)
+
+
 @pytest.fixture
 def log(ramp: GraspLog) -> GraspLog:
     return ramp.take(np.arange(60))
@@ -28,7 +33,7 @@ def log(ramp: GraspLog) -> GraspLog:
 def answers(log: GraspLog, control: Control | None) -> list[dict[str, Any]]:
     """Those of a session without an expected model."""
     assert log.force is not None
-    detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", False, ROOM, control)
+    open_session(log, control)
     try:
         frames = zip(log.time.tolist(), log.displacement, log.force, strict=True)
         return [
@@ -58,7 +63,7 @@ def test_without_a_controller_nothing_is_commanded(log: GraspLog) -> None:
 
 def test_those_who_watch_see_what_the_controller_commands(log: GraspLog) -> None:
     assert log.force is not None
-    detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", False, ROOM, ROUND)
+    open_session(log, ROUND)
     given = PackedFrame(0, float(log.time[0]), log.displacement[0].tobytes(), log.force[0].tobytes())
     answer, shown = detectors.step("one", given, is_shown=True)
     detectors.drop("one")
@@ -85,7 +90,7 @@ def test_what_the_controller_refuses_leaves_the_session_as_it_was(
 
     monkeypatch.setattr(GraspController, "step", refuse_every_other)
     assert log.force is not None
-    detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", True, ROOM, ROUND)
+    open_session(log, ROUND, keep=True)
     try:
         for k, (time, displacement, force) in enumerate(
             zip(log.time.tolist(), log.displacement, log.force, strict=True)
@@ -133,7 +138,7 @@ def test_samples_tell_how_many_of_what_slips_is_seen_to_move(log: GraspLog) -> N
 
 def test_a_frame_without_forces_is_refused_and_leaves_all_as_it_was(log: GraspLog) -> None:
     assert log.force is not None
-    detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", False, ROOM, ROUND)
+    open_session(log, ROUND)
     time, displacement = float(log.time[0]), log.displacement[0].tobytes()
     with pytest.raises(InvalidInput, match="force is None; allowed: the elements' forces"):
         detectors.step("one", PackedFrame(0, time, displacement))

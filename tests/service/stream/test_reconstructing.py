@@ -23,9 +23,11 @@ ROOM = detectors.MemoryLimit("me", 2**30)
 GRIP = Control(6e-5, {"least_force": 0.5, "most_force": 30.0}, round_at=5.0)
 
 
-def opened(log: GraspLog, **said: Any) -> detectors.Session:
-    options = {"keep": False, "room": ROOM, "gel": GEL} | said
-    detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", **options)
+def opened(
+    log: GraspLog, keep: bool = False, limit: detectors.MemoryLimit = ROOM, control: Control | None = None
+) -> detectors.Session:
+    options = detectors.SessionOptions(control, gel=GEL)
+    detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", keep, limit, options)
     return detectors._SESSIONS["one"]
 
 
@@ -120,7 +122,7 @@ def test_frames_have_forces_all_or_none_by_the_first_one_that_is_taken(ramp: Gra
 def test_without_room_or_with_too_many_markers_there_are_none_and_it_says_why(
     ramp: GraspLog, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    opened(ramp, room=detectors.MemoryLimit("me", 3 * 2**20))
+    opened(ramp, limit=detectors.MemoryLimit("me", 3 * 2**20))
     assert "bytes is" in detectors.step("one", frame(ramp, 0))[0]["force"]["reason"]
     monkeypatch.setattr(reconstructing, "MOST_NODES", 300)
     opened(ramp)
