@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.exit_codes import INPUT_REFUSED
+from service.cli.exit_codes import INPUT_REFUSED, INTERRUPTED
 from service.cli.local import Picture, refuse_inputs
 from service.cli.output import print_json, print_lines, print_table
 from service.cli.progress import counted, shown_progress
@@ -17,7 +17,7 @@ from service.formatting import number
 from service.whole_files import write_whole
 
 if TYPE_CHECKING:
-    from service.jobs.campaign import Outcome
+    from service.jobs.campaign import Outcome, RequestedAccuracy
     from slipcore import GraspLog
     from slipcore.contact import Scene
 
@@ -52,10 +52,9 @@ def simulate(
     if explain:
         _explain(wanted, seed, json)
         return
-    from slipcore.contact import simulate as simulate_scene
+    from service.jobs.campaign import RequestedAccuracy
 
-    with shown_progress(f"simulating {wanted.name}") as tell:
-        log = simulate_scene(wanted, accuracy=accuracy, seconds=seconds, seed=seed, tier=tier, progress=tell)
+    log, ended = _simulated(wanted, RequestedAccuracy(accuracy, seconds, tier), seed)
     if output is not None:
         from stiction_client import container
 
@@ -65,6 +64,20 @@ def simulate(
 
         save(truth_over_time(log, wanted.name), picture)
     _print(log, wanted.name, json)
+    if ended:
+        raise typer.Exit(INTERRUPTED)
+
+
+def _simulated(scene: "Scene", asked: "RequestedAccuracy", seed: int) -> "tuple[GraspLog, bool]":
+    """The log, and whether Ctrl-C ended it: it is then the best until then."""
+    from slipcore.contact import simulate as simulate_scene
+    from slipcore.contact.errors import Interrupted
+
+    with shown_progress(f"simulating {scene.name}") as tell:
+        try:
+            return simulate_scene(scene, seed=seed, progress=tell, **asdict(asked)), False
+        except Interrupted as stopped:
+            return stopped.log, True
 
 
 def campaign(

@@ -301,16 +301,51 @@ class AccuracyDefaults(Options):
     """Largest tolerance of the solver."""
     timed_tolerance: Annotated[float, Option(1e-8, 0.5, "-", "as of a fidelity that is not asked")] = 1e-4
     """Tolerance where seconds are asked, not an accuracy."""
+    tightest: Annotated[float, Option(1e-12, 0.1, "-", "rounding comes near in steps that change little")] = 1e-7
+    """Least tolerance of the solver."""
     coarsest_cells: Annotated[int, Option(4, 1000, "cells", "half of them see a slip front")] = 12
+    coarsest_error: Annotated[float, Option(1e-3, 1.0, "-", "scenes of the library: 0.03 to 0.1")] = 0.05
+    """On the coarsest grid, for what ``progress`` expects before the first estimate."""
     finest_cells: Annotated[int, Option(16, 100_000, "cells", "minutes a frame beyond")] = 700
     most_substeps: Annotated[int, Option(1, 10_000, "steps", "halving further tells nothing new")] = 64
-    first_growth: Annotated[float, Option(1.05, 10.0, "-", "less would show too little")] = 1.6
+    fewest_frames: Annotated[int, Option(3, 1000, "frames", "half of fewer tell little of a path")] = 8
+    """From which on a log of half the frames shows what load steps leave."""
+    least_growth: Annotated[float, Option(1.05, 10.0, "-", "less would show too little")] = 1.3
     """Of cells from one grid to the next, at least."""
+    last_growth: Annotated[float, Option(1.01, 10.0, "-", "a few per cent more cells are hardly better")] = 1.12
+    """The same for what is left of a budget."""
+    first_growth: Annotated[float, Option(1.05, 10.0, "-", "twice the cells cost 1.5 to 3 times as much")] = 1.6
+    """From the first grid to the second, and along a curve."""
     largest_growth: Annotated[float, Option(1.05, 10.0, "-", "more would trust one estimate too far")] = 2.5
     overshoot: Annotated[float, Option(1.0, 10.0, "-", "a grid too many costs more than cells")] = 1.15
     """Factor on the cells that should meet the target."""
-    cost_order: Annotated[float, Option(1.0, 6.0, "-", "contact_speed: a little more than the cells' number")] = 2.4
-    """Seconds grow with this power of the cells across."""
+    usual_order: Annotated[float, Option(0.5, 3.0, "-", "random scenes")] = 1.5
+    """Of displacement and force in the cell size, where two grids are all there is."""
+    usual_ratio_order: Annotated[float, Option(0.5, 3.0, "-", "random scenes")] = 1.0
+    """The same of the stick ratio."""
+    least_order: Annotated[float, Option(0.1, 3.0, "-", "fronts of a cell's width")] = 1.0
+    largest_order: Annotated[float, Option(0.5, 4.0, "-", "constant traction on each cell")] = 2.0
+    tried_orders: Annotated[int, Option(3, 1000, "orders", "a tenth of an order changes an estimate by 6 %")] = 21
+    step_order: Annotated[float, Option(0.5, 2.0, "-", "accuracy-contact.md: 1.5 to 1.9")] = 1.5
+    """Of what load steps leave, for what can be reached."""
+    overhead_cells: Annotated[float, Option(0.0, 1e6, "cells", "Table I, lifting and cup: 2,700 to 5,000")] = 4000.0
+    """What costs as much in a load step as all that does not grow with the grid, where nothing tells."""
+    overhead_spread: Annotated[float, Option(1.0, 100.0, "-", "coupled and layered scenes lie within")] = 4.0
+    """Factor that runs may change it by, either way."""
+    telling_growth: Annotated[float, Option(1.05, 100.0, "-", "times of smaller ones differ by noise")] = 1.5
+    """Of a grid's cells from which on two runs tell what costs what."""
+    held_back: Annotated[float, Option(0.0, 0.5, "-", "prices are off by a tenth")] = 0.08
+    """Part of a budget that no run is planned into."""
+    scouting_share: Annotated[float, Option(0.01, 0.9, "-", "the last run should have most of it")] = 0.2
+    """Of what is left of a budget: a run between the last one and the one that uses it up."""
+    overdrawn: Annotated[float, Option(1.0, 10.0, "-", "a fifth is allowed")] = 1.15
+    """Part of a budget beyond which a run is ended."""
+    telling_part: Annotated[float, Option(0.01, 1.0, "-", "presses take less, and slip more, a frame")] = 0.4
+    """Part of a run from which on it shows how long the whole takes."""
+    least_part: Annotated[float, Option(1e-6, 0.5, "-", "a frame of a hundred")] = 0.01
+    runs_at_least: Annotated[float, Option(1.0, 20.0, "-", "half the frames, all of them, a finer grid")] = 5.0
+    """Cost of a first log with its error, in runs of half the frames on the coarsest grid."""
+    rounding: Annotated[float, Option(0.0, 1e-3, "-", "rounding")] = 1e-9
     points: Annotated[int, Option(2, 1000, "points", "a scene without a sensor")] = 32
     """Points a side at which logs of a scene without a sensor are compared."""
     frames: Annotated[int, Option(2, 100_000, "frames", "two seconds at 30 frames a second")] = 60

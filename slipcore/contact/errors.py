@@ -1,7 +1,7 @@
 """What the contact simulator refuses or could not do."""
 
 from slipcore.errors import InvalidInput, SlipcoreError
-from slipcore.frames import FloatArray
+from slipcore.frames import FloatArray, GraspLog
 
 
 class InfeasibleLoad(InvalidInput):
@@ -15,6 +15,36 @@ class InfeasibleLoad(InvalidInput):
 
     def __reduce__(self) -> tuple[type, tuple[FloatArray, float]]:
         return type(self), (self.load, self.factor)
+
+
+class OutOfReach(InvalidInput):
+    """A request that is refused before it is tried: ``least`` of its ``name`` can be asked for.
+
+    ``seconds`` is what that takes: by the runs that were made to tell, on this machine.
+    """
+
+    def __init__(self, name: str, asked: float, least: float, seconds: float) -> None:
+        self.asked, self.least, self.seconds = asked, least, seconds
+        takes = "" if name == "seconds" else f", which takes about {_told(seconds)}"
+        least_told = f"{_told(least)} or more" if name == "seconds" else f"{least:.2g} or more"
+        InvalidInput.__init__(self, name, f"{asked:g}", least_told + takes)
+
+    def __reduce__(self) -> tuple[type, tuple[str, float, float, float]]:
+        return type(self), (self.name, self.asked, self.least, self.seconds)
+
+
+def _told(seconds: float) -> str:
+    if seconds < 100.0:
+        return f"{seconds:.2g} s"
+    return f"{seconds / 60:.0f} min" if seconds < 6000.0 else f"{seconds / 3600:.0f} h"
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C during a request; ``log`` is the best that was made until then, its metadata tell its accuracy."""
+
+    def __init__(self, log: GraspLog) -> None:
+        self.log = log
+        KeyboardInterrupt.__init__(self, "interrupted")
 
 
 class NotConverged(SlipcoreError):

@@ -22,12 +22,13 @@ from db.records import NewGraspLog
 from db.repositories import grasp_logs
 from service import exports, formats
 from service.cli import app, main, progress, streaming
-from service.cli.exit_codes import INPUT_REFUSED, NOT_FEASIBLE, SERVICE_REFUSED
+from service.cli.exit_codes import INPUT_REFUSED, INTERRUPTED, NOT_FEASIBLE, SERVICE_REFUSED
 from service.cli.output import plain
 from service.demo.server import running_server
 from service.settings import Settings
-from slipcore import GraspLog, detect_slip
+from slipcore import GraspLog, contact, detect_slip
 from slipcore.contact import tangential_ramp
+from slipcore.contact.errors import Interrupted
 from slipcore.contact.tiers.ramp import RampSchedule
 from stiction_client import FrictionClient, container
 
@@ -168,6 +169,23 @@ def test_simulate_takes_a_scene_by_name_or_by_file_and_writes_a_log_that_detect_
     code, out, _ = run("simulate", path)
     assert code == 0
     assert "my press" in out
+
+
+def test_simulate_that_is_interrupted_writes_the_best_log_until_then(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    best = tangential_ramp(schedule=RampSchedule(0.0, 0.1, 0.0, 0.1, 0.0))
+
+    def interrupted(*_: object, **__: object) -> GraspLog:
+        raise Interrupted(best)
+
+    monkeypatch.setattr(contact, "simulate", interrupted)
+    log = tmp_path / "best.npz"
+    code, out, err = run("simulate", "lifting_15N", "--accuracy", 0.001, "--output", log)
+    assert code == INTERRUPTED
+    assert len(formats.read(log)) == len(best)
+    assert "stick ratio" in out
+    assert "interrupted" in err
 
 
 def test_simulate_takes_the_tier_that_is_named_and_refuses_one_that_is_not(run: Run) -> None:

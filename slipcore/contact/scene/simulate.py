@@ -1,15 +1,17 @@
 """A scene in, a log with truth out."""
 
 import zlib
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
+from slipcore.contact.errors import Interrupted
 from slipcore.contact.plan.description import SceneDescription
 from slipcore.contact.plan.plan import Plan
 from slipcore.contact.progress import Progress, no_progress
 from slipcore.contact.tiers import boundary_elements
-from slipcore.contact.tiers.accuracy import simulate_to
+from slipcore.contact.tiers.accuracy import Refined, Stopped, simulate_to
 from slipcore.contact.tiers.boundary_elements import Fidelity
 from slipcore.contact.tiers.choice import cheapest, named
 from slipcore.errors import InvalidInput
@@ -33,7 +35,9 @@ def simulate(
     of force at the sensor's points, all before observation effects. ``seed`` draws random fields and noise. The
     metadata tell tier, grid, steps, tolerance, estimated accuracy and seconds. ``progress`` is told which part is done.
 
-    Raises ``InfeasibleLoad`` where friction cannot carry a load, ``NotConverged`` and ``InvalidInput``.
+    Raises ``InfeasibleLoad`` where friction cannot carry a load, ``OutOfReach`` for an accuracy or seconds that cannot
+    be kept, with what can, ``NotConverged`` and ``InvalidInput``; ``Interrupted``, with the best log until then, where
+    Ctrl-C ends a request that has one.
     """
     plan = scene.plan(seed)
     if fidelity is not None and (accuracy is not None or seconds is not None):
@@ -48,10 +52,17 @@ def simulate(
     elif accuracy is None and seconds is None:
         log, estimated = boundary_elements.run(plan, fidelity, progress), "not asked for"
     else:
-        found = simulate_to(plan, accuracy, seconds, progress)
-        log, estimated = found.log, f"{found.error.largest:.2g}"
-        log = replace(log, metadata={**log.metadata, "seconds": f"{found.seconds:.3f}"})
+        try:
+            return _requested(scene, plan, simulate_to(plan, accuracy, seconds, progress))
+        except Stopped as stopped:
+            raise Interrupted(_requested(scene, plan, stopped.found, {"stopped": "interrupted"})) from stopped
     return observe(plan, replace(log, metadata={"scene": scene.name, **log.metadata, "estimated accuracy": estimated}))
+
+
+def _requested(scene: SceneDescription, plan: Plan, found: Refined, more: Mapping[str, str] | None = None) -> GraspLog:
+    """The log of a request as the sensor sees it, with what it has come to."""
+    told = {"seconds": f"{found.seconds:.3f}", "estimated accuracy": f"{found.error.largest:.2g}", **(more or {})}
+    return observe(plan, replace(found.log, metadata={"scene": scene.name, **found.log.metadata, **told}))
 
 
 def observe(plan: Plan, log: GraspLog) -> GraspLog:

@@ -1,58 +1,22 @@
 """Accuracy on request: how far a log is from a finer one, and which fidelity brings that below what is asked."""
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from slipcore.contact.defaults import ACCURACY, PROBE
-from slipcore.contact.errors import NotConverged
+from slipcore.contact.errors import NotConverged, OutOfReach
 from slipcore.contact.plan.plan import Plan, SamplingPlan
 from slipcore.contact.progress import Progress, no_progress
-from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach, run
-from slipcore.contact.tiers.sampling import sensor_grid
+from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach
+from slipcore.contact.tiers.difference import Difference as Difference
+from slipcore.contact.tiers.difference import difference as difference
+from slipcore.contact.tiers.extrapolation import USUAL, grid_error, on_finer, orders
+from slipcore.contact.tiers.requests import OutOfTime, Runs
+from slipcore.contact.tiers.sampling import frame_times
 from slipcore.errors import InvalidInput
-from slipcore.frames import FloatArray, GraspLog
-
-
-@dataclass(frozen=True, slots=True)
-class Difference:
-    """How far two logs of a scene are apart.
-
-    ``stick_ratio``: largest absolute difference over time; ``displacement``, ``force``: relative L2 over time at the
-    sensor's points.
-    """
-
-    stick_ratio: float
-    displacement: float
-    force: float
-
-    def times(self, factor: float) -> "Difference":
-        """All three multiplied."""
-        return Difference(factor * self.stick_ratio, factor * self.displacement, factor * self.force)
-
-    @property
-    def largest(self) -> float:
-        """The largest of the three: what ``accuracy`` means."""
-        return max(self.stick_ratio, self.displacement, self.force)
-
-
-def difference(log: GraspLog, reference: GraspLog) -> Difference:
-    """Difference of a log from a reference at the same points and frames; both with truth, before observation."""
-    if log.truth is None or reference.truth is None or log.force is None or reference.force is None:
-        raise InvalidInput("log", "without truth or forces", "a simulated log")
-    ratios = np.abs(log.truth.stick_ratio - reference.truth.stick_ratio)
-    return Difference(
-        stick_ratio=float(np.nanmax(ratios, initial=0.0)),
-        displacement=_relative(log.displacement, reference.displacement),
-        force=_relative(log.force, reference.force),
-    )
-
-
-def _relative(values: FloatArray, reference: FloatArray) -> float:
-    size = float(np.sqrt(np.sum(reference**2)))
-    return float(np.sqrt(np.sum((values - reference) ** 2))) / size if size > 0.0 else 0.0
+from slipcore.frames import GraspLog
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,132 +29,250 @@ class Refined:
     seconds: float
 
 
+class Stopped(KeyboardInterrupt):
+    """Ctrl-C during a request; ``found`` is the best until then."""
+
+    def __init__(self, found: Refined) -> None:
+        self.found = found
+        KeyboardInterrupt.__init__(self, "interrupted")
+
+
 def simulate_to(
     plan: Plan, accuracy: float | None = None, seconds: float | None = None, progress: Progress = no_progress
 ) -> Refined:
-    """The cheapest log that is estimated to be as accurate as asked, or the best one within about ``seconds``.
+    """The cheapest log that is estimated to be as accurate as asked, or the best one within ``seconds``, which it uses.
 
-    ``progress`` is told from the first estimate on: before that nobody knows what the accuracy will take.
+    ``progress`` is told from the first run on.
 
-    Raises ``NotConverged`` where the finest grid does not reach the accuracy asked.
+    Raises ``OutOfReach`` for an accuracy that neither the finest grid nor the most load steps would reach, and for
+    seconds in which nothing can be made whose error is known: both as soon as the coarsest runs tell.
+    ``NotConverged`` where the finest grid falls short after all; ``Stopped`` with the best log where Ctrl-C comes after
+    the first.
     """
     for name, value in (("accuracy", accuracy), ("seconds", seconds)):
         if value is not None and not 0.0 < value < np.inf:
             raise InvalidInput(name, value, "finite and above 0")
-    began, target = time.perf_counter(), 0.0 if accuracy is None else accuracy
-    budget = np.inf if seconds is None else seconds
-    forecast = _Forecast(began, budget, progress)
-    for found in _refinements(_sampled(plan), target, forecast):
-        if found.error.largest <= target or time.perf_counter() - began + _next_seconds(found, target) > budget:
-            break
-    if seconds is None and found.error.largest > target:
-        raise NotConverged("accuracy", found.error.largest, target, found.fidelity.cells)
-    return replace(found, seconds=time.perf_counter() - began)
+    search = _Search(plan, 0.0 if accuracy is None else accuracy, np.inf if seconds is None else seconds, progress)
+    best: Refined | None = None
+    try:
+        for found in search.logs():
+            best = found
+            if found.error.largest <= search.target:
+                break
+    except OutOfTime as ended:
+        if best is None:
+            raise search.too_short(ended.seconds) from ended
+    except KeyboardInterrupt as stopped:
+        if best is None:
+            raise
+        raise Stopped(replace(best, seconds=search.runs.spent)) from stopped
+    assert best is not None  # there is a first log, or an error
+    if seconds is None and best.error.largest > search.target:
+        raise NotConverged("accuracy", best.error.largest, search.target, best.fidelity.cells)
+    return replace(best, seconds=search.runs.spent)
 
 
 def refinements(plan: Plan, seconds: float, progress: Progress = no_progress) -> Iterator[Refined]:
     """Ever finer logs, as long as the next one fits into about ``seconds``; theirs are what a request for that accuracy
-    takes, those of all coarser ones among them.
+    takes, those of all coarser ones among them. There is a first one, whatever it takes.
     """
     if not 0.0 < seconds < np.inf:
         raise InvalidInput("seconds", seconds, "finite and above 0")
-    began = time.perf_counter()
-    for found in _refinements(_sampled(plan), 0.0, _Forecast(began, seconds, progress)):
-        spent = time.perf_counter() - began
-        yield replace(found, seconds=spent)
-        if spent + _next_seconds(found, 0.0) > seconds:
+    search = _Search(plan, 0.0, seconds, progress, every=True)
+    for found in search.logs():
+        yield replace(found, seconds=search.runs.spent)
+
+
+class _Search:
+    """Ever finer logs of a plan, up to the ``target`` or within a budget; with ``every``, in equal growth."""
+
+    def __init__(self, plan: Plan, target: float, budget: float, progress: Progress, *, every: bool = False) -> None:
+        reach = contact_reach(plan)
+        self.plan, self.target, self.every = _sampled(plan, reach), target, every
+        self.limited = bool(np.isfinite(budget))
+        self.runs = Runs(PROBE.room * reach, budget, progress, strict=not every)
+        guess = ACCURACY.coarsest_cells * (ACCURACY.coarsest_error / target if target > 0.0 else 1.0)
+        self.runs.expect(self.plan, (*self.least(), self.at(_even(min(guess, ACCURACY.finest_cells)), 1)))
+
+    def at(self, cells: int, substeps: int) -> Fidelity:
+        """A fidelity, at the solver's tolerance that the target asks for."""
+        asked = ACCURACY.solver_share * self.target if self.target > 0.0 else ACCURACY.timed_tolerance
+        return Fidelity(cells, substeps, float(np.clip(asked, ACCURACY.tightest, ACCURACY.loosest)), aligned=False)
+
+    def least(self) -> tuple[Fidelity, Fidelity]:
+        """The runs without which there is no estimate, beside one in longer steps."""
+        cells = ACCURACY.coarsest_cells
+        return self.at(cells, 1), self.at(_even(cells * ACCURACY.least_growth), 1)
+
+    def price(self, cells: int, substeps: int) -> float:
+        """Seconds that a run should take."""
+        return self.runs.price(self.plan, self.at(cells, substeps))
+
+    def logs(self) -> Iterator[Refined]:
+        """Logs with their estimated errors; the first one shows what can be reached."""
+        coarsest, steps = self.coarsest()
+        made, substeps = [(ACCURACY.coarsest_cells, coarsest)], 1
+        grid: Difference | None = None
+        while (following := self.following(made[-1][0], substeps, grid, steps)) is not None:
+            fidelity = self.at(*following)
+            self.runs.expect(self.plan, (fidelity,))
+            made.append((fidelity.cells, self.runs.run(self.plan, fidelity)))
+            grid, order = _grid_error(made)
+            steps, substeps = steps.times(substeps / fidelity.substeps), fidelity.substeps
+            yield Refined(made[-1][1], fidelity, grid.plus(steps), self.runs.spent)
+            self.refuse_the_unreachable(fidelity, grid, steps, order)
+            if not self.limited and steps.largest > ACCURACY.step_share * self.target:
+                coarsest, substeps, steps = self.more_steps(substeps, steps)
+                made = [(ACCURACY.coarsest_cells, coarsest)]
+
+    def coarsest(self) -> tuple[GraspLog, Difference]:
+        """A log on the coarsest grid at a load step a frame, and what these steps leave.
+
+        That falls in proportion to their length at least: steps of two frames, or of half a one where frames are few,
+        show it.
+        """
+        one, sampling = self.least()[0], self.plan.sampling
+        assert sampling is not None  # of ``_sampled``
+        if len(frame_times(self.plan)) < ACCURACY.fewest_frames:
+            log = self.runs.run(self.plan, one)
+            self.refuse_the_too_short()
+            return log, difference(log, self.runs.run(self.plan, replace(one, substeps=2))).times(2.0)
+        rarely = replace(self.plan, sampling=replace(sampling, frame_rate=0.5 * sampling.frame_rate))
+        longer = self.runs.run(rarely, one)
+        self.refuse_the_too_short()
+        log = self.runs.run(self.plan, one)
+        return log, difference(longer, log.take(slice(0, 2 * len(longer) - 1, 2)))
+
+    def more_steps(self, substeps: int, steps: Difference) -> tuple[GraspLog, int, Difference]:
+        """A log on the coarsest grid in enough load steps a frame, their number, and what they leave."""
+        log = self.runs.run(self.plan, self.at(ACCURACY.coarsest_cells, substeps))
+        while True:
+            finer = self.runs.run(self.plan, self.at(ACCURACY.coarsest_cells, 2 * substeps))
+            before, steps, log, substeps = steps, difference(log, finer), finer, 2 * substeps
+            allowed = ACCURACY.step_share * self.target
+            if steps.largest <= allowed:
+                return log, substeps, steps
+            falls = float(np.log2(max(before.largest / steps.largest, 1.0)))
+            reached = steps.largest * (substeps / ACCURACY.most_substeps) ** falls
+            if reached > allowed:
+                takes = self.price(ACCURACY.finest_cells, ACCURACY.most_substeps)
+                raise OutOfReach("accuracy", self.target, reached / ACCURACY.step_share, takes)
+
+    def following(
+        self, cells: int, substeps: int, grid: Difference | None, steps: Difference
+    ) -> tuple[int, int] | None:
+        """Cells and load steps of the next run; None where there is none."""
+        if cells >= ACCURACY.finest_cells:
+            return None
+        if self.every:
+            finer = _even(min(cells * ACCURACY.first_growth, ACCURACY.finest_cells))
+            fits = grid is None or self.price(finer, substeps) <= self.runs.left
+            return (finer, substeps) if fits else None
+        if self.target > 0.0:
+            finer = _enough_cells(cells, grid, self.target - steps.largest)
+            if self.price(finer, substeps) <= self.runs.left:
+                return finer, substeps
+        return self.affordable(cells, substeps, grid, steps)
+
+    def affordable(
+        self, cells: int, substeps: int, grid: Difference | None, steps: Difference
+    ) -> tuple[int, int] | None:
+        """Cells and load steps that use up what is left and should err least; where that is a long way from the last
+        run, one between, to measure by.
+        """
+        held_back = 0.0 if grid is None else ACCURACY.held_back
+        left = self.runs.left - held_back * self.runs.budget
+        often = [substeps]
+        while grid is not None and 2 * often[-1] <= ACCURACY.most_substeps:
+            often.append(2 * often[-1])
+        choices = [(self.finest_within(left, count), count) for count in often]
+        least = ACCURACY.least_growth if grid is None else ACCURACY.last_growth
+        choices = [choice for choice in choices if choice[0] >= least * cells]
+        if not choices and grid is None:
+            raise self.too_short(0.0)
+        if not choices:
+            return None
+
+        def errs(choice: tuple[int, int]) -> float:
+            on_grid = 0.0 if grid is None else on_finer(grid, choice[0] / cells).largest
+            return on_grid + steps.times(substeps / choice[1]).largest
+
+        finest, count = min(choices, key=errs)
+        if finest > ACCURACY.largest_growth * cells:
+            between = self.finest_within(ACCURACY.scouting_share * left, count)
+            growth = np.clip(between / cells, ACCURACY.least_growth, ACCURACY.largest_growth)
+            finest = _even(growth * cells)
+        return finest, count
+
+    def finest_within(self, seconds: float, substeps: int) -> int:
+        """The most cells across, an even number, that so many seconds allow; 0 where there are none."""
+        low, high = 1, ACCURACY.finest_cells // 2
+        while low < high:
+            middle = (low + high + 1) // 2
+            if middle > 1 and self.price(2 * middle, substeps) > seconds:
+                high = middle - 1
+            else:
+                low = middle
+        return 2 * low if low > 1 else 0
+
+    def cheapest(self) -> float:
+        """Seconds since the request at which there would be a first log with its error, at the soonest."""
+        return self.runs.spent + sum(self.runs.price(self.plan, fidelity) for fidelity in self.least())
+
+    def refuse_the_too_short(self) -> None:
+        """Raise ``OutOfReach`` where the budget holds no log whose error is known."""
+        if self.limited and not self.every and self.cheapest() > self.runs.budget:
+            raise self.too_short(0.0)
+
+    def too_short(self, seconds: float) -> OutOfReach:
+        """The refusal of a budget, which a run of so many seconds would have overdrawn."""
+        known = self.cheapest()
+        least = max(known, ACCURACY.runs_at_least * seconds)
+        return OutOfReach("seconds", self.runs.budget, least, least)
+
+    def refuse_the_unreachable(
+        self, fidelity: Fidelity, grid: Difference, steps: Difference, order: Difference
+    ) -> None:
+        """Raise ``OutOfReach`` where neither the finest grid nor the most load steps would meet the target."""
+        if self.limited or self.target == 0.0 or grid.plus(steps).largest <= self.target:
             return
+        left = steps.times((fidelity.substeps / ACCURACY.most_substeps) ** ACCURACY.step_order)
+        reached = on_finer(grid, max(ACCURACY.finest_cells / fidelity.cells, 1.0), order).plus(left).largest
+        if reached > self.target:
+            raise OutOfReach("accuracy", self.target, reached, self.price(ACCURACY.finest_cells, fidelity.substeps))
 
 
-@dataclass(frozen=True, slots=True)
-class _Forecast:
-    """Tells ``progress`` the part of the seconds since ``began`` and of those that are left, within a ``budget``."""
-
-    began: float
-    budget: float
-    progress: Progress
-
-    def of_next(self, last: Refined, target: float) -> Progress:
-        """Whom the run after the ``last`` one tells how far it is."""
-        spent, takes = time.perf_counter() - self.began, _next_seconds(last, target)
-        total = min(spent + max(takes, _seconds_left(last, target)), self.budget)
-        return lambda part: self.progress(min((spent + part * takes) / total, 1.0))
+def _grid_error(made: list[tuple[int, GraspLog]]) -> tuple[Difference, Difference]:
+    """What the last of some grids leaves, by their cells and logs, and the orders in the cell size that it goes by."""
+    cells, finest = made[-1]
+    coarser = [entry for entry in made[:-1] if cells >= ACCURACY.least_growth * entry[0]]
+    change, growth = difference(coarser[-1][1], finest), cells / coarser[-1][0]
+    if len(coarser) < 2:
+        return grid_error(change, growth), USUAL
+    (first, coarsest), (second, coarse) = coarser[-2:]
+    order = orders(difference(coarsest, coarse), change, (first, second, cells))
+    return grid_error(change, growth, order), order
 
 
-def _refinements(plan: Plan, target: float, forecast: _Forecast) -> Iterator[Refined]:
-    """Ever finer logs, each with an error estimated from its difference from the one before."""
-    reach = PROBE.room * contact_reach(plan)
-    tolerance = min(ACCURACY.loosest, ACCURACY.solver_share * target) if target > 0.0 else ACCURACY.timed_tolerance
-    fidelity, step_error, coarse = _steps(plan, Fidelity(ACCURACY.coarsest_cells, 1, tolerance), target)
-    cells, error = _across(plan, reach, ACCURACY.coarsest_cells), np.inf
-    tell: Progress = no_progress
-    while error == np.inf or cells < ACCURACY.finest_cells:
-        fidelity = replace(fidelity, cells=_next_cells(cells, error, target))
-        began = time.perf_counter()
-        fine = run(plan, fidelity, tell)
-        spent, finer = time.perf_counter() - began, _across(plan, reach, fidelity.cells)
-        estimate = _extrapolated(difference(coarse, fine), finer / cells, step_error)
-        found = Refined(fine, fidelity, estimate, spent)
-        yield found
-        coarse, cells, error, tell = fine, finer, estimate.largest, forecast.of_next(found, target)
-
-
-def _steps(plan: Plan, fidelity: Fidelity, target: float) -> tuple[Fidelity, Difference, GraspLog]:
-    """Fidelity with enough load steps a frame, the error that they leave, and its log, all on the coarsest grid.
-
-    The error of steps falls in proportion to them: halving them shows it.
-    """
-    log = run(plan, fidelity)
-    while True:
-        halved = replace(fidelity, substeps=2 * fidelity.substeps)
-        finer = run(plan, halved)
-        left = difference(log, finer)
-        if 2.0 * left.largest <= ACCURACY.step_share * target or target == 0.0:
-            return fidelity, left.times(2.0), log
-        if left.largest <= ACCURACY.step_share * target or halved.substeps >= ACCURACY.most_substeps:
-            return halved, left, finer
-        fidelity, log = halved, finer
-
-
-def _extrapolated(change: Difference, ratio: float, step_error: Difference) -> Difference:
-    """Error of the finer of two grids whose cells are ``ratio`` apart, at first order, with that of the steps."""
-    grid = change.times(ACCURACY.safety / (ratio - 1.0))
-    return Difference(
-        grid.stick_ratio + step_error.stick_ratio,
-        grid.displacement + step_error.displacement,
-        grid.force + step_error.force,
-    )
-
-
-def _next_cells(cells: int, error: float, target: float) -> int:
-    """Cells across at which an error that falls with their size should meet the target; never too far at once."""
+def _enough_cells(cells: int, grid: Difference | None, allowed: float) -> int:
+    """Cells across at which the grid's error should meet what is allowed; never too far at once."""
     least, most = ACCURACY.first_growth, ACCURACY.largest_growth
-    growth = least if not np.isfinite(error) else ACCURACY.overshoot * error / target if target > 0.0 else most
-    return int(np.ceil(cells * min(max(growth, least), most)))
+    growth = least
+    if grid is not None:
+        falls = ACCURACY.overshoot * grid.largest / max(allowed, ACCURACY.step_share * grid.largest)
+        growth = float(np.clip(falls, ACCURACY.least_growth, most))
+    return min(_even(cells * growth), ACCURACY.finest_cells)
 
 
-def _next_seconds(last: Refined, target: float) -> float:
-    """Seconds that the next grid would take."""
-    growth = _next_cells(last.fidelity.cells, last.error.largest, target) / last.fidelity.cells
-    return last.seconds * float(growth**ACCURACY.cost_order)
+def _even(cells: float) -> int:
+    """The even number above: the centre then lies alike in all grids."""
+    return 2 * int(np.ceil(0.5 * cells - ACCURACY.rounding))
 
 
-def _seconds_left(last: Refined, target: float) -> float:
-    """Seconds that all further grids would take, by the last and finest of them."""
-    finest = ACCURACY.finest_cells / last.fidelity.cells
-    growth = min(ACCURACY.overshoot * last.error.largest / target, finest) if target > 0.0 else finest
-    return last.seconds * float(growth**ACCURACY.cost_order)
-
-
-def _across(plan: Plan, reach: float, cells: int) -> int:
-    """Cells that a fidelity really has across the contact, after rounding to the sensor's pitch."""
-    return int(2.0 * reach / sensor_grid(plan.sampling, reach, cells).grid.pitch[0])
-
-
-def _sampled(plan: Plan) -> Plan:
+def _sampled(plan: Plan, reach: float) -> Plan:
     """The plan with points that do not change with the grid; without a sensor they cover the contact."""
     if plan.sampling is not None:
         return plan
-    pitch = 2.0 * PROBE.room * contact_reach(plan) / ACCURACY.points
+    pitch = 2.0 * PROBE.room * reach / ACCURACY.points
     rate = ACCURACY.frames / plan.duration
     return replace(plan, sampling=SamplingPlan((ACCURACY.points, ACCURACY.points), pitch, rate))

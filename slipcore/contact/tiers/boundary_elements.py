@@ -94,7 +94,7 @@ def _frames(
     progress: Progress,
 ) -> tuple[list[FrameRecord], list[tuple[str, ...]]]:
     """Records of all frames, and of each load step what the grid does not resolve."""
-    state, growth = solver.start(), 1.0 / (fidelity.cells * fidelity.substeps)
+    state, growth = solver.start(), step_growth(fidelity)
     frames, warnings = [untouched(where)], list[tuple[str, ...]]()
     for begin, end in pairwise(times):
         instants = load_steps(plan, begin, end, fidelity.substeps, growth)
@@ -106,6 +106,11 @@ def _frames(
         frames.append(frame_record(where, results))
         progress(len(frames) / len(times))
     return frames, warnings
+
+
+def step_growth(fidelity: Fidelity) -> float:
+    """By how much a contact that moves sideways becomes wider in a step at most, as a share of its largest width."""
+    return 1.0 / (fidelity.cells * fidelity.substeps)
 
 
 def contact_reach(plan: Plan) -> float:

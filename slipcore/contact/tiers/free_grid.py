@@ -81,20 +81,23 @@ class FreeSensorGrid:
 
 
 def free_grid(sampling: SamplingPlan, reach: float, cells_across: int) -> FreeSensorGrid:
-    """Points, and a grid with that many cells across a contact that reaches ``reach`` m from the centre.
-
-    It covers the contact and the sensor. Cells are even or odd in number along both sides as ``cells_across`` is, so
-    that the centre lies alike in them.
-    """
-    size = 2.0 * reach / cells_across
-    sides = []
-    for count in sampling.points:
-        cells = max(cells_across, int(np.ceil(count * sampling.pitch / size)))
-        sides.append(cells + (cells - cells_across) % 2)
-    grid = Grid((sides[1], sides[0]), (size, size))
+    """Points, and a grid with that many cells across a contact that reaches ``reach`` m from the centre."""
+    size, (nx, ny) = 2.0 * reach / cells_across, sides(sampling, reach, cells_across)
+    grid = Grid((ny, nx), (size, size))
     x, y = (_centred(count, sampling.pitch) for count in sampling.points)
     along_x, along_y = Along.of(grid.x, x, sampling.pitch), Along.of(grid.y, y, sampling.pitch)
     return FreeSensorGrid(grid, sampling.points, sampling.pitch, along_x, along_y)
+
+
+def sides(sampling: SamplingPlan, reach: float, cells_across: int) -> tuple[int, int]:
+    """Cells of such a grid along x and y: they cover the contact and the sensor.
+
+    They are even or odd in number as ``cells_across`` is, so that the centre lies alike in them.
+    """
+    size = 2.0 * reach / cells_across
+    needed = (max(cells_across, int(np.ceil(count * sampling.pitch / size))) for count in sampling.points)
+    nx, ny = (cells + (cells - cells_across) % 2 for cells in needed)
+    return nx, ny
 
 
 def _centred(count: int, pitch: float) -> FloatArray:
