@@ -95,7 +95,7 @@ $(CACHE)/tac3d.tried: | setup
 	@echo "$(TAC3D)" | $(BIN)/pip download --quiet --disable-pip-version-check --no-deps --only-binary=:all: \
 	    --python-version 3.11 --dest $(CACHE)/tac3d --require-hashes --requirement /dev/stdin \
 	    && $(BIN)/python -m zipfile -e $(CACHE)/tac3d/pytac3d-*.whl $(CACHE)/tac3d && touch $@ \
-	    || echo "   not to be had: real recordings are left out, and what needs them says so"
+	    || echo "   cannot be downloaded: real recordings are left out, and what needs them says so"
 
 constraints:  ## pin with hashes what pyproject.toml names and constraints.txt lacks; other pins stay
 	printf -- '-e ./clients\n-e .[test]\nsetuptools\nuv\n' | $(UV) compile --quiet $(RESOLUTION) - --output-file constraints.txt

@@ -96,14 +96,14 @@ def onset_error(true: BoolArray, found: BoolArray) -> float:
 
 def reliability(cases_and_histories: Iterable[tuple[Case, SlipHistory]]) -> list[tuple[float, float, int]]:
     """Mean reported probability, share that truly slips, and count, of tenths of the reported probability."""
-    said, truth = [], []
+    predicted, truth = [], []
     for case, history in cases_and_histories:
         known = case.log.truth
         assert known is not None
         judged = known.contact[1:] & history.contact[1:] & history.contact[:-1]
-        said.append(history.probability[1:][judged])
+        predicted.append(history.probability[1:][judged])
         truth.append(known.slip_contact_factor[1:][judged])
-    probability, slips = np.concatenate(said), np.concatenate(truth)
+    probability, slips = np.concatenate(predicted), np.concatenate(truth)
     tenth = np.minimum((10.0 * probability).astype(int), 9)
     return [
         (float(probability[tenth == k].mean()), float(slips[tenth == k].mean()), int((tenth == k).sum()))

@@ -178,9 +178,9 @@ def measure(array: Array, which: str, runs: dict[str, tuple[str, str]] = RUNS) -
     found = []
     for name, each in scores.items():
         worst = min(each, key=each.__getitem__)
-        sticks, said = counts[name]
+        sticks, slipping = counts[name]
         found.append(
-            Found(array.name, name, float(np.mean(list(each.values()))), each[worst], worst, said / sticks, each)
+            Found(array.name, name, float(np.mean(list(each.values()))), each[worst], worst, slipping / sticks, each)
         )
     return found
 

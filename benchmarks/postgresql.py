@@ -130,8 +130,8 @@ def running_postgresql(*options: str, in_memory: bool = False) -> Iterator[Postg
         initdb = [bin_folder / "initdb", "--no-sync", "--auth=trust", "-U", "postgres", "-E", "UTF8", "--no-locale"]
         with (folder / "log").open("wb") as log:
             subprocess.run([*initdb, "-D", data], check=True, stdout=log, stderr=log, **as_user)
-        said = [part for option in (*OPTIONS, *options) for part in ("-c", option)]
-        server = PostgreSQL(folder, [bin_folder / "postgres", "-D", data, "-k", folder, *said], as_user)
+        arguments = [part for option in (*OPTIONS, *options) for part in ("-c", option)]
+        server = PostgreSQL(folder, [bin_folder / "postgres", "-D", data, "-k", folder, *arguments], as_user)
         try:
             yield server
         finally:

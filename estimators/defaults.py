@@ -108,7 +108,7 @@ class PopulationSettings(Options):
 
     fewest: Annotated[int, Option(2, 1000, "grasps", "three differences: fewer leave τ to its prior")] = 4
     """Of a material that counts."""
-    stranger: Annotated[float, Option(0.0, 1.0, "-", "one in ten: an odd one decides nothing")] = 0.1
+    outlier_share: Annotated[float, Option(0.0, 1.0, "-", "one in ten: an odd one decides nothing")] = 0.1
     """Probability that a material is none of the population but any."""
     quantiles: Annotated[int, Option(4, 10_000, "quantiles", "ratios of priors to a few per cent")] = 32
     """Of what a material tells of τ, that are averaged over."""
@@ -133,7 +133,7 @@ class ChainSettings(Options):
     batch: Annotated[int, Option(1, 1000, "steps", "shares a call's overhead")] = 10
     """Whose proposals are drawn and looked at together."""
     chain_lengths: Annotated[float, Option(5.0, 1000.0, "τ", "emcee's rule")] = 50.0
-    """Steps in units of the integrated autocorrelation time, from which that time is believed."""
+    """Steps in units of the integrated autocorrelation time, from which that time is trusted."""
     window: Annotated[float, Option(1.0, 100.0, "τ", "Sokal (1989); emcee's")] = 5.0
     """Lags that the time is summed over; steps of the chain that are dropped as burn-in."""
     longest_series: Annotated[int, Option(1000, 10_000_000, "draws", "τ to a few per cent")] = 2**15

@@ -42,10 +42,10 @@ def population_scatter(models: Iterable[FrictionModel]) -> ScatterPrior:
     log = -weak.degrees_of_freedom * (np.log(SIZES) + 0.5 * (weak.scale / SIZES) ** 2)
     before = special.softmax(log)
     for scale in sorted(known, key=_key):
-        member, stranger = _ratios(scale, before)
-        log = log + np.log((1.0 - POPULATION.stranger) * member + POPULATION.stranger * stranger)
+        member, outlier = _ratios(scale, before)
+        log = log + np.log((1.0 - POPULATION.outlier_share) * member + POPULATION.outlier_share * outlier)
     after = special.softmax(log)
-    weight = after + POPULATION.stranger * (before - after)
+    weight = after + POPULATION.outlier_share * (before - after)
     return ScatterPrior(*matched_student(weight, np.zeros(len(SIZES)), SIZES), materials=len(known))
 
 
@@ -73,6 +73,6 @@ def _ratios(scale: Scale, before: FloatArray) -> tuple[FloatArray, float]:
     tau = scale.value * np.sqrt(freedom / special.chdtri(freedom, part))
     tau = np.clip(tau, POPULATION.least, POPULATION.most)
     member = np.sqrt(2.0 / np.pi) * np.exp(-0.5 * (tau / SIZES[:, None]) ** 2) / SIZES[:, None]
-    stranger = 1.0 / (tau * np.log(POPULATION.most / POPULATION.least))
+    outlier = 1.0 / (tau * np.log(POPULATION.most / POPULATION.least))
     default = before @ member
-    return np.asarray((member / default).mean(axis=1)), float((stranger / default).mean())
+    return np.asarray((member / default).mean(axis=1)), float((outlier / default).mean())

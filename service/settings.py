@@ -82,7 +82,7 @@ class Settings(BaseSettings):
     )
     trusted_proxies: str = Field(
         default="",
-        description="Addresses or networks of proxies whose X-Forwarded-For and -Proto are believed; empty: none.",
+        description="Addresses or networks of proxies whose X-Forwarded-For and -Proto are trusted; empty: none.",
     )
     rate_limit: Annotated[float, Field(ge=0.0, le=1e6)] = Field(
         default=1000.0, description="Requests a second of one key, or of one address without a key; 0: any number."

@@ -14,7 +14,7 @@ from slipcore.slip_state import SlipHistory
 
 
 class Collected(NamedTuple):
-    """What a grasp tells of friction: the ``samples`` that are believed, those of all ``elements``, what the
+    """What a grasp tells of friction: the ``samples`` that are trusted, those of all ``elements``, what the
     ``contact`` as a whole tells (None without forces or contact), and why elements are left out (None: they are not).
     """
 
@@ -32,7 +32,7 @@ def collect_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
 def collect_friction(log: GraspLog, history: SlipHistory, **options: float) -> Collected:
     """Observe friction at the elements of ``log`` that slip by ``history``, and of contacts that slide or pivot.
 
-    Where these contradict each other the contact is believed: smoothed forces and tilted normals hardly change its
+    Where these contradict each other the contact is trusted: smoothed forces and tilted normals hardly change its
     sums. Elements of a contact that rolls tell nothing, for what slips by its motion does not.
     ``options``: see ``defaults.SampleOptions``. Raises ``NoForces`` for a log without forces, ``UnknownScale`` for one
     whose lengths are not in metres, ``InvalidInput`` for a history of another log and for bad options.

@@ -212,5 +212,7 @@ def _control(settings: ControlSettings) -> dict[str, Any]:
 
 
 def _refused(error: ConnectionClosed) -> ConnectionFailed:
-    said = error.rcvd
-    return ConnectionFailed(f"the service ended the stream: {said.reason} ({said.code})" if said else str(error))
+    received = error.rcvd
+    return ConnectionFailed(
+        f"the service ended the stream: {received.reason} ({received.code})" if received else str(error)
+    )

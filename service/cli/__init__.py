@@ -107,8 +107,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         _leave(message(error), code)
 
 
-def _leave(said: str, code: int) -> NoReturn:
-    typer.echo(f"stiction: {said}", err=True)
+def _leave(message: str, code: int) -> NoReturn:
+    typer.echo(f"stiction: {message}", err=True)
     sys.exit(code)
 
 

@@ -14,8 +14,8 @@ def message(error: Exception) -> str:
 
     from service.settings import complaints
 
-    said = complaints(error) if isinstance(error, ValidationError) else str(error)
-    return "\n".join([said, *getattr(error, "__notes__", ())])
+    message = complaints(error) if isinstance(error, ValidationError) else str(error)
+    return "\n".join([message, *getattr(error, "__notes__", ())])
 
 
 def exit_code(error: Exception) -> int | None:

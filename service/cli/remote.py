@@ -89,8 +89,8 @@ def upload(
     with connected(url, key) as client:
         if create and material is not None:
             client.ensure_material(material)
-        said = {"material": material, "scale": scale, "frame_rate": frame_rate}
-        results = list(counted((_upload(client, each, wait, **said) for each in sources), len(sources), "logs"))
+        given = {"material": material, "scale": scale, "frame_rate": frame_rate}
+        results = list(counted((_upload(client, each, wait, **given) for each in sources), len(sources), "logs"))
     if json:
         print_json({"uploads": results})
     else:
@@ -216,14 +216,14 @@ def plan(
         print_lines(f"Grip for {load:g} N on {material}", _grip_lines(answer, model))
 
 
-def _upload(client: "FrictionClient", source: Source, wait: bool, **said: Any) -> dict[str, Any]:
+def _upload(client: "FrictionClient", source: Source, wait: bool, **given: Any) -> dict[str, Any]:
     """Upload one log; that it is not read or that the service does not take it is a result like any other."""
     from slipcore import InvalidInput
     from stiction_client import ProblemError, problems
 
     try:
         log, mapping = source.log()
-        receipt = client.upload(log, mapping=mapping, **said)
+        receipt = client.upload(log, mapping=mapping, **given)
     except problems.UnknownMaterial:  # so it will be for the others
         raise
     except (InvalidInput, ProblemError) as refusal:
@@ -244,11 +244,11 @@ def _middle_force(model: "FrictionModel") -> float:
 
 def _friction_lines(answer: "FrictionAnswer") -> list[tuple[str, str | None]]:
     whose = f"of a contact of {answer.elements} elements" if answer.of == "contact" else "of one element"
-    said = number(answer.friction_coefficient)
+    friction = number(answer.friction_coefficient)
     if answer.quantile is not None:
-        said += f", the {answer.quantile:g} quantile {whose}; the mean is {number(answer.mean)}"
+        friction += f", the {answer.quantile:g} quantile {whose}; the mean is {number(answer.mean)}"
     return [
-        ("μ", said),
+        ("μ", friction),
         ("at", f"{number(answer.tangential_velocity)} m/s and {number(answer.normal_force)} N an element"),
         ("model", f"{answer.method}, version {answer.version}"),
         ("because", answer.chosen_because),

@@ -48,9 +48,9 @@ def stream(
         grasp = formats.read(path, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
     if grasp.displacement is None:
         raise InvalidInput("displacement", "missing", "a log with displacements: a live stream needs them")
-    said: dict[str, Any] = {"sensor": grasp.sensor, "material": material, "keep": store}
+    options: dict[str, Any] = {"sensor": grasp.sensor, "material": material, "keep": store}
     with SlipStream(
-        url, grasp.position, grasp.element_area, key=key, detector=method or DEFAULT_METHOD, **said
+        url, grasp.position, grasp.element_area, key=key, detector=method or DEFAULT_METHOD, **options
     ) as live:
         page = f"{url.rstrip('/')}/live/{live.session}"
         typer.echo(f"to be watched at {page}", err=True)

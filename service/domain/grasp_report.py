@@ -37,21 +37,21 @@ def inspect_grasp(log: GraspLog, name: str, method: str | None = None) -> Inspec
     found, none_because = collect(log, history, None)
     findings = check_log(log, history, found.elements)
     detection = summarise_history(history, seconds, "", findings, found.contact, is_scaled=log.is_scaled)
-    said = grasp_facts(log.sensor, len(log), float(log.time[-1] - log.time[0]), log.grid)
+    facts = grasp_facts(log.sensor, len(log), float(log.time[-1] - log.time[0]), log.grid)
     model, refusal = _fitted(found.samples, [finding.name for finding in findings], none_because)
-    return InspectedGrasp(name, said, detection, detected(log, history), found.samples, model, refusal)
+    return InspectedGrasp(name, facts, detection, detected(log, history), found.samples, model, refusal)
 
 
 def report_of_stored(log: StoredGraspLog, history: Path, samples: Path, upload: Path | None) -> Report:
     """The report of a stored log with these results; ``upload`` is the log itself, None where it was deleted."""
     assert log.detection is not None
     assert log.samples is not None
-    said = Fact("Material", log.material or "none"), *grasp_facts(log.sensor, log.frames, log.duration, log.grid)
+    facts = Fact("Material", log.material or "none"), *grasp_facts(log.sensor, log.frames, log.duration, log.grid)
     slip = _stored_slip(decode_history(history), upload, log.detection.method)
     name = f"Grasp log of {log.created_at:%Y-%m-%d %H:%M:%S} UTC"
     found, names = decode_samples(samples), [finding.name for finding in log.detection.findings or ()]
     model, refusal = _fitted(found, names, log.samples.none_because)
-    return grasp_report(InspectedGrasp(name, said, log.detection, slip, found, model, refusal))
+    return grasp_report(InspectedGrasp(name, facts, log.detection, slip, found, model, refusal))
 
 
 def _fitted(

@@ -54,7 +54,7 @@ class _Reading(NamedTuple):
 
 
 class ModelCache:
-    """Models by a material's name and a method, each believed for ``seconds`` after it was read.
+    """Models by a material's name and a method, each used for ``seconds`` after it was read.
 
     What another process stores in that time is missed, unless this one gets to know of it (``seen``, ``has_ended``).
     """
@@ -100,7 +100,7 @@ class ModelCache:
             reading.task.exception()  # whoever waited was told; who renews need not be
 
     def fresh(self, material: str, method: str) -> KnownModel | None:
-        """The model in memory, if it may still be believed."""
+        """The model in memory, if it is still recent enough."""
         known = self._known.get((material, method))
         if known is None or known.until < time.monotonic():
             return None

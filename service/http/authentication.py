@@ -32,7 +32,7 @@ from service.processes.fair_queue import UnboundedFairQueue
 from service.settings import Settings
 
 KEPT_SECONDS = 2.0
-"""s that a key read from the database is believed: so long a revoked one may still work."""
+"""s that a key read from the database is trusted: so long a revoked one may still work."""
 
 MOST_KEPT = 10_000
 """Keys; more than a fleet has."""
@@ -134,7 +134,7 @@ class Authenticator:
         return admitted
 
     async def still_admits(self, connection: HTTPConnection) -> bool:
-        """Whether who was let in still may be here; while the database is away, that is believed."""
+        """Whether who was let in still may be here; while the database is away, that is assumed."""
         try:
             await self._identify(connection)
         except Problem as problem:

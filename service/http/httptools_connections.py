@@ -78,8 +78,8 @@ class HttpToolsConnection(BoundedConnection, HttpToolsProtocol):
         """The request line and headers as they were sent, without the offer."""
         line = b" ".join([self.parser.get_method(), self.url, b"HTTP/" + self.parser.get_http_version().encode()])
         kept = [name + b": " + value for name, value in self.headers if name not in OFFER | {b"connection"}]
-        said = b",".join(value for name, value in self.headers if name == b"connection").split(b",")
-        options = [option for option in said if option.strip().lower() not in OFFER]
+        connection_values = b",".join(value for name, value in self.headers if name == b"connection").split(b",")
+        options = [option for option in connection_values if option.strip().lower() not in OFFER]
         return b"\r\n".join([line, *kept, b"connection: " + b",".join(options), b"", b""])
 
     def _is_receiving(self) -> bool:

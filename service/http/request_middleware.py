@@ -81,8 +81,8 @@ class _Sender:
     async def __call__(self, message: Message) -> None:
         if message["type"] == "http.response.start":
             self.has_begun = True
-            said = with_common_headers(message["headers"], self._scope)
-            message = {**message, "headers": [id_header(self._request_id), *said]}
+            headers_sent = with_common_headers(message["headers"], self._scope)
+            message = {**message, "headers": [id_header(self._request_id), *headers_sent]}
         await self._send(message)
 
 
@@ -111,8 +111,8 @@ class _Receiver:
 
 def with_common_headers(headers: Headers, scope: Scope) -> Headers:
     """The headers of an answer, and those that every one has, unless it says something else itself."""
-    said = dict(headers)
-    return [*headers, *(header for header in _usual(scope, said) if header[0] not in said)]
+    headers_sent = dict(headers)
+    return [*headers, *(header for header in _usual(scope, headers_sent) if header[0] not in headers_sent)]
 
 
 def id_header(request_id: str) -> tuple[bytes, bytes]:
@@ -120,11 +120,11 @@ def id_header(request_id: str) -> tuple[bytes, bytes]:
     return b"x-request-id", request_id.encode()
 
 
-def _usual(scope: Scope, said: Mapping[bytes, bytes]) -> Headers:
+def _usual(scope: Scope, headers_sent: Mapping[bytes, bytes]) -> Headers:
     usual = [*OF_ALL]
     if scope["scheme"] == "https":
         usual.append(OF_TLS)
-    if said.get(b"content-type", b"").startswith(b"text/html"):
+    if headers_sent.get(b"content-type", b"").startswith(b"text/html"):
         usual += (b"referrer-policy", b"no-referrer"), (b"content-security-policy", NOTHING.encode())
     return usual
 

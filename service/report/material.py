@@ -53,10 +53,10 @@ def _model_sections(material: Material, model: FrictionModel) -> list[Section]:
 
 def _about(material: Material, logs: Sequence[GraspLogReceipt]) -> list[Section]:
     """What somebody wrote about it, and its logs with what was found against them."""
-    said = [Section("Description", material.description)] if material.description else []
+    description = [Section("Description", material.description)] if material.description else []
     columns = ("uploaded", "sensor", "frames", "duration", "state", "samples", "least stick ratio", "findings")
     table = Table(f"The newest {len(logs)} of {material.grasp_logs} logs", columns, [_row(log) for log in logs])
-    return [*said, Section("Grasps", wording.STICK_RATIO, [table], folded=True)]
+    return [*description, Section("Grasps", wording.STICK_RATIO, [table], folded=True)]
 
 
 def _row(log: GraspLogReceipt) -> list[str]:

@@ -30,12 +30,12 @@ class Measures:
     brier: float = NAN
 
 
-def measure(truth: Truth, said: Prediction, observed: BoolArray | None) -> Measures:
+def measure(truth: Truth, prediction: Prediction, observed: BoolArray | None) -> Measures:
     """All scores of a prediction; elements that were not ``observed`` [t, n, m] count in the force alone."""
     judged = truth.contact if observed is None else truth.contact & observed
-    true, found = truth.slip & judged, said.slip & judged
+    true, found = truth.slip & judged, prediction.slip & judged
     delays, missed = onsets(truth.time, true, found, judged)
-    macro = whole(found, judged) if said.macro_slip is None else said.macro_slip & judged.any(axis=(1, 2))
+    macro = whole(found, judged) if prediction.macro_slip is None else prediction.macro_slip & judged.any(axis=(1, 2))
     return Measures(
         f1=f1(true, found),
         false_slip=_share(found & ~true, judged & ~true),
@@ -43,9 +43,9 @@ def measure(truth: Truth, said: Prediction, observed: BoolArray | None) -> Measu
         missed_onsets=missed,
         stick_ratio_error=stick_ratio_error(judged, true, found),
         macro_f1=f1(whole(true, judged), macro),
-        friction_error=NAN if said.friction is None else abs(said.friction / float(truth.friction) - 1.0),
-        force_error=NAN if said.force is None else force_error(truth, said.force),
-        brier=NAN if said.probability is None else _mean((said.probability - truth.slip)[judged] ** 2),
+        friction_error=NAN if prediction.friction is None else abs(prediction.friction / float(truth.friction) - 1.0),
+        force_error=NAN if prediction.force is None else force_error(truth, prediction.force),
+        brier=NAN if prediction.probability is None else _mean((prediction.probability - truth.slip)[judged] ** 2),
     )
 
 
@@ -76,29 +76,29 @@ def onsets(time: FloatArray, true: BoolArray, found: BoolArray, contact: BoolArr
     """
     begins = true[1:] & ~true[:-1] & contact[:-1]
     element, frame = np.nonzero(begins.reshape(len(begins), -1).T)
-    truly, said = (mask.reshape(len(mask), -1).T for mask in (true, found))
-    delays = [_found(truly[i], said[i], int(k) + 1, time) for i, k in zip(element, frame, strict=True)]
+    truly, prediction = (mask.reshape(len(mask), -1).T for mask in (true, found))
+    delays = [_found(truly[i], prediction[i], int(k) + 1, time) for i, k in zip(element, frame, strict=True)]
     known = np.array([delay for delay in delays if delay is not None], float)
     return known, 1.0 - len(known) / len(delays) if delays else NAN
 
 
-def _found(true: BoolArray, said: BoolArray, begin: int, time: FloatArray) -> float | None:
+def _found(true: BoolArray, prediction: BoolArray, begin: int, time: FloatArray) -> float | None:
     """Delay of one onset, at frame ``begin`` of an element's masks [t]; None where it was missed."""
     rest = np.flatnonzero(~true[begin:])
     end = begin + int(rest[0]) if len(rest) else len(true)
-    hits = np.flatnonzero(said[begin:end])
+    hits = np.flatnonzero(prediction[begin:end])
     if not len(hits):
         return None
     first = begin + int(hits[0])
     if first == begin:
-        silent = np.flatnonzero(~said[:begin])
+        silent = np.flatnonzero(~prediction[:begin])
         first = int(silent[-1]) + 1 if len(silent) else 0
     return float(time[first] - time[begin])
 
 
-def force_error(truth: Truth, said: FloatArray) -> float:
+def force_error(truth: Truth, prediction: FloatArray) -> float:
     """L2 over time of the difference of forces, relative to the true ones."""
-    return float(np.linalg.norm(said - truth.force) / np.linalg.norm(truth.force))
+    return float(np.linalg.norm(prediction - truth.force) / np.linalg.norm(truth.force))
 
 
 def _share(part: BoolArray, of: BoolArray) -> float:

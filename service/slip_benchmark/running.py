@@ -29,7 +29,7 @@ from slipcore.slip_state import SlipHistory
 
 NEEDS_FORCES = ("force_ratio", "forces_only")
 """Detectors that see nothing where the sensor tells no forces: there is nothing to score."""
-MOST_SAID = 300
+MOST_OUTPUT = 300
 """Letters of what a failed program said that are kept."""
 
 
@@ -79,14 +79,14 @@ class Program:
             words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True
         ) as running:
             try:
-                _, said = running.communicate(timeout=self.limit)
+                _, output = running.communicate(timeout=self.limit)
             except subprocess.TimeoutExpired as error:
                 os.killpg(running.pid, signal.SIGKILL)
                 raise InvalidInput(
                     self.name, f"not done after {self.limit:g} s", "faster, or a longer --limit"
                 ) from error
         if running.returncode != 0:
-            told = said.decode(errors="replace").strip()[-MOST_SAID:] or "nothing"
+            told = output.decode(errors="replace").strip()[-MOST_OUTPUT:] or "nothing"
             raise InvalidInput(self.name, f"ended by code {running.returncode}; it said: {told}", "code 0")
 
 

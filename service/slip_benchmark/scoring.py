@@ -141,11 +141,11 @@ def _scene_scores(folder: Path, scene: SceneEntry, refused: dict[str, dict[str, 
             yield SceneScore(method, scene, None, missing=why.get(scene.name, "no file"))
             continue
         try:
-            said = read_prediction(path, truth.slip.shape)
+            prediction = read_prediction(path, truth.slip.shape)
         except InvalidInput as error:
             yield SceneScore(method, scene, None, wrong=f"prediction of {method} for scene {scene.name}: {error}")
         else:
-            yield SceneScore(method, scene, measure(truth, said, observed))
+            yield SceneScore(method, scene, measure(truth, prediction, observed))
 
 
 def _summary(scores: Iterator[SceneScore]) -> Summary:

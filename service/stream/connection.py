@@ -229,7 +229,7 @@ class _Connection:
         return await self._streams.detect(session, given, is_shown)
 
     async def _finish(self, session: Session, message: Finish) -> dict[str, Any]:
-        """Store the kept frames through the same door as an upload; until the answer is there it may be said again."""
+        """Store the kept frames as an upload is stored; until the answer is there it may be said again."""
         if not message.store:
             return {"type": "finished", "grasp_log": None}
         opening = session.opening

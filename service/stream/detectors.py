@@ -172,21 +172,21 @@ def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[st
         raise FitInProgress
     frame = _frame(session, given)
     size = 0 if session.kept is None else _kept_bytes(session, frame)
-    felt, told = _felt(session, frame, given)
-    state, command = _detected(session, felt)
+    with_forces, force_report = _with_forces(session, frame, given)
+    state, command = _detected(session, with_forces)
     session.begun = frame.time if session.begun is None else session.begun
     _keep(session, frame, given, size)
-    _plan_look(session, felt, state)
+    _plan_look(session, with_forces, state)
     answer = _answer(session, given.number, state)
-    if told is not None:
-        answer["force"] = told
+    if force_report is not None:
+        answer["force"] = force_report
     if command is not None:
         answer["command"] = command
     session.last = (given.number, answer)
     if not is_shown:
         return answer, None
     pressed = answer.get("command", {}).get("normal_force") if given.command is None else given.command
-    return answer, pack_frame(given.number, state, felt.force, pressed, session.expected)
+    return answer, pack_frame(given.number, state, with_forces.force, pressed, session.expected)
 
 
 def _keep(session: Session, frame: Frame, given: PackedFrame, size: int) -> None:
@@ -212,7 +212,7 @@ def _detected(session: Session, frame: Frame) -> tuple[SlipState, dict[str, Any]
         raise
 
 
-def _felt(session: Session, frame: Frame, given: PackedFrame) -> tuple[Frame, dict[str, Any] | None]:
+def _with_forces(session: Session, frame: Frame, given: PackedFrame) -> tuple[Frame, dict[str, Any] | None]:
     """The frame with reconstructed forces where it has none and its sensor's gel is known, and what is told of them."""
     if session.forces is None:
         return frame, None
@@ -220,10 +220,10 @@ def _felt(session: Session, frame: Frame, given: PackedFrame) -> tuple[Frame, di
         session.forces.begin(
             frame, session.position, session.element_area, lambda size: _check_room(size, session.limit)
         )
-    felt, told = session.forces.step(frame, given.gripper_force, given.gripper_force_deviation)
-    if session.grip is not None and felt.force is None:
+    with_forces, force_report = session.forces.step(frame, given.gripper_force, given.gripper_force_deviation)
+    if session.grip is not None and with_forces.force is None:
         raise InvalidInput("force", None, f"the elements' forces, for none are reconstructed: {session.forces.refused}")
-    return felt, told
+    return with_forces, force_report
 
 
 def _frame(session: Session, given: PackedFrame) -> Frame:
@@ -264,8 +264,8 @@ def _with_reports(session: Session, log: GraspLog) -> GraspLog:
     """
     if all(force is None for force in session.reported):
         return log
-    told = np.array([0.0 if force is None else force for force in session.reported])
-    return replace(log, gripper_force=told, gripper_force_deviation=session.report_deviation)
+    reported = np.array([0.0 if force is None else force for force in session.reported])
+    return replace(log, gripper_force=reported, gripper_force_deviation=session.report_deviation)
 
 
 def drop(name: str) -> None:

@@ -53,7 +53,5 @@ def friction_against_contact(seen: Subject) -> Iterator[Finding]:
         return
     evidence = contradiction(seen.samples, contact, seen.history.patches)
     if evidence is not None:
-        remedy = (
-            "the contact is believed, and no element: record a grasp that slides or pivots, or calibrate the sensor"
-        )
+        remedy = "the contact is trusted, and no element: record a grasp that slides or pivots, or calibrate the sensor"
         yield Finding("contact contradicts elements", evidence, remedy)

@@ -45,7 +45,7 @@ class ResponseDefaults(Options):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PriorDefaults(Options):
-    """What is believed of traction before any marker is seen (``prior.py``)."""
+    """What is assumed of traction before any marker is seen (``prior.py``)."""
 
     pressure_length: Annotated[float, Option(0.1, 100.0, "pitches", "trials")] = 6.0
     """Correlation length of pressure, from which the choice begins."""

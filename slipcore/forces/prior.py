@@ -1,4 +1,4 @@
-"""What is believed of traction before any marker is seen: a Gaussian field, alike everywhere on its support."""
+"""What is assumed of traction before any marker is seen: a Gaussian field, alike everywhere on its support."""
 
 from typing import NamedTuple
 

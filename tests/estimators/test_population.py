@@ -57,7 +57,7 @@ def test_a_model_of_three_grasps_or_without_scales_does_not_count(model: Frictio
 
 def test_of_known_scatter_the_prior_is_the_closed_form(model: FrictionModel, monkeypatch: pytest.MonkeyPatch) -> None:
     """A² stays scaled inverse-χ², on the default's degrees of freedom and one for each material."""
-    monkeypatch.setattr(population, "POPULATION", replace(POPULATION, stranger=1e-9))
+    monkeypatch.setattr(population, "POPULATION", replace(POPULATION, outlier_share=1e-9))
     tau = np.array([0.02, 0.05, 0.03, 0.08, 0.04])
     prior = population_scatter(others(model, tau.tolist(), 1e4))
     freedom = WEAK.degrees_of_freedom + len(tau)

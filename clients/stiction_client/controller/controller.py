@@ -30,7 +30,7 @@ class ControllerState:
     time: float = -math.inf
     since: float = -math.inf
     load: Load = field(default_factory=Load)
-    felt: StickRatioEstimate = field(default_factory=StickRatioEstimate)
+    sticking: StickRatioEstimate = field(default_factory=StickRatioEstimate)
     learned: LearnedFriction = field(default_factory=LearnedFriction)
     contradictions: int = 0
     recognition: Recognition | None = None
@@ -79,9 +79,9 @@ def step(state: ControllerState, observation: Observation) -> tuple[ControllerSt
 def _sense(state: ControllerState, observation: Observation, elapsed: float) -> ControllerState:
     """What the frame tells of load and friction."""
     load = state.load.step(observation, elapsed, state.settings)
-    felt = state.felt.step(observation, load.size, state.settings)
-    sampled = _sampled(observation, felt, state.settings)
-    agrees = not math.isnan(sampled) and _agrees(sampled, observation.normal, felt, load.size, state.settings)
+    sticking = state.sticking.step(observation, load.size, state.settings)
+    sampled = _sampled(observation, sticking, state.settings)
+    agrees = not math.isnan(sampled) and _agrees(sampled, observation.normal, sticking, load.size, state.settings)
     friction = sampled if agrees else math.nan
     learned, recognition, samples = state.learned, state.recognition, observation.slip_samples
     counts = samples is not None and not math.isnan(sampled) and _counts(state, samples, agrees)
@@ -91,29 +91,31 @@ def _sense(state: ControllerState, observation: Observation, elapsed: float) -> 
         told = friction if counts else math.nan
         count = 0 if samples is None else samples.normal_force.size
         recognition = recognition.step(observation.time, _loaded(load, state.settings), told, count, state.settings)
-    against = _contradicts(state, felt, observation.normal, load.size, friction)
+    against = _contradicts(state, sticking, observation.normal, load.size, friction)
     contradictions = state.contradictions if against is None else state.contradictions + 1 if against else 0
-    seen = replace(state, time=observation.time, load=load, felt=felt, learned=learned, recognition=recognition)
+    seen = replace(state, time=observation.time, load=load, sticking=sticking, learned=learned, recognition=recognition)
     return replace(seen, contradictions=contradictions)
 
 
-def _sampled(observation: Observation, felt: StickRatioEstimate, settings: ControlSettings) -> float:
+def _sampled(observation: Observation, sticking: StickRatioEstimate, settings: ControlSettings) -> float:
     """The contact's friction by the elements that slip; NaN without any."""
     if (
         observation.slip_samples is None
-        or not felt.stick_ratio < settings.told_stick_ratio
+        or not sticking.stick_ratio < settings.told_stick_ratio
         or observation.normal == 0.0
     ):
         return math.nan
     return observation.slip_samples.contact_friction()
 
 
-def _agrees(friction: float, normal: float, felt: StickRatioEstimate, size: float, settings: ControlSettings) -> bool:
+def _agrees(
+    friction: float, normal: float, sticking: StickRatioEstimate, size: float, settings: ControlSettings
+) -> bool:
     """Whether the stick ratio says no otherwise of the contact's ``friction``.
 
     What sticks bears less than its friction: taken for slip, it would make the contact slip more than it does.
     """
-    return friction >= settings.agreement_share * size / (normal * utilisation(felt.stick_ratio))
+    return friction >= settings.agreement_share * size / (normal * utilisation(sticking.stick_ratio))
 
 
 def _counts(state: ControllerState, samples: SlipSamples, agrees: bool) -> bool:
@@ -126,7 +128,7 @@ def _counts(state: ControllerState, samples: SlipSamples, agrees: bool) -> bool:
 
 
 def _contradicts(
-    state: ControllerState, felt: StickRatioEstimate, normal: float, size: float, friction: float
+    state: ControllerState, sticking: StickRatioEstimate, normal: float, size: float, friction: float
 ) -> bool | None:
     """Whether a frame speaks against the friction that is known; None where it tells nothing of it.
 
@@ -138,9 +140,9 @@ def _contradicts(
     share = state.settings.contradiction_share
     if not math.isnan(friction) and not low * (1.0 - share) <= friction <= high * (1.0 + share):
         return True
-    if felt.slips(state.settings) and 0.0 < size < low * normal:
+    if sticking.slips(state.settings) and 0.0 < size < low * normal:
         return True
-    return None if math.isnan(friction) and math.isnan(felt.stick_ratio) else False
+    return None if math.isnan(friction) and math.isnan(sticking.stick_ratio) else False
 
 
 def _decide(state: ControllerState, observation: Observation) -> ControllerState:
@@ -150,7 +152,7 @@ def _decide(state: ControllerState, observation: Observation) -> ControllerState
         return _enter(_forgotten(state), "alarm")
     if state.known is not None:
         return _enter(_sharpened(state, state.known, observation.normal), "hold")
-    if (state.felt.slips(settings) and state.load.size > 0.0) or _blind(state):
+    if (state.sticking.slips(settings) and state.load.size > 0.0) or _blind(state):
         return _enter(replace(state, since=state.time, recognition=None), "alarm")
     if state.mode == "alarm" and state.time - state.since < settings.settle_time:
         return state
@@ -191,7 +193,7 @@ def _sharpened(state: ControllerState, known: KnownFriction, normal: float) -> C
     """With what this grasp's samples add; slip, where they told of more friction than a model, disproves them."""
     if not known.of_others:
         return replace(state, known=state.learned.known(state.settings) or known)
-    if state.felt.slips(state.settings) and state.load.size > 0.0 and known.sharpened > 1.0:
+    if state.sticking.slips(state.settings) and state.load.size > 0.0 and known.sharpened > 1.0:
         return replace(state, known=replace(known, sharpened=1.0), learned=LearnedFriction())
     return replace(state, known=known.sharpen(state.learned, normal, state.settings))
 
@@ -205,7 +207,7 @@ def _blind(state: ControllerState) -> bool:
     return (
         state.known is None
         and _loaded(state.load, state.settings)
-        and state.time - state.felt.told > state.settings.dropout_time
+        and state.time - state.sticking.told > state.settings.dropout_time
     )
 
 
@@ -218,7 +220,7 @@ def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
     """All that asks for a force; the largest is followed."""
     settings = state.settings
     demands = [_Demand(settings.least_force, "least force")]
-    slips = state.felt.slips(settings) and state.load.size > 0.0
+    slips = state.sticking.slips(settings) and state.load.size > 0.0
     growth = 1.0 if slips else state.load.growth(settings)  # in slip, what is measured grows with the grip
     if slips:
         demands.append(_Demand(observation.normal * (1.0 + settings.reflex_gain), "slip"))
@@ -229,11 +231,11 @@ def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
     among = state.recognition
     waits = among is not None and among.waits(state.time, settings) and state.mode == "feel"
     target = settings.learn_stick_ratio if state.mode == "learn" else settings.feel_stick_ratio
-    demands.append(_Demand(state.felt.required(load, target), "stick ratio"))
+    demands.append(_Demand(state.sticking.required(load, target), "stick ratio"))
     lowest = state.learned.lowest(settings)
     if state.mode == "learn" and lowest > 0.0:
-        believed = max(lowest, settings.unknown_friction)  # what sticks, taken for slip, would ask for ever more
-        demands.append(_Demand(load / believed, "samples of slip"))
+        friction = max(lowest, settings.unknown_friction)  # what sticks, taken for slip, would ask for ever more
+        demands.append(_Demand(load / friction, "samples of slip"))
     if among is not None and waits:
         slippery = max(among.least_friction(observation.normal), settings.unknown_friction)
         asked = load / slippery

@@ -93,11 +93,11 @@ def _file(form: FormData) -> UploadFile:
 def _asked(wanted: NewUpload, file: UploadFile, principal: Principal) -> UploadRequest:
     """The upload; raises ``RequestValidationError`` for a new material with a name that none may have."""
     settings = {"scale": wanted.scale, "frame_rate": wanted.frame_rate, "mapping": wanted.mapping}
-    said = (wanted.material, wanted.sensor, wanted.detector, wanted.format)
+    declared = (wanted.material, wanted.sensor, wanted.detector, wanted.format)
     creates = wanted.create and wanted.material is not None
     if creates:
         checked(NewMaterial, {"name": wanted.material or ""})
-    return UploadRequest(*said, file.size, settings=settings, principal=principal, creates_material=creates)
+    return UploadRequest(*declared, file.size, settings=settings, principal=principal, creates_material=creates)
 
 
 async def _chunks(file: UploadFile) -> AsyncIterator[bytes]:
