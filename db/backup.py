@@ -104,16 +104,16 @@ def restore(
 
     Every blob must have the bytes that it is named for. A blob store of another database is only filled where it is
     ``taken_over_by`` somebody, as the audit trail then tells; that database is refused there from then on. Raises
-    ``NotEmpty`` for a database that has any rows and for a backup whose blobs are the store's, ``StoreMismatch``,
-    ``SchemaMismatch``, ``NotFound`` for a blob that is missing: all before anything is changed. ``BlobDamaged``, for a
-    blob whose bytes have changed, and ``NotEmpty`` for a database that somebody else fills meanwhile, leave tables
-    without these rows and the blobs before it, and the same restore can be begun again.
+    ``NotEmpty`` for a database that has any rows and for a store that has the backup's blobs or is inside the backup,
+    ``StoreMismatch``, ``SchemaMismatch``, ``NotFound`` for a blob that is missing: all before anything is changed.
+    ``BlobDamaged``, for a blob whose bytes have changed, and ``NotEmpty`` for a database that somebody else fills
+    meanwhile, leave tables without these rows and the blobs before it, and the same restore can be begun again.
     """
     file = folder / FILE
     if not file.is_file():
         raise FileNotFoundError(f"backup {file} is not there")
-    if blobs.has_within(folder):  # the only copy would be worked in from now on
-        raise NotEmpty(str(blobs), "a data folder other than the backup's")
+    if blobs.has_within(folder) or blobs.is_within(folder):  # the only copy would be worked in from now on
+        raise NotEmpty(str(blobs), "a data folder other than the backup's and outside of it")
     source = BlobStore(folder)
     with TemporaryDirectory() as own, closing(_opened(_copied(file, Path(own)))) as copy:
         migrate.check(copy)

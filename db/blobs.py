@@ -136,6 +136,10 @@ class BlobStore:
         among = any(not parts.isdisjoint(_way_to(place)) for place in (folder, theirs))
         return among or any(_identity(theirs) in _way_to(part) for part in own)
 
+    def is_within(self, folder: Path) -> bool:
+        """Whether any of the store's own files are in a folder, by whichever way."""
+        return any(_identity(folder) in _way_to(part) for part in (self._blobs, self._spool, self._set_aside))
+
     def spool(self) -> Spool:
         """A new file to write to; use it in a ``with`` statement."""
         with disk_errors_named():

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from service.cli.database import Url, command_actor, opened
+from service.cli.database import Url, command_actor, opened, opened_blobs
 from service.cli.durations import moment_to_come
 from service.cli.output import print_json, print_table
 
@@ -90,10 +90,20 @@ def revoke(
 
 
 def _prepare(database: "Database") -> None:
-    from db import migrate
+    """Let the database be of this version; raises ``StoreMismatch`` where this machine's files are another one's.
+
+    A restored copy has the same keys: one that is revoked there only would still be good where it counts. A machine
+    without files makes keys for any database.
+    """
+    from db import identity, migrate
     from service.settings import Settings
 
-    if Settings().migrate_at_start:
+    settings = Settings()
+    if settings.blob_url is not None or settings.data_folder.exists():
+        blobs = opened_blobs()
+        if blobs.read_store_id() is not None:
+            identity.verify_before_upgrade(database, blobs)
+    if settings.migrate_at_start:
         migrate.upgrade(database)
     else:
         migrate.check(database)

@@ -1,5 +1,6 @@
 import hashlib
 import sqlite3
+import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
@@ -118,6 +119,24 @@ def test_a_backup_among_the_blobs_themselves_is_refused(
     assert not [*(tmp_path / "data").rglob(FILE)]
 
 
+@pytest.mark.parametrize("part", ["", "blobs"])
+def test_a_backup_into_another_mount_of_the_data_folder_is_refused(
+    filled: Database, blobs: BlobStore, tmp_path: Path, part: str
+) -> None:
+    mounted = tmp_path / "mounted" / part
+    mounted.mkdir(parents=True)
+    try:
+        subprocess.run(["mount", "--bind", tmp_path / "data" / part, mounted], check=True, capture_output=True)
+    except (OSError, subprocess.CalledProcessError) as error:
+        pytest.skip(f"no mount without the right to it: {error}")
+    try:
+        with pytest.raises(NotEmpty, match="a folder outside of it"):
+            backup(filled, blobs, tmp_path / "mounted", nothing)
+    finally:
+        subprocess.run(["umount", mounted], check=True)
+    assert not [*(tmp_path / "mounted").rglob(FILE), *(tmp_path / "data").rglob(FILE)]
+
+
 def test_a_backup_whose_blobs_are_the_services_own_is_refused_either_way(
     filled: Database, blobs: BlobStore, other: Database, tmp_path: Path
 ) -> None:
@@ -128,8 +147,9 @@ def test_a_backup_whose_blobs_are_the_services_own_is_refused_either_way(
     backup(filled, blobs, tmp_path / "copy", nothing)
     with pytest.raises(NotEmpty, match="allowed: a data folder other than the backup's"):
         restore(tmp_path / "copy", other, BlobStore(tmp_path / "copy"), nothing)
-    with pytest.raises(NotEmpty, match="allowed: a data folder other than the backup's"):
-        restore(tmp_path / "copy", other, BlobStore(tmp_path / "copy" / "blobs" / "data"), nothing)
+    for part in ("blobs/data", "data", "data/of/robot"):
+        with pytest.raises(NotEmpty, match="allowed: a data folder other than the backup's and outside of it"):
+            restore(tmp_path / "copy", other, BlobStore(tmp_path / "copy" / part), nothing)
     restore(tmp_path / "copy", other, BlobStore(tmp_path / "again"), nothing)
 
 

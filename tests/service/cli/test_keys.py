@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import URL
 
+from db.blobs import BlobStore
 from db.database import Database
 from db.repositories import access_keys
 from service import cli
@@ -44,6 +45,19 @@ def test_a_key_is_shown_once_listed_and_revoked(run, tmp_path: Path) -> None:  #
     with database.read() as session:
         assert not is_key(text.strip(), access_keys.get(session, shown["id"]))
     database.close()
+
+
+def test_keys_of_another_database_than_that_of_the_files_are_left_alone(  # type: ignore[no-untyped-def]
+    run, tmp_path: Path
+) -> None:
+    run("create", "robot", "--database-url", copy := f"sqlite:///{tmp_path}/copy.sqlite3")
+    (shown,) = json.loads(run("list", "--json", "--database-url", copy)[1])["keys"]
+    BlobStore(tmp_path).write_store_id("0" * 32)
+    for command in (("create", "x"), ("list",), ("revoke", shown["id"])):
+        code, told = run(*command, "--database-url", copy)
+        assert (code, "0" * 32 in told, "Traceback" in told) == (INPUT_REFUSED, True, False)
+    assert run("create", "x")[0] == INPUT_REFUSED  # in a database that would be new
+    assert not (tmp_path / "stiction.sqlite3").exists()
 
 
 def test_a_program_gets_the_key_as_json_and_read_is_the_least(run) -> None:  # type: ignore[no-untyped-def]

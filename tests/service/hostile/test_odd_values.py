@@ -193,6 +193,25 @@ def test_objects_in_lists_have_few_fields_too(local: Any, fields: int, padding: 
     assert (answer.status_code, told in answer.json()["detail"]) == (httpx.codes.BAD_REQUEST, True)
 
 
+@pytest.mark.parametrize("padding", [0, 5000])
+@pytest.mark.parametrize(
+    "twice", ['{"description": "a", "d\\u0065scription": "b"}', '[{"a:b": [{"\\u00fc": "\\\\", "\\u00fc": "\\":"}]}]']
+)
+@ONLY_SQLITE
+def test_a_field_that_stands_twice_is_refused_by_name(local: Any, padding: int, twice: str) -> None:
+    headers = {"content-type": "application/json"}
+    answer = local.request("POST", "/v1/materials", content=twice + " " * padding, headers=headers)
+    name = "description" if "description" in twice else "\\xfc"
+    told = f"POST /v1/materials: an object of the body has the field '{name}' more than once"
+    assert (answer.status_code, answer.json()["detail"]) == (httpx.codes.BAD_REQUEST, told)
+
+
+@ONLY_SQLITE
+def test_a_long_body_with_colons_and_quotes_in_its_text_has_each_field_once(local: Any) -> None:
+    body = {"name": "felt", "description": '": \\ "' * 700}
+    assert local.request("POST", "/v1/materials", json=body).status_code == httpx.codes.CREATED
+
+
 @ONLY_SQLITE
 def test_of_many_wrong_values_the_first_are_told(local: Any) -> None:
     body = {"presses": [{"x": 0}] * 30}
