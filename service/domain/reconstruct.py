@@ -19,6 +19,13 @@ def needs_forces(log: "GraspLog") -> bool:
     return log.force is None and log.is_scaled
 
 
+def bytes_needed(log: "GraspLog") -> int:
+    """What a reconstruction of its forces takes of memory at least; raises ``InvalidInput`` for an absurd lattice."""
+    from slipcore.forces import look  # few logs need it
+
+    return look.bytes_needed(log.position, log.element_area)
+
+
 def with_forces(log: "GraspLog", gel: Mapping[str, float | None]) -> "tuple[GraspLog, Reconstruction]":
     """The log with forces that follow from its displacement by this gel (``slipcore.forces.Gel.from_json``)."""
     from slipcore.forces import Gel, reconstruct  # few logs need it

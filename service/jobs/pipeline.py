@@ -29,7 +29,7 @@ from service.domain.collect_friction import collect
 from service.domain.doubtful_logs import with_doubts
 from service.domain.other_materials import prior_from_others
 from service.domain.queueing import INGEST_METHODS, queue_cheap_refits
-from service.domain.reconstruct import needs_forces, reconstruction_findings, with_forces
+from service.domain.reconstruct import bytes_needed, needs_forces, reconstruction_findings, with_forces
 from service.domain.stored_results import (
     decode_samples,
     encode_history,
@@ -40,6 +40,7 @@ from service.domain.stored_results import (
 )
 from service.domain.surface_change import MARK, with_change
 from service.observability import logs, traces
+from service.processes import limits
 from slipcore import FrictionSamples, GraspLog, SlipcoreError
 
 if TYPE_CHECKING:
@@ -208,6 +209,7 @@ def _with_forces(run: Run, log: GraspLog, sensor: str) -> "tuple[GraspLog, Recon
     if gel is None:
         return log, None
     with run.stage("forces"):
+        limits.require(bytes_needed(log))
         return with_forces(log, asdict(gel))
 
 

@@ -38,8 +38,24 @@ def memory(budget: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_DATA, before)
 
 
+def require(amount: int) -> None:
+    """Raise the ``MemoryError`` of ``memory`` now where so many bytes cannot be had: before any of them are written."""
+    if sys.platform != "linux":
+        return
+    import resource
+
+    limit, _ = resource.getrlimit(resource.RLIMIT_DATA)
+    if 0 <= limit < _private_bytes() + amount:
+        raise MemoryError(f"{amount} bytes are more than this process may have")
+
+
 @cache
 def _own_bytes() -> int:
-    """Bytes of private memory, as RLIMIT_DATA counts them, at the first call."""
+    """Bytes of private memory at the first call."""
+    return _private_bytes()
+
+
+def _private_bytes() -> int:
+    """Bytes of private memory, as RLIMIT_DATA counts them."""
     lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
     return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmData:"))

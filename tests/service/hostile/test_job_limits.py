@@ -16,8 +16,9 @@ import pytest
 import slipcore
 from db.blobs import BlobStore
 from db.database import Database
-from db.records import Claim, NewGraspLog
-from db.repositories import grasp_logs, jobs, runners
+from db.records import Claim, Gel, NewGraspLog
+from db.repositories import grasp_logs, jobs, runners, sensors
+from db.tables import GraspLogRow
 from service.jobs import pipeline, process_executor, worker
 from service.jobs.executor import LimitReached
 from service.processes import limits
@@ -79,6 +80,25 @@ def test_a_job_that_wants_too_much_memory_is_refused_and_its_process_goes_on(
     reason = "stage frames wants more than 268435456 bytes of memory (STICTION_JOB_MEMORY_BYTES)"
     assert (job.status, job.reason) == ("refused", reason)
     assert np.ones(2**28 // 8 * 2).all()  # the limit is the job's
+
+
+@ONLY_SQLITE
+def test_a_lattice_whose_reconstruction_has_no_room_is_refused_before_any_of_it_is_written(
+    database: Database, claim: Claim, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A log of 280 kB took 1.9 GB and half a minute until an allocation failed, also after its cancel."""
+    monkeypatch.setattr(pipeline, "with_forces", lambda *_: pytest.fail("it has begun"))
+    place = 1e-3 * np.stack(np.meshgrid(np.arange(113.0), np.arange(113.0), [0.0], indexing="ij"), axis=-1)[:, :, 0]
+    wide = container.encode(GraspLog(np.arange(3.0), place, np.zeros((3, *place.shape)), 1e-6))
+    with database.write() as session:
+        row = session.get_one(GraspLogRow, jobs.get(session, claim.job_id).grasp_log_id)
+        row.sha256 = BlobStore(tmp_path).put(wide)
+        sensors.describe(session, "s", Gel(1e6, 0.49, None, 0.0))
+    worker.run_job(worker.StoreConfig(database.url, tmp_path, job_memory_bytes=4 * 2**30), claim)
+    with database.read() as session:
+        job = jobs.get(session, claim.job_id)
+    reason = "stage forces wants more than 4294967296 bytes of memory (STICTION_JOB_MEMORY_BYTES)"
+    assert (job.status, job.reason) == ("refused", reason)
 
 
 @ONLY_SQLITE
