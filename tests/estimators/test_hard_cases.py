@@ -64,6 +64,8 @@ def hard(samples: Make, case: str) -> FrictionSamples | list[FrictionSamples]:
         "grasps of one sample": lambda: [samples(1, seed=k) for k in range(8)],
         "the same grasp five times": lambda: [samples(20)] * 5,
         "strided and read-only": lambda: strided(samples(100)),
+        "two places": lambda: samples(60, elements=2),
+        "one grasp of a hundred times the samples": lambda: [samples(n, seed=n) for n in (20, 21, 22, 2000)],
     }
     return made[case]()
 
@@ -91,6 +93,8 @@ CASES = [
     "grasps of one sample",
     "the same grasp five times",
     "strided and read-only",
+    "two places",
+    "one grasp of a hundred times the samples",
 ]
 
 
@@ -210,6 +214,21 @@ def test_many_moments_merge_to_the_fit_of_all_their_samples(samples: Make) -> No
 @pytest.mark.long
 def test_a_million_moments_merge_to_the_fit_of_all_their_samples(samples: Make) -> None:
     _merge_many(samples, 1_000_000)
+
+
+@pytest.mark.long
+def test_a_hundred_thousand_grasps_tell_the_law_and_their_scatter(samples: Make) -> None:
+    """Moments of 2,000 grasps of two places, fifty times each: scales as of 2,000, errors 50 times less in square."""
+    rng = np.random.default_rng(0)
+    parts = [samples(6, seed=k, elements=2, offset=0.02 * rng.standard_normal()) for k in range(2000)]
+    moments = [Moments.from_samples(part) for part in parts]
+    few, many = (estimators.fit(times * moments, method="hierarchical") for times in (1, 50))
+    assert few.scales is not None
+    assert many.scales is not None
+    np.testing.assert_allclose(many.coefficients, few.coefficients, rtol=0.0, atol=0.1 * few.standard_errors.max())
+    np.testing.assert_allclose(few.standard_errors / many.standard_errors, np.sqrt(50.0), rtol=0.1)  # priors tell less
+    assert many.scales.between_grasps.value == pytest.approx(few.scales.between_grasps.value, rel=0.1)
+    assert few.scales.between_grasps.value == pytest.approx(0.02 / 0.35, rel=0.15)  # a part of friction
 
 
 def _merge_many(samples: Make, count: int) -> None:
