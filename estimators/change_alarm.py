@@ -107,7 +107,7 @@ def grasp_level(model: FrictionModel, grasp: GraspStatistics) -> tuple[float, fl
         places, within = model.scales.between_places.value, model.scales.within.value
     largest = float(np.abs(grasp.mean[:, 2]).max())
     least = (ALARM.least_scatter * max(largest, ALARM.least_scatter)) ** 2
-    weight = grasp.count / (places**2 + within**2 / grasp.weight + least)
+    weight = grasp.independent / (places**2 + within**2 / grasp.weight + least)
     expected = model.coefficients[0] + grasp.mean[:, :2] @ model.coefficients[1:]
     information = float(weight @ expected**2)
     if not information > 0.0:

@@ -321,7 +321,7 @@ class RobustSettings(Options):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterSettings(Options):
     """Errors that samples share (``linear/``: ``cluster_errors``, ``shared_errors``, ``observations``,
-    ``grasp_statistics``, ``within_places``).
+    ``grasp_statistics``, ``within_places``, ``place_correlation``).
     """
 
     few: Annotated[int, Option(1, 100, "clusters", "9 for the three coefficients")] = 3
@@ -336,6 +336,12 @@ class ClusterSettings(Options):
     """That the record of a single element, or of a grasp, is cut into."""
     by_chance: Annotated[float, Option(0.0, 10.0, "standard errors", "usual of what is told from chance")] = 2.0
     """Of a variance of so many blocks: larger by less than that shows no errors that go together."""
+    least_neighbours: Annotated[int, Option(2, 1000, "pairs", "a correlation to 0.25")] = 16
+    """Of places of a grasp beside each other, from which they tell whether neighbours are off alike."""
+    most_alike: Annotated[float, Option(0.0, 0.999, "-", "alike over 7 elements: wider than a contact tells")] = 0.99
+    """Correlation of neighbours that is taken at most."""
+    least_places: Annotated[float, Option(1.0, 100.0, "places", "a level and two slopes, and one to spare")] = 4.0
+    """That those of a grasp count as in any case."""
     most_places: Annotated[int, Option(2, 1_000_000, "places", "32 bytes each: less than 16 kB a grasp")] = 480
     """That are kept one by one."""
     most_groups: Annotated[int, Option(2, 1_000_000, "groups", "88 bytes each")] = 170

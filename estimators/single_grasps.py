@@ -75,8 +75,8 @@ def _square(grasp: GraspStatistics, unit: float, places: float, within: float) -
     The mean of a place of weight W has the variance ω² + σ²/W, a deviation from it σ²/w.
     """
     inverse = 1.0 / (places**2 + within**2 / (unit * grasp.weight))
-    means = np.sqrt(inverse * grasp.count)[:, None] * np.column_stack([np.ones(len(grasp.mean)), grasp.mean])
-    spread = (np.sqrt(inverse)[:, None, None] * grasp.spread).reshape(-1, 3)
+    means = np.sqrt(inverse * grasp.independent)[:, None] * np.column_stack([np.ones(len(grasp.mean)), grasp.mean])
+    spread = (np.sqrt(inverse * grasp.share)[:, None, None] * grasp.spread).reshape(-1, 3)
     deviations = np.concatenate([spread, np.sqrt(unit) / within * grasp.within])
     rows = np.concatenate([means, np.pad(deviations, ((0, 0), (1, 0)))])
     return np.asarray(rows.T @ rows)

@@ -52,7 +52,7 @@ LAYOUT = {
         "NOISE_OF_PLACE",
     },
     "slipcore/detection/strain_rate/step.py": {"ROWS"},
-    "estimators/linear/grasp_statistics.py": {"POOLED", "UNKNOWN"},
+    "estimators/linear/grasp_statistics.py": {"POOLED", "UNKNOWN", "ALIKE"},
     "slipcore/contact/solver/tangent_space.py": {"OUTSIDE", "STICK", "SLIP"},
     "slipcore/detection/shared/contact.py": {"CURVATURE_NOISE"},
     "slipcore/patch/regions.py": {"NOWHERE"},

@@ -162,7 +162,13 @@ def _statistics_of_samples(observations: Observations) -> tuple[GraspStatistics,
     ends = np.flatnonzero(np.diff(observations.grasp[order])) + 1
     return tuple(
         GraspStatistics.from_columns(
-            Columns(values[rows], observations.weight[rows], codes_of(place[rows]), observations.time[rows]),
+            Columns(
+                values[rows],
+                observations.weight[rows],
+                codes_of(place[rows]),
+                observations.time[rows],
+                observations.element[rows],
+            ),
             observations.noise[observations.grasp[rows[0]]],
             bool(observations.velocity_is_relative[rows[0]]),
         )

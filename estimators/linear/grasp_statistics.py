@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from estimators.defaults import CLUSTERS, ROUNDING
 from estimators.errors import InvalidSamples
 from estimators.linear.least_squares import upper_triangle
+from estimators.linear.place_correlation import independent_share
 from estimators.linear.within_places import within_places
 
 FloatArray = NDArray[np.float64]
@@ -17,21 +18,23 @@ IntArray = NDArray[np.int64]
 
 
 HEADER = struct.Struct("<2I8d")
-POOLED, UNKNOWN = 1, 2
-"""Flags in its second number: places in groups, velocity unknown."""
+SHARE = struct.Struct("<d")
+POOLED, UNKNOWN, ALIKE = 1, 2, 4
+"""Flags in its second number: places in groups, velocity unknown, and a share of places behind it."""
 UPPER = np.triu_indices(3)
 NO_NOISE = np.zeros(2)
 
 
 class Columns(NamedTuple):
-    """Samples of one grasp: ``values`` [k, 3] of (v, f_n, μ), ``weight`` [k] > 0, ``place`` [k], codes from 0, and
-    ``time`` [k] s.
+    """Samples of one grasp: ``values`` [k, 3] of (v, f_n, μ), ``weight`` [k] > 0, ``place`` [k], codes from 0 in the
+    order of the ``element`` [k], row-major, and ``time`` [k] s. Without ``element`` no place has a known neighbour.
     """
 
     values: FloatArray
     weight: FloatArray
     place: IntArray
     time: FloatArray
+    element: IntArray | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +46,8 @@ class GraspStatistics:
     group is one place. ``within`` [3, 3]: triangular factor of all samples about the means of their places,
     freed of noise and of errors that go together.
     ``total_weight`` Σw and ``weight_square`` Σw² give the effective number of samples. ``velocity_unknown``: v is
-    that relative to what seems to stick, and counts as 0.
+    that relative to what seems to stick, and counts as 0. ``share``: the part of the places that they count as, where
+    neighbours are off alike (``place_correlation``).
 
     Exact up to ``most_places`` places; beyond, places whose weights differ by a few per cent count as alike.
     """
@@ -56,6 +60,12 @@ class GraspStatistics:
     total_weight: float
     weight_square: float
     velocity_unknown: bool = False
+    share: float = 1.0
+
+    @property
+    def independent(self) -> FloatArray:
+        """As how many independent places each group [g] counts."""
+        return self.count * self.share
 
     @classmethod
     def from_columns(
@@ -66,13 +76,18 @@ class GraspStatistics:
         The places' means average that noise away; the deviations from them are freed of it (``within_places``), or it
         would pass for slopes.
         """
-        values, weight, place, time = columns
+        values, weight, place, time, element = columns
         centre = weight @ values / weight.sum()
         offset = values - centre
         sums = np.bincount(place, weight).astype(float)
         mean = np.stack([np.bincount(place, weight * column) for column in offset.T], axis=1) / sums[:, None]
         left = weight.sum() * max(1.0 - len(sums) / len(weight), 0.0)
         within = within_places(values, offset - mean[place], weight, time, noise * np.sqrt(left))
+        share = 1.0
+        if element is not None and left > 0.0:
+            label = np.zeros(len(sums), dtype=np.int64)
+            label[place] = element
+            share = independent_share(mean, within[2, 2] ** 2 / left / sums, label)
         count, sums, mean, spread = _pooled(sums, mean)
         return cls(
             count=count,
@@ -83,6 +98,7 @@ class GraspStatistics:
             total_weight=float(weight.sum()),
             weight_square=float(weight @ weight),
             velocity_unknown=velocity_unknown,
+            share=share,
         )
 
     def scaled(self, normal_force: float) -> "GraspStatistics":
@@ -93,13 +109,15 @@ class GraspStatistics:
     def to_bytes(self) -> bytes:
         """These statistics in little-endian doubles, less than 16 kB."""
         pooled = bool((self.count > 1.0).any())
-        flags = POOLED * pooled | UNKNOWN * self.velocity_unknown
+        alike = self.share < 1.0
+        flags = POOLED * pooled | UNKNOWN * self.velocity_unknown | ALIKE * alike
         header = HEADER.pack(
             len(self.count), flags, self.total_weight, self.weight_square, *(float(x) for x in self.within[UPPER])
         )
         columns = [self.weight[:, None], self.mean]
         if pooled:
             columns += [self.count[:, None], self.spread[:, UPPER[0], UPPER[1]]]
+        header += SHARE.pack(self.share) if alike else b""
         return header + np.concatenate(columns, axis=1).astype("<f8").tobytes()
 
     @classmethod
@@ -109,18 +127,19 @@ class GraspStatistics:
             raise InvalidSamples("moments of a grasp", f"{len(content)} bytes", f"at least {HEADER.size} bytes")
         groups, flags, total, square, *within = HEADER.unpack_from(content)
         pooled, unknown = bool(flags & POOLED), bool(flags & UNKNOWN)
-        width = 11 if pooled else 4
-        end = HEADER.size + 8 * width * groups
-        if flags > POOLED | UNKNOWN or len(content) < end:
+        width, start = 11 if pooled else 4, HEADER.size + SHARE.size * bool(flags & ALIKE)
+        end = start + 8 * width * groups
+        if flags > POOLED | UNKNOWN | ALIKE or len(content) < end:
             raise InvalidSamples("moments of a grasp", f"{len(content)} bytes", f"{end} bytes for {groups} groups")
-        table = np.frombuffer(content[HEADER.size : end], "<f8").reshape(groups, width).astype(float)
-        _check(table, total, square, within)
+        table = np.frombuffer(content[start:end], "<f8").reshape(groups, width).astype(float)
+        share = SHARE.unpack_from(content, HEADER.size)[0] if flags & ALIKE else 1.0
+        _check(table, total, square, within, share)
         triangle, spread = np.zeros((3, 3)), np.zeros((groups, 3, 3))
         triangle[UPPER] = within
         count = table[:, 4] if pooled else np.ones(groups)
         if pooled:
             spread[:, UPPER[0], UPPER[1]] = table[:, 5:]
-        return cls(count, table[:, 0], table[:, 1:4], spread, triangle, total, square, unknown), content[end:]
+        return cls(count, table[:, 0], table[:, 1:4], spread, triangle, total, square, unknown, share), content[end:]
 
 
 def _pooled(weight: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -145,8 +164,10 @@ def _pooled(weight: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArra
     return count, typical, centre, spread
 
 
-def _check(table: FloatArray, total: float, square: float, within: list[float]) -> None:
+def _check(table: FloatArray, total: float, square: float, within: list[float], share: float) -> None:
     if not (np.isfinite(table).all() and np.isfinite([total, square, *within]).all()):
         raise InvalidSamples("moments of a grasp", "not finite", "finite numbers")
+    if not 0.0 < share <= 1.0:
+        raise InvalidSamples("share of a grasp's places", share, "above 0, at most 1")
     if not (total > 0.0 and square > 0.0 and (table[:, 0] > 0.0).all()):
         raise InvalidSamples("moments of a grasp", "a weight of 0 or less", "weights above 0")

@@ -161,18 +161,19 @@ def hierarchical(
 ) -> Hierarchical:
     """The model of these grasps, b̂ the pooled fit; the prior is of friction at ``centre`` and slopes over ``spans``."""
     total = sum(grasp.total_weight for grasp in grasps)
+    alike = sum(float((grasp.count - grasp.independent).sum()) for grasp in grasps)
     unit = total / sum(grasp.weight_square for grasp in grasps)
     group = np.concatenate([_group_squares(grasp, pooled) for grasp in grasps])
     sizes = [len(grasp.count) for grasp in grasps]
     return Hierarchical(
         group=np.ascontiguousarray(group.T),
-        count=np.concatenate([grasp.count for grasp in grasps]),
+        count=np.concatenate([grasp.independent for grasp in grasps]),
         weight=unit * np.concatenate([grasp.weight for grasp in grasps]),
         start=np.concatenate([[0], np.cumsum(sizes)[:-1]]),
         within=unit * np.stack([_squares(_rows(grasp.within, pooled)).sum(axis=0) for grasp in grasps]),
         prior=_prior_square(pooled, spans, centre),
         direction=_direction(pooled, pooled.mean),
-        effective_n=unit * total,
+        effective_n=unit * total - alike,
         pooled=pooled,
         unknown=np.array([grasp.velocity_unknown for grasp in grasps]),
         offset=offset_variance(float(centre @ pooled.mean), float(pooled.mean[1]), float(pooled.covariance[1, 1])),
@@ -189,9 +190,9 @@ def _group_squares(grasp: GraspStatistics, pooled: NormalInverseGamma) -> FloatA
     """Sums of squares [g, 10] over the places of each group, a weight of 1 each."""
     means = np.column_stack([np.ones(len(grasp.mean)), grasp.mean])
     centre = np.column_stack([means[:, :3] @ pooled.root, means[:, 3] - means[:, :3] @ pooled.mean])
-    square = grasp.count[:, None] * _squares(centre)
+    square = grasp.independent[:, None] * _squares(centre)
     if (grasp.count > 1.0).any():
-        square += np.stack([_squares(_rows(spread, pooled)).sum(axis=0) for spread in grasp.spread])
+        square += grasp.share * np.stack([_squares(_rows(spread, pooled)).sum(axis=0) for spread in grasp.spread])
     return square
 
 

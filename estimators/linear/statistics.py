@@ -68,7 +68,8 @@ class SufficientStatistics:
         unknown = velocity_unknown(samples)
         domain = Domain(NOTHING if unknown else (float(v.min()), float(v.max())), (float(f_n.min()), float(f_n.max())))
         place, time = codes_of(samples.element[used]), np.asarray(samples.time, dtype=float)[used]
-        columns_of_grasp = Columns(np.stack([v, f_n, mu]).T, weight, place, time)
+        element = np.asarray(samples.element, dtype=np.int64)[used]
+        columns_of_grasp = Columns(np.stack([v, f_n, mu]).T, weight, place, time, element)
         grasp = GraspStatistics.from_columns(columns_of_grasp, noise_of(samples), unknown)
         return cls(
             factorise(columns_of_grasp.values, weight),
