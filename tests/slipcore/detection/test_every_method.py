@@ -8,7 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slipcore import METHODS, GraspLog, SlipDetector, SlipHistory, collect_history, detect_slip
+from slipcore import (
+    METHODS,
+    GraspLog,
+    InvalidInput,
+    SlipDetector,
+    SlipHistory,
+    collect_history,
+    describe_options,
+    detect_slip,
+)
 from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.defaults import ContactOptions
 from slipcore.detection.batch import with_patches
@@ -136,6 +145,45 @@ def check_events(log: GraspLog, history: SlipHistory) -> None:
         slip[at["release"]], slip[at["onset"]], slip[at["end"]] = False, True, False
         np.testing.assert_array_equal(contact, history.contact[k].ravel())
         np.testing.assert_array_equal(slip, history.slip[k].ravel())
+
+
+@EACH_METHOD
+def test_the_same_log_gives_the_same_history_to_the_last_bit_and_stays_as_it_was(
+    short_ramp: GraspLog, method: str, same_history: Same
+) -> None:
+    before = pickle.dumps(short_ramp)
+    same_history(detect_slip(short_ramp, method), detect_slip(pickle.loads(before), method))
+    assert pickle.dumps(short_ramp) == before
+
+
+@EACH_METHOD
+def test_what_is_not_finite_is_refused_by_name_and_the_detector_goes_on_as_if_it_had_not_come(method: str) -> None:
+    at_rest, pose = np.zeros((4, 5, 3)), np.zeros(3)
+    for bad in (np.nan, np.inf):
+        detector = SlipDetector(lattice(), 1e-6, method)
+        before = pickle.dumps(detector.state)
+        field = at_rest.copy()
+        field[1, 2, 0] = bad
+        for name, given in {
+            "time": (bad, at_rest, at_rest, pose),
+            "displacement": (0.0, field, at_rest, pose),
+            "force": (0.0, at_rest, field, pose),
+            "object_pose": (0.0, at_rest, at_rest, pose + bad),
+        }.items():
+            with pytest.raises(InvalidInput, match=rf"^{name} is .*(nan|inf)"):
+                detector.step(*given)
+        assert pickle.dumps(detector.state) == before
+
+
+@EACH_METHOD
+def test_a_log_in_other_units_of_force_slips_at_the_same_elements(short_ramp: GraspLog, method: str) -> None:
+    """By a power of two, so that rounding is the same. Options in N and in m are absolute: only those without any."""
+    if any(option.unit in {"N", "1/N"} for option in describe_options(METHODS[method].options).values()):
+        pytest.skip("a method with options in N")
+    assert short_ramp.force is not None
+    stronger = replace(short_ramp, force=4.0 * short_ramp.force, truth=None)
+    expected, found = detect_slip(short_ramp, method), detect_slip(stronger, method)
+    assert np.mean(found.slip != expected.slip) < 1e-3
 
 
 @EACH_METHOD
