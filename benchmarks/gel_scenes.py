@@ -154,7 +154,7 @@ def _at_the_surface(gel: Gel, grid: Grid) -> dict[Below, FloatArray]:
     operator = ElasticOperator((free, *base), grid)
     kernels: dict[Below, FloatArray] = {}
     for name in get_args(Component):
-        kernel = operator.kernel(name)
+        kernel = operator.influence(name)
         kernels[name] = np.zeros(grid.shape) if kernel is None else kernel
     return kernels | {"xz": -kernels["zx"], "yz": -kernels["zy"]}
 

@@ -58,7 +58,7 @@ def cell_responses(gel: Gel, grid: Grid) -> dict[Below, FloatArray]:
     operator = ElasticOperator(tuple(bodies), grid)
     surface: dict[Below, FloatArray] = {}
     for component in ("nn", "xx", "xy", "yy", "zx", "zy"):
-        kernel = operator.kernel(component)
+        kernel = operator.influence(component)
         surface[component] = np.zeros(grid.shape) if kernel is None else kernel
     return surface | {"xz": -surface["zx"], "yz": -surface["zy"]}
 

@@ -119,7 +119,7 @@ class ElasticOperator:
             self._coarse = ElasticOperator(self.bodies, grid, self.count)
         return self._coarse
 
-    def kernel(self, component: Component) -> FloatArray | None:
+    def influence(self, component: Component) -> FloatArray | None:
         """Influence of one cell, summed over the bodies; first quadrant [ny, nx], None where it is zero."""
         if component not in self._kernels:
             self._kernels[component] = self._influence(component, self.grid)
@@ -131,7 +131,7 @@ class ElasticOperator:
 
     def _influence(self, component: Component, grid: Grid) -> FloatArray | None:
         if self.source is not None:
-            whole = self.source.kernel(component)
+            whole = self.source.influence(component)
             return None if whole is None else whole[: grid.shape[0], : grid.shape[1]]
         parts = [body.influence(component, grid) for body in self.bodies]
         present = [part for part in parts if part is not None]
@@ -139,7 +139,7 @@ class ElasticOperator:
 
     def _symbol(self, component: Component) -> FloatArray | None:
         if component not in self._symbols:
-            quadrant = self.kernel(component)
+            quadrant = self.influence(component)
             odd_y, odd_x = component in {"xy", "zy"}, component in {"xy", "zx"}
             self._symbols[component] = None if quadrant is None else self.transform.symbol(quadrant, odd_y, odd_x)
         return self._symbols[component]

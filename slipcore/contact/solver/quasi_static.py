@@ -302,7 +302,7 @@ class QuasiStatic:
         """
         part = self.grid.part(solution.box)
         carried = float(np.hypot(*rigid_displacement(np.stack(part.points()), motion)).max())
-        kernel = equations.operators.on(part).kernel("xx")
+        kernel = equations.operators.on(part).influence("xx")
         compliance = 0.0 if kernel is None else float(kernel[0, 0])
         return max(STEP.moved * carried, STEP.noise * equations.tolerance * float(solution.limit.max()) * compliance)
 

@@ -109,7 +109,7 @@ class _TangentialStep:
         self.target = control.load / self.units / operator.grid.cell_area
         self.original = offset
         self.offset = offset - rigid_displacement(self.arm, np.where(self.given, 0.0, control.motion * self.units))
-        kernel = operator.kernel("xx")
+        kernel = operator.influence("xx")
         assert kernel is not None  # no body is rigid
         self.stiffness = 1.0 / float(kernel[0, 0])
         self.largest, self.capacity = float(limit.max()), float(limit.sum())
