@@ -128,6 +128,47 @@ def test_no_number_that_changes_results_stands_outside_of_the_tables() -> None:
     assert {name: told for name, text in sources() if (told := bare_numbers(text))} == {}
 
 
+CLIENT = ROOT / "clients/stiction_client"
+
+CLIENT_OTHER = {
+    "calls.py": "waiting and retrying, which change no answer",
+    "client.py": "waiting and retrying, which change no answer",
+    "stream.py": "waiting and retrying, which change no answer",
+    "container.py": "the format's layout",
+    "contacts.py": "permitted ranges, and means of Hertz's pressure",
+    "controller/settings.py": "the gains, each with its range, unit and reason",
+    "defaults.py": "the table",
+    "model.py": "the file format's name and version",
+    "planner.py": "permitted ranges, and the default bound, an argument of the call",
+}
+"""Modules of the client that have numbers of their own, with what these are."""
+
+
+def client_sources() -> Iterator[tuple[str, str]]:
+    """Every module of the client but those that describe other tools' formats and scenes."""
+    for path in sorted(CLIENT.rglob("*.py")):
+        name = str(path.relative_to(CLIENT))
+        if name.split("/")[0] not in {"exports", "mujoco_scene"}:
+            yield name, path.read_text(encoding="utf-8")
+
+
+def test_the_clients_numbers_that_change_results_stand_in_its_table() -> None:
+    found = {name: bare_constants(text) for name, text in client_sources()}
+    assert {name for name, names in found.items() if names} <= set(CLIENT_OTHER)
+    assert set(CLIENT_OTHER) <= set(found)
+
+
+def test_each_number_of_the_clients_table_has_its_unit_and_reason() -> None:
+    body = ast.parse((CLIENT / "defaults.py").read_text(encoding="utf-8")).body
+    kinds = [node for node in body if isinstance(node, ast.Assign)]
+    for node in kinds:
+        told = body[body.index(node) + 1]
+        assert isinstance(told, ast.Expr)
+        assert isinstance(told.value, ast.Constant)
+        assert str(told.value.value).startswith(("-, ", "N "))
+    assert len(kinds) == 10
+
+
 @pytest.mark.parametrize(
     "text",
     [

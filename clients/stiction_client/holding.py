@@ -1,20 +1,11 @@
 """Which normal forces hold a loaded contact: the roots of a concave function, for one grasp or for arrays of them."""
 
 import math
-import sys
 from dataclasses import dataclass, replace
 
+from stiction_client.defaults import ENDLESS, MOST_STEPS, ROUNDING
 from stiction_client.elementwise import Number, Truth, anywhere, greatest, least, select
 from stiction_client.quantile import FrictionQuantile
-
-MOST_STEPS = 200
-"""Steps of a search; a root that only touches takes 50, any other fewer than 20."""
-
-ROUNDING = 8.0 * sys.float_info.epsilon
-"""Relative, to which a load counts as held and a force as found."""
-
-ENDLESS = 1e12
-"""N an element: what holds up to there has no upper bound, and what doesn't hold has no root."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

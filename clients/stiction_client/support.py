@@ -9,19 +9,10 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stiction_client.defaults import BEND, UNCERTAIN
 from stiction_client.elementwise import FloatArray, Number, greatest, least, logarithm, plain, root, select
 
 Kind = Literal["supported", "extrapolated", "not identified", "stale", "implausible"]
-
-UNCERTAIN = 0.1
-"""-, in parts of the expected friction: the half-width of its 95 % interval from which on it is not identified. The
-same tenth makes a coefficient identifiable."""
-
-BEND = 0.1
-"""-: standard deviation, in parts of friction, of what the law bends away from its line where an element's normal force
-leaves the data by as much as the bound that it passes, and where velocity does by a factor of e. Friction that goes as
-f^(-1/3), as an elastic sphere's does (Hertz), departs from its tangent by 0.13 of itself at twice the force; with
-velocity friction goes by its logarithm (Dieterich, 1979)."""
 
 OUTDATED = "the material's logs are others since, and it was not fitted again by this method: ask for a fit"
 SUPERSEDED = "a newer version took its place: fetch the current model"

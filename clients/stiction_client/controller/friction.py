@@ -6,15 +6,10 @@ from statistics import NormalDist, median
 
 from stiction_client.contacts import Contact
 from stiction_client.controller.settings import ControlSettings
+from stiction_client.defaults import LEAST_CERTAIN, NORMAL_DEVIATIONS
 from stiction_client.holding import LoadedContact
 from stiction_client.model import FrictionModel
 from stiction_client.quantile import FrictionQuantile
-
-NORMAL_DEVIATIONS = 3.0902
-"""Standard deviations of a normal quantile of 1e-3, the default bound: what is learnt in one grasp has no better."""
-
-LEAST_CERTAIN = 0.3
-"""Largest probability at whose quantile a model's scatter is read: near a half it lies at the mean, and tells none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

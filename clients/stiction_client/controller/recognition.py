@@ -9,16 +9,13 @@ import numpy as np
 
 from stiction_client.controller.friction import KnownFriction, error_of_mean
 from stiction_client.controller.settings import ControlSettings
+from stiction_client.defaults import UNKNOWN_FRICTION, UNKNOWN_LEVEL, UNKNOWN_SHARE
 from stiction_client.elementwise import FloatArray
 from stiction_client.errors import InvalidArgument
 from stiction_client.model import FrictionModel
 from stiction_client.quantile import FrictionQuantile
 
 UNKNOWN = "unknown"
-
-UNKNOWN_SHARE, UNKNOWN_FRICTION, UNKNOWN_LEVEL = 0.05, 0.5, 0.25
-"""Of a surface that is none of the known ones: its probability beforehand, and mean and standard deviation of its
-friction. They are ``estimators.recognise``'s, as a test sees to."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

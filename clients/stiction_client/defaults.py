@@ -1,0 +1,42 @@
+"""The numbers that change what the planner and the controller answer, beside the controller's gains (``settings``).
+
+Each with its unit, its range and where it is from.
+"""
+
+import sys
+
+UNCERTAIN = 0.1
+"""-, 0 to 1, in parts of the expected friction: the half-width of its 95 % interval from which on it is not identified.
+The same tenth makes a coefficient identifiable."""
+
+BEND = 0.1
+"""-, 0 to 1: standard deviation, in parts of friction, of what the law bends away from its line where an element's
+normal force leaves the data by as much as the bound that it passes, and where velocity does by a factor of e. Friction
+that varies as f^(-1/3), as an elastic sphere's does (Hertz), departs from its tangent by 0.13 of itself at twice the
+force; with velocity friction varies as its logarithm (Dieterich, 1979)."""
+
+NORMAL_DEVIATIONS = 3.0902
+"""-, 0 to 8: standard deviations of a normal quantile of 1e-3, the planner's default bound: what is learnt in one grasp
+has no better."""
+
+LEAST_CERTAIN = 0.3
+"""-, 0 to 0.5: largest probability at whose quantile a model's scatter is read; near a half it lies at the mean, and
+tells none."""
+
+MOST_STEPS = 200
+"""-, 50 and more: steps of a search; a root that only touches takes 50, any other fewer than 20."""
+
+ROUNDING = 8.0 * sys.float_info.epsilon
+"""-, 1e-15 to 1e-9: relative, to which a load counts as held and a force as found."""
+
+ENDLESS = 1e12
+"""N an element, 1e9 and more: what holds up to there has no upper bound, and what doesn't hold has no root."""
+
+UNKNOWN_SHARE = 0.05
+"""-, 0 to 1: probability beforehand of a surface that is none of the known ones; that of ``estimators.recognise``."""
+
+UNKNOWN_FRICTION = 0.5
+"""-, 0 to 2: mean friction of such a surface; that of ``estimators.recognise``."""
+
+UNKNOWN_LEVEL = 0.25
+"""-, 0 to 2: standard deviation of the friction of such a surface; that of ``estimators.recognise``."""
