@@ -1,6 +1,7 @@
 """Presses of a ball (Hertz) on a sensor with known faults; the force on an element is the sum over 5 × 5 points."""
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -50,12 +51,13 @@ class Faults:
         return replace(log, force=force, displacement=log.displacement + noise)
 
 
+@cache
 def pressed(
     normal_force: float = 2.0, radius: float = 15e-3, rest: float = 1.0, press: float = 1.5, sideways: float = 0.0
 ) -> GraspLog:
     """A ball that is pressed on 20 × 20 elements of 1 mm with that force, N, and lifted again.
 
-    ``sideways``: load along the surface in the hold, as a share of the friction limit.
+    ``sideways``: load along the surface in the hold, as a share of the friction limit. Made once for each.
     """
     schedule = RampSchedule(rest=rest, press=press, settle=0.2, shear=0.3, hold=0.0)
     fine = tangential_ramp(

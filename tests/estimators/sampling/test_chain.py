@@ -87,3 +87,16 @@ def test_an_error_three_times_too_large_takes_nine_times_the_steps() -> None:
     steps = sampling._missing(chain, goal=0.01)
     assert steps % SAMPLING.batch == 0
     assert steps == pytest.approx(SAMPLING.more_steps * 9 * 400 - 400, abs=1.01 * SAMPLING.batch)
+
+
+@pytest.mark.parametrize("slowness", [1.0, 4.0])
+def test_walkers_are_as_many_as_their_first_block_needs(slowness: float) -> None:
+    """Draws go by the square of the accuracy; never an odd number, fewer than the least or more than the most."""
+    few, many = SAMPLING.fewest_walkers, SAMPLING.most_walkers
+    assert sampling._walkers(1e6, slowness) == few
+    assert sampling._walkers(1e-6, slowness) == many
+    needed = 0.5 * (few + many)
+    draws = needed * SAMPLING.block
+    goal = SAMPLING.tail_error / np.sqrt(draws / (slowness * SAMPLING.more_walkers * SAMPLING.expected_time))
+    assert sampling._walkers(goal, slowness) == pytest.approx(needed, abs=2.0)
+    assert sampling._walkers(goal, slowness) % 2 == 0

@@ -57,9 +57,10 @@ def test_a_press_alone_slips_nowhere() -> None:
     assert not detect_slip(log, "forces_only").slip.any()
 
 
+@pytest.mark.parametrize("hold", [5.0, pytest.param(30.0, marks=pytest.mark.long)])
 @pytest.mark.parametrize("reach", [0.0, 5e-4])
-def test_what_is_held_neither_slips_nor_changes_its_probability(reach: float) -> None:
-    log = seen(ramp(reach=reach, hold=30.0))
+def test_what_is_held_neither_slips_nor_changes_its_probability(reach: float, hold: float) -> None:
+    log = seen(ramp(reach=reach, hold=hold))
     history = detect_slip(log, "forces_only")
     held = log.time > 2.6
     assert history.slip[held].mean() < 0.005
