@@ -20,7 +20,7 @@ from estimators.defaults import ALARM, CHANGE
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
 from estimators.linear.grasp_statistics import GraspStatistics
-from estimators.linear.priors import ScatterPrior
+from estimators.linear.priors import WEAK, ScatterPrior
 
 FloatArray = NDArray[np.float64]
 
@@ -33,7 +33,8 @@ class ChangeAlarm:
     """Grasps so far: ``levels`` of their friction, as parts of what the law expects, and their ``variances``.
 
     ``rate``: at most so many false alarms a grasp, on average; ``shift``: standard deviation of a change of friction,
-    up or down, as a part of it; ``reference``: grasps before which none can have happened.
+    up or down, as a part of it; ``reference``: grasps before which none can have happened; ``scatter_prior``: what is
+    expected of the scatter between grasps.
     """
 
     rate: float = ALARM.rate
@@ -41,10 +42,15 @@ class ChangeAlarm:
     reference: int = ALARM.reference
     levels: tuple[float, ...] = ()
     variances: tuple[float, ...] = ()
+    scatter_prior: ScatterPrior = WEAK
 
     @classmethod
     def init(
-        cls, rate: float = ALARM.rate, shift: float = ALARM.shift, reference: int = ALARM.reference
+        cls,
+        rate: float = ALARM.rate,
+        shift: float = ALARM.shift,
+        reference: int = ALARM.reference,
+        scatter_prior: ScatterPrior = WEAK,
     ) -> "ChangeAlarm":
         """An alarm that has seen no grasp; raises ``InvalidSamples`` for settings that cannot be."""
         for name, value, right, allowed in (
@@ -54,7 +60,7 @@ class ChangeAlarm:
         ):
             if not right:
                 raise InvalidSamples(name, value, allowed)
-        return cls(rate, shift, reference)
+        return cls(rate, shift, reference, scatter_prior=scatter_prior)
 
     def step(self, level: float, variance: float) -> "ChangeAlarm":
         """The alarm after one more grasp; see ``grasp_level``."""
@@ -69,7 +75,7 @@ class ChangeAlarm:
         count = len(self.levels)
         if count <= self.reference:
             return np.zeros(count)
-        log = _log_evidence(np.array(self.levels), np.array(self.variances), self.shift)
+        log = _log_evidence(np.array(self.levels), np.array(self.variances), self.shift, self.scatter_prior)
         log[: self.reference] = -np.inf
         return np.exp(np.minimum(log, CHANGE.largest_exponent))
 
@@ -115,14 +121,19 @@ def grasp_level(model: FrictionModel, grasp: GraspStatistics) -> tuple[float, fl
     return float(weight @ (expected * grasp.mean[:, 2])) / information, 1.0 / information
 
 
-def watched(model: FrictionModel, grasps: Sequence[GraspStatistics], rate: float = ALARM.rate) -> ChangeAlarm:
-    """The alarm after these grasps, oldest first."""
-    alarm = ChangeAlarm.init(rate)
+def watched(
+    model: FrictionModel,
+    grasps: Sequence[GraspStatistics],
+    rate: float = ALARM.rate,
+    scatter_prior: ScatterPrior = WEAK,
+) -> ChangeAlarm:
+    """The alarm after these grasps, oldest first; ``scatter_prior``: that by which the model was fitted."""
+    alarm = ChangeAlarm.init(rate, scatter_prior=scatter_prior)
     told = [grasp_level(model, grasp) for grasp in grasps[-ALARM.longest :]]
     return replace(alarm, levels=tuple(level for level, _ in told), variances=tuple(error for _, error in told))
 
 
-def _log_evidence(level: FloatArray, variance: FloatArray, shift: float) -> FloatArray:
+def _log_evidence(level: FloatArray, variance: FloatArray, shift: float, scatter_prior: ScatterPrior) -> FloatArray:
     """Log of p(levels | shifted from grasp j on) over p(levels | not), for each j [n].
 
     Given τ all is Gaussian: with w = 1/(τ² + s²), flat level m and δ ~ N(0, shift²), sums of w, wy, wy² tell it.
@@ -137,6 +148,6 @@ def _log_evidence(level: FloatArray, variance: FloatArray, shift: float) -> Floa
     deviation = later[1] - later[0] * whole[1] / whole[0]
     precision = information + shift**-2
     gain = 0.5 * (deviation**2 / precision - np.log(precision * shift**2))
-    prior = ScatterPrior().log_density(TAUS) + np.log(TAUS)
+    prior = scatter_prior.log_density(TAUS) + np.log(TAUS)
     null = prior[:, None] + unchanged
     return np.asarray(special.logsumexp(null + gain, axis=0) - special.logsumexp(null))

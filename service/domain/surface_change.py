@@ -3,22 +3,27 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from estimators import FrictionModel, Moments
+from estimators import FrictionModel, Moments, ScatterPrior
 from estimators.change_alarm import ChangeAlarm, watched
+from estimators.linear.priors import WEAK
 
 MARK = "surface_change"
 """Diagnostic of a model in whose data the surface has changed."""
 
 
-def with_change(models: Sequence[FrictionModel], logs: Sequence[Moments]) -> list[FrictionModel]:
+def with_change(
+    models: Sequence[FrictionModel], logs: Sequence[Moments], prior: ScatterPrior = WEAK
+) -> list[FrictionModel]:
     """The models, marked where friction of the newest ``logs``, oldest first, is another than of those before.
 
     The first of the models that tells scatter between grasps apart is the law; without such a model nothing is marked.
+    ``prior``: what is expected of that scatter.
     """
     law = next((model for model in models if model.scales is not None), None)
     if law is None:
         return list(models)
-    alarm = watched(law, [grasp for log in logs for grasp in log.at_element_area(law.element_area).grasps])
+    grasps = [grasp for log in logs for grasp in log.at_element_area(law.element_area).grasps]
+    alarm = watched(law, grasps, scatter_prior=prior)
     if not alarm.changed:
         return list(models)
     told = _sentence(alarm)

@@ -224,7 +224,7 @@ def _fit(run: Run, parts: Sequence[SamplesOfLog], prior: ScatterPrior) -> list[F
         raise InsufficientData("no grasp log of this material has friction samples yet")
     ingested = run.job.kind == "ingest"
     models = _all_that_fit(run, parts, prior) if ingested else [_fit_by(run, parts, run.job.method, len(parts), prior)]
-    return with_change(models, [_moments(run, part) for part in parts])
+    return with_change(models, [_moments(run, part) for part in parts], prior)
 
 
 def _all_that_fit(run: Run, parts: Sequence[SamplesOfLog], prior: ScatterPrior) -> list[FrictionModel]:
