@@ -148,3 +148,24 @@ def test_owners_are_shown_added_and_removed_and_the_trail_tells_so(call: Call, n
     ]
     assert (removed.actor, removed.address, removed.details) == ("anybody", "127.0.0.1", {"owner": "group:lab 1"})
     assert call("audit", subject=name, action="owner.added", limit=1) == [added]
+
+
+def test_a_material_renamed_or_emptied_while_a_client_holds_it_is_told_by_name(
+    service_url: str, name: str, grasp: GraspLog
+) -> None:
+    """A held model goes on answering; what is asked anew comes under the name of now, or says that there is none."""
+    with FrictionClient(service_url) as client, FrictionClient(service_url) as other:
+        receipt = client.upload(grasp, material=name)
+        client.wait(receipt.job).raise_for_status()
+        held = client.model(name)
+        renamed = f"{name[:90]}-now"
+        other.rename_material(name, renamed)
+        assert client.model(name).material == renamed
+        assert float(held.predict(0.0, 0.1)) == float(client.model(renamed).predict(0.0, 0.1))
+        other.withdraw(receipt.id, "of another material")
+        for asked in (name, renamed):
+            with pytest.raises(NoModel, match=asked):
+                client.model(asked)
+        with pytest.raises(ProblemError, match="nowhere"):
+            client.model("nowhere")
+    assert required_normal_force(held, 0.3, contact_area=6e-5).normal_force > 0.0

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from stiction_client import (
+    CoulombFriction,
     FrictionModel,
     InvalidArgument,
     cone_half_angle,
@@ -194,3 +195,22 @@ def test_moveit_and_contactile_are_told_what_the_planner_found(make_model: Make)
         "target_grip_force": bounded.normal_force,
     }
     assert contactile_answer(None) == {"friction_est": -1.0, "target_grip_force": -1.0}
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, -0.1])
+@pytest.mark.parametrize("name", ["static_friction", "dynamic_friction"])
+def test_drake_is_given_no_coefficient_that_is_none(name: str, value: float) -> None:
+    """Drake takes NaN and infinity."""
+    with pytest.raises(InvalidArgument, match=name):
+        CoulombFriction(**{"static_friction": 0.4, "dynamic_friction": 0.3} | {name: value})
+    with pytest.raises(InvalidArgument, match="dynamic_friction"):
+        CoulombFriction(0.3, 0.4)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1.0])
+@pytest.mark.parametrize("name", ["sliding_velocity", "other_friction"])
+def test_drake_s_friction_is_asked_for_with_finite_numbers(
+    name: str, value: float, make_model: Callable[..., FrictionModel]
+) -> None:
+    with pytest.raises(InvalidArgument, match=name):
+        drake_friction(make_model(), 0.1, **{name: value})

@@ -1,5 +1,6 @@
 """Friction for Drake (drake.mit.edu, CoulombFriction and "Hydroelastic/point contact"; version 1.51)."""
 
+import math
 from dataclasses import dataclass
 from typing import Unpack
 
@@ -11,10 +12,23 @@ from stiction_client.model import FrictionModel
 
 @dataclass(frozen=True, slots=True)
 class CoulombFriction:
-    """Drake's pair of coefficients: ``static_friction`` ≥ ``dynamic_friction`` ≥ 0."""
+    """Drake's pair of coefficients: ``static_friction`` ≥ ``dynamic_friction`` ≥ 0.
+
+    Raises ``InvalidArgument`` for any other, and for what is not finite, which Drake itself takes.
+    """
 
     static_friction: float
     dynamic_friction: float
+
+    def __post_init__(self) -> None:
+        for name in ("static_friction", "dynamic_friction"):
+            value = getattr(self, name)
+            if not 0.0 <= value < math.inf:
+                raise InvalidArgument(name, value, "finite, and at least 0")
+        if self.dynamic_friction > self.static_friction:
+            raise InvalidArgument(
+                "dynamic_friction", self.dynamic_friction, f"at most {self.static_friction:g}, static"
+            )
 
     def to_sdf(self) -> str:
         """The element for a collision in SDFormat.
@@ -46,7 +60,8 @@ def drake_friction(
     or name the ``other_friction`` [-] of the other, and this is the one that makes the pair right. Raises
     ``InvalidArgument`` where none can: a pair never has twice the other's friction.
     """
-    velocity = model.domain.tangential_velocity[1] if sliding_velocity is None else sliding_velocity
+    fastest = model.domain.tangential_velocity[1] if sliding_velocity is None else sliding_velocity
+    velocity = float(within("sliding_velocity", fastest, 0.0, 1e3, "m/s"))
     static = conservative_friction(model, normal_force, quantile, **terms)
     moving = conservative_friction(model, normal_force, quantile, tangential_velocity=velocity, **terms)
     dynamic = static if discrete else min(static, moving)
