@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,11 @@ BENEATH = 0.04
 """Relative standard deviation of friction under one contact, of 1 to 3 N, by its field alone (400 other seeds): the
 field's spots are as large as half of the contact, which does not average them out.
 """
+
+LIFTED = (0.3, 0.45, 0.7)
+"""Friction of the materials among which the object's is recognised."""
+OFTEN, LIGHT = 1e-2, 0.5
+"""Slip in one of a hundred loads; N of a least force below that of the first touch."""
 
 FIXED = 0.2
 """Friction of the fixed strategy."""
@@ -87,7 +93,8 @@ class Approach:
 
 def settings_of(world: World, most: float = MOST, **changed: float) -> ControlSettings:
     """The controller's defaults for this finger."""
-    return ControlSettings(contact=contact_of(world), least_force=START, most_force=min(most, MOST), **changed)  # type: ignore[arg-type]
+    given: dict[str, Any] = {"least_force": START, "most_force": min(most, MOST)} | changed
+    return ControlSettings(contact=contact_of(world), **given)
 
 
 def model_of(friction: float, world: World) -> FrictionModel:
@@ -109,10 +116,16 @@ def model_of(friction: float, world: World) -> FrictionModel:
     )
 
 
-def with_model(factor: float, task: Task, world: World, finger: int) -> Strategy:
+def with_model(factor: float, task: Task, world: World, finger: int, **changed: float) -> Strategy:
     """The controller with the material's friction, or ``factor`` times it; it is told what breaks the object."""
     model = model_of(factor * (task.told or task.friction)[finger], world)
-    return Controlled(GraspController.init(settings_of(world, task.limit), model))
+    return Controlled(GraspController.init(settings_of(world, task.limit, **changed), model))
+
+
+def among_three(task: Task, world: World, finger: int) -> Strategy:  # noqa: ARG001
+    """The controller that is told of three materials, of which the object's is one, but for the block's rough face."""
+    materials = {f"{friction:g}": model_of(friction, world) for friction in LIFTED}
+    return Controlled(GraspController.init(settings_of(world, task.limit), materials=materials))
 
 
 def without_model(task: Task, world: World, finger: int) -> Strategy:  # noqa: ARG001 - all strategies are made alike
@@ -163,6 +176,10 @@ def exploration(world: World, finger: int) -> tuple[float, float]:
 CONTROLLERS = {
     "known": Approach(partial(with_model, 1.0)),
     "unknown": Approach(without_model),
+    "known, 1 in 100 may slip": Approach(
+        partial(with_model, 1.0, slip_probability=OFTEN, least_force=LIGHT, touch_force=START)
+    ),
+    "one of three": Approach(among_three),
 }
 MISLED = {
     "known, half of slip missed": Approach(partial(with_model, 1.0), missed=0.5),

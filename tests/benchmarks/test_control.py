@@ -12,6 +12,7 @@ from benchmarks.control import campaign, episode
 from benchmarks.control_episodes import FRAME, START, Episode, least_force, run, world_of
 from benchmarks.control_outcomes import SIGNATURES, outcome_of, scores
 from benchmarks.control_strategies import (
+    CONTROLLERS,
     EXPLORED_SLIP,
     Controlled,
     Fixed,
@@ -44,7 +45,7 @@ def test_two_fingers_share_the_load() -> None:
     assert least == pytest.approx([0.1 * GRAVITY / friction for friction in block.friction])
 
 
-@pytest.mark.parametrize("name", ["known", "unknown", "known, half of slip missed"])
+@pytest.mark.parametrize("name", [*CONTROLLERS, "known, half of slip missed"])
 def test_the_controller_holds_a_lift_seen_by_the_real_detector(name: str) -> None:
     score = scores(name, [outcome_of(episode(dataclasses.replace(TASK, seconds=2.5), name, 0), name, 0)])
     assert score["held"] == "1/1"

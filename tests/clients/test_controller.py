@@ -428,3 +428,19 @@ def test_every_setting_is_documented_with_its_default() -> None:
         default = defaults[name]
         assert rows[name].strip() == ("needed" if default is dataclasses.MISSING else f"{default:g}"), name
         assert gain.reason
+
+
+def test_the_first_touch_lasts_until_a_load_rests(make_model: Make) -> None:
+    """And no command jumps when it ends."""
+    settings = dataclasses.replace(SETTINGS, touch_force=2.0)
+    plant = PointContact(ramp((0.4, 0.5, 0.3)))
+    episode = run(plant, GraspController.init(settings, model_of(make_model, 0.45)), seconds=8.0)
+    asked = np.array([command.normal_force for command in episode.commands])
+    touch = int(np.argmax(asked < 2.0))
+    assert 0.8 < episode.time[touch] < 1.5
+    assert (asked[:touch] == 2.0).all()
+    assert not fell_or_rose_too_fast(episode)
+    assert 1.0 < episode.normal[-1] / episode.least < 1.3
+    assert GraspController.init(dataclasses.replace(settings, touch_force=0.1)).normal_force == SETTINGS.least_force
+    with pytest.raises(InvalidArgument, match="touch_force"):
+        dataclasses.replace(settings, touch_force=50.0)

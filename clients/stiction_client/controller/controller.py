@@ -20,7 +20,8 @@ class ControllerState:
 
     ``known``: the friction that ``hold`` goes by, None while there is none; ``learned``: what slipping elements told;
     ``contradictions``: frames in a row that speak against ``known``; ``since``: when ``mode`` began, s;
-    ``recognition``: the materials that it may be of; ``material``: which it was taken for, and its ``probability``.
+    ``rested``: whether a load has come to rest, until which the first touch lasts; ``recognition``: the materials that
+    it may be of; ``material``: which it was taken for, and its ``probability``.
     """
 
     settings: ControlSettings
@@ -33,6 +34,7 @@ class ControllerState:
     sticking: StickRatioEstimate = field(default_factory=StickRatioEstimate)
     learned: LearnedFriction = field(default_factory=LearnedFriction)
     contradictions: int = 0
+    rested: bool = False
     recognition: Recognition | None = None
     material: str | None = None
     probability: float = 0.0
@@ -56,9 +58,11 @@ def init(
     ``InvalidArgument`` for one that is called "unknown".
     """
     if model is not None:
-        return ControllerState(settings, KnownFriction.of_model(model, settings), "hold", settings.least_force)
+        return ControllerState(
+            settings, KnownFriction.of_model(model, settings), "hold", _floor(settings, rested=False)
+        )
     among = Recognition.among(materials or {}, settings)
-    return ControllerState(settings, None, "feel", settings.least_force, recognition=among)
+    return ControllerState(settings, None, "feel", _floor(settings, rested=False), recognition=among)
 
 
 def step(state: ControllerState, observation: Observation) -> tuple[ControllerState, Command]:
@@ -94,7 +98,7 @@ def _sense(state: ControllerState, observation: Observation, elapsed: float) -> 
     against = _contradicts(state, sticking, observation.normal, load.size, friction)
     contradictions = state.contradictions if against is None else state.contradictions + 1 if against else 0
     seen = replace(state, time=observation.time, load=load, sticking=sticking, learned=learned, recognition=recognition)
-    return replace(seen, contradictions=contradictions)
+    return replace(seen, contradictions=contradictions, rested=state.rested or _settled(seen))
 
 
 def _sampled(observation: Observation, sticking: StickRatioEstimate, settings: ControlSettings) -> float:
@@ -160,8 +164,7 @@ def _decide(state: ControllerState, observation: Observation) -> ControllerState
     known = state.known or state.learned.known(settings)
     if known is not None:
         return _enter(replace(state, known=known), "hold")
-    settled = _loaded(state.load, state.settings) and state.time - state.load.steady >= settings.settle_time
-    return _enter(state, "learn" if settled and observation.stick_ratio >= 0.0 else "feel")
+    return _enter(state, "learn" if _settled(state) and observation.stick_ratio >= 0.0 else "feel")
 
 
 def _forgotten(state: ControllerState) -> ControllerState:
@@ -216,10 +219,20 @@ def _loaded(load: Load, settings: ControlSettings) -> bool:
     return load.size > settings.unknown_friction * settings.least_force
 
 
+def _settled(state: ControllerState) -> bool:
+    """Whether a load that needs more than the least force has been steady for a while."""
+    return _loaded(state.load, state.settings) and state.time - state.load.steady >= state.settings.settle_time
+
+
+def _floor(settings: ControlSettings, rested: bool) -> float:
+    """The least force, N: after a load has come to rest, and before."""
+    return settings.least_force if rested else max(settings.least_force, settings.touch_force)
+
+
 def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
     """All that asks for a force; the largest is followed."""
     settings = state.settings
-    demands = [_Demand(settings.least_force, "least force")]
+    demands = [_Demand(_floor(settings, state.rested), "least force")]
     slips = state.sticking.slips(settings) and state.load.size > 0.0
     growth = 1.0 if slips else state.load.growth(settings)  # in slip, what is measured grows with the grip
     if slips:

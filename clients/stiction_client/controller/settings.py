@@ -23,11 +23,14 @@ class ControlSettings:
     """What a grip controller is set to; forces are those of one contact, the ``contact`` that the sensor looks at."""
 
     contact: Contact
-    least_force: Annotated[float, Gain(1e-3, 1e3, "N", "keeps the sensor in touch; also the force of the first touch")]
+    least_force: Annotated[float, Gain(1e-3, 1e3, "N", "keeps the sensor in touch")]
     most_force: Annotated[float, Gain(1e-3, 1e4, "N", "what the gripper, or the object before it breaks, can bear")]
     slip_probability: Annotated[
         float, Gain(*SLIP_PROBABILITIES, "-", "the planner's: one slip in a thousand loads")
     ] = SLIP_PROBABILITY
+    touch_force: Annotated[
+        float, Gain(0.0, 1e3, "N", "until a load rests: samples of slip come while it is borne; 0: `least_force`")
+    ] = 0.0
     rise_rate: Annotated[float, Gain(1e-3, 1e6, "N/s", "5 N within the lag of a gripper, 30 ms")] = 150.0
     fall_rate: Annotated[
         float, Gain(1e-3, 100.0, "1/s", "half of the force in 1.4 s: a load that comes back within a task finds a grip")
@@ -105,6 +108,8 @@ class ControlSettings:
             value = getattr(self, name)
             if not isinstance(within(name, value, gain.low, gain.high, gain.unit), float):
                 raise InvalidArgument(name, "an array", "one number")
+        if self.touch_force >= self.most_force:
+            raise InvalidArgument("touch_force", self.touch_force, f"less than most_force, {self.most_force:g} N")
         if self.least_force >= self.most_force:
             raise InvalidArgument("least_force", self.least_force, f"less than most_force, {self.most_force:g} N")
         if not self.reflex_stick_ratio < self.learn_stick_ratio <= self.feel_stick_ratio < self.told_stick_ratio:
