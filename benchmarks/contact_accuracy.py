@@ -26,7 +26,8 @@ from slipcore.contact.reference.torsion import TorsionPartialSlip, sliding_momen
 from slipcore.contact.scene import Scene
 from slipcore.contact.solver.normal import solve_normal
 from slipcore.contact.solver.problem import Problem, StepLoad
-from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
+from slipcore.contact.solver.quasi_static import QuasiStatic
+from slipcore.contact.solver.state import StepResult
 from slipcore.contact.tiers.accuracy import difference, simulate_to
 from slipcore.contact.tiers.boundary_elements import Fidelity, run
 from slipcore.frames import FloatArray

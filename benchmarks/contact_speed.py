@@ -25,7 +25,8 @@ from slipcore.contact.elasticity.operator import Count, ElasticOperator, Operato
 from slipcore.contact.scene import Scene
 from slipcore.contact.solver.normal import solve_normal
 from slipcore.contact.solver.problem import Problem, StepLoad
-from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
+from slipcore.contact.solver.quasi_static import QuasiStatic
+from slipcore.contact.solver.state import StepResult
 from slipcore.contact.tiers.boundary_elements import Fidelity
 
 YOUNG, RADIUS, FORCE, FRICTION = 1e6, 15e-3, 10.0, 0.4

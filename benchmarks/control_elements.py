@@ -15,7 +15,8 @@ from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.reduced import Load, World
 from slipcore.contact.solver.macro_slip import FreeObject
 from slipcore.contact.solver.problem import Problem, StepLoad
-from slipcore.contact.solver.quasi_static import QuasiStatic, State, StepResult
+from slipcore.contact.solver.quasi_static import QuasiStatic
+from slipcore.contact.solver.state import State, StepResult
 from slipcore.contact.tiers.sampling import SensorGrid, frame_record
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray, Frame

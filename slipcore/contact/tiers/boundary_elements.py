@@ -13,8 +13,9 @@ from slipcore.contact.elasticity.operator import Operators
 from slipcore.contact.plan.plan import Plan
 from slipcore.contact.progress import Progress, no_progress
 from slipcore.contact.solver.normal import solve_normal
-from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
+from slipcore.contact.solver.quasi_static import QuasiStatic
 from slipcore.contact.solver.resolution import summary
+from slipcore.contact.solver.state import StepResult
 from slipcore.contact.tiers.free_grid import FreeSensorGrid, free_grid
 from slipcore.contact.tiers.load_steps import load_steps
 from slipcore.contact.tiers.sampling import (

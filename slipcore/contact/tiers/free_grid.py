@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.plan.plan import SamplingPlan
-from slipcore.contact.solver.quasi_static import StepResult
+from slipcore.contact.solver.state import StepResult
 from slipcore.contact.tiers import fronts
 from slipcore.frames import BoolArray, FloatArray
 

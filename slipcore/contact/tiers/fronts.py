@@ -3,7 +3,7 @@
 import numpy as np
 
 from slipcore.contact.defaults import ACCURACY
-from slipcore.contact.solver.quasi_static import StepResult
+from slipcore.contact.solver.state import StepResult
 from slipcore.frames import BoolArray, FloatArray
 
 

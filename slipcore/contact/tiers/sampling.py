@@ -8,7 +8,7 @@ import numpy as np
 from slipcore.contact.defaults import ACCURACY, CHEAP_TIERS
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.plan.plan import Plan, SamplingPlan
-from slipcore.contact.solver.quasi_static import StepResult
+from slipcore.contact.solver.state import StepResult
 from slipcore.contact.tiers.free_grid import FreeSensorGrid
 from slipcore.frames import BoolArray, FloatArray, GraspLog, GroundTruth
 

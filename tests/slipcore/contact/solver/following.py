@@ -7,7 +7,8 @@ import numpy as np
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.solver.problem import Problem, StepLoad
-from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
+from slipcore.contact.solver.quasi_static import QuasiStatic
+from slipcore.contact.solver.state import StepResult
 
 YOUNG, RADIUS, FORCE, FRICTION = 1e6, 15e-3, 10.0, 0.4
 SLIDING = FRICTION * FORCE

@@ -9,7 +9,8 @@ from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
 from slipcore.contact.reference.mindlin_deresiewicz import MindlinDeresiewicz
 from slipcore.contact.reference.torsion import TorsionPartialSlip, sliding_moment
 from slipcore.contact.solver.problem import Problem, StepLoad
-from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
+from slipcore.contact.solver.quasi_static import QuasiStatic
+from slipcore.contact.solver.state import StepResult
 
 FORCE, FRICTION = 10.0, 0.4
 SLIDING = FORCE * FRICTION

@@ -18,7 +18,8 @@ from slipcore.contact.reference.hertz import HertzContact
 from slipcore.contact.reference.mindlin_deresiewicz import MindlinDeresiewicz
 from slipcore.contact.solver.normal import solve_normal
 from slipcore.contact.solver.problem import Problem, StepLoad
-from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
+from slipcore.contact.solver.quasi_static import QuasiStatic
+from slipcore.contact.solver.state import StepResult
 from slipcore.frames import FloatArray
 from tests.slipcore.contact.solver.following import (
     FORCE,

@@ -11,7 +11,8 @@ from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.solver import quasi_static
 from slipcore.contact.solver.problem import HeightField, Problem, StepLoad
-from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
+from slipcore.contact.solver.quasi_static import QuasiStatic
+from slipcore.contact.solver.state import StepResult
 
 SCENES = Path(__file__).parents[3] / "data" / "contact"
 YOUNG, FRICTION = 1e6, 0.4

@@ -9,7 +9,8 @@ import pytest
 from slipcore.contact.errors import InfeasibleLoad
 from slipcore.contact.solver.macro_slip import FreeObject, borne
 from slipcore.contact.solver.problem import StepLoad
-from slipcore.contact.solver.quasi_static import QuasiStatic, State
+from slipcore.contact.solver.quasi_static import QuasiStatic
+from slipcore.contact.solver.state import State
 from slipcore.errors import InvalidInput
 from tests.slipcore.contact.solver.test_quasi_static import FORCE, FRICTION, SLIDING, shear, sphere_on
 

@@ -9,8 +9,9 @@ import pytest
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.solver.problem import Problem, StepLoad
-from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
+from slipcore.contact.solver.quasi_static import QuasiStatic
 from slipcore.contact.solver.slip_rate import carried_share
+from slipcore.contact.solver.state import StepResult
 from slipcore.frames import FloatArray
 
 FRICTION, FORCE = 0.4, 10.0

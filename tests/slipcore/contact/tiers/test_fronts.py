@@ -6,7 +6,8 @@ import pytest
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.solver.problem import Problem, StepLoad
-from slipcore.contact.solver.quasi_static import QuasiStatic, StepResult
+from slipcore.contact.solver.quasi_static import QuasiStatic
+from slipcore.contact.solver.state import StepResult
 from slipcore.contact.tiers.fronts import shares_within, stick_ratio
 
 FORCE, FRICTION, RADIUS = 10.0, 0.4, 15e-3
