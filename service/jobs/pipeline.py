@@ -188,7 +188,8 @@ def fit_material(run: Run) -> None:
             models = _fit(run, parts, prior)
         with run.database.write() as session:
             friction_models.lock(session, material_id)
-            if detections.samples_of_material(session, material_id) == parts:
+            is_still = jobs.material_id(session, run.job.id) == material_id  # copies stay with one that was merged
+            if is_still and detections.samples_of_material(session, material_id) == parts:
                 _store_models(run, session, material_id, models)
                 return
     with run.database.write() as session:  # logs come in faster than they are fitted: the other fits wait for this one

@@ -312,6 +312,30 @@ def test_a_fit_under_way_does_not_bring_a_withdrawn_log_back(shop: Shop, monkeyp
     assert shop.model("paper") == (3, both // 2, False)
 
 
+def test_a_fit_under_way_is_of_what_its_material_is_merged_into_though_its_logs_are_copies(
+    shop: Shop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("paper", "papre"):
+        shop.ingest(name, 0)
+    with shop.database.write() as session:
+        source = materials.find_id(session, "papre")
+        job_id = jobs.add(session, "fit", "conjugate", material_id=source)
+    claim, fit, merged = shop.claim(), pipeline._fit, list[object]()
+    assert claim is not None
+
+    def merge_meanwhile(*given: Any) -> Any:
+        if not merged:
+            merged.append(curate.merge(shop.context, "paper", "papre"))
+        return fit(*given)
+
+    monkeypatch.setattr(pipeline, "_fit", merge_meanwhile)
+    pipeline.run_job(shop.database, shop.blobs, claim)
+    assert shop.model("paper", "conjugate")[0] == 1
+    with shop.database.read() as session:
+        assert jobs.get(session, job_id).status == "done"
+        assert friction_models.current_methods(session, [source]) == []
+
+
 def test_a_merged_material_is_fitted_over_all_its_logs(shop: Shop) -> None:
     shop.ingest("paper", 0)
     shop.ingest("papre", 1)
