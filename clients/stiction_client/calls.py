@@ -119,6 +119,7 @@ def upload(
     scale: float | None,
     frame_rate: float | None,
     mapping: Mapping[str, Any] | None,
+    rest: str | int | None = None,
 ) -> Call[GraspLogReceipt]:
     """Upload a log; the service knows logs by content, so that a repetition is no second log."""
     content, content_type = _body(log)
@@ -129,6 +130,7 @@ def upload(
         scale=scale,
         frame_rate=frame_rate,
         mapping=None if mapping is None else json.dumps(mapping),
+        rest=rest,
     )
     request = Request("POST", "/v1/grasp-logs", params, content=content, content_type=content_type)
     return _record(GraspLogReceipt.from_json, (yield from _ask(request)))

@@ -80,15 +80,17 @@ class FrictionClient:
         scale: float | None = None,
         frame_rate: float | None = None,
         mapping: Mapping[str, Any] | None = None,
+        rest: str | int | None = None,
     ) -> GraspLogReceipt:
         """Upload a grasp log: a record, a file, or a Tac3D recording folder.
 
         With ``material`` the service refits that material once the slip is detected; follow with ``wait``. The same
         content twice is one log. ``sensor`` and ``detector`` default to what the log and the service say.
         ``scale`` (m per pixel) and ``frame_rate`` (1/s) are for a table of tracked markers that does not tell them,
-        ``mapping`` for a recording whose topics, fields or columns have names of their own.
+        ``mapping`` for a recording whose topics, fields or columns have names of their own, ``rest`` the frame
+        of either in which nothing touches: "first", "least contact" or its number.
         """
-        return self._run(calls.upload(log, material, sensor, detector, scale, frame_rate, mapping))
+        return self._run(calls.upload(log, material, sensor, detector, scale, frame_rate, mapping, rest))
 
     def grasp_log(self, id: str) -> GraspLogReceipt:  # noqa: A002 - the API's own name
         """A grasp log by its id, with what was detected."""
@@ -304,9 +306,10 @@ class AsyncFrictionClient:
         scale: float | None = None,
         frame_rate: float | None = None,
         mapping: Mapping[str, Any] | None = None,
+        rest: str | int | None = None,
     ) -> GraspLogReceipt:
         """As ``FrictionClient.upload``."""
-        return await self._run(calls.upload(log, material, sensor, detector, scale, frame_rate, mapping))
+        return await self._run(calls.upload(log, material, sensor, detector, scale, frame_rate, mapping, rest))
 
     async def grasp_log(self, id: str) -> GraspLogReceipt:  # noqa: A002 - the API's own name
         """As ``FrictionClient.grasp_log``."""

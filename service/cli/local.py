@@ -40,6 +40,10 @@ Mapping = Annotated[
     Path | None,
     typer.Option("--mapping", help="A JSON file that says which topic, field or column of the log is what."),
 ]
+Rest = Annotated[
+    str | None,
+    typer.Option(help="Frame without contact: first, least contact, its number, or a file of the sensor alone."),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
 
 
@@ -49,6 +53,7 @@ def detect(
     scale: Scale = None,
     frame_rate: FrameRate = None,
     mapping: Mapping = None,
+    rest: Rest = None,
     sensor_model: SensorModelFile = None,
     gel: GelFile = None,
     json: Json = False,
@@ -57,7 +62,7 @@ def detect(
     """Detect local slip in one grasp log and say what was seen."""
     from service import formats
 
-    grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
+    grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping), rest=rest_of(rest))
     with shown_progress(f"looking at {log.name}"):
         seen = look(grasp, method, sensor_model, gel)
     if picture is not None:
@@ -77,6 +82,7 @@ def check(
     scale: Scale = None,
     frame_rate: FrameRate = None,
     mapping: Mapping = None,
+    rest: Rest = None,
     sensor_model: SensorModelFile = None,
     gel: GelFile = None,
     json: Json = False,
@@ -84,7 +90,7 @@ def check(
     """Look for what makes the friction of a grasp log doubtful, and say what to do (docs/checks.md)."""
     from service import formats
 
-    grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
+    grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping), rest=rest_of(rest))
     with shown_progress(f"looking at {log.name}"):
         seen = look(grasp, method, sensor_model, gel)
     findings, contact = seen.findings(), _contact_record(seen.log, seen.history)
@@ -141,6 +147,7 @@ def convert(
     scale: Scale = None,
     frame_rate: FrameRate = None,
     mapping: Mapping = None,
+    rest: Rest = None,
 ) -> None:
     """Write a grasp log of any format as a Stiction NPZ, Parquet or MCAP, bit for bit."""
     from service import formats
@@ -148,7 +155,7 @@ def convert(
 
     name = writing.format_of(output)
     refuse_inputs(output, log, mapping)
-    grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
+    grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping), rest=rest_of(rest))
     write_whole(output, lambda beside: writing.write(grasp, beside, name))
     typer.echo(f"{output}: {len(grasp)} frames of {grasp.grid[0]} × {grasp.grid[1]} markers")
 
@@ -198,6 +205,11 @@ def refuse_inputs(output: Path, *inputs: Path | None) -> None:
 def mapping_text(path: Path | None) -> str | None:
     """What a mapping's file says, where there is one."""
     return None if path is None else path.read_text(encoding="utf-8")
+
+
+def rest_of(told: str | None) -> str | Path | None:
+    """The word or number that names a frame at rest, or a file that shows the sensor alone."""
+    return Path(told) if told is not None and Path(told).is_file() else told
 
 
 def print_comparison(found: "ForceComparison") -> None:

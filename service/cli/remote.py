@@ -12,7 +12,7 @@ import typer
 
 from estimators.method_names import METHODS
 from service.cli.exit_codes import FAILURE, INPUT_REFUSED, SERVICE_REFUSED
-from service.cli.local import FrameRate, Mapping, Scale
+from service.cli.local import FrameRate, Mapping, Rest, Scale, rest_of
 from service.cli.output import print_json, print_lines, print_table
 from service.cli.progress import counted
 from service.cli.sources import Source, found
@@ -77,6 +77,7 @@ def upload(
     scale: Scale = None,
     frame_rate: FrameRate = None,
     mapping: Mapping = None,
+    rest: Rest = None,
     url: Url = DEFAULT_URL,
     key: Key = None,
     json: Json = False,
@@ -85,12 +86,14 @@ def upload(
 
     if create and material is None:
         raise typer.BadParameter("--create needs --material")
-    sources = found(logs, mapping)
+    sources = found(logs, mapping, scale=scale, frame_rate=frame_rate, rest=rest_of(rest))
     with connected(url, key) as client:
         if create and material is not None:
             client.ensure_material(material)
-        given = {"material": material, "scale": scale, "frame_rate": frame_rate}
-        results = list(counted((_upload(client, each, wait, **given) for each in sources), len(sources), "logs"))
+        table = {"scale": scale, "frame_rate": frame_rate, "rest": rest}
+        results = list(
+            counted((_upload(client, each, wait, material, table) for each in sources), len(sources), "logs")
+        )
     if json:
         print_json({"uploads": results})
     else:
@@ -216,14 +219,19 @@ def plan(
         print_lines(f"Grip for {load:g} N on {material}", _grip_lines(answer, model))
 
 
-def _upload(client: "FrictionClient", source: Source, wait: bool, **given: Any) -> dict[str, Any]:
-    """Upload one log; that it is not read or that the service does not take it is a result like any other."""
+def _upload(
+    client: "FrictionClient", source: Source, wait: bool, material: str | None, table: dict[str, Any]
+) -> dict[str, Any]:
+    """Upload one log, with what a ``table`` of it needs unless it was read here; that it is not read or that the
+    service does not take it is a result like any other.
+    """
     from slipcore import InvalidInput
     from stiction_client import ProblemError, problems
 
     try:
         log, mapping = source.log()
-        receipt = client.upload(log, mapping=mapping, **given)
+        said = table if isinstance(log, Path) else {}
+        receipt = client.upload(log, material, mapping=mapping, **said)
     except problems.UnknownMaterial:  # so it will be for the others
         raise
     except (InvalidInput, ProblemError) as refusal:

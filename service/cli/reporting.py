@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.local import DETECTOR_HELP, FrameRate, Mapping, Scale, mapping_text, refuse_inputs
+from service.cli.local import DETECTOR_HELP, FrameRate, Mapping, Rest, Scale, mapping_text, refuse_inputs, rest_of
 from service.cli.remote import DEFAULT_URL, Key, Url, connected
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ def report(
     scale: Scale = None,
     frame_rate: FrameRate = None,
     mapping: Mapping = None,
+    rest: Rest = None,
     url: Url = DEFAULT_URL,
     key: Key = None,
 ) -> None:
@@ -39,7 +40,7 @@ def report(
     path = Path(what)
     refuse_inputs(output, path, mapping)
     if path.exists():
-        made = _of_log(path, method, scale, frame_rate, mapping)
+        made = _of_log(path, method, scale, frame_rate, mapping, rest)
     elif len(path.parts) > 1:
         raise typer.BadParameter(f"there is no file {what}; allowed: a grasp log, or the name of a material")
     else:
@@ -50,12 +51,17 @@ def report(
 
 
 def _of_log(
-    path: Path, method: str | None, scale: float | None, frame_rate: float | None, mapping: Path | None
+    path: Path,
+    method: str | None,
+    scale: float | None,
+    frame_rate: float | None,
+    mapping: Path | None,
+    rest: str | None,
 ) -> "Report":
     from service import formats
     from service.domain.grasp_report import report_of_log
 
-    log = formats.read(path, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
+    log = formats.read(path, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping), rest=rest_of(rest))
     return report_of_log(log, path.name, method)
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.local import DETECTOR_HELP, FrameRate, Json, Mapping, Scale, mapping_text
+from service.cli.local import DETECTOR_HELP, FrameRate, Json, Mapping, Rest, Scale, mapping_text, rest_of
 from service.cli.output import print_json, print_lines
 from service.cli.remote import DEFAULT_URL, Key, Url
 from service.formatting import number
@@ -34,6 +34,7 @@ def stream(
     scale: Scale = None,
     frame_rate: FrameRate = None,
     mapping: Mapping = None,
+    rest: Rest = None,
     url: Url = DEFAULT_URL,
     key: Key = None,
     json: Json = False,
@@ -45,7 +46,9 @@ def stream(
     from stiction_client.stream import SlipStream
 
     with _file(log) as path:
-        grasp = formats.read(path, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping))
+        grasp = formats.read(
+            path, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping), rest=rest_of(rest)
+        )
     if grasp.displacement is None:
         raise InvalidInput("displacement", "missing", "a log with displacements: a live stream needs them")
     options: dict[str, Any] = {"sensor": grasp.sensor, "material": material, "keep": store}

@@ -2,12 +2,14 @@
 
 import importlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 from types import ModuleType
 from typing import Any
 
-from service.formats import frame_table, tac3d, tracked_markers
+import numpy as np
+
+from service.formats import frame_table, rest, tac3d, tracked_markers
 from service.formats import mapping as mappings
 from service.formats.archive import open_archive
 from slipcore.errors import InvalidInput
@@ -42,7 +44,7 @@ class Format:
     content_type: str
     reader: str
     magic: bytes = b""
-    settings: tuple[str, ...] = ("mapping",)
+    settings: tuple[str, ...] = ("mapping", "rest")
     plain: bool = False
     leads: bool = True
 
@@ -50,7 +52,7 @@ class Format:
 FORMATS = {
     "npz": Format("application/vnd.stiction.grasp-log+npz", "npz.read", settings=(), plain=True),
     "tac3d": Format("application/vnd.tac3d+zip", "tac3d.read", settings=(), plain=True),
-    "tracked markers": Format("text/csv", "tracked_markers.read", settings=("scale", "frame_rate")),
+    "tracked markers": Format("text/csv", "tracked_markers.read", settings=("scale", "frame_rate", "rest")),
     "frame table": Format("application/vnd.stiction.frame-table+csv", "frame_table.read"),
     "mcap": Format("application/x-mcap", "mcap.read", b"\x89MCAP0\r\n"),
     "rosbag1": Format("application/x-rosbag", "rosbag.read_bag1", b"#ROSBAG V"),
@@ -68,6 +70,7 @@ UNSPECIFIC_TYPES = ("application/zip", "application/octet-stream")
 _WHERE = {
     "scale": "only beside a table of tracked markers: other formats are in SI units",
     "frame_rate": "only beside a table of tracked markers: other formats tell times",
+    "rest": "only beside tracked markers or a format of topics, fields or columns",
     "mapping": "only beside a format of topics, fields or columns",
 }
 
@@ -78,7 +81,8 @@ TABLES = (
 )
 """What is taken of delimited text."""
 
-NO_SETTINGS: Mapping[str, float | str | None] = {}
+Settings = Mapping[str, float | str | Path | None]
+NO_SETTINGS: Settings = {}
 
 EXTRA = "formats"
 """The extra that brings the libraries of the formats that need some."""
@@ -108,20 +112,37 @@ class UnusedSetting(InvalidInput):
     """A setting given with a format that has no use for it."""
 
 
-def read(path: Path, content_type: str | None = None, **settings: float | str | None) -> GraspLog:
+def read(path: Path, content_type: str | None = None, **settings: float | str | Path | None) -> GraspLog:
     """Read a grasp log of any known format: a file, or the folder of a Tac3D or rosbag2 recording or, with
     the episode in the mapping, of a LeRobot data set.
 
     The format is what ``content_type`` names or, without one, what the file's content tells. ``settings``, where they
     are not None: of tracked markers ``scale`` (m per pixel) and ``frame_rate`` (1/s), of formats with topics, fields or
-    columns the ``mapping`` (JSON). Raises ``UnsupportedFormat``, or ``InvalidInput`` for what is wrong inside.
+    columns the ``mapping`` (JSON); of both ``rest``, the frame at rest by the words of ``rest.py``, or a ``Path`` to a
+    recording of the sensor alone in the same format. Raises ``UnsupportedFormat``, or ``InvalidInput`` for what is
+    wrong inside.
     """
     name = identify(path, content_type, settings)
     check_settings(name, settings)
     given: dict[str, Any] = {key: value for key, value in settings.items() if value is not None}
     if "mapping" in given:
         given["mapping"] = parse_mapping(settings)
-    return _reader(name)(path, **given)
+    if "rest" not in given or name == "tracked markers":
+        return _reader(name)(path, **given)
+    return _read_from_rest(_reader(name), path, given)
+
+
+def _read_from_rest(reader: Callable[..., GraspLog], path: Path, given: dict[str, Any]) -> GraspLog:
+    """A log of a format that takes a mapping, with displacement from the frame or the file that is at ``rest``."""
+    chosen = given.pop("rest")
+    if not isinstance(chosen, Path):
+        mapping = given.get("mapping") or mappings.UNMAPPED
+        return reader(path, **{**given, "mapping": replace(mapping, rest=rest.check(chosen))})
+    log, alone = reader(path, **given), reader(chosen, **given)
+    if alone.grid != log.grid:
+        raise InvalidInput("rest", f"a file of {alone.grid} elements", f"{log.grid}, as the log")
+    moved = log.displacement - np.median(alone.displacement, axis=0)
+    return replace(log, displacement=moved, metadata={**log.metadata, "rest": chosen.name})
 
 
 def episodes_of(folder: Path, mapping: str | None = None) -> list[int]:
@@ -130,22 +151,22 @@ def episodes_of(folder: Path, mapping: str | None = None) -> list[int]:
     return [episode.number for episode in module_of("parquet").lerobot.episodes(folder, parsed)]
 
 
-def check_settings(name: str, settings: Mapping[str, float | str | None]) -> None:
+def check_settings(name: str, settings: Settings) -> None:
     """Raises ``UnusedSetting`` for one that the format does not take."""
     for key, value in settings.items():
         if value is not None and key not in FORMATS[name].settings:
             raise UnusedSetting(key, f"{str(value)[:60]} with {name}", _WHERE[key])
 
 
-def parse_mapping(settings: Mapping[str, float | str | None]) -> mappings.FieldMapping | None:
-    """The mapping among the settings; raises ``InvalidInput``."""
+def parse_mapping(settings: Settings) -> mappings.FieldMapping | None:
+    """The mapping among the settings, which are checked; raises ``InvalidInput``."""
+    if isinstance(chosen := settings.get("rest"), str):
+        rest.check(chosen)
     text = settings.get("mapping")
     return None if text is None else mappings.parse(str(text))
 
 
-def identify(
-    path: Path, content_type: str | None = None, settings: Mapping[str, float | str | None] = NO_SETTINGS
-) -> str:
+def identify(path: Path, content_type: str | None = None, settings: Settings = NO_SETTINGS) -> str:
     """Name of the format of the log at ``path``, a key of ``FORMATS``; raises ``UnsupportedFormat``.
 
     Delimited text is a table of tracked markers, or one of frames where the ``settings`` have a mapping.

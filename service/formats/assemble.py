@@ -7,6 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from service.formats import rest
 from service.formats.lattice import element_area, flat_lattice
 from service.formats.mapping import FieldMapping, Origin
 from service.formats.members import DTYPES, FLAG, ONCE, REQUIRED, TEXT, Members, grasp_log, told_metadata
@@ -65,6 +66,8 @@ def _log(
     if "position" not in members and mapping.pitch is not None:
         members["position"] = flat_lattice(members["displacement"].shape[1:3], mapping.pitch)
         metadata["position"] = f"a flat lattice of pitch {mapping.pitch:g} m"
+    if mapping.rest is not None:
+        _from_rest(members, mapping, metadata)
     _require("position", members, recording)
     if len(mapping.origins["displacement"].fields) == 2 and not {"force", "contact"} & members.keys():
         members["contact"] = np.ones(members["displacement"].shape[:3], dtype=bool)
@@ -75,6 +78,21 @@ def _log(
     if metadata:
         members["metadata"] = _with(members, metadata)
     return grasp_log(members)
+
+
+def _from_rest(members: dict[str, NDArray[Any]], mapping: FieldMapping, metadata: dict[str, str]) -> None:
+    """Displacement from the frame at rest. Where displacement and position are the same fields, these tell places."""
+    moved = np.asarray(members["displacement"], dtype=np.float64)
+    places = mapping.origins["displacement"].fields == mapping.origins["position"].fields != ()
+    if not places and "position" in members and members["position"].shape == moved.shape[1:]:
+        at = members["position"] + moved
+    else:
+        at = moved
+    flat = at.reshape(len(moved), -1, moved.shape[-1])
+    frame = rest.frame_of(mapping.rest or rest.FIRST, len(moved), rest.load_of(members), flat)
+    if places:
+        members["position"] = moved[frame]
+    members["displacement"], metadata["rest"] = moved - moved[frame], f"frame {frame}"
 
 
 def _require(name: str, members: Members, recording: Recording) -> None:

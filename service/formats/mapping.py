@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from service.formats import rest as rests
 from service.formats.members import DTYPES, ONCE
 from slipcore.errors import InvalidInput
 
@@ -37,7 +38,7 @@ LARGEST = 1e300
 
 _ORIGIN_KEYS = {"field", "topic", "unit", "value"}
 _ALLOWED_ORIGIN = "a field, a list of fields, or an object of field or value, topic and unit"
-_SETTINGS = ("topic", "grid", "pitch", "tolerance", "episode", "element")
+_SETTINGS = ("topic", "grid", "pitch", "tolerance", "episode", "element", "rest")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +62,7 @@ class Origin:
 @dataclass(frozen=True, slots=True)
 class FieldMapping:
     """Origin of each member, and what the file may not tell: lattice, pitch (m), tolerance (s), episode, and the column
-    that numbers the elements where a table has a row for each.
+    that numbers the elements where a table has a row for each, and the frame at ``rest``, from which displacement is.
 
     ``text`` is the mapping as it was given, empty where none was.
     """
@@ -72,6 +73,7 @@ class FieldMapping:
     tolerance: float | None = None
     episode: int | None = None
     element: str | None = None
+    rest: str | None = None
     text: str = ""
 
     def over(self, defaults: Mapping[str, Origin]) -> "FieldMapping":
@@ -103,6 +105,7 @@ def parse(text: str) -> FieldMapping:
         tolerance=_positive("tolerance", given["tolerance"]) if "tolerance" in given else None,
         episode=_episode(given["episode"]) if "episode" in given else None,
         element=_text("element", given["element"]) if "element" in given else None,
+        rest=rests.check(str(given["rest"])) if "rest" in given else None,
         text=json.dumps(given, sort_keys=True, ensure_ascii=False),
     )
 

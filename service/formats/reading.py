@@ -50,7 +50,7 @@ SHORT_BYTES = 2**20
 """Of an unpacked log that is read in some ms."""
 
 Result = TypeVar("Result")
-FormatSettings = Mapping[str, float | str | None]
+FormatSettings = Mapping[str, float | str | Path | None]
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from service.formats import rest as rests
 from service.formats.delimited import parse_number, rows, split_header, text_lines
 from service.formats.npy import MAX_ARRAY_BYTES
 from slipcore.defaults import LIMITS
@@ -20,15 +21,17 @@ from slipcore.frames import BoolArray, FloatArray, GraspLog
 ALIASES = {
     "time": "time", "frame": "frame", "marker": "marker", "particle": "marker", "id": "marker", "track_id": "marker",
     "x": "x", "y": "y", "z": "z", "contact": "contact", "gripper_force": "gripper_force",
+    "fx": "fx", "fy": "fy", "fz": "fz", "force_x": "fx", "force_y": "fy", "force_z": "fz",
 }  # fmt: skip
 """Columns that are read, by the names that trackers give them."""
-SETTINGS = ("scale", "frame_rate", "sensor", "gripper_force_deviation")
+FORCE = ("fx", "fy", "fz")
+SETTINGS = ("scale", "frame_rate", "sensor", "gripper_force_deviation", "rest")
 """What lines before the header may tell: ``# scale: 2.5e-5``."""
 SCALE, FRAME_RATE = (1e-9, 1.0), (1e-3, 1e6)
 """m per pixel (1 where the file is in metres) and frames a second that can be."""
 ASSUMED_WIDTH = 15e-3
 """m that the markers span where their scale is unknown: a fingertip's sensor. Detection depends on it a little."""
-MAX_ROWS, ROW = 5_000_000, 8
+MAX_ROWS, ROW = 5_000_000, 11
 """Rows of a file, and numbers that are kept of each."""
 
 
@@ -46,31 +49,53 @@ class Header:
 
 @dataclass(frozen=True, slots=True)
 class Tracks:
-    """Markers over time: ``time`` [t] s, ``place`` [t, k, 3] as in the file (NaN where lost), ``contact`` [t, k],
-    ``gripper_force`` [t] N.
+    """Markers over time: ``names`` [k], ``time`` [t] s, ``place`` [t, k, 3] as in the file (NaN where lost),
+    ``contact`` [t, k], ``force`` [t, k, 3] N, ``gripper_force`` [t] N.
     """
 
+    names: tuple[str, ...]
     time: FloatArray
     place: FloatArray
+    force: FloatArray | None
     contact: BoolArray | None
     has_height: bool
     gripper_force: FloatArray | None
 
 
-def read(path: Path, scale: float | None = None, frame_rate: float | None = None) -> GraspLog:
-    """Read a file of tracked markers; ``scale`` (m per pixel) and ``frame_rate`` (1/s) go before what the file says.
+def read(
+    path: Path, scale: float | None = None, frame_rate: float | None = None, rest: str | Path | None = None
+) -> GraspLog:
+    """Read a file of tracked markers; ``scale`` (m per pixel), ``frame_rate`` (1/s) and ``rest`` (of ``rest.py``'s
+    words, or a file of the same markers at rest) go before what the file says.
 
     Raises ``InvalidInput`` naming the line and the value that is wrong.
     """
     given = {name: repr(value) for name, value in (("scale", scale), ("frame_rate", frame_rate)) if value is not None}
-    return read_lines(text_lines(path), given)
+    if isinstance(rest, Path):
+        return read_lines(text_lines(path), given, at_rest(rest, given))
+    return read_lines(text_lines(path), given if rest is None else {**given, "rest": rest})
 
 
-def read_lines(lines: Iterator[str], given: Mapping[str, str] = MappingProxyType({})) -> GraspLog:
-    """Read a file's lines, with what is ``given`` in place of the settings that it tells."""
+def read_lines(
+    lines: Iterator[str],
+    given: Mapping[str, str] = MappingProxyType({}),
+    places: Mapping[str, FloatArray] | None = None,
+) -> GraspLog:
+    """Read a file's lines, with what is ``given`` in place of the settings that it tells, and ``places`` at rest [3] by
+    the markers' names, in the file's unit, in place of a frame.
+    """
     header = read_header(lines)
     settings = {**header.settings, **given}
-    return _grasp_log(_tracks(header, lines, settings), settings, header.ignored)
+    return _grasp_log(_tracks(header, lines, settings), settings, header.ignored, places)
+
+
+def at_rest(path: Path, given: Mapping[str, str] = MappingProxyType({})) -> dict[str, FloatArray]:
+    """Median place [3] of each marker of a file that shows the sensor alone, in the file's unit."""
+    lines = text_lines(path)
+    header = read_header(lines)
+    tracks = _tracks(header, lines, {"frame_rate": "1", **header.settings, **given})  # times play no part
+    seen = np.isfinite(tracks.place).all(axis=2).any(axis=0)
+    return {tracks.names[k]: np.nanmedian(tracks.place[:, k], axis=0) for k in np.flatnonzero(seen)}
 
 
 def looks_like(start: bytes) -> bool:
@@ -111,9 +136,13 @@ def _columns(text: str, settings: Mapping[str, str], number: int) -> Header:
     if missing:
         value = f"a header without {', '.join(missing)} ({text[:60]!r})"
         raise InvalidInput(
-            f"line {number}", value, "columns time or frame, marker, x, y; optional z, contact, gripper_force"
+            f"line {number}",
+            value,
+            "columns time or frame, marker, x, y; optional z, contact, fx with fy and fz, gripper_force",
         )
-    ignored = tuple(name for name in names if name not in ALIASES)
+    if not columns.keys() >= set(FORCE):  # friction needs all three
+        columns = {name: place for name, place in columns.items() if name not in FORCE}
+    ignored = tuple(name for name in names if ALIASES.get(name) not in columns)
     return Header(settings, columns, len(names), delimiter, ignored, number)
 
 
@@ -133,11 +162,18 @@ def _tracks(header: Header, lines: Iterator[str], settings: Mapping[str, str]) -
     if "contact" in header.columns:
         contact = _held(frame, marker, table[:, 5], place.shape[:2])
     gripper_force = _one_a_frame(frame, table[:, 6], line) if "gripper_force" in header.columns else None
-    return Tracks(time, place, contact, "z" in header.columns, gripper_force)
+    force = None
+    if header.columns.keys() >= set(FORCE):
+        force = np.full(place.shape, np.nan)
+        force[frame, marker] = table[:, 7:10]
+        force = _last_told(force)
+    return Tracks(tuple(names), time, place, force, contact, "z" in header.columns, gripper_force)
 
 
 def _table(header: Header, lines: Iterator[str]) -> tuple[FloatArray, dict[str, int]]:
-    """Rows [r, 8] of moment, marker (its number), x, y, z, contact, gripper's force, line; and the markers by name."""
+    """Rows [r, 11] of moment, marker (its number), x, y, z, contact, gripper's force, force along x, y and z, line; and
+    the markers by name.
+    """
     names: dict[str, int] = {}
     values = array("d")  # a list of tuples would take five times the memory
     for line, cells in rows(lines, header.delimiter, header.width, header.lines, MAX_ROWS):
@@ -162,7 +198,8 @@ def _row(header: Header, cells: list[str], line: int, names: dict[str, int]) -> 
     if touching not in (0.0, 1.0) and not math.isnan(touching):
         raise InvalidInput(f"line {line}, contact", repr(text["contact"])[:40], "0 or 1, empty where unknown")
     gripper = parse_number(text["gripper_force"], line, "gripper_force") if "gripper_force" in text else math.nan
-    return moment, marker, x, y, z, touching, gripper, line
+    force = (parse_number(text[name], line, name) if name in text else math.nan for name in FORCE)
+    return moment, marker, x, y, z, touching, gripper, *force, line
 
 
 def _setting(name: str, settings: Mapping[str, str], limits: tuple[float, float], unit: str) -> float:
@@ -214,39 +251,65 @@ def _one_a_frame(frame: NDArray[np.intp], told: FloatArray, lines: FloatArray) -
 
 def _held(frame: NDArray[np.intp], marker: NDArray[np.intp], touching: FloatArray, shape: tuple[int, int]) -> BoolArray:
     """Contact [t, k]; where it isn't told, as it was told last, at first none."""
-    told = np.full(shape, np.nan)
-    told[frame, marker] = touching
-    last = np.where(np.isnan(told), 0, np.arange(shape[0])[:, None])
-    held: BoolArray = np.take_along_axis(told, np.maximum.accumulate(last, axis=0), axis=0) == 1.0
+    told = np.full((*shape, 1), np.nan)
+    told[frame, marker, 0] = touching
+    held: BoolArray = _last_told(told)[..., 0] == 1.0
     return held
 
 
-def _grasp_log(tracks: Tracks, settings: Mapping[str, str], ignored: tuple[str, ...]) -> GraspLog:
-    """The log in metres, from the markers that the first frame shows: there they are at rest."""
-    known = np.isfinite(tracks.place[0]).all(axis=1)
+def _last_told(told: FloatArray) -> FloatArray:
+    """Numbers [t, k, c] as they were told last, at first 0."""
+    frames = np.arange(len(told))[:, None, None]
+    last = np.maximum.accumulate(np.where(np.isnan(told), 0, frames), axis=0)
+    return np.nan_to_num(np.take_along_axis(told, last, axis=0), nan=0.0)
+
+
+def _grasp_log(
+    tracks: Tracks,
+    settings: Mapping[str, str],
+    ignored: tuple[str, ...],
+    places: Mapping[str, FloatArray] | None,
+) -> GraspLog:
+    """The log in metres, from the markers whose place at rest is known."""
+    at, where = _rest(tracks, settings.get("rest", rests.FIRST), places)
+    known: BoolArray = np.asarray(np.isfinite(at).all(axis=1))
     if not known.any():
-        raise InvalidInput("first frame", "without any marker", "markers at rest in the first frame")
-    place, metadata = tracks.place[:, known], _metadata(tracks, known, ignored)
+        raise InvalidInput(where, "without any marker of the log", f"markers at rest in the {where}")
+    at, place, metadata = at[known], tracks.place[:, known], _metadata(tracks, known, ignored, where)
     if "scale" in settings:
         scale = _setting("scale", settings, SCALE, "m per pixel")
         metadata["scale"] = f"{scale:g} m per pixel"
     else:
-        scale = ASSUMED_WIDTH / max(float(np.ptp(place[0, :, :2], axis=0).max()), 1e-300)
+        scale = ASSUMED_WIDTH / max(float(np.ptp(at[:, :2], axis=0).max()), 1e-300)
         metadata |= {"scale": "unknown", "assumed_scale": f"{scale:.6g} m per pixel"}
     from slipcore.markers import on_lattice  # loads scipy.spatial, which whoever only looks what a file is does without
 
     contact = tracks.contact
-    if contact is None and not tracks.has_height:
+    if contact is None and not tracks.has_height and tracks.force is None:
         contact, metadata["contact"] = np.ones(tracks.place.shape[:2], bool), "assumed: every marker"
-    log, _ = on_lattice(
+    log, lattice = on_lattice(
         tracks.time,
-        scale * place[0],
-        scale * (place - place[0]),
+        scale * at,
+        scale * (place - at),
         None if contact is None else contact[:, known],
         settings.get("sensor", "unknown"),
         metadata,
     )
+    if tracks.force is not None:  # an element without a marker of its own bears none, or a force would count twice
+        own = lattice.occupied[..., None]
+        log = replace(log, force=np.where(own, tracks.force[:, known][:, lattice.marker], 0.0))
     return _with_gripper(log, tracks.gripper_force, settings)
+
+
+def _rest(tracks: Tracks, chosen: str, places: Mapping[str, FloatArray] | None) -> tuple[FloatArray, str]:
+    """Places [k, 3] at rest, NaN where unknown, and where they are from."""
+    if places is not None:
+        unknown = np.full(3, np.nan)
+        return np.array([places.get(name, unknown) for name in tracks.names]), "file of rest"
+    told = {"contact": tracks.contact, "force": tracks.force, "gripper_force": tracks.gripper_force}
+    load = rests.load_of({name: value for name, value in told.items() if value is not None})
+    frame = rests.frame_of(chosen, len(tracks.time), load, tracks.place)
+    return tracks.place[frame], f"frame {frame}" if frame else "first frame"
 
 
 def _with_gripper(log: GraspLog, force: FloatArray | None, settings: Mapping[str, str]) -> GraspLog:
@@ -257,12 +320,14 @@ def _with_gripper(log: GraspLog, force: FloatArray | None, settings: Mapping[str
     return replace(log, gripper_force=force, gripper_force_deviation=deviation)
 
 
-def _metadata(tracks: Tracks, known: BoolArray, ignored: tuple[str, ...]) -> dict[str, Any]:
+def _metadata(tracks: Tracks, known: BoolArray, ignored: tuple[str, ...], where: str) -> dict[str, Any]:
     lost = int(np.isnan(tracks.place[:, known, 0] + tracks.place[:, known, 1]).sum())
     told = {"format": "tracked markers", "markers": str(int(known.sum())), "lost_places": str(lost)}
     left_out = int(len(known) - known.sum())
     if left_out:
-        told["markers_left_out"] = f"{left_out} (not in the first frame)"
+        told["markers_left_out"] = f"{left_out} (not in the {where})"
+    if where != "first frame":
+        told["rest"] = where
     if ignored:
         told["columns_left_out"] = ", ".join(ignored)[:200]
     return told

@@ -151,6 +151,8 @@ def test_detect_reads_tracked_markers_and_says_what_it_cannot_know(run: Run, tmp
     assert (code, seen["marker_noise"]) == (0, None)
     assert "scale" in seen["unknown"]
     assert run("detect", tmp_path / "dots.csv")[0] == INPUT_REFUSED
+    assert run("convert", dots, tmp_path / "log.npz", "--rest", dots)[0] == 0
+    assert formats.read(tmp_path / "log.npz").metadata["rest"] == "file of rest"
 
 
 def test_simulate_takes_a_scene_by_name_or_by_file_and_writes_a_log_that_detect_reads(run: Run, tmp_path: Path) -> None:

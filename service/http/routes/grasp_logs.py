@@ -114,7 +114,7 @@ async def create_grasp_log(
         request.headers.get("content-type"),
         int(length) if length.isdecimal() else None,
         ",".join(request.headers.getlist("content-encoding")),
-        {"scale": asked.scale, "frame_rate": asked.frame_rate, "mapping": asked.mapping},
+        {name: getattr(asked, name) for name in ("scale", "frame_rate", "mapping", "rest")},
         principal,
     )
     async with received(context, chunks(request), wanted, partial(gone, request)) as log:

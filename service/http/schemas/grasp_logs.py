@@ -252,6 +252,10 @@ class UploadQuery(BaseModel):
             examples=['{"topic": "/tactile", "displacement": {"field": "markers", "unit": "mm"}, "grid": [20, 20]}'],
         ),
     ] = None
+    rest: Annotated[
+        str | None,
+        Field(max_length=60, description="Frame in which nothing touches: first, least contact, or its number"),
+    ] = None
 
 
 class GraspLogsQuery(BaseModel):

@@ -51,6 +51,7 @@ class NewUpload(BaseModel):
     scale: float | None = Field(default=None, ge=SCALE[0], le=SCALE[1])
     frame_rate: float | None = Field(default=None, ge=FRAME_RATE[0], le=FRAME_RATE[1])
     mapping: str | None = None
+    rest: str | None = None
 
 
 @router.get("/upload", dependencies=[READ])
@@ -92,7 +93,7 @@ def _file(form: FormData) -> UploadFile:
 
 def _asked(wanted: NewUpload, file: UploadFile, principal: Principal) -> UploadRequest:
     """The upload; raises ``RequestValidationError`` for a new material with a name that none may have."""
-    settings = {"scale": wanted.scale, "frame_rate": wanted.frame_rate, "mapping": wanted.mapping}
+    settings = {name: getattr(wanted, name) for name in ("scale", "frame_rate", "mapping", "rest")}
     declared = (wanted.material, wanted.sensor, wanted.detector, wanted.format)
     creates = wanted.create and wanted.material is not None
     if creates:

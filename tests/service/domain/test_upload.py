@@ -166,6 +166,13 @@ def test_the_scale_given_with_an_upload_is_kept_with_it(client: httpx.Client, up
     assert upload(client, unscaled(), "text/csv", scale="3e-5", frame_rate="30").json()["id"] != log["id"]
 
 
+def test_the_rest_given_with_an_upload_makes_another_log(client: httpx.Client, upload: Upload) -> None:
+    ids = {rest: upload(client, DOTS.read_bytes(), "text/csv", rest=rest).json()["id"] for rest in ("first", "9")}
+    assert ids["first"] == upload(client, DOTS.read_bytes(), "text/csv").json()["id"] != ids["9"]
+    problem = refusal(client, upload, DOTS.read_bytes(), 422, "text/csv", rest="/etc/hostname")
+    assert (problem["name"], problem["value"]) == ("rest", "'/etc/hostname'"), "a server opens no file by name"
+
+
 def test_a_loggers_table_is_taken_by_its_mapping_with_its_forces(
     client: httpx.Client, upload: Upload, wait: Wait
 ) -> None:

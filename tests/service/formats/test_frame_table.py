@@ -262,3 +262,36 @@ def test_taxels_that_tell_forces_alone_make_a_log_without_displacement(tmp_path:
     np.testing.assert_array_equal(log.force, field(told, "F") * [1.0, 1.0, -1.0])
     with pytest.raises(InvalidInput, match="displacement"):
         formats.read(path, "text/csv", mapping=json.dumps(MAPPING))
+
+
+@pytest.mark.parametrize(("rest", "frame"), [("least contact", 2), (1, 1), ("first", 0)])
+def test_displacement_is_from_the_frame_that_a_mapping_chooses(tmp_path: Path, rest: str | int, frame: int) -> None:
+    told = columns(np.random.default_rng(1)) | {f"P{p}_isInContact": list("11011") for p in range(PILLARS)}
+    path = written(tmp_path / "log.csv", told)
+    log, plain = read(path, rest=rest), read(path)
+    np.testing.assert_allclose(log.displacement, plain.displacement - plain.displacement[frame], rtol=0, atol=1e-18)
+    assert log.metadata["rest"] == f"frame {frame}"
+    given = formats.read(path, "text/csv", mapping=json.dumps(MAPPING), rest=str(rest))
+    np.testing.assert_array_equal(given.displacement, log.displacement)
+
+
+def test_places_of_markers_become_displacement_by_a_frame_at_rest(tmp_path: Path) -> None:
+    path, told = long_table(tmp_path / "log.csv")
+    mapping = {name: value for name, value in LONG.items() if name != "force"}
+    place = {"field": ["x_mm", "y_mm"], "unit": "mm"}
+    log = formats.read(path, mapping=json.dumps(mapping | {"position": place, "displacement": place, "rest": 1}))
+    places = 1e-3 * told.reshape(4, 2, 3, 7)[..., 5:]
+    np.testing.assert_allclose(log.position[..., :2], places[1], rtol=1e-12)
+    np.testing.assert_allclose(log.displacement[..., :2], places - places[1], rtol=0, atol=1e-15)
+
+
+def test_a_file_of_the_sensor_alone_tells_what_a_mapped_table_moves_from(tmp_path: Path) -> None:
+    told = columns(np.random.default_rng(1))
+    path, alone = (
+        written(tmp_path / "log.csv", told),
+        written(tmp_path / "alone.csv", columns(np.random.default_rng(2))),
+    )
+    log = formats.read(path, "text/csv", mapping=json.dumps(MAPPING), rest=alone)
+    zero = np.median(read(alone).displacement, axis=0)
+    np.testing.assert_allclose(log.displacement, read(path).displacement - zero, rtol=0, atol=1e-18)
+    assert log.metadata["rest"] == "alone.csv"

@@ -265,3 +265,85 @@ def test_a_damaged_file_is_read_or_refused(tmp_path: Path, seed: int, damages: i
     path.write_bytes(content)
     with contextlib.suppress(InvalidInput):
         assert len(formats.read(path, "text/csv")) > 1
+
+
+def pressed(order: list[int]) -> list[str]:
+    """A lattice of 9 × 9 dots, bulging sideways by frame as ``order`` tells, in 0.1 px at most a step."""
+    along = np.arange(9.0) - 4.0
+    x, y = np.meshgrid(along, along, indexing="ij")
+    bulge = np.exp(-(x**2 + y**2) / 4.0) * (np.abs(x) < 4) * (np.abs(y) < 4)
+    return [
+        f"{k},{i}-{j},{10 * i + step * x[i, j] * bulge[i, j]},{10 * j + step * y[i, j] * bulge[i, j]}"
+        for k, step in enumerate(order)
+        for i in range(9)
+        for j in range(9)
+    ]
+
+
+@pytest.mark.parametrize(("rest", "frame"), [("first", 0), ("least contact", 2), ("1", 1), (None, 0)])
+def test_rest_is_the_frame_that_is_chosen(write: Write, rest: str | None, frame: int) -> None:
+    path = write(table(rows=pressed([2, 1, 0, 3])))
+    log = formats.read(path, rest=rest)
+    assert not log.displacement[frame].any()
+    assert log.metadata.get("rest") == (f"frame {frame}" if frame else None)
+    np.testing.assert_allclose(np.abs(log.displacement).max(axis=(1, 2, 3)) > 0, np.arange(4) != frame, rtol=0)
+
+
+def test_a_file_may_say_which_frame_is_at_rest_and_what_is_given_goes_before(write: Write) -> None:
+    path = write(table(head="# scale: 1e-4\n# rest: least contact\n", rows=pressed([2, 1, 0, 3])))
+    assert formats.read(path).metadata["rest"] == "frame 2"
+    assert not formats.read(path, rest="3").displacement[3].any()
+
+
+def test_the_frame_of_least_contact_is_that_of_the_fewest_dots_that_touch(write: Write) -> None:
+    touching = {"0.0": "1", "0.1": "0", "0.2": "1"}
+    rows = [f"{row},{touching[row[:3]]}" for row in square()]
+    log = formats.read(write(table(header="time,marker,x,y,contact", rows=rows)), rest="least contact")
+    assert log.metadata["rest"] == "frame 1"
+
+
+def test_a_file_of_the_sensor_alone_tells_the_rest(write: Write, tmp_path: Path) -> None:
+    alone = tmp_path / "alone.csv"
+    alone.write_text(table(rows=pressed([0, 0])), encoding="utf-8")
+    path = write(table(rows=pressed([2, 1, 3])))
+    log, whole = formats.read(path, rest=alone), formats.read(write(table(rows=pressed([0, 2, 1, 3]))))
+    np.testing.assert_allclose(log.displacement, whole.displacement[1:], rtol=0, atol=1e-15, err_msg="rounding")
+    assert log.metadata["rest"] == "file of rest"
+    alone.write_text(table(rows=["0.0,elsewhere,1,2"]), encoding="utf-8")
+    with pytest.raises(InvalidInput, match="file of rest is without any marker of the log"):
+        formats.read(path, rest=alone)
+
+
+@pytest.mark.parametrize(
+    ("rest", "message"),
+    [("9", "rest is frame 9 of 3; allowed: 0 to 2"), ("last", "rest is 'last'; allowed: first, least contact, or"),
+     ("-1", "rest is '-1'"), ("1" * 10, "rest is '1111111111'")],
+)  # fmt: skip
+def test_a_frame_that_there_is_not_is_refused(write: Write, rest: str, message: str) -> None:
+    with pytest.raises(InvalidInput, match=message):
+        formats.read(write(table()), rest=rest)
+
+
+def test_dots_on_no_lattice_tell_no_frame_of_least_contact(write: Write) -> None:
+    dots = np.random.default_rng(1).uniform(0, 100, (60, 2))
+    rows = [f"{t},{k},{x},{y}" for t in (0, 1) for k, (x, y) in enumerate(dots)]
+    with pytest.raises(InvalidInput, match="least contact, of dots on no lattice without contact or force"):
+        formats.read(write(table(rows=rows)), rest="least contact")
+
+
+def test_forces_of_markers_are_kept(write: Write) -> None:
+    rows = [f"{row},0.1,{0.01 * k},-1.5" for k, row in enumerate(square())]
+    log = formats.read(write(table(header="time,marker,x,y,fx,force_y,fz", rows=rows)))
+    assert log.force is not None
+    np.testing.assert_allclose(log.force[..., 0], 0.1, rtol=1e-12)
+    np.testing.assert_allclose(log.force[..., 1].ravel(), 0.01 * np.arange(27), rtol=1e-12)
+    assert (log.contact, "columns_left_out" in log.metadata) == (None, False), "forces tell the contact"
+    part = formats.read(write(table(header="time,marker,x,y,fx,mass,fz", rows=rows)))
+    assert (part.force, part.metadata["columns_left_out"]) == (None, "fx, mass, fz"), "friction needs all three"
+
+
+def test_the_force_of_a_lost_marker_is_as_it_was_told_last(write: Write) -> None:
+    rows = [f"{row},0.1,0,{-1.0 - float(row[:3])}" for row in square() if not row.startswith("0.2,dot 11")]
+    log = formats.read(write(table(header="time,marker,x,y,fx,fy,fz", rows=rows)))
+    assert log.force is not None
+    np.testing.assert_allclose(log.force[:, 1, 1, 2], [-1.0, -1.1, -1.1], rtol=1e-12)

@@ -1,0 +1,66 @@
+"""Where markers are at rest: in a frame that is chosen, or in a recording of the sensor alone (docs/formats.md)."""
+
+import numpy as np
+
+from service.formats.members import Members
+from slipcore.errors import InvalidInput
+from slipcore.frames import FloatArray
+
+FIRST, LEAST_CONTACT = "first", "least contact"
+ALLOWED = f"{FIRST}, {LEAST_CONTACT}, or the number of a frame from 0 (local commands: or a file)"
+MOST_DIGITS = 9
+NEIGHBOUR = 1.25
+"""Of the usual distance to the nearest marker: between it and a square lattice's diagonal."""
+IRREGULAR = 0.1
+"""Standard deviation of that distance over its mean, above which dots are on no lattice."""
+
+
+def check(rest: str) -> str:
+    """One of the words, or a number as text; raises ``InvalidInput``."""
+    text = rest.strip().lower()
+    if text in (FIRST, LEAST_CONTACT) or (text.isascii() and text.isdecimal() and len(text) <= MOST_DIGITS):
+        return text
+    raise InvalidInput("rest", repr(rest)[:60], ALLOWED)
+
+
+def frame_of(rest: str, frames: int, load: FloatArray | None, place: FloatArray) -> int:
+    """The frame that ``rest`` names, of so many; the first of those with the least ``load`` [t] where it is the least
+    contact, or of those in which a lattice of markers ``place`` [t, k, 3] is stretched least.
+
+    Raises ``InvalidInput`` for a number that is none of a frame, and where nothing tells of contact.
+    """
+    text = check(rest)
+    if text == LEAST_CONTACT:
+        return int(np.argmin(stretch(place) if load is None else load))
+    frame = 0 if text == FIRST else int(text)
+    if frame >= frames:
+        raise InvalidInput("rest", f"frame {frame} of {frames}", f"0 to {frames - 1}")
+    return frame
+
+
+def load_of(members: Members) -> FloatArray | None:
+    """How much touches in each frame [t]: elements in contact, or force, or the gripper's; None where none is told."""
+    for name in ("contact", "force", "gripper_force"):
+        if name in members:
+            told = np.abs(np.asarray(members[name], dtype=np.float64))
+            return np.asarray(np.nan_to_num(told).reshape(len(told), -1).sum(axis=1))
+    return None
+
+
+def stretch(place: FloatArray) -> FloatArray:
+    """Sum of squared distances [t] of neighbouring markers ``place`` [t, k, 3] of a lattice.
+
+    Of places x + u it is that at rest, plus Σ|δu|², plus 2 Σ δx·δu, which on a lattice telescopes to its border: least
+    at rest where the border stands still. Raises ``InvalidInput`` for markers on no lattice, whose distances tell none.
+    """
+    from scipy.spatial import cKDTree
+
+    seen = place[:, np.isfinite(place).all(axis=(0, 2))]
+    if seen.shape[1] < 4:
+        raise InvalidInput("rest", f"{LEAST_CONTACT}, with {seen.shape[1]} markers never lost", ALLOWED)
+    usual = np.median(seen, axis=0)
+    nearest = np.asarray(cKDTree(usual).query(usual, k=2)[0])[:, 1]
+    if nearest.std() > IRREGULAR * nearest.mean():
+        raise InvalidInput("rest", f"{LEAST_CONTACT}, of dots on no lattice without contact or force", ALLOWED)
+    pairs = cKDTree(usual).query_pairs(NEIGHBOUR * float(np.median(nearest)), output_type="ndarray")
+    return np.asarray(((seen[:, pairs[:, 0]] - seen[:, pairs[:, 1]]) ** 2).sum(axis=(1, 2)))
