@@ -96,6 +96,12 @@ class MarkerDefaults(Options):
     """Of the bounding box to one marker, at most."""
     narrowest: Annotated[float, Option(1e-3, 1.0, "-", "6°: strain is ten times as noisy")] = 0.1
     """Sine of the angle between rows and columns; where markers cross them more narrowly, one is left out."""
+    touching_share: Annotated[float, Option(0.1, 0.95, "-", "tuning scenes: best F1 that loses 0.03 inside")] = 0.65
+    """Of the frame's largest motion, above which a marker that is seen in the plane only is taken to touch."""
+    touching_quantile: Annotated[float, Option(0.5, 1.0, "-", "8 of 400 markers may be tracked wrongly")] = 0.98
+    """Of the markers' motion, which stands for the largest."""
+    touching_noise: Annotated[float, Option(0.0, 100.0, "noises", "one of 400 markers in 10⁵ frames")] = 5.0
+    """Least of that motion, for any contact."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import binary_dilation, generate_binary_structure
+from scipy.ndimage import binary_dilation, binary_fill_holes, generate_binary_structure
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from slipcore.defaults import MARKERS
@@ -108,6 +108,24 @@ def on_lattice(
         observed=np.stack([frame.observed for frame in frames]),
     )
     return log, lattice
+
+
+def contact_by_motion(time: FloatArray, displacement: FloatArray) -> BoolArray:
+    """Which elements [t, n, m] touch, of displacements [t, n, m, 3] m that are seen in the plane only.
+
+    A body takes along what it touches, and the gel around it lags behind: under a rigid punch to ¾ a tenth of its
+    radius away, and at the rim of a sphere that is about to slide to ½ (Johnson, Contact Mechanics, §3.7 and §7.2). So
+    those touch that move by more than a share of the largest motion, with all that they enclose; where nothing moves
+    beyond noise, none. A contact as large as the sensor is found whole. Shares: ``defaults.MARKERS``.
+    """
+    from slipcore.noise import estimate_noise  # compiled
+
+    plane = displacement[..., :2]
+    noise = float(np.nan_to_num(estimate_noise(time, plane.reshape(len(time), -1, 2).swapaxes(1, 2))))
+    moved = np.hypot(plane[..., 0], plane[..., 1])
+    largest = np.quantile(moved.reshape(len(time), -1), MARKERS.touching_quantile, axis=1)[:, None, None]
+    touching = (moved > MARKERS.touching_share * largest) & (largest > MARKERS.touching_noise * noise)
+    return np.stack([binary_fill_holes(frame) for frame in touching])
 
 
 def mean_spacing(markers: FloatArray) -> float:

@@ -118,7 +118,7 @@ def upload(
     detector: str | None,
     scale: float | None,
     frame_rate: float | None,
-    mapping: Mapping[str, Any] | None,
+    mapping: Mapping[str, Any] | str | None,
     rest: str | int | None = None,
 ) -> Call[GraspLogReceipt]:
     """Upload a log; the service knows logs by content, so that a repetition is no second log."""
@@ -129,7 +129,7 @@ def upload(
         detector=detector,
         scale=scale,
         frame_rate=frame_rate,
-        mapping=None if mapping is None else json.dumps(mapping),
+        mapping=mapping if mapping is None or isinstance(mapping, str) else json.dumps(mapping),
         rest=rest,
     )
     request = Request("POST", "/v1/grasp-logs", params, content=content, content_type=content_type)

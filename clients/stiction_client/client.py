@@ -79,7 +79,7 @@ class FrictionClient:
         detector: str | None = None,
         scale: float | None = None,
         frame_rate: float | None = None,
-        mapping: Mapping[str, Any] | None = None,
+        mapping: Mapping[str, Any] | str | None = None,
         rest: str | int | None = None,
     ) -> GraspLogReceipt:
         """Upload a grasp log: a record, a file, or a Tac3D recording folder.
@@ -87,8 +87,8 @@ class FrictionClient:
         With ``material`` the service refits that material once the slip is detected; follow with ``wait``. The same
         content twice is one log. ``sensor`` and ``detector`` default to what the log and the service say.
         ``scale`` (m per pixel) and ``frame_rate`` (1/s) are for a table of tracked markers that does not tell them,
-        ``mapping`` for a recording whose topics, fields or columns have names of their own, ``rest`` the frame
-        of either in which nothing touches: "first", "least contact" or its number.
+        ``mapping`` (or the name of a preset) for a recording whose topics, fields or columns have names of their own,
+        ``rest`` the frame of either in which nothing touches: "first", "least contact" or its number.
         """
         return self._run(calls.upload(log, material, sensor, detector, scale, frame_rate, mapping, rest))
 
@@ -305,7 +305,7 @@ class AsyncFrictionClient:
         detector: str | None = None,
         scale: float | None = None,
         frame_rate: float | None = None,
-        mapping: Mapping[str, Any] | None = None,
+        mapping: Mapping[str, Any] | str | None = None,
         rest: str | int | None = None,
     ) -> GraspLogReceipt:
         """As ``FrictionClient.upload``."""

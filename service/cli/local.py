@@ -38,7 +38,9 @@ Scale = Annotated[float | None, typer.Option(help="Of tracked markers: m per pix
 FrameRate = Annotated[float | None, typer.Option(help="Of tracked markers whose file counts frames: 1/s.")]
 Mapping = Annotated[
     Path | None,
-    typer.Option("--mapping", help="A JSON file that says which topic, field or column of the log is what."),
+    typer.Option(
+        "--mapping", help="A JSON file that says which column or field is what, or a preset: papillarray, uskin."
+    ),
 ]
 Rest = Annotated[
     str | None,
@@ -203,8 +205,12 @@ def refuse_inputs(output: Path, *inputs: Path | None) -> None:
 
 
 def mapping_text(path: Path | None) -> str | None:
-    """What a mapping's file says, where there is one."""
-    return None if path is None else path.read_text(encoding="utf-8")
+    """What a mapping's file says, or the name of a preset."""
+    from service.formats.presets import PRESETS
+
+    if path is None or (str(path) in PRESETS and not path.exists()):
+        return None if path is None else str(path)
+    return path.read_text(encoding="utf-8")
 
 
 def rest_of(told: str | None) -> str | Path | None:

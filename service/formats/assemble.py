@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from service.formats import rest
 from service.formats.lattice import element_area, flat_lattice
-from service.formats.mapping import FieldMapping, Origin
+from service.formats.mapping import COMPONENTS, PRESSURE_ALONE, FieldMapping, Origin
 from service.formats.members import DTYPES, FLAG, ONCE, REQUIRED, TEXT, Members, grasp_log, told_metadata
 from service.formats.npy import MAX_ARRAY_BYTES
 from slipcore.errors import InvalidInput
@@ -54,12 +55,14 @@ def assemble(recording: Recording, mapping: FieldMapping) -> GraspLog:
 def _log(
     members: dict[str, NDArray[Any]], mapping: FieldMapping, metadata: dict[str, str], recording: Recording
 ) -> GraspLog:
+    grid = mapping.grid or recording.grid()
+    if "force" in members:
+        _check_no_pressure(members["force"], mapping, grid)
     if "force" in members and "displacement" not in members:
         members["displacement"] = np.zeros(members["force"].shape)
         metadata["displacement"] = NONE
     for name in ("displacement", "time"):
         _require(name, members, recording)
-    grid = mapping.grid or recording.grid()
     for name in (*VECTORS, *MASKS):
         if name in members:
             members[name] = _on_grid(name, members[name], grid)
@@ -69,15 +72,20 @@ def _log(
     if mapping.rest is not None:
         _from_rest(members, mapping, metadata)
     _require("position", members, recording)
-    if len(mapping.origins["displacement"].fields) == 2 and not {"force", "contact"} & members.keys():
-        members["contact"] = np.ones(members["displacement"].shape[:3], dtype=bool)
-        metadata["contact"] = "assumed"
+    unseen = len(mapping.origins["displacement"].fields) == 2 and not {"force", "contact"} & members.keys()
+    if unseen:
+        metadata["contact"] = "estimated from motion"
     if "element_area" not in members:
         members["element_area"] = np.array(element_area("position", members["position"]))
         metadata["element_area"] = "mean of the cells between the markers"
     if metadata:
         members["metadata"] = _with(members, metadata)
-    return grasp_log(members)
+    log = grasp_log(members)
+    if not unseen:
+        return log
+    from slipcore.markers import contact_by_motion  # loads scipy.spatial, which few files need
+
+    return replace(log, contact=contact_by_motion(log.time, log.displacement))
 
 
 def _from_rest(members: dict[str, NDArray[Any]], mapping: FieldMapping, metadata: dict[str, str]) -> None:
@@ -205,6 +213,14 @@ def _on_grid(name: str, array: NDArray[Any], grid: tuple[int, int] | None) -> ND
     if array.size != np.prod(shape, dtype=object):
         raise InvalidInput(name, f"of shape {list(array.shape)}", f"{list(shape)} or as many numbers")
     return array.reshape(shape)
+
+
+def _check_no_pressure(force: NDArray[Any], mapping: FieldMapping, grid: tuple[int, int] | None) -> None:
+    """Raises ``InvalidInput`` for forces of one component."""
+    single = len(mapping.origins["force"].fields) == 1
+    elements = force.size // max(1, len(force)) if force.ndim else 0
+    if single and (elements == math.prod(grid) if grid else elements % len(COMPONENTS["force"])):
+        raise InvalidInput("force", f"one component an element (shape {list(force.shape)})", PRESSURE_ALONE)
 
 
 def _likely_grid(name: str, array: NDArray[Any]) -> str:

@@ -5,6 +5,7 @@ and element (docs/formats.md).
 import re
 from array import array
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,10 @@ from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray, GraspLog
 
 MAX_ROWS = 5_000_000
+TRUTH = {"True": "1", "False": "0"}
+"""As pandas and ROS write them."""
+MOST_STATES = 12
+"""Numbers of a noted column that are counted one by one."""
 OF_FRAMES = ("time", "object_pose", "gripper_force", "gripper_force_deviation", "sensor", "metadata", "element_area")
 """Members that are the same for all elements of a frame."""
 
@@ -27,8 +32,9 @@ ANY_NUMBER = "*"
 
 def read(path: Path, mapping: FieldMapping | None = None) -> GraspLog:
     """Read a grasp log from a table of frames. Raises ``InvalidInput`` naming the line, column or member."""
-    table = _Table(path, (mapping or UNMAPPED).over(default_origins()))
-    return assemble(table, table.mapping)
+    table = _Table(path, mapping or UNMAPPED)
+    log = assemble(table, table.mapping)
+    return replace(log, metadata={**log.metadata, **table.notes()})
 
 
 def looks_like(start: bytes) -> bool:
@@ -46,13 +52,13 @@ class _Table:
     """The columns that a mapping names; a ``Recording``."""
 
     def __init__(self, path: Path, mapping: FieldMapping) -> None:
-        self.mapping = mapping
         lines = text_lines(path)
         self._names, delimiter, before = _header(lines)
+        self.mapping = mapping = self._chosen(mapping).over(default_origins())
         for name, origin in mapping.origins.items():
             self._check_same_elements(name, origin.fields)
         fields = [field for origin in mapping.origins.values() for field in origin.fields]
-        fields += [] if mapping.element is None else [mapping.element]
+        fields += [*mapping.notes.values(), *([] if mapping.element is None else [mapping.element])]
         chosen = sorted({column for field in fields for column in self._columns(field)})
         self._place = {column: k for k, column in enumerate(chosen)}
         self._values = self._read(rows(lines, delimiter, len(self._names), before, MAX_ROWS), chosen)
@@ -72,6 +78,32 @@ class _Table:
 
     def grid(self) -> None:
         """Told by the mapping alone."""
+
+    def _chosen(self, mapping: FieldMapping) -> FieldMapping:
+        """The first of a preset's alternatives whose columns are there, without the contact where that isn't told."""
+        if "preset" not in mapping.text:
+            return mapping
+        for each in (mapping, *mapping.alternatives):
+            missing = {name for name, origin in each.origins.items() if not all(map(self._columns, origin.fields))}
+            if missing <= {"contact"}:
+                told = {name: origin for name, origin in each.origins.items() if name not in missing}
+                return replace(each, origins=told)
+        looked_for = {field for each in (mapping, *mapping.alternatives) for field in each.origins["force"].fields[:1]}
+        raise InvalidInput("preset", f"of columns {', '.join(sorted(looked_for))}, not there", self.contents())
+
+    def notes(self) -> dict[str, str]:
+        """What the columns to be noted tell: how often each of a few numbers, or the median of many."""
+        told = {}
+        for name, field in self.mapping.notes.items():
+            found = self._values[:, [self._place[column] for column in self._columns(field)]]
+            numbers, times = np.unique(found[np.isfinite(found)], return_counts=True)
+            if 0 < len(numbers) <= MOST_STATES:
+                told[name] = ", ".join(
+                    f"{number:g} {count} times" for number, count in zip(numbers, times, strict=True)
+                )
+            elif len(numbers):
+                told[name] = f"median {np.nanmedian(found):.4g} of {int(times.sum())}"
+        return told
 
     def contents(self) -> str:
         """The columns."""
@@ -118,7 +150,10 @@ class _Table:
         values = array("d")
         for line, cells in lines:
             values.extend(
-                parse_number(cells[column].strip(), line, self._names[column], "a finite number") for column in chosen
+                parse_number(
+                    TRUTH.get(text := cells[column].strip(), text), line, self._names[column], "a finite number"
+                )
+                for column in chosen
             )
             if len(values) * values.itemsize > MAX_CONTENT_BYTES:
                 raise InvalidInput("file", f"more than {MAX_CONTENT_BYTES} bytes", f"at most {MAX_CONTENT_BYTES}")

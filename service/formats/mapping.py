@@ -3,9 +3,10 @@
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
+from service.formats import presets
 from service.formats import rest as rests
 from service.formats.members import DTYPES, ONCE
 from slipcore.errors import InvalidInput
@@ -33,12 +34,17 @@ COMPONENTS = {
 }
 """Those of what may have a unit a component; one that begins with a minus turns that axis."""
 
+PRESSURE_ALONE = (
+    "three components of force an element, or displacement of markers: pressure alone tells no tangential force, "
+    "and so neither slip nor friction. Record a sensor of shear beside it, or the displacement of markers in its skin"
+)
+"""What is asked of an array that tells pressure."""
 LARGEST = 1e300
 """Of any number: a whole one may have more digits than a float can hold."""
 
 _ORIGIN_KEYS = {"field", "topic", "unit", "value"}
 _ALLOWED_ORIGIN = "a field, a list of fields, or an object of field or value, topic and unit"
-_SETTINGS = ("topic", "grid", "pitch", "tolerance", "episode", "element", "rest")
+_SETTINGS = ("topic", "grid", "pitch", "tolerance", "episode", "element", "rest", "notes")
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,9 +68,10 @@ class Origin:
 @dataclass(frozen=True, slots=True)
 class FieldMapping:
     """Origin of each member, and what the file may not tell: lattice, pitch (m), tolerance (s), episode, and the column
-    that numbers the elements where a table has a row for each, and the frame at ``rest``, from which displacement is.
+    that numbers the elements where a table has a row for each, and the frame at ``rest``, whose displacement is 0.
 
-    ``text`` is the mapping as it was given, empty where none was.
+    ``text`` is the mapping as it was given, empty where none was. ``notes`` are fields kept in the metadata, by
+    name. A preset has ``alternatives``, of which the first whose fields are there is taken.
     """
 
     origins: Mapping[str, Origin]
@@ -75,6 +82,8 @@ class FieldMapping:
     element: str | None = None
     rest: str | None = None
     text: str = ""
+    notes: Mapping[str, str] = field(default_factory=dict)
+    alternatives: "tuple[FieldMapping, ...]" = ()
 
     def over(self, defaults: Mapping[str, Origin]) -> "FieldMapping":
         """This mapping with ``defaults`` for the members that it does not name."""
@@ -85,16 +94,26 @@ UNMAPPED = FieldMapping({})
 
 
 def parse(text: str) -> FieldMapping:
-    """A mapping from its JSON; raises ``InvalidInput`` naming the entry that is wrong."""
+    """A mapping from its JSON, or from a preset's name; raises ``InvalidInput`` naming the entry that is wrong."""
     if len(text.encode(errors="replace")) > MAX_MAPPING_BYTES:
         raise InvalidInput("mapping", f"{len(text)} characters", f"at most {MAX_MAPPING_BYTES} bytes")
+    if text.strip() in presets.PRESETS:
+        text = json.dumps({"preset": text.strip()})
     try:
         given = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise InvalidInput("mapping", f"not JSON ({error})", "a JSON object") from error
     if not isinstance(given, dict):
         raise InvalidInput("mapping", text[:60], "a JSON object")
+    first, *others = [_parsed(each, given) for each in presets.alternatives(given)]
+    return replace(first, alternatives=tuple(others))
+
+
+def _parsed(given: Mapping[str, Any], told: Mapping[str, Any]) -> FieldMapping:
+    """The mapping that is ``given``, where another may have been ``told``, such as a preset."""
     unknown = sorted(given.keys() - DTYPES.keys() - set(_SETTINGS))
+    if "pressure" in unknown:
+        raise InvalidInput("pressure", "mapped", PRESSURE_ALONE)
     if unknown:
         raise InvalidInput("mapping", f"of the unknown {unknown[0][:60]!r}", ", ".join((*DTYPES, *_SETTINGS)))
     topic = _text("topic", given["topic"]) if "topic" in given else None
@@ -106,8 +125,15 @@ def parse(text: str) -> FieldMapping:
         episode=_episode(given["episode"]) if "episode" in given else None,
         element=_text("element", given["element"]) if "element" in given else None,
         rest=rests.check(str(given["rest"])) if "rest" in given else None,
-        text=json.dumps(given, sort_keys=True, ensure_ascii=False),
+        text=json.dumps(told, sort_keys=True, ensure_ascii=False),
+        notes=_notes(given["notes"]) if "notes" in given else {},
     )
+
+
+def _notes(given: Any) -> dict[str, str]:
+    if not isinstance(given, dict) or len(given) > 100:
+        raise InvalidInput("notes", repr(given)[:60], "an object of names and fields, 100 at most")
+    return {_text("notes", name): _text(f"notes, {name[:60]}", each) for name, each in given.items()}
 
 
 def default_origins(frame_topic: str | None = None, once_topic: str | None = None) -> dict[str, Origin]:

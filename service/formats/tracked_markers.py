@@ -21,6 +21,7 @@ from slipcore.frames import BoolArray, FloatArray, GraspLog
 ALIASES = {
     "time": "time", "frame": "frame", "marker": "marker", "particle": "marker", "id": "marker", "track_id": "marker",
     "x": "x", "y": "y", "z": "z", "contact": "contact", "gripper_force": "gripper_force",
+    "frameno": "frame", "cx": "x", "cy": "y", "row": "row", "col": "col",
     "fx": "fx", "fy": "fy", "fz": "fz", "force_x": "fx", "force_y": "fy", "force_z": "fz",
 }  # fmt: skip
 """Columns that are read, by the names that trackers give them."""
@@ -130,6 +131,10 @@ def _columns(text: str, settings: Mapping[str, str], number: int) -> Header:
             raise InvalidInput(f"line {number}", f"two columns of {ALIASES[name]}", "one of each")
         if name in ALIASES:
             columns[ALIASES[name]] = place
+    if "marker" in columns or not columns.keys() >= {"row", "col"}:  # which else name the marker
+        columns = {name: place for name, place in columns.items() if name not in ("row", "col")}
+    elif columns.keys() >= {"row", "col"}:
+        columns["marker"] = columns["row"]
     missing = [name for name in ("marker", "x", "y") if name not in columns]
     if not {"time", "frame"} & columns.keys():
         missing.insert(0, "time or frame")
@@ -191,7 +196,8 @@ def _row(header: Header, cells: list[str], line: int, names: dict[str, int]) -> 
         raise InvalidInput(f"line {line}, {key}", repr(text[key])[:40], "a finite number")
     if not text["marker"]:
         raise InvalidInput(f"line {line}, marker", "empty", "a name or number")
-    marker = names.setdefault(text["marker"], len(names))
+    name = f"{text['row']}, {text['col']}" if "row" in text else text["marker"]
+    marker = names.setdefault(name, len(names))
     x, y = parse_number(text["x"], line, "x"), parse_number(text["y"], line, "y")
     z = parse_number(text["z"], line, "z") if "z" in text else 0.0
     touching = parse_number(text["contact"], line, "contact") if "contact" in text else 1.0
@@ -282,11 +288,13 @@ def _grasp_log(
     else:
         scale = ASSUMED_WIDTH / max(float(np.ptp(at[:, :2], axis=0).max()), 1e-300)
         metadata |= {"scale": "unknown", "assumed_scale": f"{scale:.6g} m per pixel"}
-    from slipcore.markers import on_lattice  # loads scipy.spatial, which whoever only looks what a file is does without
+    from slipcore.markers import (
+        contact_by_motion,
+        on_lattice,
+    )  # loads scipy.spatial, which whoever only looks what a file is does without
 
     contact = tracks.contact
-    if contact is None and not tracks.has_height and tracks.force is None:
-        contact, metadata["contact"] = np.ones(tracks.place.shape[:2], bool), "assumed: every marker"
+    unseen = contact is None and not tracks.has_height and tracks.force is None
     log, lattice = on_lattice(
         tracks.time,
         scale * at,
@@ -298,6 +306,9 @@ def _grasp_log(
     if tracks.force is not None:  # an element without a marker of its own bears none, or a force would count twice
         own = lattice.occupied[..., None]
         log = replace(log, force=np.where(own, tracks.force[:, known][:, lattice.marker], 0.0))
+    if unseen:
+        metadata = {**log.metadata, "contact": "estimated from motion"}
+        log = replace(log, contact=contact_by_motion(log.time, log.displacement), metadata=metadata)
     return _with_gripper(log, tracks.gripper_force, settings)
 
 

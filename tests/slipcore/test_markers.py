@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from slipcore import GraspLog, GroundTruth, InvalidInput, SlipDetector, SlipHistory, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
-from slipcore.markers import MarkerLattice, mean_spacing, on_lattice
+from slipcore.markers import MarkerLattice, contact_by_motion, mean_spacing, on_lattice
 from slipcore.surface.strain import Lattice
 
 PITCH = 1e-3
@@ -174,3 +174,25 @@ def test_a_stream_of_dots_is_its_batch(dots: tuple[GraspLog, np.ndarray]) -> Non
         frame = lattice.step(frame, moved[k])
         answer = detector.step(time, frame.displacement, observed=frame.observed)
         np.testing.assert_array_equal(answer.slip, history.slip[k])
+
+
+def test_contact_by_motion_is_near_the_true_one_of_simulated_grasps() -> None:
+    log = tangential_ramp(points=24, pitch=0.75e-3)
+    assert log.truth is not None
+    rng = np.random.default_rng(3)
+    seen = np.array(log.displacement) + 1e-6 * rng.standard_normal(log.displacement.shape)
+    seen[..., 2] = 0.0
+    found, truth = contact_by_motion(log.time, seen), log.truth.contact
+    loaded = found.any(axis=(1, 2))
+    assert loaded.any()
+    found, truth = found[loaded], truth[loaded]
+    assert (found & truth).sum() / (found | truth).sum() > 0.6
+    turned = contact_by_motion(log.time, seen[..., ::-1, :, :])
+    np.testing.assert_array_equal(turned, contact_by_motion(log.time, seen)[:, ::-1], err_msg="by place alone")
+
+
+def test_without_motion_nothing_touches_and_a_whole_sensor_that_moves_touches_whole() -> None:
+    time, still = np.arange(40) / 30, 1e-6 * np.random.default_rng(1).standard_normal((40, 10, 10, 3))
+    assert not contact_by_motion(time, still).any()
+    moving = still + np.linspace(0.0, 1e-3, 40)[:, None, None, None] * [1.0, 0.0, 0.0]
+    assert contact_by_motion(time, moving)[20:].all()

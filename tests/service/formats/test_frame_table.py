@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from service import formats
 from service.formats import frame_table
 from slipcore import GraspLog, InvalidInput
+from slipcore.markers import contact_by_motion
 
 FRAMES, PILLARS = 5, 9
 MAPPING: dict[str, Any] = {
@@ -222,13 +223,13 @@ def test_a_table_with_a_row_for_each_marker_and_frame_is_read(tmp_path: Path) ->
     assert log.contact is None, "forces tell it"
 
 
-def test_markers_seen_from_above_without_forces_are_taken_to_touch(tmp_path: Path) -> None:
+def test_markers_seen_from_above_without_forces_touch_where_they_move(tmp_path: Path) -> None:
     path, _ = long_table(tmp_path / "log.csv")
     mapping = {name: value for name, value in LONG.items() if name != "force"}
     log = formats.read(path, mapping=json.dumps(mapping))
     assert log.contact is not None
-    assert log.contact.all()
-    assert log.metadata["contact"] == "assumed"
+    np.testing.assert_array_equal(log.contact, contact_by_motion(log.time, log.displacement))
+    assert log.metadata["contact"] == "estimated from motion"
 
 
 def test_a_missing_row_or_column_of_a_long_table_is_refused_by_name(tmp_path: Path) -> None:
@@ -295,3 +296,12 @@ def test_a_file_of_the_sensor_alone_tells_what_a_mapped_table_moves_from(tmp_pat
     zero = np.median(read(alone).displacement, axis=0)
     np.testing.assert_allclose(log.displacement, read(path).displacement - zero, rtol=0, atol=1e-18)
     assert log.metadata["rest"] == "alone.csv"
+
+
+def test_pressure_alone_is_refused_with_what_to_record(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t,P0,P1,P2,P3\n0,1,1,1,1\n1,1,1,1,2\n", encoding="utf-8")
+    mapping = {"grid": [2, 2], "pitch": 1e-3, "time": "t"}
+    for name in ("force", "pressure"):
+        with pytest.raises(InvalidInput, match=r"tells no tangential force.*neither slip nor friction.*Record"):
+            formats.read(path, mapping=json.dumps(mapping | {name: "P*"}))

@@ -104,11 +104,11 @@ def test_a_marker_that_is_not_there_at_rest_is_left_out_and_told(write: Write) -
     assert (log.metadata["markers"], log.metadata["markers_left_out"]) == ("9", "1 (not in the first frame)")
 
 
-def test_without_height_and_contact_every_marker_is_taken_to_touch(write: Write) -> None:
+def test_without_height_and_contact_those_touch_that_move_more_than_around_them(write: Write) -> None:
     log = formats.read(write(table()))
     assert log.contact is not None
-    assert log.contact.all()
-    assert log.metadata["contact"] == "assumed: every marker"
+    assert np.argwhere(log.contact).tolist() == [[1, 1, 1], [2, 1, 1]], "the only dot that moves"
+    assert log.metadata["contact"] == "estimated from motion"
 
 
 def test_with_height_contact_is_left_to_the_shape(write: Write) -> None:
@@ -347,3 +347,15 @@ def test_the_force_of_a_lost_marker_is_as_it_was_told_last(write: Write) -> None
     log = formats.read(write(table(header="time,marker,x,y,fx,fy,fz", rows=rows)))
     assert log.force is not None
     np.testing.assert_allclose(log.force[:, 1, 1, 2], [-1.0, -1.1, -1.1], rtol=1e-12)
+
+
+def test_a_table_of_rows_and_columns_as_gelsights_trackers_write_it_is_read(write: Write) -> None:
+    rows = [
+        f"{t},{i},{j},{10 * i},{10 * j},{10 * i + t * (i == j == 1)},{10 * j}"
+        for t in range(3)
+        for i in range(3)
+        for j in range(3)
+    ]
+    log = formats.read(write("frameno,row,col,Ox,Oy,Cx,Cy\n" + "\n".join(rows)), scale=1e-4, frame_rate=25.0)
+    np.testing.assert_allclose(log.displacement[:, 1, 1, 0], [0.0, 1e-4, 2e-4], rtol=0, atol=1e-15)
+    assert (log.grid, log.metadata["columns_left_out"]) == ((3, 3), "ox, oy")

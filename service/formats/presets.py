@@ -1,0 +1,68 @@
+"""Mappings of vendors' tables by name (docs/formats.md): from public documentation and loggers, not from the vendors.
+
+A preset has alternatives, for the same array is logged under several names; the first whose columns are there is taken.
+``{array}`` is the number of the sensor where a table has several, ``{again}`` what its repeated names end in.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from slipcore.errors import InvalidInput
+
+AXES = "XYZ"
+PRESSED = ["N", "N", "-N"]
+"""Sensors of vendors tell pressure as positive; here z points outwards."""
+
+
+def papillarray(array: int) -> list[dict[str, Any]]:
+    """Contactile's PapillArray: nine pillars, mm and N, in the names of its logger, its ROS message, and recorders."""
+    again = f".{array}" if array else ""
+
+    def named(pattern: str, contact: str, time: Any, notes: dict[str, str]) -> dict[str, Any]:
+        return {
+            "grid": [3, 3],
+            "pitch": 7e-3,
+            "time": time,
+            "displacement": {"field": [pattern.format("d" + axis) for axis in AXES], "unit": "mm"},
+            "force": {"field": [pattern.format("f" + axis) for axis in AXES], "unit": PRESSED},
+            "contact": contact,
+            "notes": notes,
+        }
+
+    logger = named("P*_{}" + again, "P*_isInContact" + again, {"field": "T_us", "unit": "us"}, {})
+    logger |= {
+        "displacement": {"field": [f"P*_D{axis}{again}" for axis in AXES], "unit": "mm"},
+        "force": {"field": [f"P*_F{axis}{again}" for axis in AXES], "unit": PRESSED},
+        "notes": {"slip_state": f"P*_slipState{again}", "friction_est": f"FrictionEst{again}"},
+    }
+    message = named(
+        "field.pillars*.{}",
+        "field.pillars*.in_contact",
+        {"field": "field.tus", "unit": "us"},
+        {"slip_state": "field.pillars*.slip_state", "friction_est": "field.friction_est"},
+    )
+    notes = {"slip_state": f"{array}_slipstate_*", "friction_est": f"{array}_friction_est"}
+    return [logger, message, named(f"{array}_{{}}_*", f"{array}_incontact_*", "timestamp", notes)]
+
+
+def uskin(array: int) -> list[dict[str, Any]]:
+    """XELA's uSkin: calibrated forces in N and no displacement, in the names of its server's ROS message."""
+    field = [f"field.sensors{array}.forces*.{axis}" for axis in "xyz"]
+    force = {"field": field, "unit": PRESSED}
+    return [{"grid": [4, 4], "pitch": 4.7e-3, "time": {"field": "%time", "unit": "ns"}, "force": force}]
+
+
+PRESETS: Mapping[str, Callable[[int], list[dict[str, Any]]]] = {"papillarray": papillarray, "uskin": uskin}
+
+
+def alternatives(given: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The mappings that a given one stands for: its preset's, each with what else it says, or itself."""
+    if "preset" not in given:
+        return [dict(given)]
+    name, array = given["preset"], given.get("array", 0)
+    if not isinstance(name, str) or name not in PRESETS:
+        raise InvalidInput("preset", repr(name)[:60], ", ".join(PRESETS))
+    if type(array) is not int or not 0 <= array < 100:
+        raise InvalidInput("array", repr(array)[:60], "0 to 99, the number of a sensor in the table")
+    said = {key: value for key, value in given.items() if key not in ("preset", "array")}
+    return [{**each, **said} for each in PRESETS[name](array)]
