@@ -63,6 +63,38 @@ class NoiseDefaults(Options):
     """That are looked at at most, evenly chosen."""
     least_series: Annotated[int, Option(2, 1000, "elements", "a median of fewer is one of them")] = 4
     """That must have changed for a frame to tell anything."""
+    least_step: Annotated[float, Option(0.0, 1e-3, "m", "digits of files, and rounding of floats")] = 1e-9
+    """By so much a place may miss a multiple of the step in which places are told."""
+    finest_step: Annotated[float, Option(0.0, 1e-3, "m", "a third of it is less than any camera's noise")] = 2e-8
+    """No finer one is told apart from none."""
+    step_levels: Annotated[int, Option(2, 1000, "-", "two are multiples of their distance, by chance")] = 3
+    """Different places from which they may be multiples of a step."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SmoothingDefaults(Options):
+    """How widely a sensor smooths its fields (``surface/smoothing.py``)."""
+
+    reach: Annotated[float, Option(1.0, 100.0, "standard deviations", "beyond it a Gaussian is 3e-4 of its peak")] = 4.0
+    """To which the kernel is reckoned."""
+    frequencies: Annotated[int, Option(8, 1_000_000, "-", "integrals to 1e-6")] = 513
+    """At which integrals are taken."""
+    frames: Annotated[int, Option(1, 1_000_000, "frames", "the median then errs by 2 %")] = 64
+    """Looked at, evenly chosen."""
+    least_frames: Annotated[int, Option(3, 1_000_000, "frames", "a median of ten")] = 12
+    """Of a recording whose smoothing is told."""
+    least_elements: Annotated[int, Option(1, 1_000_000, "elements", "as many as noise is estimated from")] = 64
+    """With neighbours all around."""
+    least_noise: Annotated[float, Option(0.0, 1e-3, "m", "motion that changes its speed bends as little")] = 1e-7
+    """Of markers, from which it tells how they are smoothed."""
+    least_force_noise: Annotated[float, Option(0.0, 1.0, "N", "as above, of forces")] = 1e-4
+    """The same of forces."""
+    largest_still: Annotated[float, Option(0.0, 1.0, "-", "5 % of markers may freeze")] = 0.1
+    """Share of readings that may lie on the line through their neighbours in time: others are rounded."""
+    whole: Annotated[float, Option(0.0, 1.0, "-", "white noise: 0.97 to 1.03")] = 0.85
+    """Bend of noise, over that of white noise, from which it is not smoothed."""
+    widest: Annotated[float, Option(0.1, 100.0, "elements", "0.2 % of a field's finest waves is left")] = 1.6
+    """No wider kernel is made undone."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,11 +187,12 @@ DEVIATION_TO_SIGMA = 1.4826022185056018
 NORMAL_95 = 1.959963984540054
 """Φ⁻¹(0.975): half-width of the 95 % interval of a normal distribution in standard deviations."""
 NOISE = NoiseDefaults()
+SMOOTHING = SmoothingDefaults()
 NUMERICS = NumericsDefaults()
 MARKERS = MarkerDefaults()
 PATCHES = PatchDefaults()
 COLLECTION = CollectionDefaults()
-TABLES = (NOISE, NUMERICS, MARKERS, PATCHES, COLLECTION)
+TABLES = (NOISE, SMOOTHING, NUMERICS, MARKERS, PATCHES, COLLECTION)
 """What is not an option of a method."""
 
 
@@ -235,6 +268,18 @@ class FilterOptions(ContactOptions):
     """Marker noise while it cannot be estimated yet."""
     displacement_floor: Annotated[float, Option(1e-12, 1e-3, "m", "no camera tracks a marker better")] = 3.5e-08
     """Least standard deviation of a marker coordinate."""
+    lasting_ratio: Annotated[float, Option(1.0, 100.0, "-", "white noise up to 1.6, correlated by 0.9 over 2")] = 1.7
+    """Noise by neighbours over that by three frames, beyond which it lasts from frame to frame."""
+    lasting_least: Annotated[float, Option(0.0, 1e-3, "m", "bends of fields without noise, tuning scenes")] = 3e-7
+    """Such noise that is none."""
+    lasting_share: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes; errors of frames are not independent")] = 2.0
+    """Factor on its variance; 0: no noise is taken to last."""
+    marker_kernel: Annotated[float, Option(0.0, 0.1, "m", "0: not smoothed; of whole logs estimated")] = 0.0
+    """Standard deviation of the kernel that the sensor smooths displacement with, which is then undone."""
+    force_kernel: Annotated[float, Option(0.0, 0.1, "m", "0: not smoothed; of whole logs estimated")] = 0.0
+    """The same of forces."""
+    smoothing_noise: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 1e-4
+    """Power of noise that came after the smoothing, over that of the field."""
     rigidity: Annotated[float, Option(0.0, 1.0, "-", "tuning scenes")] = 0.012
     """How far a stuck element may stray from the object's motion, as a share of it."""
     rigidity_of_fit: Annotated[float, Option(0.0, 10.0, "-", "fits are of many elements")] = 0.5
@@ -256,7 +301,11 @@ class FilterOptions(ContactOptions):
     end_length: Annotated[float, Option(1e-9, 1.0, "m", "tuning scenes")] = 0.0001
     """Motion of the object within which slip ends."""
     hold_time: Annotated[float, Option(0.0, 1e6, "s", "tuning scenes")] = 0.5
-    """Without motion for so long, where markers are tells nothing more of slip."""
+    """Without motion or change of load for so long, frames tell nothing more of slip."""
+    hold_deviations: Annotated[float, Option(0.0, 100.0, "standard deviations", "one in 10⁶ frames of white noise")] = (
+        5.0
+    )
+    """How far pose or load must part from their means since something last happened, for something to happen."""
     least_weight: Annotated[float, Option(0.0, 1.0, "-", "slipping points still tell that all stand still")] = 0.003
     """Weight of a surely slipping element in the fit of the object's motion."""
     outlier: Annotated[float, Option(0.1, 100.0, "-", "tuning scenes")] = 4.4

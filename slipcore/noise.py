@@ -13,11 +13,17 @@ _LEAST, _MEMORY = NOISE.least_series, NOISE.memory
 
 @compiled
 def median(values: FloatArray) -> float:
-    """Upper median of values [k], by selection; their order is changed.
+    """Upper median of values [k]; their order is changed."""
+    return ranked(values, len(values) // 2)
+
+
+@compiled
+def ranked(values: FloatArray, rank: int) -> float:
+    """The value [k] that so many of them precede in order, by selection; their order is changed.
 
     Partitioned without a branch in the inner loop (Lomuto), which random values would mispredict every other time.
     """
-    low, high, middle = 0, len(values), len(values) // 2
+    low, high = 0, len(values)
     while True:
         pivot = values[(low + high) // 2]
         less = low
@@ -25,7 +31,7 @@ def median(values: FloatArray) -> float:
             value = values[k]
             values[k], values[less] = values[less], value
             less += value < pivot
-        if middle < less:
+        if rank < less:
             high = less
         elif less > low:
             low = less
@@ -34,7 +40,7 @@ def median(values: FloatArray) -> float:
                 value = values[k]
                 values[k], values[less] = values[less], value
                 less += not value > pivot  # true of NaN, too
-            if middle < less:
+            if rank < less:
                 return float(pivot)
             low = less
 

@@ -12,6 +12,7 @@ from slipcore.detection.detector import DetectorState, init, masked, slip_state,
 from slipcore.detection.methods import find_method, findings_by
 from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.interface import CompiledMethod
+from slipcore.detection.sharpening import kernels_of, smoothing_found
 from slipcore.detection.whole_log import history_of
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
@@ -31,8 +32,9 @@ def detect_slip(
     """Detect local slip in a whole log: the fold of ``step`` over its frames.
 
     With a ``lookahead`` each frame is decided in the light of that many frames after it (see ``FixedLagSmoother``);
-    with a ``sensor_model`` the log is first corrected by it (``SensorModel.apply``). A log without displacement is left
-    to method "forces_only" where the default would see nothing. ``options`` are the method's, and
+    with a ``sensor_model`` the log is first corrected by it (``SensorModel.apply``). Method "filter" sharpens what the
+    sensor smoothed, as far as the log's noise tells how widely, unless options tell it. A log without displacement is
+    left to method "forces_only" where the default would see nothing. ``options`` are the method's, and
     ``kernel_width`` of ``defaults.PatchOptions``; what the sensor model knows of noise and smoothing goes before their
     defaults. Raises ``InvalidInput`` as ``init`` does, and for a log of another lattice than the sensor model's.
     """
@@ -42,9 +44,14 @@ def detect_slip(
         log, _, known = sensor_model.apply(log, method)
         options = {**known, **options}
     kernel_width = options.pop("kernel_width", 0.0)
+    estimated = {}
+    if method == DEFAULT_METHOD:
+        estimated = {name: width for name, width in kernels_of(log).items() if name not in options}
+        options |= estimated
     state = init(log.position, log.element_area, method, **options)
     if isinstance(find_method(method), CompiledMethod):
         history = history_of(log, state, checked_lookahead(lookahead))
+        history = replace(history, findings=history.findings + smoothing_found(estimated))
         return with_patches(log, history, kernel_width=kernel_width)
     smoother, settled_states = FixedLagSmoother(state, lookahead), []
     for frame in log.frames():

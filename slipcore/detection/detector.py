@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from slipcore.defaults import DEFAULT_METHOD, LIMITS, NOISE, ContactOptions, choose_options
+from slipcore.defaults import DEFAULT_METHOD, LIMITS, ContactOptions, choose_options
 from slipcore.detection.methods import find_method, findings_by
 from slipcore.detection.shared.contact import Touch
 from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.interface import CompiledMethod, Observation, Start
+from slipcore.detection.shared.lasting_noise import start_noise
 from slipcore.detection.shared.observe import observe
 from slipcore.detection.shared.records import (
     NO_FIELD,
@@ -28,6 +29,7 @@ from slipcore.detection.shared.records import (
     unwritten,
     workspace,
 )
+from slipcore.detection.sharpening import sharpened
 from slipcore.errors import InvalidInput
 from slipcore.finding import Finding
 from slipcore.frames import (
@@ -91,7 +93,7 @@ def init(position: ArrayLike, element_area: float, method: str = DEFAULT_METHOD,
     sensor = Sensor(position_at_rest, steps, inverse, lattice.orientation, *touch, start.settings)
     shape = lattice.position.shape
     frame = FrameArrays(-math.inf, read_only(np.zeros(shape)), NO_FIELD, NO_POSE, NO_FIELD, NO_MASK)
-    noise = np.zeros((9, max(1 + NOISE.memory, NOISE.series)))
+    noise = start_noise()
     nowhere, nothing = np.zeros(shape[:2], bool), np.zeros(shape[:2])
     memory = Memory(nowhere, nowhere, nothing, noise, start.elements, start.common)
     return DetectorState(Setup(lattice, area, method, chosen, sensor), frame, None, memory, of_method, math.nan)
@@ -117,7 +119,9 @@ def touch_thresholds(options: ContactOptions, element_area: float) -> tuple[Floa
 
 def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
     """Take one valid frame, later than the last; on the first, every element in contact sticks."""
-    setup, seen, last = state.setup, frame_arrays(frame), unwritten(state.frame)
+    setup, last = state.setup, unwritten(state.frame)
+    displacement, force = sharpened(frame.displacement, frame.force, setup.options, setup.element_area)
+    seen = frame_arrays(frame._replace(displacement=displacement, force=force))
     method, memory = find_method(setup.method), state.memory
     sensor, after, of_method = setup.sensor, empty_like(memory), None
     velocity = np.empty((*memory.probability.shape, 2))
@@ -127,7 +131,7 @@ def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
     else:
         room = workspace(*memory.probability.shape)
         observe(sensor, seen, memory, after, room)
-        noise, pressing_noise = (float(known) for known in room.surface.noise)
+        noise, pressing_noise = (float(known) for known in room.surface.noise[:2])
         observation = Observation(
             seen.time - last.time,
             seen.displacement,

@@ -10,6 +10,7 @@ from slipcore.detection.detector import DetectorState, step
 from slipcore.detection.fold import FrameResults, Recording, fold, rings_from
 from slipcore.detection.methods import findings_by
 from slipcore.detection.shared.records import NO_FIELD, NO_MASK, NO_POSE, workspace
+from slipcore.detection.sharpening import sharpened
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.slip_state import SlipHistory, slip_events
 
@@ -26,7 +27,9 @@ def history_of(log: GraspLog, state: DetectorState, lookahead: int) -> SlipHisto
     ahead = lookahead if is_filter else 0
     room = workspace(*memory.probability.shape)
     rings = rings_from(memory, ahead)
-    noise = fold(is_filter, setup.sensor, _recording(log), rings, ahead, room, results)
+    displacement, force = sharpened(log.displacement, log.force, setup.options, setup.element_area)
+    recording = _recording(log, displacement, force)
+    noise = fold(is_filter, setup.sensor, recording, rings, ahead, room, results)
     found = findings_by(setup.method, rings.common[(len(log) - 1) % 2])
     return replace(_history(log, setup.method, noise, results), findings=found)
 
@@ -37,11 +40,11 @@ def _empty_results(log: GraspLog) -> FrameResults:
     return FrameResults(np.empty(shape, bool), np.empty(shape, bool), np.empty(shape), np.empty((*shape, 2)), *counts)
 
 
-def _recording(log: GraspLog) -> Recording:
+def _recording(log: GraspLog, displacement: FloatArray, force: FloatArray | None) -> Recording:
     return Recording(
         log.time,
-        _frames(log.displacement, NO_FIELD, log),
-        _frames(log.force, NO_FIELD, log),
+        _frames(displacement, NO_FIELD, log),
+        _frames(force, NO_FIELD, log),
         _frames(log.object_pose, NO_POSE, log),
         _frames(log.normal, NO_FIELD, log),
         _frames(log.contact, NO_MASK, log),

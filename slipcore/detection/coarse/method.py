@@ -10,11 +10,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import expit, logit
 
-from slipcore.defaults import NOISE, CoarseOptions, FilterOptions
+from slipcore.defaults import CoarseOptions, FilterOptions
 from slipcore.detection.filter import method as by_place
 from slipcore.detection.forces_only import method as by_force
 from slipcore.detection.shared.contact import Touch
 from slipcore.detection.shared.interface import Method, Observation
+from slipcore.detection.shared.lasting_noise import start_noise
 from slipcore.detection.shared.records import (
     NO_FIELD,
     NO_MASK,
@@ -42,7 +43,7 @@ class State(NamedTuple):
 def init(lattice: Lattice, options: CoarseOptions) -> State:
     """Nothing touches yet."""
     shape, start = lattice.position.shape, by_place.METHOD.start(lattice, FilterOptions())
-    noise = np.zeros((9, max(1 + NOISE.memory, NOISE.series)))
+    noise = start_noise()
     nowhere, nothing = np.zeros(shape[:2], bool), np.zeros(shape[:2])
     frame = FrameArrays(-np.inf, read_only(np.zeros(shape)), NO_FIELD, NO_POSE, NO_FIELD, NO_MASK)
     memory = Memory(nowhere, nowhere, nothing, noise, start.elements, start.common)

@@ -102,6 +102,15 @@ def weigh_forces(
 
 
 @compiled
+def keep_ratios(elements: FloatArray, places: NDArray[np.int64], after: FloatArray, told: FloatArray) -> None:
+    """Learn nothing, and fill ``told`` [2, k] with nothing: for frames in which nothing happens."""
+    told[:] = 0.0
+    for e in range(len(places)):
+        i, j = places[e]
+        after[RATIO, i, j], after[RATIO_WEIGHT, i, j] = elements[RATIO, i, j], elements[RATIO_WEIGHT, i, j]
+
+
+@compiled
 def learn_ratios(
     elements: FloatArray,
     places: NDArray[np.int64],

@@ -11,12 +11,14 @@ from slipcore.detection.filter.smoothing import look_back
 from slipcore.detection.filter.state import (
     COMMON,
     FORCE_FRAMES,
+    LASTING,
     POSE,
     PROBABILITY,
     PULLED_FRAMES,
     REFERENCE,
     ROWS,
     STICK_VARIANCE,
+    TOLD_STEP,
 )
 from slipcore.detection.filter.step import decide
 from slipcore.detection.filter.tuning import LEAST_TRANSITION, THRESHOLD, settings_of
@@ -47,12 +49,23 @@ def revise(elements: Sequence[FloatArray], settings: FloatArray) -> Decision:
 
 
 def findings(common: FloatArray) -> tuple[Finding, ...]:
-    """Forces by which the object pulls."""
-    frames, pulled = round(common[FORCE_FRAMES]), round(common[PULLED_FRAMES])
-    if not pulled:
-        return ()
-    evidence = f"the object pulls in {pulled} of {frames} frames in which it touches; slip is told without them there"
-    return (Finding("forces not believed", evidence, "give the force of the object on the sensor, in its frame"),)
+    """Forces by which the object pulls, and noise of markers that three frames do not show."""
+    found, frames, pulled = [], round(common[FORCE_FRAMES]), round(common[PULLED_FRAMES])
+    if pulled:
+        evidence = (
+            f"the object pulls in {pulled} of {frames} frames in which it touches; slip is told without them there"
+        )
+        remedy = "give the force of the object on the sensor, in its frame"
+        found.append(Finding("forces not believed", evidence, remedy))
+    if common[TOLD_STEP] > 0.0:
+        evidence = f"all places of markers are multiples of {1e6 * common[TOLD_STEP]:.3g} µm"
+        found.append(Finding("rounded", evidence, "record places as finely as the tracker tells them"))
+    elif common[LASTING] > 0.0:
+        evidence = (
+            f"markers part from their neighbours by {1e6 * common[LASTING]:.3g} µm that lasts from frame to frame"
+        )
+        found.append(Finding("lasting noise", evidence, "record without a low-pass; calibrate the sensor"))
+    return tuple(found)
 
 
 METHOD = CompiledMethod(FilterOptions, start, run_filter, revise, findings)

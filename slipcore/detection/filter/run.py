@@ -1,7 +1,10 @@
 """A whole step of method ``filter`` in one call: observe, decide, and what follows."""
 
+import math
+
 from slipcore.compilation import compiled
-from slipcore.detection.filter.step import step_filter
+from slipcore.detection.filter.step import lasting_noise, step_filter
+from slipcore.detection.filter.tuning import tuning_of
 from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.observe import observe
 from slipcore.detection.shared.records import FrameArrays, Memory, Sensor, Workspace, named, workspace
@@ -36,4 +39,6 @@ def filter_frame(
     touching, slipping = apply_decision(
         sensor.position, last, frame, room.decision, before, after, room.weight, velocity
     )
-    return room.surface.noise[0], touching, slipping
+    shown, _, between_neighbours, step = room.surface.noise
+    lasting = lasting_noise(shown, between_neighbours, step, tuning_of(sensor.settings))
+    return math.hypot(shown, lasting), touching, slipping

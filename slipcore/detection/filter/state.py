@@ -6,12 +6,14 @@ force ratio that it slipped at with the weight of that knowledge; and how probab
 that it began to slip if it stuck and that it stuck again if it slipped.
 
 ``common`` is what elements share: the pose; the loading; the slipping force ratio (weighted sum, weight); the
-share in which the surface follows the known motion (the same); the pose from which motion counts; for how long there
-has been none, s; and of a given pose: how it was corrected for noise, how far the markers' pose lay from it in the
-last two frames, of how many frames that is known, and what second differences of it say of the noise of place, m, and
-yaw, rad; in how many frames of contact there were forces, and pulled; how far the camera has moved, x, y m; and of
-the markers around the contact the last step, x, y m, by how much it differed from the one before, and what such
-differences say of jitter, m².
+share in which the surface follows the known motion (the same); the pose from which motion counts; for how long
+neither it nor the load has moved, s; and of a given pose: how it was corrected for noise, how far the markers' pose lay
+from it in the last two frames, of how many frames that is known, and what second differences of it say of the noise of
+place, m, and yaw, rad; in how many frames of contact there were forces, and pulled; how far the camera moved, x, y m;
+and of the markers around the contact the last step, x, y m, by how much it differed from the one before, and what such
+differences say of jitter, m²; and of the frames since object or load last moved how many there are, and the means of
+pose and of load (N, or without forces m); and of markers the step in which places are told, m, and the noise that lasts
+from frame to frame, m.
 """
 
 from slipcore.defaults import NOISE
@@ -28,4 +30,7 @@ FORCE_FRAMES = NOISE_OF_YAW + 1 + NOISE.memory
 PULLED_FRAMES = FORCE_FRAMES + 1
 SHIFT = PULLED_FRAMES + 1
 STEP, BEND, JITTER = SHIFT + 2, SHIFT + 4, SHIFT + 6
-COMMON = JITTER + 2
+HELD_FRAMES = JITTER + 2
+HELD_POSE, HELD_LOAD = HELD_FRAMES + 1, HELD_FRAMES + 5
+TOLD_STEP, LASTING = HELD_LOAD + 3, HELD_LOAD + 4
+COMMON = HELD_LOAD + 5

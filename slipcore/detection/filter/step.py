@@ -7,12 +7,15 @@ from numpy.typing import NDArray
 
 from slipcore.compilation import compiled
 from slipcore.detection.filter.element import Increment, Measurement, update_element
-from slipcore.detection.filter.force_ratio import follow_forces, weigh_forces
+from slipcore.detection.filter.force_ratio import follow_forces, keep_ratios, weigh_forces
+from slipcore.detection.filter.hold import changed, load_of, step_hold
 from slipcore.detection.filter.loading import low_pass, restick_under_load
 from slipcore.detection.filter.pose import Anchors, Motion, Pose, object_motion, place_on_object
 from slipcore.detection.filter.state import (
     END,
     FORCE_FRAMES,
+    HELD_FRAMES,
+    LASTING,
     ONSET,
     POSE,
     PROBABILITY,
@@ -25,13 +28,19 @@ from slipcore.detection.filter.state import (
     STICK_X,
     STICK_Y,
     STILL,
+    TOLD_STEP,
 )
 from slipcore.detection.filter.surface_motion import step_pose, store_pose, stored_pose
 from slipcore.detection.filter.surroundings import shift_of_surroundings
 from slipcore.detection.filter.tuning import Tuning, tuning_of
+from slipcore.detection.shared.contact import neighbours
+from slipcore.detection.shared.lasting_noise import OF_STEP
 from slipcore.detection.shared.observe import same
-from slipcore.detection.shared.records import Decision, FrameArrays, Memory, Sensor, Workspace
+from slipcore.detection.shared.records import Decision, FrameArrays, Memory, Sensor, Surface, Workspace
 from slipcore.frames import BoolArray, FloatArray
+
+WHOLE = 8
+"""Neighbours of an element that is not at an edge."""
 
 
 @compiled
@@ -49,6 +58,7 @@ def step_filter(
     """
     tuning = tuning_of(sensor.settings)
     after.common[:] = before.common
+    hold_contact(frame, before, after, room.surface, has_force, tuning)
     if frame.force.size and after.contact.any():
         after.common[FORCE_FRAMES] += 1.0
         after.common[PULLED_FRAMES] += 0.0 if has_force else 1.0
@@ -73,9 +83,11 @@ def step_elements(
 ) -> None:
     """The object's motion, the load's change and the forces' log-odds; then each element that stays in contact."""
     surface = room.surface
-    marker_noise, pressing_noise = surface.noise
-    variance = (tuning.noise_margin * known_or(marker_noise, tuning.unknown_noise)) ** 2 + tuning.displacement_floor**2
-    force_noise = tuning.force_noise_margin * known_or(pressing_noise, 0.0)
+    marker_noise, _, between_neighbours, told_step = surface.noise
+    lasting = lasting_noise(marker_noise, between_neighbours, told_step, tuning)
+    after.common[TOLD_STEP] = told_step
+    after.common[LASTING] = lasting if lasting > known_or(marker_noise, tuning.unknown_noise) else 0.0
+    variance, force_noise = noise_of_frame(surface, tuning)
     interval, common, elements = frame.time - last.time, before.common, before.elements
     last_pose = stored_pose(common, POSE)
     places = room.places[: find_places(elements, surface.stays, room.places)]
@@ -85,31 +97,80 @@ def step_elements(
     )
     find_anchors(elements, places, position, frame.displacement, shift, anchors)
     pose, spread = step_pose(anchors, last_pose, last, frame, variance, tuning, after.common)
+    noise = interval, variance, force_noise
+    held = step_hold(anchors, pose, spread, frame, noise, has_force, tuning, after.common)
     reference = stored_pose(common, REFERENCE)
     reference = object_motion(anchors, reference, pose, spread, tuning.motion_play, motion)
-    store_pose(after.common, REFERENCE, reference)
-    moves = motion.x.any() or motion.y.any()
-    after.common[STILL] = 0.0 if moves else common[STILL] + interval
+    if held:
+        motion.x[:] = 0.0
+        motion.y[:] = 0.0
+    else:
+        store_pose(after.common, REFERENCE, reference)
     if not (has_force and last.force.size):
         change = change[:, :0]
     force_change(places, last.force, frame.force, change)
     indentation_change(places, last.displacement, frame.displacement, deeper)
-    noise = interval, variance, force_noise
-    restick = restick_under_load(common, after.common, anchors, motion, deeper, change, noise, tuning)
+    restick = restick_under_load(common, after.common, anchors, motion, deeper, change, noise, tuning) and not held
     readiness = 0.0 if restick or math.isnan(marker_noise) else 1.0  # nor does it begin before noise is known
     follow_forces(elements, surface, has_force, low_pass(interval, tuning.force_smoothing), after.elements)
-    if change.size:
+    if held:
+        keep_ratios(elements, places, after.elements, told)
+    elif change.size:
         weigh_forces(elements, places, force_noise, interval, tuning, after.elements, after.common, told)
     else:
         told[:] = 0.0
     start_elements(position, frame.displacement, shift, surface.stays, pose, variance, after)
-    increment = Increment(interval, variance, restick, after.common[STILL] > tuning.hold_time)
+    increment = Increment(interval, variance, restick, held)
     for e in range(len(places)):
         i, j = places[e]
         near = tuning.onset_inside + tuning.onset_at_front * slip_of_neighbours(elements, after.contact, i, j)
         x, y = place_on_object(pose, anchors.marker_x[e], anchors.marker_y[e])
         seen = Measurement(motion.x[e], motion.y[e], motion.variance[e], readiness * near, told[0, e], x, y)
         update_element(elements, after.elements, i, j, seen, increment, tuning)
+
+
+@compiled
+def noise_of_frame(surface: Surface, tuning: Tuning) -> tuple[float, float]:
+    """Variance of a marker coordinate, m², and deviation of an element's force, N, that are reckoned with."""
+    marker_noise, pressing_noise, between_neighbours, told_step = surface.noise
+    lasting = lasting_noise(marker_noise, between_neighbours, told_step, tuning)
+    shown = tuning.noise_margin * known_or(marker_noise, tuning.unknown_noise)
+    variance = shown**2 + lasting**2 + tuning.displacement_floor**2
+    return variance, tuning.force_noise_margin * known_or(pressing_noise, 0.0)
+
+
+@compiled
+def hold_contact(
+    frame: FrameArrays, before: Memory, after: Memory, surface: Surface, has_force: bool, tuning: Tuning
+) -> None:
+    """Let the contact's rim stay as it was while nothing happens: elements there would come and go by noise, and with
+    them what is known of their slip. What touches apart from it, or lets go amid it, does.
+    """
+    common = before.common
+    if not common[STILL] > tuning.hold_time or common[HELD_FRAMES] == 0.0 or frame.contact.size:
+        return
+    variance, force_noise = noise_of_frame(surface, tuning)
+    load, load_variance = load_of(frame, has_force, variance, force_noise, tuning)
+    if changed(load, load_variance, tuning, common):
+        return
+    n, m = after.contact.shape
+    for i in range(n):
+        for j in range(m):
+            if after.contact[i, j] != before.contact[i, j]:
+                around = neighbours(before.contact, i, j)
+                if around > 0 if after.contact[i, j] else around < WHOLE:
+                    after.contact[i, j] = surface.stays[i, j] = before.contact[i, j]
+
+
+@compiled
+def lasting_noise(marker_noise: float, between_neighbours: float, step: float, tuning: Tuning) -> float:
+    """What of a marker coordinate's noise three frames do not show, m: rounding to a ``step``, and what parts it from
+    its neighbours by far more than from one frame to the next.
+    """
+    shown, rounding = known_or(marker_noise, 0.0), OF_STEP * step
+    most = math.hypot(tuning.lasting_ratio * max(shown, rounding), tuning.lasting_least)
+    more = max(known_or(between_neighbours, 0.0) ** 2 - most**2, 0.0)
+    return math.sqrt(tuning.lasting_share * (max(rounding**2 - shown**2, 0.0) + more))
 
 
 @compiled

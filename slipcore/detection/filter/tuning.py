@@ -15,6 +15,9 @@ class Tuning(NamedTuple):
     noise_margin: float
     unknown_noise: float
     displacement_floor: float
+    lasting_ratio: float
+    lasting_least: float
+    lasting_share: float
     rigidity: float
     rigidity_of_fit: float
     rigidity_of_anchor: float
@@ -26,6 +29,7 @@ class Tuning(NamedTuple):
     onset_at_front: float
     end_length: float
     hold_time: float
+    hold_deviations: float
     least_weight: float
     outlier: float
     outlier_gate: float

@@ -5,6 +5,7 @@ import math
 from slipcore.compilation import compiled, unpack
 from slipcore.defaults import NOISE
 from slipcore.detection.shared.contact import TOUCH, Touch, find_contact, spatial_noise
+from slipcore.detection.shared.lasting_noise import OF_STEP, step_lasting
 from slipcore.detection.shared.records import FrameArrays, Memory, Sensor, Workspace
 from slipcore.frames import FloatArray
 from slipcore.noise import noise_of_three, recent_median, remember
@@ -29,6 +30,11 @@ def observe(sensor: Sensor, frame: FrameArrays, before: Memory, after: Memory, r
         indent(frame.displacement, pressing)
         tangential[:] = 0.0
     noise[0], noise[1] = step_noise(before.noise, frame.time, frame.displacement, pressing, after.noise, room.series)
+    fresh = after.noise[2, 2] > before.noise[2, 2]
+    between, step, step_of_depth = step_lasting(before.noise, frame.displacement, fresh, after.noise, room.series)
+    noise[2], noise[3] = between, step
+    if not frame.force.size:
+        noise[1] = max(noise[1], OF_STEP * step_of_depth)
     contact, was = after.contact, before.contact
     by_force, by_shape = Touch(*unpack(sensor.touch_by_force, TOUCH)), Touch(*unpack(sensor.touch_by_shape, TOUCH))
     pulls = frame.force.size > 0 and pulled(pressing, noise[1], by_force)
@@ -75,8 +81,8 @@ def step_noise(
     """Learn from one more frame, unless it repeats the last (that would make the noise look smaller); the noise of a
     marker coordinate, m, and of ``pressing``, NaN while unknown. ``series`` [2, k]: room for medians.
 
-    Remembered in rows of [9, columns]: recent estimates of markers and of pressing; a clock (times of the last two
-    frames, and how many there were); then x, y and pressing of evenly chosen elements in each of these two frames.
+    Remembered in the first nine rows of [11, columns]: recent estimates of markers and of pressing; a clock (times of
+    the last two frames, and how many there were); then x, y and pressing of evenly chosen elements in each of these.
     """
     n, m = pressing.shape
     k = min(n * m, SERIES)

@@ -57,7 +57,7 @@ class Memory(NamedTuple):
     """What a detector remembers between two frames beside the frame itself.
 
     ``contact``, ``slip`` and its ``probability`` [n, m]; state of the ``noise`` estimate (see
-    ``noise.step_noise``); the method's own ``elements`` [rows, n, m] and ``common`` [k] of all of them.
+    ``observe.step_noise``, ``lasting_noise``); the method's own ``elements`` [rows, n, m] and ``common`` [k] of all.
     """
 
     contact: BoolArray
@@ -133,7 +133,7 @@ class Workspace(NamedTuple):
 def workspace(n: int, m: int) -> Workspace:
     """Room for frames of n × m elements."""
     stays, slip, shape = np.empty((n, m), np.bool_), np.empty((n, m), np.bool_), (n, m)
-    surface = Surface(np.empty((n, m, 3)), np.empty(shape), np.empty(shape), stays, np.empty(2))
+    surface = Surface(np.empty((n, m, 3)), np.empty(shape), np.empty(shape), stays, np.empty(4))
     decision, series = Decision(slip, np.empty(shape)), np.empty((2, _SERIES))
     return Workspace(
         surface, decision, np.empty(shape), series, np.empty((n * m, 2), np.int64), np.empty((_ROWS, n * m))

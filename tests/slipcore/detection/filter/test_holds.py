@@ -1,12 +1,15 @@
 """No evidence, no transition: while nothing moves, noise alone begins no slip and moves no probability."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from benchmarks.detector_scenes import simulated, tuning
 from slipcore import GraspLog, SlipHistory, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
+from slipcore.contact.scene import Scene
 
 INPUTS = ("forces", "displacement", "motion")
 PRESS = RampSchedule(rest=0.2, press=0.5, settle=0.2, shear=0.0, hold=0.0)
@@ -58,13 +61,37 @@ def test_nor_in_a_hundred_thousand_frames(inputs: str) -> None:
     assert share(history)[-1] <= 0.005
 
 
+def drift(history: SlipHistory, frames: int, settled: int) -> float:
+    """Mean change of probability of what touches, from so many frames after the beginning of a hold to its end."""
+    begin = len(history.time) - frames + settled
+    touches = history.contact[begin:].all(axis=0)
+    assert touches.any()
+    return float(np.abs(history.probability[-1] - history.probability[begin])[touches].mean())
+
+
+@pytest.mark.parametrize("inputs", INPUTS)
+@pytest.mark.parametrize("marker_noise", [0.0, 1e-6, 1e-5])
+def test_what_slipped_before_a_hold_is_still_said_at_its_end(inputs: str, marker_noise: float) -> None:
+    history = detect_slip(held(ramp(SHEAR), 1800, 30.0, marker_noise, inputs))
+    assert share(history)[-1] > 0.2
+    assert drift(history, 1800, 30) <= 0.01
+
+
+@pytest.mark.parametrize("inputs", ["forces", "displacement"])
+@pytest.mark.parametrize("name", ["cond1", "reversal"])
+def test_a_hold_after_a_scene_moves_no_probability(scene: Callable[..., GraspLog], name: str, inputs: str) -> None:
+    history = detect_slip(held(scene(name), 600, 30.0, 1e-6, inputs))
+    assert drift(history, 600, 30) <= 0.01
+
+
+@pytest.mark.long
 @pytest.mark.parametrize("inputs", INPUTS)
 @pytest.mark.parametrize("marker_noise", [1e-6, 1e-5])
-def test_what_slipped_before_a_hold_is_still_said_at_its_end(inputs: str, marker_noise: float) -> None:
-    slip = share(detect_slip(held(ramp(SHEAR), 1800, 30.0, marker_noise, inputs)))
-    settled, end = slip[-1500], slip[-1]
-    assert settled > 0.2
-    assert abs(end - settled) <= 0.08  # an element or two of 28 to 36, whose places noise had not told apart
+@pytest.mark.parametrize("rate", [30.0, 120.0, 1000.0])
+@pytest.mark.parametrize("case", tuning(), ids=lambda case: case.name)
+def test_nor_do_those_of_a_library_of_scenes(case: Scene, rate: float, marker_noise: float, inputs: str) -> None:
+    frames = round(20.0 * rate)
+    assert drift(detect_slip(held(simulated(case), frames, rate, marker_noise, inputs)), frames, round(rate)) <= 0.01
 
 
 def test_interpolated_frames_change_nothing() -> None:

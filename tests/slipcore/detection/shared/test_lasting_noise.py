@@ -1,0 +1,73 @@
+"""Noise that three frames do not show: what lasts from frame to frame, and rounding."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from service.slip_benchmark.faults import Fault, correlated, rounded
+from slipcore import GraspLog, SlipHistory, detect_slip
+from slipcore.detection.shared.lasting_noise import noise_between_neighbours, seek_step
+
+Scene = Callable[..., GraspLog]
+Score = Callable[[GraspLog, SlipHistory], float]
+
+
+def step_of(*frames: np.ndarray) -> float:
+    found = np.zeros(2)
+    for values in frames:
+        seek_step(np.ascontiguousarray(np.atleast_2d(values)), found)
+    return float(found[0])
+
+
+@pytest.mark.parametrize("step", [1e-7, 5e-6, 2e-5])
+def test_the_step_of_rounded_places_is_their_greatest_common_divisor(step: float) -> None:
+    places = step * np.random.default_rng(1).integers(-30, 30, (2, 64))
+    assert step_of(places) == pytest.approx(step, rel=1e-6)
+    assert step_of(step * np.array([0, 4, 8]), step * np.array([0, 6, 10])) == pytest.approx(2.0 * step, rel=1e-6)
+
+
+def test_places_that_are_not_rounded_have_no_step() -> None:
+    rng = np.random.default_rng(2)
+    assert all(step_of(1e-5 * rng.standard_normal((2, 64))) == 0.0 for _ in range(200))
+    assert step_of(np.zeros(8)) == 0.0
+    assert step_of(np.array([0.0, 0.0, 7e-6])) == 0.0  # two places are multiples of their distance
+    coarse = 2e-5 * np.round(rng.standard_normal((2, 64)))
+    assert step_of(coarse, coarse + 1e-6 * rng.standard_normal((2, 64))) == 0.0
+
+
+def bent(field: np.ndarray) -> float:
+    return float(noise_between_neighbours(np.ascontiguousarray(field), np.empty(128)))
+
+
+def test_noise_is_told_from_neighbours_in_one_frame() -> None:
+    rng = np.random.default_rng(3)
+    told = [bent(1e-6 * rng.standard_normal((20, 20, 3))) for _ in range(100)]
+    assert np.mean(told) == pytest.approx(1e-6, rel=0.05)  # a quartile of 128 errs by 16 %, the mean of 100 by 2 %
+
+
+def test_an_even_field_has_no_noise() -> None:
+    i, j = np.meshgrid(np.arange(20.0), np.arange(20.0), indexing="ij")
+    field = 1e-6 * np.stack([i**2 * (1.0 + j) + j**2, i * j - 3.0 * i**2, i], axis=-1)
+    assert bent(field) < 1e-18  # rounding
+    assert np.isnan(bent(field[:9, :9]))  # 49 elements with neighbours
+
+
+@pytest.mark.parametrize(("fault", "least"), [(correlated(1e-5), 0.75), (correlated(3e-6), 0.86), (rounded(2e-5), 0.8)])
+@pytest.mark.parametrize("name", ["cond1", "ring"])
+def test_slip_is_found_beside_noise_that_lasts(
+    scene: Scene, f1_score: Score, name: str, fault: Fault, least: float
+) -> None:
+    log = fault(scene(name, marker_noise=1e-6, force_noise=2e-3), np.random.default_rng(4))
+    history = detect_slip(log)
+    assert f1_score(log, history) > least
+    assert history.noise > 2e-6
+    assert {finding.name for finding in history.findings} & {"lasting noise", "rounded"}
+
+
+def test_white_noise_is_not_taken_to_last(scene: Scene) -> None:
+    for name in ("cond1", "cond4"):
+        for size in (0.0, 1e-6, 1e-5):
+            history = detect_slip(scene(name, marker_noise=size, force_noise=2e-3))
+            assert history.findings == ()
+            assert not size or history.noise == pytest.approx(size, rel=0.1)
