@@ -5,13 +5,13 @@ solver, which nothing was chosen on. F1 of method "filter" with forces, from dis
 pose, and of the paper's method with forces beside it. Writes detector_faults.json.
 """
 
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from benchmarks.detector_accuracy import FORCE_NOISE, score
-from benchmarks.detector_scenes import Case, cases, observed
+from benchmarks.detector_scenes import PITCH, Case, cases, observed
 from benchmarks.pages import options, picture_folder, table, write
 from service.slip_benchmark.faults import (
     Fault,
@@ -22,19 +22,22 @@ from service.slip_benchmark.faults import (
     faded,
     frozen,
     hysteresis,
+    lagging,
     late,
     lost,
     pose_noise,
     rounded,
     shake,
     smoothed,
+    smoothed_then_noisy,
     stuck,
     tilted,
 )
-from slipcore import detect_slip
+from slipcore import GraspLog, SlipHistory, detect_slip
 
 MARKER_NOISE = 1e-6
 INPUTS = ("force", "displacement", "motion")
+Judge = Callable[[Case, GraspLog, SlipHistory], float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +51,9 @@ class Cost:
     strain_rate: float
 
 
+LOST = "a tenth of the markers lost"
+SMOOTHED_THEN_NOISY = "smoothing over 1 element, then 0.5 µm of noise"
+
 FAULTS: dict[str, Fault] = {
     "none": lambda log, _: log,
     "common shake, 3 µm": shake(3e-6),
@@ -60,8 +66,10 @@ FAULTS: dict[str, Fault] = {
     "rounding to 20 µm": rounded(2e-5),
     "smoothing over ½ element": smoothed(0.5),
     "smoothing over 1 element": smoothed(1.0),
-    "a tenth of the markers lost": lost(0.1),
+    SMOOTHED_THEN_NOISY: smoothed_then_noisy(1.0, 5e-7),
+    LOST: lost(0.1),
     "5 % of the markers freeze": frozen(0.05),
+    "5 % of the markers lag by 0.1 s": lagging(0.05, 0.1),
     "hysteresis of 5 µm": hysteresis(5e-6),
 }
 
@@ -82,8 +90,12 @@ FORCE_FAULTS: dict[str, Fault] = {
 }
 """Faults of forces alone; the lattices are square."""
 
-CALIBRATED = {"correlated noise (0.9), 3 µm": 3e-6, "correlated noise (0.9), 10 µm": 1e-5}
-"""Faults of which a calibration of the sensor tells the detector, by the noise in m."""
+CALIBRATED: dict[str, dict[str, float]] = {
+    "correlated noise (0.9), 3 µm": {"displacement_floor": float(np.hypot(3e-6, MARKER_NOISE))},
+    "correlated noise (0.9), 10 µm": {"displacement_floor": float(np.hypot(1e-5, MARKER_NOISE))},
+    SMOOTHED_THEN_NOISY: {"marker_kernel": PITCH, "smoothing_noise": 3e-3},
+}
+"""Faults of which the detector may be told, and what: the noise, m, or the kernel, m, and the noise after it."""
 
 COLUMNS = (
     "fault",
@@ -100,16 +112,36 @@ def measure(scenes: list[Case], faults: dict[str, Fault]) -> Iterator[Cost]:
         filtered = {inputs: _mean(scenes, fault, inputs, "filter") for inputs in INPUTS}
         yield Cost(name, **filtered, strain_rate=_mean(scenes, fault, "force", "strain_rate"))
         if name in CALIBRATED:
-            known = {"displacement_floor": float(np.hypot(CALIBRATED[name], MARKER_NOISE))}
-            told = {inputs: _mean(scenes, fault, inputs, "filter", **known) for inputs in INPUTS}
+            told = {inputs: _mean(scenes, fault, inputs, "filter", **CALIBRATED[name]) for inputs in INPUTS}
             yield Cost(f"{name}, calibrated", **told, strain_rate=np.nan)
+        if name == LOST:
+            for row, judge in (("filled", _filled), ("of observed ones", _observed)):
+                judged = {inputs: _mean(scenes, fault, inputs, "filter", judge=judge) for inputs in INPUTS}
+                yield Cost(
+                    f"{name}, {row}", **judged, strain_rate=_mean(scenes, fault, "force", "strain_rate", judge=judge)
+                )
 
 
-def _mean(scenes: list[Case], fault: Fault, inputs: str, method: str, **known: float) -> float:
+def _filled(case: Case, log: GraspLog, history: SlipHistory) -> float:
+    return score(case, log, history.filled()).f1
+
+
+def _observed(case: Case, log: GraspLog, history: SlipHistory) -> float:
+    assert log.truth is not None
+    assert log.observed is not None
+    truth = replace(log.truth, contact=log.truth.contact & log.observed)
+    return score(case, replace(log, truth=truth), history).f1
+
+
+def _all(case: Case, log: GraspLog, history: SlipHistory) -> float:
+    return score(case, log, history).f1
+
+
+def _mean(scenes: list[Case], fault: Fault, inputs: str, method: str, *, judge: Judge = _all, **known: float) -> float:
     found = []
     for seed, case in enumerate(scenes):
         log = fault(observed(case.log, MARKER_NOISE, FORCE_NOISE, inputs, seed), np.random.default_rng(1000 + seed))
-        found.append(score(case, log, detect_slip(log, method, sensor_model=None, **known)).f1)
+        found.append(judge(case, log, detect_slip(log, method, sensor_model=None, **known)))
     return float(np.mean(found))
 
 

@@ -1,7 +1,7 @@
 """Local slip: what a detector finds in one frame and in a whole log (stage 4: slip_state)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -100,6 +100,33 @@ class SlipHistory:
     patches: tuple[Patch, ...] = ()
     findings: tuple[Finding, ...] = ()
 
+    def filled(self) -> "SlipHistory":
+        """The history with what its neighbours say of each element that was not observed.
+
+        Such an element touches where most of its observed neighbours do, and slips as probably as those that touch do
+        in the mean; where none was observed nothing is told. Of edges and corners a corner counts by half. ``observed``
+        still tells which elements these are; they have no velocity and no events.
+        """
+        if self.observed is None:
+            return self
+        seen = _of_neighbours(self.observed.astype(float))
+        touching = _of_neighbours((self.contact & self.observed).astype(float))
+        slipping = _of_neighbours(np.where(self.contact & self.observed, self.probability, 0.0))
+        touches = ~self.observed & (2.0 * touching > seen)
+        mean = np.divide(slipping, touching, out=np.zeros_like(slipping), where=touches)
+        contact, slip = self.contact | touches, self.slip | (touches & (mean > 0.5))
+        some = contact.any(axis=(1, 2))
+        ratio = np.full(len(self.time), np.nan)
+        ratio[some] = 1.0 - slip[some].sum(axis=(1, 2)) / contact[some].sum(axis=(1, 2))
+        return replace(
+            self,
+            contact=contact,
+            slip=slip,
+            probability=np.where(touches, mean, self.probability),
+            stick_ratio=ratio,
+            macro_slip=self.macro_slip & ~(contact & ~slip).any(axis=(1, 2)),
+        )
+
     @property
     def references(self) -> tuple[str, ...]:
         """The papers behind the method; none of one that this package does not know."""
@@ -151,6 +178,15 @@ class SlipHistory:
             "onsets of slip": len(self.events.onset),
         }
         return summary("Slip history", rows.items(), curve(self.stick_ratio, "stick ratio over time"))
+
+
+def _of_neighbours(field: FloatArray) -> FloatArray:
+    """Sum of each element's eight neighbours of a field [t, n, m], those across a corner by half."""
+    wide = np.pad(field, ((0, 0), (1, 1), (1, 1)))
+    rows = wide[:, :-2] + wide[:, 2:]
+    beside = rows[..., 1:-1] + wide[:, 1:-1, :-2] + wide[:, 1:-1, 2:]
+    total: FloatArray = beside + 0.5 * (rows[..., :-2] + rows[..., 2:])
+    return total
 
 
 def observed_over_time(slip_states: Sequence[SlipState]) -> BoolArray | None:

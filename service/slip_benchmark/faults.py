@@ -61,6 +61,28 @@ def smoothed(width: float) -> Fault:
     return fault
 
 
+def smoothed_then_noisy(width: float, size: float) -> Fault:
+    """Smoothed as by ``smoothed``, and white noise of ``size`` m in displacement after that."""
+
+    def fault(log: GraspLog, rng: np.random.Generator) -> GraspLog:
+        seen = smoothed(width)(log, rng)
+        return moved(seen, size * rng.standard_normal(log.displacement.shape))
+
+    return fault
+
+
+def lagging(share: float, time: float) -> Fault:
+    """A share of the markers is told as it was so many seconds before."""
+
+    def fault(log: GraspLog, rng: np.random.Generator) -> GraspLog:
+        then = np.maximum(np.searchsorted(log.time, log.time - time, side="right") - 1, 0)
+        lag, displacement = rng.random(log.grid) < share, log.displacement.copy()
+        displacement[:, lag] = log.displacement[then][:, lag]
+        return replace(log, displacement=displacement)
+
+    return fault
+
+
 def lost(share: float) -> Fault:
     """A share of the markers is lost from the beginning, and said to be."""
 

@@ -68,3 +68,17 @@ def test_lost_markers_are_said_to_be_and_frozen_ones_are_not(log: GraspLog) -> N
 def test_a_marker_with_hysteresis_lags_by_its_play(log: GraspLog) -> None:
     by = difference(log, faults.hysteresis(5e-6))
     np.testing.assert_allclose(by[50:, ..., 0], -5e-6, rtol=1e-9)
+
+
+def test_noise_after_smoothing_is_white(log: GraspLog) -> None:
+    by = difference(log, faults.smoothed_then_noisy(1.0, 5e-7))
+    assert by.std() == pytest.approx(5e-7, rel=0.02)
+    assert abs(np.mean(by[:, 1:] * by[:, :-1])) < 0.02 * by.var()
+
+
+def test_markers_that_lag_are_told_as_they_were_before(log: GraspLog) -> None:
+    by = difference(log, faults.lagging(0.25, 0.11))
+    lag = by[-1, ..., 0] != 0.0
+    assert lag.mean() == pytest.approx(0.25, abs=0.15)
+    np.testing.assert_allclose(by[10:, lag, 0], -4 * 5e-7, rtol=0.0, atol=1e-15)  # rounding
+    assert not by[:, ~lag].any()

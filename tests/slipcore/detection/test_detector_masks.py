@@ -30,6 +30,32 @@ def test_nothing_is_said_of_an_element_that_is_not_observed(short_ramp: GraspLog
     assert np.isnan(history.velocity[~before]).all()  # where it was half an interval of placeholder
 
 
+def test_what_was_not_observed_can_be_filled_from_its_neighbours(short_ramp: GraspLog) -> None:
+    observed = np.broadcast_to(np.random.default_rng(5).random((12, 12)) < 0.9, short_ramp.displacement.shape[:3])
+    whole = detect_slip(short_ramp)
+    history = detect_slip(replace(short_ramp, observed=observed.copy()))
+    full = history.filled()
+    assert full.observed is history.observed
+    for name in ("contact", "slip", "probability"):
+        np.testing.assert_array_equal(getattr(full, name)[observed], getattr(history, name)[observed], err_msg=name)
+    missed = whole.contact & ~observed
+    assert (full.contact == whole.contact)[missed].mean() > 0.8
+    assert (full.slip == whole.slip)[missed].mean() > 0.9
+    assert np.isnan(full.velocity[~observed]).all()
+    touched = full.contact.any(axis=(1, 2))
+    sticks = 1.0 - full.slip[touched].sum(axis=(1, 2)) / full.contact[touched].sum(axis=(1, 2))
+    np.testing.assert_array_equal(full.stick_ratio[touched], sticks)
+    assert whole.filled() is whole
+
+
+def test_a_frame_without_any_marker_is_not_filled(short_ramp: GraspLog) -> None:
+    observed = np.ones(short_ramp.displacement.shape[:3], bool)
+    observed[40:43] = False
+    full = detect_slip(replace(short_ramp, observed=observed)).filled()
+    assert not full.contact[40:43].any()
+    assert np.isnan(full.stick_ratio[40:43]).all()
+
+
 def test_all_observed_is_the_same_as_no_mask(short_ramp: GraspLog) -> None:
     whole, masked = (
         detect_slip(log, "filter")
