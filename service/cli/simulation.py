@@ -35,6 +35,9 @@ def simulate(
     explain: Annotated[
         bool, typer.Option("--explain", help="Say what each effect costs and changes, in place of simulating.")
     ] = False,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Explain a scene in however many coarse runs it takes, not in five at most.")
+    ] = False,
     accuracy: Accuracy = None,
     seconds: Seconds = None,
     tier: Tier = None,
@@ -50,7 +53,7 @@ def simulate(
     if output is not None:
         refuse_inputs(output, Path(scene))
     if explain:
-        _explain(wanted, seed, json)
+        _explain(wanted, seed, json, all_runs=yes)
         return
     from service.jobs.campaign import RequestedAccuracy
 
@@ -118,9 +121,9 @@ def _print_campaign(made: "Iterable[Outcome]", folder: Path, json: bool) -> None
         print_table(str(folder), ("scene", "seed", "log"), cells)
 
 
-def _explain(scene: "Scene", seed: int, json: bool) -> None:
+def _explain(scene: "Scene", seed: int, json: bool, *, all_runs: bool) -> None:
     with shown_progress(f"explaining {scene.name}") as tell:
-        explanation = scene.explain(seed, progress=tell)
+        explanation = scene.explain(seed, tell, all_runs=all_runs)
     if json:
         print_json(asdict(explanation))
     else:

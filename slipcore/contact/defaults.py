@@ -384,8 +384,8 @@ class ExplainDefaults(Options):
     """Fidelity of the coarse runs."""
     frames: Annotated[int, Option(2, 1000, "frames", "the same")] = 12
     tolerance: Annotated[float, Option(1e-8, 0.5, "-", "below the error of ten cells")] = 1e-3
-    repeats: Annotated[int, Option(1, 100, "runs", "the other may have shared its core")] = 2
-    """Runs of which the faster one's time counts."""
+    most_runs: Annotated[int, Option(1, 1000, "runs", "a scene with four effects of mechanics")] = 5
+    """That are made without being asked for."""
     negligible: Annotated[float, Option(0.0, 1.0, "-", "the coarse runs' tolerance")] = 1e-3
     """Change of stick ratio, displacement and force below which an effect may be left out."""
     layer_ratio: Annotated[float, Option(0.0, 10.0, "-", "Garcia & Garcia, Biophys. J. 114 (2018) 2923")] = 0.08

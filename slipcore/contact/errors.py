@@ -33,6 +33,20 @@ class OutOfReach(InvalidInput):
         return type(self), (self.name, self.asked, self.least, self.seconds)
 
 
+class ManyRuns(InvalidInput):
+    """An explanation that takes many ``runs``, about ``seconds`` in all, which must be asked for."""
+
+    def __init__(self, runs: int, seconds: float) -> None:
+        self.runs, self.seconds = runs, seconds
+        takes = f"{runs}, about {_told(seconds)} in all"
+        InvalidInput.__init__(
+            self, "coarse runs to explain", takes, "so many where they are asked for: all_runs, --yes"
+        )
+
+    def __reduce__(self) -> tuple[type, tuple[int, float]]:
+        return type(self), (self.runs, self.seconds)
+
+
 def _told(seconds: float) -> str:
     if seconds < 100.0:
         return f"{seconds:.2g} s"

@@ -42,9 +42,12 @@ class Scene(SceneDescription):
         parts = {name: _record(kind, entries.pop(name)) for name, kind in _PARTS.items() if name in entries}
         return _record(cls, entries | parts | {"effects": effects})
 
-    def explain(self, seed: int = 0, progress: Progress = no_progress) -> Explanation:
-        """What each effect is there for, what it costs and what leaving it out would change, by coarse runs."""
-        return explain(self, seed, progress)
+    def explain(self, seed: int = 0, progress: Progress = no_progress, *, all_runs: bool = False) -> Explanation:
+        """What each effect is there for, what it costs and what leaving it out would change, by coarse runs.
+
+        Raises ``ManyRuns``, with what it takes, for more than five of them that are not asked for by ``all_runs``.
+        """
+        return explain(self, seed, progress, all_runs=all_runs)
 
 
 Record = TypeVar("Record")

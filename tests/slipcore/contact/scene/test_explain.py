@@ -6,19 +6,27 @@ import numpy as np
 import pytest
 
 from slipcore.contact.effects import (
+    DroppedFrames,
     ElasticObject,
     FiniteLayer,
     FlatSurface,
+    ForceNoise,
     FrictionPatch,
+    GelDrift,
     MarkerNoise,
     NormalTangentialCoupling,
     ObjectMotion,
     SensorSampling,
+    SphereSurface,
     TangentialLoad,
 )
+from slipcore.contact.errors import ManyRuns
 from slipcore.contact.plan.plan import Effect
 from slipcore.contact.scene import Finger, Scene
+from slipcore.contact.scene import explain as explaining
 from slipcore.contact.scene.explain import Explanation, explain
+from slipcore.contact.tiers.boundary_elements import run
+from slipcore.frames import GraspLog
 
 LOAD, SENSOR = TangentialLoad((2.0, 0.0)), SensorSampling()
 GEL = Finger(thickness=5e-3)
@@ -56,6 +64,40 @@ def test_cost_and_change_are_measured(sheared: Explanation) -> None:
     assert noise.change.displacement > 0.0
     assert stiff.applications > 0
     assert stiff.change.largest < 1e-3
+
+
+def test_what_is_only_observed_takes_no_run_of_the_mechanics(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+
+    def counted(*arguments: object) -> GraspLog:
+        made.append(1)
+        return run(*arguments)
+
+    monkeypatch.setattr(explaining, "run", counted)
+    seen = (MarkerNoise(1e-6), ForceNoise(1e-3), GelDrift((1e-7, 0.0, 0.0)), DroppedFrames(0.2))
+    found = explain(Scene("observed", (LOAD, *seen, SENSOR)))
+    assert len(made) == 2  # with all effects, and without the load
+    assert len(found.effects) == 6
+    assert all(report.seconds == report.applications == 0 for report in found.effects[1:])
+    assert found.effects[1].change.displacement > 0.0
+
+
+def test_more_than_five_runs_must_be_asked_for_and_say_their_price(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+
+    def counted(*arguments: object) -> GraspLog:
+        made.append(1)
+        return run(*arguments)
+
+    monkeypatch.setattr(explaining, "run", counted)
+    mechanics = (LOAD, SphereSurface(10.0), ElasticObject(1e7), FiniteLayer(5e-3), FrictionPatch(0.1, (0.0, 0.0), 1e-3))
+    scene = Scene("many", (*mechanics, SENSOR), finger=GEL)
+    with pytest.raises(ManyRuns, match=r"6, about .* s in all") as refused:
+        scene.explain()
+    assert len(made) == 1
+    assert refused.value.seconds > 0.0
+    assert len(scene.explain(all_runs=True).effects) == 6
+    assert len(made) == 7
 
 
 def test_an_effect_that_changes_nothing_may_be_left_out(sheared: Explanation) -> None:
