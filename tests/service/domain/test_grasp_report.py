@@ -9,7 +9,7 @@ import pytest
 
 from db.records import Finding
 from service.domain.doubtful_logs import with_doubts
-from service.domain.grasp_report import report_of_stored, see
+from service.domain.grasp_report import inspect_grasp, report_of_stored
 from service.domain.stored_results import encode_history, encode_samples
 from service.report.grasp import InspectedGrasp, grasp_report
 from service.report.page import render
@@ -27,7 +27,7 @@ def log() -> GraspLog:
 
 @pytest.fixture(scope="module")
 def seen(log: GraspLog) -> InspectedGrasp:
-    return see(log, "grasp.npz")
+    return inspect_grasp(log, "grasp.npz")
 
 
 def test_a_grasp_that_slips_is_told_with_its_friction_and_what_to_record_next(seen: InspectedGrasp) -> None:
@@ -48,7 +48,7 @@ def test_terms_are_explained_on_the_page_that_uses_them(seen: InspectedGrasp) ->
 
 
 def test_a_grasp_without_forces_says_why_there_is_no_friction(log: GraspLog) -> None:
-    report = grasp_report(see(replace(log, force=None), "no forces"))
+    report = grasp_report(inspect_grasp(replace(log, force=None), "no forces"))
     assert "the log has no forces" in report.lead
     assert not [fact for fact in report.facts if fact.name.startswith("Friction coefficient")]
     assert "Friction model" not in [section.heading for section in report.sections]
@@ -58,7 +58,7 @@ def test_what_makes_friction_doubtful_is_told_with_what_to_do(log: GraspLog) -> 
     assert log.force is not None
     force = log.force.copy()
     force[..., 2] *= -1.0
-    report = grasp_report(see(replace(log, force=force), "pulled"))
+    report = grasp_report(inspect_grasp(replace(log, force=force), "pulled"))
     assert "What makes its friction doubtful" in [section.heading for section in report.sections]
     assert any(step.startswith("force pulls: ") for step in report.steps[:-1])
     assert "Upload" not in report.steps[-1]
