@@ -402,3 +402,21 @@ def test_what_cannot_be_scored_ends_the_command_with_what_is_wrong(
     code, _, err = command("score", mine / "nowhere")
     assert code == INPUT_REFUSED
     assert "stiction benchmark make" in err
+
+
+def test_what_slides_stays_there_or_comes_back_on_its_way() -> None:
+    """By up to 130 %, and in half of the scenes at all."""
+    body = scenes.Body(0.5, 8.0, 4e-3, Finger())
+    shares = []
+    for seed in range(40):
+        (motion,), end = scenes._slide(np.random.default_rng(seed), body, 0.0)
+        x, y = np.array(motion.x), np.array(motion.y)
+        far = np.hypot(x[1], y[1])
+        assert far >= 1.1 * body.give
+        assert end == pytest.approx(motion.time[-1] + 0.1)
+        assert x[1] * y[2] == pytest.approx(y[1] * x[2], abs=1e-12)  # along one line
+        shares.append((x[1] * x[2] + y[1] * y[2]) / far**2)
+    back = np.array([share for share in shares if share < 0.999])
+    assert ((back >= -0.3) & (back <= 0.6)).all()
+    assert 10 <= len(back) <= 30
+    assert max(shares) == pytest.approx(1.0)
