@@ -9,15 +9,12 @@ import numpy as np
 from slipcore.contact.defaults import EXPLAIN
 from slipcore.contact.effects.finite_layer import FiniteLayer
 from slipcore.contact.effects.sensor_sampling import SensorSampling
-from slipcore.contact.elasticity.grid import Grid
-from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.errors import ManyRuns
 from slipcore.contact.plan.description import SceneDescription
 from slipcore.contact.plan.plan import Effect, Observed, Plan, SamplingPlan
 from slipcore.contact.progress import Progress, no_progress
 from slipcore.contact.scene.simulate import observe
-from slipcore.contact.solver.problem import Problem, StepLoad
-from slipcore.contact.solver.quasi_static import QuasiStatic
+from slipcore.contact.solver.kernels import load_kernels
 from slipcore.contact.tiers.accuracy import Difference, difference
 from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach, run
 from slipcore.errors import SlipcoreError
@@ -104,7 +101,7 @@ def explain(
     wanted, and what ``simulate`` raises.
     """
     sampling, effects, reports = _few_frames(scene.plan(seed)), scene.present(), list[EffectReport]()
-    _load_kernels()
+    load_kernels()
     whole = _measure(scene, sampling, seed)
     runs = 1 + sum(not _only_observed(effect) for effect in effects)
     if runs > EXPLAIN.most_runs and not all_runs:
@@ -123,14 +120,6 @@ def explain(
 def _only_observed(effect: Effect) -> bool:
     """Whether an effect never reaches the mechanics."""
     return isinstance(effect, Observed | SensorSampling)
-
-
-def _load_kernels() -> None:
-    """Load what is compiled, which the first run of a process would pay for: a smallest contact, pressed and pulled."""
-    loads = [StepLoad(1.0), StepLoad(1.0, tangential=np.array([0.1, 0.0, 0.0]))]
-    problem = Problem((HalfSpace.from_young(1.0, 0.0),), 1.0, heights=(lambda x, y: x**2 + y**2,))
-    for _ in QuasiStatic(problem, Grid.square(4, 2.0), EXPLAIN.tolerance, EXPLAIN.tolerance).run(loads):
-        pass
 
 
 def _few_frames(plan: Plan) -> SamplingPlan:

@@ -9,6 +9,7 @@ from slipcore.contact.defaults import ACCURACY, PROBE
 from slipcore.contact.errors import NotConverged, OutOfReach
 from slipcore.contact.plan.plan import Plan, SamplingPlan
 from slipcore.contact.progress import Progress, no_progress
+from slipcore.contact.solver.kernels import load_kernels
 from slipcore.contact.tiers.boundary_elements import Fidelity, contact_reach
 from slipcore.contact.tiers.difference import Difference as Difference
 from slipcore.contact.tiers.difference import difference as difference
@@ -87,6 +88,7 @@ class _Search:
     """Ever finer logs of a plan, up to the ``target`` or within a budget; with ``every``, in equal growth."""
 
     def __init__(self, plan: Plan, target: float, budget: float, progress: Progress, *, every: bool = False) -> None:
+        load_kernels()  # no part of the budget, nor of the first run's pace
         reach = contact_reach(plan)
         self.plan, self.target, self.every = _sampled(plan, reach), target, every
         self.limited = bool(np.isfinite(budget))
