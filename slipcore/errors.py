@@ -13,7 +13,7 @@ class InvalidInput(SlipcoreError, ValueError):
 
     def __init__(self, name: str, value: object, allowed: str) -> None:
         self.name, self.value, self.allowed = name, str(value), allowed
-        super().__init__(name, self.value, allowed)  # all three, so that the error survives pickling
+        Exception.__init__(self, name, self.value, allowed)  # all three, so that the error survives pickling
 
     def __str__(self) -> str:
         return f"{self.name} is {self.value}; allowed: {self.allowed}"

@@ -4,6 +4,19 @@ from slipcore.errors import InvalidInput, SlipcoreError
 from slipcore.frames import FloatArray, GraspLog
 
 
+class NotConverged(SlipcoreError):
+    """A solver stopped at its iteration bound; ``residual`` is what it reached and ``tolerance`` what was asked."""
+
+    def __init__(self, what: str, residual: float, tolerance: float, iterations: int) -> None:
+        self.what, self.residual, self.tolerance, self.iterations = what, residual, tolerance, iterations
+        super().__init__(what, residual, tolerance, iterations)
+
+    def __str__(self) -> str:
+        return (
+            f"{self.what}: residual {self.residual:.3g} after {self.iterations} iterations, asked {self.tolerance:.3g}"
+        )
+
+
 class InfeasibleLoad(InvalidInput):
     """A tangential load outside the limit surface of friction; ``factor`` (below 1) times it would be on it."""
 
@@ -17,14 +30,16 @@ class InfeasibleLoad(InvalidInput):
         return type(self), (self.load, self.factor)
 
 
-class OutOfReach(InvalidInput):
+class OutOfReach(InvalidInput, NotConverged):
     """A request that is refused before it is tried: ``least`` of its ``name`` can be asked for.
 
-    ``seconds`` is what that takes: by the runs that were made to tell, on this machine.
+    ``seconds`` is what that takes: by the runs that were made to tell, on this machine. It is a ``NotConverged``, too,
+    with ``least`` for its ``residual``: that is what an accuracy out of reach raised before it was refused.
     """
 
     def __init__(self, name: str, asked: float, least: float, seconds: float) -> None:
         self.asked, self.least, self.seconds = asked, least, seconds
+        self.what, self.residual, self.tolerance, self.iterations = name, least, asked, 0
         takes = "" if name == "seconds" else f", which takes about {_told(seconds)}"
         least_told = f"{_told(least)} or more" if name == "seconds" else f"{least:.2g} or more"
         InvalidInput.__init__(self, name, f"{asked:g}", least_told + takes)
@@ -59,16 +74,3 @@ class Interrupted(KeyboardInterrupt):
     def __init__(self, log: GraspLog) -> None:
         self.log = log
         KeyboardInterrupt.__init__(self, "interrupted")
-
-
-class NotConverged(SlipcoreError):
-    """A solver stopped at its iteration bound; ``residual`` is what it reached and ``tolerance`` what was asked."""
-
-    def __init__(self, what: str, residual: float, tolerance: float, iterations: int) -> None:
-        self.what, self.residual, self.tolerance, self.iterations = what, residual, tolerance, iterations
-        super().__init__(what, residual, tolerance, iterations)
-
-    def __str__(self) -> str:
-        return (
-            f"{self.what}: residual {self.residual:.3g} after {self.iterations} iterations, asked {self.tolerance:.3g}"
-        )

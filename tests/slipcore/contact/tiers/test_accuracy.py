@@ -132,6 +132,8 @@ def test_an_accuracy_out_of_reach_is_refused_after_the_coarsest_runs(
     clock = Clock(monkeypatch, "reversal")
     with pytest.raises(OutOfReach, match=r"accuracy .* or more, which takes about") as refused:
         simulate_to(SCENES["reversal"].plan(), accuracy=asked)
+    assert isinstance(refused.value, NotConverged)  # as callers caught it before requests were refused
+    assert refused.value.residual == refused.value.least
     assert asked < refused.value.least < 0.02
     assert refused.value.seconds > clock.now
     assert max(fidelity.cells for fidelity in clock.runs) <= 20
