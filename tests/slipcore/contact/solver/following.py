@@ -51,25 +51,39 @@ def follow(
 def follow_on(
     grid: Grid, scene: Problem, loads: Iterable[StepLoad], bound: int = BOUND, tolerance: float = 1e-8
 ) -> list[StepResult]:
-    """All results, after holding each to bound, balance, Coulomb's law and complementarity."""
-    solver = QuasiStatic(scene, grid, tolerance, 1e-9)
+    """All results, after holding each to bound, balance, Coulomb's law and complementarity; at rates of slip of second
+    order, as scenes are run.
+    """
+    solver = QuasiStatic(scene, grid, tolerance, 1e-9, second_order=True)
     results = list(solver.run(loads))
+    before = np.zeros((2, *grid.shape))
     for result in results:
         assert result.iterations <= bound
         assert result.imbalance <= 1e-10
         assert result.residual <= tolerance
         assert result.normal_residual <= 1e-9
         assert np.isfinite(result.displacement).all()
-        assert complementarity(result, solver.friction) <= 10.0 * tolerance
+        assert complementarity(result, solver.friction, before) <= 10.0 * tolerance
+        before = result.slip
     return results
 
 
-def complementarity(result: StepResult, friction: np.ndarray) -> float:
-    """The larger of how far a cell is over its limit and what power friction leaves untaken, both as shares."""
+def complementarity(result: StepResult, friction: np.ndarray, before: np.ndarray) -> float:
+    """The larger of how far a cell is over its limit and what power friction leaves untaken, both as shares.
+
+    Traction is opposite to the rate of slip at the step's end: in a cell that goes on slipping in steps as long as the
+    last, that is s - s'/3, with the slip s' of the step ``before``; else that of the step.
+    """
     limit = friction * result.force[2]
     largest, carried = float(limit.max()), float((friction * result.contact).max()) * abs(result.approach)
     if largest == 0.0:
         return float(np.abs(result.force[:2]).max())
     size, slip = np.hypot(*result.force[:2]), np.hypot(*result.slip)
-    untaken = np.abs((result.force[:2] * result.slip).sum(axis=0) + limit * slip)
-    return max(float((size - limit).max()) / largest, float(untaken.max()) / (largest * max(carried, slip.max())))
+    going_on, stepped = (untaken(result, limit, rate) for rate in (result.slip - before / 3.0, result.slip))
+    power = float(np.minimum(going_on, stepped).max())
+    return max(float((size - limit).max()) / largest, power / (largest * max(carried, slip.max())))
+
+
+def untaken(result: StepResult, limit: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """Power of each cell that tractions opposite to a rate of slip would take, and these do not."""
+    return np.abs((result.force[:2] * rate).sum(axis=0) + limit * np.hypot(*rate))

@@ -248,7 +248,7 @@ def on_the_boundary(steps: int) -> None:
     turning = [at(FORCE, *SLIDING * np.array([np.cos(a), np.sin(a)])) for a in angle]
     breathing = [at(force, FRICTION * force) for force in FORCE * (1.0 + 0.5 * np.sin(angle))]
     for loads in (held, turning, breathing):
-        solver = QuasiStatic(problem(), Grid.square(16, 13e-3), 1e-6, 1e-8)
+        solver = QuasiStatic(problem(), Grid.square(16, 13e-3), 1e-6, 1e-8, second_order=True)
         poses = []
         for load, result in zip([at(FORCE), *loads], solver.run([at(FORCE), *loads]), strict=True):
             poses.append(result.pose[:2])
