@@ -1,8 +1,10 @@
 """Numbers that change results stand in the packages' tables, where they have a unit, a range and a source."""
 
 import ast
+import re
 from collections.abc import Iterator
 from dataclasses import fields
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 
@@ -169,6 +171,30 @@ def test_each_number_of_the_clients_table_has_its_unit_and_reason() -> None:
         assert isinstance(told.value, ast.Constant)
         assert str(told.value.value).startswith(("-, ", "N "))
     assert len(kinds) == 10
+
+
+READERS = ROOT / "service/formats"
+READERS_CONSTANTS = {
+    "frame_table.py": {"MOST_STATES"},
+    "rest.py": {"NEIGHBOUR", "IRREGULAR"},
+    "tac3d.py": {"REST_TOLERANCE"},
+    "tracked_markers.py": {"ASSUMED_WIDTH"},
+}
+"""What changes the log that is read from a file; a reader's other constants are limits and formats' layout."""
+
+
+@pytest.mark.parametrize(("file", "names"), READERS_CONSTANTS.items())
+def test_each_number_of_a_reader_that_changes_its_log_has_its_unit_and_reason(file: str, names: set[str]) -> None:
+    body = ast.parse((READERS / file).read_text(encoding="utf-8")).body
+    told = {
+        node.targets[0].id: ast.literal_eval(after.value)
+        for node, after in pairwise(body)
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name)
+        if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+    }
+    for name in names:
+        assert re.match(r"(-, |m; |m that )", told[name]), name
+        assert len(told[name]) > 60, "a reason"
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,9 @@ MAX_ROWS = 5_000_000
 TRUTH = {"True": "1", "False": "0"}
 """As pandas and ROS write them."""
 MOST_STATES = 12
-"""Numbers of a noted column that are counted one by one."""
+"""-, distinct numbers of a noted column that are counted one by one; of more, as of a measured quantity, the median
+tells more.
+"""
 OF_FRAMES = ("time", "object_pose", "gripper_force", "gripper_force_deviation", "sensor", "metadata", "element_area")
 """Members that are the same for all elements of a frame."""
 
@@ -54,6 +56,7 @@ class _Table:
     def __init__(self, path: Path, mapping: FieldMapping) -> None:
         lines = text_lines(path)
         self._names, delimiter, before = _header(lines)
+        self._case = re.IGNORECASE if "preset" in mapping.text else re.NOFLAG
         self.mapping = mapping = self._chosen(mapping).over(default_origins())
         for name, origin in mapping.origins.items():
             self._check_same_elements(name, origin.fields)
@@ -115,8 +118,8 @@ class _Table:
         return [column for _, column in self._numbered(field)]
 
     def _numbered(self, field: str) -> list[tuple[int, int]]:
-        """Numbers of elements, and their columns, in order."""
-        pattern = re.compile(r"(\d{1,6})".join(map(re.escape, field.split(ANY_NUMBER, 1))), re.ASCII)
+        """Numbers of elements, and their columns, in order. Manuals differ in the case of a preset's names."""
+        pattern = re.compile(r"(\d{1,6})".join(map(re.escape, field.split(ANY_NUMBER, 1))), re.ASCII | self._case)
         found = [(int(match[1]), k) for k, name in enumerate(self._names) if (match := pattern.fullmatch(name))]
         return sorted(found)
 

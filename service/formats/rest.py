@@ -10,9 +10,13 @@ FIRST, LEAST_CONTACT = "first", "least contact"
 ALLOWED = f"{FIRST}, {LEAST_CONTACT}, or the number of a frame from 0 (local commands: or a file)"
 MOST_DIGITS = 9
 NEIGHBOUR = 1.25
-"""Of the usual distance to the nearest marker: between it and a square lattice's diagonal."""
+"""-, of the usual distance to the nearest marker, up to which markers are neighbours: more than a lattice's sides
+scatter by, less than a square's diagonal of 1.41.
+"""
 IRREGULAR = 0.1
-"""Standard deviation of that distance over its mean, above which dots are on no lattice."""
+"""-, standard deviation of that distance over its mean, above which dots are on no lattice: printed or moulded ones
+scatter by far less, dots strewn at random by 0.5.
+"""
 
 
 def check(rest: str) -> str:

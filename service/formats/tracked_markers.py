@@ -24,7 +24,7 @@ ALIASES = {
     "frameno": "frame", "cx": "x", "cy": "y", "row": "row", "col": "col",
     "fx": "fx", "fy": "fy", "fz": "fz", "force_x": "fx", "force_y": "fy", "force_z": "fz",
 }  # fmt: skip
-"""Columns that are read, by the names that trackers give them."""
+"""Columns that are read, by the names that they may have."""
 FORCE = ("fx", "fy", "fz")
 SETTINGS = ("scale", "frame_rate", "sensor", "gripper_force_deviation", "rest")
 """What lines before the header may tell: ``# scale: 2.5e-5``."""
