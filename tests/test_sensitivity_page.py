@@ -12,7 +12,10 @@ PAGE = Path(__file__).parents[1] / "docs/sensitivity.md"
 
 ABSENT: dict[str, dict[str, str]] = {
     "not measured yet": {
-        "slipcore.defaults.NOISE": "least_series series",
+        "slipcore.defaults.NOISE": "finest_step lasting_told least_series least_step series step_levels",
+        "slipcore.defaults.SMOOTHING": (
+            "frequencies largest_still least_elements least_force_noise least_noise whole widest"
+        ),
         "slipcore.defaults.NUMERICS": ("least_element_force least_lever least_spread stretch_variance yaw_variance"),
         "slipcore.defaults.MARKERS": "farthest narrowest neighbours sparsest",
         "slipcore.defaults.PATCHES": "least_square_arm",
@@ -48,8 +51,9 @@ ABSENT: dict[str, dict[str, str]] = {
         "estimators.defaults.PRIOR": "unknown_velocity velocity_effect velocity_tilt",
         "estimators.defaults.SAMPLING": "nearer nearer_starts",
         "filter": (
-            "pose_noise_least surroundings_jitter surroundings_least surroundings_memory "
-            "surroundings_outlier surroundings_reach"
+            "force_kernel hold_deviations lasting_least lasting_ratio lasting_share marker_kernel "
+            "pose_noise_least smoothing_noise surroundings_jitter surroundings_least "
+            "surroundings_memory surroundings_outlier surroundings_reach"
         ),
         "strain_rate_literal": "growth_share lag",
         "rigid_fit": "core_share deviation_share least_deviation",

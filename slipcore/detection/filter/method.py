@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from slipcore.defaults import FilterOptions
+from slipcore.defaults import NOISE, FilterOptions
 from slipcore.detection.filter.run import run_filter
 from slipcore.detection.filter.smoothing import look_back
 from slipcore.detection.filter.state import (
@@ -60,7 +60,7 @@ def findings(common: FloatArray) -> tuple[Finding, ...]:
     if common[TOLD_STEP] > 0.0:
         evidence = f"all places of markers are multiples of {1e6 * common[TOLD_STEP]:.3g} µm"
         found.append(Finding("rounded", evidence, "record places as finely as the tracker tells them"))
-    elif common[LASTING] > 0.0:
+    elif common[LASTING] > NOISE.lasting_told:
         evidence = (
             f"markers part from their neighbours by {1e6 * common[LASTING]:.3g} µm that lasts from frame to frame"
         )
