@@ -17,7 +17,9 @@ ABSENT: dict[str, dict[str, str]] = {
             "frequencies largest_still least_elements least_force_noise least_noise whole widest"
         ),
         "slipcore.defaults.NUMERICS": ("least_element_force least_lever least_spread stretch_variance yaw_variance"),
-        "slipcore.defaults.MARKERS": "farthest narrowest neighbours sparsest",
+        "slipcore.defaults.MARKERS": (
+            "farthest narrowest neighbours sparsest touching_noise touching_quantile touching_share"
+        ),
         "slipcore.defaults.PATCHES": "least_square_arm",
         "slipcore.defaults.COLLECTION": "agreement least_samples",
         "slipcore.contact.defaults.INTERIOR": "most_points",
@@ -35,7 +37,7 @@ ABSENT: dict[str, dict[str, str]] = {
             "beam_cells beam_error beam_room beam_tolerance element_samples limit_rounding poisson_error sampling_error"
         ),
         "slipcore.contact.defaults.EXPLAIN": (
-            "coupling_ratio fewest_points layer_ratio layer_shear moment_share repeats"
+            "coupling_ratio fewest_points layer_ratio layer_shear moment_share most_runs"
         ),
         "slipcore.forces.defaults.RECONSTRUCTION": "contradicted_share contradiction largest_pressure",
         "estimators.defaults.ALARM": "least_scatter longest most_tau rate reference shift",
