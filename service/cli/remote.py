@@ -230,8 +230,8 @@ def _upload(
 
     try:
         log, mapping = source.log()
-        said = table if isinstance(log, Path) else {}
-        receipt = client.upload(log, material, mapping=mapping, **said)
+        options = table if isinstance(log, Path) else {}
+        receipt = client.upload(log, material, mapping=mapping, **options)
     except problems.UnknownMaterial:  # so it will be for the others
         raise
     except (InvalidInput, ProblemError) as refusal:

@@ -64,5 +64,5 @@ def alternatives(given: Mapping[str, Any]) -> list[dict[str, Any]]:
         raise InvalidInput("preset", repr(name)[:60], ", ".join(PRESETS))
     if type(array) is not int or not 0 <= array < 100:
         raise InvalidInput("array", repr(array)[:60], "0 to 99, the number of a sensor in the table")
-    said = {key: value for key, value in given.items() if key not in ("preset", "array")}
-    return [{**each, **said} for each in PRESETS[name](array)]
+    chosen = {key: value for key, value in given.items() if key not in ("preset", "array")}
+    return [{**each, **chosen} for each in PRESETS[name](array)]

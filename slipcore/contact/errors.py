@@ -40,8 +40,8 @@ class OutOfReach(InvalidInput, NotConverged):
     def __init__(self, name: str, asked: float, least: float, seconds: float) -> None:
         self.asked, self.least, self.seconds = asked, least, seconds
         self.what, self.residual, self.tolerance, self.iterations = name, least, asked, 0
-        takes = "" if name == "seconds" else f", which takes about {_told(seconds)}"
-        least_told = f"{_told(least)} or more" if name == "seconds" else f"{least:.2g} or more"
+        takes = "" if name == "seconds" else f", which takes about {_duration(seconds)}"
+        least_told = f"{_duration(least)} or more" if name == "seconds" else f"{least:.2g} or more"
         InvalidInput.__init__(self, name, f"{asked:g}", least_told + takes)
 
     def __reduce__(self) -> tuple[type, tuple[str, float, float, float]]:
@@ -53,7 +53,7 @@ class ManyRuns(InvalidInput):
 
     def __init__(self, runs: int, seconds: float) -> None:
         self.runs, self.seconds = runs, seconds
-        takes = f"{runs}, about {_told(seconds)} in all"
+        takes = f"{runs}, about {_duration(seconds)} in all"
         InvalidInput.__init__(
             self, "coarse runs to explain", takes, "so many where they are asked for: all_runs, --yes"
         )
@@ -62,7 +62,7 @@ class ManyRuns(InvalidInput):
         return type(self), (self.runs, self.seconds)
 
 
-def _told(seconds: float) -> str:
+def _duration(seconds: float) -> str:
     if seconds < 100.0:
         return f"{seconds:.2g} s"
     return f"{seconds / 60:.0f} min" if seconds < 6000.0 else f"{seconds / 3600:.0f} h"

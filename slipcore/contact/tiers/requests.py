@@ -28,7 +28,7 @@ class Runs:
 
     def __init__(self, reach: float, budget: float, progress: Progress, *, strict: bool = True) -> None:
         self._reach, self.budget, self._strict = reach, budget, strict
-        self._began, self._progress, self._told = time.perf_counter(), progress, 0.0
+        self._began, self._progress, self._reported = time.perf_counter(), progress, 0.0
         self._pace, self._done, self._ahead = Pace(), 0.0, 0.0
         self._sizes: dict[float, Sizes] = {}
 
@@ -79,8 +79,8 @@ class Runs:
         part = (self._done + now) / (self._done + max(whole, self._ahead))
         if np.isfinite(self.budget):
             part = self.spent / self.budget
-        self._told = min(max(self._told, part), 1.0)
-        self._progress(self._told)
+        self._reported = min(max(self._reported, part), 1.0)
+        self._progress(self._reported)
 
 
 def _work(size: Size) -> float:

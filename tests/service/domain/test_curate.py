@@ -202,7 +202,7 @@ def test_a_log_that_is_withdrawn_before_its_samples_are_stored_outdates_no_model
 def test_a_surface_that_changed_is_marked_on_its_models_and_recorded_once(
     shop: Shop, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def marked(models: list[Any], logs: list[Any]) -> list[Any]:
+    def marked(models: list[Any], logs: list[Any], *_prior: object) -> list[Any]:
         assert len(logs) == len(seen)
         return [replace(model, diagnostics={**model.diagnostics, "surface_change": "lower"}) for model in models]
 
