@@ -6,25 +6,16 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from typing import Annotated, Any, TypeVar
+from typing import Any, TypeVar
 from urllib.parse import quote
 
-from fastapi import Query, Request, Response
+from fastapi import Request, Response
 
 from db.paging import Window
 from service.http.problems import INVALID_REQUEST, Problem
 
-MOST = 1000
-"""Entries of one answer: a megabyte of materials with their models."""
-
-USUAL = 100
 LARGEST_ID = 2**31 - 1
 """Of a PostgreSQL integer."""
-
-Limit = Annotated[int, Query(ge=1, le=MOST, description="How many entries at most")]
-CursorText = Annotated[
-    str | None, Query(max_length=1000, description="Where to go on: `next` of the answer before, asked the same way")
-]
 
 Item = TypeVar("Item")
 

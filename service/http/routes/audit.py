@@ -10,9 +10,10 @@ from service.http.access import ADMIN
 from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
 from service.http.fair_route import FairRoute
-from service.http.paging import USUAL, CursorText, Limit, Page, link_next
+from service.http.paging import Page, link_next
 from service.http.problems import INVALID_REQUEST, STORAGE_UNAVAILABLE
 from service.http.schemas.audit import AuditEntryOut, AuditOut
+from service.http.schemas.common import USUAL, CursorText, Limit
 
 router = APIRouter(prefix="/v1/audit", tags=["audit"], route_class=FairRoute)
 

@@ -12,8 +12,9 @@ from service.http.access import ADMIN, READ, CurrentPrincipal
 from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
 from service.http.fair_route import FairRoute
-from service.http.paging import USUAL, CursorText, Limit, Page, link_next
+from service.http.paging import Page, link_next
 from service.http.problems import INVALID_REQUEST, JOB_ENDED, STORAGE_UNAVAILABLE, UNKNOWN_JOB
+from service.http.schemas.common import USUAL, CursorText, Limit
 from service.http.schemas.jobs import JobOut, JobsOut
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], route_class=FairRoute)

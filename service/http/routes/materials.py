@@ -18,7 +18,7 @@ from service.http.conditional import NOT_MODIFIED, conditional, tagged
 from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
 from service.http.idempotency import KeyWithBody, RepeatableResponse, respond_once
-from service.http.paging import USUAL, CursorText, Limit, Page, link_next
+from service.http.paging import Page, link_next
 from service.http.problems import (
     IDEMPOTENCY_KEY_REUSED,
     INVALID_REQUEST,
@@ -31,6 +31,7 @@ from service.http.problems import (
     UNSUPPORTED_FORMAT,
     UPLOAD_TOO_LARGE,
 )
+from service.http.schemas.common import USUAL, CursorText, Limit
 from service.http.schemas.jobs import JobOut
 from service.http.schemas.materials import MaterialOut, MaterialsOut, NewMaterial
 from service.http.schemas.models import (

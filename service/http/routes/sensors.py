@@ -12,7 +12,7 @@ from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.bodies import JsonRoute
 from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
-from service.http.paging import LARGEST_ID, MOST, USUAL, CursorText, Limit, Page, link_next
+from service.http.paging import LARGEST_ID, Page, link_next
 from service.http.problems import (
     FILE_DELETED,
     INVALID_REQUEST,
@@ -25,7 +25,7 @@ from service.http.problems import (
     UNSUPPORTED_FORMAT,
     UPLOAD_TOO_LARGE,
 )
-from service.http.schemas.common import Reference
+from service.http.schemas.common import MOST, USUAL, CursorText, Limit, Reference
 from service.http.schemas.sensors import (
     CalibrationOut,
     CalibrationsOut,

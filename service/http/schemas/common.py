@@ -2,12 +2,22 @@
 
 from typing import Annotated
 
+from fastapi import Query
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from db.text import is_storable
 
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}$"
 MOMENT_EXAMPLE = "2026-11-21T08:41:00.123456Z"
+
+MOST = 1000
+"""Entries of one answer: a megabyte of materials with their models."""
+
+USUAL = 100
+Limit = Annotated[int, Query(ge=1, le=MOST, description="How many entries at most")]
+CursorText = Annotated[
+    str | None, Query(max_length=1000, description="Where to go on: `next` of the answer before, asked the same way")
+]
 
 LARGEST_FORCE, LARGEST_VELOCITY = 1e4, 1e3
 """N on one element, as of an uploaded log, and m/s: beyond, a question is a mistake of units."""

@@ -9,8 +9,7 @@ from pydantic.config import JsonDict
 
 from db.records import Detection, JobStatus, StoredGraspLog, Withdrawal
 from service.formats.tracked_markers import FRAME_RATE, SCALE
-from service.http.paging import USUAL, CursorText, Limit
-from service.http.schemas.common import MOMENT_EXAMPLE, Body, Next, Reason
+from service.http.schemas.common import MOMENT_EXAMPLE, USUAL, Body, CursorText, Limit, Next, Reason
 from service.http.schemas.jobs import JOB_EXAMPLE, JobOut
 from slipcore.defaults import DEFAULT_METHOD, METHOD_NAMES
 

@@ -11,7 +11,8 @@ from service.domain.keys import is_valid
 from service.http.access import ADMIN
 from service.http.dependencies import CurrentContext
 from service.http.fair_route import FairRoute
-from service.http.paging import CursorText, Page
+from service.http.paging import Page
+from service.http.schemas.common import CursorText
 from service.web.rendering import render
 
 router = APIRouter(include_in_schema=False, route_class=FairRoute)

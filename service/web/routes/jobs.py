@@ -11,7 +11,8 @@ from service.domain.cancel import cancel
 from service.http.access import ADMIN, READ, CurrentPrincipal
 from service.http.dependencies import CurrentContext
 from service.http.fair_route import FairRoute
-from service.http.paging import CursorText, Page
+from service.http.paging import Page
+from service.http.schemas.common import CursorText
 from service.web.forms import EMPTY_IS_NONE
 from service.web.rendering import render
 

@@ -20,8 +20,8 @@ from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.conditional import KEEP_AND_ASK, is_one_of, unchanged
 from service.http.dependencies import CurrentContext
 from service.http.long_answers import LONG_ANSWER
-from service.http.paging import CursorText, Page
-from service.http.schemas.common import Force, Velocity
+from service.http.paging import Page
+from service.http.schemas.common import CursorText, Force, Velocity
 from service.http.schemas.grasp_logs import GraspLogOut
 from service.http.schemas.materials import MaterialOut, NewMaterial
 from service.report.wording import NEWEST_LOGS

@@ -17,8 +17,9 @@ from service.domain import sensors
 from service.domain.context import Context
 from service.http.access import READ, UPLOAD, Access, CurrentPrincipal
 from service.http.dependencies import CurrentContext
-from service.http.paging import CursorText, Page
+from service.http.paging import Page
 from service.http.routes.sensors import SensorName
+from service.http.schemas.common import CursorText
 from service.http.schemas.sensors import GelIn
 from service.web.forms import FormRoute, checked
 from service.web.rendering import on_problem, render

@@ -8,13 +8,12 @@ from numpy.typing import NDArray
 from slipcore.compilation import compiled
 from slipcore.detection.filter.element import Increment, Measurement, update_element
 from slipcore.detection.filter.force_ratio import follow_forces, keep_ratios, weigh_forces
-from slipcore.detection.filter.hold import changed, load_of, step_hold
+from slipcore.detection.filter.hold import step_hold
 from slipcore.detection.filter.loading import low_pass, restick_under_load
 from slipcore.detection.filter.pose import Anchors, Motion, Pose, object_motion, place_on_object
 from slipcore.detection.filter.state import (
     END,
     FORCE_FRAMES,
-    HELD_FRAMES,
     LASTING,
     ONSET,
     POSE,
@@ -27,20 +26,15 @@ from slipcore.detection.filter.state import (
     STICK_VARIANCE,
     STICK_X,
     STICK_Y,
-    STILL,
     TOLD_STEP,
 )
 from slipcore.detection.filter.surface_motion import step_pose, store_pose, stored_pose
 from slipcore.detection.filter.surroundings import shift_of_surroundings
 from slipcore.detection.filter.tuning import Tuning, tuning_of
-from slipcore.detection.shared.contact import neighbours
 from slipcore.detection.shared.lasting_noise import OF_STEP
 from slipcore.detection.shared.observe import same
 from slipcore.detection.shared.records import Decision, FrameArrays, Memory, Sensor, Surface, Workspace
 from slipcore.frames import BoolArray, FloatArray
-
-WHOLE = 8
-"""Neighbours of an element that is not at an edge."""
 
 
 @compiled
@@ -58,7 +52,6 @@ def step_filter(
     """
     tuning = tuning_of(sensor.settings)
     after.common[:] = before.common
-    hold_contact(frame, before, after, room.surface, has_force, tuning)
     if frame.force.size and after.contact.any():
         after.common[FORCE_FRAMES] += 1.0
         after.common[PULLED_FRAMES] += 0.0 if has_force else 1.0
@@ -137,29 +130,6 @@ def noise_of_frame(surface: Surface, tuning: Tuning) -> tuple[float, float]:
     shown = tuning.noise_margin * known_or(marker_noise, tuning.unknown_noise)
     variance = shown**2 + lasting**2 + tuning.displacement_floor**2
     return variance, tuning.force_noise_margin * known_or(pressing_noise, 0.0)
-
-
-@compiled
-def hold_contact(
-    frame: FrameArrays, before: Memory, after: Memory, surface: Surface, has_force: bool, tuning: Tuning
-) -> None:
-    """Let the contact's rim stay as it was while nothing happens: elements there would come and go by noise, and with
-    them what is known of their slip. What touches apart from it, or lets go amid it, does.
-    """
-    common = before.common
-    if not common[STILL] > tuning.hold_time or common[HELD_FRAMES] == 0.0 or frame.contact.size:
-        return
-    variance, force_noise = noise_of_frame(surface, tuning)
-    load, load_variance = load_of(frame, has_force, variance, force_noise, tuning)
-    if changed(load, load_variance, tuning, common):
-        return
-    n, m = after.contact.shape
-    for i in range(n):
-        for j in range(m):
-            if after.contact[i, j] != before.contact[i, j]:
-                around = neighbours(before.contact, i, j)
-                if around > 0 if after.contact[i, j] else around < WHOLE:
-                    after.contact[i, j] = surface.stays[i, j] = before.contact[i, j]
 
 
 @compiled
