@@ -73,7 +73,7 @@ def drift(history: SlipHistory, frames: int, settled: int) -> float:
 @pytest.mark.parametrize("marker_noise", [0.0, 1e-6, 1e-5])
 def test_what_slipped_before_a_hold_is_still_said_at_its_end(inputs: str, marker_noise: float) -> None:
     history = detect_slip(held(ramp(SHEAR), 1800, 30.0, marker_noise, inputs))
-    assert share(history)[-1] > 0.2
+    assert share(history)[-1] > 0.15  # .25 before the hold; without forces the rim comes and goes by noise
     assert drift(history, 1800, 30) <= 0.01
 
 
