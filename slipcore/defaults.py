@@ -63,6 +63,8 @@ class NoiseDefaults(Options):
     """That are looked at at most, evenly chosen."""
     least_series: Annotated[int, Option(2, 1000, "elements", "a median of fewer is one of them")] = 4
     """That must have changed for a frame to tell anything."""
+    least_inner: Annotated[int, Option(1, 1_000_000, "elements", "fields bend from marker to marker on 10 × 10")] = 225
+    """With neighbours all around, from which these tell of noise that lasts."""
     least_step: Annotated[float, Option(0.0, 1e-3, "m", "digits of files, and rounding of floats")] = 1e-9
     """By so much a place may miss a multiple of the step in which places are told."""
     finest_step: Annotated[float, Option(0.0, 1e-3, "m", "a third of it is less than any camera's noise")] = 2e-8

@@ -58,7 +58,6 @@ LAYOUT = {
     "slipcore/contact/solver/tangent_space.py": {"OUTSIDE", "STICK", "SLIP"},
     "slipcore/detection/shared/contact.py": {"CURVATURE_NOISE"},
     "slipcore/detection/shared/lasting_noise.py": {"SPREAD", "STEP", "ROWS", "OF_STENCIL", "OF_QUARTILE"},
-    "slipcore/detection/filter/step.py": {"WHOLE"},
     "slipcore/patch/regions.py": {"NOWHERE"},
     "estimators/sampling/proposal.py": {"TINY"},
 }

@@ -12,7 +12,7 @@ PAGE = Path(__file__).parents[1] / "docs/sensitivity.md"
 
 ABSENT: dict[str, dict[str, str]] = {
     "not measured yet": {
-        "slipcore.defaults.NOISE": "finest_step lasting_told least_series least_step series step_levels",
+        "slipcore.defaults.NOISE": "finest_step lasting_told least_inner least_series least_step series step_levels",
         "slipcore.defaults.SMOOTHING": (
             "frequencies largest_still least_elements least_force_noise least_noise whole widest"
         ),

@@ -10,7 +10,7 @@ from slipcore.frames import FloatArray
 from slipcore.noise import ranked, recent_median, remember
 
 SERIES = NOISE.series
-_MEMORY, _LEAST, _LEVELS = NOISE.memory, NOISE.least_step, NOISE.step_levels
+_MEMORY, _LEAST, _LEVELS, _INNER = NOISE.memory, NOISE.least_step, NOISE.step_levels, NOISE.least_inner
 _FINEST = NOISE.finest_step
 SPREAD, STEP = 9, 10
 """Rows of a memory's noise, behind those of ``observe.step_noise``: a ring of estimates, and the step, m."""
@@ -47,11 +47,11 @@ def step_lasting(
 def noise_between_neighbours(displacement: FloatArray, values: FloatArray) -> float:
     """Standard deviation of a coordinate in the plane by how displacement [n, m, 3] bends both along and across,
     in m: the lower quartile over evenly chosen elements, most of which lie where the field is even. NaN where there are
-    fewer than ``NOISE.series`` that have neighbours. ``values``: room for twice as many.
+    fewer than ``NOISE.least_inner`` that have neighbours. ``values``: room for twice as many.
     """
     n, m, _ = displacement.shape
     inner = max(n - 2, 0) * max(m - 2, 0)
-    if inner < SERIES:
+    if inner < max(_INNER, SERIES):
         return math.nan
     for s in range(SERIES):
         i, j = divmod(s * inner // SERIES, m - 2)

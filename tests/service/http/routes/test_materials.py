@@ -100,13 +100,13 @@ def test_a_material_without_a_model_says_so(client: httpx.Client, material: str)
 
 @pytest.mark.usefixtures("fitted")
 def test_the_friction_of_a_fitted_material_is_its_truth(client: httpx.Client) -> None:
-    mean = client.get("/v1/materials/fitted/friction", params={"fn": 0.15}).json()
+    mean = client.get("/v1/materials/fitted/friction", params={"v": 3e-4, "fn": 0.15}).json()
     assert mean["friction_coefficient"] == mean["mean"] == pytest.approx(0.4, abs=0.004)
     assert (mean["material"], mean["method"], mean["version"]) == ("fitted", "hierarchical", 1)
     assert mean["chosen_because"].startswith("hierarchical: ")
-    ols = client.get("/v1/materials/fitted/friction", params={"fn": 0.15, "method": "ols"}).json()
+    ols = client.get("/v1/materials/fitted/friction", params={"v": 3e-4, "fn": 0.15, "method": "ols"}).json()
     assert (ols["method"], ols["chosen_because"]) == ("ols", None)
-    assert (mean["tangential_velocity"], mean["normal_force"], mean["quantile"]) == (0.0, 0.15, None)
+    assert (mean["tangential_velocity"], mean["normal_force"], mean["quantile"]) == (3e-4, 0.15, None)
     assert (mean["within_domain"], mean["support"]) == (True, "not identified")  # by one grasp
     assert mean["warning"] == mean["advice"]
     assert "record more grasps" in mean["advice"]
