@@ -136,8 +136,8 @@ def _read_from_rest(reader: Callable[..., GraspLog], path: Path, given: dict[str
     """A log of a format that takes a mapping, with displacement from the frame or the file that is at ``rest``."""
     chosen = given.pop("rest")
     if not isinstance(chosen, Path):
-        mapping = given.get("mapping") or mappings.UNMAPPED
-        return reader(path, **{**given, "mapping": replace(mapping, rest=rest.check(chosen))})
+        mapping = given.get("mapping", mappings.UNMAPPED).at_rest(rest.check(chosen))
+        return reader(path, **{**given, "mapping": mapping})
     log, alone = reader(path, **given), reader(chosen, **given)
     if alone.grid != log.grid:
         raise InvalidInput("rest", f"a file of {alone.grid} elements", f"{log.grid}, as the log")

@@ -91,6 +91,8 @@ def _log(
 def _from_rest(members: dict[str, NDArray[Any]], mapping: FieldMapping, metadata: dict[str, str]) -> None:
     """Displacement from the frame at rest. Where displacement and position are the same fields, these tell places."""
     moved = np.asarray(members["displacement"], dtype=np.float64)
+    if moved.ndim < 2 or not moved.size:
+        raise InvalidInput("displacement", f"of shape {moved.shape}", "frames, elements and components, one at least")
     places = mapping.origins["displacement"].fields == mapping.origins["position"].fields != ()
     if not places and "position" in members and members["position"].shape == moved.shape[1:]:
         at = members["position"] + moved

@@ -56,7 +56,7 @@ class _Table:
     def __init__(self, path: Path, mapping: FieldMapping) -> None:
         lines = text_lines(path)
         self._names, delimiter, before = _header(lines)
-        self._case = re.IGNORECASE if "preset" in mapping.text else re.NOFLAG
+        self._case = re.IGNORECASE if mapping.preset else re.NOFLAG
         self.mapping = mapping = self._chosen(mapping).over(default_origins())
         for name, origin in mapping.origins.items():
             self._check_same_elements(name, origin.fields)
@@ -84,7 +84,7 @@ class _Table:
 
     def _chosen(self, mapping: FieldMapping) -> FieldMapping:
         """The first of a preset's alternatives whose columns are there, without the contact where that isn't told."""
-        if "preset" not in mapping.text:
+        if not mapping.preset:
             return mapping
         for each in (mapping, *mapping.alternatives):
             missing = {name for name, origin in each.origins.items() if not all(map(self._columns, origin.fields))}

@@ -27,7 +27,7 @@ FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLE
 def read(path: Path, mapping: FieldMapping | None = None) -> GraspLog:
     """Read a grasp log from an HDF5 file. Raises ``InvalidInput`` naming the member or dataset that is wrong."""
     with _library(), h5py.File(path, "r") as file:
-        chosen = (mapping or _own_mapping(file)).over(default_origins())
+        chosen = mappings.chosen_over(mapping, _own_mapping(file)).over(default_origins())
         return assemble(_Datasets(file), chosen)
 
 

@@ -25,7 +25,7 @@ def read(path: Path, mapping: FieldMapping | None = None) -> GraspLog:
     defaults = default_origins()
     if isinstance(document.get("frames"), list):
         defaults |= {name: Origin((f"frames.{name}",), explicit=False) for name in _of_frames(document)}
-    return assemble(_Document(document), (mapping or own).over(defaults))
+    return assemble(_Document(document), mappings.chosen_over(mapping, own).over(defaults))
 
 
 class _Document:

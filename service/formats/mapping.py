@@ -71,7 +71,7 @@ class FieldMapping:
     that numbers the elements where a table has a row for each, and the frame at ``rest``, whose displacement is 0.
 
     ``text`` is the mapping as it was given, empty where none was. ``notes`` are fields kept in the metadata, by
-    name. A preset has ``alternatives``, of which the first whose fields are there is taken.
+    name. A ``preset`` may have ``alternatives``, of which the first whose fields are there is taken.
     """
 
     origins: Mapping[str, Origin]
@@ -84,6 +84,13 @@ class FieldMapping:
     text: str = ""
     notes: Mapping[str, str] = field(default_factory=dict)
     alternatives: "tuple[FieldMapping, ...]" = ()
+    preset: bool = False
+
+    def at_rest(self, rest: str | None) -> "FieldMapping":
+        """This mapping, in each of its alternatives, with another frame at rest, unless that is None."""
+        if rest is None:
+            return self
+        return replace(self, rest=rest, alternatives=tuple(replace(each, rest=rest) for each in self.alternatives))
 
     def over(self, defaults: Mapping[str, Origin]) -> "FieldMapping":
         """This mapping with ``defaults`` for the members that it does not name."""
@@ -91,6 +98,13 @@ class FieldMapping:
 
 
 UNMAPPED = FieldMapping({})
+
+
+def chosen_over(given: FieldMapping | None, own: FieldMapping | None) -> FieldMapping:
+    """The mapping that was ``given``, or a file's ``own`` where none was, with the frame at rest that was given."""
+    if given is not None and given.text:
+        return given
+    return (own or UNMAPPED).at_rest(None if given is None else given.rest)
 
 
 def parse(text: str) -> FieldMapping:
@@ -127,6 +141,7 @@ def _parsed(given: Mapping[str, Any], told: Mapping[str, Any]) -> FieldMapping:
         rest=rests.check(str(given["rest"])) if "rest" in given else None,
         text=json.dumps(told, sort_keys=True, ensure_ascii=False),
         notes=_notes(given["notes"]) if "notes" in given else {},
+        preset="preset" in told,
     )
 
 

@@ -30,7 +30,7 @@ _DAMAGE = (McapError, struct.error, UnicodeDecodeError, ValueError, KeyError, Ov
 
 def read(path: Path, mapping: FieldMapping | None = None) -> GraspLog:
     """Read a grasp log from an MCAP file. Raises ``InvalidInput`` naming the member or topic that is wrong."""
-    chosen = with_defaults(mapping or _own_mapping(path))
+    chosen = with_defaults(mappings.chosen_over(mapping, _own_mapping(path)))
     columns = MessageColumns(chosen)
     gather(path, columns)
     return assemble(columns, chosen)

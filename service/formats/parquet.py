@@ -77,7 +77,7 @@ class _Columns:
         notes = file.schema_arrow.metadata or {}
         self._log = _object("stiction_log", notes.get(LOG_KEY, b"{}"))
         own = mappings.parse(notes[MAPPING_KEY].decode("utf-8", "replace")) if MAPPING_KEY in notes else None
-        self.mapping = (mapping or own or mappings.UNMAPPED).over(self._defaults())
+        self.mapping = mappings.chosen_over(mapping, own).over(self._defaults())
         self._bytes = 0
         self._groups: Sequence[int] = range(file.metadata.num_row_groups)
         self._rows = self._episode()

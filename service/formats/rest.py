@@ -34,6 +34,8 @@ def frame_of(rest: str, frames: int, load: FloatArray | None, place: FloatArray)
     Raises ``InvalidInput`` for a number that is none of a frame, and where nothing tells of contact.
     """
     text = check(rest)
+    if text == LEAST_CONTACT and load is not None and len(load) != frames:
+        raise InvalidInput("rest", f"{LEAST_CONTACT}, told of {len(load)} frames", f"{frames} frames, as displacement")
     if text == LEAST_CONTACT:
         return int(np.argmin(stretch(place) if load is None else load))
     frame = 0 if text == FIRST else int(text)
@@ -45,7 +47,7 @@ def frame_of(rest: str, frames: int, load: FloatArray | None, place: FloatArray)
 def load_of(members: Members) -> FloatArray | None:
     """How much touches in each frame [t]: elements in contact, or force, or the gripper's; None where none is told."""
     for name in ("contact", "force", "gripper_force"):
-        if name in members:
+        if name in members and np.ndim(members[name]):  # one number for all frames tells nothing of rest
             told = np.abs(np.asarray(members[name], dtype=np.float64))
             return np.asarray(np.nan_to_num(told).reshape(len(told), -1).sum(axis=1))
     return None

@@ -1,0 +1,71 @@
+"""The frame at rest beside mappings of a file's own, presets, and what cannot be."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from service import formats
+from slipcore import InvalidInput
+from tests.service.formats.test_presets import recorder, written
+
+MOVED = 1e-4 * np.random.default_rng(1).random((3, 2, 2, 3))
+PLACES = np.stack(np.meshgrid([0.0, 1e-3], [0.0, 1e-3], [0.0], indexing="ij"), -1)[:, :, 0]
+LOG = {"time": [0.0, 0.03, 0.06], "displacement": MOVED.tolist(), "position": PLACES.tolist(), "element_area": 1e-6}
+
+
+def log_of(folder: Path, **members: Any) -> Path:
+    path = folder / "log.json"
+    path.write_text(json.dumps(LOG | members), encoding="utf-8")
+    return path
+
+
+def test_rest_leaves_a_files_own_mapping(tmp_path: Path) -> None:
+    own = {"force": {"field": "force", "unit": ["mN", "mN", "-mN"]}}
+    path = log_of(tmp_path, force=(1e3 * MOVED).tolist(), mapping=own)
+    plain, rested = formats.read(path), formats.read(path, rest="1")
+    assert plain.force is not None
+    assert rested.force is not None
+    np.testing.assert_array_equal(rested.force, plain.force)
+    np.testing.assert_allclose(plain.force, MOVED * [1.0, 1.0, -1.0], rtol=1e-12, atol=0)
+    np.testing.assert_array_equal(rested.displacement[1], 0.0)
+
+
+def test_each_alternative_of_a_preset_has_the_frame_at_rest(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.csv", recorder(0))
+    np.testing.assert_array_equal(formats.read(path, mapping="papillarray", rest="3").displacement[3], 0.0)
+    with pytest.raises(InvalidInput, match=r"rest is frame 99 of 5; allowed: 0 to 4"):
+        formats.read(path, mapping="papillarray", rest="99")
+
+
+def test_one_gripper_force_of_all_frames_is_refused_by_name(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match="gripper_force is of shape"):
+        formats.read(log_of(tmp_path), mapping=json.dumps({"gripper_force": {"value": 1.0}}), rest="least contact")
+
+
+@pytest.mark.parametrize(
+    ("members", "rest", "said"),
+    [
+        ({"contact": [[[True] * 2] * 2] * 5 + [[[False] * 2] * 2]}, "least contact", "told of 6 frames"),
+        ({"displacement": np.zeros((3, 2, 2, 0)).tolist()}, "first", "displacement is of shape"),
+    ],
+    ids=["contact of other frames", "no components"],
+)
+def test_rest_of_what_cannot_be_is_refused_by_name(
+    tmp_path: Path, members: dict[str, Any], rest: str, said: str
+) -> None:
+    with pytest.raises(InvalidInput, match=said):
+        formats.read(log_of(tmp_path, **members), rest=rest)
+
+
+def test_a_mapping_that_speaks_of_presets_is_none(tmp_path: Path) -> None:
+    """It had dropped a contact that is not there, and failed by a KeyError."""
+    path = tmp_path / "log.csv"
+    path.write_text("t,dx,dy\n0,0,0\n1,0,0\n", encoding="utf-8")
+    given = {"time": "t", "displacement": ["dx", "dy"], "sensor": {"value": "preset 1"}, "grid": [1, 1], "pitch": 1e-3}
+    with pytest.raises(InvalidInput, match="contact"):
+        formats.read(path, mapping=json.dumps(given | {"contact": "touching"}))
+    with pytest.raises(InvalidInput, match="missing"):
+        formats.read(path, mapping=json.dumps(given | {"displacement": ["dx", "missing"]}))
