@@ -3,8 +3,8 @@
 Medians of processor time (one thread, so that other programs matter little) over warm-started load steps of the
 paper's Condition 1 (sphere of 15 mm, F_N = 10 N, F_T to 3.96 N in 50 steps), at residuals of 1e-4 and 1e-8 of the
 largest limit; beside each its floor, the number of convolutions times the cost of one, both measured. Then normal
-contact from nothing, coupled steps, whole scenes, and the memory of 1024 × 1024 cells. Writes contact_speed.json and
-prints a Markdown table.
+contact from nothing, coupled steps, the steps of few cells that audits of control take, whole scenes, and the memory of
+1024 × 1024 cells. Writes contact_speed.json and prints a Markdown table. `--parts` measures only some of that.
 """
 
 import argparse
@@ -129,6 +129,13 @@ def steps() -> Iterator[Cost]:
     yield step_cost("coupled step, 64², ν = 0.49, residual 1e-04", 64, 1e-4, None, 0.49, coupled=True)
 
 
+def small_steps() -> Iterator[Cost]:
+    """Load steps on as few cells as the audit of grip control takes."""
+    for cells in (12, 16, 20, 24):
+        yield step_cost(f"step, {cells}², residual 1e-03", cells, 1e-3, 2.0, 0.3, coupled=False)
+        yield step_cost(f"coupled step, {cells}², residual 1e-03", cells, 1e-3, 2.0, 0.3, coupled=True)
+
+
 def presses() -> Iterator[Cost]:
     """Normal contact from nothing, to 1e-6 of the indentation."""
     for cells in (64, 128, 256, 512):
@@ -155,11 +162,18 @@ def scenes() -> Iterator[Cost]:
         yield Cost(what, median_time(run, 3), 1000.0, None, None, None, 3)
 
 
+PARTS: dict[str, Callable[[], Iterator[Cost]]] = {
+    "steps": steps,
+    "small": small_steps,
+    "presses": presses,
+    "scenes": scenes,
+}
+
 MEMORY = """
 import resource
-from benchmarks.contact_speed import press_once
+from benchmarks.contact_speed import press_once, shear_once
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-press_once({cells})
+{action}({cells})
 print(before, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
@@ -170,11 +184,18 @@ def press_once(cells: int) -> None:
     solve_normal(Operators((HalfSpace.from_young(YOUNG, 0.0),)), grid, bowl(*grid.points()), force=FORCE)
 
 
-def memory(cells: int) -> tuple[float, float]:
-    """Largest resident size in MiB of a process that solves normal contact, before and after."""
-    found = subprocess.run(
-        [sys.executable, "-c", MEMORY.format(cells=cells)], capture_output=True, text=True, check=True
-    )
+def shear_once(cells: int) -> None:
+    """A press, then two steps of partial slip, for the memory that they take."""
+    problem = Problem((HalfSpace.from_young(YOUNG, 0.3),), FRICTION, heights=(bowl,))
+    pulls = [StepLoad(FORCE, tangential=np.array([force, 0.0, 0.0])) for force in (0.0, 1.2, 2.8)]
+    for _ in QuasiStatic(problem, Grid.square(cells, width(0.3)), 1e-3, 1e-4, second_order=True).run(pulls):
+        pass
+
+
+def memory(action: str, cells: int) -> tuple[float, float]:
+    """Largest resident size in MiB of a process that does one of the above, before and after."""
+    script = MEMORY.format(action=action, cells=cells)
+    found = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     before, after = (float(part) / MIB for part in found.stdout.split())
     return before, after
 
@@ -196,16 +217,24 @@ def main() -> None:
     """Measure, print, write JSON."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, default=Path("benchmarks/results"))
+    parser.add_argument("--parts", nargs="+", choices=(*PARTS, "memory"), default=[*PARTS, "memory"])
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
-    costs = [*steps(), *presses(), *scenes()]
+    costs = [cost for part in PARTS if part in options.parts for cost in PARTS[part]()]
     print(table(costs))
-    uncoupled, coupled = costs[0].milliseconds, [c.milliseconds for c in costs if c.what.startswith("coupled")]
-    print("\ncoupled over uncoupled:", ", ".join(f"{c / uncoupled:.1f}" for c in coupled))
-    sizes = {cells: memory(cells) for cells in (256, 512, 1024)}
-    for cells, (before, after) in sizes.items():
-        print(f"memory of normal contact, {cells}²: {after - before:.0f} MiB over the {before:.0f} of the libraries")
-    result = {"costs": [asdict(c) for c in costs], "memory_mib": {str(c): after for c, (_, after) in sizes.items()}}
+    uncoupled = [c.milliseconds for c in costs if c.what == "step, 64², residual 1e-04"]
+    coupled = [c.milliseconds for c in costs if c.what.startswith("coupled step, 64²")]
+    if uncoupled:
+        print("\ncoupled over uncoupled:", ", ".join(f"{c / uncoupled[0]:.1f}" for c in coupled))
+    sizes = {}
+    if "memory" in options.parts:
+        cases = [("press_once", cells) for cells in (256, 512, 1024)] + [("shear_once", 1024)]
+        sizes = {(action, cells): memory(action, cells) for action, cells in cases}
+    for (action, cells), (before, after) in sizes.items():
+        what = "normal contact" if action == "press_once" else "partial slip"
+        print(f"memory of {what}, {cells}²: {after - before:.0f} MiB over the {before:.0f} of the libraries")
+    peaks = {f"{action} {cells}": after for (action, cells), (_, after) in sizes.items()}
+    result = {"costs": [asdict(c) for c in costs], "memory_mib": peaks}
     (options.output / "contact_speed.json").write_text(json.dumps(result, indent=1), encoding="utf-8")
 
 
