@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from slipcore.contact import reference
+from slipcore.contact.effects import LoadPath, SensorSampling, Viscoelasticity
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.elasticity.operator import Operators
@@ -48,7 +49,17 @@ SCENES = (
 )
 ASKED = (0.1, 0.05, 0.02)
 FINE = Fidelity(cells=110, substeps=2, tolerance=1e-6)
-STEPPED = ("table1_condition1_layer", "bottle_cap_twist", "cup_filling", "lifting_07N")
+CREEPING = Scene(
+    "creeping pull",
+    (
+        Viscoelasticity((0.3,), (0.3,)),
+        LoadPath((1.0, 1.5), force_x=(0.0, 2.0), force_y=(0.0, 1.0)),
+        SensorSampling((12, 12), 1e-3, 10.0),
+    ),
+    duration=2.0,
+)
+"""Pressed, pulled and held, on a gel that creeps by 30 %, in 0.3 s."""
+STEPPED = ("table1_condition1_layer", "bottle_cap_twist", "cup_filling", "lifting_07N", CREEPING.name)
 STEPS = (1, 2, 4, 8)
 FINEST_STEPS = 32
 """Load steps a frame that those of ``STEPS`` are compared with, on the same grid."""
@@ -228,7 +239,7 @@ def scenes(names: list[str]) -> Iterator[Point | Kept]:
 def load_steps(names: list[str]) -> Iterator[Stepped]:
     """Scenes on the default grid in ever more load steps, against the finest."""
     for name in names:
-        plan = Scene.from_toml(name).plan()
+        plan = (CREEPING if name == CREEPING.name else Scene.from_toml(name)).plan()
         fine = run(plan, Fidelity(substeps=FINEST_STEPS, tolerance=1e-5))
         for substeps in STEPS:
             began = time.process_time()
@@ -272,6 +283,20 @@ def step_table(stepped: list[Stepped]) -> str:
         f"| {e.force:.1e} | {e.seconds:.2f} |"
         for e in stepped
     ]
+    return "\n".join(lines)
+
+
+def order_table(stepped: list[Stepped]) -> str:
+    """Orders in load steps between the first and the last row of each scene; none where nothing is left."""
+    measures = ("displacement", "force", "mean_stick_ratio")
+    lines = ["| scene | displacement | force | mean of the stick ratio |", "|---|---|---|---|"]
+    for name in dict.fromkeys(entry.scene for entry in stepped):
+        own = [entry for entry in stepped if entry.scene == name]
+        growth, told = np.log(own[-1].steps / own[0].steps), []
+        for measure in measures:
+            first, last = getattr(own[0], measure), getattr(own[-1], measure)
+            told.append(f"{np.log(first / last) / growth:.2f}" if last > 0.0 else "")
+        lines.append(f"| {name} | " + " | ".join(told) + " |")
     return "\n".join(lines)
 
 
@@ -325,6 +350,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("benchmark-output"))
     parser.add_argument("--cells", type=int, nargs="+", default=[16, 32, 64, 128])
     parser.add_argument("--scenes", nargs="*", default=list(SCENES), help="the layered one takes minutes")
+    parser.add_argument("--stepped", nargs="+", choices=STEPPED, default=list(STEPPED), help="scenes of load steps")
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS), help="what to measure")
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
@@ -337,12 +363,12 @@ def main() -> None:
         curves(points).savefig(options.output / "contact_accuracy.png", dpi=100)
         print(table(points), request_table(kept), sep="\n\n")
     if "steps" in options.parts:
-        stepped = list(load_steps(list(STEPPED)))
+        stepped = list(load_steps(options.stepped))
         (options.output / "contact_accuracy_steps.json").write_text(
             json.dumps([asdict(entry) for entry in stepped], indent=1)
         )
         step_curves(stepped).savefig(options.output / "contact_accuracy_steps.png", dpi=100)
-        print(step_table(stepped))
+        print(step_table(stepped), order_table(stepped), sep="\n\n")
 
 
 if __name__ == "__main__":
