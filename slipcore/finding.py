@@ -1,11 +1,39 @@
 """What speaks against a log, or against what was found in it."""
 
 from dataclasses import dataclass
+from typing import Literal
+
+Severity = Literal["warning", "note"]
+"""A warning makes friction doubtful; a note says what was not seen, or what was done about it."""
+
+SEVERITIES: dict[str, Severity] = {
+    "reconstructed forces": "note",
+    "gripper's force contradicted": "note",
+    "slow frames": "note",
+    "no displacement": "note",
+    "repeated frames": "note",
+    "force too large": "warning",
+    "force pulls": "warning",
+    "forces not believed": "note",
+    "rounded": "note",
+    "lasting noise": "note",
+    "smoothed": "note",
+    "saturation": "warning",
+    "no rest": "note",
+    "sideways force without load": "warning",
+    "contact travels": "warning",
+    "friction follows force": "warning",
+    "friction differs by place": "warning",
+    "contact contradicts elements": "note",
+}
+"""Of each finding's name. After a warning the ratio of an element's forces, or the force at which it was seen, is not
+the material's: models of such logs are implausible.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Something that makes the friction found in a log doubtful: its ``name`` in docs/checks.md, what was seen, and
+    """Something to know about a log before its friction is used: its ``name`` in docs/checks.md, what was seen, and
     what to do about it.
     """
 
@@ -19,6 +47,11 @@ class Finding:
         return self.name
 
     @property
-    def severity(self) -> str:
-        """Always "warning": each makes friction doubtful, none stops an evaluation."""
-        return "warning"
+    def severity(self) -> Severity:
+        """By ``SEVERITIES``: "warning" where friction is doubtful, else "note"."""
+        return severity_of(self.name)
+
+
+def severity_of(name: str) -> Severity:
+    """That of the finding of this ``name``; a name that is not known, as of a newer version, is a note."""
+    return SEVERITIES.get(name, "note")

@@ -85,11 +85,15 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Something that makes the friction found in a log doubtful: its name, what was seen, and what to do about it."""
+    """Something to know about a log before its friction is used: its name, what was seen, and what to do about it.
+
+    ``severity``: "warning" where it makes friction doubtful, else "note"; None from an older service.
+    """
 
     name: str
     evidence: str
     remedy: str
+    severity: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -98,13 +98,16 @@ def check(
     findings, contact = seen.findings(), _contact_record(seen.log, seen.history)
     compared = None if seen.reconstruction else comparison(seen.log, gel)
     if json:
-        told = {"log": log.name, "findings": [asdict(finding) for finding in findings], "contact_friction": contact}
+        told = {"log": log.name, "findings": [_finding_record(each) for each in findings], "contact_friction": contact}
         print_json(told if compared is None else told | {"forces_by_gel": asdict(compared)})
         return
     for finding in findings:
         typer.echo(f"{finding.name}: {finding.evidence}\n  {finding.remedy}")
     if not findings:
         typer.echo(f"{log.name}: nothing found against it")
+    doubts = [finding.name for finding in findings if finding.severity == "warning"]
+    if doubts:
+        typer.echo(f"friction from this log is doubtful: {', '.join(doubts)}")
     if contact is not None:
         typer.echo(f"friction of the contact: {_contact_line(contact)}")
     if compared is not None:
@@ -295,6 +298,10 @@ def _detection_summary(log: "GraspLog", history: "SlipHistory", seconds: float) 
         "contact_friction": _contact_record(log, history),
         **({} if log.is_scaled else {"unknown": "the scale: no noise, velocity or friction can be told in SI units"}),
     }
+
+
+def _finding_record(finding: "Finding") -> dict[str, Any]:
+    return asdict(finding) | {"severity": finding.severity}
 
 
 def _contact_record(log: "GraspLog", history: "SlipHistory") -> dict[str, Any] | None:

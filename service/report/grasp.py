@@ -9,7 +9,7 @@ from service.formatting import NOTHING, interval, number
 from service.report import wording
 from service.report.page import Fact, Picture, Report, Section, Table
 from service.report.pictures import SlipOverTime, draw_slip, friction_sections, marginals
-from slipcore.checks import AGAINST_FRICTION
+from slipcore.finding import severity_of
 from slipcore.samples import FrictionSamples
 
 MAP = (
@@ -56,7 +56,7 @@ def _steps(seen: InspectedGrasp) -> list[str]:
     steps = [f"{finding.name}: {finding.remedy}." for finding in found]
     if seen.model is None:
         return [*steps, "Record another grasp of the same material, or load this one further, until parts of it slip."]
-    if AGAINST_FRICTION.intersection(finding.name for finding in found):
+    if any(severity_of(finding.name) == "warning" for finding in found):
         return [*steps, "Record the grasp again once that is mended."]
     told = next_grasp(seen.model, WorkingPoint(0.5 * sum(seen.model.domain.normal_force)), grasps=1)
     return [*steps, wording.record_next(told), "Upload it with others of its material, and ask how hard to grip that."]

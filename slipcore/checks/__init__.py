@@ -11,7 +11,7 @@ from slipcore.checks.subject import Check, Subject
 from slipcore.defaults import CheckOptions, choose_options
 from slipcore.element_forces import element_forces
 from slipcore.errors import NoForces, UnknownScale
-from slipcore.finding import Finding
+from slipcore.finding import SEVERITIES, Finding
 from slipcore.frames import GraspLog
 from slipcore.samples import FrictionSamples, element_samples
 from slipcore.slip_state import SlipHistory
@@ -34,22 +34,10 @@ CHECKS: tuple[Check, ...] = (
     friction.friction_by_place,
     friction.friction_against_contact,
 )
-"""In the order in which findings are told: the recording first, then what was found in it."""
+"""In the order in which findings are listed: the recording first, then what was found in it."""
 
-AGAINST_FRICTION = frozenset(
-    {
-        "contact travels",
-        "force pulls",
-        "force too large",
-        "friction differs by place",
-        "friction follows force",
-        "saturation",
-        "sideways force without load",
-    }
-)
-"""Findings by which the ratio of an element's forces, or the force it is told at, is not the material's. The others say
-that less was seen than might have been.
-"""
+AGAINST_FRICTION = frozenset(name for name, severity in SEVERITIES.items() if severity == "warning")
+"""Names of the findings that are warnings: friction from such logs is not the material's."""
 
 
 def check_log(

@@ -133,6 +133,10 @@ def test_check_says_what_is_doubtful_and_fit_says_it_beside_its_model(
     container.write(replace(log, time=1e3 * log.time), doubtful)
     found = json.loads(run("check", doubtful, "--json")[1])["findings"]
     assert [each["name"] for each in found] == ["slow frames"]
+    assert [each["severity"] for each in found] == ["note"]
+    assert "doubtful:" not in run("check", doubtful)[1]
+    container.write(replace(log, force=-np.asarray(log.force)), pulling := tmp_path / "pulling.npz")
+    assert "friction from this log is doubtful: force pulls" in run("check", pulling)[1]
     assert "times are in s, not ms" in run("check", doubtful)[1]
     code, _, told = run("fit", *ramps[1:], doubtful)
     assert (code, told.count("slow frames")) == (0, 1)

@@ -1,5 +1,6 @@
 """Faults put into a log on purpose are found by name; a log without them is left alone."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -7,8 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from slipcore import GraspLog, InvalidInput, check_log, detect_slip
+from service.domain.reconstruct import CONTRADICTED, RECONSTRUCTED
+from slipcore import Finding, GraspLog, InvalidInput, check_log, detect_slip
+from slipcore.checks import AGAINST_FRICTION
 from slipcore.contact import RampSchedule, tangential_ramp
+from slipcore.finding import SEVERITIES
 
 Scene = Callable[..., GraspLog]
 
@@ -159,6 +163,25 @@ def test_a_limit_can_be_moved_and_a_wrong_one_is_refused(long_ramp: GraspLog) ->
         names(long_ramp, place_scatter=-1.0)
 
 
-def test_every_finding_is_documented() -> None:
+def findings_in_code() -> set[str]:
+    """The names of all findings that the packages make."""
+    sources = [
+        path.read_text(encoding="utf-8") for part in ("slipcore", "service") for path in Path(part).rglob("*.py")
+    ]
+    return {name for source in sources for name in re.findall(r'\bFinding\(\s*"([^"]+)"', source)} | {
+        RECONSTRUCTED,
+        CONTRADICTED,
+    }
+
+
+def test_every_finding_is_documented_with_its_severity() -> None:
     page = Path("docs/checks.md").read_text(encoding="utf-8")
-    assert all(f"| {fault} |" in page for fault in FAULTS)
+    assert dict(re.findall(r"^\| ([^|]+) \| (warning|note) \|", page, re.MULTILINE)) == SEVERITIES
+    assert findings_in_code() == set(SEVERITIES)
+
+
+def test_severity_parts_what_makes_friction_doubtful_from_what_informs() -> None:
+    assert Finding("saturation", "", "").severity == "warning"
+    assert Finding("no rest", "", "").severity == "note"
+    assert Finding("of a newer version", "", "").severity == "note"
+    assert {name for name in SEVERITIES if Finding(name, "", "").severity == "warning"} == AGAINST_FRICTION

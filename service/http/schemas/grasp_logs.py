@@ -7,14 +7,16 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.config import JsonDict
 
-from db.records import Detection, JobStatus, StoredGraspLog, Withdrawal
+from db.records import Detection, Finding, JobStatus, StoredGraspLog, Withdrawal
 from service.formats.tracked_markers import FRAME_RATE, SCALE
 from service.http.schemas.common import MOMENT_EXAMPLE, USUAL, Body, CursorText, Limit, Next, Reason
 from service.http.schemas.jobs import JOB_EXAMPLE, JobOut
 from slipcore.defaults import DEFAULT_METHOD, METHOD_NAMES
+from slipcore.finding import Severity, severity_of
 
 FINDING_EXAMPLE: JsonDict = {
     "name": "no rest",
+    "severity": "note",
     "evidence": "68 elements touch in the first frame",
     "remedy": "begin the recording before the touch: what was before is not known",
 }
@@ -90,11 +92,12 @@ class EventCounts(BaseModel):
 
 
 class FindingOut(BaseModel):
-    """Something that makes the friction found in a log doubtful."""
+    """Something to know about a log before its friction is used."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [FINDING_EXAMPLE]})
 
     name: Annotated[str, Field(description="As in docs/checks.md")]
+    severity: Annotated[Severity, Field(description="`warning`: makes friction doubtful; `note`: does not")]
     evidence: Annotated[str, Field(description="What was seen")]
     remedy: Annotated[str, Field(description="What to do about it")]
 
@@ -186,6 +189,10 @@ class GraspLogOut(BaseModel):
         )
 
 
+def _finding_out(found: Finding) -> FindingOut:
+    return FindingOut(**asdict(found), severity=severity_of(found.name))
+
+
 def _contact_friction_out(found: Detection) -> ContactFrictionOut | None:
     return None if found.contact_friction is None else ContactFrictionOut(**asdict(found.contact_friction))
 
@@ -204,7 +211,7 @@ def _detection_out(log: StoredGraspLog) -> DetectionOut | None:
         samples=log.samples.count,
         velocity_is_relative=log.samples.velocity_is_relative,
         seconds=found.seconds,
-        findings=None if found.findings is None else [FindingOut(**asdict(each)) for each in found.findings],
+        findings=None if found.findings is None else [_finding_out(each) for each in found.findings],
         contact_friction=_contact_friction_out(found),
         calibration=found.calibration,
         corrections=None if found.corrections is None else list(found.corrections),
