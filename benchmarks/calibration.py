@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.pages import options, picture_folder, save, table, write
-from benchmarks.patch_grasps import PIVOT, grasp
+from benchmarks.patch_grasps import PIVOT, Setting, grasp
 from benchmarks.presses import WHITE_SHARE, Faults, pressed
 from estimators import fit
 from slipcore import (
@@ -164,7 +164,9 @@ def pivots(width: float) -> tuple[float, ContactFriction, ContactFriction]:
     """Friction of a contact that pivots, without and with the kernel that three presses tell; ``width`` elements."""
     faults = replace(WHITE, smoothing=width)
     model = calibrate_sensor([faults.put_into(pressed(5.0), seed) for seed in range(3)])
-    log = grasp(PIVOT, PIVOT_FRICTION, smoothing=width, marker_noise=WHITE.marker_noise, force_noise=WHITE.force_noise)
+    log = grasp(
+        PIVOT, PIVOT_FRICTION, Setting(smoothing=width, marker_noise=WHITE.marker_noise, force_noise=WHITE.force_noise)
+    )
     histories = [detect_slip(log, lookahead=2, sensor_model=each) for each in (None, model)]
     before, after = (contact_friction(log.time, history.patches) for history in histories)
     assert before is not None

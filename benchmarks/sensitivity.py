@@ -28,7 +28,7 @@ from benchmarks.detector_accuracy import FORCE_NOISE, INPUTS, score
 from benchmarks.detector_coarse import coarse
 from benchmarks.detector_scenes import Case, cases, observed, phases, scoring, simulated
 from benchmarks.pages import options, picture_folder, save, write
-from benchmarks.patch_grasps import PIVOT, SLIDE, Course
+from benchmarks.patch_grasps import PIVOT, SLIDE, Course, Setting
 from benchmarks.patch_grasps import grasp as moving_grasp
 from benchmarks.scatter import TRUTH, Kind, grasp
 from estimators import defaults as of_estimators
@@ -225,7 +225,7 @@ def moving(name: str) -> tuple[GraspLog, BoolArray, BoolArray]:
     """A body that moves over markers, and what the detector says of contact and slip, which no default of patches
     changes."""
     noise = {"marker_noise": 3e-6, "force_noise": 2e-3, "smoothing": 0.7, "crosstalk": 0.1}
-    log = moving_grasp(COURSES[name], FRICTION, half_axes=(6.2e-3, 4e-3), seed=31, **noise)
+    log = moving_grasp(COURSES[name], FRICTION, Setting(half_axes=(6.2e-3, 4e-3), seed=31, **noise))
     found = detect_slip(log)
     return log, found.contact, found.slip
 

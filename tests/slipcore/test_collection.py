@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.patch_grasps import PIVOT, SLIDE, grasp
+from benchmarks.patch_grasps import PIVOT, SLIDE, Setting, grasp
 from slipcore import GraspLog, check_log, collect_friction, collect_samples, detect_slip
 from slipcore.samples import element_samples
 from tests.slipcore.conftest import RECORDINGS, read_recording
@@ -28,7 +28,7 @@ def test_a_sliding_contact_has_the_friction_of_its_law_at_its_mean_elements() ->
 
 
 def test_elements_under_smoothed_forces_are_left_out_and_the_contact_is_believed() -> None:
-    log = grasp(PIVOT, 0.7, smoothing=1.0, crosstalk=0.3, **NOISE)
+    log = grasp(PIVOT, 0.7, Setting(smoothing=1.0, crosstalk=0.3, **NOISE))
     history = detect_slip(log, lookahead=2)
     everywhere = replace(history, slip=history.contact.copy(), probability=history.contact.astype(float))
     found = collect_friction(log, everywhere, velocity_to_noise=0.0, least_velocity=0.0)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.patch_grasps import PIVOT, grasp
+from benchmarks.patch_grasps import PIVOT, Setting, grasp
 from benchmarks.presses import Faults, pressed
 from slipcore import (
     GraspLog,
@@ -277,7 +277,7 @@ def test_the_friction_of_a_pivot_is_freed_of_the_forces_smoothing() -> None:
     for width in (1.0, 2.0):
         faults = Faults(smoothing=width, force_noise=2e-3, marker_noise=1e-6)
         model = calibrate_sensor([faults.put_into(pressed(5.0), seed) for seed in range(3)])
-        pivot = grasp(PIVOT, 0.7, smoothing=width, marker_noise=1e-6, force_noise=2e-3)
+        pivot = grasp(PIVOT, 0.7, Setting(smoothing=width, marker_noise=1e-6, force_noise=2e-3))
         before, after = (
             contact_friction(pivot.time, detect_slip(pivot, lookahead=2, sensor_model=each).patches)
             for each in (None, model)

@@ -4,7 +4,7 @@ import tracemalloc
 
 import numpy as np
 
-from benchmarks.patch_grasps import PIVOT, SLIDE, grasp
+from benchmarks.patch_grasps import PIVOT, SLIDE, Setting, grasp
 from slipcore import GraspLog
 from slipcore.patch.following import follow_patches
 from slipcore.patch.friction import contact_friction
@@ -34,8 +34,8 @@ def test_each_touch_is_a_patch_of_its_own_frames() -> None:
 
 
 def test_a_touch_tells_the_same_alone_and_between_others() -> None:
-    once = grasp(PIVOT, 0.7, marker_noise=1e-6, force_noise=2e-3)
-    slide = grasp(SLIDE, 0.7, marker_noise=1e-6, force_noise=2e-3)
+    once = grasp(PIVOT, 0.7, Setting(marker_noise=1e-6, force_noise=2e-3))
+    slide = grasp(SLIDE, 0.7, Setting(marker_noise=1e-6, force_noise=2e-3))
     assert once.force is not None
     assert slide.force is not None
     parts = slide, once, slide

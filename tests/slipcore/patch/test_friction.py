@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.patch_grasps import PITCH, PIVOT, SLIDE, grasp, ramp_and_go
+from benchmarks.patch_grasps import PITCH, PIVOT, SLIDE, Setting, grasp, ramp_and_go
 from slipcore import GraspLog, InvalidInput, detect_slip
 from slipcore.detection.batch import with_patches
 from slipcore.patch.following import follow_patches
@@ -28,7 +28,7 @@ def friction_of(log: GraspLog, **options: float) -> ContactFriction:
 @pytest.mark.parametrize("crosstalk", [0.0, 0.3])
 @pytest.mark.parametrize("smoothing", [0.0, 1.0, 1.5])
 def test_a_sliding_contact_tells_its_friction(smoothing: float, crosstalk: float) -> None:
-    found = friction_of(grasp(SLIDE, FRICTION, smoothing=smoothing, crosstalk=crosstalk, **NOISE))
+    found = friction_of(grasp(SLIDE, FRICTION, Setting(smoothing=smoothing, crosstalk=crosstalk, **NOISE)))
     assert found.coefficient == pytest.approx(FRICTION, rel=0.01)
     assert found.low < FRICTION < found.high
     assert not found.is_bound
@@ -37,28 +37,28 @@ def test_a_sliding_contact_tells_its_friction(smoothing: float, crosstalk: float
 @pytest.mark.parametrize("crosstalk", [0.0, 0.3])
 @pytest.mark.parametrize("smoothing", [0.0, 1.0])
 def test_a_pivoting_contact_tells_its_friction_once_the_kernel_is_known(smoothing: float, crosstalk: float) -> None:
-    log = grasp(PIVOT, FRICTION, smoothing=smoothing, crosstalk=crosstalk, **NOISE)
+    log = grasp(PIVOT, FRICTION, Setting(smoothing=smoothing, crosstalk=crosstalk, **NOISE))
     found = friction_of(log, kernel_width=smoothing * PITCH)
     assert found.coefficient == pytest.approx(FRICTION, rel=0.03)
     assert not found.is_bound
 
 
 def test_an_unknown_kernel_makes_a_pivoting_contact_look_a_little_less_rough() -> None:
-    found = friction_of(grasp(PIVOT, FRICTION, smoothing=1.0))
+    found = friction_of(grasp(PIVOT, FRICTION, Setting(smoothing=1.0)))
     assert 0.9 * FRICTION < found.coefficient < FRICTION
 
 
 @pytest.mark.parametrize("turns", [False, True])
 def test_a_contact_that_holds_gives_a_bound_below_its_friction(turns: bool) -> None:
     still = ramp_and_go(0.0, turns=turns)
-    found = friction_of(grasp(still._replace(share=0.6 * still.share), FRICTION, **NOISE))
+    found = friction_of(grasp(still._replace(share=0.6 * still.share), FRICTION, Setting(**NOISE)))
     assert found.is_bound
     assert found.low == pytest.approx(0.6 * FRICTION, rel=0.1)
     assert (found.low < FRICTION, found.high) == (True, np.inf)
 
 
 def test_a_contact_that_travels_under_hardly_any_load_rolls() -> None:
-    log = grasp(SLIDE._replace(share=np.full(len(SLIDE.time), 0.05)), FRICTION, **NOISE)
+    log = grasp(SLIDE._replace(share=np.full(len(SLIDE.time), 0.05)), FRICTION, Setting(**NOISE))
     (patch,) = patches_of(log)
     assert (patch.regime[60:80] == "rolling").all()
     found = contact_friction(log.time, [patch])
@@ -87,7 +87,7 @@ def test_regimes_follow_each_other() -> None:
 
 def test_a_round_contact_shows_that_it_pivots_by_the_pose_alone() -> None:
     course = ramp_and_go(np.deg2rad(60.0), turns=True)
-    log = grasp(course, FRICTION, half_axes=(6e-3, 6e-3))
+    log = grasp(course, FRICTION, Setting(half_axes=(6e-3, 6e-3)))
     assert friction_of(log).is_bound
     pose = np.stack([np.zeros_like(course.yaw), course.x, course.yaw + 5e-4 / 6e-3 * course.share], axis=-1)
     seen = GraspLog(log.time, log.position, log.displacement, log.element_area, log.force, log.normal, pose)
@@ -101,8 +101,8 @@ def test_pivoting_beyond_half_a_turn_is_followed() -> None:
 
 
 def test_two_bodies_are_two_patches() -> None:
-    one = grasp(ramp_and_go(0.0, turns=False)._replace(x=np.full(90, -6e-3)), FRICTION, half_axes=(2e-3, 4e-3))
-    two = grasp(ramp_and_go(0.0, turns=False)._replace(x=np.full(90, 5e-3)), 0.4, half_axes=(3e-3, 4e-3))
+    one = grasp(ramp_and_go(0.0, turns=False)._replace(x=np.full(90, -6e-3)), FRICTION, Setting(half_axes=(2e-3, 4e-3)))
+    two = grasp(ramp_and_go(0.0, turns=False)._replace(x=np.full(90, 5e-3)), 0.4, Setting(half_axes=(3e-3, 4e-3)))
     assert one.force is not None
     assert two.force is not None
     both = GraspLog(one.time, one.position, one.displacement, one.element_area, one.force + two.force, one.normal)
@@ -135,7 +135,7 @@ def test_an_option_out_of_its_range_is_refused() -> None:
 
 def test_macro_slip_is_seen_though_all_markers_stand_still() -> None:
     """The elements may say what they will: their patch turns over them."""
-    history = detect_slip(grasp(PIVOT, FRICTION, smoothing=1.0, crosstalk=0.3, **NOISE))
+    history = detect_slip(grasp(PIVOT, FRICTION, Setting(smoothing=1.0, crosstalk=0.3, **NOISE)))
     assert history.macro_slip[-40:].all()
     assert not history.macro_slip[:35].any()
 
