@@ -128,7 +128,7 @@ def noise_of_frame(surface: Surface, tuning: Tuning) -> tuple[float, float]:
     marker_noise, pressing_noise, between_neighbours, told_step = surface.noise
     lasting = lasting_noise(marker_noise, between_neighbours, told_step, tuning)
     shown = tuning.noise_margin * known_or(marker_noise, tuning.unknown_noise)
-    variance = shown**2 + lasting**2 + tuning.displacement_floor**2
+    variance = shown**2 + max(lasting, tuning.displacement_floor) ** 2  # a floor that is told is lasting noise, too
     return variance, tuning.force_noise_margin * known_or(pressing_noise, 0.0)
 
 
