@@ -36,6 +36,17 @@ def find_id(session: Session, name: str) -> int:
     return found
 
 
+def find_ids(session: Session, names: Sequence[str]) -> dict[str, int]:
+    """The keys of many materials by these names or aliases, in their order, in one query; raises ``NotFound``."""
+    columns = select(MaterialNameRow.name, MaterialNameRow.material_id)
+    rows = session.execute(columns.where(MaterialNameRow.name.in_(filter(is_storable, names))))
+    found: dict[str, int] = dict(iter(rows))
+    missing = next((name for name in names if name not in found), None)
+    if missing is not None:
+        raise NotFound("material", missing)
+    return {name: found[name] for name in names}
+
+
 def get(session: Session, name: str) -> Material:
     """One material, by its name or an alias, with its current models; raises ``NotFound``."""
     return _with_counts_and_models(session, [find_id(session, name)])[0]

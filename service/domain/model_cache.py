@@ -5,7 +5,7 @@ import hashlib
 import math
 import time
 from collections import OrderedDict
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
@@ -111,19 +111,35 @@ class ModelCache:
         """Whether there was a model when it was last read, however long ago."""
         return (material, method) in self._known
 
+    def get_all(self, database: Database, names: Iterable[str], method: str) -> dict[str, KnownModel]:
+        """The models of many materials, by these names, in memory or read together; raises as ``read``."""
+        known = {name: self.fresh(name, method) for name in names}
+        missing = [name for name, found in known.items() if found is None]
+        read = self._read_all(database, missing, method) if missing else {}
+        return {name: found or read[name] for name, found in known.items()}
+
     def read(self, database: Database, material: str, method: str) -> KnownModel:
         """The model in the database; raises ``NotFound``, and ``NoModel`` where the material has none."""
         read_at = time.monotonic()
-        until = read_at + self._seconds
         with database.read() as session:
-            stored, because, others = _current(session, material, method)
-        disagreement = disagreeing(stored, others)
-        known, tag = self._known.get((material, method)), _tag(stored, disagreement)
+            found = _current(session, {material: materials.find_id(session, material)}, method)
+        return self._keep(material, method, found[material], read_at)
+
+    def _read_all(self, database: Database, names: Sequence[str], method: str) -> dict[str, KnownModel]:
+        read_at = time.monotonic()
+        with database.read() as session:
+            found = _current(session, materials.find_ids(session, names), method)
+        return {name: self._keep(name, method, each, read_at) for name, each in found.items()}
+
+    def _keep(self, material: str, method: str, found: "_Current", read_at: float) -> KnownModel:
+        disagreement = disagreeing(found.stored, found.all)
+        until = read_at + self._seconds
+        known, tag = self._known.get((material, method)), _tag(found.stored, disagreement)
         if known is not None and known.tag == tag:
             known = replace(known, read_at=read_at, until=until)
         else:
-            model = to_friction_model(stored.model)
-            known = KnownModel(stored, model, tag, read_at, until, because, disagreement)
+            model = to_friction_model(found.stored.model)
+            known = KnownModel(found.stored, model, tag, read_at, until, found.because, disagreement)
         if len(self._known) >= MOST:
             self._known.clear()
         newer = self._known.get((material, method))
@@ -169,20 +185,35 @@ class ModelCache:
             self._changes.popitem(last=False)
 
 
-def _current(session: Session, material: str, method: str) -> tuple[StoredModel, str | None, Sequence[StoredModel]]:
-    """The current model by a method, or the recommended one with the reason, and all of the material's current models;
-    raises as ``ModelCache.read``.
+class _Current(NamedTuple):
+    """A material's current model that was asked for, why it is this one, and all of its current models."""
+
+    stored: StoredModel
+    because: str | None
+    all: Sequence[StoredModel]
+
+
+def _current(session: Session, ids: Mapping[str, int], method: str) -> dict[str, _Current]:
+    """The current models by a method, or the recommended ones, of materials by their names, in one query.
+
+    Raises ``NoModel``.
     """
-    material_id = materials.find_id(session, material)
-    models = friction_models.all_current(session, [material_id]).get(material_id, [])
+    models = friction_models.all_current(session, list(ids.values()))
+    return {
+        name: _chosen(session, name, material_id, models.get(material_id, []), method)
+        for name, material_id in ids.items()
+    }
+
+
+def _chosen(session: Session, material: str, material_id: int, models: Sequence[StoredModel], method: str) -> _Current:
     if method != AUTO:
         named = next((stored for stored in models if stored.model.method == method), None)
         if named is not None:
-            return named, None, models
+            return _Current(named, None, models)
     else:
         found = recommended(models)
         if found is not None:
-            return found.stored, found.because, models
+            return _Current(found.stored, found.because, models)
     raise NoModel(f"material {material!r} has no model fitted by {method!r} yet{_bound(session, material_id)}", method)
 
 

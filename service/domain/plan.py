@@ -196,7 +196,7 @@ def _candidates(context: Context, names: Sequence[str] | None, method: str) -> l
         if names is None:
             ids = friction_models.materials_with_current(session, methods, MOST_CANDIDATES + 1)
         else:
-            ids = [materials.find_id(session, name) for name in names]
+            ids = list(materials.find_ids(session, names).values())
         of_them = friction_models.all_current(session, ids).values()
     found = [best for models in of_them if (best := _preferred(models, methods)) is not None]
     if len(found) > MOST_CANDIDATES:

@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -124,19 +124,23 @@ class _Connection:
         if opening.control is None or not opening.control.known or opening.material is None:
             return None
         with suppress(NoModel):
-            return await self._model(opening.material)
+            return (await self._models([opening.material]))[0]
         return None
 
     async def _candidates(self, opening: Open) -> "dict[str, FrictionModel]":
         """What a grip controller recognises, by the materials' own names; raises ``NoModel`` and ``NotFound``."""
         names = [] if opening.control is None else opening.control.materials
-        models = [await self._model(name) for name in names]
+        models = await self._models(names) if names else []
         return {model.material: model for model in models}
 
-    async def _model(self, material: str) -> "FrictionModel":
-        """The recommended one."""
-        known = await self._context.models.get(self._context.database, material, AUTO)
-        return await self._context.threads.run(self._principal.share, to_client_model, known.stored)
+    async def _models(self, names: Sequence[str]) -> "list[FrictionModel]":
+        """The recommended ones of some materials; raises ``NoModel`` and ``NotFound``."""
+
+        def read() -> "list[FrictionModel]":
+            known = self._context.models.get_all(self._context.database, names, AUTO)
+            return [to_client_model(each.stored) for each in known.values()]
+
+        return await self._context.threads.run(self._principal.share, read)
 
     async def _gel(self, opening: Open) -> dict[str, float | None] | None:
         """Of the sensor, if one is named and described."""

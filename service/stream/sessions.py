@@ -113,8 +113,8 @@ class Streams:
         position, opening.position = packed("position", opening.position), b""
         self._sessions[session.id] = session  # before it is there, so that others who open one meanwhile count it
         try:
-            await self.call(
-                detectors.open_session, session.id, position, opening.grid, opening.element_area, opening.detector,
+            await self.ask(
+                session, detectors.open_session, position, opening.grid, opening.element_area, opening.detector,
                 opening.keep, detectors.MemoryLimit(session.owner, self._most_bytes),
                 detectors.SessionOptions(opening.control, model, gel, materials),
             )  # fmt: skip

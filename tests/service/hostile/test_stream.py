@@ -2,9 +2,10 @@
 
 import asyncio
 import json
+import threading
 import tracemalloc
 from collections.abc import Awaitable, Callable, Iterator
-from contextlib import nullcontext, suppress
+from contextlib import AsyncExitStack, nullcontext, suppress
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,15 +14,20 @@ import httpx
 import msgspec
 import numpy as np
 import pytest
+from sqlalchemy import event
 from starlette.websockets import WebSocketDisconnect
 
+from db.database import Database
+from db.records import NewModel
+from db.repositories import friction_models, jobs, materials
+from service.domain.model_cache import ModelCache
 from service.domain.principal import Principal
 from service.processes.fair_threads import FairThreads
 from service.settings import Settings
 from service.stream import connection, detectors, errors, sessions
 from service.stream.detectors import PackedFrame
 from service.stream.errors import REFUSED, TOO_MANY, UNKNOWN_SESSION, End
-from service.stream.messages import Open
+from service.stream.messages import MOST_MATERIALS, Open
 from service.stream.sessions import Streams
 from slipcore.errors import InvalidInput
 
@@ -154,6 +160,57 @@ def test_a_frame_waits_for_two_of_another_however_many_that_sends(
     run(go)
 
 
+def test_who_opens_a_session_waits_for_its_turn_as_a_frame_does(make: Callable[..., Streams]) -> None:
+    """It may take some ms of the one process that all frames wait for."""
+
+    async def go() -> None:
+        streams = make(per_owner=50)
+        async with AsyncExitStack() as frames:
+            for _ in range(sessions.FRAMES_OF_ONE):
+                await frames.enter_async_context(streams._turns.turn("greedy"))
+            waiting = asyncio.ensure_future(streams.open(opening(), "greedy", ""))
+            honest = await asyncio.wait_for(streams.open(opening(), "honest", ""), 5.0)
+            assert set(detectors._SESSIONS) == {honest.id}
+        late = await waiting
+        assert set(detectors._SESSIONS) == {honest.id, late.id}
+
+    run(go)
+
+
+@pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+def test_the_materials_of_a_controller_are_read_together_and_beside_the_event_loop(
+    make: Callable[..., Streams], database: Database, new_model: NewModel
+) -> None:
+    names = [f"m{number:02}" for number in range(MOST_MATERIALS)]
+    with database.write() as session:
+        ids = [materials.create(session, name, "").id for name in names]
+        for material_id in ids:
+            friction_models.add(
+                session, material_id, jobs.add(session, "fit", "ols", material_id=material_id), new_model
+            )
+        materials.add_alias(session, ids[0], "another name")
+    streams, asked, threads = make(), [], set()
+
+    def note(*given: Any) -> None:
+        asked.append(given[2])
+        threads.add(threading.current_thread())
+
+    event.listen(database.engine, "before_cursor_execute", note)
+    counts = []
+    for among in (names[1:2], [*names[1:], "another name"]):
+        asked.clear()
+        control = {"contact_area": 6e-5, "settings": {"least_force": 0.5, "most_force": 20.0}, "materials": among}
+        answers = converse(streams, first(control=control), database=database).answers
+        assert [answer["type"] for answer in answers] == ["opened"]
+        counts.append(len([each for each in asked if each.startswith("SELECT")]))
+    assert 0 < counts[0] == counts[1]
+    assert threading.current_thread() not in threads
+    *_, last = detectors._SESSIONS.values()
+    assert last.grip is not None
+    assert last.grip._state.recognition is not None
+    assert set(last.grip._state.recognition.materials) == set(names)
+
+
 def test_a_frame_that_comes_faster_than_it_is_looked_at_waits_and_nobody_with_it(
     make: Callable[..., Streams], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -207,9 +264,13 @@ class Socket:
         self.closed = code, reason
 
 
-def converse(streams: Streams, *said: Any, raw: bool = False) -> Socket:
-    database = SimpleNamespace(read=lambda: nullcontext())  # nothing is looked up without a key and a material
-    context: Any = SimpleNamespace(streams=streams, database=database, settings=Settings(), threads=FairThreads())
+NO_DATABASE = SimpleNamespace(read=lambda: nullcontext())
+"""Nothing is looked up without a key and a material."""
+
+
+def converse(streams: Streams, *said: Any, raw: bool = False, database: Any = NO_DATABASE) -> Socket:
+    parts = {"database": database, "models": ModelCache(), "settings": Settings(), "threads": FairThreads()}
+    context: Any = SimpleNamespace(streams=streams, **parts)
     socket: Any = Socket(*(said if raw else (json.dumps(each) for each in said)))
 
     async def go() -> None:
