@@ -26,7 +26,7 @@ from slipcore.contact.reference.mindlin_deresiewicz import MindlinDeresiewicz
 from slipcore.contact.reference.torsion import TorsionPartialSlip, sliding_moment
 from slipcore.contact.scene import Scene
 from slipcore.contact.solver.normal import solve_normal
-from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
 from slipcore.contact.solver.state import StepResult
 from slipcore.contact.tiers.accuracy import difference, simulate_to
@@ -116,10 +116,10 @@ def hertz_grid(cells: int) -> Grid:
     return Grid.square(cells, WIDTH * HERTZ.contact_radius)
 
 
-def sphere(poisson: float, *, coupled: bool = False) -> Problem:
+def sphere(poisson: float, *, coupled: bool = False) -> ContactProblem:
     """The paper's fingertip on a flat object."""
     heights = (lambda x, y: (x**2 + y**2) / (2.0 * RADIUS),)
-    return Problem((HalfSpace.from_young(YOUNG, poisson),), FRICTION, heights=heights, coupled=coupled)
+    return ContactProblem((HalfSpace.from_young(YOUNG, poisson),), FRICTION, heights=heights, coupled=coupled)
 
 
 def shear(along_x: float, moment: float = 0.0) -> StepLoad:
@@ -127,7 +127,7 @@ def shear(along_x: float, moment: float = 0.0) -> StepLoad:
     return StepLoad(FORCE, tangential=np.array([along_x, 0.0, moment]))
 
 
-def stepped(problem: Problem, cells: int, tolerance: float, loads: list[StepLoad]) -> list[StepResult]:
+def stepped(problem: ContactProblem, cells: int, tolerance: float, loads: list[StepLoad]) -> list[StepResult]:
     """Results of loads on a grid of that many cells a side."""
     grid = hertz_grid(cells)
     return list(QuasiStatic(problem, grid, tolerance, 1e-2 * tolerance).run(loads))

@@ -31,7 +31,7 @@ from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
 from slipcore.contact.reference.elastic_pair import half_space
 from slipcore.contact.reference.hertz import HertzContact
 from slipcore.contact.solver.normal import solve_normal
-from slipcore.contact.solver.tangential import Control, solve_tangential
+from slipcore.contact.solver.tangential import SolverControl, solve_tangential
 from slipcore.frames import FloatArray
 
 OURS = "Stiction"
@@ -177,7 +177,7 @@ class Ours:
         box = bounding_box(self.pressed[cells] > 0.0)
         part, limit = grid.part(box), FRICTION * self.pressed[cells][box]
         nothing = np.zeros((2, *part.shape))
-        control = Control(np.array([SHARE * FRICTION * FORCE, 0.0, 0.0]))
+        control = SolverControl(np.array([SHARE * FRICTION * FORCE, 0.0, 0.0]))
         begin = time.perf_counter()
         found = solve_tangential(operators.on(part), part.points(), limit, nothing, control, nothing, tolerance)
         seconds = time.perf_counter() - begin

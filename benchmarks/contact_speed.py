@@ -24,7 +24,7 @@ from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.elasticity.operator import Count, ElasticOperator, Operators
 from slipcore.contact.scene import Scene
 from slipcore.contact.solver.normal import solve_normal
-from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
 from slipcore.contact.solver.state import StepResult
 from slipcore.contact.tiers.boundary_elements import Fidelity
@@ -69,7 +69,7 @@ def width(poisson: float) -> float:
 def shear_steps(cells: int, residual: float, poisson: float, coupled: bool) -> list[StepResult]:
     """Results of the steps of tangential force, which are to be solved to a residual."""
     body = HalfSpace.from_young(YOUNG, poisson)
-    problem = Problem((body,), FRICTION, heights=(bowl,), coupled=coupled)
+    problem = ContactProblem((body,), FRICTION, heights=(bowl,), coupled=coupled)
     share = LARGEST / STEPS / (FRICTION * FORCE)  # tolerances are relative to what a step changes
     solver = QuasiStatic(problem, Grid.square(cells, width(poisson)), residual / share, 1e-7)
     state, _ = solver.step(solver.start(), StepLoad(FORCE))
@@ -186,7 +186,7 @@ def press_once(cells: int) -> None:
 
 def shear_once(cells: int) -> None:
     """A press, then two steps of partial slip, for the memory that they take."""
-    problem = Problem((HalfSpace.from_young(YOUNG, 0.3),), FRICTION, heights=(bowl,))
+    problem = ContactProblem((HalfSpace.from_young(YOUNG, 0.3),), FRICTION, heights=(bowl,))
     pulls = [StepLoad(FORCE, tangential=np.array([force, 0.0, 0.0])) for force in (0.0, 1.2, 2.8)]
     for _ in QuasiStatic(problem, Grid.square(cells, width(0.3)), 1e-3, 1e-4, second_order=True).run(pulls):
         pass

@@ -14,9 +14,9 @@ from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.reduced import Load, World
 from slipcore.contact.solver.macro_slip import FreeObject
-from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
-from slipcore.contact.solver.state import State, StepResult
+from slipcore.contact.solver.state import ContactState, StepResult
 from slipcore.contact.tiers.sampling import SensorGrid, frame_record
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray, Frame
@@ -34,7 +34,7 @@ class ElementsState(NamedTuple):
 
     time: float
     normal_force: FloatArray
-    contact: State
+    contact: ContactState
     result: StepResult
     offset: FloatArray
 
@@ -104,6 +104,6 @@ def _solver(world: World) -> _Solver:
 
     finger = world.finger
     body = HalfSpace.from_young(finger.young_modulus, finger.poisson_ratio)
-    problem = Problem((body,), 0.0, heights=(finger.height(),), friction_fields=(of_element,))
+    problem = ContactProblem((body,), 0.0, heights=(finger.height(),), friction_fields=(of_element,))
     solver = QuasiStatic(problem, grid, TOLERANCE, 1e-2 * TOLERANCE, second_order=True)
     return _Solver(solver, SensorGrid(grid, world.sampling.points, CELLS))

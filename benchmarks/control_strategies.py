@@ -12,7 +12,7 @@ from benchmarks.control_episodes import BETWEEN, FRAME, START, Strategy, Task, c
 from slipcore.contact import reduced
 from slipcore.contact.reduced import World
 from stiction_client import ControllerState, ControlSettings, Cost, Domain, FrictionModel, GraspController, Observation
-from stiction_client.controller.load import Load
+from stiction_client.controller.load import LoadEstimate
 
 MOST = 30.0
 """N of the gripper."""
@@ -57,7 +57,7 @@ class Fixed:
 
     settings: ControlSettings
     friction: float = FIXED
-    load: Load = field(default_factory=Load)
+    load: LoadEstimate = field(default_factory=LoadEstimate)
     time: float = 0.0
     force: float = START
 

@@ -362,7 +362,7 @@ class LinearSettings(Options):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Recognition(Options):
+class RecognitionPrior(Options):
     """The population of materials from which one that is not known comes."""
 
     unknown: Annotated[float, Option(0.0, 1.0, "-", "one in twenty")] = 0.05
@@ -491,7 +491,7 @@ CLUSTERS = ClusterSettings()
 DESIGN = DesignSettings()
 GRID = GridSettings()
 LINEAR = LinearSettings()
-RECOGNITION = Recognition()
+RECOGNITION = RecognitionPrior()
 REFERENCE = Reference()
 IDENTIFIABILITY = Identifiability()
 POPULATION = PopulationSettings()

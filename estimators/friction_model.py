@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from estimators.defaults import IDENTIFIABILITY
 from estimators.errors import InvalidSamples
 from slipcore.references import ESTIMATION, LIKELIHOODS, cited
-from stiction_client.linear_friction import Domain, LinearFriction, Scale, Scales
+from stiction_client.linear_friction import LinearFriction, Scale, Scales
 from stiction_client.model import Cost
+from stiction_client.support import Domain
 
 if TYPE_CHECKING:
     from estimators.inference_data import InferenceData

@@ -14,7 +14,7 @@ import slipcore
 from slipcore.contact import tangential_ramp
 from slipcore.defaults import ContactOptions
 from slipcore.detection.baselines.since_touch import threshold_method
-from slipcore.detection.shared.interface import Observation
+from slipcore.detection.shared.interface import ObservedFrame
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.options import Option
 from slipcore.surface.strain import Lattice
@@ -28,12 +28,12 @@ class Options(ContactOptions):
     """Least distance from the mean displacement of the contact."""
 
 
-def measure(_: Lattice, seen: Observation) -> FloatArray:
+def measure(_: Lattice, seen: ObservedFrame) -> FloatArray:
     """Displacement in the plane [2, n, m] m; the framework takes the difference since the touch."""
     return np.moveaxis(seen.displacement[..., :2], -1, 0)
 
 
-def slips(_: Lattice, seen: Observation, change: FloatArray, options: Options) -> BoolArray:
+def slips(_: Lattice, seen: ObservedFrame, change: FloatArray, options: Options) -> BoolArray:
     """Slip [n, m] of each element."""
     if not seen.stays.any():
         return np.zeros(seen.contact.shape, bool)

@@ -163,7 +163,7 @@ CLIENT_PARTS = {
     "slipcore": set[str](),
     "db": set[str](),
     "migrations": set[str](),
-    "estimators": MODEL,
+    "estimators": MODEL | {"support"},
     "service/domain": MODEL | CONTAINER | PLANNER | {"support"},
     "service/exports": CONTAINER,
     "service/formats": CONTAINER,
@@ -575,6 +575,42 @@ def test_no_file_names_a_package_registry_or_this_machine() -> None:
         text = path.read_text(encoding="utf-8")
         assert "--index-url" not in text, path
         assert "://pypi" not in text, path
+
+
+IN_TWO_PACKAGES = {
+    "a record as computed or stored, and the client's of the same": "AuditEntry ContactFriction Detection Finding"
+    " FrictionModel Gel Job Material NextGrasp Recognition Scale Scales Withdrawal",
+    "an error inside the service, and the client's when it is answered": "FileDeleted InsufficientScope InvalidGraspLog"
+    " InvalidSamples JobEnded NoFeasibleForce NoModel NotOwner QuotaExceeded StorageQuotaExceeded StorageUnavailable"
+    " UnknownOwner UnsupportedFormat UploadInterrupted",
+    "public in either: an iteration that did not converge": "NotConverged",
+}
+"""Public classes of one name, with the reason: each names the same thing wherever it stands."""
+
+
+def classes_of_one_name(paths: Collection[Path]) -> dict[str, list[str]]:
+    """The public classes that some files define more than once between them, each with where."""
+    found = defaultdict[str, list[str]](list)
+    for path in paths:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                found[node.name].append(f"{path}:{node.lineno}")
+    return {name: places for name, places in found.items() if len(places) > 1}
+
+
+def test_a_name_of_a_class_means_one_thing() -> None:
+    packages = ("slipcore", "estimators", "db", "service", CLIENT)
+    found = classes_of_one_name([path for package in packages for path in sorted((ROOT / package).rglob("*.py"))])
+    defended = {name for names in IN_TWO_PACKAGES.values() for name in names.split()}
+    assert {name: places for name, places in found.items() if name not in defended} == {}
+    assert defended <= set(found)
+
+
+def test_a_class_that_stands_twice_is_seen(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.py").write_text(f"class Twice: ...\nclass _Own: ...\nclass Of{name}: ...")
+    paths = sorted(tmp_path.glob("*.py"))
+    assert classes_of_one_name(paths) == {"Twice": [f"{path}:1" for path in paths]}
 
 
 MOST_PARAMETERS = 8

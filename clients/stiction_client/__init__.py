@@ -52,7 +52,7 @@ if TYPE_CHECKING:
         sdf_surface,
         urdf_gazebo,
     )
-    from stiction_client.linear_friction import Domain, Scale, Scales
+    from stiction_client.linear_friction import Scale, Scales
     from stiction_client.model import Cost, FrictionModel
     from stiction_client.planner import RequiredForce, RequiredForces, required_normal_force
     from stiction_client.records import (
@@ -102,7 +102,7 @@ _LAZY = {
     "sdf_surface": "stiction_client.exports",
     "urdf_gazebo": "stiction_client.exports",
     "Cost": "stiction_client.model",
-    "Domain": "stiction_client.linear_friction",
+    "Domain": "stiction_client.support",
     "FrictionModel": "stiction_client.model",
     "Scale": "stiction_client.linear_friction",
     "Scales": "stiction_client.linear_friction",

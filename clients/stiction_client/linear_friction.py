@@ -10,21 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from stiction_client.elementwise import FloatArray, Number
 from stiction_client.errors import InvalidArgument
-from stiction_client.support import Kind, Support, extrapolation, support, widening
+from stiction_client.support import Domain, Kind, Support, extrapolation, support, widening
 
 if TYPE_CHECKING:
     from stiction_client.labelled import DataFrame, Dataset, Row
 
 KINDS = ("element", "contact")
 """Whose friction a quantile may be of."""
-
-
-@dataclass(frozen=True, slots=True)
-class Domain:
-    """Range of the data behind a model: tangential velocity, m/s, and normal force of an element, N."""
-
-    tangential_velocity: tuple[float, float]
-    normal_force: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 from stiction_client.elementwise import FloatArray
 from stiction_client.errors import InvalidArgument
 from stiction_client.linear_friction import (
-    Domain,
     LinearFriction,
     Scales,
     degrees_from_json,
     degrees_to_json,
 )
-from stiction_client.support import OUTDATED, SUPERSEDED
+from stiction_client.support import OUTDATED, SUPERSEDED, Domain
 
 FILE_FORMAT, FILE_VERSION = "stiction-friction-model", 1
 

@@ -18,16 +18,12 @@ OUTDATED = "the material's logs are others since, and it was not fitted again by
 SUPERSEDED = "a newer version took its place: fetch the current model"
 
 
-class Domain(Protocol):
-    """Range of the data: tangential velocity, m/s, and normal force of an element, N."""
+@dataclass(frozen=True, slots=True)
+class Domain:
+    """Range of the data behind a model: tangential velocity, m/s, and normal force of an element, N."""
 
-    @property
-    def tangential_velocity(self) -> tuple[float, float]:
-        """Least and greatest, m/s."""
-
-    @property
-    def normal_force(self) -> tuple[float, float]:
-        """Least and greatest, N."""
+    tangential_velocity: tuple[float, float]
+    normal_force: tuple[float, float]
 
 
 class Model(Protocol):

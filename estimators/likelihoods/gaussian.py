@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.defaults import PRIOR, REFERENCE, SAMPLING
-from estimators.likelihoods.posterior import Summary, Whitening, bounded_exp, corners, supported
+from estimators.likelihoods.posterior import PosteriorSummary, Whitening, bounded_exp, corners, supported
 from estimators.linear.fit_data import FitData
 from estimators.linear.least_squares import whole_triangle
 from estimators.linear.normal_inverse_gamma import NormalInverseGamma, exact_posterior
@@ -45,14 +45,14 @@ class Gaussian:
         log = -(self.effective_n + PRIOR.degrees_of_freedom) * np.log(sigma) - 0.5 * square / sigma**2
         return supported(log, beta, self.corners)
 
-    def summarise(self, whitened: FloatArray, _rng: np.random.Generator, /) -> Summary:
+    def summarise(self, whitened: FloatArray, _rng: np.random.Generator, /) -> PosteriorSummary:
         """Student-t of β from the draws: in z, which is independent of σ, its moments exist for any ν."""
         _, sigma = self._natural(whitened)
         scale = float(1.0 / np.sqrt(np.mean(sigma**-2.0)))
         root = scale * self.exact.root
         z = whitened[:, :3]
         kept = np.column_stack(self._natural(whitened[:: -(-len(whitened) // SAMPLING.kept_draws)]))
-        return Summary(
+        return PosteriorSummary(
             coefficients=self.exact.mean + root @ z.mean(axis=0),
             covariance=root @ np.cov(z.T) @ root.T,
             scale=scale,

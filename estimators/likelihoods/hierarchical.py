@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.defaults import GRID, SAMPLING
-from estimators.likelihoods.posterior import Summary
+from estimators.likelihoods.posterior import PosteriorSummary
 from estimators.linear.fit_data import FitData
 from estimators.linear.hierarchical import Products
 from estimators.linear.mixture_summary import summarise
-from estimators.linear.posterior_grid import Nodes, PosteriorGrid, posterior_grid
+from estimators.linear.posterior_grid import PosteriorGrid, ScaleNodes, posterior_grid
 from estimators.linear.priors import WEAK, ScatterPrior, structured
 from estimators.sampling.normal_score import NormalScore, normal_score
 from estimators.sampling.proposal import StudentMixture, standard
@@ -61,7 +61,7 @@ class HierarchicalPosterior:
             np.einsum("kt,kti->ki", weight, unknown[node]),
         )
 
-    def nodes(self, whitened: FloatArray) -> Nodes:
+    def nodes(self, whitened: FloatArray) -> ScaleNodes:
         """Draws [k, 3] as nodes of equal weight, with what is known of β given each."""
         log_lambda, log_rho = (score(column)[0] for score, column in zip(self.scores, whitened[:, 1:].T, strict=True))
         products = self.products(log_lambda, log_rho)
@@ -70,15 +70,15 @@ class HierarchicalPosterior:
         given = self.grid.model.conditional(products, log_lambda, log_rho, log_sigma)
         sigma = np.exp(log_sigma)
         scatter = np.stack([sigma, sigma * np.exp(0.5 * log_lambda), sigma * np.exp(0.5 * log_rho)], axis=1)
-        return Nodes(np.full(len(sigma), 1.0 / len(sigma)), scatter, given.mean, given.covariance)
+        return ScaleNodes(np.full(len(sigma), 1.0 / len(sigma)), scatter, given.mean, given.covariance)
 
-    def summarise(self, whitened: FloatArray, rng: np.random.Generator, /) -> Summary:
+    def summarise(self, whitened: FloatArray, rng: np.random.Generator, /) -> PosteriorSummary:
         """β given each (σ, τ, ω) is exactly normal: its mean and covariance need no draws of it."""
         nodes = self.nodes(whitened[:: -(-len(whitened) // SAMPLING.kept_draws)])
         found = summarise(nodes, self.at)
         normal = rng.standard_normal((len(nodes.weight), 3, 1))
         beta = nodes.mean + (np.linalg.cholesky(nodes.covariance) @ normal)[..., 0]
-        return Summary(
+        return PosteriorSummary(
             coefficients=found.coefficients,
             covariance=found.covariance,
             scale=found.scatter.scale,

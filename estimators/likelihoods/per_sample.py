@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 
 from estimators.defaults import PRIOR, PROPOSAL, REFERENCE, SAMPLING
 from estimators.errors import InvalidSamples
-from estimators.likelihoods.posterior import Summary, Whitening, corners, scatter, supported
+from estimators.likelihoods.posterior import PosteriorSummary, Whitening, corners, scatter, supported
 from estimators.linear.fit_data import FitData
 from estimators.linear.m_estimate import LOSSES, m_estimate
 from estimators.linear.normal_inverse_gamma import exact_posterior
 from estimators.linear.priors import positive_friction, prior_rows
-from estimators.sampling.adaptation import Fit, adapted
+from estimators.sampling.adaptation import ProposalFit, adapted
 from estimators.sampling.laplace import laplace, refine
 from estimators.sampling.proposal import StudentMixture, standard
 
@@ -30,7 +30,7 @@ class Rows(NamedTuple):
     weight: FloatArray
 
 
-class Terms(Protocol):
+class LikelihoodTerms(Protocol):
     """What is special to a likelihood, and its own parameters as real coordinates, σ the first of them."""
 
     @property
@@ -71,7 +71,7 @@ class PerSample:
     Coordinates: γ [3] and those of the ``terms``, whitened by Laplace's approximation; β = ``centre`` + ``root`` γ.
     """
 
-    terms: Terms
+    terms: LikelihoodTerms
     rows: Rows
     prior_rows: FloatArray
     corners: FloatArray
@@ -118,12 +118,12 @@ class PerSample:
         """The same in coordinates about ``centre`` [d] of these, with unit ``root`` [d, d]."""
         return replace(self, whitening=Whitening(self.whitening(centre[None])[0], self.whitening.root @ root))
 
-    def summarise(self, whitened: FloatArray, _rng: np.random.Generator, /) -> Summary:
+    def summarise(self, whitened: FloatArray, _rng: np.random.Generator, /) -> PosteriorSummary:
         """Moments of the draws."""
         beta, natural = self.natural(self.whitening(whitened))
         scale, degrees = scatter(natural[:, 0] ** 2)
         every = -(-len(beta) // SAMPLING.kept_draws)
-        return Summary(
+        return PosteriorSummary(
             coefficients=beta.mean(axis=0),
             covariance=np.cov(beta.T),
             scale=scale,
@@ -138,7 +138,7 @@ class PerSample:
         return np.asarray(-(3.0 + PRIOR.degrees_of_freedom) * np.log(sigma) - 0.5 * square / sigma**2)
 
 
-def per_sample(data: FitData, terms: Terms, name: str) -> PerSample:
+def per_sample(data: FitData, terms: LikelihoodTerms, name: str) -> PerSample:
     """Posterior around the robust fit, whose plane and scale no outlier moves far."""
     observations = data.raw(f"bayes, {name}")
     start = m_estimate(data, observations, LOSSES["tukey"])
@@ -187,5 +187,5 @@ def _proposing(posterior: PerSample) -> PerSample:
     size, rng = len(posterior.names), np.random.default_rng(0)
     centre, root, even = refine(posterior.log_probability, np.zeros(size), np.eye(size), rng)
     moved = posterior.moved(centre, root)
-    fit = Fit(moved.proposal, even) if even > SAMPLING.even else adapted(moved.log_probability, size, rng)
+    fit = ProposalFit(moved.proposal, even) if even > SAMPLING.even else adapted(moved.log_probability, size, rng)
     return replace(moved, proposal=fit.proposal, local=0.0 if fit.even > SAMPLING.even else SAMPLING.local)

@@ -14,7 +14,7 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Summary:
+class PosteriorSummary:
     """What a fit found of the coefficients and the scatter: see ``FrictionModel``.
 
     ``draws`` [k, names] in natural parameters, and the ``monte_carlo_error``, where a posterior was sampled.
@@ -62,7 +62,7 @@ class Posterior(Protocol):
         """Log posterior density [k] in whitened coordinates [k, d], up to a constant; -inf outside the support."""
         ...
 
-    def summarise(self, whitened: FloatArray, rng: np.random.Generator, /) -> Summary:
+    def summarise(self, whitened: FloatArray, rng: np.random.Generator, /) -> PosteriorSummary:
         """What draws [k, d] in whitened coordinates amount to; ``rng`` draws what was integrated out."""
         ...
 

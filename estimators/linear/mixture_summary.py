@@ -9,7 +9,7 @@ from scipy import special
 from estimators.defaults import IDENTIFIABILITY
 from estimators.friction_model import Scale, Scales
 from estimators.linear.normal_mixture import Student, matched_student, mixture_quantile
-from estimators.linear.posterior_grid import Nodes
+from estimators.linear.posterior_grid import ScaleNodes
 from estimators.linear.priors import ScatterPrior
 
 FloatArray = NDArray[np.float64]
@@ -27,7 +27,7 @@ class MixtureSummary(NamedTuple):
     scatter: Student
 
 
-def summarise(nodes: Nodes, at: FloatArray) -> MixtureSummary:
+def summarise(nodes: ScaleNodes, at: FloatArray) -> MixtureSummary:
     """Summary of nodes; the degrees of freedom are those of friction expected ``at`` (1, v, f_n), [3]."""
     mean, covariance = nodes.moments()
     away = nodes.mean - mean
@@ -45,7 +45,7 @@ def summarise(nodes: Nodes, at: FloatArray) -> MixtureSummary:
     )
 
 
-def scatter_alone(nodes: Nodes, scatter_prior: ScatterPrior) -> Scale:
+def scatter_alone(nodes: ScaleNodes, scatter_prior: ScatterPrior) -> Scale:
     """The scale between grasps as the weak default prior would have left it: what the material tells by itself.
 
     The nodes' weights by the ratio of the priors (Hogg, Myers & Bovy, 2010, Astrophysical Journal 725:2166).
@@ -55,7 +55,7 @@ def scatter_alone(nodes: Nodes, scatter_prior: ScatterPrior) -> Scale:
     return Scale(*matched_student(weight / weight.sum(), np.zeros(len(tau)), tau))
 
 
-def _widened(covariance: FloatArray, nodes: Nodes, away: FloatArray, degrees_of_freedom: float) -> FloatArray:
+def _widened(covariance: FloatArray, nodes: ScaleNodes, away: FloatArray, degrees_of_freedom: float) -> FloatArray:
     """Scale matrix with the correlations of the covariance and, for each coefficient, the mixture's 95 % interval."""
     deviation = np.sqrt(np.diag(covariance))
     scale = np.empty(3)

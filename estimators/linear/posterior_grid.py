@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 SIGMA_NODES, SIGMA_WEIGHTS = hermegauss(GRID.sigma_nodes)
 
 
-class Nodes(NamedTuple):
+class ScaleNodes(NamedTuple):
     """Weighted points of the posterior: ``weight`` [m] that sums to 1, ``scatter`` [m, 3] of (σ, τ, ω), and β given
     them, normal with ``mean`` [m, 3] and ``covariance`` [m, 3, 3].
     """
@@ -47,7 +47,7 @@ class PosteriorGrid:
     log_rho: FloatArray
     products: Products
     log_marginal: FloatArray
-    nodes: Nodes
+    nodes: ScaleNodes
 
     def prior_shift(self) -> FloatArray:
         """Move of each coefficient, in standard deviations, were the prior of β twice as wide; at the scales' mode."""
@@ -109,7 +109,7 @@ def _evaluated(model: Hierarchical, box: FloatArray, count: int) -> PosteriorGri
     scatter = np.stack([sigma, sigma * np.exp(0.5 * lambdas), sigma * np.exp(0.5 * rhos)], axis=1)
     marginal = special.logsumexp(log, axis=1).reshape(count, count)
     return PosteriorGrid(
-        model, log_lambda, log_rho, products, marginal, Nodes(weight, scatter, given.mean, given.covariance)
+        model, log_lambda, log_rho, products, marginal, ScaleNodes(weight, scatter, given.mean, given.covariance)
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from estimators.defaults import PRIOR
 from estimators.friction_model import FrictionModel
-from estimators.likelihoods.posterior import Summary
+from estimators.likelihoods.posterior import PosteriorSummary
 from estimators.linear.fit_data import FitData
 from estimators.linear.normal_inverse_gamma import NormalInverseGamma, exact_posterior
 from estimators.linear.priors import conjugate_prior, prior_rows
@@ -19,7 +19,7 @@ def fit(data: FitData) -> FrictionModel:
     exact = exact_posterior(data)
     diagnostics: Diagnostics = {"assumes": "independent Gaussian errors", "prior": conjugate_prior()}
     degrees = exact.degrees_of_freedom
-    found = Summary(exact.mean, exact.covariance, exact.scale, degrees, degrees)
+    found = PosteriorSummary(exact.mean, exact.covariance, exact.scale, degrees, degrees)
     return report(data, "conjugate", found, begin, diagnostics | sensitivity(data, exact))
 
 

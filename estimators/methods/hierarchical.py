@@ -3,7 +3,7 @@
 import time
 
 from estimators.friction_model import FrictionModel
-from estimators.likelihoods.posterior import Summary
+from estimators.likelihoods.posterior import PosteriorSummary
 from estimators.linear.fit_data import FitData
 from estimators.linear.mixture_summary import summarise
 from estimators.linear.posterior_grid import posterior_grid
@@ -22,7 +22,7 @@ def fit(data: FitData, scatter_prior: ScatterPrior = WEAK) -> FrictionModel:
     diagnostics: Diagnostics = {"prior": structured(scatter_prior), "nodes": float(len(grid.nodes.weight))}
     diagnostics |= by_coefficient("prior_sensitivity", grid.prior_shift())
     diagnostics |= pooled_prior(grid.nodes, scatter_prior)
-    summary = Summary(
+    summary = PosteriorSummary(
         found.coefficients,
         found.covariance,
         found.scatter.scale,

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from estimators.defaults import LINEAR, REFERENCE
 from estimators.friction_model import FrictionModel
-from estimators.likelihoods.posterior import Summary
+from estimators.likelihoods.posterior import PosteriorSummary
 from estimators.linear.cluster_errors import cluster_sums
 from estimators.linear.coefficient_errors import CoefficientErrors, clustered_errors
 from estimators.linear.fit_data import FitData
@@ -38,7 +38,7 @@ def fit(data: FitData) -> FrictionModel:
         **by_coefficient("standard_error_classical", np.sqrt(np.diag(classical(linear, scale)))),
         **_of_clusters(data, linear, errors),
     }
-    found = Summary(linear.coefficients, errors.covariance, scale, errors.degrees_of_freedom, residual_degrees)
+    found = PosteriorSummary(linear.coefficients, errors.covariance, scale, errors.degrees_of_freedom, residual_degrees)
     return report(data, "ols", found, begin, diagnostics, linear)
 
 

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from estimators.defaults import REFERENCE
 from estimators.friction_model import Cost, FrictionModel, Scales
-from estimators.likelihoods.posterior import Summary
+from estimators.likelihoods.posterior import PosteriorSummary
 from estimators.linear.fit_data import FitData
 from estimators.linear.least_squares import LinearFit, solve
 from estimators.linear.mixture_summary import scatter_alone
-from estimators.linear.posterior_grid import Nodes
+from estimators.linear.posterior_grid import ScaleNodes
 from estimators.linear.priors import ScatterPrior
 from estimators.methods.identifiability import effects, identifiable
 from estimators.methods.unknown_velocity import in_words, slope_inflation, widened
@@ -28,7 +28,7 @@ def by_coefficient(name: str, values: FloatArray) -> Diagnostics:
     return {f"{name}_beta{k}": float(value) for k, value in enumerate(values)}
 
 
-def pooled_prior(nodes: Nodes, scatter_prior: ScatterPrior) -> Diagnostics:
+def pooled_prior(nodes: ScaleNodes, scatter_prior: ScatterPrior) -> Diagnostics:
     """Of a prior of τ that is not the default: where it is from, in a sentence, and what the data tell without it."""
     if scatter_prior == ScatterPrior():
         return {}
@@ -59,7 +59,7 @@ def describe(data: FitData, linear: LinearFit) -> Diagnostics:
 def report(
     data: FitData,
     method: str,
-    found: Summary,
+    found: PosteriorSummary,
     begin: float,
     diagnostics: Diagnostics,
     linear: LinearFit | None = None,

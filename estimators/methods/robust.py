@@ -5,7 +5,7 @@ import time
 from estimators.defaults import ROBUST
 from estimators.errors import InvalidSamples
 from estimators.friction_model import FrictionModel
-from estimators.likelihoods.posterior import Summary
+from estimators.likelihoods.posterior import PosteriorSummary
 from estimators.linear.fit_data import FitData
 from estimators.linear.m_estimate import LOSSES, m_estimate
 from estimators.methods.reporting import Diagnostics, by_coefficient, report
@@ -29,7 +29,7 @@ def fit(data: FitData, loss: str = "tukey", seed: int = 0) -> FrictionModel:
         **by_coefficient("standard_error_cluster", errors.standard),
         **by_coefficient("degrees_of_freedom", errors.degrees),
     }
-    summary = Summary(coefficients, errors.covariance, found.scale, errors.degrees_of_freedom, degrees)
+    summary = PosteriorSummary(coefficients, errors.covariance, found.scale, errors.degrees_of_freedom, degrees)
     model = report(data, "robust", summary, begin, diagnostics)
     if not found.settled:
         raise NotConverged(f"the {loss} estimate still moves after {ROBUST.iterations} iterations", model)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimators.defaults import LINEAR, ROUNDING
-from estimators.likelihoods.posterior import Summary
+from estimators.likelihoods.posterior import PosteriorSummary
 from estimators.linear.fit_data import FitData
 from estimators.linear.least_squares import LinearFit
 from estimators.linear.unknown_velocity import offset_variance
@@ -23,7 +23,7 @@ def sensitivity(data: FitData, linear: LinearFit) -> FloatArray:
     return np.asarray(root @ (root.T @ data.unknown))
 
 
-def widened(found: Summary, data: FitData, linear: LinearFit) -> Summary:
+def widened(found: PosteriorSummary, data: FitData, linear: LinearFit) -> PosteriorSummary:
     """What a method found that knows nothing of the offset, its uncertainty with that of the offset added.
 
     Draws are moved at random with it, by a seed of their own.

@@ -17,26 +17,26 @@ PILOT_WIDTHS = 2.0 ** np.arange(4)
 """Of the draws that walkers of the pilot run start from: near and far."""
 
 
-class Fit(NamedTuple):
+class ProposalFit(NamedTuple):
     """A proposal, and the evenness of the density's weights under it: effective number of draws over their number."""
 
     proposal: StudentMixture
     even: float
 
 
-def adapted(log_density: LogDensity, dimension: int, rng: np.random.Generator) -> Fit:
+def adapted(log_density: LogDensity, dimension: int, rng: np.random.Generator) -> ProposalFit:
     """Proposal for a density that one component about 0 does not suit: a mixture grown on a short pilot run."""
     x = _pilot(log_density, dimension, rng)
     proposal, even = _split(x, rng), np.ones(len(x))
     for _ in range(PROPOSAL.first_fits):
         proposal = proposal.fitted(x, even)
-    best = Fit(proposal, 0.0)
+    best = ProposalFit(proposal, 0.0)
     for _ in range(PROPOSAL.rounds):
         x = proposal.draw(rng, PROPOSAL.draws)
         log_weight = log_density(x) - proposal.log_density(x)
         if not np.isfinite(log_weight.max()):
             break
-        best = max(best, Fit(proposal, evenness(log_weight)), key=lambda fit: fit.even)
+        best = max(best, ProposalFit(proposal, evenness(log_weight)), key=lambda fit: fit.even)
         if best.even > SAMPLING.even:
             break
         proposal = proposal.fitted(x, flattened(log_weight))

@@ -186,9 +186,9 @@ def export(
     target = exports.target_of(output)
     exports.check_output(output, target)
 
-    def recorded(path: Path) -> exports.Recording:
+    def recorded(path: Path) -> exports.DetectedLog:
         seen = look(formats.read(path, mapping=mapping_text(mapping)), method, sensor_model, gel)
-        return exports.Recording(seen.log, seen.history, path.name)
+        return exports.DetectedLog(seen.log, seen.history, path.name)
 
     recordings = list(counted(map(recorded, logs), len(logs), "logs looked at"))
     exports.write(recordings, output, target)

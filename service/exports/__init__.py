@@ -13,7 +13,7 @@ from slipcore.slip_state import SlipHistory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Recording:
+class DetectedLog:
     """A log, what was detected in it, and its name."""
 
     log: GraspLog
@@ -61,7 +61,7 @@ def check_output(output: Path, name: str) -> None:
         raise InvalidInput("output", f"{output}, the folder that you are in", "another, empty or not there yet")
 
 
-def write(recordings: Sequence[Recording], output: Path, name: str) -> None:
+def write(recordings: Sequence[DetectedLog], output: Path, name: str) -> None:
     """Write a new file or folder, whole or not at all.
 
     Raises as ``check_output``, ``InvalidInput`` for several logs in a file of one, and ``UnsupportedFormat`` where a

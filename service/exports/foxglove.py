@@ -16,7 +16,7 @@ from mcap.writer import Writer
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from service.exports import Recording
+from service.exports import DetectedLog
 from service.exports.scene import COLOURS, arrows, normal_force, patches_at, tangential_force
 from service.formats.lattice import cell_size, lattice_axes
 from service.formats.stiction_messages import nanoseconds
@@ -110,7 +110,7 @@ TOPICS = {
 }
 
 
-def write(recordings: Sequence[Recording], path: Path) -> None:
+def write(recordings: Sequence[DetectedLog], path: Path) -> None:
     """Write the one recording."""
     (recording,) = recordings
     streams = {"/slip/grid": _grids(recording), "/slip/scene": _scenes(recording), "/slip/state": _states(recording)}
@@ -147,7 +147,7 @@ def _pose(position: NDArray[np.float64], rotation: Rotation | None = None) -> Js
     return {"position": _point(position), "orientation": dict(zip("xyzw", turned.as_quat().tolist(), strict=True))}
 
 
-def _grids(recording: Recording) -> Iterator[Json]:
+def _grids(recording: DetectedLog) -> Iterator[Json]:
     log = recording.log
     packed = np.empty(recording.history.contact.shape, CELL)
     packed["state"] = element_states(recording.history.contact, recording.history.slip)
@@ -175,14 +175,14 @@ def _lattice(log: GraspLog) -> Json:
     return {"pose": _pose(corner, rotation), "cell_size": {"x": size[0], "y": size[1]}}
 
 
-def _scenes(recording: Recording) -> Iterator[Json]:
+def _scenes(recording: DetectedLog) -> Iterator[Json]:
     drawn = arrows(recording)
     note = [{"key": "longest line", "value": f"{drawn.longest:.4g} {drawn.unit} of {drawn.what}"}]
     return (_scene(recording, drawn.begin[k], drawn.end[k], k, note) for k in range(len(recording.log)))
 
 
 def _scene(
-    recording: Recording, begin: NDArray[np.float64], end: NDArray[np.float64], k: int, note: list[Json]
+    recording: DetectedLog, begin: NDArray[np.float64], end: NDArray[np.float64], k: int, note: list[Json]
 ) -> Json:
     touching = recording.history.contact[k]
     points = np.stack([begin[touching], end[touching]], axis=1).reshape(-1, 3)
@@ -216,7 +216,7 @@ def _scene(
     return {"deletions": [], "entities": [entity]}
 
 
-def _states(recording: Recording) -> Iterator[Json]:
+def _states(recording: DetectedLog) -> Iterator[Json]:
     log, history = recording.log, recording.history
     pressing, shearing = normal_force(log), tangential_force(log)
     for k, time in enumerate(log.time):

@@ -10,7 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from service.exports import Recording
+from service.exports import DetectedLog
 from service.formats.parquet import LOG_KEY
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
@@ -35,7 +35,7 @@ OF_A_SENSOR = ("position", "element_area", "gripper_force_deviation", "sensor")
 Columns = dict[str, NDArray[Any]]
 
 
-def write(recordings: Sequence[Recording], folder: Path) -> None:
+def write(recordings: Sequence[DetectedLog], folder: Path) -> None:
     """Write the data set; raises ``InvalidInput`` for logs of different sensors."""
     _check_alike(recordings)
     rate = _frame_rate(recordings)
@@ -53,7 +53,7 @@ def write(recordings: Sequence[Recording], folder: Path) -> None:
     _write_json(folder / "meta/stats.json", {name: _statistics(column) for name, column in columns.items()})
 
 
-def _check_alike(recordings: Sequence[Recording]) -> None:
+def _check_alike(recordings: Sequence[DetectedLog]) -> None:
     first = recordings[0].log
     present = list(_features(first))
     for recording in recordings[1:]:
@@ -73,17 +73,17 @@ def _features(log: GraspLog) -> Columns:
     return {name: values for name, values in told.items() if values is not None}
 
 
-def _frame_rate(recordings: Sequence[Recording]) -> int:
+def _frame_rate(recordings: Sequence[DetectedLog]) -> int:
     """Frames a second, by the usual step between frames; LeRobot counts whole ones."""
     steps = np.concatenate([np.diff(recording.log.time) for recording in recordings])
     return max(1, round(1.0 / float(np.median(steps))))
 
 
-def _task(recording: Recording) -> str:
+def _task(recording: DetectedLog) -> str:
     return recording.log.metadata.get("task", "hold the object")
 
 
-def _episode(recording: Recording, number: int, rate: int) -> Columns:
+def _episode(recording: DetectedLog, number: int, rate: int) -> Columns:
     """The frames of a log. Time runs evenly in ``timestamp``, as LeRobot wants it; the log's own is beside it."""
     log, history = recording.log, recording.history
     frames = np.arange(len(log))
@@ -98,7 +98,7 @@ def _episode(recording: Recording, number: int, rate: int) -> Columns:
     }
 
 
-def _once(recording: Recording) -> dict[bytes, str]:
+def _once(recording: DetectedLog) -> dict[bytes, str]:
     """What there is one of, as our own Parquet tables tell it."""
     arrays = members(recording.log)
     return {LOG_KEY: json.dumps({name: arrays[name].tolist() for name in OF_A_SENSOR if name in arrays})}
@@ -111,7 +111,7 @@ def _split(columns: Columns, lengths: Sequence[int]) -> list[Columns]:
     return [{name: part[number] for name, part in parts.items()} for number in range(len(lengths))]
 
 
-def _episodes(recordings: Sequence[Recording], columns: Columns, lengths: Sequence[int]) -> Columns:
+def _episodes(recordings: Sequence[DetectedLog], columns: Columns, lengths: Sequence[int]) -> Columns:
     ends = np.cumsum(lengths)
     zeros = np.zeros(len(lengths), np.int64)
     places = ("data/chunk_index", "data/file_index", "meta/episodes/chunk_index", "meta/episodes/file_index")

@@ -12,7 +12,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from service.exports import Recording
+from service.exports import DetectedLog
 from service.exports.scene import COLOURS, arrows, normal_force, patches_at, tangential_force
 from service.formats.lattice import cell_size, columns_and_rows, lattice_axes
 from slipcore.frames import FloatArray
@@ -25,7 +25,7 @@ SERIES = {"slip/stick_ratio": STICK, "force/normal": STICK, "force/tangential": 
 """Numbers over time, and their colours."""
 
 
-def write(recordings: Sequence[Recording], path: Path) -> None:
+def write(recordings: Sequence[DetectedLog], path: Path) -> None:
     """Write the one recording."""
     (recording,) = recordings
     stream = rr.RecordingStream(APPLICATION, recording_id=recording.name)
@@ -46,7 +46,7 @@ def _blueprint(name: str) -> rrb.Blueprint:
     return rrb.Blueprint(rrb.Horizontal(contact, plots), rrb.TimePanel(timeline=TIME), collapse_panels=True)
 
 
-def _log_numbers(stream: rr.RecordingStream, recording: Recording) -> None:
+def _log_numbers(stream: rr.RecordingStream, recording: DetectedLog) -> None:
     """Those that are known; NaN leaves a gap in a line."""
     log = recording.log
     numbers = (recording.history.stick_ratio, normal_force(log), tangential_force(log))
@@ -57,7 +57,7 @@ def _log_numbers(stream: rr.RecordingStream, recording: Recording) -> None:
             rr.send_columns(entity, [times], rr.Scalars.columns(scalars=values), recording=stream)
 
 
-def _log_frames(stream: rr.RecordingStream, recording: Recording) -> None:
+def _log_frames(stream: rr.RecordingStream, recording: DetectedLog) -> None:
     log, history = recording.log, recording.history
     states, drawn = element_states(history.contact, history.slip), arrows(recording)
     axes, size = lattice_axes(log.position), cell_size(log.position)
@@ -71,7 +71,7 @@ def _log_frames(stream: rr.RecordingStream, recording: Recording) -> None:
         stream.log("sensor/patches", _patches(recording, k))
 
 
-def _patches(recording: Recording, frame: int) -> rr.Points2D:
+def _patches(recording: DetectedLog, frame: int) -> rr.Points2D:
     found = list(patches_at(recording.history, frame))
     centres: FloatArray = np.array([(x, y) for x, y, _ in found]).reshape(-1, 2)
     places = columns_and_rows(recording.log.position, centres) + 0.5

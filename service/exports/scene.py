@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from service.exports import Recording
+from service.exports import DetectedLog
 from slipcore.frames import FloatArray, GraspLog
 from slipcore.slip_state import SlipHistory
 
@@ -31,7 +31,7 @@ class Arrows:
     unit: str
 
 
-def arrows(recording: Recording) -> Arrows:
+def arrows(recording: DetectedLog) -> Arrows:
     """Tangential force of each element or, where none is known, its displacement; on the lattice at rest."""
     log = recording.log
     what, unit, vectors = (

@@ -50,11 +50,11 @@ class RequestMiddleware:
         scope.setdefault("state", {})["request_id"] = request_id
         token = ABOUT.set({"request_id": request_id})
         try:
-            await self._serve(scope, receive, _Sender(scope, send, request_id))
+            await self._serve(scope, receive, _HeaderSender(scope, send, request_id))
         finally:
             ABOUT.reset(token)
 
-    async def _serve(self, scope: Scope, receive: Receive, send: "_Sender") -> None:
+    async def _serve(self, scope: Scope, receive: Receive, send: "_HeaderSender") -> None:
         try:
             _check(scope)
             await self.app(scope, _Receiver(receive).receive, send)
@@ -71,7 +71,7 @@ class RequestMiddleware:
             await answer(scope, receive, send)
 
 
-class _Sender:
+class _HeaderSender:
     """Sends an answer with the headers that every one has, unless it says something else itself."""
 
     def __init__(self, scope: Scope, send: Send, request_id: str) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from service.formatting import NOTHING, number
 from service.report.page import Fact, Picture, Report, Section, Table
 from service.slip_benchmark.measures import Measures
-from service.slip_benchmark.scoring import Scores, Summary
+from service.slip_benchmark.scoring import Scores, ScoreSummary
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +35,7 @@ SIMULATION = (
 )
 
 
-def cells(summary: Summary) -> list[str]:
+def cells(summary: ScoreSummary) -> list[str]:
     """A row of a table, but for its name."""
     means = summary.means
     return [f"{summary.scored} of {summary.scenes}", *_numbers(means)]

@@ -86,7 +86,7 @@ def seal(phrase: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class DrawnPress:
     """A press that is drawn: ``friction``, normal ``force`` N, Hertz's contact ``radius`` m, and the ``finger``."""
 
     friction: float
@@ -121,7 +121,7 @@ def simulate_gel(rng: np.random.Generator, kind: Kind) -> GraspLog:
     return simulate(scene, fidelity=FIDELITY, seed=int(rng.integers(2**31)))
 
 
-def _body(rng: np.random.Generator) -> Body:
+def _body(rng: np.random.Generator) -> DrawnPress:
     finger = Finger(
         radius=float(rng.uniform(10e-3, 25e-3)),
         young_modulus=_evenly(rng, 0.4e6, 1.5e6),
@@ -129,10 +129,10 @@ def _body(rng: np.random.Generator) -> Body:
     )
     radius = float(rng.uniform(3e-3, 5.5e-3))
     modulus = finger.young_modulus / (1.0 - finger.poisson_ratio**2)
-    return Body(_evenly(rng, 0.25, 0.9), 4.0 * modulus * radius**3 / (3.0 * finger.radius), radius, finger)
+    return DrawnPress(_evenly(rng, 0.25, 0.9), 4.0 * modulus * radius**3 / (3.0 * finger.radius), radius, finger)
 
 
-def _variety(rng: np.random.Generator, kind: Kind, body: Body) -> tuple[list[Effect], float]:
+def _variety(rng: np.random.Generator, kind: Kind, body: DrawnPress) -> tuple[list[Effect], float]:
     """What the object and its surface are like, and the share of the sliding force that this leaves."""
     effects: list[Effect] = []
     carried = 1.0
@@ -161,14 +161,14 @@ Loaded = tuple[tuple[Effect, ...], float]
 """Effects that load or move the object, and how long the scene lasts, s."""
 
 
-def _pull(rng: np.random.Generator, body: Body, carried: float) -> Loaded:
+def _pull(rng: np.random.Generator, body: DrawnPress, carried: float) -> Loaded:
     """Pulled along a line, then held."""
     end = 0.7 + float(rng.uniform(0.8, 1.8))
     level, angle = carried * rng.uniform(0.7, 0.97) * body.sliding, rng.uniform(0.0, 2.0 * np.pi)
     return (_loads((0.7, end), np.array([[0.0, 0.0], [1.0, 0.0]]) * level, angle),), end + 0.3
 
 
-def _back_and_forth(rng: np.random.Generator, body: Body, carried: float) -> Loaded:
+def _back_and_forth(rng: np.random.Generator, body: DrawnPress, carried: float) -> Loaded:
     """Pulled, pulled back, and pulled again."""
     time = 0.7 + np.cumsum([0.0, *rng.uniform(0.5, 1.0, 3)])
     levels = carried * body.sliding * np.array([0.0, 1.0, -1.0, 1.0]) * [0.0, *rng.uniform(0.6, 0.95, 3)]
@@ -176,7 +176,7 @@ def _back_and_forth(rng: np.random.Generator, body: Body, carried: float) -> Loa
     return (_loads(tuple(time), along, rng.uniform(0.0, 2.0 * np.pi)),), float(time[-1]) + 0.1
 
 
-def _wander(rng: np.random.Generator, body: Body, carried: float) -> Loaded:
+def _wander(rng: np.random.Generator, body: DrawnPress, carried: float) -> Loaded:
     """Force and its direction wander while the grip changes."""
     time = 0.7 + np.cumsum([0.0, *rng.uniform(0.3, 0.6, 5)])
     extra = body.force * np.r_[0.0, rng.uniform(-0.4, 0.3, 5)]
@@ -186,7 +186,7 @@ def _wander(rng: np.random.Generator, body: Body, carried: float) -> Loaded:
     return (replace(_loads(tuple(time), along, 0.0), normal_force=_plain(extra)),), float(time[-1]) + 0.1
 
 
-def _twist(rng: np.random.Generator, body: Body, carried: float) -> Loaded:
+def _twist(rng: np.random.Generator, body: DrawnPress, carried: float) -> Loaded:
     """Turned about the normal while something pulls a little."""
     end = 0.7 + float(rng.uniform(0.8, 1.5))
     share, turn = carried * rng.uniform(0.6, 0.9), rng.uniform(0.5, 1.4)
@@ -196,7 +196,7 @@ def _twist(rng: np.random.Generator, body: Body, carried: float) -> Loaded:
     return (pulled, Torsion(moment, 0.7, end - 0.7)), end + 0.3
 
 
-def _grip(rng: np.random.Generator, body: Body, carried: float) -> Loaded:
+def _grip(rng: np.random.Generator, body: DrawnPress, carried: float) -> Loaded:
     """Held by a load while the grip loosens, or tightens before it is pulled further."""
     time = 0.7 + np.cumsum([0.0, *rng.uniform(0.4, 0.9, 2), rng.uniform(0.6, 1.2)])
     share, angle = rng.uniform(0.4, 0.7), rng.uniform(0.0, 2.0 * np.pi)
@@ -210,7 +210,7 @@ def _grip(rng: np.random.Generator, body: Body, carried: float) -> Loaded:
     return (replace(path, normal_force=_plain(extra)),), float(time[-1]) + 0.2
 
 
-def _slide(rng: np.random.Generator, body: Body, _: float) -> Loaded:
+def _slide(rng: np.random.Generator, body: DrawnPress, _: float) -> Loaded:
     """Moved along until all of it slides, and half of the time back."""
     way = rng.uniform(1.1, 1.6) * body.give + rng.uniform(0.0, 2e-3)
     angle, end = rng.uniform(0.0, 2.0 * np.pi), 0.7 + float(rng.uniform(1.0, 2.0))
@@ -220,7 +220,7 @@ def _slide(rng: np.random.Generator, body: Body, _: float) -> Loaded:
     return (ObjectMotion((0.7, end, back), _plain(x), _plain(y)),), back + 0.1
 
 
-def _turn_and_slide(rng: np.random.Generator, body: Body, _: float) -> Loaded:
+def _turn_and_slide(rng: np.random.Generator, body: DrawnPress, _: float) -> Loaded:
     """Moved and turned until all of it slides."""
     end = 0.7 + float(rng.uniform(1.0, 2.0))
     way, angle = rng.uniform(0.6, 1.5) * body.give, rng.uniform(0.0, 2.0 * np.pi)
@@ -229,7 +229,7 @@ def _turn_and_slide(rng: np.random.Generator, body: Body, _: float) -> Loaded:
     return (ObjectMotion((0.7, end), (0.0, there[0]), (0.0, there[1]), (0.0, yaw)),), end + 0.2
 
 
-def _let_go(rng: np.random.Generator, body: Body, _: float) -> Loaded:
+def _let_go(rng: np.random.Generator, body: DrawnPress, _: float) -> Loaded:
     """Pressed, held and released: next to nothing slips."""
     end = 1.0 + float(rng.uniform(0.5, 0.8))
     return (LoadPath((1.0, end), normal_force=(0.0, -0.93 * body.force)),), end

@@ -29,7 +29,7 @@ class SceneScore:
 
 
 @dataclass(frozen=True, slots=True)
-class Summary:
+class ScoreSummary:
     """Means over the ``scored`` of so many ``scenes``; those without a meaning are left out of each."""
 
     scenes: int
@@ -65,7 +65,7 @@ class Scores:
         """Predictions that cannot be scored."""
         return [score for score in self.each if score.wrong]
 
-    def of(self, method: str, kind: str | None = None, fault: str | None = None) -> Summary:
+    def of(self, method: str, kind: str | None = None, fault: str | None = None) -> ScoreSummary:
         """A method's means, over all scenes or those of a kind or fault."""
         return _summary(
             score
@@ -102,7 +102,7 @@ class Scores:
         }
 
 
-def _record(summary: Summary) -> dict[str, Any]:
+def _record(summary: ScoreSummary) -> dict[str, Any]:
     return {"scenes": summary.scenes, "scored": summary.scored, **asdict(summary.means)}
 
 
@@ -148,11 +148,11 @@ def _scene_scores(folder: Path, scene: SceneEntry, refused: dict[str, dict[str, 
             yield SceneScore(method, scene, measure(truth, prediction, observed))
 
 
-def _summary(scores: Iterator[SceneScore]) -> Summary:
+def _summary(scores: Iterator[SceneScore]) -> ScoreSummary:
     all_ = list(scores)
     known = [score.measures for score in all_ if score.measures is not None]
     means = {entry.name: _mean([getattr(each, entry.name) for each in known]) for entry in fields(Measures)}
-    return Summary(len(all_), len(known), Measures(**means))
+    return ScoreSummary(len(all_), len(known), Measures(**means))
 
 
 def _mean(values: Sequence[float]) -> float:

@@ -85,7 +85,7 @@ class SessionOptions(NamedTuple):
 
 
 @dataclass(slots=True)
-class Session:
+class DetectorSession:
     """A running detector with what it saw: the last frames and answers, all frames if they are ``kept``, with what the
     gripper ``reported`` in them; and the controller of the grip, where one was asked for.
 
@@ -121,7 +121,7 @@ class Session:
         return self.held_bytes + (0 if self.forces is None else self.forces.held_bytes)
 
 
-_SESSIONS: dict[str, Session] = {}
+_SESSIONS: dict[str, DetectorSession] = {}
 
 _LOOKS = FairExecutor()
 """Does the looks for friction, so that frames need not wait for them."""
@@ -156,7 +156,9 @@ def open_session(
     kept: list[Frame] | None = [] if keep else None
     grip = None if control is None else Grip(at_rest, control, model, materials)
     forces = None if gel is None else Reconstructing(gel, limit.owner)
-    _SESSIONS[name] = Session(detector, at_rest, area, moments, limit, kept, grip=grip, forces=forces, held_bytes=held)
+    _SESSIONS[name] = DetectorSession(
+        detector, at_rest, area, moments, limit, kept, grip=grip, forces=forces, held_bytes=held
+    )
 
 
 def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[str, Any], bytes | None]:
@@ -189,7 +191,7 @@ def step(name: str, given: PackedFrame, is_shown: bool = False) -> tuple[dict[st
     return answer, pack_frame(given.number, state, with_forces.force, pressed, session.expected)
 
 
-def _keep(session: Session, frame: Frame, given: PackedFrame, size: int) -> None:
+def _keep(session: DetectorSession, frame: Frame, given: PackedFrame, size: int) -> None:
     """Keep a frame of this size for the log, where one is wanted, and in any case how much its gripper reported."""
     session.most_reported = max(session.most_reported, given.gripper_force or 0.0)
     if session.kept is None:
@@ -201,7 +203,7 @@ def _keep(session: Session, frame: Frame, given: PackedFrame, size: int) -> None
         session.report_deviation = max(session.report_deviation or 0.0, given.gripper_force_deviation)
 
 
-def _detected(session: Session, frame: Frame) -> tuple[SlipState, dict[str, Any] | None]:
+def _detected(session: DetectorSession, frame: Frame) -> tuple[SlipState, dict[str, Any] | None]:
     """The slip state after a frame, and what is then commanded; the session is as it was where one is refused."""
     before = session.detector.state
     state = session.detector.step(*frame)
@@ -212,7 +214,7 @@ def _detected(session: Session, frame: Frame) -> tuple[SlipState, dict[str, Any]
         raise
 
 
-def _with_forces(session: Session, frame: Frame, given: PackedFrame) -> tuple[Frame, dict[str, Any] | None]:
+def _with_forces(session: DetectorSession, frame: Frame, given: PackedFrame) -> tuple[Frame, dict[str, Any] | None]:
     """The frame with reconstructed forces where it has none and its sensor's gel is known, and what is told of them."""
     if session.forces is None:
         return frame, None
@@ -226,7 +228,7 @@ def _with_forces(session: Session, frame: Frame, given: PackedFrame) -> tuple[Fr
     return with_forces, force_report
 
 
-def _frame(session: Session, given: PackedFrame) -> Frame:
+def _frame(session: DetectorSession, given: PackedFrame) -> Frame:
     """The frame, if a log could have it: one that could not would spoil what is kept."""
     shape, command = session.position.shape, given.command
     if command is not None and not 0.0 <= command <= MOST_COMMAND:
@@ -258,7 +260,7 @@ def write(name: str, target: Path, sensor: str) -> Description:
     return describe("stream", log)
 
 
-def _with_reports(session: Session, log: GraspLog) -> GraspLog:
+def _with_reports(session: DetectorSession, log: GraspLog) -> GraspLog:
     """With the gripper's force, where any frame told it; of others 0, which tells nothing. It is as sure as the least
     sure.
     """
@@ -279,7 +281,7 @@ def drop(name: str) -> None:
         session.forces.end()
 
 
-def _kept_bytes(session: Session, frame: Frame) -> int:
+def _kept_bytes(session: DetectorSession, frame: Frame) -> int:
     """What a frame takes that is to be kept; raises ``InvalidInput`` where there is no room for it."""
     size = frame.displacement.nbytes * (1 + (frame.force is not None) + (frame.normal is not None))
     count = len(session.kept or ()) + 1
@@ -302,7 +304,7 @@ def _check_room(size: int, limit: MemoryLimit) -> None:
         raise InvalidInput("bytes", own + size, allowed)
 
 
-def _plan_look(session: Session, frame: Frame, state: SlipState) -> None:
+def _plan_look(session: DetectorSession, frame: Frame, state: SlipState) -> None:
     """Once in a while, let the last frames be looked at."""
     if frame.force is None:
         return
@@ -317,7 +319,7 @@ def _plan_look(session: Session, frame: Frame, state: SlipState) -> None:
 
 
 def _look(
-    session: Session, frames: list[Frame], answers: list[SlipState], state: "DetectorState", noise: float | None
+    session: DetectorSession, frames: list[Frame], answers: list[SlipState], state: "DetectorState", noise: float | None
 ) -> None:
     try:
         _find_friction(session, frames, answers, state, noise)
@@ -326,7 +328,7 @@ def _look(
 
 
 def _find_friction(
-    session: Session, frames: list[Frame], answers: list[SlipState], state: "DetectorState", noise: float | None
+    session: DetectorSession, frames: list[Frame], answers: list[SlipState], state: "DetectorState", noise: float | None
 ) -> None:
     """The samples since the last look, merged with those before; ``noise`` N of forces that are reconstructed."""
     options = {} if noise is None else {"force_noise": noise}
@@ -361,7 +363,7 @@ def _expected(model: "FrictionModel") -> dict[str, float] | None:
     return found if all(map(math.isfinite, found.values())) else None
 
 
-def _answer(session: Session, number: int, state: SlipState) -> dict[str, Any]:
+def _answer(session: DetectorSession, number: int, state: SlipState) -> dict[str, Any]:
     return {
         "type": "state",
         "number": number,
@@ -374,7 +376,7 @@ def _answer(session: Session, number: int, state: SlipState) -> dict[str, Any]:
     }
 
 
-def _log(session: Session, frames: Sequence[Frame], sensor: str, metadata: dict[str, str]) -> GraspLog:
+def _log(session: DetectorSession, frames: Sequence[Frame], sensor: str, metadata: dict[str, str]) -> GraspLog:
     def stacked(name: str) -> NDArray[np.float64] | None:
         parts = [getattr(frame, name) for frame in frames]
         return None if any(part is None for part in parts) else np.stack(parts)

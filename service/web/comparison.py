@@ -9,7 +9,7 @@ from db.records import StoredModel
 from service.domain.stored_results import to_friction_model
 from service.report.wording import LEVELS
 from service.web.charts import Curve, ManyChart, draw_together
-from service.web.friction import POINTS, Friction, friction_at
+from service.web.friction import POINTS, FrictionEstimate, friction_at
 
 MOST_COMPARED = 6
 """Models in one picture: so many colours are told apart."""
@@ -20,7 +20,7 @@ class ComparedModel:
     """A model, and its friction where all of them are compared."""
 
     stored: StoredModel
-    friction: Friction
+    friction: FrictionEstimate
 
 
 def compare(models: Sequence[StoredModel], normal_force: float) -> list[ComparedModel]:

@@ -22,7 +22,7 @@ BEYOND = 1.25
 
 
 @dataclass(frozen=True, slots=True)
-class Friction:
+class FrictionEstimate:
     """Friction coefficient at a tangential velocity, m/s, and a normal force of an element, N, with its interval.
 
     ``disagreement`` with the material's models by other methods, where there is any.
@@ -54,7 +54,7 @@ def friction_at(
     normal_force: float | None,
     tangential_velocity: float = 0.0,
     others: Sequence[StoredModel] = (),
-) -> Friction:
+) -> FrictionEstimate:
     """Friction of a model; without a normal force, in the middle of what its samples have.
 
     ``others``: current models of the same material, with which it may disagree.
@@ -63,10 +63,10 @@ def friction_at(
     v, f_n = tangential_velocity, middle_force(stored) if normal_force is None else normal_force
     low, high = (float(model.predict(v, f_n, quantile=level)) for level in LEVELS)
     support = model.support_at(v, f_n, OUTDATED if stored.outdated else None)
-    return Friction(v, f_n, float(model.predict(v, f_n)), (low, high), support, disagreeing(stored, others))
+    return FrictionEstimate(v, f_n, float(model.predict(v, f_n)), (low, high), support, disagreeing(stored, others))
 
 
-def next_of(stored: StoredModel, at: Friction) -> RecordNext | None:
+def next_of(stored: StoredModel, at: FrictionEstimate) -> RecordNext | None:
     """What to record next to know friction ``at`` its working point; None without a normal force."""
     if not at.normal_force > 0.0:
         return None
@@ -79,7 +79,7 @@ class Listed:
 
     material: Material
     stored: StoredModel | None
-    friction: Friction | None
+    friction: FrictionEstimate | None
 
     @property
     def grasps(self) -> int:
@@ -115,7 +115,7 @@ def coefficients(stored: StoredModel) -> list[Coefficient]:
     ]
 
 
-def sections(stored: StoredModel, at: Friction) -> list[Chart]:
+def sections(stored: StoredModel, at: FrictionEstimate) -> list[Chart]:
     """Friction over normal force and, where any is known or asked for, over velocity, through the point ``at``."""
     forces, velocities = stored.model.normal_force, stored.model.tangential_velocity
     f_n = np.linspace(0.0, max(BEYOND * forces[1], at.normal_force), POINTS)

@@ -34,10 +34,10 @@ class ProblemPages:
             await self.app(scope, receive, send)
             return
         scope.setdefault("state", {})  # which those inside share
-        await self.app(scope, receive, _Sender(scope, receive, send))
+        await self.app(scope, receive, _PageSender(scope, receive, send))
 
 
-class _Sender:
+class _PageSender:
     """Keeps a problem back until it is whole, then sends the page of it; hands all else on."""
 
     def __init__(self, scope: Scope, receive: Receive, send: Send) -> None:

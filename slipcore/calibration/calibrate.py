@@ -6,12 +6,12 @@ import numpy as np
 
 from slipcore.calibration.crosstalk import crosstalk, inward_share
 from slipcore.calibration.defaults import ESTIMATE
-from slipcore.calibration.estimate import Estimate, Observation, joined
+from slipcore.calibration.estimate import Estimate, PressResult, joined
 from slipcore.calibration.gain import gain
 from slipcore.calibration.kernel import kernel_width, squared_width
 from slipcore.calibration.marker_noise import marker_noise
 from slipcore.calibration.model import AXES, SensorModel
-from slipcore.calibration.press import InvalidPress, Press, find_press, press_fault
+from slipcore.calibration.press import InvalidPress, PressLog, find_press, press_fault
 from slipcore.calibration.zero import drifts, offsets
 from slipcore.defaults import LIMITS
 from slipcore.errors import InvalidInput, UnknownScale
@@ -61,7 +61,7 @@ def _checked(logs: Sequence[GraspLog], known_force: Sequence[float | None] | Non
     return known
 
 
-def _estimates(presses: list[Press], known_force: Sequence[float | None]) -> list[Estimate]:
+def _estimates(presses: list[PressLog], known_force: Sequence[float | None]) -> list[Estimate]:
     tables = {
         "force_offset": ("N", AXES, [offsets(press.zero) for press in presses]),
         "force_drift": ("N/s", AXES, [drifts(press.zero) for press in presses]),
@@ -72,7 +72,7 @@ def _estimates(presses: list[Press], known_force: Sequence[float | None]) -> lis
         for name, (unit, axes, rows) in tables.items()
         for number, axis in enumerate(axes)
     ]
-    gains: list[Observation] = [gain(press, force) for press, force in zip(presses, known_force, strict=True)]
+    gains: list[PressResult] = [gain(press, force) for press, force in zip(presses, known_force, strict=True)]
     return [
         *vectors,
         joined("inward_share", "-", [inward_share(press) for press in presses]),
@@ -82,7 +82,7 @@ def _estimates(presses: list[Press], known_force: Sequence[float | None]) -> lis
     ]
 
 
-def _offset(presses: list[Press]) -> FloatArray | None:
+def _offset(presses: list[PressLog]) -> FloatArray | None:
     """Of each element [n, m, 3] N: the mean over presses, weighted by their free frames."""
     known = [zero for press in presses if (zero := press.zero) is not None and zero.frames >= ESTIMATE.free_frames]
     if not known:

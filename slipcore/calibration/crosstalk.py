@@ -3,12 +3,12 @@
 import numpy as np
 
 from slipcore.calibration.defaults import ESTIMATE
-from slipcore.calibration.estimate import Observation, Observed, error_of_mean
-from slipcore.calibration.press import Press, load_terms, marker_motion
+from slipcore.calibration.estimate import PressEstimate, PressResult, error_of_mean
+from slipcore.calibration.press import PressLog, load_terms, marker_motion
 from slipcore.frames import FloatArray
 
 
-def crosstalk(press: Press) -> list[Observation]:
+def crosstalk(press: PressLog) -> list[PressResult]:
     """Along x and along y, the share of the normal force that appears as tangential force.
 
     Of the sums over the footprint, in which parts that point inwards all around cancel. Its error holds that of noise,
@@ -21,10 +21,10 @@ def crosstalk(press: Press) -> list[Observation]:
     shares, errors = _proportional(press)
     leaning = np.abs(marker_motion(press)[0].mean(axis=0)) * ESTIMATE.sideways_stiffness / press.depth
     errors = np.hypot(errors, leaning)
-    return [Observed(float(share), float(error)) for share, error in zip(shares, errors, strict=True)]
+    return [PressEstimate(float(share), float(error)) for share, error in zip(shares, errors, strict=True)]
 
 
-def _proportional(press: Press) -> tuple[FloatArray, FloatArray]:
+def _proportional(press: PressLog) -> tuple[FloatArray, FloatArray]:
     """Slopes of tangential over normal force [2] beside an offset and, where it is known, a drift; their errors."""
     terms, load = load_terms(press)
     found = np.linalg.lstsq(terms, load)[0]
@@ -34,7 +34,7 @@ def _proportional(press: Press) -> tuple[FloatArray, FloatArray]:
     return found[0], errors
 
 
-def inward_share(press: Press) -> Observation:
+def inward_share(press: PressLog) -> PressResult:
     """Tangential force that points to the middle of the contact, over normal force, summed up over the footprint.
 
     It goes with the contact, so that no property of single elements makes it: the body's and the gel's own elasticity
@@ -48,10 +48,10 @@ def inward_share(press: Press) -> Observation:
     direction = arm / np.maximum(np.linalg.norm(arm, axis=-1, keepdims=True), np.finfo(float).tiny)
     share = (force[..., :2] * direction).sum(axis=(1, 2)) / normal.sum(axis=(1, 2))
     error = np.hypot(error_of_mean(share - share.mean()), _zero_error(press) / normal.sum(axis=(1, 2)).mean())
-    return Observed(float(share.mean()), float(error))
+    return PressEstimate(float(share.mean()), float(error))
 
 
-def _zero_error(press: Press) -> float:
+def _zero_error(press: PressLog) -> float:
     """Standard error of a component's sum over the footprint that single elements' zeros make, N."""
     if press.split is None or not press.free.any():
         return 0.0

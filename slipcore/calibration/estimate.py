@@ -36,14 +36,14 @@ class Estimate:
         return self.is_identified and not self.low <= 0.0 <= self.high
 
 
-class Observed(NamedTuple):
+class PressEstimate(NamedTuple):
     """What one press tells of a quantity: its value and standard error."""
 
     value: float
     error: float
 
 
-Observation = Observed | str
+PressResult = PressEstimate | str
 """Or why it tells nothing."""
 
 
@@ -52,12 +52,12 @@ def unknown(name: str, unit: str, reason: str) -> Estimate:
     return Estimate(name, unit, math.nan, math.nan, math.nan, reason)
 
 
-def joined(name: str, unit: str, found: Sequence[Observation]) -> Estimate:
+def joined(name: str, unit: str, found: Sequence[PressResult]) -> Estimate:
     """One quantity of several presses: a random effect of each press beside its own error (DerSimonian and Laird).
 
     Presses that tell nothing are left out; where none tells, the first says why.
     """
-    known = [each for each in found if isinstance(each, Observed)]
+    known = [each for each in found if isinstance(each, PressEstimate)]
     if not known:
         return unknown(name, unit, next(each for each in found if isinstance(each, str)))
     value, error, freedom = _random_effects(np.array(known))

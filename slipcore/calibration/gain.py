@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from slipcore.calibration.estimate import Observation, Observed, error_of_mean
-from slipcore.calibration.press import Press
+from slipcore.calibration.estimate import PressEstimate, PressResult, error_of_mean
+from slipcore.calibration.press import PressLog
 
 
-def gain(press: Press, known_force: float | None) -> Observation:
+def gain(press: PressLog, known_force: float | None) -> PressResult:
     """Known force over the sum of normal forces in the hold; ``known_force`` N."""
     if known_force is None:
         return "no total force is given: hold a known weight, or press by a scale, and say with how much"
@@ -22,4 +22,4 @@ def gain(press: Press, known_force: float | None) -> Observation:
     elements = math.prod(press.log.grid)
     error = math.hypot(error_of_mean(held - held.mean()), elements * float(press.zero.offset_error[2]))
     value = known_force / float(held.mean())
-    return Observed(value, value * error / float(np.abs(held.mean())))
+    return PressEstimate(value, value * error / float(np.abs(held.mean())))

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.ndimage import binary_dilation
 
 from slipcore.calibration.defaults import ESTIMATE, PRESS
-from slipcore.calibration.estimate import Estimate, Observation, Observed, joined, unknown
-from slipcore.calibration.press import Press
+from slipcore.calibration.estimate import Estimate, PressEstimate, PressResult, joined, unknown
+from slipcore.calibration.press import PressLog
 from slipcore.frames import BoolArray, FloatArray
 
 NAME, UNIT = "kernel_width", "m"
@@ -26,7 +26,7 @@ class _Growth(NamedTuple):
     error: FloatArray
 
 
-def kernel_width(found: list[Observation]) -> Estimate:
+def kernel_width(found: list[PressResult]) -> Estimate:
     """Standard deviation of the kernel along one axis, m, from its squares; 0 where these are within their error."""
     square = joined(NAME, UNIT, found)
     if not square.is_identified:
@@ -35,7 +35,7 @@ def kernel_width(found: list[Observation]) -> Estimate:
     return Estimate(NAME, UNIT, value, low, high)
 
 
-def squared_width(press: Press) -> Observation:
+def squared_width(press: PressLog) -> PressResult:
     """The second moment that is left at no force, m²."""
     if press.split is None:
         return "the log has no forces"
@@ -54,7 +54,7 @@ def squared_width(press: Press) -> Observation:
     return _left_at_no_force(growth, press.log.element_area)
 
 
-def _growth(press: Press, split: FloatArray) -> _Growth:
+def _growth(press: PressLog, split: FloatArray) -> _Growth:
     """Of all frames in contact whose force is well above its noise.
 
     Each over no more of the lattice than its contact and kernel need, since noise far out counts by its arm's square.
@@ -93,7 +93,7 @@ def _moments(field: FloatArray, arm: FloatArray, inside: BoolArray, noise: float
     return _Growth(force, moment, error)
 
 
-def _left_at_no_force(growth: _Growth, element_area: float) -> Observed:
+def _left_at_no_force(growth: _Growth, element_area: float) -> PressEstimate:
     """Over exponents of the contact's growth, weighted by how likely each is.
 
     A force on an element is its sum over it, or its density there: the moment holds area/12 of it, or nothing.
@@ -108,7 +108,7 @@ def _left_at_no_force(growth: _Growth, element_area: float) -> Observed:
     mean = float(likely @ left)
     spread = float(likely @ (scale * variance + (left - mean) ** 2))
     unsure = element_area / 24.0
-    return Observed(mean - unsure, math.hypot(math.sqrt(spread), unsure))
+    return PressEstimate(mean - unsure, math.hypot(math.sqrt(spread), unsure))
 
 
 class _Line(NamedTuple):

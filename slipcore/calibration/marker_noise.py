@@ -14,11 +14,11 @@ from scipy.stats import norm
 
 from slipcore.calibration.defaults import ESTIMATE
 from slipcore.calibration.estimate import Estimate, unknown
-from slipcore.calibration.press import Press
+from slipcore.calibration.press import PressLog
 from slipcore.frames import BoolArray, FloatArray
 
 
-def marker_noise(presses: list[Press]) -> tuple[Estimate, Estimate]:
+def marker_noise(presses: list[PressLog]) -> tuple[Estimate, Estimate]:
     """Standard deviation of a marker's coordinate in the plane, m, and its correlation from frame to frame.
 
     Motion that all markers have in common is not in it. Intervals are those of a jackknife over groups of elements.
@@ -48,7 +48,7 @@ def _bounded(name: tuple[str, str], value: float, half: float, most: float) -> E
     return Estimate(*name, float(value), float(max(value - half, 0.0)), float(min(value + half, most)))
 
 
-def _mean_squares(presses: list[Press]) -> FloatArray:
+def _mean_squares(presses: list[PressLog]) -> FloatArray:
     """Mean square of each element's change over 1 … lags frames, [lags, k] m², of all presses.
 
     Only up to the first lag that no two free frames lie apart, as where as many are free before a press as after it.
@@ -69,7 +69,7 @@ def _mean_squares(presses: list[Press]) -> FloatArray:
     return shared
 
 
-def _longest_lag(press: Press) -> int:
+def _longest_lag(press: PressLog) -> int:
     return int(ESTIMATE.noise_share_of_frames * np.count_nonzero(press.free))
 
 

@@ -29,7 +29,7 @@ class InvalidPress(InvalidInput):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Press:
+class PressLog:
     """A log of a press; ``free``, ``pressed`` [t]: frames without contact, and those with most of the load.
 
     With forces and free frames: their ``zero``. ``split`` [t, n, m, 3] N: forces without it, first their tangential
@@ -78,7 +78,7 @@ class Press:
         return float(np.maximum(-self.log.displacement[..., 2], 0.0).max())
 
 
-def find_press(log: GraspLog) -> Press:
+def find_press(log: GraspLog) -> PressLog:
     """The log as a press, pure or not."""
     field = -log.displacement[..., 2]
     if not field.any() and log.force is not None:
@@ -89,7 +89,7 @@ def find_press(log: GraspLog) -> Press:
         before = touched.copy()
         touched[1:] |= before[:-1]
         touched[:-1] |= before[1:]
-    return Press(log, level, ~touched)
+    return PressLog(log, level, ~touched)
 
 
 def _level(field: FloatArray) -> tuple[FloatArray, float]:
@@ -109,12 +109,12 @@ def _split(log: GraspLog, zero: Zero | None) -> FloatArray | None:
     return np.concatenate([(force - along * normal)[..., :2], -along], axis=-1)
 
 
-def press_fault(press: Press) -> str | None:
+def press_fault(press: PressLog) -> str | None:
     """What makes a press unfit to calibrate by; None where nothing does."""
     return next(_impurities(press), None)
 
 
-def _impurities(press: Press) -> Iterator[str]:
+def _impurities(press: PressLog) -> Iterator[str]:
     if press.level.max() <= 0.0 or not press.pressed.any():
         yield "nothing presses"
         return
@@ -127,7 +127,7 @@ def _impurities(press: Press) -> Iterator[str]:
     yield from _motion_sideways(press)
 
 
-def _load_sideways(press: Press) -> Iterator[str]:
+def _load_sideways(press: PressLog) -> Iterator[str]:
     """Tangential load that is no share of the normal load."""
     largest, (terms, load) = press.normal_force.max(), load_terms(press)
     residual = np.hypot(*(load - terms @ np.linalg.lstsq(terms, load)[0]).T)
@@ -136,7 +136,7 @@ def _load_sideways(press: Press) -> Iterator[str]:
         yield f"the load sideways changes by {residual.max():.3g} N beside a normal load of {largest:.3g} N"
 
 
-def load_terms(press: Press) -> tuple[FloatArray, FloatArray]:
+def load_terms(press: PressLog) -> tuple[FloatArray, FloatArray]:
     """Normal load in free and pressed frames, beside an offset and a drift where they are known, [k, 1 to 3], and
     tangential load [k, 2] N in them.
     """
@@ -148,7 +148,7 @@ def load_terms(press: Press) -> tuple[FloatArray, FloatArray]:
     return np.stack(columns, axis=1)[seen], press.tangential_force[seen]
 
 
-def _motion_sideways(press: Press) -> Iterator[str]:
+def _motion_sideways(press: PressLog) -> Iterator[str]:
     """Markers that go along the surface, or turn, as they would with a body that is pushed or turned."""
     sideways, turn = marker_motion(press)
     limit = PRESS.sideways * press.depth
@@ -159,7 +159,7 @@ def _motion_sideways(press: Press) -> Iterator[str]:
         yield f"markers turn by {1e6 * np.abs(turn).max():.3g} µm at the rim of the contact"
 
 
-def marker_motion(press: Press) -> tuple[FloatArray, FloatArray]:
+def marker_motion(press: PressLog) -> tuple[FloatArray, FloatArray]:
     """Mean motion of the footprint's markers along x and y, and its turn times its radius, in pressed frames, m."""
     place = press.log.position[press.footprint][:, :2]
     moved = press.log.displacement[:, press.footprint, :2]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slipcore.calibration.defaults import ESTIMATE
-from slipcore.calibration.estimate import Observation, Observed, error_of_mean
+from slipcore.calibration.estimate import PressEstimate, PressResult, error_of_mean
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 
 
@@ -60,21 +60,23 @@ def find_zero(log: GraspLog, free: BoolArray) -> Zero | None:
     )
 
 
-def offsets(zero: Zero | None) -> list[Observation]:
+def offsets(zero: Zero | None) -> list[PressResult]:
     """The offset along each axis that the elements have in common, N."""
     if zero is None or zero.frames < ESTIMATE.free_frames:
         return [_too_few(zero)] * 3
     values = zero.offset.mean(axis=(0, 1))
-    return [Observed(float(value), float(error)) for value, error in zip(values, zero.offset_error, strict=True)]
+    return [PressEstimate(float(value), float(error)) for value, error in zip(values, zero.offset_error, strict=True)]
 
 
-def drifts(zero: Zero | None) -> list[Observation]:
+def drifts(zero: Zero | None) -> list[PressResult]:
     """Its drift along each axis, N/s; known where there are free frames before the press and after it."""
     if zero is None or zero.frames < ESTIMATE.free_frames:
         return [_too_few(zero)] * 3
     if not zero.around:
         return ["no frames without contact both before the press and after it: lift the body before the log ends"] * 3
-    return [Observed(float(value), float(error)) for value, error in zip(zero.drift, zero.drift_error, strict=True)]
+    return [
+        PressEstimate(float(value), float(error)) for value, error in zip(zero.drift, zero.drift_error, strict=True)
+    ]
 
 
 def _too_few(zero: Zero | None) -> str:

@@ -12,18 +12,18 @@ from numpy.typing import ArrayLike
 
 from slipcore.defaults import DEFAULT_METHOD, LIMITS, ContactOptions, choose_options
 from slipcore.detection.methods import find_method, findings_by
-from slipcore.detection.shared.contact import Touch
+from slipcore.detection.shared.contact import ContactThreshold
 from slipcore.detection.shared.decision import apply_decision
-from slipcore.detection.shared.interface import CompiledMethod, Observation, Start
+from slipcore.detection.shared.interface import CompiledMethod, ObservedFrame, Start
 from slipcore.detection.shared.lasting_noise import start_noise
 from slipcore.detection.shared.observe import observe
 from slipcore.detection.shared.records import (
     NO_FIELD,
     NO_MASK,
     NO_POSE,
+    DetectorSetup,
     FrameArrays,
     Memory,
-    Sensor,
     empty_like,
     read_only,
     unwritten,
@@ -55,7 +55,7 @@ class Setup(NamedTuple):
     element_area: float
     method: str
     options: ContactOptions
-    sensor: Sensor
+    sensor: DetectorSetup
 
 
 class DetectorState(NamedTuple):
@@ -90,7 +90,7 @@ def init(position: ArrayLike, element_area: float, method: str = DEFAULT_METHOD,
     position_at_rest, steps, inverse = map(np.array, (lattice.position, lattice.steps, lattice.inverse_jacobian))
     # copies that can be written to, as unpickled ones can: kernels are compiled for one type
     touch = touch_thresholds(chosen, area)
-    sensor = Sensor(position_at_rest, steps, inverse, lattice.orientation, *touch, start.settings)
+    sensor = DetectorSetup(position_at_rest, steps, inverse, lattice.orientation, *touch, start.settings)
     shape = lattice.position.shape
     frame = FrameArrays(-math.inf, read_only(np.zeros(shape)), NO_FIELD, NO_POSE, NO_FIELD, NO_MASK)
     noise = start_noise()
@@ -100,8 +100,8 @@ def init(position: ArrayLike, element_area: float, method: str = DEFAULT_METHOD,
 
 
 def touch_thresholds(options: ContactOptions, element_area: float) -> tuple[FloatArray, FloatArray]:
-    """What an element of that area, m², needs to touch, by force and by shape: ``contact.Touch`` as arrays."""
-    by_shape = Touch(
+    """What an element of that area, m², needs to touch, by force and by shape: ``ContactThreshold`` as arrays."""
+    by_shape = ContactThreshold(
         least=options.contact_depth,
         share=options.contact_depth_share,
         noise=options.contact_noise,
@@ -132,7 +132,7 @@ def step(state: DetectorState, frame: Frame) -> tuple[DetectorState, SlipState]:
         room = workspace(*memory.probability.shape)
         observe(sensor, seen, memory, after, room)
         noise, pressing_noise = (float(known) for known in room.surface.noise[:2])
-        observation = Observation(
+        observation = ObservedFrame(
             seen.time - last.time,
             seen.displacement,
             seen.force,

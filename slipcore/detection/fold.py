@@ -12,12 +12,12 @@ from slipcore.detection.filter.state import PROBABILITY
 from slipcore.detection.filter.step import decide
 from slipcore.detection.filter.tuning import LEAST_TRANSITION, THRESHOLD
 from slipcore.detection.shared.decision import apply_decision
-from slipcore.detection.shared.records import FrameArrays, Memory, Sensor, Workspace
+from slipcore.detection.shared.records import DetectorSetup, FrameArrays, Memory, Workspace
 from slipcore.detection.strain_rate.run import run_strain_rate
 from slipcore.frames import BoolArray, FloatArray
 
 
-class Recording(NamedTuple):
+class LogArrays(NamedTuple):
     """The frames of a log, [t, ...]; each frame of a field that it does not have is empty."""
 
     time: FloatArray
@@ -50,8 +50,8 @@ class Rings(NamedTuple):
 @compiled
 def fold(
     is_filter: bool,
-    sensor: Sensor,
-    log: Recording,
+    sensor: DetectorSetup,
+    log: LogArrays,
     rings: Rings,
     lookahead: int,
     room: Workspace,
@@ -90,7 +90,7 @@ def _ring(size: int, first: FloatArray) -> FloatArray:
 
 
 @compiled
-def frame_at(log: Recording, k: int) -> FrameArrays:
+def frame_at(log: LogArrays, k: int) -> FrameArrays:
     """One frame of a log."""
     return FrameArrays(
         log.time[k], log.displacement[k], log.force[k], log.object_pose[k], log.normal[k], log.contact[k]
@@ -107,7 +107,7 @@ def memory_at(results: FrameResults, rings: Rings, k: int) -> Memory:
 
 @compiled
 def revise(
-    sensor: Sensor, log: Recording, rings: Rings, k: int, last: int, room: Workspace, results: FrameResults
+    sensor: DetectorSetup, log: LogArrays, rings: Rings, k: int, last: int, room: Workspace, results: FrameResults
 ) -> None:
     """Decide frame ``k`` again, in the light of what the filter remembers up to frame ``last``."""
     elements, posterior = rings.elements, room.decision.probability

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slipcore.detection.detector import DetectorState, step
-from slipcore.detection.fold import FrameResults, Recording, fold, rings_from
+from slipcore.detection.fold import FrameResults, LogArrays, fold, rings_from
 from slipcore.detection.methods import findings_by
 from slipcore.detection.shared.records import NO_FIELD, NO_MASK, NO_POSE, workspace
 from slipcore.detection.sharpening import sharpened
@@ -40,8 +40,8 @@ def _empty_results(log: GraspLog) -> FrameResults:
     return FrameResults(np.empty(shape, bool), np.empty(shape, bool), np.empty(shape), np.empty((*shape, 2)), *counts)
 
 
-def _recording(log: GraspLog, displacement: FloatArray, force: FloatArray | None) -> Recording:
-    return Recording(
+def _recording(log: GraspLog, displacement: FloatArray, force: FloatArray | None) -> LogArrays:
+    return LogArrays(
         log.time,
         _frames(displacement, NO_FIELD, log),
         _frames(force, NO_FIELD, log),

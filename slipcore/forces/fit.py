@@ -14,7 +14,7 @@ from slipcore.frames import BoolArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True)
-class Prior:
+class TractionPrior:
     """Its shape, and its ``strength``: the standard deviation of pressure, in Young's moduli."""
 
     smoothness: Smoothness
@@ -22,7 +22,7 @@ class Prior:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Observation:
+class ObservationModel:
     """How a frame's data come from traction in Young's moduli: ``response`` [m, 3, k], and ``noise`` [m] of each."""
 
     response: FloatArray
@@ -42,7 +42,7 @@ class Observation:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fit:
+class TractionFit:
     """Posterior of the tractions (q_x, q_y, p) at the ``support`` [j] nodes, for any data of one observation.
 
     ``operator`` [3 j, m] gives its mean from data; ``root`` [3 j, 3 j] times its transpose is its covariance;
@@ -85,7 +85,7 @@ class Fit:
         before = np.linalg.norm(whole @ self.prior_root, axis=(-2, -1))
         return np.asarray(1.0 - (self.deviation(whole)[:, 0] / before) ** 2)
 
-    def kernel_width(self, observation: Observation, pitch: float) -> float:
+    def kernel_width(self, observation: ObservationModel, pitch: float) -> float:
         """Side (m) of the square over which tractions are in effect averaged: the median over nodes, of the worse of
         tangential and normal direction.
         """
@@ -101,7 +101,7 @@ class Fit:
         return pitch * max(1.0, *widths)
 
 
-def fit(observation: Observation, nodes: Nodes, support: BoolArray, prior: Prior) -> Fit:
+def fit(observation: ObservationModel, nodes: Nodes, support: BoolArray, prior: TractionPrior) -> TractionFit:
     """The posterior on a ``support`` [k] under a known prior."""
     q, r = observation.on(support)
     root = prior.strength * factors(nodes.places()[support], nodes.grid.pitch[0], prior.smoothness)
@@ -111,10 +111,12 @@ def fit(observation: Observation, nodes: Nodes, support: BoolArray, prior: Prior
     whitened = solve_root(np.asarray(outer, dtype=np.float64), np.column_stack((np.eye(3 * j), inner[: len(r)].T)))
     whitened = np.concatenate([part @ rows for part, rows in zip(root, np.split(whitened, 3), strict=True)])
     operator = whitened[:, 3 * j :] @ q.T / observation.noise
-    return Fit(support, operator, whitened[:, : 3 * j], root)
+    return TractionFit(support, operator, whitened[:, : 3 * j], root)
 
 
-def log_evidence(observation: Observation, data: FloatArray, nodes: Nodes, support: BoolArray, prior: Prior) -> float:
+def log_evidence(
+    observation: ObservationModel, data: FloatArray, nodes: Nodes, support: BoolArray, prior: TractionPrior
+) -> float:
     """Log probability of data [m] if traction acts on a ``support`` [k], without what no support changes."""
     q, r = observation.on(support)
     root = prior.strength * factors(nodes.places()[support], nodes.grid.pitch[0], prior.smoothness)
@@ -125,14 +127,14 @@ def log_evidence(observation: Observation, data: FloatArray, nodes: Nodes, suppo
 
 
 def choose_prior(
-    observation: Observation,
+    observation: ObservationModel,
     data: FloatArray,
     nodes: Nodes,
     support: BoolArray,
     criterion: Criterion = "evidence",
     first: Smoothness | None = None,
     strength_alone: bool = False,
-) -> Prior:
+) -> TractionPrior:
     """The prior that data [m] speak for: its shape by evidence, property by property; its strength by a criterion.
 
     ``first``: the shape to begin with (None: the usual one); with ``strength_alone`` the one that is kept.
@@ -150,14 +152,14 @@ def choose_prior(
 
     best = usual() if first is None else first
     if strength_alone:
-        return Prior(best, evaluate(best, criterion)[1])
+        return TractionPrior(best, evaluate(best, criterion)[1])
     evidence = evaluate(best, "evidence")[0]
     for name, values in choices().items():
         for value in values:
             other = best._replace(**{name: value})
             if other != best and (found := evaluate(other, "evidence")[0]) > evidence:
                 best, evidence = other, found
-    return Prior(best, evaluate(best, criterion)[1])
+    return TractionPrior(best, evaluate(best, criterion)[1])
 
 
 def _times(r: FloatArray, root: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from slipcore.forces.defaults import RECONSTRUCTION
-from slipcore.forces.sensor import Sensor
+from slipcore.forces.sensor import SensorResponse
 from slipcore.forces.tracking import Key
 from slipcore.frames import BoolArray, FloatArray
 
@@ -40,7 +40,7 @@ class Reader:
     ``deviation`` [3, e] N of elements' forces, and ``total`` [3] N of the resultant.
     """
 
-    sensor: Sensor
+    sensor: SensorResponse
     key: Key
     response: FloatArray
     elements: FloatArray
@@ -48,7 +48,7 @@ class Reader:
     total: FloatArray
 
     @classmethod
-    def of(cls, sensor: Sensor, key: Key) -> "Reader":
+    def of(cls, sensor: SensorResponse, key: Key) -> "Reader":
         """Of a sensor whose contact was sought."""
         support, observation = key.fit.support, key.observation
         response = observation.response[:, :, support].reshape(len(observation.noise), -1)

@@ -16,9 +16,17 @@ from slipcore.errors import InvalidInput
 from slipcore.forces.bounded_gaussian import BoundedGaussian, through
 from slipcore.forces.defaults import GEL, GEL_CALIBRATION
 from slipcore.forces.gel import Gel
-from slipcore.forces.gel_likelihood import Elasticity, EvaluatedGel, Press, Presses, Seek, evaluate_gel, first_contacts
+from slipcore.forces.gel_likelihood import (
+    Elasticity,
+    EvaluatedGel,
+    PressData,
+    Presses,
+    Seek,
+    evaluate_gel,
+    first_contacts,
+)
 from slipcore.forces.nodes import Nodes
-from slipcore.forces.recording import Recording, error
+from slipcore.forces.recording import DisplacementData, error
 from slipcore.frames import FloatArray, GraspLog
 
 GIVEN, PRIORS = "given", "the prior's: the presses hardly tell it"
@@ -92,7 +100,7 @@ def calibrate_gel(
     given = _checked(young_modulus, poisson_ratio, thickness, marker_depth)
     forces = _forces(logs, known_force, young_modulus)
     presses = _presses(logs, forces, marker_depth, noise)
-    search = _Search.begun(presses, young_modulus, given)
+    search = _GelSearch.begun(presses, young_modulus, given)
     search.climb()
     search.look_around()
     return _calibration(search)
@@ -127,7 +135,7 @@ def _presses(logs: Sequence[GraspLog], forces: list[float], marker_depth: float,
         if not np.array_equal(log.position, first.position) or log.element_area != first.element_area:
             raise InvalidInput("logs", "of several lattices", "one sensor at a time")
     position, nodes = _lattice(first)
-    recordings = [Recording.of(log, noise) for log in logs]
+    recordings = [DisplacementData.of(log, noise) for log in logs]
     axes = min((recording.axes for recording in recordings), key=len)
     each = tuple(_held(*pair, len(axes) * len(position)) for pair in zip(recordings, forces, strict=True))
     return Presses(position, marker_depth, axes, nodes, each)
@@ -143,7 +151,7 @@ def _lattice(log: GraspLog) -> tuple[FloatArray, Nodes]:
     return position, nodes
 
 
-def _held(recording: Recording, force: float, used: int) -> Press:
+def _held(recording: DisplacementData, force: float, used: int) -> PressData:
     """The mean over the frames that are like the one in which markers moved most, of the first ``used`` data."""
     touched, strongest = recording.touched(), recording.strongest()
     if not touched.any():
@@ -155,11 +163,11 @@ def _held(recording: Recording, force: float, used: int) -> Press:
     frames = touched & (change <= allowed) & (seen == seen[strongest]).all(axis=1)
     mean = data[frames].mean(axis=0)
     spread = error(mean, seen[strongest], recording.noise / math.sqrt(frames.sum()))
-    return Press(mean, spread, force)
+    return PressData(mean, spread, force)
 
 
 @dataclass(slots=True, eq=False)
-class _Search:
+class _GelSearch:
     """Gels on which presses were ``tried``; ``given`` is what is not sought, NaN what is."""
 
     presses: Presses
@@ -168,7 +176,7 @@ class _Search:
     tried: list[EvaluatedGel]
 
     @classmethod
-    def begun(cls, presses: Presses, young_modulus: float | None, given: Elasticity) -> "_Search":
+    def begun(cls, presses: Presses, young_modulus: float | None, given: Elasticity) -> "_GelSearch":
         """With thicknesses that are far apart."""
         pitch = presses.nodes.grid.pitch[0]
         usual = Elasticity(GEL_CALIBRATION.first_ratio, 1.0 / (GEL_CALIBRATION.first_thickness * pitch))
@@ -279,7 +287,7 @@ def _thinnest(presses: Presses) -> float:
     return presses.marker_depth + GEL_CALIBRATION.thinnest * presses.nodes.grid.pitch[0]
 
 
-def _calibration(search: _Search) -> GelCalibration:
+def _calibration(search: _GelSearch) -> GelCalibration:
     """What was found, with what the misfit and the model add to the intervals."""
     found, properties = _found(search), (_young_modulus, _poisson_ratio, _thickness)
     estimates = tuple(made(search, found) for made in properties)
@@ -303,7 +311,7 @@ class _Found:
     posterior: BoundedGaussian | None
 
 
-def _found(search: _Search) -> _Found:
+def _found(search: _GelSearch) -> _Found:
     """The posterior from all gels that are nearly as probable as the best one; a misfit widens it."""
     best = search.best
     values, covariance = np.array([best.modulus.logarithm, *best.elasticity]), np.zeros((3, 3))
@@ -325,7 +333,7 @@ def _found(search: _Search) -> _Found:
     return _Found(values, covariance, posterior)
 
 
-def _young_modulus(search: _Search, found: _Found) -> GelEstimate:
+def _young_modulus(search: _GelSearch, found: _Found) -> GelEstimate:
     value = math.exp(found.values[0])
     if search.young_modulus is not None:
         return _given("young_modulus", "Pa", value)
@@ -336,7 +344,7 @@ def _young_modulus(search: _Search, found: _Found) -> GelEstimate:
     return GelEstimate("young_modulus", "Pa", value, value * math.exp(-away), value * math.exp(away), 1.0)
 
 
-def _poisson_ratio(search: _Search, found: _Found) -> GelEstimate:
+def _poisson_ratio(search: _GelSearch, found: _Found) -> GelEstimate:
     value = float(found.values[1])
     if 0 not in search.free:
         return _given("poisson_ratio", "-", value)
@@ -347,7 +355,7 @@ def _poisson_ratio(search: _Search, found: _Found) -> GelEstimate:
     return GelEstimate("poisson_ratio", "-", value, low, high, information, _of_the_prior(information))
 
 
-def _thickness(search: _Search, found: _Found) -> GelEstimate:
+def _thickness(search: _GelSearch, found: _Found) -> GelEstimate:
     value = 1.0 / float(found.values[2]) if found.values[2] > 0.0 else math.inf
     if 1 not in search.free:
         return _given("thickness", "m", value)
@@ -359,21 +367,21 @@ def _thickness(search: _Search, found: _Found) -> GelEstimate:
     return GelEstimate("thickness", "m", value, 1.0 / high, 1.0 / low if low > 0.0 else math.inf, information, note)
 
 
-def _may_be_a_half_space(search: _Search, found: _Found) -> bool:
+def _may_be_a_half_space(search: _GelSearch, found: _Found) -> bool:
     if 1 not in search.free:
         return search.given.closeness == 0.0
     assert found.posterior is not None
     return found.posterior.density(search.free.index(1), 0.0) > GEL_CALIBRATION.half_space
 
 
-def _confounded(search: _Search, found: _Found) -> bool:
+def _confounded(search: _GelSearch, found: _Found) -> bool:
     """Whether Young's modulus and Poisson's ratio show only together: in the plane a half-space moves in proportion to
     (1 + ν)(1 − 2ν)/E, and what tells them apart is the prior of shear.
     """
     return 0 in search.free and len(search.presses.axes) == 2 and _may_be_a_half_space(search, found)
 
 
-def _interval(search: _Search, found: _Found, axis: int, own: float) -> tuple[tuple[float, float], float]:
+def _interval(search: _GelSearch, found: _Found, axis: int, own: float) -> tuple[tuple[float, float], float]:
     """Of 95 % with the model's ``own`` error, and the share of information that is not the prior's."""
     posterior = found.posterior
     assert posterior is not None

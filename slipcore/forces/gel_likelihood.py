@@ -12,7 +12,7 @@ import numpy as np
 
 from slipcore.contact.elasticity.grid import bounding_box
 from slipcore.forces.defaults import GEL, GEL_CALIBRATION, RECONSTRUCTION
-from slipcore.forces.fit import Observation, Prior, choose_prior, fit, log_evidence
+from slipcore.forces.fit import ObservationModel, TractionPrior, choose_prior, fit, log_evidence
 from slipcore.forces.gel import Gel
 from slipcore.forces.nodes import Nodes
 from slipcore.forces.response import response_matrix
@@ -38,7 +38,7 @@ class Elasticity(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Press:
+class PressData:
     """Displacements ``data`` [m] m of one press with their standard deviation ``error`` [m], and its normal ``force``
     N, NaN where it is not known.
     """
@@ -58,21 +58,21 @@ class Presses:
     marker_depth: float
     axes: tuple[int, ...]
     nodes: Nodes
-    each: tuple[Press, ...]
+    each: tuple[PressData, ...]
 
-    def observations(self, elasticity: Elasticity) -> list[Observation]:
+    def observations(self, elasticity: Elasticity) -> list[ObservationModel]:
         """How each press's displacement comes from tractions in Young's moduli."""
         unit = GEL.young_modulus[0]  # of any modulus: the response is in proportion to one over it
         whole = response_matrix(elasticity.gel(unit, self.marker_depth), self.nodes, self.position)
         seen = unit * whole[list(self.axes)].reshape(-1, 3, len(self.nodes))
-        return [Observation(seen, press.error) for press in self.each]
+        return [ObservationModel(seen, press.error) for press in self.each]
 
 
-class Contact(NamedTuple):
+class PressContact(NamedTuple):
     """Where a press touches, [ny, nx], and the prior of its tractions."""
 
     support: BoolArray
-    prior: Prior
+    prior: TractionPrior
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,13 +94,13 @@ class EvaluatedGel:
 
     elasticity: Elasticity
     log_probability: float
-    contacts: tuple[Contact, ...]
+    contacts: tuple[PressContact, ...]
     modulus: Modulus
     resultant: FloatArray
     misfit: float
 
 
-def first_contacts(presses: Presses, elasticity: Elasticity) -> tuple[Presses, tuple[Contact, ...]]:
+def first_contacts(presses: Presses, elasticity: Elasticity) -> tuple[Presses, tuple[PressContact, ...]]:
     """Where presses touch a gel of about this elasticity, and the presses with nodes about there alone."""
     found = _pressed(presses) if len(presses.axes) == 3 else _within(presses)
     box = bounding_box(widened(np.any(found, axis=0), GEL_CALIBRATION.margin))
@@ -108,7 +108,7 @@ def first_contacts(presses: Presses, elasticity: Elasticity) -> tuple[Presses, t
     contacts = []
     for press, support, observation in zip(presses.each, found, near.observations(elasticity), strict=True):
         prior = choose_prior(observation, press.data, near.nodes, support[box].ravel())
-        contacts.append(Contact(support[box], prior))
+        contacts.append(PressContact(support[box], prior))
     return near, tuple(contacts)
 
 
@@ -136,7 +136,7 @@ def _within(presses: Presses) -> list[BoolArray]:
 def evaluate_gel(
     presses: Presses,
     elasticity: Elasticity,
-    contacts: Sequence[Contact],
+    contacts: Sequence[PressContact],
     young_modulus: float | None,
     seek: Seek = "nothing",
 ) -> EvaluatedGel:
@@ -156,7 +156,9 @@ def evaluate_gel(
     return EvaluatedGel(elasticity, probability, tuple(found), modulus, np.array(yields)[:, 0], float(np.mean(misfits)))
 
 
-def _better(observation: Observation, data: FloatArray, nodes: Nodes, contact: Contact, seek: Seek) -> Contact:
+def _better(
+    observation: ObservationModel, data: FloatArray, nodes: Nodes, contact: PressContact, seek: Seek
+) -> PressContact:
     """A contact that explains a press better."""
     support, prior = contact
     for _ in range(1 if seek == "support" else GEL_CALIBRATION.alternations):
@@ -165,18 +167,18 @@ def _better(observation: Observation, data: FloatArray, nodes: Nodes, contact: C
         before, support = support, better_support(observation, data, nodes, support, prior)
         if (before == support).all():
             break
-    return Contact(support, prior)
+    return PressContact(support, prior)
 
 
-def _as_strong(observation: Observation, data: FloatArray, nodes: Nodes, contact: Contact) -> Contact:
+def _as_strong(observation: ObservationModel, data: FloatArray, nodes: Nodes, contact: PressContact) -> PressContact:
     """With tractions as strong as the press is under this gel: how strong is no reason to prefer one."""
     smoothness, support = contact.prior.smoothness, contact.support.ravel()
     prior = choose_prior(observation, data, nodes, support, first=smoothness, strength_alone=True)
-    return Contact(contact.support, prior)
+    return PressContact(contact.support, prior)
 
 
 def _resultant(
-    observation: Observation, data: FloatArray, nodes: Nodes, contact: Contact
+    observation: ObservationModel, data: FloatArray, nodes: Nodes, contact: PressContact
 ) -> tuple[float, float, float]:
     """Normal resultant (N, by a modulus of 1 Pa), its standard deviation, and the mean square misfit."""
     support = contact.support.ravel()

@@ -7,19 +7,19 @@ from functools import partial
 import numpy as np
 
 from slipcore.forces.defaults import FORCE_STREAM
-from slipcore.forces.fit import Observation
+from slipcore.forces.fit import ObservationModel
 from slipcore.forces.frame_forces import Reader
 from slipcore.forces.known import KnownForce
 from slipcore.forces.nodes import Nodes
 from slipcore.forces.recording import error
-from slipcore.forces.sensor import Sensor
+from slipcore.forces.sensor import SensorResponse
 from slipcore.forces.tracking import Tracker, lattice_of
 from slipcore.forces.whole_lattice import WholeLattice
 from slipcore.frames import BoolArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MarkerFrame:
+class MarkerReading:
     """What markers show at one ``time`` s: ``moved`` [m] m, which of them were ``seen`` [m], and their ``noise`` m; and
     what is ``known`` of the resultant. ``data`` [m + 3] are both, with the last ones of what is not there.
     """
@@ -50,12 +50,12 @@ class Prepared:
     typical: float
 
     @classmethod
-    def of(cls, sensor: Sensor, noise: float, typical: float) -> "Prepared":
+    def of(cls, sensor: SensorResponse, noise: float, typical: float) -> "Prepared":
         """For displacements that are as large as this, or as is expected."""
         typical = max(typical, FORCE_STREAM.typical * noise)
         return cls(lattice_of(sensor, noise, typical), noise, typical)
 
-    def fits(self, frame: MarkerFrame) -> bool:
+    def fits(self, frame: MarkerReading) -> bool:
         """Whether it still does for a frame."""
         change = max(frame.noise / self.noise, self.noise / frame.noise)
         return change <= FORCE_STREAM.noise_change and frame.size <= FORCE_STREAM.lattice_growth * self.typical
@@ -67,7 +67,7 @@ class ContactTracking:
     ``time`` s, and the ``size`` m of displacements by which the ``tracker`` began.
     """
 
-    sensor: Sensor
+    sensor: SensorResponse
     prepared: Prepared | None = None
     tracker: Tracker | None = None
     reader: Reader | None = None
@@ -83,7 +83,7 @@ class ContactTracking:
         """Of the sensor alone."""
         return ContactTracking(self.sensor, self.prepared)
 
-    def next_look(self, frame: MarkerFrame, touched: bool) -> "Callable[[], ContactTracking] | None":
+    def next_look(self, frame: MarkerReading, touched: bool) -> "Callable[[], ContactTracking] | None":
         """What is to be found out next, if anything; it takes its time, and changes nothing that is there."""
         if self.sensor.sees_depth and (self.prepared is None or not self.prepared.fits(frame)):
             return partial(self._prepare, frame)
@@ -95,25 +95,25 @@ class ContactTracking:
             return partial(self._begin, frame)
         return None if self.holds(frame) else partial(self._follow, self.tracker, frame)
 
-    def holds(self, frame: MarkerFrame) -> bool:
+    def holds(self, frame: MarkerReading) -> bool:
         """Whether the contact is that of a frame in which something touches, too."""
         return self.tracker is not None and self.tracker.key.holds(self._observation(frame), frame.data)
 
-    def _observation(self, frame: MarkerFrame) -> Observation:
+    def _observation(self, frame: MarkerReading) -> ObservationModel:
         return self.sensor.observation(error(frame.moved, frame.seen, frame.noise), frame.known)
 
-    def _prepare(self, frame: MarkerFrame) -> "ContactTracking":
+    def _prepare(self, frame: MarkerReading) -> "ContactTracking":
         return replace(self, prepared=Prepared.of(self.sensor, frame.noise, frame.size))
 
-    def _begin(self, frame: MarkerFrame) -> "ContactTracking":
+    def _begin(self, frame: MarkerReading) -> "ContactTracking":
         lattice = None if self.prepared is None else self.prepared.lattice
         tracker = Tracker.of(self.sensor, self._observation(frame), frame.data, "evidence", lattice)
         return replace(self._by(tracker, frame), size=frame.size)
 
-    def _follow(self, tracker: Tracker, frame: MarkerFrame) -> "ContactTracking":
+    def _follow(self, tracker: Tracker, frame: MarkerReading) -> "ContactTracking":
         return self._by(tracker.at(self._observation(frame), frame.data), frame)
 
-    def _by(self, tracker: Tracker, frame: MarkerFrame) -> "ContactTracking":
+    def _by(self, tracker: Tracker, frame: MarkerReading) -> "ContactTracking":
         return replace(self, tracker=tracker, reader=Reader.of(self.sensor, tracker.key), time=frame.time)
 
 

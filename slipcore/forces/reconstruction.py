@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from slipcore.errors import InvalidInput
-from slipcore.forces.fit import Observation
+from slipcore.forces.fit import ObservationModel
 from slipcore.forces.frame_forces import FrameForces, Reader
 from slipcore.forces.gel import Gel
 from slipcore.forces.known import KnownForce, contradicts, reported
-from slipcore.forces.recording import Recording, error
-from slipcore.forces.sensor import Sensor
+from slipcore.forces.recording import DisplacementData, error
+from slipcore.forces.sensor import SensorResponse
 from slipcore.forces.strength import Criterion
 from slipcore.forces.tracking import Tracker
 from slipcore.frames import BoolArray, FloatArray, GraspLog
@@ -81,8 +81,8 @@ def reconstruct(
     as seen in the plane only.
     Raises ``UnknownScale`` for a log not in metres and ``InvalidInput`` for what does not fit.
     """
-    shown = Recording.of(log, noise)
-    sensor = Sensor.of(log.position, log.element_area, gel, shown.axes)
+    shown = DisplacementData.of(log, noise)
+    sensor = SensorResponse.of(log.position, log.element_area, gel, shown.axes)
     name = "total_force"
     if total_force is None and total_force_deviation is None and log.gripper_force is not None:
         name, total_force = "gripper_force", reported(log.gripper_force)
@@ -117,11 +117,11 @@ def reconstruct(
 class _Recording:
     """What was ``shown`` to a ``sensor``, and resultants that are ``known``."""
 
-    sensor: Sensor
-    shown: Recording
+    sensor: SensorResponse
+    shown: DisplacementData
     known: KnownForce
 
-    def frame(self, t: int) -> tuple[Observation, FloatArray]:
+    def frame(self, t: int) -> tuple[ObservationModel, FloatArray]:
         """What one frame tells: displacements, then its resultant."""
         data = self.shown.data[t]
         spread = error(data, self.shown.seen[t], self.shown.noise)

@@ -10,7 +10,7 @@ from slipcore.frames import BoolArray, FloatArray, GraspLog
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Recording:
+class DisplacementData:
     """Displacements ``data`` [t, m] m along the ``axes`` that are seen, one after the other, z into the gel; which are
     ``seen`` [t, m]; and the ``noise`` m of each.
     """
@@ -21,7 +21,7 @@ class Recording:
     noise: float
 
     @classmethod
-    def of(cls, log: GraspLog, noise: float | None) -> "Recording":
+    def of(cls, log: GraspLog, noise: float | None) -> "DisplacementData":
         """Of a log; ``noise`` None is estimated from it. Raises ``UnknownScale`` for one not in metres and
         ``InvalidInput`` for a noise that is none.
         """

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slipcore.forces.fit import Observation
+from slipcore.forces.fit import ObservationModel
 from slipcore.forces.gel import Gel
 from slipcore.forces.known import KnownForce
 from slipcore.forces.nodes import Nodes
@@ -13,7 +13,7 @@ from slipcore.frames import FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sensor:
+class SensorResponse:
     """For tractions in Young's moduli: ``observed`` [m + 3, 3, k], what markers move by along the ``axes`` that are
     seen, m, and the resultant, N; ``elements`` [e, k] N of theirs by tractions at nodes, and ``load`` N, the force by a
     traction of 1 at one node.
@@ -26,7 +26,7 @@ class Sensor:
     axes: tuple[int, ...]
 
     @classmethod
-    def of(cls, position: FloatArray, element_area: float, gel: Gel, axes: tuple[int, ...]) -> "Sensor":
+    def of(cls, position: FloatArray, element_area: float, gel: Gel, axes: tuple[int, ...]) -> "SensorResponse":
         """With markers at ``position`` [n, m, 3] m."""
         place = position[..., :2].reshape(-1, 2)
         nodes, young, markers = Nodes.around(place, element_area), gel.young_modulus, len(axes) * len(place)
@@ -47,9 +47,9 @@ class Sensor:
         """Whether its markers also tell how deep they are pressed."""
         return len(self.axes) == 3
 
-    def observation(self, spread: FloatArray, known: KnownForce) -> Observation:
+    def observation(self, spread: FloatArray, known: KnownForce) -> ObservationModel:
         """Of a frame whose displacements have the standard deviations ``spread`` [m] m, and what is known of it."""
-        return Observation(self.observed, np.concatenate((spread, known.noise)))
+        return ObservationModel(self.observed, np.concatenate((spread, known.noise)))
 
     @staticmethod
     def data(displacement: FloatArray, known: KnownForce) -> FloatArray:

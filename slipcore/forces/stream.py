@@ -13,10 +13,10 @@ from slipcore.forces.defaults import FORCE_STREAM
 from slipcore.forces.frame_forces import FrameForces
 from slipcore.forces.gel import Gel
 from slipcore.forces.known import KnownForce, contradicts, reported
-from slipcore.forces.look import ContactTracking, MarkerFrame, bytes_needed
+from slipcore.forces.look import ContactTracking, MarkerReading, bytes_needed
 from slipcore.forces.nodes import Nodes
 from slipcore.forces.recording import axes_seen, check_noise, moved, noise_of, rows
-from slipcore.forces.sensor import Sensor
+from slipcore.forces.sensor import SensorResponse
 from slipcore.frames import BoolArray, FloatArray, check_displacement, check_gripper_report, check_mask
 
 
@@ -148,7 +148,7 @@ class ForceStream:
         known.check("gripper_force", self._gel, self._area * self._position[..., 0].size)
         return known[0]
 
-    def _compare(self, frame: MarkerFrame, found: FrameForces) -> float:
+    def _compare(self, frame: MarkerReading, found: FrameForces) -> float:
         """The contradiction of a frame, which is counted."""
         if not frame.known.given.any() or self._tracking is None or not self._tracking.holds(frame):
             return float("nan")
@@ -173,23 +173,23 @@ class ForceStream:
 
     def _marker_frame(
         self, time: float, displacement: FloatArray, observed: BoolArray | None, known: KnownForce
-    ) -> MarkerFrame:
+    ) -> MarkerReading:
         """The frame, and whether something touches in it; noise is that of the frames just before a touch.
 
         A marker that is not seen stays where it was, until a contact is sought without it; so does a gripper's force.
         """
         (data,), (seen,) = rows(displacement[None], None if observed is None else observed[None], self._axes)
         there = np.concatenate((seen, known.given))
-        self._data = np.where(there, Sensor.data(data, known), self._data if self._data.size else 0.0)
+        self._data = np.where(there, SensorResponse.data(data, known), self._data if self._data.size else 0.0)
         data, before = self._data[: len(seen)], self._touched
         self._touched = bool(moved(data, seen, self._noise or 0.0))
         if self._touched and not before:
             self._noise = self._noise_now()
             self._touched = bool(moved(data, seen, self._noise))
             self._touches += self._touched
-        return MarkerFrame(time, self._data, seen, max(self._noise or 0.0, FORCE_STREAM.least_noise), known)
+        return MarkerReading(time, self._data, seen, max(self._noise or 0.0, FORCE_STREAM.least_noise), known)
 
-    def _seek(self, tracking: ContactTracking, frame: MarkerFrame) -> None:
+    def _seek(self, tracking: ContactTracking, frame: MarkerReading) -> None:
         """Let the contact be sought, if it is time to; forget it once nothing touches."""
         if not self._touched:
             self._tracking = tracking = tracking.untouched()
@@ -201,7 +201,7 @@ class ForceStream:
             self._begin_to(look)
 
     def _set_up(self) -> ContactTracking:
-        return ContactTracking(Sensor.of(self._position, self._area, self._gel, self._axes))
+        return ContactTracking(SensorResponse.of(self._position, self._area, self._gel, self._axes))
 
     def _begin_to(self, look: Callable[[], ContactTracking]) -> None:
         """Look beside the frames, or at once."""

@@ -15,7 +15,7 @@ from scipy.ndimage import binary_closing, binary_dilation, binary_erosion, convo
 
 from slipcore.forces.covariance import covariance_root, solve_root
 from slipcore.forces.defaults import STRENGTH, SUPPORT
-from slipcore.forces.fit import Observation, Prior, log_evidence
+from slipcore.forces.fit import ObservationModel, TractionPrior, log_evidence
 from slipcore.forces.nodes import Nodes
 from slipcore.frames import BoolArray, FloatArray
 
@@ -23,7 +23,7 @@ STEPS: tuple[Callable[[BoolArray], BoolArray], ...] = (binary_dilation, binary_e
 """How a contact may change: by one row of nodes at its rim, or over a gap."""
 
 
-def relevant_nodes(observation: Observation, data: FloatArray, candidates: BoolArray) -> BoolArray:
+def relevant_nodes(observation: ObservationModel, data: FloatArray, candidates: BoolArray) -> BoolArray:
     """Nodes [ny, nx] among ``candidates`` that displacement ``data`` [m] m needs."""
     chosen = np.flatnonzero(candidates)
     scale = np.array([SUPPORT.shear, SUPPORT.shear, 1.0])[:, None]
@@ -47,7 +47,7 @@ def relevant_nodes(observation: Observation, data: FloatArray, candidates: BoolA
 
 
 def better_support(
-    observation: Observation, data: FloatArray, nodes: Nodes, support: BoolArray, prior: Prior
+    observation: ObservationModel, data: FloatArray, nodes: Nodes, support: BoolArray, prior: TractionPrior
 ) -> BoolArray:
     """The support [ny, nx] that explains data [m] best among those that grow, shrink or close step by step from one."""
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from slipcore.forces.defaults import RECONSTRUCTION
-from slipcore.forces.fit import Fit, Observation, Prior, choose_prior, fit
-from slipcore.forces.sensor import Sensor
+from slipcore.forces.fit import ObservationModel, TractionFit, TractionPrior, choose_prior, fit
+from slipcore.forces.sensor import SensorResponse
 from slipcore.forces.strength import Criterion
 from slipcore.forces.support import better_support, relevant_nodes, widened
 from slipcore.forces.whole_lattice import WholeLattice, whole_lattice
@@ -17,11 +17,11 @@ from slipcore.frames import BoolArray, FloatArray
 class Key:
     """A frame at which the contact was sought, and the fit that holds until markers have moved on."""
 
-    observation: Observation
+    observation: ObservationModel
     data: FloatArray
-    fit: Fit
+    fit: TractionFit
 
-    def holds(self, observation: Observation, data: FloatArray) -> bool:
+    def holds(self, observation: ObservationModel, data: FloatArray) -> bool:
         """Whether a frame sees the same markers and differs by little more than the noise of both."""
         if len(data) != len(self.data) or ((observation.noise == np.inf) != (self.observation.noise == np.inf)).any():
             return False
@@ -34,17 +34,17 @@ class Key:
 class Tracker:
     """The contact followed from frame to frame; ``lattice`` where depth is seen."""
 
-    sensor: Sensor
+    sensor: SensorResponse
     criterion: Criterion
-    prior: Prior
+    prior: TractionPrior
     key: Key
     lattice: WholeLattice | None
 
     @classmethod
     def of(
         cls,
-        sensor: Sensor,
-        observation: Observation,
+        sensor: SensorResponse,
+        observation: ObservationModel,
         data: FloatArray,
         criterion: Criterion,
         lattice: WholeLattice | None = None,
@@ -63,7 +63,7 @@ class Tracker:
         begun = cls(sensor, criterion, prior, key, lattice)
         return begun if lattice is not None else begun._sought_in_the_plane(observation, data)
 
-    def at(self, observation: Observation, data: FloatArray) -> "Tracker":
+    def at(self, observation: ObservationModel, data: FloatArray) -> "Tracker":
         """Go on to another frame; the contact is sought again only where markers have moved on."""
         if self.key.holds(observation, data):
             return self
@@ -72,7 +72,7 @@ class Tracker:
         support = _pressed(self.lattice, data[: len(self.sensor.response)], self.sensor.nodes.grid.shape)
         return self._on(observation, data, support, self.prior)
 
-    def _sought_in_the_plane(self, observation: Observation, data: FloatArray) -> "Tracker":
+    def _sought_in_the_plane(self, observation: ObservationModel, data: FloatArray) -> "Tracker":
         """With a better contact for a frame, and before it the frame's own prior: one that allows for the shear of
         another frame lets shear stand for pressure, and the contact shrinks to where it would.
         """
@@ -81,14 +81,16 @@ class Tracker:
         support = better_support(observation, data, nodes, before.reshape(nodes.grid.shape), prior)
         return self._on(observation, data, support, prior)
 
-    def _on(self, observation: Observation, data: FloatArray, support: BoolArray, prior: Prior) -> "Tracker":
+    def _on(
+        self, observation: ObservationModel, data: FloatArray, support: BoolArray, prior: TractionPrior
+    ) -> "Tracker":
         found = fit(observation, self.sensor.nodes, support.ravel(), prior)
         return replace(self, prior=prior, key=Key(observation, data, found))
 
 
-def lattice_of(sensor: Sensor, noise: float, typical: float) -> WholeLattice:
+def lattice_of(sensor: SensorResponse, noise: float, typical: float) -> WholeLattice:
     """For markers with this ``noise`` m whose displacements have the root mean square ``typical`` m."""
-    everywhere = Observation(sensor.response, np.full(len(sensor.response), noise))
+    everywhere = ObservationModel(sensor.response, np.full(len(sensor.response), noise))
     return whole_lattice(everywhere, sensor.nodes, typical)
 
 

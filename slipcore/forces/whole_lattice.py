@@ -10,7 +10,7 @@ import numpy as np
 
 from slipcore.forces.covariance import covariance_root, solve_root
 from slipcore.forces.defaults import LATTICE
-from slipcore.forces.fit import Observation
+from slipcore.forces.fit import ObservationModel
 from slipcore.forces.nodes import Nodes
 from slipcore.forces.prior import factors, usual
 from slipcore.frames import FloatArray
@@ -24,7 +24,7 @@ class WholeLattice:
     deviation: FloatArray
 
 
-def whole_lattice(observation: Observation, nodes: Nodes, typical: float) -> WholeLattice:
+def whole_lattice(observation: ObservationModel, nodes: Nodes, typical: float) -> WholeLattice:
     """The operator for displacements of the root mean square ``typical`` m."""
     m = len(observation.noise)
     root = factors(nodes.places(), nodes.grid.pitch[0], usual())

@@ -12,7 +12,7 @@ from slipcore.patch.local_rates import local_rates
 from slipcore.patch.spans import IntArray, Spans, elements_at, for_kernels
 
 
-class Motion(NamedTuple):
+class PatchMotion(NamedTuple):
     """Of the object over the markers: ``velocity`` [k, 2] m/s at the patch's centre, and ``turning`` [k] m/s, its
     rotation times the patch's radius of gyration; ``travels`` and ``turns`` [k]: where they are more than their errors
     and than can be resolved; ``wanders`` [k]: where the patch itself travels on the lattice.
@@ -32,7 +32,7 @@ class Motion(NamedTuple):
 
 def motion_over_markers(
     log: GraspLog, spans: Spans, weight: FloatArray, pose: FloatArray, gyration: FloatArray, options: PatchOptions
-) -> Motion:
+) -> PatchMotion:
     """By the object's pose where the log has it; else by that of the patches on the lattice, [k, 3] m, m, rad.
 
     ``weight`` [t, n, m] of the elements, ``gyration`` [k] m of the patches. These go with their object unless it rolls.
@@ -54,12 +54,12 @@ def motion_over_markers(
     return of_object._replace(wanders=of_patch.travels)
 
 
-def _motion(rate: FloatArray, error: FloatArray, gyration: FloatArray, least: float) -> Motion:
+def _motion(rate: FloatArray, error: FloatArray, gyration: FloatArray, least: float) -> PatchMotion:
     velocity, turning = rate[:, :2], rate[:, 2] * gyration
     speed, spin = np.hypot(*velocity.T), np.abs(turning)
     travels = speed > np.maximum(least, PATCHES.significant * np.hypot(error[:, 0], error[:, 1]))
     turns = spin > np.maximum(least, PATCHES.significant * error[:, 2] * gyration)
-    return Motion(velocity, turning, travels, turns, travels)
+    return PatchMotion(velocity, turning, travels, turns, travels)
 
 
 def _marker_motion(log: GraspLog, spans: Spans, weight: FloatArray) -> tuple[FloatArray, FloatArray]:

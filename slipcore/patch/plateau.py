@@ -7,7 +7,7 @@ import numpy as np
 from slipcore.compilation import compiled
 from slipcore.defaults import PATCHES, PatchOptions
 from slipcore.frames import BoolArray, FloatArray
-from slipcore.patch.motion import Motion
+from slipcore.patch.motion import PatchMotion
 from slipcore.patch.spans import IntArray, for_kernels
 
 
@@ -34,7 +34,7 @@ class Flatness(NamedTuple):
 def find_plateaus(
     time: FloatArray,
     bounds: IntArray,
-    motion: Motion,
+    motion: PatchMotion,
     ratio: FloatArray,
     force: FloatArray,
     held: BoolArray,

@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 from slipcore.compilation import compiled
 from slipcore.defaults import PatchOptions
 from slipcore.frames import BoolArray
-from slipcore.patch.motion import Motion
+from slipcore.patch.motion import PatchMotion
 from slipcore.patch.plateau import SteadySliding
 from slipcore.patch.spans import IntArray, Spans, elements_at, for_kernels
 from slipcore.patch_record import MACRO_SLIP, REGIMES, Patch, frames_of, joined
 
 
 def regimes(
-    spans: Spans, slip: BoolArray, motion: Motion, steady: SteadySliding, options: PatchOptions
+    spans: Spans, slip: BoolArray, motion: PatchMotion, steady: SteadySliding, options: PatchOptions
 ) -> NDArray[np.str_]:
     """One of ``REGIMES`` for each frame of the patches, [k], of whose elements some ``slip`` [t, n, m].
 

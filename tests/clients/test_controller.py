@@ -23,7 +23,7 @@ from stiction_client import (
 )
 from stiction_client.controller import gains
 from stiction_client.controller.friction import KnownFriction, LearnedFriction, utilisation
-from stiction_client.controller.load import Load
+from stiction_client.controller.load import LoadEstimate
 from tests.clients.point_contact import FRAME, Episode, PointContact, ramp, run
 
 Make = Callable[..., FrictionModel]
@@ -163,7 +163,7 @@ def test_slip_disproves_samples_that_told_of_more_friction(make_model: Make) -> 
 @pytest.mark.parametrize("rate", [0.4, 0.8])
 def test_the_lead_follows_loads_that_grow_slowly(rate: float) -> None:
     """Slower than the noise of the load lets tell within two frames."""
-    load, generator = Load(), np.random.default_rng(0)
+    load, generator = LoadEstimate(), np.random.default_rng(0)
     leads = []
     for frame in range(180):
         size = 0.5 + rate * frame * FRAME

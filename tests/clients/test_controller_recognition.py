@@ -20,7 +20,7 @@ from stiction_client import (
     SlipSamples,
 )
 from stiction_client.controller import recognition
-from stiction_client.controller.recognition import Recognition
+from stiction_client.controller.recognition import GripRecognition
 from tests.clients.point_contact import FRAME, PointContact, ramp, run
 
 Make = Callable[..., FrictionModel]
@@ -90,7 +90,7 @@ def test_what_was_taken_for_another_is_held_and_not_guessed_again(
 
 def test_probabilities_are_bayes_s(materials: dict[str, FrictionModel]) -> None:
     """Of 300,000 grasps of the three and of strangers, those whose samples tell the same."""
-    among = Recognition.among(materials, SETTINGS)
+    among = GripRecognition.among(materials, SETTINGS)
     assert among is not None
     told = dataclasses.replace(among, mean=0.4, count=20, frames=5)
     generator = np.random.default_rng(0)
@@ -119,7 +119,7 @@ def test_a_material_named_unknown_is_refused_and_none_is_as_without(materials: d
 
 
 def test_samples_of_long_ago_are_forgotten(materials: dict[str, FrictionModel]) -> None:
-    among = Recognition.among(materials, SETTINGS)
+    among = GripRecognition.among(materials, SETTINGS)
     assert among is not None
     for second, friction in ((0.0, 0.3), (0.5, 0.4), (1.6, 0.7)):
         among = among.step(second, True, friction, 4, SETTINGS)

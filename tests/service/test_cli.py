@@ -612,7 +612,7 @@ def test_a_lerobot_data_set_is_uploaded_one_log_an_episode(
 ) -> None:
     monkeypatch.setattr(progress, "MOMENT", 0.01)
     logs = [formats.read(path) for path in ramps[:2]]
-    recordings = [exports.Recording(log, detect_slip(log), "ramp") for log in logs]
+    recordings = [exports.DetectedLog(log, detect_slip(log), "ramp") for log in logs]
     exports.write(recordings, tmp_path / "grasps", "lerobot")
     code, out, err = run(
         "upload", tmp_path / "grasps", "--material", "from lerobot", "--create", "--url", url, "--json"

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from stiction_client.controller.friction import KnownFriction, LearnedFriction, utilisation
-from stiction_client.controller.load import Load
-from stiction_client.controller.recognition import UNKNOWN, Recognition
+from stiction_client.controller.load import LoadEstimate
+from stiction_client.controller.recognition import UNKNOWN, GripRecognition
 from stiction_client.controller.records import Command, Mode, Observation, SlipSamples, check
 from stiction_client.controller.settings import ControlSettings
 from stiction_client.controller.stick_ratio import StickRatioEstimate
@@ -30,12 +30,12 @@ class ControllerState:
     normal_force: float
     time: float = -math.inf
     since: float = -math.inf
-    load: Load = field(default_factory=Load)
+    load: LoadEstimate = field(default_factory=LoadEstimate)
     sticking: StickRatioEstimate = field(default_factory=StickRatioEstimate)
     learned: LearnedFriction = field(default_factory=LearnedFriction)
     contradictions: int = 0
     rested: bool = False
-    recognition: Recognition | None = None
+    recognition: GripRecognition | None = None
     material: str | None = None
     probability: float = 0.0
 
@@ -61,7 +61,7 @@ def init(
         return ControllerState(
             settings, KnownFriction.of_model(model, settings), "hold", _floor(settings, rested=False)
         )
-    among = Recognition.among(materials or {}, settings)
+    among = GripRecognition.among(materials or {}, settings)
     return ControllerState(settings, None, "feel", _floor(settings, rested=False), recognition=among)
 
 
@@ -214,7 +214,7 @@ def _blind(state: ControllerState) -> bool:
     )
 
 
-def _loaded(load: Load, settings: ControlSettings) -> bool:
+def _loaded(load: LoadEstimate, settings: ControlSettings) -> bool:
     """Whether the load needs more than the least force, were friction low."""
     return load.size > settings.unknown_friction * settings.least_force
 

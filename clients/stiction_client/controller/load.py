@@ -9,7 +9,7 @@ from stiction_client.errors import InvalidArgument
 
 
 @dataclass(frozen=True, slots=True)
-class Load:
+class LoadEstimate:
     """``size`` N of tangential force and torque together, how fast it grows, and since when it is ``steady`` (s).
 
     ``rate`` N/s: told soon, and noisy; ``trend`` N/s: the same, told later and more exactly.
@@ -20,14 +20,14 @@ class Load:
     trend: float = 0.0
     steady: float = math.inf
 
-    def step(self, observation: Observation, elapsed: float, settings: ControlSettings) -> "Load":
+    def step(self, observation: Observation, elapsed: float, settings: ControlSettings) -> "LoadEstimate":
         """The load after a frame; over a gap its rate is not known, and taken as 0."""
         size = size_of(observation, settings)
         if not elapsed <= settings.dropout_time:
-            return Load(size, steady=observation.time)
+            return LoadEstimate(size, steady=observation.time)
         rate = _followed(self.rate, size - self.size, elapsed, settings.rate_time)
         trend = _followed(self.trend, size - self.size, elapsed, settings.trend_time)
-        moving = Load(size, rate, trend)
+        moving = LoadEstimate(size, rate, trend)
         changes = abs(moving.lead(settings) - size) > settings.steady_share * size or size == 0.0
         return replace(moving, steady=math.inf if changes else min(self.steady, observation.time))
 

@@ -19,7 +19,7 @@ UNKNOWN = "unknown"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Recognition:
+class GripRecognition:
     """``materials`` by name, as they are gripped, and their quantiles together (fields [materials]), of an element that
     bears ``unit``·F^(1/``power``) N, ``deviations`` below their means.
 
@@ -39,7 +39,7 @@ class Recognition:
     frames: int = 0
 
     @classmethod
-    def among(cls, models: Mapping[str, FrictionModel], settings: ControlSettings) -> "Recognition | None":
+    def among(cls, models: Mapping[str, FrictionModel], settings: ControlSettings) -> "GripRecognition | None":
         """Of these materials; None of none. Raises ``InvalidArgument`` for one that is called "unknown"."""
         if UNKNOWN in models:
             raise InvalidArgument("materials", sorted(models), f'names other than "{UNKNOWN}"')
@@ -54,7 +54,9 @@ class Recognition:
         """Whether samples may still come of a load that is borne with little force."""
         return time - self.loaded <= settings.recognise_time
 
-    def step(self, time: float, loaded: bool, friction: float, count: int, settings: ControlSettings) -> "Recognition":
+    def step(
+        self, time: float, loaded: bool, friction: float, count: int, settings: ControlSettings
+    ) -> "GripRecognition":
         """The same after a frame with the ``friction`` of so many elements, NaN without any.
 
         What was sampled more than ``recognise_time`` ago is forgotten by the next sample.

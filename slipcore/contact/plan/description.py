@@ -7,7 +7,7 @@ import numpy as np
 from slipcore.contact.defaults import RAMP, SCENE
 from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.plan.plan import Effect, Plan, ramp
-from slipcore.contact.solver.problem import HeightField, Problem
+from slipcore.contact.solver.problem import ContactProblem, HeightField
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray, FrictionLaw
 from slipcore.references import EFFECTS, cited
@@ -79,7 +79,7 @@ class SceneDescription:
         finger = self.finger
         body = HalfSpace.from_young(finger.young_modulus, finger.poisson_ratio)
         plan = Plan(
-            problem=Problem((body,), self.friction, heights=(finger.height(),)),
+            problem=ContactProblem((body,), self.friction, heights=(finger.height(),)),
             duration=self.duration,
             histories=(ramp("normal_force", self.press.force, 0.0, self.press.duration),),
             law=FrictionLaw((self.friction, 0.0, 0.0)),

@@ -5,7 +5,7 @@ from typing import ClassVar, Literal, Protocol, Self, get_args
 
 import numpy as np
 
-from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, StepLoad
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray, FrictionLaw, GraspLog
 
@@ -84,7 +84,7 @@ class Plan:
     for effects that depend on them; ``seed`` of random fields.
     """
 
-    problem: Problem
+    problem: ContactProblem
     duration: float
     histories: tuple[History, ...]
     law: FrictionLaw

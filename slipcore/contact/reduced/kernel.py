@@ -30,7 +30,7 @@ class Pad(NamedTuple):
     pressing: float
 
 
-class Patch(NamedTuple):
+class TouchingBristles(NamedTuple):
     """The bristles that touch: their numbers ``which`` [i]; ``near`` [3, i, i]: displacement of one by 1 N on another,
     as in ``Pad.influence``; ``moved`` [2, i] m: that by all forces, kept up as these change.
     """
@@ -82,7 +82,7 @@ def advance(
     frame.
     """
     fingers = normal.shape[0]
-    patches = [Patch(np.zeros(0, np.int64), np.zeros((3, 0, 0)), np.zeros((2, 0))) for _ in range(fingers)]
+    patches = [TouchingBristles(np.zeros(0, np.int64), np.zeros((3, 0, 0)), np.zeros((2, 0))) for _ in range(fingers)]
     for step in range(steps.number):
         resultant = np.zeros(3)
         motion[0] += steps.length * motion[1]
@@ -157,7 +157,7 @@ def leave(limit: FloatArray, force: FloatArray, offset: FloatArray, slips: BoolA
 
 
 @compiled
-def patch_of(pad: Pad, which: Places, force: FloatArray) -> Patch:
+def patch_of(pad: Pad, which: Places, force: FloatArray) -> TouchingBristles:
     """The bristles of these numbers as a patch, under the forces [k, 2] N on all."""
     near = np.empty((3, which.size, which.size))
     for i, k in enumerate(which):
@@ -168,13 +168,13 @@ def patch_of(pad: Pad, which: Places, force: FloatArray) -> Patch:
     moved = np.zeros((2, which.size))
     for i, k in enumerate(which):
         spread(near, i, force[k, 0], force[k, 1], moved)
-    return Patch(which, near, moved)
+    return TouchingBristles(which, near, moved)
 
 
 @compiled
 def settle(
     pad: Pad,
-    patch: Patch,
+    patch: TouchingBristles,
     limit: FloatArray,
     pose: FloatArray,
     force: FloatArray,
@@ -216,7 +216,7 @@ def settle(
 
 
 @compiled
-def put(pad: Pad, patch: Patch, pose: FloatArray, i: int, offset: FloatArray) -> None:
+def put(pad: Pad, patch: TouchingBristles, pose: FloatArray, i: int, offset: FloatArray) -> None:
     """Let the i-th bristle of a patch hold the object where it now is: by its ``offset`` [k, 2] m, in place."""
     k = patch.which[i]
     offset[k, 0] = pose[0] - pose[2] * pad.y[k] - patch.moved[0, i]

@@ -15,11 +15,11 @@ from slipcore.contact.defaults import STEP
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.errors import InfeasibleLoad
 from slipcore.contact.solver.problem import StepLoad
-from slipcore.contact.solver.state import State, StepResult
+from slipcore.contact.solver.state import ContactState, StepResult
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray
 
-Step = Callable[[State, StepLoad], tuple[State, StepResult]]
+Step = Callable[[ContactState, StepLoad], tuple[ContactState, StepResult]]
 """A step in which the object is at rest, or its motion prescribed; raises ``InfeasibleLoad`` where neither can be."""
 
 
@@ -47,7 +47,9 @@ class FreeObject:
         return after if before @ (unit * after) >= 0.0 else np.zeros(3)
 
 
-def moving(step: Step, grid: Grid, state: State, load: StepLoad, free: FreeObject) -> tuple[State, StepResult]:
+def moving(
+    step: Step, grid: Grid, state: ContactState, load: StepLoad, free: FreeObject
+) -> tuple[ContactState, StepResult]:
     """The next state of a contact with a free object, and what happened in all of the step.
 
     Load and pressing change evenly within it where the object slides. Raises ``InvalidInput`` where motion is given.
@@ -85,7 +87,9 @@ def _between(before: StepLoad, after: StepLoad, share: float, number: int) -> St
     )
 
 
-def _slid(step: Step, grid: Grid, state: State, load: StepLoad, free: FreeObject) -> tuple[State, StepResult]:
+def _slid(
+    step: Step, grid: Grid, state: ContactState, load: StepLoad, free: FreeObject
+) -> tuple[ContactState, StepResult]:
     """After a short step in which the object moves."""
     velocity = free.velocity(state.velocity, load.tangential - borne(grid, state), load.duration)
     asked = replace(load, motion=load.duration * velocity, given=(False, False, False))
@@ -94,12 +98,12 @@ def _slid(step: Step, grid: Grid, state: State, load: StepLoad, free: FreeObject
     return after if velocity.any() else _unlike(after), result
 
 
-def _unlike(state: State) -> State:
+def _unlike(state: ContactState) -> ContactState:
     """The same, of which nothing goes on: from load to motion, and back, rates are of different things."""
     return replace(state, drive=np.zeros(3), rate=np.zeros(4))
 
 
-def borne(grid: Grid, state: State) -> FloatArray:
+def borne(grid: Grid, state: ContactState) -> FloatArray:
     """Force and moment on the finger, [3] N, N, N·m."""
     x, y = grid.points()
     along, across = state.stress.traction * grid.cell_area

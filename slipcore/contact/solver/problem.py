@@ -7,7 +7,7 @@ import numpy as np
 
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import ElasticBody
-from slipcore.contact.solver.tangential import Control
+from slipcore.contact.solver.tangential import SolverControl
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray
 
@@ -32,7 +32,7 @@ class MaxwellBranch:
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class ContactProblem:
     """Bodies, shapes, friction and history of one contact; all tuples are sums.
 
     ``finger``, ``obstacle``: compliances, the obstacle rigid if empty; ``heights``: gap between undeformed surfaces;
@@ -91,6 +91,6 @@ class StepLoad:
             raise InvalidInput("duration of a step", self.duration, "finite and above 0 s")
         self.control()  # refuses what is not finite
 
-    def control(self) -> Control:
+    def control(self) -> SolverControl:
         """What drives the object tangentially."""
-        return Control(self.tangential, self.motion, np.array(self.given))
+        return SolverControl(self.tangential, self.motion, np.array(self.given))

@@ -17,14 +17,14 @@ from slipcore.contact.elasticity.operator import Count, Operators
 from slipcore.contact.solver.creep import creep_compliance, creep_recalled, creep_step
 from slipcore.contact.solver.extrapolation import Stress, continuation, extrapolated
 from slipcore.contact.solver.macro_slip import FreeObject, moving
-from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, StepLoad
 from slipcore.contact.solver.slip_rate import carried_share, solve_carrying
-from slipcore.contact.solver.state import State, StepResult
+from slipcore.contact.solver.state import ContactState, StepResult
 from slipcore.contact.solver.step_equations import StepEquations, StepSolution
 from slipcore.contact.solver.touching import from_touch
 from slipcore.frames import FloatArray
 
-__all__ = ["QuasiStatic", "State", "StepResult"]
+__all__ = ["ContactState", "QuasiStatic", "StepResult"]
 
 
 class QuasiStatic:
@@ -37,7 +37,7 @@ class QuasiStatic:
 
     def __init__(
         self,
-        problem: Problem,
+        problem: ContactProblem,
         grid: Grid,
         tolerance: float = STEP.tolerance,
         normal_tolerance: float = STEP.normal_tolerance,
@@ -53,12 +53,14 @@ class QuasiStatic:
         self.finger = Operators(problem.finger, self.count, grid)
         self._relaxed: dict[float, Operators] = {}
 
-    def start(self) -> State:
+    def start(self) -> ContactState:
         """Bodies apart."""
         zero = np.zeros((3, *self.grid.shape))
         creep = tuple(zero for _ in self.problem.creep)
         apart, still, at_rest = Stress(zero[0], zero[:2], zero[0]), np.zeros(3), np.zeros(4)
-        return State(None, apart, apart, zero[:2], zero, creep, still, zero[0], zero[:2], StepLoad(0.0), still, at_rest)
+        return ContactState(
+            None, apart, apart, zero[:2], zero, creep, still, zero[0], zero[:2], StepLoad(0.0), still, at_rest
+        )
 
     def run(self, loads: Iterable[StepLoad]) -> Iterator[StepResult]:
         """Results of loads one after the other, from bodies apart."""
@@ -67,7 +69,9 @@ class QuasiStatic:
             state, result = self.step(state, load)
             yield result
 
-    def step(self, state: State, load: StepLoad, free: FreeObject | None = None) -> tuple[State, StepResult]:
+    def step(
+        self, state: ContactState, load: StepLoad, free: FreeObject | None = None
+    ) -> tuple[ContactState, StepResult]:
         """The next state and what happened; raises ``InfeasibleLoad``, ``NotConverged`` and ``InvalidInput``.
 
         ``free``: the object, where what friction does not carry shall move it instead of being refused.
@@ -80,7 +84,7 @@ class QuasiStatic:
         seconds = time.perf_counter() - began
         return after, replace(result, applications=self.count.since(counted), seconds=seconds)
 
-    def _balanced(self, state: State, load: StepLoad) -> tuple[State, StepResult]:
+    def _balanced(self, state: ContactState, load: StepLoad) -> tuple[ContactState, StepResult]:
         """The same for an object at rest, or one whose motion is given."""
         recalled = creep_recalled(self.problem.creep, state.creep, state.elastic, load.duration)
         drive = _drive(state.load, load)
@@ -104,12 +108,12 @@ class QuasiStatic:
         after = self._advance(equations, state, load, drive, solution, recalled)
         return after, self._result(equations, state, after, solution)
 
-    def _pressed_alike(self, state: State, load: StepLoad) -> bool:
+    def _pressed_alike(self, state: ContactState, load: StepLoad) -> bool:
         """Whether nothing that pressure depends on has changed since the last step."""
         pressed = (load.normal_force, load.approach) == (state.load.normal_force, state.load.approach)
         return pressed and not self.problem.coupled and not self.problem.creep
 
-    def _carried(self, state: State, load: StepLoad, drive: FloatArray) -> FloatArray:
+    def _carried(self, state: ContactState, load: StepLoad, drive: FloatArray) -> FloatArray:
         """Slip [2, ny, nx] m of the last step that goes on in this one, for rates of slip of second order."""
         if not self.second_order:
             return np.zeros_like(state.slip)
@@ -130,7 +134,7 @@ class QuasiStatic:
             self._relaxed[softening] = Operators((*finger, *self.problem.obstacle), self.count, self.grid)
         return self._relaxed[softening]
 
-    def _share(self, state: State, load: StepLoad, drive: FloatArray) -> float:
+    def _share(self, state: ContactState, load: StepLoad, drive: FloatArray) -> float:
         """How much of the contact's capacity the step can change: what its tolerance is measured by."""
         before, now = state.load.normal_force, load.normal_force
         if before is None or now is None or now == 0.0 or not all(load.given):
@@ -142,12 +146,12 @@ class QuasiStatic:
     def _advance(
         self,
         equations: StepEquations,
-        state: State,
+        state: ContactState,
         load: StepLoad,
         drive: FloatArray,
         solution: StepSolution,
         recalled: FloatArray | None,
-    ) -> State:
+    ) -> ContactState:
         """The state at the end of the step."""
         stress = equations.stress(solution)
         pressure, traction, _ = stress
@@ -162,7 +166,7 @@ class QuasiStatic:
         if self.problem.velocity_laws:
             speed = np.zeros_like(pressure)
             speed[solution.box] = np.hypot(*solution.tangential.slip) / load.duration
-        return State(
+        return ContactState(
             normal=solution.normal,
             stress=stress,
             before=state.stress,
@@ -177,7 +181,7 @@ class QuasiStatic:
             rate=_rate(state.load, load, drive),
         )
 
-    def _slid(self, state: State, solution: StepSolution) -> FloatArray:
+    def _slid(self, state: ContactState, solution: StepSolution) -> FloatArray:
         """Slip [2, ny, nx] m of the cells that touched at the step's begin and slide at its end."""
         slip, tangential, box = np.zeros_like(state.slip), solution.tangential, solution.box
         sliding = tangential.slides & (solution.limit > 0.0) & (state.stress.pressure[box] > 0.0)
@@ -201,7 +205,9 @@ class QuasiStatic:
                 whole[:2] += operator.tangential_by_pressure(pressure)
         return whole
 
-    def _result(self, equations: StepEquations, state: State, after: State, solution: StepSolution) -> StepResult:
+    def _result(
+        self, equations: StepEquations, state: ContactState, after: ContactState, solution: StepSolution
+    ) -> StepResult:
         normal, tangential, box = solution.normal, solution.tangential, solution.box
         contact = normal.pressure > 0.0
         slip, at_limit, moved = np.zeros_like(after.stress.traction), np.zeros_like(contact), np.zeros_like(contact)

@@ -13,7 +13,7 @@ from slipcore.frames import BoolArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class State:
+class ContactState:
     """What the next step depends on; fields on the whole grid.
 
     ``normal`` contact, ``stress`` and that of the step ``before``; ``displacement`` [2, ny, nx] m of the finger against

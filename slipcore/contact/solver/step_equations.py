@@ -13,7 +13,7 @@ from slipcore.contact.elasticity.operator import Operators
 from slipcore.contact.errors import NotConverged
 from slipcore.contact.solver.extrapolation import Stress
 from slipcore.contact.solver.normal import NormalContact, solve_normal
-from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, StepLoad
 from slipcore.contact.solver.tangential import TangentialContact, solve_tangential
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray
@@ -69,7 +69,7 @@ class StepEquations:
     largest limit; ``known``: normal contact where it is that of the last step.
     """
 
-    problem: Problem
+    problem: ContactProblem
     grid: Grid
     operators: Operators
     height: FloatArray

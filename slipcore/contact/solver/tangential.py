@@ -29,7 +29,7 @@ from slipcore.frames import BoolArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Control:
+class SolverControl:
     """What drives the object along x, along y and in rotation: its load where ``given``, otherwise its motion.
 
     ``load``: F_x N, F_y N, M N·m on the finger, total; ``motion``: dx m, dy m, dφ rad in this step.
@@ -70,7 +70,7 @@ def solve_tangential(
     points: tuple[FloatArray, FloatArray],
     limit: FloatArray,
     offset: FloatArray,
-    control: Control,
+    control: SolverControl,
     start: FloatArray,
     tolerance: float = TANGENTIAL.tolerance,
     max_iterations: int = TANGENTIAL.newton_steps,
@@ -97,7 +97,7 @@ class _TangentialStep:
         points: tuple[FloatArray, FloatArray],
         limit: FloatArray,
         offset: FloatArray,
-        control: Control,
+        control: SolverControl,
     ) -> None:
         self.operator, self.limit, self.control = operator, limit, control
         self.given = control.given
@@ -233,7 +233,7 @@ class _TangentialStep:
         return self._result(traction, displacement, 0.0, 0)._replace(sliding=True)
 
 
-def _frictionless(offset: FloatArray, control: Control) -> TangentialContact:
+def _frictionless(offset: FloatArray, control: SolverControl) -> TangentialContact:
     """Nothing holds and nothing is held."""
     if (np.abs(control.load) * control.given).any():
         raise InfeasibleLoad(control.load, 0.0)

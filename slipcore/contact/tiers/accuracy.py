@@ -53,7 +53,9 @@ def simulate_to(
     for name, value in (("accuracy", accuracy), ("seconds", seconds)):
         if value is not None and not 0.0 < value < np.inf:
             raise InvalidInput(name, value, "finite and above 0")
-    search = _Search(plan, 0.0 if accuracy is None else accuracy, np.inf if seconds is None else seconds, progress)
+    search = _AccuracySearch(
+        plan, 0.0 if accuracy is None else accuracy, np.inf if seconds is None else seconds, progress
+    )
     best: Refined | None = None
     try:
         for found in search.logs():
@@ -79,12 +81,12 @@ def refinements(plan: Plan, seconds: float, progress: Progress = no_progress) ->
     """
     if not 0.0 < seconds < np.inf:
         raise InvalidInput("seconds", seconds, "finite and above 0")
-    search = _Search(plan, 0.0, seconds, progress, every=True)
+    search = _AccuracySearch(plan, 0.0, seconds, progress, every=True)
     for found in search.logs():
         yield replace(found, seconds=search.runs.spent)
 
 
-class _Search:
+class _AccuracySearch:
     """Ever finer logs of a plan, up to the ``target`` or within a budget; with ``every``, in equal growth."""
 
     def __init__(self, plan: Plan, target: float, budget: float, progress: Progress, *, every: bool = False) -> None:

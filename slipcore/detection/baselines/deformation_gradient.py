@@ -9,17 +9,17 @@ import numpy as np
 
 from slipcore.defaults import DeformationGradientOptions
 from slipcore.detection.baselines.since_touch import threshold_method
-from slipcore.detection.shared.interface import Observation
+from slipcore.detection.shared.interface import ObservedFrame
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.surface.strain import Lattice, displacement_gradient, lattice_steps
 
 
-def measure(lattice: Lattice, seen: Observation) -> FloatArray:
+def measure(lattice: Lattice, seen: ObservedFrame) -> FloatArray:
     """Displacement gradient [2, 2, n, m]."""
     return displacement_gradient(lattice, lattice_steps(seen.displacement))
 
 
-def slips(_: Lattice, seen: Observation, change: FloatArray, options: DeformationGradientOptions) -> BoolArray:
+def slips(_: Lattice, seen: ObservedFrame, change: FloatArray, options: DeformationGradientOptions) -> BoolArray:
     """Norm of the change of gradient against a threshold tied to the field."""
     if not seen.contact.any():
         return seen.contact

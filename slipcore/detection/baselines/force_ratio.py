@@ -7,7 +7,7 @@ work finds it by exploring the surface before the grasp. Without forces nothing 
 import numpy as np
 
 from slipcore.defaults import ForceRatioOptions
-from slipcore.detection.shared.interface import Method, Observation
+from slipcore.detection.shared.interface import Method, ObservedFrame
 from slipcore.detection.shared.records import Decision
 from slipcore.surface.strain import Lattice
 
@@ -16,7 +16,7 @@ def init(_: Lattice, __: ForceRatioOptions) -> None:
     """Nothing to remember."""
 
 
-def step(state: None, _: Lattice, seen: Observation, options: ForceRatioOptions) -> tuple[None, Decision]:
+def step(state: None, _: Lattice, seen: ObservedFrame, options: ForceRatioOptions) -> tuple[None, Decision]:
     """An element slips where its f_t/f_n is over the break-away ratio."""
     if seen.force.size == 0:
         return state, Decision(np.zeros(seen.contact.shape, bool), np.full(seen.contact.shape, 0.5))

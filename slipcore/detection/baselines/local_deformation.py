@@ -10,17 +10,17 @@ import numpy as np
 
 from slipcore.defaults import LocalDeformationOptions
 from slipcore.detection.baselines.since_touch import threshold_method
-from slipcore.detection.shared.interface import Observation
+from slipcore.detection.shared.interface import ObservedFrame
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.surface.strain import Lattice, lattice_steps
 
 
-def measure(_: Lattice, seen: Observation) -> FloatArray:
+def measure(_: Lattice, seen: ObservedFrame) -> FloatArray:
     """Relative displacement in the plane of opposite neighbours [2 (along), 2, n, m] m."""
     return lattice_steps(seen.displacement)[:, :2]
 
 
-def slips(lattice: Lattice, _: Observation, change: FloatArray, options: LocalDeformationOptions) -> BoolArray:
+def slips(lattice: Lattice, _: ObservedFrame, change: FloatArray, options: LocalDeformationOptions) -> BoolArray:
     """Root mean square relative displacement per distance, against a threshold."""
     share = (change**2).sum(axis=1) / (lattice.steps**2).sum(axis=1)
     degree = np.sqrt(share.mean(axis=0))

@@ -10,18 +10,18 @@ import numpy as np
 
 from slipcore.defaults import RigidFitOptions
 from slipcore.detection.baselines.since_touch import threshold_method
-from slipcore.detection.shared.interface import Observation
+from slipcore.detection.shared.interface import ObservedFrame
 from slipcore.detection.shared.rigid_motion import fit_rigid_motion
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.surface.strain import Lattice
 
 
-def measure(_: Lattice, seen: Observation) -> FloatArray:
+def measure(_: Lattice, seen: ObservedFrame) -> FloatArray:
     """Displacement in the plane [2, n, m] m."""
     return np.moveaxis(seen.displacement[..., :2], -1, 0)
 
 
-def slips(lattice: Lattice, seen: Observation, change: FloatArray, options: RigidFitOptions) -> BoolArray:
+def slips(lattice: Lattice, seen: ObservedFrame, change: FloatArray, options: RigidFitOptions) -> BoolArray:
     """Deviation of the displacement since the touch from the core's rigid motion."""
     points, moved = lattice.position[..., :2], np.moveaxis(change, 0, -1)
     core = _core(points, seen.stays, options.core_share)

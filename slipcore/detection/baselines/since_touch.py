@@ -7,7 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from slipcore.defaults import ContactOptions
-from slipcore.detection.shared.interface import Method, Observation
+from slipcore.detection.shared.interface import Method, ObservedFrame
 from slipcore.detection.shared.records import Decision
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.surface.strain import Lattice
@@ -24,8 +24,8 @@ class MeasureAtTouch:
 
 def threshold_method(
     options: type[Options],
-    measure: Callable[[Lattice, Observation], FloatArray],
-    slips: Callable[[Lattice, Observation, FloatArray, Options], BoolArray],
+    measure: Callable[[Lattice, ObservedFrame], FloatArray],
+    slips: Callable[[Lattice, ObservedFrame, FloatArray, Options], BoolArray],
 ) -> Method[MeasureAtTouch, Options]:
     """A method without memory of its own: ``slips`` judges how ``measure`` [..., n, m] changed since the touch.
 
@@ -37,7 +37,7 @@ def threshold_method(
         return MeasureAtTouch(np.zeros(()))
 
     def step(
-        state: MeasureAtTouch, lattice: Lattice, seen: Observation, chosen: Options
+        state: MeasureAtTouch, lattice: Lattice, seen: ObservedFrame, chosen: Options
     ) -> tuple[MeasureAtTouch, Decision]:
         now = measure(lattice, seen)
         start = np.where(seen.stays, state.measure, now)

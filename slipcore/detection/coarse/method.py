@@ -13,17 +13,17 @@ from scipy.special import expit, logit
 from slipcore.defaults import CoarseOptions, FilterOptions
 from slipcore.detection.filter import method as by_place
 from slipcore.detection.forces_only import method as by_force
-from slipcore.detection.shared.contact import Touch
-from slipcore.detection.shared.interface import Method, Observation
+from slipcore.detection.shared.contact import ContactThreshold
+from slipcore.detection.shared.interface import Method, ObservedFrame
 from slipcore.detection.shared.lasting_noise import start_noise
 from slipcore.detection.shared.records import (
     NO_FIELD,
     NO_MASK,
     NO_POSE,
     Decision,
+    DetectorSetup,
     FrameArrays,
     Memory,
-    Sensor,
     empty_like,
     read_only,
     unwritten,
@@ -32,25 +32,27 @@ from slipcore.frames import FloatArray
 from slipcore.surface.strain import Lattice
 
 
-class State(NamedTuple):
+class CoarseState(NamedTuple):
     """What each method remembers, and the last frame, as the filter sees it."""
 
-    forces: by_force.State
+    forces: by_force.ForcesState
     memory: Memory
     frame: FrameArrays
 
 
-def init(lattice: Lattice, options: CoarseOptions) -> State:
+def init(lattice: Lattice, options: CoarseOptions) -> CoarseState:
     """Nothing touches yet."""
     shape, start = lattice.position.shape, by_place.METHOD.start(lattice, FilterOptions())
     noise = start_noise()
     nowhere, nothing = np.zeros(shape[:2], bool), np.zeros(shape[:2])
     frame = FrameArrays(-np.inf, read_only(np.zeros(shape)), NO_FIELD, NO_POSE, NO_FIELD, NO_MASK)
     memory = Memory(nowhere, nowhere, nothing, noise, start.elements, start.common)
-    return State(by_force.init(lattice, options), memory, frame)
+    return CoarseState(by_force.init(lattice, options), memory, frame)
 
 
-def step(state: State, lattice: Lattice, seen: Observation, options: CoarseOptions) -> tuple[State, Decision]:
+def step(
+    state: CoarseState, lattice: Lattice, seen: ObservedFrame, options: CoarseOptions
+) -> tuple[CoarseState, Decision]:
     """Both, on the same contact; without forces the filter's word alone."""
     forces, decision = by_force.step(state.forces, lattice, seen, options)
     last = unwritten(state.frame)
@@ -69,7 +71,7 @@ def step(state: State, lattice: Lattice, seen: Observation, options: CoarseOptio
     odds = _log_odds(after.probability, options)
     if seen.force.size:
         odds = _log_odds(decision.probability, options) + options.filter_weight * odds
-    return State(forces, after, frame), Decision(odds > 0.0, expit(odds))
+    return CoarseState(forces, after, frame), Decision(odds > 0.0, expit(odds))
 
 
 def _log_odds(probability: FloatArray, options: CoarseOptions) -> FloatArray:
@@ -78,12 +80,12 @@ def _log_odds(probability: FloatArray, options: CoarseOptions) -> FloatArray:
     return odds
 
 
-def _sensor(lattice: Lattice, options: CoarseOptions) -> Sensor:
+def _sensor(lattice: Lattice, options: CoarseOptions) -> DetectorSetup:
     """The lattice and options for the filter's kernel; contact is known, and only what pulls is told by them."""
-    touch = np.array(Touch(0.0, 0.0, options.contact_noise, 1.0, 1.0, 0.0, 1.0, 0.0, 0.0))
+    touch = np.array(ContactThreshold(0.0, 0.0, options.contact_noise, 1.0, 1.0, 0.0, 1.0, 0.0, 0.0))
     settings = by_place.METHOD.start(lattice, FilterOptions()).settings
     position, steps, inverse = map(np.array, (lattice.position, lattice.steps, lattice.inverse_jacobian))
-    return Sensor(position, steps, inverse, lattice.orientation, touch, touch, settings)
+    return DetectorSetup(position, steps, inverse, lattice.orientation, touch, touch, settings)
 
 
 METHOD = Method(CoarseOptions, init, step)

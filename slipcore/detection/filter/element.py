@@ -45,7 +45,7 @@ class Measurement(NamedTuple):
     y: float
 
 
-class Estimate(NamedTuple):
+class PlaceEstimate(NamedTuple):
     """A place in the object's frame, m, and the variance of each coordinate, m²."""
 
     x: float
@@ -66,13 +66,13 @@ def update_element(
     p, size2 = old[PROBABILITY, i, j], seen.motion_x * seen.motion_x + seen.motion_y * seen.motion_y
     onset, end = transitions(math.sqrt(size2), seen.readiness, increment, tuning)
     slip_probability = expected(p, onset, end, tuning.least_transition)
-    stick = Estimate(old[STICK_X, i, j], old[STICK_Y, i, j], old[STICK_VARIANCE, i, j])
-    slip = Estimate(old[SLIP_X, i, j], old[SLIP_Y, i, j], old[SLIP_VARIANCE, i, j])
+    stick = PlaceEstimate(old[STICK_X, i, j], old[STICK_Y, i, j], old[STICK_VARIANCE, i, j])
+    slip = PlaceEstimate(old[SLIP_X, i, j], old[SLIP_Y, i, j], old[SLIP_VARIANCE, i, j])
     kept_stick, kept_slip = (1.0 - p) * (1.0 - onset) / (1.0 - slip_probability), p * (1.0 - end) / slip_probability
     drift = tuning.creep**2 * increment.interval
     stuck = mix(stick, slip, kept_stick, drift, (tuning.rigidity_of_anchor * tuning.rigidity) ** 2 * size2)
     slid = mix(slip, stick, kept_slip, drift, tuning.slip_share_spread**2 * size2)
-    slid = Estimate(
+    slid = PlaceEstimate(
         slid.x - tuning.slip_share * seen.motion_x, slid.y - tuning.slip_share * seen.motion_y, slid.variance
     )
     noise = increment.variance + seen.motion_variance + (tuning.rigidity_of_fit * tuning.rigidity) ** 2 * size2
@@ -85,8 +85,8 @@ def update_element(
         gained = 0.0
     if stick2 > tuning.outlier_gate * stick_variance and slip2 > tuning.outlier_gate * slip_variance:
         trust = 0.0
-        stuck = Estimate(stuck.x, stuck.y, stuck.variance + tuning.outlier_spread * stick2)
-        slid = Estimate(slid.x, slid.y, slid.variance + tuning.outlier_spread * slip2)
+        stuck = PlaceEstimate(stuck.x, stuck.y, stuck.variance + tuning.outlier_spread * stick2)
+        slid = PlaceEstimate(slid.x, slid.y, slid.variance + tuning.outlier_spread * slip2)
     odds = math.log(slip_probability / (1.0 - slip_probability)) + trust * min(max(gained, -most), most)
     odds = min(max(odds + seen.force_log_odds, -most), most)
     new[ONSET, i, j], new[END, i, j], new[PROBABILITY, i, j] = onset, end, 1.0 / (1.0 + math.exp(-odds))
@@ -115,16 +115,16 @@ def expected(p: float, onset: float, end: float, least: float) -> float:
 
 
 @compiled
-def mix(own: Estimate, other: Estimate, kept: float, drift: float, spread: float) -> Estimate:
+def mix(own: PlaceEstimate, other: PlaceEstimate, kept: float, drift: float, spread: float) -> PlaceEstimate:
     """Mean of two estimates with weights ``kept`` and the rest; its variance grown by ``drift`` + ``spread``, m²."""
     left = 1.0 - kept
     apart = 0.5 * ((own.x - other.x) ** 2 + (own.y - other.y) ** 2)
     variance = kept * own.variance + left * other.variance + kept * left * apart
-    return Estimate(kept * own.x + left * other.x, kept * own.y + left * other.y, variance + drift + spread)
+    return PlaceEstimate(kept * own.x + left * other.x, kept * own.y + left * other.y, variance + drift + spread)
 
 
 @compiled
-def correct(predicted: Estimate, seen: Measurement, noise: float, trust: float) -> tuple[float, float, float]:
+def correct(predicted: PlaceEstimate, seen: Measurement, noise: float, trust: float) -> tuple[float, float, float]:
     """Kalman update of a prediction by what was seen with variance ``noise``, m²; none at no ``trust``."""
     gain = trust * predicted.variance / (predicted.variance + noise)
     x = predicted.x + gain * (seen.x - predicted.x)

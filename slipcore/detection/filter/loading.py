@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from slipcore.compilation import compiled, unpack
 from slipcore.defaults import NUMERICS
-from slipcore.detection.filter.pose import Anchors, Motion
+from slipcore.detection.filter.pose import AnchorMotion, Anchors
 from slipcore.detection.filter.state import FRICTION, LOADING
 from slipcore.detection.filter.tuning import Tuning
 from slipcore.frames import FloatArray
@@ -34,7 +34,7 @@ def low_pass(interval: float, time_constant: float) -> float:
 def step_loading(
     loading: Loading,
     places: tuple[FloatArray, FloatArray],
-    motion: Motion,
+    motion: AnchorMotion,
     deeper: FloatArray,
     force: FloatArray,
     interval: float,
@@ -73,7 +73,7 @@ def restick_under_load(
     before: FloatArray,
     after: FloatArray,
     anchors: Anchors,
-    motion: Motion,
+    motion: AnchorMotion,
     indentation: FloatArray,
     force: FloatArray,
     noise: tuple[float, float, float],

@@ -53,7 +53,7 @@ class Anchors(NamedTuple):
     weight: FloatArray
 
 
-class Motion(NamedTuple):
+class AnchorMotion(NamedTuple):
     """How far the object carried each anchor, x and y in its own frame, m, and the variance of that, m²: [k] each."""
 
     x: FloatArray
@@ -158,7 +158,7 @@ def find_pose(
 
 @compiled
 def object_motion(
-    anchors: Anchors, reference: Pose, pose: Pose, spread: PoseVariance, play: float, motion: Motion
+    anchors: Anchors, reference: Pose, pose: Pose, spread: PoseVariance, play: float, motion: AnchorMotion
 ) -> Pose:
     """Fill the ``motion`` of each anchor; the reference of the next step.
 

@@ -7,13 +7,13 @@ from slipcore.detection.filter.step import lasting_noise, step_filter
 from slipcore.detection.filter.tuning import tuning_of
 from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.observe import observe
-from slipcore.detection.shared.records import FrameArrays, Memory, Sensor, Workspace, named, workspace
+from slipcore.detection.shared.records import DetectorSetup, FrameArrays, Memory, Workspace, named, workspace
 from slipcore.frames import FloatArray
 
 
 @compiled
 def run_filter(
-    sensor: Sensor, last: FrameArrays, frame: FrameArrays, before: Memory, after: Memory, velocity: FloatArray
+    sensor: DetectorSetup, last: FrameArrays, frame: FrameArrays, before: Memory, after: Memory, velocity: FloatArray
 ) -> tuple[float, int, int]:
     """Fill the memory ``after`` and ``velocity``; marker noise, m (NaN if unknown), and how many elements touch and
     slip. What it is given may be plain tuples of the same entries.
@@ -25,7 +25,7 @@ def run_filter(
 
 @compiled
 def filter_frame(
-    sensor: Sensor,
+    sensor: DetectorSetup,
     last: FrameArrays,
     frame: FrameArrays,
     before: Memory,

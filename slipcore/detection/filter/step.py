@@ -10,7 +10,7 @@ from slipcore.detection.filter.element import Increment, Measurement, update_ele
 from slipcore.detection.filter.force_ratio import follow_forces, keep_ratios, weigh_forces
 from slipcore.detection.filter.hold import step_hold
 from slipcore.detection.filter.loading import low_pass, restick_under_load
-from slipcore.detection.filter.pose import Anchors, Motion, Pose, object_motion, place_on_object
+from slipcore.detection.filter.pose import AnchorMotion, Anchors, Pose, object_motion, place_on_object
 from slipcore.detection.filter.state import (
     END,
     FORCE_FRAMES,
@@ -33,13 +33,13 @@ from slipcore.detection.filter.surroundings import shift_of_surroundings
 from slipcore.detection.filter.tuning import Tuning, tuning_of
 from slipcore.detection.shared.lasting_noise import OF_STEP
 from slipcore.detection.shared.observe import same
-from slipcore.detection.shared.records import Decision, FrameArrays, Memory, Sensor, Surface, Workspace
+from slipcore.detection.shared.records import Decision, DetectorSetup, FrameArrays, Memory, Surface, Workspace
 from slipcore.frames import BoolArray, FloatArray
 
 
 @compiled
 def step_filter(
-    sensor: Sensor,
+    sensor: DetectorSetup,
     last: FrameArrays,
     frame: FrameArrays,
     before: Memory,
@@ -156,13 +156,13 @@ def known_or(noise: float, otherwise: float) -> float:
 
 
 @compiled
-def rooms_of(rows: FloatArray, count: int) -> tuple[Anchors, Motion, FloatArray, FloatArray, FloatArray]:
+def rooms_of(rows: FloatArray, count: int) -> tuple[Anchors, AnchorMotion, FloatArray, FloatArray, FloatArray]:
     """Where ``rows`` take what is worked out of so many anchors: themselves, how they move, how much deeper they are,
     change of force [3, k], and what this tells [2, k].
     """
     r = rows[:, :count]
     anchors = Anchors(r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7])
-    return anchors, Motion(r[8], r[9], r[10]), r[11], r[12:15], r[15:17]
+    return anchors, AnchorMotion(r[8], r[9], r[10]), r[11], r[12:15], r[15:17]
 
 
 @compiled

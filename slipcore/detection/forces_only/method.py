@@ -15,7 +15,7 @@ from scipy.special import expit
 from slipcore.defaults import ForcesOnlyOptions
 from slipcore.detection.filter.loading import low_pass
 from slipcore.detection.forces_only.sharing import Loads, Sharing, compare, slip_density, stick_density
-from slipcore.detection.shared.interface import Method, Observation
+from slipcore.detection.shared.interface import Method, ObservedFrame
 from slipcore.detection.shared.records import Decision
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.surface.strain import Lattice
@@ -24,7 +24,7 @@ RAYLEIGH_MEAN = np.sqrt(np.pi / 2.0)
 """Mean length of a vector of two components with normal noise of 1."""
 
 
-class State(NamedTuple):
+class ForcesState(NamedTuple):
     """What is remembered: low-passed forces of the elements, ``normal`` [n, m] and ``tangential`` [n, m, 3] N, now and
     when the load was last looked at; which elements touched then; log-odds of slip [n, m] that changes of the load have
     told; log weights [g] of friction coefficients; and the probability of slip [n, m].
@@ -53,13 +53,15 @@ def prior(options: ForcesOnlyOptions) -> FloatArray:
     return weights
 
 
-def init(lattice: Lattice, options: ForcesOnlyOptions) -> State:
+def init(lattice: Lattice, options: ForcesOnlyOptions) -> ForcesState:
     """Nothing touches yet."""
     nothing, vectors = np.zeros(lattice.position.shape[:2]), np.zeros(lattice.position.shape)
-    return State(nothing, vectors, nothing, vectors, nothing > 0.0, nothing, prior(options), nothing)
+    return ForcesState(nothing, vectors, nothing, vectors, nothing > 0.0, nothing, prior(options), nothing)
 
 
-def step(state: State, lattice: Lattice, seen: Observation, options: ForcesOnlyOptions) -> tuple[State, Decision]:
+def step(
+    state: ForcesState, lattice: Lattice, seen: ObservedFrame, options: ForcesOnlyOptions
+) -> tuple[ForcesState, Decision]:
     """Follow the forces, and look at them once the load has changed by more than noise."""
     if seen.force.size == 0:
         return state, Decision(np.zeros(seen.contact.shape, bool), np.full(seen.contact.shape, 0.5))
@@ -81,13 +83,13 @@ def _loads(lattice: Lattice, normal: FloatArray, tangential: FloatArray, on: Boo
     return Loads(lattice.position[on][:, :2], normal[on], tangential[on])
 
 
-def follow(state: State, seen: Observation, gain: float) -> State:
+def follow(state: ForcesState, seen: ObservedFrame, gain: float) -> ForcesState:
     """Low-pass the forces of what stays in contact, and begin anew with what has just touched."""
     pressing, anew = np.maximum(seen.pressing, 0.0), ~(seen.stays & state.touched)
     sideways = seen.force + seen.pressing[..., None] * seen.normal
     normal = np.where(anew, pressing, state.normal + gain * (pressing - state.normal))
     tangential = np.where(anew[..., None], sideways, state.tangential + gain * (sideways - state.tangential))
-    return State(
+    return ForcesState(
         normal,
         tangential,
         np.where(anew, normal, state.last_normal),
@@ -108,8 +110,8 @@ def load_change(before: Loads, now: Loads, noise: float, options: ForcesOnlyOpti
 
 
 def look(
-    state: State, on: BoolArray, before: Loads, now: Loads, noise: float, moved: float, options: ForcesOnlyOptions
-) -> State:
+    state: ForcesState, on: BoolArray, before: Loads, now: Loads, noise: float, moved: float, options: ForcesOnlyOptions
+) -> ForcesState:
     """What a change of the load says of the friction, and of each element that stays ``on``."""
     seen, grid = compare(before, now, noise, options), frictions(options)
     level = np.clip(

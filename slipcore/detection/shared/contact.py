@@ -13,7 +13,7 @@ from slipcore.noise import median
 _LEAST = NOISE.least_series
 
 
-class Touch(NamedTuple):
+class ContactThreshold(NamedTuple):
     """What an element needs to touch: ``least`` N or m, ``share`` of the frame's peak, ``noise`` multiples of it; the
     share of that under which it is released; the rim's least hollow, as a share of the peak (1: not looked at), and
     ``rim_noise`` multiples of that of the curvature; the share of the peak that is enough inside the rim of a contact;
@@ -31,13 +31,15 @@ class Touch(NamedTuple):
     clear: float
 
 
-TOUCH = len(Touch._fields)
+TOUCH = len(ContactThreshold._fields)
 CURVATURE_NOISE = 0.6374
 """Standard deviation of ``curvature`` for white noise of 1 (from the 25 weights of its stencil)."""
 
 
 @compiled
-def find_contact(pressing: FloatArray, sigma: float, before: BoolArray, touch: Touch, contact: BoolArray) -> None:
+def find_contact(
+    pressing: FloatArray, sigma: float, before: BoolArray, touch: ContactThreshold, contact: BoolArray
+) -> None:
     """Elements pressed (N, or m of indentation, positive inwards) by more than a threshold tied to the frame.
 
     ``sigma``: noise of ``pressing``, NaN where unknown. Elements in contact ``before`` are released only under

@@ -14,7 +14,7 @@ State = TypeVar("State")
 Options = TypeVar("Options", bound=ContactOptions)
 
 
-class Observation(NamedTuple):
+class ObservedFrame(NamedTuple):
     """One frame as a method in numpy sees it, with what is common to all of them already worked out.
 
     ``interval`` s since the frame before (infinite for the first); ``displacement`` [n, m, 3] m and outward ``normal``;
@@ -45,7 +45,7 @@ class Method(NamedTuple, Generic[State, Options]):
 
     options: type[Options]
     init: Callable[[Lattice, Options], State]
-    step: Callable[[State, Lattice, Observation, Options], tuple[State, Decision]]
+    step: Callable[[State, Lattice, ObservedFrame, Options], tuple[State, Decision]]
 
 
 class Start(NamedTuple):

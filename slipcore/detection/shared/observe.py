@@ -4,9 +4,9 @@ import math
 
 from slipcore.compilation import compiled, unpack
 from slipcore.defaults import NOISE
-from slipcore.detection.shared.contact import TOUCH, Touch, find_contact, spatial_noise
+from slipcore.detection.shared.contact import TOUCH, ContactThreshold, find_contact, spatial_noise
 from slipcore.detection.shared.lasting_noise import OF_STEP, step_lasting
-from slipcore.detection.shared.records import FrameArrays, Memory, Sensor, Workspace
+from slipcore.detection.shared.records import DetectorSetup, FrameArrays, Memory, Workspace
 from slipcore.frames import FloatArray
 from slipcore.noise import noise_of_three, recent_median, remember
 from slipcore.surface.normals import split_forces, surface_normals
@@ -15,7 +15,7 @@ SERIES = NOISE.series
 
 
 @compiled
-def observe(sensor: Sensor, frame: FrameArrays, before: Memory, after: Memory, room: Workspace) -> bool:
+def observe(sensor: DetectorSetup, frame: FrameArrays, before: Memory, after: Memory, room: Workspace) -> bool:
     """Fill ``room.surface``, what all methods see of a frame, and in the memory ``after`` contact and the state of the
     noise estimate. Whether there are forces, and they do not pull: an object cannot, and contact is then by shape.
     """
@@ -36,7 +36,10 @@ def observe(sensor: Sensor, frame: FrameArrays, before: Memory, after: Memory, r
     if not frame.force.size:
         noise[1] = max(noise[1], OF_STEP * step_of_depth)
     contact, was = after.contact, before.contact
-    by_force, by_shape = Touch(*unpack(sensor.touch_by_force, TOUCH)), Touch(*unpack(sensor.touch_by_shape, TOUCH))
+    by_force, by_shape = (
+        ContactThreshold(*unpack(sensor.touch_by_force, TOUCH)),
+        ContactThreshold(*unpack(sensor.touch_by_shape, TOUCH)),
+    )
     pulls = frame.force.size > 0 and pulled(pressing, noise[1], by_force)
     if frame.contact.size:
         contact[:] = frame.contact
@@ -53,7 +56,7 @@ def observe(sensor: Sensor, frame: FrameArrays, before: Memory, after: Memory, r
 
 
 @compiled
-def pulled(pressing: FloatArray, sigma: float, touch: Touch) -> bool:
+def pulled(pressing: FloatArray, sigma: float, touch: ContactThreshold) -> bool:
     """Whether elements pull on the whole, by more than noise ``sigma``, N, and what an element needs to touch."""
     known = spatial_noise(pressing) if math.isnan(sigma) else sigma
     noise = 0.0 if math.isnan(known) else touch.noise * known * math.sqrt(pressing.size)

@@ -26,9 +26,9 @@ NO_FIELD, NO_MASK, NO_POSE = (read_only(np.empty(s, t)) for s, t in (((0, 0, 3),
 """Stand for what a frame does not have."""
 
 
-class Sensor(NamedTuple):
+class DetectorSetup(NamedTuple):
     """What stays the same over a stream: the lattice (see ``strain.Lattice``), what an element needs to touch
-    by force and by shape (``contact.Touch`` as arrays) and the method's options as an array.
+    by force and by shape (``ContactThreshold`` as arrays) and the method's options as an array.
     """
 
     position: FloatArray
@@ -142,8 +142,8 @@ def workspace(n: int, m: int) -> Workspace:
 
 @compiled
 def named(
-    sensor: Sensor, last: FrameArrays, frame: FrameArrays, before: Memory, after: Memory
-) -> tuple[Sensor, FrameArrays, FrameArrays, Memory, Memory]:
+    sensor: DetectorSetup, last: FrameArrays, frame: FrameArrays, before: Memory, after: Memory
+) -> tuple[DetectorSetup, FrameArrays, FrameArrays, Memory, Memory]:
     """The same with names: from Python, plain tuples reach a kernel four times as fast as named ones."""
     frames = FrameArrays(*borrowed(last)), FrameArrays(*borrowed(frame))
-    return Sensor(*borrowed(sensor)), *frames, Memory(*borrowed(before)), Memory(*borrowed(after))
+    return DetectorSetup(*borrowed(sensor)), *frames, Memory(*borrowed(before)), Memory(*borrowed(after))

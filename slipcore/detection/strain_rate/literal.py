@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slipcore.defaults import StrainRateLiteralOptions
-from slipcore.detection.shared.interface import Method, Observation
+from slipcore.detection.shared.interface import Method, ObservedFrame
 from slipcore.detection.shared.records import Decision
 from slipcore.detection.strain_rate.lagged_score import LaggedScore, init_lagged_score, step_lagged_score
 from slipcore.frames import BoolArray, FloatArray
@@ -36,7 +36,7 @@ def init(lattice: Lattice, options: StrainRateLiteralOptions) -> LiteralState:
 
 
 def step(
-    state: LiteralState, lattice: Lattice, seen: Observation, options: StrainRateLiteralOptions
+    state: LiteralState, lattice: Lattice, seen: ObservedFrame, options: StrainRateLiteralOptions
 ) -> tuple[LiteralState, Decision]:
     """A positive extreme of δ above "0.1 × strain / Δt" begins slip, a negative one ends it (paper, section II-D)."""
     strains = _strains(lattice, seen)
@@ -51,7 +51,7 @@ def step(
     return LiteralState(strains, score, slip), Decision(slip, slip.astype(float))
 
 
-def _strains(lattice: Lattice, seen: Observation) -> FloatArray:
+def _strains(lattice: Lattice, seen: ObservedFrame) -> FloatArray:
     strain = green_lagrange(displacement_gradient(lattice, lattice_steps(seen.displacement)))
     return principal_strains(strain) * inclination_factor(seen.normal)
 

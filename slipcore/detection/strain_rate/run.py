@@ -3,14 +3,14 @@
 from slipcore.compilation import compiled
 from slipcore.detection.shared.decision import apply_decision
 from slipcore.detection.shared.observe import observe
-from slipcore.detection.shared.records import FrameArrays, Memory, Sensor, named, workspace
+from slipcore.detection.shared.records import DetectorSetup, FrameArrays, Memory, named, workspace
 from slipcore.detection.strain_rate.step import step_strain_rate
 from slipcore.frames import FloatArray
 
 
 @compiled
 def run_strain_rate(
-    sensor: Sensor, last: FrameArrays, frame: FrameArrays, before: Memory, after: Memory, velocity: FloatArray
+    sensor: DetectorSetup, last: FrameArrays, frame: FrameArrays, before: Memory, after: Memory, velocity: FloatArray
 ) -> tuple[float, int, int]:
     """Fill the memory ``after`` and ``velocity``; marker noise, m (NaN if unknown), and how many elements touch and
     slip. What it is given may be plain tuples of the same entries.

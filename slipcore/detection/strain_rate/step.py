@@ -7,7 +7,7 @@ import numpy as np
 
 from slipcore.compilation import compiled, unpack
 from slipcore.defaults import LIMITS
-from slipcore.detection.shared.records import Decision, Sensor, Surface
+from slipcore.detection.shared.records import Decision, DetectorSetup, Surface
 from slipcore.frames import BoolArray, FloatArray
 from slipcore.surface.normals import steps_at
 
@@ -55,7 +55,7 @@ def surface_strains(inverse_jacobian: FloatArray, displacement: FloatArray, norm
 
 @compiled
 def step_strain_rate(
-    sensor: Sensor,
+    sensor: DetectorSetup,
     displacement: FloatArray,
     surface: Surface,
     interval: float,

@@ -1,11 +1,11 @@
 import pytest
 
 import slipcore
-from service.exports import Recording
+from service.exports import DetectedLog
 from slipcore import GraspLog
 
 
 @pytest.fixture(scope="session")
-def recording(ramp: GraspLog) -> Recording:
+def recording(ramp: GraspLog) -> DetectedLog:
     """A simulated grasp and the slip in it."""
-    return Recording(ramp, slipcore.detect_slip(ramp), "ramp.npz")
+    return DetectedLog(ramp, slipcore.detect_slip(ramp), "ramp.npz")

@@ -10,7 +10,7 @@ import pytest
 from service import exports, formats
 from service.cli import main
 from service.cli.exit_codes import INPUT_REFUSED
-from service.exports import Recording
+from service.exports import DetectedLog
 from service.formats import writing
 from slipcore import GraspLog, InvalidInput
 from stiction_client import container
@@ -38,21 +38,23 @@ def test_another_ending_is_refused(tmp_path: Path) -> None:
         exports.target_of(tmp_path / "log.txt")
 
 
-def test_several_logs_in_a_file_of_one_are_refused(recording: Recording, tmp_path: Path) -> None:
+def test_several_logs_in_a_file_of_one_are_refused(recording: DetectedLog, tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match="logs is 2; allowed: one log a file for foxglove"):
         exports.write([recording, recording], tmp_path / "log.mcap", "foxglove")
     assert not (tmp_path / "log.mcap").exists()
 
 
-def test_an_export_that_breaks_off_leaves_nothing(recording: Recording, tmp_path: Path) -> None:
-    torn = Recording(recording.log, replace(recording.history, stick_ratio=recording.history.stick_ratio[:10]), "torn")
+def test_an_export_that_breaks_off_leaves_nothing(recording: DetectedLog, tmp_path: Path) -> None:
+    torn = DetectedLog(
+        recording.log, replace(recording.history, stick_ratio=recording.history.stick_ratio[:10]), "torn"
+    )
     with pytest.raises(IndexError, match="index 10 is out of bounds"):
         exports.write([torn], tmp_path / "log.mcap", "foxglove")
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("name", ["log.mcap", "log.rrd", "grasps"])
-def test_what_is_there_is_not_replaced(recording: Recording, tmp_path: Path, name: str) -> None:
+def test_what_is_there_is_not_replaced(recording: DetectedLog, tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text("mine")
     with pytest.raises(InvalidInput, match=r"output is .*; allowed: a (file|folder) that is .*not there yet"):
         exports.write([recording], tmp_path / name, exports.target_of(tmp_path / name))
@@ -77,7 +79,7 @@ def test_a_recording_is_not_exported_over_itself(
 
 
 def test_the_folder_that_one_is_in_is_refused_by_name(
-    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    recording: DetectedLog, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     with pytest.raises(InvalidInput, match=r"output is \., the folder that you are in; allowed: another"):
@@ -112,7 +114,7 @@ def test_no_command_writes_over_what_it_reads(
 
 
 def test_a_file_inside_of_a_folder_that_is_read_is_not_replaced(
-    recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    recording: DetectedLog, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     exports.write([recording], tmp_path / "grasps", "lerobot")
     data = tmp_path / "grasps" / "data" / "chunk-000" / "file-000.parquet"
@@ -125,7 +127,7 @@ def test_a_file_inside_of_a_folder_that_is_read_is_not_replaced(
 
 
 def test_a_missing_library_is_named_with_what_brings_it(
-    recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    recording: DetectedLog, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     import sys
 

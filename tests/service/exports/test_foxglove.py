@@ -15,7 +15,7 @@ from mcap.reader import make_reader
 from scipy.spatial.transform import Rotation
 
 from service import exports
-from service.exports import Recording
+from service.exports import DetectedLog
 from service.exports.foxglove import CELL, TOPICS
 from service.exports.scene import COLOURS
 from slipcore.slip_state import element_states
@@ -36,7 +36,7 @@ def read(path: Path) -> dict[str, list[Any]]:
 
 
 @pytest.fixture(scope="module")
-def path(recording: Recording, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def path(recording: DetectedLog, tmp_path_factory: pytest.TempPathFactory) -> Path:
     file = tmp_path_factory.mktemp("foxglove") / "log.mcap"
     exports.write([recording], file, exports.target_of(file))
     return file
@@ -47,14 +47,14 @@ def messages(path: Path) -> dict[str, list[Any]]:
     return read(path)
 
 
-def test_every_topic_has_a_message_a_frame_at_its_time(messages: dict[str, list[Any]], recording: Recording) -> None:
+def test_every_topic_has_a_message_a_frame_at_its_time(messages: dict[str, list[Any]], recording: DetectedLog) -> None:
     assert messages.keys() == TOPICS.keys()
     for told in messages.values():
         np.testing.assert_allclose([moment * 1e-9 for moment, _ in told], recording.log.time, atol=1e-9)
 
 
 def test_the_grid_shows_the_state_of_each_element_where_it_is(
-    messages: dict[str, list[Any]], recording: Recording
+    messages: dict[str, list[Any]], recording: DetectedLog
 ) -> None:
     states, log = element_states(recording.history.contact, recording.history.slip), recording.log
     for (_, grid), expected in zip(messages["/slip/grid"], states, strict=True):
@@ -72,7 +72,7 @@ def test_the_grid_shows_the_state_of_each_element_where_it_is(
 
 
 def test_lines_follow_the_tangential_force_of_elements_in_contact(
-    messages: dict[str, list[Any]], recording: Recording
+    messages: dict[str, list[Any]], recording: DetectedLog
 ) -> None:
     log, k = recording.log, len(recording.log) // 2
     assert log.force is not None
@@ -86,7 +86,7 @@ def test_lines_follow_the_tangential_force_of_elements_in_contact(
     assert entity["metadata"][0]["value"].endswith("N of tangential force")
 
 
-def test_patches_stand_with_their_regimes(messages: dict[str, list[Any]], recording: Recording) -> None:
+def test_patches_stand_with_their_regimes(messages: dict[str, list[Any]], recording: DetectedLog) -> None:
     (patch,) = recording.history.patches
     for k in range(len(patch.pose)):
         (entity,) = messages["/slip/scene"][patch.first + k][1]["entities"]
@@ -96,7 +96,7 @@ def test_patches_stand_with_their_regimes(messages: dict[str, list[Any]], record
             np.testing.assert_allclose(words[0]["pose"]["position"]["x"], patch.pose[k, 0], atol=1e-8)
 
 
-def test_numbers_over_time_are_those_of_the_history(messages: dict[str, list[Any]], recording: Recording) -> None:
+def test_numbers_over_time_are_those_of_the_history(messages: dict[str, list[Any]], recording: DetectedLog) -> None:
     log, history = recording.log, recording.history
     assert log.force is not None
     told = [state for _, state in messages["/slip/state"]]
@@ -150,8 +150,8 @@ def with_protobufs_times(told: Any, of: str = "") -> Any:
     return {name: with_protobufs_times(value, name) for name, value in told.items()}
 
 
-def test_a_log_without_forces_shows_displacement(recording: Recording, tmp_path: Path) -> None:
-    bare = Recording(replace(recording.log, force=None, truth=None), recording.history, "bare")
+def test_a_log_without_forces_shows_displacement(recording: DetectedLog, tmp_path: Path) -> None:
+    bare = DetectedLog(replace(recording.log, force=None, truth=None), recording.history, "bare")
     exports.write([bare], tmp_path / "bare.mcap", "foxglove")
     messages = read(tmp_path / "bare.mcap")
     assert messages["/slip/state"][0][1]["normal_force"] is None

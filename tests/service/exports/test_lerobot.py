@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from service import exports, formats
-from service.exports import Recording
+from service.exports import DetectedLog
 from slipcore import InvalidInput
 
 ARROW = {"double": "float64", "float": "float32"}
@@ -21,17 +21,17 @@ DATA = "data/chunk-000/file-000.parquet"
 
 
 @pytest.fixture(scope="module")
-def second(recording: Recording) -> Recording:
+def second(recording: DetectedLog) -> DetectedLog:
     """Another grasp of the same sensor: the first one's later half, with a task of its own."""
     log, history = recording.log, recording.history
     later = slice(len(log) // 2, None)
     parts = {name: getattr(history, name)[later] for name in ("contact", "slip", "stick_ratio")}
     told = replace(log.take(later), metadata={"task": "lift the cup"})
-    return Recording(told, replace(history, **parts), "later")
+    return DetectedLog(told, replace(history, **parts), "later")
 
 
 @pytest.fixture(scope="module")
-def folder(recording: Recording, second: Recording, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(recording: DetectedLog, second: DetectedLog, tmp_path_factory: pytest.TempPathFactory) -> Path:
     output = tmp_path_factory.mktemp("lerobot") / "grasps"
     exports.write([recording, second], output, exports.target_of(output))
     return output
@@ -42,7 +42,7 @@ def info(folder: Path) -> Any:
     return json.loads((folder / "meta/info.json").read_text())
 
 
-def test_the_description_is_of_version_3(folder: Path, info: Any, recording: Recording, second: Recording) -> None:
+def test_the_description_is_of_version_3(folder: Path, info: Any, recording: DetectedLog, second: DetectedLog) -> None:
     frames = len(recording.log) + len(second.log)
     assert info["codebase_version"] == "v3.0"
     assert (info["total_episodes"], info["total_frames"], info["total_tasks"]) == (2, frames, 2)
@@ -68,7 +68,7 @@ def _innermost(kind: Any) -> Any:
 
 
 def test_frames_count_through_episodes_and_time_runs_evenly(
-    folder: Path, info: Any, recording: Recording, second: Recording
+    folder: Path, info: Any, recording: DetectedLog, second: DetectedLog
 ) -> None:
     table = pd.read_parquet(folder / DATA)
     lengths = [len(recording.log), len(second.log)]
@@ -78,7 +78,7 @@ def test_frames_count_through_episodes_and_time_runs_evenly(
     np.testing.assert_allclose(table["timestamp"], table["frame_index"] / info["fps"], rtol=1e-6)
 
 
-def test_episodes_and_tasks_say_where_each_is(folder: Path, recording: Recording, second: Recording) -> None:
+def test_episodes_and_tasks_say_where_each_is(folder: Path, recording: DetectedLog, second: DetectedLog) -> None:
     episodes = pd.read_parquet(folder / "meta/episodes/chunk-000/file-000.parquet")
     assert episodes["length"].tolist() == [len(recording.log), len(second.log)]
     assert episodes["dataset_to_index"].tolist() == np.cumsum(episodes["length"]).tolist()
@@ -91,7 +91,7 @@ def test_episodes_and_tasks_say_where_each_is(folder: Path, recording: Recording
     assert frames.groupby("episode_index")["task_index"].unique().map(list).tolist() == [[0], [1]]
 
 
-def test_slip_is_among_the_features(folder: Path, recording: Recording) -> None:
+def test_slip_is_among_the_features(folder: Path, recording: DetectedLog) -> None:
     frames = pd.read_parquet(folder / DATA).query("episode_index == 0")
     history = recording.history
     states = np.array([[list(row) for row in frame] for frame in frames["observation.slip_state"]])
@@ -101,7 +101,7 @@ def test_slip_is_among_the_features(folder: Path, recording: Recording) -> None:
     np.testing.assert_allclose(frames["observation.stick_ratio"], expected, rtol=1e-6)
 
 
-def test_statistics_are_those_of_the_frames(folder: Path, recording: Recording, second: Recording) -> None:
+def test_statistics_are_those_of_the_frames(folder: Path, recording: DetectedLog, second: DetectedLog) -> None:
     stats = json.loads((folder / "meta/stats.json").read_text())
     assert recording.log.force is not None
     assert second.log.force is not None
@@ -111,7 +111,7 @@ def test_statistics_are_those_of_the_frames(folder: Path, recording: Recording, 
     assert stats["observation.force"]["count"] == [len(force)]
 
 
-def test_statistics_of_each_episode_stand_beside_it(folder: Path, second: Recording) -> None:
+def test_statistics_of_each_episode_stand_beside_it(folder: Path, second: DetectedLog) -> None:
     episodes = pd.read_parquet(folder / "meta/episodes/chunk-000/file-000.parquet")
     assert second.log.force is not None
     told = np.array([[list(row) for row in rows] for rows in episodes["stats/observation.force/q90"][1]])
@@ -119,7 +119,7 @@ def test_statistics_of_each_episode_stand_beside_it(folder: Path, second: Record
     assert episodes["stats/observation.stick_ratio/count"][1].tolist() == [len(second.log)]
 
 
-def test_a_grippers_force_is_a_feature_and_comes_back(recording: Recording, tmp_path: Path) -> None:
+def test_a_grippers_force_is_a_feature_and_comes_back(recording: DetectedLog, tmp_path: Path) -> None:
     log = replace(recording.log, gripper_force=np.arange(float(len(recording.log))), gripper_force_deviation=0.5)
     exports.write([replace(recording, log=log)], tmp_path / "grasp", exports.target_of(tmp_path / "grasp"))
     back = formats.read(tmp_path / "grasp" / DATA)
@@ -130,7 +130,7 @@ def test_a_grippers_force_is_a_feature_and_comes_back(recording: Recording, tmp_
         exports.write(pair, tmp_path / "pair", exports.target_of(tmp_path / "pair"))
 
 
-def test_lerobot_itself_loads_it(folder: Path, recording: Recording, second: Recording) -> None:
+def test_lerobot_itself_loads_it(folder: Path, recording: DetectedLog, second: DetectedLog) -> None:
     """With what trains on it: where LeRobot is installed, which brings PyTorch."""
     reason = "lerobot is not installed: pip install lerobot"
     loaded = pytest.importorskip("lerobot.datasets.lerobot_dataset", reason=reason).LeRobotDataset("me/it", root=folder)
@@ -142,7 +142,9 @@ def test_lerobot_itself_loads_it(folder: Path, recording: Recording, second: Rec
 
 
 @pytest.mark.parametrize("episode", [0, 1])
-def test_an_episode_is_read_back_as_a_log(folder: Path, recording: Recording, second: Recording, episode: int) -> None:
+def test_an_episode_is_read_back_as_a_log(
+    folder: Path, recording: DetectedLog, second: DetectedLog, episode: int
+) -> None:
     log = (recording, second)[episode].log
     back = formats.read(folder / DATA, mapping=json.dumps({"episode": episode}))
     np.testing.assert_array_equal(back.time, log.time)
@@ -153,8 +155,8 @@ def test_an_episode_is_read_back_as_a_log(folder: Path, recording: Recording, se
     assert (back.element_area, back.sensor, back.contact) == (log.element_area, log.sensor, None)
 
 
-def test_a_log_of_forces_alone_stays_one(recording: Recording, tmp_path: Path) -> None:
-    alone = Recording(replace(recording.log, displacement=None, truth=None), recording.history, "alone")
+def test_a_log_of_forces_alone_stays_one(recording: DetectedLog, tmp_path: Path) -> None:
+    alone = DetectedLog(replace(recording.log, displacement=None, truth=None), recording.history, "alone")
     exports.write([alone], tmp_path / "alone", "lerobot")
     assert "observation.displacement" not in pq.read_table(tmp_path / "alone" / DATA).column_names
     read = formats.read(tmp_path / "alone", mapping='{"episode": 0}')
@@ -163,10 +165,10 @@ def test_a_log_of_forces_alone_stays_one(recording: Recording, tmp_path: Path) -
     np.testing.assert_allclose(read.force, recording.log.force, rtol=1e-6, atol=0.0)  # of single precision
 
 
-def test_logs_of_different_sensors_or_members_are_refused(recording: Recording, tmp_path: Path) -> None:
+def test_logs_of_different_sensors_or_members_are_refused(recording: DetectedLog, tmp_path: Path) -> None:
     log = recording.log
-    bare = Recording(replace(log, force=None, truth=None), recording.history, "bare.npz")
-    moved = Recording(replace(log, position=log.position * 1.01), recording.history, "moved.npz")
+    bare = DetectedLog(replace(log, force=None, truth=None), recording.history, "bare.npz")
+    moved = DetectedLog(replace(log, position=log.position * 1.01), recording.history, "moved.npz")
     with pytest.raises(InvalidInput, match=r"bare\.npz is with other members"):
         exports.write([recording, bare], tmp_path / "a", "lerobot")
     with pytest.raises(InvalidInput, match=r"moved\.npz is of a sensor with other markers"):
@@ -174,7 +176,7 @@ def test_logs_of_different_sensors_or_members_are_refused(recording: Recording, 
     assert not list(tmp_path.iterdir())
 
 
-def test_a_folder_that_holds_something_is_left_alone(recording: Recording, tmp_path: Path) -> None:
+def test_a_folder_that_holds_something_is_left_alone(recording: DetectedLog, tmp_path: Path) -> None:
     (tmp_path / "kept").write_text("mine")
     with pytest.raises(InvalidInput, match="allowed: a folder that is empty or not there yet"):
         exports.write([recording], tmp_path, "lerobot")

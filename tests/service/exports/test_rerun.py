@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from service import exports
-from service.exports import Recording
+from service.exports import DetectedLog
 from slipcore.slip_state import element_states
 
 chunk = pytest.importorskip("rerun.chunk", reason="rerun-sdk is not installed: pip install rerun-sdk")
 
 
 @pytest.fixture(scope="module")
-def reader(recording: Recording, tmp_path_factory: pytest.TempPathFactory) -> Any:
+def reader(recording: DetectedLog, tmp_path_factory: pytest.TempPathFactory) -> Any:
     path = tmp_path_factory.mktemp("rerun") / "log.rrd"
     exports.write([recording], path, exports.target_of(path))
     return chunk.RrdReader(path)
@@ -44,7 +44,7 @@ def values(columns: dict[tuple[str, str], dict[float, Any]], entity: str, compon
     return [found[time] for time in sorted(found)]
 
 
-def test_the_map_shows_the_state_of_each_element(columns: Any, recording: Recording) -> None:
+def test_the_map_shows_the_state_of_each_element(columns: Any, recording: DetectedLog) -> None:
     images = values(columns, "/sensor/map", ":buffer")
     expected = element_states(recording.history.contact, recording.history.slip)
     assert len(images) == len(expected)
@@ -52,7 +52,7 @@ def test_the_map_shows_the_state_of_each_element(columns: Any, recording: Record
         np.testing.assert_array_equal(np.frombuffer(bytes(image[0]), np.uint8).reshape(states.shape), states)
 
 
-def test_numbers_over_time_are_those_of_the_log(columns: Any, recording: Recording) -> None:
+def test_numbers_over_time_are_those_of_the_log(columns: Any, recording: DetectedLog) -> None:
     assert recording.log.force is not None
     told = np.ravel(values(columns, "/force/normal", ":scalars"))
     np.testing.assert_allclose(told, np.abs(recording.log.force[..., 2].sum((1, 2))))
@@ -61,13 +61,13 @@ def test_numbers_over_time_are_those_of_the_log(columns: Any, recording: Recordi
     )
 
 
-def test_arrows_stand_on_elements_in_contact(columns: Any, recording: Recording) -> None:
+def test_arrows_stand_on_elements_in_contact(columns: Any, recording: DetectedLog) -> None:
     for origins, touching in zip(values(columns, "/sensor/arrows", ":origins"), recording.history.contact, strict=True):
         places = np.array(origins or [], float).reshape(-1, 2)
         np.testing.assert_array_equal(places[:, ::-1] - 0.5, np.argwhere(touching))
 
 
-def test_patches_are_labelled_with_their_regimes_inside_of_the_contact(columns: Any, recording: Recording) -> None:
+def test_patches_are_labelled_with_their_regimes_inside_of_the_contact(columns: Any, recording: DetectedLog) -> None:
     (patch,) = recording.history.patches
     frame = patch.first + len(patch.pose) // 2
     assert values(columns, "/sensor/patches", ":labels")[frame] == [patch.regime[frame - patch.first]]

@@ -30,7 +30,7 @@ def logs(ramp: GraspLog) -> list[GraspLog]:
 @pytest.fixture(scope="module")
 def exported(logs: list[GraspLog], tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("lerobot") / "grasps"
-    recordings = [exports.Recording(log, slipcore.detect_slip(log), str(k)) for k, log in enumerate(logs)]
+    recordings = [exports.DetectedLog(log, slipcore.detect_slip(log), str(k)) for k, log in enumerate(logs)]
     exports.write(recordings, folder, "lerobot")
     return folder
 

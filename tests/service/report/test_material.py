@@ -6,9 +6,9 @@ import pytest
 from service.report.material import material_report
 from service.report.page import render
 from service.report.pictures import friction_sections, marginals
-from stiction_client.linear_friction import Domain
 from stiction_client.model import Cost, FrictionModel
 from stiction_client.records import Material, NextGrasp
+from stiction_client.support import Domain
 
 MODEL = FrictionModel(
     material="<b>paper</b>",

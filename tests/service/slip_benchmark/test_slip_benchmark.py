@@ -147,7 +147,7 @@ def test_a_camera_without_depth_tells_nothing_along_z_and_no_forces(monkeypatch:
 
 @pytest.mark.parametrize("family", dict.fromkeys(family for family, _ in scenes._FAMILIES), ids=lambda f: f.__name__)
 def test_loads_begin_after_the_press_and_stay_below_sliding_and_motions_go_beyond(family: Any) -> None:
-    body = scenes.Body(0.5, 8.0, 4e-3, Finger())
+    body = scenes.DrawnPress(0.5, 8.0, 4e-3, Finger())
     for seed in range(20):
         effects, duration = family(np.random.default_rng(seed), body, 1.0)
         for effect in effects:
@@ -406,7 +406,7 @@ def test_what_cannot_be_scored_ends_the_command_with_what_is_wrong(
 
 def test_what_slides_stays_there_or_comes_back_on_its_way() -> None:
     """By up to 130 %, and in half of the scenes at all."""
-    body = scenes.Body(0.5, 8.0, 4e-3, Finger())
+    body = scenes.DrawnPress(0.5, 8.0, 4e-3, Finger())
     shares = []
     for seed in range(40):
         (motion,), end = scenes._slide(np.random.default_rng(seed), body, 0.0)

@@ -25,7 +25,7 @@ GRIP = Control(6e-5, {"least_force": 0.5, "most_force": 30.0}, round_at=5.0)
 
 def opened(
     log: GraspLog, keep: bool = False, limit: detectors.MemoryLimit = ROOM, control: Control | None = None
-) -> detectors.Session:
+) -> detectors.DetectorSession:
     options = detectors.SessionOptions(control, gel=GEL)
     detectors.open_session("one", log.position.tobytes(), log.grid, log.element_area, "filter", keep, limit, options)
     return detectors._SESSIONS["one"]

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from slipcore.calibration.press import Press, find_press
+from slipcore.calibration.press import PressLog, find_press
 from slipcore.frames import FloatArray, GraspLog
 
 GRID = (8, 8)
@@ -44,6 +44,6 @@ def straight(
     return GraspLog(time, places(share.shape), motion, 1e-6, force=force, normal=normal, sensor="straight press")
 
 
-def press(**chosen: object) -> Press:
+def press(**chosen: object) -> PressLog:
     """The same, as calibration sees it."""
     return find_press(straight(**chosen))  # type: ignore[arg-type]

@@ -22,7 +22,7 @@ from slipcore import (
     contact_friction,
     detect_slip,
 )
-from slipcore.calibration.estimate import Observed, error_of_mean, joined
+from slipcore.calibration.estimate import PressEstimate, error_of_mean, joined
 from slipcore.contact import RampSchedule, tangential_ramp
 
 FAULTS = Faults(
@@ -100,8 +100,8 @@ def test_more_presses_narrow_what_they_agree_on(ball: GraspLog, models: list[Sen
 
 
 def test_presses_that_disagree_widen_the_interval() -> None:
-    alike = joined("x", "-", [Observed(1.0, 0.1)] * 4)
-    apart = joined("x", "-", [Observed(value, 0.1) for value in (0.0, 1.0, 2.0, 1.0)])
+    alike = joined("x", "-", [PressEstimate(1.0, 0.1)] * 4)
+    apart = joined("x", "-", [PressEstimate(value, 0.1) for value in (0.0, 1.0, 2.0, 1.0)])
     assert (alike.value, alike.high) == pytest.approx((1.0, 1.0 + 1.959964 * 0.05), rel=1e-6)
     deviation = np.std([0.0, 1.0, 2.0, 1.0], ddof=1)
     assert apart.high - apart.value == pytest.approx(3.182446 * deviation / 2.0, rel=1e-6)

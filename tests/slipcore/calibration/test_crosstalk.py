@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from slipcore.calibration.crosstalk import crosstalk, inward_share
-from slipcore.calibration.estimate import Observed
+from slipcore.calibration.estimate import PressEstimate
 from slipcore.calibration.press import find_press
 from tests.slipcore.calibration.straight_press import LOAD, STEP, places, press, straight
 
@@ -55,7 +55,7 @@ def test_force_towards_the_middle_is_found(share: float) -> None:
     tangential = -share * log.force[..., 2:] * inward
     force = np.concatenate([tangential, log.force[..., 2:]], axis=-1)
     found = inward_share(find_press(replace(log, force=force)))
-    assert isinstance(found, Observed)
+    assert isinstance(found, PressEstimate)
     assert found.value == pytest.approx(share, rel=1e-9)
     assert found.error == pytest.approx(0.0, abs=1e-9)
 
@@ -66,7 +66,7 @@ def test_the_error_of_inward_force_is_that_of_the_elements_zeros() -> None:
     noise[free, ..., :2] = 1e-3 * np.where(np.arange(len(free)) % 2, 1.0, -1.0)[:, None, None, None]
     seen = press(added=noise)
     found = inward_share(seen)
-    assert isinstance(found, Observed)
+    assert isinstance(found, PressEstimate)
     assert seen.split is not None
     still = seen.split[seen.free][:, seen.footprint, :2].std()
     normal = np.maximum(seen.split[seen.pressed][:, seen.footprint, 2], 0.0).sum(axis=1).mean()

@@ -5,20 +5,20 @@ import math
 import numpy as np
 import pytest
 
-from slipcore.calibration.estimate import Estimate, Observed, error_of_mean, joined, unknown
+from slipcore.calibration.estimate import Estimate, PressEstimate, error_of_mean, joined, unknown
 
 NORMAL = 1.959964
 
 
 def test_one_press_is_taken_as_it_is() -> None:
-    found = joined("gain", "-", ["no force", Observed(1.5, 0.2)])
+    found = joined("gain", "-", ["no force", PressEstimate(1.5, 0.2)])
     assert (found.value, found.low, found.high) == pytest.approx((1.5, 1.5 - NORMAL * 0.2, 1.5 + NORMAL * 0.2))
     assert (found.name, found.unit, found.not_identified) == ("gain", "-", None)
 
 
 def test_presses_that_agree_count_by_the_square_of_their_errors() -> None:
     """Weights 1/0.1² and 1/0.2²; what lies between them is less than their errors."""
-    found = joined("x", "m", [Observed(1.0, 0.1), Observed(1.1, 0.2)])
+    found = joined("x", "m", [PressEstimate(1.0, 0.1), PressEstimate(1.1, 0.2)])
     assert found.value == pytest.approx((100.0 + 25.0 * 1.1) / 125.0)
     assert found.high - found.value == pytest.approx(NORMAL / math.sqrt(125.0), rel=1e-6)
 
@@ -31,7 +31,7 @@ def test_presses_that_disagree_have_an_effect_of_their_own() -> None:
     excess = sum(w * (v - mean) ** 2 for w, (v, _) in zip(weights, values, strict=True)) - 2.0
     between = excess / (150.0 - 11250.0 / 150.0)
     weights = [1.0 / (e**2 + between) for _, e in values]
-    found = joined("x", "m", [Observed(*each) for each in values])
+    found = joined("x", "m", [PressEstimate(*each) for each in values])
     assert found.value == pytest.approx(sum(w * v for w, (v, _) in zip(weights, values, strict=True)) / sum(weights))
     assert found.high - found.value == pytest.approx(4.302653 / math.sqrt(sum(weights)), rel=1e-6)  # t of two
     assert found.value - found.low == pytest.approx(found.high - found.value)

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slipcore.calibration.estimate import Observed
+from slipcore.calibration.estimate import PressEstimate
 from slipcore.calibration.gain import gain
-from slipcore.calibration.press import Press, find_press
+from slipcore.calibration.press import PressLog, find_press
 from tests.slipcore.calibration.straight_press import LOAD, press, shares, straight
 
 
 def test_a_gain_is_known_force_over_told_force() -> None:
     found = gain(press(newton=2.0), 3.0)
-    assert isinstance(found, Observed)
+    assert isinstance(found, PressEstimate)
     assert found.value == pytest.approx(1.5, rel=1e-12)
     assert found.error == pytest.approx(0.0, abs=1e-12)
 
@@ -23,13 +23,13 @@ def test_its_error_is_that_of_the_zero_of_all_elements() -> None:
     noise[LOAD == 0.0, ..., 2] = 1e-4 * np.where(np.arange(24) % 2, 1.0, -1.0)[:, None, None]
     seen = press(newton=2.0, added=noise)
     found = gain(seen, 2.0)
-    assert isinstance(found, Observed)
+    assert isinstance(found, PressEstimate)
     assert seen.zero is not None
     told = -seen.log.force[seen.held, ..., 2].sum(axis=(1, 2)).mean()  # type: ignore[index]
     assert found.error == pytest.approx(2.0 / told * 64 * seen.zero.offset_error[2] / told, rel=1e-3)
 
 
-REFUSED: dict[str, tuple[Press, float | None]] = {
+REFUSED: dict[str, tuple[PressLog, float | None]] = {
     "no total force is given": (press(), None),
     "the log has no forces": (find_press(replace(straight(), force=None)), 2.0),
     "no frames without contact": (press(load=LOAD[14:24]), 2.0),

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slipcore.calibration.estimate import Observed
+from slipcore.calibration.estimate import PressEstimate
 from slipcore.calibration.kernel import _Growth, _left_at_no_force, _line, _moments, kernel_width, squared_width
 from slipcore.calibration.press import find_press
 from slipcore.frames import GraspLog
@@ -65,7 +65,7 @@ def test_what_is_left_takes_half_of_an_element_off() -> None:
 @pytest.mark.parametrize("width", [1e-3, 1.5e-3])
 def test_a_kernel_is_found_under_a_growing_contact(width: float) -> None:
     found = squared_width(find_press(growing(width)))
-    assert isinstance(found, Observed)
+    assert isinstance(found, PressEstimate)
     assert abs(found.value - width**2) < 2.0 * found.error
     assert found.value == pytest.approx(width**2, rel=0.15)  # of the exponents that are possible, no one is known
 
@@ -75,13 +75,13 @@ def test_a_kernel_is_found_under_a_growing_contact(width: float) -> None:
     [(4e-6, 0.0, (2e-3, 2e-3, 2e-3)), (4e-6, 1e-6, (2e-3, math.sqrt(4e-6 - 1.959964e-6), math.sqrt(5.959964e-6)))],
 )
 def test_a_width_is_the_root_of_its_square(square: float, error: float, width: tuple[float, float, float]) -> None:
-    found = kernel_width([Observed(square, error)])
+    found = kernel_width([PressEstimate(square, error)])
     assert (found.value, found.low, found.high) == pytest.approx(width, rel=1e-6)
     assert (found.name, found.unit) == ("kernel_width", "m")
 
 
 def test_a_square_below_none_is_no_width() -> None:
-    found = kernel_width([Observed(-1e-6, 1e-6)])
+    found = kernel_width([PressEstimate(-1e-6, 1e-6)])
     assert (found.value, found.low) == (0.0, 0.0)
     assert found.high == pytest.approx(math.sqrt(0.959964e-6), rel=1e-6)
     assert not found.is_significant
@@ -107,7 +107,7 @@ def test_noise_far_out_does_not_widen_a_kernel() -> None:
     assert log.force is not None
     noise = 1e-4 * np.random.default_rng(3).standard_normal(log.force.shape)
     found = squared_width(find_press(replace(log, force=log.force + noise)))
-    assert isinstance(found, Observed)
+    assert isinstance(found, PressEstimate)
     assert abs(found.value - 1e-6) < 3.0 * found.error
     assert found.error < 4e-7
     assert places(GRID).shape == (*GRID, 3)

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from slipcore.calibration.marker_noise import _bounded, _change, _fit, _mean_squares, _parts, marker_noise
-from slipcore.calibration.press import Press, find_press
+from slipcore.calibration.press import PressLog, find_press
 from slipcore.frames import FloatArray
 from tests.slipcore.calibration.straight_press import LOAD, shares, straight
 
 LAGS = np.arange(1, 31)
 
 
-def noisy(motion: FloatArray, load: FloatArray = LOAD) -> Press:
+def noisy(motion: FloatArray, load: FloatArray = LOAD) -> PressLog:
     """Markers that move, beside the press, by ``motion`` [t, 8, 8, 2] m."""
     log = straight(load=load)
     moved = log.displacement + np.concatenate([motion, np.zeros_like(motion[..., :1])], axis=-1)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slipcore.calibration.press import Press, _noise, find_press, load_terms, marker_motion, press_fault
+from slipcore.calibration.press import PressLog, _noise, find_press, load_terms, marker_motion, press_fault
 from slipcore.frames import GraspLog
 from tests.slipcore.calibration.straight_press import DEPTH, LOAD, STEP, places, press, shares, straight
 
@@ -82,7 +82,7 @@ def test_motion_of_markers_is_told_by_mean_and_turn() -> None:
     np.testing.assert_allclose(turn, angle * radius * LOAD[seen.pressed], rtol=1e-9)  # rounding
 
 
-def bent(share: float) -> Press:
+def bent(share: float) -> PressLog:
     """Load along x in the middle of the hold, as a share of the largest normal load over the footprint."""
     load = np.zeros((len(LOAD), 1, 1, 3))
     load[18:20, ..., 0] = share * 2.0 * shares()[shares() >= 0.05 * shares().max()].sum()

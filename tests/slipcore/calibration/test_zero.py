@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slipcore.calibration.estimate import Observed
+from slipcore.calibration.estimate import PressEstimate
 from slipcore.calibration.zero import drifts, elapsed, find_zero, offsets
 from slipcore.frames import FloatArray
 from tests.slipcore.calibration.straight_press import GRID, LOAD, STEP, straight
@@ -71,7 +71,7 @@ def test_fewer_than_two_free_frames_tell_no_zero() -> None:
 def test_ten_free_frames_tell_an_offset(frames: int, is_known: bool) -> None:
     zero = find_zero(straight(added=faulty()), np.arange(len(LOAD)) < frames)
     found = offsets(zero)
-    assert [isinstance(each, Observed) for each in found] == [is_known] * 3
+    assert [isinstance(each, PressEstimate) for each in found] == [is_known] * 3
     if is_known:
         mean = OFFSET.mean(axis=(0, 1)) + TIME[:10].mean() * DRIFT
         np.testing.assert_allclose([each[0] for each in found], mean, rtol=0.0, atol=1e-14)  # rounding

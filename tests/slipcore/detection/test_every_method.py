@@ -22,7 +22,7 @@ from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.defaults import DEFAULT_METHOD, ContactOptions
 from slipcore.detection.batch import with_patches
 from slipcore.detection.detector import init, step
-from slipcore.detection.shared.interface import Decision, Method, Observation
+from slipcore.detection.shared.interface import Decision, Method, ObservedFrame
 from slipcore.patch.regimes import slips_as_a_whole
 from slipcore.surface.strain import Lattice
 
@@ -231,7 +231,7 @@ def test_with_every_element_in_contact_and_none_moving_all_stick(method: str) ->
 
 
 def test_no_method_can_make_slip_of_a_fresh_touch_or_out_of_contact(monkeypatch: pytest.MonkeyPatch) -> None:
-    def everything_slips(state: None, _: Lattice, seen: Observation, __: ContactOptions) -> tuple[None, Decision]:
+    def everything_slips(state: None, _: Lattice, seen: ObservedFrame, __: ContactOptions) -> tuple[None, Decision]:
         return state, Decision(np.ones(seen.contact.shape, bool), np.ones(seen.contact.shape))
 
     reckless = Method(ContactOptions, lambda *_: None, everything_slips)

@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import hadamard
 
 from slipcore.forces.covariance import covariance_root
-from slipcore.forces.fit import Observation
+from slipcore.forces.fit import ObservationModel
 from slipcore.forces.support import condensed, node_relevance, relevant_nodes, widened
 
 NODES = 16
@@ -64,5 +64,5 @@ def test_nodes_that_data_show_directly_are_found_with_the_row_beside_them(noise:
     loaded[2:5, 3:7] = True
     response = np.eye(3 * count).reshape(3 * count, 3, count)
     data = np.concatenate([0.2 * loaded.ravel(), np.zeros(count), 0.7 * loaded.ravel()])
-    found = relevant_nodes(Observation(response, np.full(3 * count, noise)), data, np.ones(shape, dtype=bool))
+    found = relevant_nodes(ObservationModel(response, np.full(3 * count, noise)), data, np.ones(shape, dtype=bool))
     np.testing.assert_array_equal(found, widened(loaded, 1))

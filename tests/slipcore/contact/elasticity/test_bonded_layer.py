@@ -10,7 +10,7 @@ from slipcore.contact.elasticity.influence import Component, HalfSpace
 from slipcore.contact.elasticity.operator import Operators
 from slipcore.contact.reference.bonded_layer import half_space_modes
 from slipcore.contact.solver.normal import solve_normal
-from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
 
 YOUNG, RADIUS, FRICTION = 1e6, 15e-3, 0.4
@@ -152,7 +152,7 @@ def test_a_layer_costs_no_application_by_itself() -> None:
     loads = [StepLoad(10.0, tangential=np.array([f, 0.0, 0.0])) for f in (0.0, 1.0, 2.0, 3.0)]
     counts = []
     for finger in (bodies(5e-3, 0.49), bodies(5e-3, 0.49)[:1]):
-        problem = Problem(finger, FRICTION, heights=(lambda x, y: (x**2 + y**2) / (2 * RADIUS),))
+        problem = ContactProblem(finger, FRICTION, heights=(lambda x, y: (x**2 + y**2) / (2 * RADIUS),))
         solver = QuasiStatic(problem, Grid.square(32, 12e-3), 1e-4)
         list(solver.run(loads))
         counts.append(solver.count.normal + solver.count.tangential)

@@ -6,7 +6,7 @@ import numpy as np
 
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import HalfSpace
-from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
 from slipcore.contact.solver.state import StepResult
 
@@ -24,8 +24,8 @@ def body(poisson: float = 0.3, young: float = YOUNG) -> HalfSpace:
     return HalfSpace.from_young(young, poisson)
 
 
-def problem(poisson: float = 0.3, friction: float = FRICTION, height=bowl, **more) -> Problem:
-    return Problem((body(poisson),), friction, heights=(height,), **more)
+def problem(poisson: float = 0.3, friction: float = FRICTION, height=bowl, **more) -> ContactProblem:
+    return ContactProblem((body(poisson),), friction, heights=(height,), **more)
 
 
 def at(normal: float, along_x: float = 0.0, along_y: float = 0.0, moment: float = 0.0) -> StepLoad:
@@ -37,7 +37,7 @@ def moved(normal: float, *motion: float) -> StepLoad:
 
 
 def follow(
-    scene: Problem,
+    scene: ContactProblem,
     loads: Iterable[StepLoad],
     cells: int = 32,
     width: float = 11e-3,
@@ -49,7 +49,7 @@ def follow(
 
 
 def follow_on(
-    grid: Grid, scene: Problem, loads: Iterable[StepLoad], bound: int = BOUND, tolerance: float = 1e-8
+    grid: Grid, scene: ContactProblem, loads: Iterable[StepLoad], bound: int = BOUND, tolerance: float = 1e-8
 ) -> list[StepResult]:
     """All results, after holding each to bound, balance, Coulomb's law and complementarity; at rates of slip of second
     order, as scenes are run.

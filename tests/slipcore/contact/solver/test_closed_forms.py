@@ -8,7 +8,7 @@ import pytest
 from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
 from slipcore.contact.reference.mindlin_deresiewicz import MindlinDeresiewicz
 from slipcore.contact.reference.torsion import TorsionPartialSlip, sliding_moment
-from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
 from slipcore.contact.solver.state import StepResult
 
@@ -25,7 +25,7 @@ def norm_errors(got: np.ndarray, exact: np.ndarray, case) -> tuple[float, float]
 
 
 def solver_of(case, tolerance: float = 1e-8) -> QuasiStatic:
-    problem = Problem(case.operators.bodies, FRICTION, heights=(lambda x, y: (x**2 + y**2) / 30e-3,))
+    problem = ContactProblem(case.operators.bodies, FRICTION, heights=(lambda x, y: (x**2 + y**2) / 30e-3,))
     return QuasiStatic(problem, case.grid, tolerance, 1e-2 * tolerance)
 
 

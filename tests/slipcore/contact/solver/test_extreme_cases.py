@@ -17,7 +17,7 @@ from slipcore.contact.reference.elastic_pair import half_space
 from slipcore.contact.reference.hertz import HertzContact
 from slipcore.contact.reference.mindlin_deresiewicz import MindlinDeresiewicz
 from slipcore.contact.solver.normal import solve_normal
-from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
 from slipcore.contact.solver.state import StepResult
 from slipcore.frames import FloatArray
@@ -43,7 +43,7 @@ def round_punch(x: FloatArray, y: FloatArray) -> FloatArray:
     return np.where(np.hypot(x, y) <= PUNCH, 0.0, np.inf)
 
 
-def pushed(scene: Problem, cells: int = 32) -> StepResult:
+def pushed(scene: ContactProblem, cells: int = 32) -> StepResult:
     """A flat round punch pushed in at once."""
     return follow(scene, [StepLoad(approach=DEPTH)], cells, 2.3 * PUNCH, bound=60, tolerance=1e-6)[-1]
 
@@ -66,7 +66,7 @@ def test_a_punch_that_cannot_slip_presses_as_mossakovskii_has_it(poisson: float)
 def test_dundurs_beta_of_minus_a_half_mirrors_that_of_a_half() -> None:
     """A soft object on a hard finger presses as a soft finger on a hard object; shear turns round."""
     soft = problem(0.0, height=round_punch, coupled=True)
-    hard = Problem((body(0.5, 1e9 * YOUNG),), FRICTION, (MirroredBody(body(0.0)),), (round_punch,), coupled=True)
+    hard = ContactProblem((body(0.5, 1e9 * YOUNG),), FRICTION, (MirroredBody(body(0.0)),), (round_punch,), coupled=True)
     usual, mirrored = pushed(soft), pushed(hard)
     np.testing.assert_allclose(mirrored.force[2], usual.force[2], rtol=0.0, atol=1e-5 * usual.force[2].max())
     np.testing.assert_allclose(mirrored.force[:2], -usual.force[:2], rtol=0.0, atol=1e-5 * usual.force[2].max())
@@ -74,9 +74,11 @@ def test_dundurs_beta_of_minus_a_half_mirrors_that_of_a_half() -> None:
     assert along_radius(usual, x, y) * along_radius(mirrored, x, y) < 0.0
 
 
-def layer(thickness: float, poisson: float, height: Callable[..., FloatArray], friction: float = FRICTION) -> Problem:
+def layer(
+    thickness: float, poisson: float, height: Callable[..., FloatArray], friction: float = FRICTION
+) -> ContactProblem:
     bodies = (body(poisson), LayerBase(thickness, YOUNG, poisson))
-    return Problem(bodies, friction, heights=(height,), coupled=True)
+    return ContactProblem(bodies, friction, heights=(height,), coupled=True)
 
 
 def squeezed(thickness: float, poisson: float, held: float) -> float:
@@ -115,7 +117,7 @@ def test_a_layer_of_a_twentieth_of_the_contact_is_pressed_sheared_and_reversed(p
     assert results[-1].force[0].sum() == pytest.approx(0.2 * FRICTION * force, rel=1e-9)
 
 
-def reversals(scene: Problem, count: int, steps: int = 1) -> list[StepResult]:
+def reversals(scene: ContactProblem, count: int, steps: int = 1) -> list[StepResult]:
     """Pulled to 0.7 of sliding and back, so many times each way."""
     ends = 0.7 * SLIDING * np.array([0.0, *(1.0 if k % 2 == 0 else -1.0 for k in range(count + 1))])
     pulls = np.concatenate([np.linspace(a, b, steps + 1)[1:] for a, b in pairwise(ends)])

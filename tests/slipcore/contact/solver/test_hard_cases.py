@@ -16,7 +16,7 @@ from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
 from slipcore.contact.reference.torsion import sliding_moment
 from slipcore.contact.scene import Scene
 from slipcore.contact.solver.normal import solve_normal
-from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
 from slipcore.errors import InvalidInput
 from tests.slipcore.contact.solver.following import (
@@ -266,10 +266,10 @@ def test_units_do_not_matter() -> None:
     path = [(FORCE, 0.0, 0.0), (FORCE, 0.7 * SLIDING, 2e-3)]
     usual = follow(problem(), [at(n, t, 0.0, m) for n, t, m in path])[-1]
     for s in (1e-6, 1e6):
-        wide = Problem((body(),), FRICTION, heights=(lambda x, y, s=s: bowl(x, y) / s,))
+        wide = ContactProblem((body(),), FRICTION, heights=(lambda x, y, s=s: bowl(x, y) / s,))
         scaled = follow(wide, [at(n * s**2, t * s**2, 0.0, m * s**3) for n, t, m in path], width=11e-3 * s)[-1]
         np.testing.assert_allclose(scaled.pose, usual.pose * [s, s, 1.0], rtol=1e-7, atol=1e-12 * s)
-        stiff = Problem((body(young=YOUNG * s),), FRICTION, heights=(bowl,))
+        stiff = ContactProblem((body(young=YOUNG * s),), FRICTION, heights=(bowl,))
         scaled = follow(stiff, [at(n * s, t * s, 0.0, m * s) for n, t, m in path])[-1]
         np.testing.assert_allclose(scaled.pose, usual.pose, rtol=1e-7, atol=1e-12)
 

@@ -10,7 +10,7 @@ from slipcore.contact.elasticity.bonded_layer import LayerBase
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.solver import quasi_static
-from slipcore.contact.solver.problem import HeightField, Problem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, HeightField, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
 from slipcore.contact.solver.state import StepResult
 
@@ -34,7 +34,7 @@ def finger(poisson: float) -> HalfSpace:
     return HalfSpace.from_young(YOUNG, poisson)
 
 
-def run(scene: Any, problem: Problem, tolerance: float) -> list[StepResult]:
+def run(scene: Any, problem: ContactProblem, tolerance: float) -> list[StepResult]:
     """Results at the steps that the scene keeps."""
     columns = (scene["F_N"], scene["F_T"], 1e-3 * scene["M"])
     loads = [StepLoad(n, tangential=np.array([t, 0.0, m])) for n, t, m in zip(*columns, strict=True)]
@@ -51,7 +51,7 @@ def points(scene: Any) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("name", ["cond1", "cond4", "reversal", "ring"])
 def test_displacements_and_all_masks_are_met(name: str) -> None:
     scene = np.load(SCENES / f"{name}.npz")
-    problem = Problem((finger(float(scene["nu"])),), FRICTION, heights=HEIGHTS.get(name, (ball,)))
+    problem = ContactProblem((finger(float(scene["nu"])),), FRICTION, heights=HEIGHTS.get(name, (ball,)))
     at, largest = points(scene), 1e-3 * np.abs(scene["u"]).max()
     for k, result in enumerate(run(scene, problem, 1e-5)):
         expected = 1e-3 * np.moveaxis(scene["u"][k], -1, 0)
@@ -69,7 +69,7 @@ def test_a_bonded_layer_with_coupling_is_met(monkeypatch: pytest.MonkeyPatch) ->
     scene = np.load(SCENES / "cond1_layer5c.npz")
     poisson = float(scene["nu"])
     bodies = (finger(poisson), LayerBase(5e-3, YOUNG, poisson))
-    problem = Problem(bodies, FRICTION, heights=(ball,), coupled=True)
+    problem = ContactProblem(bodies, FRICTION, heights=(ball,), coupled=True)
     at, largest = points(scene), 1e-3 * np.abs(scene["u"]).max()
     for k, result in enumerate(run(scene, problem, 1e-4)):
         expected = 1e-3 * np.moveaxis(scene["u"][k], -1, 0)

@@ -10,7 +10,7 @@ from slipcore.contact.errors import InfeasibleLoad
 from slipcore.contact.solver.macro_slip import FreeObject, borne
 from slipcore.contact.solver.problem import StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
-from slipcore.contact.solver.state import State
+from slipcore.contact.solver.state import ContactState
 from slipcore.errors import InvalidInput
 from tests.slipcore.contact.solver.test_quasi_static import FORCE, FRICTION, SLIDING, shear, sphere_on
 
@@ -22,7 +22,7 @@ def solver(sphere) -> QuasiStatic:
     return QuasiStatic(sphere_on(0.3), sphere(16).grid, 1e-3, 1e-5)
 
 
-def pressed(solver: QuasiStatic) -> State:
+def pressed(solver: QuasiStatic) -> ContactState:
     return solver.step(solver.start(), shear(FORCE, 0.0))[0]
 
 

@@ -8,16 +8,16 @@ from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.errors import InfeasibleLoad
 from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
 from slipcore.contact.reference.mindlin_deresiewicz import MindlinDeresiewicz
-from slipcore.contact.solver.problem import MaxwellBranch, Problem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, MaxwellBranch, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
 
 FRICTION, RADIUS, FORCE, YOUNG = 0.4, 15e-3, 10.0, 1e6
 SLIDING = FRICTION * FORCE
 
 
-def sphere_on(poisson: float, **more) -> Problem:
+def sphere_on(poisson: float, **more) -> ContactProblem:
     heights = (lambda x, y: (x**2 + y**2) / (2.0 * RADIUS),)
-    return Problem((HalfSpace.from_young(YOUNG, poisson),), FRICTION, heights=heights, **more)
+    return ContactProblem((HalfSpace.from_young(YOUNG, poisson),), FRICTION, heights=heights, **more)
 
 
 def shear(normal: float, along_x: float, moment: float = 0.0, duration: float = 1.0) -> StepLoad:
@@ -88,7 +88,7 @@ def test_creep_reaches_the_relaxed_solution_and_starts_from_the_glassy_one() -> 
     grid, branch = Grid.square(48, 14e-3), MaxwellBranch(strength=0.8, time=1.0)
     glassy = QuasiStatic(sphere_on(0.5), grid)
     relaxed = QuasiStatic(
-        Problem((HalfSpace.from_young(YOUNG / 1.8, 0.5),), FRICTION, heights=sphere_on(0.5).heights), grid
+        ContactProblem((HalfSpace.from_young(YOUNG / 1.8, 0.5),), FRICTION, heights=sphere_on(0.5).heights), grid
     )
     creeping = QuasiStatic(sphere_on(0.5, creep=(branch,)), grid)
     state, first = creeping.step(creeping.start(), shear(FORCE, 0.0, duration=1e-9))

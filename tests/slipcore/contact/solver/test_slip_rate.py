@@ -8,7 +8,7 @@ import pytest
 
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import HalfSpace
-from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
 from slipcore.contact.solver.slip_rate import carried_share
 from slipcore.contact.solver.state import StepResult
@@ -26,7 +26,7 @@ def ball(x: FloatArray, y: FloatArray) -> FloatArray:
 
 def follow(corners: tuple[tuple[float, float], ...], steps: int, poisson: float, *, second: bool) -> list[StepResult]:
     """Pressed, then pulled in straight lines to shares of the sliding force, in so many steps each."""
-    problem = Problem((HalfSpace.from_young(1e6, poisson),), FRICTION, heights=(ball,))
+    problem = ContactProblem((HalfSpace.from_young(1e6, poisson),), FRICTION, heights=(ball,))
     solver = QuasiStatic(problem, Grid.square(16, 11.5e-3), 1e-6, 1e-8, second_order=second)
     ends = SLIDING * np.array([(0.0, 0.0), *corners])
     lines = [a + (b - a) * k / steps for a, b in pairwise(ends) for k in range(1, steps + 1)]

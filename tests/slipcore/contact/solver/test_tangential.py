@@ -6,7 +6,7 @@ import pytest
 from slipcore.contact.errors import InfeasibleLoad, NotConverged
 from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
 from slipcore.contact.reference.torsion import TorsionPartialSlip, sliding_moment
-from slipcore.contact.solver.tangential import Control, solve_tangential
+from slipcore.contact.solver.tangential import SolverControl, solve_tangential
 
 FRICTION, FORCE = 0.4, 10.0
 SLIDING = FRICTION * FORCE
@@ -18,7 +18,7 @@ def once(case, load, tolerance: float = 1e-8, friction: float = FRICTION, **opti
     """One step from rest to a load; with the part of the grid that it was solved on."""
     part, limit = case.limit(friction)
     nothing = np.zeros((2, *part.shape))
-    control = options.pop("control", None) or Control(np.array(load))
+    control = options.pop("control", None) or SolverControl(np.array(load))
     operator = case.operators.on(part)
     return (
         part,
@@ -78,10 +78,10 @@ def test_a_given_motion_gives_back_its_load(sphere) -> None:
     case = sphere(48, 0.3)
     load = np.array([1.5, 0.5, 4e-3])
     pushed = once(case, load)[2]
-    held = Control(motion=pushed.motion, given=np.zeros(3, dtype=bool))
+    held = SolverControl(motion=pushed.motion, given=np.zeros(3, dtype=bool))
     moved = once(case, None, control=held)[2]
     np.testing.assert_allclose(moved.traction, pushed.traction, rtol=0.0, atol=1e-5 * pushed.traction.max())
-    mixed = Control(np.array([1.5, 0.0, 0.0]), pushed.motion, np.array([True, False, False]))
+    mixed = SolverControl(np.array([1.5, 0.0, 0.0]), pushed.motion, np.array([True, False, False]))
     both = once(case, None, control=mixed)[2]
     assert both.motion[0] == pytest.approx(pushed.motion[0], rel=1e-6)
     np.testing.assert_array_equal(both.motion[1:], pushed.motion[1:])
@@ -89,7 +89,7 @@ def test_a_given_motion_gives_back_its_load(sphere) -> None:
 
 def test_moved_far_everything_slides(sphere) -> None:
     case = sphere(32, 0.3)
-    control = Control(motion=np.array([1e-2, 0.0, 0.0]), given=np.zeros(3, dtype=bool))
+    control = SolverControl(motion=np.array([1e-2, 0.0, 0.0]), given=np.zeros(3, dtype=bool))
     _, limit, solved = once(case, None, control=control)
     assert solved.sliding
     np.testing.assert_allclose(np.hypot(*solved.traction), limit, rtol=1e-9)

@@ -11,7 +11,7 @@ from slipcore.contact.elasticity.influence import HalfSpace
 from slipcore.contact.solver import quasi_static
 from slipcore.contact.solver.extrapolation import Stress
 from slipcore.contact.solver.normal import NormalContact
-from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
 from slipcore.contact.solver.step_equations import StepEquations
 from slipcore.contact.solver.touching import from_touch
@@ -25,12 +25,14 @@ def ball(x: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def half_space() -> QuasiStatic:
-    return QuasiStatic(Problem((HalfSpace.from_young(1e6, 0.0),), FRICTION, heights=(ball,)), Grid.square(24, 11.5e-3))
+    return QuasiStatic(
+        ContactProblem((HalfSpace.from_young(1e6, 0.0),), FRICTION, heights=(ball,)), Grid.square(24, 11.5e-3)
+    )
 
 
 def layer(cells: int) -> QuasiStatic:
     bodies = (HalfSpace.from_young(1e6, 0.49), LayerBase(5e-3, 1e6, 0.49))
-    problem = Problem(bodies, FRICTION, heights=(ball,), coupled=True)
+    problem = ContactProblem(bodies, FRICTION, heights=(ball,), coupled=True)
     return QuasiStatic(problem, Grid.square(cells, 8.5e-3))
 
 

@@ -8,17 +8,17 @@ import pytest
 from slipcore.contact.errors import InfeasibleLoad, NotConverged
 from slipcore.contact.reference.cattaneo_mindlin import CattaneoMindlin
 from slipcore.contact.solver.normal import solve_normal
-from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, StepLoad
 from slipcore.contact.solver.projection import project
 from slipcore.contact.solver.quasi_static import QuasiStatic
-from slipcore.contact.solver.tangential import Control, solve_tangential
+from slipcore.contact.solver.tangential import SolverControl, solve_tangential
 
 FORCE, FRICTION = 10.0, 0.4
 SLIDING = FORCE * FRICTION
 
 
 def sheared(case, share: float, tolerance: float = 1e-6):
-    problem = Problem(case.operators.bodies, FRICTION, heights=(lambda x, y: (x**2 + y**2) / 30e-3,))
+    problem = ContactProblem(case.operators.bodies, FRICTION, heights=(lambda x, y: (x**2 + y**2) / 30e-3,))
     solver = QuasiStatic(problem, case.grid, tolerance, 1e-2 * tolerance)
     load = StepLoad(FORCE, tangential=np.array([share * SLIDING, 0.0, 0.0]))
     return list(solver.run([StepLoad(FORCE), load]))[-1]
@@ -45,7 +45,7 @@ def test_a_rigid_motion_far_larger_than_the_slip_does_not_drown_the_residual(sph
     case = sphere(48, 0.3)
     part, limit = case.limit()
     operator, start = case.operators.on(part), np.zeros((2, *part.shape))
-    control = Control(np.array([0.7 * SLIDING, 0.3, 2e-3]))
+    control = SolverControl(np.array([0.7 * SLIDING, 0.3, 2e-3]))
     plain = solve_tangential(operator, part.points(), limit, start, control, start, tolerance=1e-12)
     for carried in (1.0, 100.0):  # m, of contacts that move 0.4 mm
         offset = start + carried * case.hertz.approach
@@ -115,7 +115,7 @@ def test_default_tolerances_are_tight_enough_to_trust() -> None:
 
 def test_default_tolerances_give_the_answer_of_tight_ones(sphere) -> None:
     case = sphere(48, 0.3)
-    problem = Problem(case.operators.bodies, FRICTION, heights=(lambda x, y: (x**2 + y**2) / 30e-3,))
+    problem = ContactProblem(case.operators.bodies, FRICTION, heights=(lambda x, y: (x**2 + y**2) / 30e-3,))
     loads = [StepLoad(FORCE, tangential=np.array([k, 0.0, 1e-3 * k])) for k in (0.0, 1.0, 2.5, -1.0)]
     usual = list(QuasiStatic(problem, case.grid).run(loads))[-1]
     tight = list(QuasiStatic(problem, case.grid, 1e-10, 1e-11).run(loads))[-1]

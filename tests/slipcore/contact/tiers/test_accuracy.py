@@ -15,7 +15,7 @@ from slipcore.contact.plan.plan import Plan
 from slipcore.contact.progress import Progress, no_progress
 from slipcore.contact.scene import Press, Scene, simulate
 from slipcore.contact.tiers import accuracy, requests
-from slipcore.contact.tiers.accuracy import Difference, _Search, difference, simulate_to
+from slipcore.contact.tiers.accuracy import Difference, _AccuracySearch, difference, simulate_to
 from slipcore.contact.tiers.boundary_elements import Fidelity, run
 from slipcore.contact.tiers.price import Sizes
 from slipcore.errors import InvalidInput
@@ -207,6 +207,6 @@ def test_a_fidelity_beside_an_accuracy_is_refused() -> None:
 
 def test_a_finest_grid_that_falls_short_is_an_error_not_an_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(accuracy, "ACCURACY", replace(ACCURACY, finest_cells=20))
-    monkeypatch.setattr(_Search, "refuse_the_unreachable", lambda *_: None)
+    monkeypatch.setattr(_AccuracySearch, "refuse_the_unreachable", lambda *_: None)
     with pytest.raises(NotConverged, match="accuracy"):
         simulate_to(SCENES["shear"].plan(), accuracy=0.005)

@@ -5,7 +5,7 @@ import pytest
 
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import HalfSpace
-from slipcore.contact.solver.problem import Problem, StepLoad
+from slipcore.contact.solver.problem import ContactProblem, StepLoad
 from slipcore.contact.solver.quasi_static import QuasiStatic
 from slipcore.contact.solver.state import StepResult
 from slipcore.contact.tiers.fronts import shares_within, stick_ratio
@@ -16,7 +16,7 @@ REACH = (0.75 * FORCE * RADIUS / 1e6) ** (1.0 / 3.0)  # Hertz, ν = 0
 
 def sheared(share: float, cells: int) -> StepResult:
     heights = (lambda x, y: (x**2 + y**2) / (2.0 * RADIUS),)
-    problem = Problem((HalfSpace.from_young(1e6, 0.0),), FRICTION, heights=heights)
+    problem = ContactProblem((HalfSpace.from_young(1e6, 0.0),), FRICTION, heights=heights)
     loads = [StepLoad(FORCE, tangential=np.array([part * FRICTION * FORCE, 0.0, 0.0])) for part in (0.0, share)]
     return list(QuasiStatic(problem, Grid.square(cells, 2.2 * REACH), 1e-4, 1e-6).run(loads))[-1]
 

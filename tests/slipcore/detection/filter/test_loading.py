@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from slipcore.detection.filter.loading import Loading, low_pass, step_loading
-from slipcore.detection.filter.pose import Motion
+from slipcore.detection.filter.pose import AnchorMotion
 
 INTERVAL, GAIN, STEPS = 0.02, 0.25, 3
 X, Y = 4e-3 * np.array([1.0, -1.0, -1.0, 1.0]), 3e-3 * np.array([1.0, 1.0, -1.0, -1.0])
@@ -16,7 +16,7 @@ X, Y = 4e-3 * np.array([1.0, -1.0, -1.0, 1.0]), 3e-3 * np.array([1.0, 1.0, -1.0,
 
 def grown(force: np.ndarray) -> Loading:
     """After some steps of the same growth: the object moves by 5 µm and sinks in by 2 µm in each."""
-    motion = Motion(np.full(4, 3e-6), np.full(4, -4e-6), np.zeros(4))
+    motion = AnchorMotion(np.full(4, 3e-6), np.full(4, -4e-6), np.zeros(4))
     loading = Loading(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for _ in range(STEPS):
         loading = unwrap(step_loading)(loading, (X + 0.1, Y), motion, np.full(4, 2e-6), force, INTERVAL, GAIN)

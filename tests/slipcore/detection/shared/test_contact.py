@@ -7,7 +7,14 @@ from slipcore import detect_slip
 from slipcore.contact import tangential_ramp
 from slipcore.defaults import ContactOptions, FilterOptions
 from slipcore.detection.detector import touch_thresholds
-from slipcore.detection.shared.contact import CURVATURE_NOISE, Touch, curvature, find_contact, reach_rim, spatial_noise
+from slipcore.detection.shared.contact import (
+    CURVATURE_NOISE,
+    ContactThreshold,
+    curvature,
+    find_contact,
+    reach_rim,
+    spatial_noise,
+)
 
 OPTIONS = ContactOptions()
 AREA = 1e-6
@@ -27,7 +34,7 @@ def contact_from_shape(
 
 def found_contact(pressing: np.ndarray, noise: float, before: np.ndarray | None, touch: np.ndarray) -> np.ndarray:
     contact = np.zeros(pressing.shape, bool)
-    find_contact(pressing, noise, contact.copy() if before is None else before, Touch(*touch), contact)
+    find_contact(pressing, noise, contact.copy() if before is None else before, ContactThreshold(*touch), contact)
     return contact
 
 
