@@ -1,7 +1,7 @@
 """Recognition of ten simulated materials from one grasp each: `python -m benchmarks.recognition [--method NAME]`.
 
 A material is a plane and two scatters; its model is fitted to eight grasps that differ by an intercept. New grasps of
-5 to 40 samples are recognised: accuracy, a reliability diagram (of those told with probability p, how many are right),
+5 to 40 samples are recognised: accuracy, a reliability diagram (of answers stated with probability p, how many are right),
 and how many grasps of unknown materials, drawn from the stated population, are called unknown. Writes recognition.png.
 """
 
@@ -58,7 +58,7 @@ def trial(
 
 def summary(trials: list[dict[str, float | str]]) -> list[str]:
     """Accuracy by number of samples, and how unknown materials fare, as a table."""
-    lines = ["| samples of the grasp | right | mean probability told | unknown called so | known called unknown |"]
+    lines = ["| samples of the grasp | right | mean probability stated | unknown called so | known called unknown |"]
     lines.append("|---|---|---|---|---|")
     for n in (*SIZES, 0):
         some = [t for t in trials if n in (0, t["n"])]
@@ -68,30 +68,30 @@ def summary(trials: list[dict[str, float | str]]) -> list[str]:
         wrongly = np.mean([t["answer"] == "unknown" for t in some if t["truth"] != "unknown"])
         parts = f"{right:.1%} | {claimed:.1%} | {np.mean(strange):.0%} of {len(strange)} | {wrongly:.2%}"
         lines.append(f"| {n or 'all'} | {parts} |")
-    told = np.array([float(t["unknown"]) for t in trials])
-    strangers, error = sum(t["truth"] == "unknown" for t in trials), np.sqrt(np.sum(told * (1.0 - told)))
+    stated = np.array([float(t["unknown"]) for t in trials])
+    strangers, error = sum(t["truth"] == "unknown" for t in trials), np.sqrt(np.sum(stated * (1.0 - stated)))
     lines.append(
-        f"\nUnknown: {strangers} grasps; told: {told.sum():.0f} expected, with a standard error of {error:.0f}."
+        f"\nUnknown: {strangers} grasps; stated: {stated.sum():.0f} expected, with a standard error of {error:.0f}."
     )
     return lines
 
 
 def picture(trials: list[dict[str, float | str]], path: Path) -> None:
-    """Part of right answers against the probability told, with two standard errors; as many trials in every bin."""
-    told = np.array([float(t["probability"]) for t in trials])
+    """Part of right answers against the probability stated, with two standard errors; as many trials in every bin."""
+    stated = np.array([float(t["probability"]) for t in trials])
     right = np.array([t["answer"] == t["truth"] for t in trials], dtype=float)
     edges = [0.0, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.97, 0.995, 1.0]
     figure = Figure(figsize=(6.0, 5.4), layout="constrained")
     axes = figure.subplots()
-    axes.plot([0.2, 1], [0.2, 1], color="0.7", linewidth=1, label="as told")
+    axes.plot([0.2, 1], [0.2, 1], color="0.7", linewidth=1, label="as stated")
     for low, high in pairwise(edges):
-        some = (told > low) & (told <= high)
+        some = (stated > low) & (stated <= high)
         if some.sum() >= 10:
-            mean, part, count = told[some].mean(), right[some].mean(), int(some.sum())
+            mean, part, count = stated[some].mean(), right[some].mean(), int(some.sum())
             error = 2.0 * np.sqrt(max(mean * (1.0 - mean), 1e-6) / count)
             axes.errorbar(mean, part, error, fmt="o", color="C0", capsize=3)
             axes.annotate(f"{count}", (mean, part), textcoords="offset points", xytext=(7, -11), fontsize=8)
-    axes.set_xlabel("probability told for the answer")
+    axes.set_xlabel("probability stated for the answer")
     axes.set_ylabel("part of right answers")
     axes.set_title(
         "Ten materials and strangers, one grasp each (bars: two standard errors; number of grasps)", fontsize=8

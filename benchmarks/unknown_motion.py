@@ -177,7 +177,7 @@ def markdown(found: Sequence[Finding]) -> str:
     """Coverage, error and width of each coefficient and of μ."""
     names = ("β₀", "β₁, s/m", "β₂, 1/N", f"μ at {FORCE:g} N")
     lines = [
-        "| object's motion | method | quantity | mean error | scatter | half-width (median) | truth inside | told |",
+        "| object's motion | method | quantity | mean error | scatter | half-width (median) | truth inside | identifiable |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for condition, method in dict.fromkeys((f.condition, f.method) for f in found):
@@ -185,9 +185,9 @@ def markdown(found: Sequence[Finding]) -> str:
         error = np.array([np.subtract(f.estimate, f.truth) for f in rows])
         half = np.array([f.half_width for f in rows])
         inside = np.mean(np.abs(error) <= half, axis=0)
-        told = [*np.mean([f.identifiable for f in rows], axis=0), None]
+        identified = [*np.mean([f.identifiable for f in rows], axis=0), None]
         for k, name in enumerate(names):
-            known = "" if told[k] is None else f"{told[k]:.0%}"
+            known = "" if identified[k] is None else f"{identified[k]:.0%}"
             lines.append(
                 f"| {condition} | {method} | {name} | {error[:, k].mean():+.2g} | {error[:, k].std():.2g} "
                 f"| {np.median(half[:, k]):.2g} | {inside[k]:.0%} of {len(rows)} | {known} |"

@@ -118,7 +118,7 @@ class InvalidGraspLog(ProblemError):
 
 
 class InvalidSamples(ProblemError):
-    """Friction samples of which nothing can be told."""
+    """Friction samples from which nothing follows."""
 
 
 class InvalidRequest(ProblemError):

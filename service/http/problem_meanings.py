@@ -125,7 +125,7 @@ MEANINGS: dict[str, ProblemMeaning] = {
         "`name`, `value` and `allowed` say what is wrong.",
     ),
     "invalid-samples": ProblemMeaning(
-        "Friction samples of which nothing can be told: too few, or of no slip.",
+        "Friction samples from which nothing follows: too few, or of no slip.",
         "`detail` says what is wrong.",
     ),
     "invalid-request": ProblemMeaning(

@@ -52,7 +52,7 @@ class ControlSettings:
         float, Gain(0.05, 0.95, "-", "0.79 of what it can hold: a ring that slips is wide enough to be sampled")
     ] = 0.35
     told_stick_ratio: Annotated[
-        float, Gain(0.05, 1.0, "-", "a thinner ring is of one element, and tells nothing of friction")
+        float, Gain(0.05, 1.0, "-", "a thinner ring is one element wide, too little to measure friction")
     ] = 0.9
     agreement_share: Annotated[
         float, Gain(0.0, 1.0, "-", "stick taken for slip has half of it; 0.1 of the stick ratio makes 0.8")
