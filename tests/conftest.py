@@ -11,10 +11,14 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import hypothesis
 import pytest
 import uvicorn
+from sqlalchemy import Dialect
+from sqlalchemy.sql import ClauseElement
+from sqlalchemy.util import LRUCache
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import Response
@@ -81,6 +85,21 @@ def prompt_servers() -> Iterator[None]:
     hurried = SimpleNamespace(**vars(asyncio) | {"sleep": lambda seconds: asyncio.sleep(seconds / 20.0)})
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("uvicorn.server.asyncio", hurried)
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def statements_compiled_once() -> Iterator[None]:
+    """SQLAlchemy compiles each statement anew for each engine, and most tests of a database have one of their own."""
+    compile_with_cache, caches = ClauseElement._compile_w_cache, dict[object, tuple[Dialect, LRUCache[Any, Any]]]()
+
+    def compile_once(self: ClauseElement, dialect: Dialect, **options: Any) -> Any:
+        kind = (type(dialect), dialect.server_version_info)
+        first, cache = caches.setdefault(kind, (dialect, LRUCache(5000)))
+        return compile_with_cache(self, first, **options | {"compiled_cache": cache})
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(ClauseElement, "_compile_w_cache", compile_once)
         yield
 
 
