@@ -228,6 +228,8 @@ def _check(context: Context, request: UploadRequest) -> int | None:
     """What can be told before the bytes are there; returns the material's key, None where there is none yet."""
     if request.detector not in METHOD_NAMES:
         raise InvalidValue("detector", request.detector, ", ".join(METHOD_NAMES))
+    if request.sensor is not None:
+        _sensor_name(request.sensor)
     try:
         formats.parse_mapping(request.settings)
     except InvalidInput as error:

@@ -7,8 +7,6 @@ from pathlib import Path, PurePosixPath
 from types import ModuleType
 from typing import Any
 
-import numpy as np
-
 from service.formats import frame_table, rest, tac3d, tracked_markers
 from service.formats import mapping as mappings
 from service.formats.archive import open_archive
@@ -141,8 +139,10 @@ def _read_from_rest(reader: Callable[..., GraspLog], path: Path, given: dict[str
     log, alone = reader(path, **given), reader(chosen, **given)
     if alone.grid != log.grid:
         raise InvalidInput("rest", f"a file of {alone.grid} elements", f"{log.grid}, as the log")
-    moved = log.displacement - np.median(alone.displacement, axis=0)
-    return replace(log, displacement=moved, metadata={**log.metadata, "rest": chosen.name})
+    place, known = rest.unmoved(alone.displacement, alone.observed)
+    observed = log.observed if known.all() else known & (True if log.observed is None else log.observed)
+    moved, metadata = log.displacement - place, {**log.metadata, "rest": chosen.name}
+    return replace(log, displacement=moved, observed=observed, metadata=metadata)
 
 
 def episodes_of(folder: Path, mapping: str | None = None) -> list[int]:

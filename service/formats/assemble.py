@@ -14,7 +14,7 @@ from service.formats.mapping import COMPONENTS, PRESSURE_ALONE, FieldMapping, Or
 from service.formats.members import DTYPES, FLAG, ONCE, REQUIRED, TEXT, Members, grasp_log, told_metadata
 from service.formats.npy import MAX_ARRAY_BYTES
 from slipcore.errors import InvalidInput
-from slipcore.frames import NONE, GraspLog
+from slipcore.frames import NONE, BoolArray, FloatArray, GraspLog, check_mask
 
 MAX_CONTENT_BYTES = MAX_ARRAY_BYTES // 2
 """Bytes of all that is read of one file: they are held twice while the log is made of them."""
@@ -89,7 +89,10 @@ def _log(
 
 
 def _from_rest(members: dict[str, NDArray[Any]], mapping: FieldMapping, metadata: dict[str, str]) -> None:
-    """Displacement from the frame at rest. Where displacement and position are the same fields, these tell places."""
+    """Displacement from the frame at rest. Where displacement and position are the same fields, these are places.
+
+    Of an element that is not observed in that frame no displacement is known in any: it counts as observed in none.
+    """
     moved = np.asarray(members["displacement"], dtype=np.float64)
     if moved.ndim < 2 or not moved.size:
         raise InvalidInput("displacement", f"of shape {moved.shape}", "frames, elements and components, one at least")
@@ -98,11 +101,26 @@ def _from_rest(members: dict[str, NDArray[Any]], mapping: FieldMapping, metadata
         at = members["position"] + moved
     else:
         at = moved
+    observed = members.get("observed")
+    if observed is not None:
+        observed = check_mask("observed", observed, moved.shape[:-1])
+        at = np.where(observed[..., None], at, np.nan)
     flat = at.reshape(len(moved), -1, moved.shape[-1])
     frame = rest.frame_of(mapping.rest or rest.FIRST, len(moved), rest.load_of(members), flat)
     if places:
-        members["position"] = moved[frame]
+        members["position"] = moved[frame] if observed is None else _places(moved, observed, frame)
     members["displacement"], metadata["rest"] = moved - moved[frame], f"frame {frame}"
+    if observed is not None:
+        members["observed"] = observed & observed[frame]
+
+
+def _places(at: FloatArray, observed: BoolArray, frame: int) -> FloatArray:
+    """Places of a frame [n, m, c], of elements not observed in it those that they have on the median."""
+    usual, ever = rest.unmoved(at, observed)
+    if not ever.all():
+        element = np.argwhere(~ever)[0].tolist()
+        raise InvalidInput("position", f"of element {element} observed in no frame", "a place of each element")
+    return np.where(observed[frame][..., None], at[frame], usual)
 
 
 def _require(name: str, members: Members, recording: Recording) -> None:

@@ -83,16 +83,18 @@ class _Table:
         """Told by the mapping alone."""
 
     def _chosen(self, mapping: FieldMapping) -> FieldMapping:
-        """The first of a preset's alternatives whose columns are there, without the contact where that isn't told."""
+        """The first of a preset's alternatives whose columns are there, those apart that need not be."""
         if not mapping.preset:
             return mapping
-        for each in (mapping, *mapping.alternatives):
-            missing = {name for name, origin in each.origins.items() if not all(map(self._columns, origin.fields))}
-            if missing <= {"contact"}:
-                told = {name: origin for name, origin in each.origins.items() if name not in missing}
-                return replace(each, origins=told)
-        looked_for = {field for each in (mapping, *mapping.alternatives) for field in each.origins["force"].fields[:1]}
-        raise InvalidInput("preset", f"of columns {', '.join(sorted(looked_for))}, not there", self.contents())
+        nearest = min((mapping, *mapping.alternatives), key=lambda each: len(self._missing(each)))
+        if missing := self._missing(nearest):
+            raise InvalidInput("preset", f"of columns {', '.join(missing)}, not there"[:200], self.contents())
+        return nearest
+
+    def _missing(self, mapping: FieldMapping) -> list[str]:
+        """Fields that must be there, and are not."""
+        fields = [field for origin in mapping.origins.values() if origin.explicit for field in origin.fields]
+        return [field for field in fields if not self._columns(field)]
 
     def notes(self) -> dict[str, str]:
         """What the columns to be noted tell: how often each of a few numbers, or the median of many."""

@@ -132,7 +132,7 @@ def _parsed(given: Mapping[str, Any], told: Mapping[str, Any]) -> FieldMapping:
         raise InvalidInput("mapping", f"of the unknown {unknown[0][:60]!r}", ", ".join((*DTYPES, *_SETTINGS)))
     topic = _text("topic", given["topic"]) if "topic" in given else None
     return FieldMapping(
-        origins={name: _origin(name, given[name], topic) for name in DTYPES if name in given},
+        origins={name: _required(name, told, _origin(name, given[name], topic)) for name in DTYPES if name in given},
         grid=_grid(given["grid"]) if "grid" in given else None,
         pitch=_positive("pitch", given["pitch"]) if "pitch" in given else None,
         tolerance=_positive("tolerance", given["tolerance"]) if "tolerance" in given else None,
@@ -143,6 +143,11 @@ def _parsed(given: Mapping[str, Any], told: Mapping[str, Any]) -> FieldMapping:
         notes=_notes(given["notes"]) if "notes" in given else {},
         preset="preset" in told,
     )
+
+
+def _required(name: str, told: Mapping[str, Any], origin: Origin) -> Origin:
+    """An origin that must be there, unless a preset alone names the contact: not all firmware reports it."""
+    return replace(origin, explicit=name != "contact" or "preset" not in told or name in told)
 
 
 def _notes(given: Any) -> dict[str, str]:

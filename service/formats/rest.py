@@ -4,7 +4,7 @@ import numpy as np
 
 from service.formats.members import Members
 from slipcore.errors import InvalidInput
-from slipcore.frames import FloatArray
+from slipcore.frames import BoolArray, FloatArray
 
 FIRST, LEAST_CONTACT = "first", "least contact"
 ALLOWED = f"{FIRST}, {LEAST_CONTACT}, or the number of a frame from 0 (local commands: or a file)"
@@ -42,6 +42,19 @@ def frame_of(rest: str, frames: int, load: FloatArray | None, place: FloatArray)
     if frame >= frames:
         raise InvalidInput("rest", f"frame {frame} of {frames}", f"0 to {frames - 1}")
     return frame
+
+
+def unmoved(moved: FloatArray, observed: BoolArray | None) -> tuple[FloatArray, BoolArray]:
+    """Median over frames of what elements ``moved`` [t, n, m, c] where they were ``observed`` [t, n, m], and which were
+    observed at all [n, m]; of the others it is 0.
+    """
+    if observed is None:
+        return np.asarray(np.median(moved, axis=0)), np.ones(moved.shape[1:3], bool)
+    ever = np.asarray(observed.any(axis=0))
+    shown = np.where(observed[..., None], moved, np.nan)[:, ever]
+    rest: FloatArray = np.zeros(moved.shape[1:])
+    rest[ever] = np.nanmedian(shown, axis=0)
+    return rest, ever
 
 
 def load_of(members: Members) -> FloatArray | None:

@@ -109,7 +109,7 @@ async def create_grasp_log(
     length = request.headers.get("content-length", "")
     wanted = UploadRequest(
         asked.material,
-        asked.sensor,
+        asked.sensor or None,
         asked.detector,
         request.headers.get("content-type"),
         int(length) if length.isdecimal() else None,

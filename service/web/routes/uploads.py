@@ -94,7 +94,7 @@ def _file(form: FormData) -> UploadFile:
 def _asked(wanted: NewUpload, file: UploadFile, principal: Principal) -> UploadRequest:
     """The upload; raises ``RequestValidationError`` for a new material with a name that none may have."""
     settings = {name: getattr(wanted, name) for name in ("scale", "frame_rate", "mapping", "rest")}
-    declared = (wanted.material, wanted.sensor, wanted.detector, wanted.format)
+    declared = (wanted.material, wanted.sensor or None, wanted.detector, wanted.format)
     creates = wanted.create and wanted.material is not None
     if creates:
         checked(NewMaterial, {"name": wanted.material or ""})

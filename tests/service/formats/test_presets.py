@@ -100,10 +100,18 @@ def test_taxels_of_forces_alone_are_read_by_name(tmp_path: Path) -> None:
 def test_a_preset_that_does_not_fit_or_is_none_is_refused_by_name(tmp_path: Path) -> None:
     path = written(tmp_path / "log.csv", {"t": ["0", "1"], "x": ["1", "2"]})
     with pytest.raises(
-        InvalidInput, match=r"preset is of columns 0_fX_\*, P\*_FX, .* not there; allowed: the columns t, x"
+        InvalidInput, match=r"preset is of columns T_us, .*P\*_FX, .* not there; allowed: the columns t, x"
     ):
         formats.read(path, mapping="papillarray")
     with pytest.raises(InvalidInput, match="preset is 'biotac'; allowed: papillarray, uskin"):
         formats.read(path, mapping='{"preset": "biotac"}')
     with pytest.raises(InvalidInput, match="array is -1; allowed: 0 to 99"):
         formats.read(path, mapping='{"preset": "papillarray", "array": -1}')
+
+
+def test_a_contact_that_the_caller_names_must_be_there(tmp_path: Path) -> None:
+    """Misspelt, it was dropped, and with it the contact that the preset alone would have read."""
+    path = written(tmp_path / "log.csv", logger(0))
+    with pytest.raises(InvalidInput, match=r"preset is of columns P\*_isInContct, not there"):
+        formats.read(path, mapping='{"preset": "papillarray", "contact": "P*_isInContct"}')
+    assert formats.read(path, mapping='{"preset": "papillarray"}').contact is not None

@@ -69,3 +69,43 @@ def test_a_mapping_that_speaks_of_presets_is_none(tmp_path: Path) -> None:
         formats.read(path, mapping=json.dumps(given | {"contact": "touching"}))
     with pytest.raises(InvalidInput, match="missing"):
         formats.read(path, mapping=json.dumps(given | {"displacement": ["dx", "missing"]}))
+
+
+OBSERVED = np.ones((3, 2, 2), bool)
+OBSERVED[0, 0, 1] = False
+"""One element is not observed in the first frame."""
+
+
+@pytest.mark.parametrize("rest", ["first", "file"])
+def test_what_is_not_observed_at_rest_has_no_displacement(tmp_path: Path, rest: str) -> None:
+    """The placeholder was taken for its place at rest, and its offset for displacement ever after."""
+    moved = np.where(OBSERVED[..., None], MOVED, 0.0)
+    path = log_of(tmp_path, displacement=moved.tolist(), observed=OBSERVED.tolist())
+    (tmp_path / "alone").mkdir()
+    first = {"displacement": moved[[0, 0]].tolist(), "observed": OBSERVED[[0, 0]].tolist(), "time": [0.0, 0.03]}
+    alone = log_of(tmp_path / "alone", **first)
+    rested = formats.read(path, rest=alone if rest == "file" else rest)
+    assert rested.observed is not None
+    np.testing.assert_array_equal(rested.observed, OBSERVED.all(axis=0) & OBSERVED)
+    np.testing.assert_allclose(rested.displacement[:, 1], MOVED[:, 1] - MOVED[0, 1], rtol=1e-12, atol=0)
+
+
+def test_lost_frames_of_the_sensor_alone_do_not_shift_its_rest(tmp_path: Path) -> None:
+    offset, observed = np.full((5, 2, 2, 3), 2e-4), np.ones((5, 2, 2), bool)
+    observed[:3, 1, 1], offset[:3, 1, 1] = False, 0.0
+    (tmp_path / "alone").mkdir()
+    times = (0.03 * np.arange(5)).tolist()
+    alone = log_of(tmp_path / "alone", displacement=offset.tolist(), observed=observed.tolist(), time=times)
+    rested = formats.read(log_of(tmp_path), rest=alone)
+    np.testing.assert_allclose(rested.displacement, MOVED - 2e-4, rtol=0, atol=1e-18)
+    assert rested.observed is None
+
+
+def test_places_of_what_is_not_observed_at_rest_are_its_usual_ones(tmp_path: Path) -> None:
+    places = np.where(OBSERVED[..., None], PLACES + MOVED, 0.0)
+    mapping = json.dumps({"position": "displacement", "displacement": "displacement", "rest": "first"})
+    path = log_of(tmp_path, displacement=places.tolist(), observed=OBSERVED.tolist())
+    np.testing.assert_allclose(formats.read(path, mapping=mapping).position, PLACES, rtol=0, atol=1e-4)
+    never = np.where(np.arange(4).reshape(2, 2) == 3, False, OBSERVED)
+    with pytest.raises(InvalidInput, match=r"position is of element \[1, 1\] observed in no frame"):
+        formats.read(log_of(tmp_path, displacement=places.tolist(), observed=never.tolist()), mapping=mapping)

@@ -201,6 +201,7 @@ def test_a_session_goes_on_after_a_reconnect(served: Served, ramp: GraspLog) -> 
         ({"element_area": 1.0}, 4422, "element_area is 1 m²"),
         ({"material": "nothing"}, 4422, "no material 'nothing'"),
         ({"detector": "guess"}, 4422, "detector is guess"),
+        ({"sensor": "tab\tbed", "keep": True}, 4422, "sensor is 'tab\\tbed'; allowed: 1 to 200 printable"),
         ({"control": {"contact_area": 6e-5}}, 1003, "missing required field `settings`"),
         ({"control": {"contact_area": 6e-5, "settings": {"least_force": 1}}}, 4422, "control: most_force is not given"),
         ({"control": {"contact_area": -1, "settings": FORCES}}, 4422, "control: area is -1.0"),
