@@ -1,7 +1,7 @@
 """Recognition of ten simulated materials from one grasp each: `python -m benchmarks.recognition [--method NAME]`.
 
 A material is a plane and two scatters; its model is fitted to eight grasps that differ by an intercept. New grasps of
-5 to 40 samples are recognised: accuracy, a reliability diagram (of answers stated with probability p, how many are right),
+5 to 40 samples are recognised: accuracy, a reliability diagram (of answers with probability p, how many are right),
 and how many grasps of unknown materials, drawn from the stated population, are called unknown. Writes recognition.png.
 """
 

@@ -177,7 +177,8 @@ def markdown(found: Sequence[Finding]) -> str:
     """Coverage, error and width of each coefficient and of μ."""
     names = ("β₀", "β₁, s/m", "β₂, 1/N", f"μ at {FORCE:g} N")
     lines = [
-        "| object's motion | method | quantity | mean error | scatter | half-width (median) | truth inside | identifiable |",
+        "| object's motion | method | quantity | mean error | scatter | half-width (median) | truth inside "
+        "| identifiable |",
         "|---|---|---|---|---|---|---|---|",
     ]
     for condition, method in dict.fromkeys((f.condition, f.method) for f in found):

@@ -226,7 +226,7 @@ class ProposalSettings(Options):
     refine_draws: Annotated[int, Option(10, 1_000_000, "draws", "trials")] = 400
     refine_even: Annotated[float, Option(0.01, 1.0, "-", "trials")] = 0.6
     """Evenness of weights at which refinement ends."""
-    coarse_samples: Annotated[int, Option(100, 10_000_000, "samples", "tell where to look")] = 4000
+    coarse_samples: Annotated[int, Option(100, 10_000_000, "samples", "show where to look")] = 4000
     """Samples on which the mode is looked for first."""
     score_knots: Annotated[int, Option(10, 100_000, "knots", "linear between them: 1e-4 of a score")] = 400
     score_depth: Annotated[float, Option(1.0, 300.0, "-", "a normal score of about 5.5")] = 18.0
@@ -334,11 +334,11 @@ class ClusterSettings(Options):
     """Level of the test that errors are shared within the elements of a grasp."""
     time_blocks: Annotated[int, Option(2, 1000, "blocks", "enough for a variance, long enough to be independent")] = 20
     """That the record of a single element, or of a grasp, is cut into."""
-    by_chance: Annotated[float, Option(0.0, 10.0, "standard errors", "usual of what is told from chance")] = 2.0
+    by_chance: Annotated[float, Option(0.0, 10.0, "standard errors", "usual for what differs from chance")] = 2.0
     """Of a variance of so many blocks: larger by less than that shows no errors that go together."""
     least_neighbours: Annotated[int, Option(2, 1000, "pairs", "a correlation to 0.25")] = 16
     """Of places of a grasp beside each other, from which they tell whether neighbours are off alike."""
-    most_alike: Annotated[float, Option(0.0, 0.999, "-", "alike over 7 elements: wider than a contact tells")] = 0.99
+    most_alike: Annotated[float, Option(0.0, 0.999, "-", "alike over 7 elements: wider than a contact shows")] = 0.99
     """Correlation of neighbours that is taken at most."""
     least_places: Annotated[float, Option(1.0, 100.0, "places", "a level and two slopes, and one to spare")] = 4.0
     """That those of a grasp count as in any case."""
@@ -432,7 +432,7 @@ class AlarmSettings(Options):
     rate: Annotated[float, Option(1e-12, 0.999, "-", "one false alarm in a thousand grasps")] = 1e-3
     shift: Annotated[float, Option(1e-3, 10.0, "-", "a fifth of friction matters to a grip")] = 0.2
     """Standard deviation of a change of friction, as a part of it."""
-    reference: Annotated[int, Option(1, 1000, "grasps", "fewer do not tell their scatter")] = 3
+    reference: Annotated[int, Option(1, 1000, "grasps", "fewer do not show their scatter")] = 3
     """Before which none can have happened."""
     longest: Annotated[int, Option(10, 1_000_000, "grasps", "a change so long ago is the material")] = 1000
     """That are looked at: those before say no more of τ."""
@@ -471,7 +471,7 @@ class DesignSettings(Options):
     """The same of their velocities."""
     forces: Annotated[int, Option(2, 1000, "forces", "8 % apart where the greatest is six times the least")] = 25
     """That are tried, at equal ratios."""
-    least_scatter: Annotated[float, Option(0.0, 1e-2, "-", "scatter of 0 would make one grasp tell all")] = 1e-6
+    least_scatter: Annotated[float, Option(0.0, 1e-2, "-", "scatter of 0 would make one grasp decide all")] = 1e-6
     """Of a model, in parts of friction."""
 
 

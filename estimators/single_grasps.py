@@ -38,7 +38,7 @@ def grasp_effects(model: FrictionModel, moments: Sequence[SufficientStatistics])
     of one grasp, place by place.
     """
     if model.scales is None:
-        raise InvalidSamples("model", f"by {model.method}, without scales", "one that tells scatter between grasps")
+        raise InvalidSamples("model", f"by {model.method}, without scales", "one that separates scatter between grasps")
     if not moments:
         return []
     grasps = [_only_grasp(part.at_element_area(model.element_area)) for part in moments]

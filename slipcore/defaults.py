@@ -109,7 +109,7 @@ class NumericsDefaults(Options):
 
     least_spread: Annotated[float, Option(0.0, 1e-12, "m²", "far below a marker's variance")] = 1e-30
     """Weighted spread of points about their centre."""
-    least_element_force: Annotated[float, Option(1e-15, 1e-3, "N", "far below what any sensor tells")] = 1e-9
+    least_element_force: Annotated[float, Option(1e-15, 1e-3, "N", "far below what any sensor resolves")] = 1e-9
     """By which forces are divided (``detection/forces_only``)."""
     least_lever: Annotated[float, Option(1e-12, 1e-3, "m", "far below a pitch")] = 1e-9
     """Of the moment of a contact's forces."""
@@ -159,7 +159,7 @@ class PatchDefaults(Options):
     least_spin: Annotated[float, Option(0.0, 10.0, "-", "what rolls turns less")] = 0.5
     """Of a patch that pivots: rotation times radius of gyration, over the speed of its centre."""
     least_square_arm: Annotated[
-        float, Option(0.0, 1.0, "-", "a patch no larger than the sensor's kernel tells no more")
+        float, Option(0.0, 1.0, "-", "a patch no larger than the sensor's kernel shows no more")
     ] = 0.25
     """Mean square arm of the forces that act, as a share of that of the smoothed ones, at least."""
     descents: Annotated[int, Option(1, 100_000, "steps", "bound")] = 100
@@ -312,7 +312,7 @@ class FilterOptions(ContactOptions):
         5.0
     )
     """How far pose or load must part from their means since something last happened, for something to happen."""
-    least_weight: Annotated[float, Option(0.0, 1.0, "-", "slipping points still tell that all stand still")] = 0.003
+    least_weight: Annotated[float, Option(0.0, 1.0, "-", "slipping points still show that all stand still")] = 0.003
     """Weight of a surely slipping element in the fit of the object's motion."""
     outlier: Annotated[float, Option(0.1, 100.0, "-", "tuning scenes")] = 4.4
     """Squared misfit over its variance at which an element's weight falls to a quarter."""

@@ -56,7 +56,7 @@ def coefficient_html(title: str, rows: Sequence[Row], below: str) -> str:
         f"<tr><th>{symbol}{'' if told else ' †'}</th><td>{value:.4g}</td><td>{low:.4g} … {high:.4g}</td></tr>"
         for symbol, (value, _, low, high, told) in zip(SYMBOLS, rows, strict=False)
     )
-    note = "" if all(row[-1] for row in rows) else " † not told by the data."
+    note = "" if all(row[-1] for row in rows) else " † not determined by the data."
     return f"<div><strong>{escape(title)}</strong><table><tr>{head}</tr>{lines}</table>{escape(below)}.{note}</div>"
 
 

@@ -92,7 +92,7 @@ def support(model: Model, tangential_velocity: float, normal_force: float, stale
     outside = extrapolation(model.domain, tangential_velocity, normal_force)
     if outside is not None:
         return Support("extrapolated", f"{outside}: record a grasp there")
-    return Support("supported", f"the samples tell the expected friction to within ± {part:.1%}")
+    return Support("supported", f"the samples determine the expected friction to within ± {part:.1%}")
 
 
 def kinds(

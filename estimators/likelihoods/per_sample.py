@@ -158,7 +158,7 @@ def per_sample(data: FitData, terms: LikelihoodTerms, name: str) -> PerSample:
         proposal=standard(3 + len(initial)),
         local=SAMPLING.local,
     )
-    if len(observations) > 2 * PROPOSAL.coarse_samples:  # a few samples tell where to look
+    if len(observations) > 2 * PROPOSAL.coarse_samples:  # a few samples show where to look
         posterior = _rewhitened(posterior, len(observations) // PROPOSAL.coarse_samples)
     return _proposing(_rewhitened(posterior, 1))
 

@@ -36,7 +36,7 @@ def pooled_prior(nodes: ScaleNodes, scatter_prior: ScatterPrior) -> Diagnostics:
     count = scatter_prior.materials
     origin = f"{count} other material{'s' * (count > 1)}" if count else "the prior that was given"
     return {
-        "scatter_prior": f"how much its grasps differ is expected from {origin}, as far as they do not tell",
+        "scatter_prior": f"how much its grasps differ is expected from {origin}, as far as they do not show it",
         ALONE: alone.value,
         f"{ALONE}_degrees_of_freedom": alone.degrees_of_freedom,
     }

@@ -31,7 +31,7 @@ from service.cli.exit_codes import INPUT_REFUSED, INTERRUPTED, exit_code, messag
 
 app = typer.Typer(
     name="stiction",
-    help="Friction identification for robotic grasping: what a held object's micro-slips tell of its friction.",
+    help="Friction identification for robotic grasping: what a held object's micro-slips show of its friction.",
     epilog="Exit codes: 0 done, 1 failure, 2 wrong usage, 3 input refused, 4 service unreachable or refusing, "
     "5 no force holds the load, 130 interrupted. More: docs/cli.md.",
     no_args_is_help=True,

@@ -26,7 +26,7 @@ def prune(
         str | None,
         typer.Option(help="How long unreferenced files are in quarantine; by default 7d, or the setting's days."),
     ] = None,
-    delete: Annotated[bool, typer.Option("--delete", help="Do what is else only told.")] = False,
+    delete: Annotated[bool, typer.Option("--delete", help="Delete what is otherwise only listed.")] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would go, also with an age.")] = False,
     database_url: Url = None,
 ) -> None:

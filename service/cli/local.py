@@ -296,7 +296,7 @@ def _detection_summary(log: "GraspLog", history: "SlipHistory", seconds: float) 
         "marker_noise": history.noise if log.is_scaled else None,
         "seconds": round(seconds, 6),
         "contact_friction": _contact_record(log, history),
-        **({} if log.is_scaled else {"unknown": "the scale: no noise, velocity or friction can be told in SI units"}),
+        **({} if log.is_scaled else {"unknown": "the scale: no noise, velocity or friction can be given in SI units"}),
     }
 
 

@@ -75,7 +75,7 @@ def comparison(log: "GraspLog", gel: Path | None) -> "ForceComparison | None":
     from slipcore.forces import Gel, compare_forces, reconstruct
 
     if not log.has_displacement:
-        raise InvalidInput("gel", "given for a log of forces alone", "a log whose displacement tells forces, too")
+        raise InvalidInput("gel", "given for a log of forces alone", "a log with displacement")
     by_gel = replace(log, gripper_force=None, gripper_force_deviation=None)  # which would hide what is wrong of the gel
     with shown_progress("reconstructing forces"):
         return compare_forces(log, reconstruct(by_gel, Gel.from_json(_read_json(gel, "gel"))))

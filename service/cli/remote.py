@@ -180,11 +180,11 @@ def plan(
     of: Annotated[
         str | None,
         typer.Option(
-            help="Whose scatter counts: element or contact; by default the contact's where the model tells it."
+            help="Whose scatter counts: element or contact; by default the contact's where the model has its scales."
         ),
     ] = None,
     elements: Annotated[
-        float | None, typer.Option(min=1.0, help="Elements of one contact, where its area does not tell them.")
+        float | None, typer.Option(min=1.0, help="Elements of one contact, where they do not follow from its area.")
     ] = None,
     method: Method = "auto",
     url: Url = DEFAULT_URL,

@@ -21,7 +21,7 @@ def check_scene(
     model: Annotated[Path, typer.Argument(help="A MuJoCo scene (MJCF) in which something is gripped.")],
     keyframe: Annotated[str | None, typer.Option(help="Begin at this keyframe, with its controls.")] = None,
     seconds: Annotated[float, typer.Option(help="Simulate so long before the contacts are looked at, s.")] = 1.0,
-    friction: Annotated[float | None, typer.Option(help="What it is to be, such as `stiction lookup` tells.")] = None,
+    friction: Annotated[float | None, typer.Option(help="What it is to be, such as `stiction lookup` answers.")] = None,
     json: Json = False,
 ) -> None:
     """Measure in MuJoCo at which load each contact of a scene really slips, and say which settings to change."""

@@ -47,7 +47,7 @@ def friction(answers: Iterable[Answer], truths: Mapping[str, FrictionLaw | None]
         else:
             outcome = _fitted(answer.model, truths[answer.material])
         rows.append([answer.material, answer.method, *outcome])
-    caption = "Friction models: estimate ± half of the 95 % interval; † marks what the data do not tell"
+    caption = "Friction models: estimate ± half of the 95 % interval; † marks what the data do not determine"
     return Table(caption, columns, rows)
 
 

@@ -39,13 +39,13 @@ def _unsure(log: GraspLog, reconstruction: "Reconstruction | None") -> str | Non
         return None
     return (
         f"elements' normal forces follow from displacement to ± {1e3 * noise:.2g} mN of at most "
-        f"{1e3 * largest:.2g} mN, too unsure for samples; let all of the contact slide, and tell the object's pose"
+        f"{1e3 * largest:.2g} mN, too unsure for samples; let all of the contact slide, and record the object's pose"
     )
 
 
 def _without_samples(log: GraspLog, history: SlipHistory) -> str:
     if not log.has_displacement:
-        return "forces alone tell slip but no velocity, so no friction samples"
+        return "forces alone show slip but no velocity, so there are no friction samples"
     seen = f"no slip gave a friction sample ({int(history.slip.sum())} slipping elements in {len(log)} frames)"
     return f"{seen}; an element counts once all around it slips: load it further, or press less"
 

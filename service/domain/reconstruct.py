@@ -40,10 +40,10 @@ def reconstruction_findings(reconstruction: "Reconstruction | None") -> "list[Fi
         return []
     from slipcore import Finding
 
-    told = ", ".join(f"{axis} {share:.0%}" for axis, share in zip("xyz", reconstruction.information, strict=True))
+    shares = ", ".join(f"{axis} {share:.0%}" for axis, share in zip("xyz", reconstruction.information, strict=True))
     evidence = (
         f"forces follow from displacement by the sensor's gel{_by_the_gripper(reconstruction)}, in effect "
-        f"averaged over {1e3 * reconstruction.kernel_width:.2g} mm; share of the resultant that data tell: {told}"
+        f"averaged over {1e3 * reconstruction.kernel_width:.2g} mm; share of the resultant by the data: {shares}"
     )
     by_gel = Finding(RECONSTRUCTED, evidence, "friction is as sure as the description of the sensor's gel")
     return [by_gel, *contradicted(reconstruction.contradicted)]
@@ -56,7 +56,7 @@ def contradicted(share: float) -> "list[Finding]":
 
     if share <= RECONSTRUCTION.contradicted_share:
         return []
-    evidence = f"in {share:.0%} of the frames that touch the gel's shape tells another force"
+    evidence = f"in {share:.0%} of the frames that touch the gel's shape implies another force"
     return [Finding(CONTRADICTED, evidence, "make sure that it is this finger's, in N, and the gel's description")]
 
 

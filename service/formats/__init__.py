@@ -67,7 +67,7 @@ UNSPECIFIC_TYPES = ("application/zip", "application/octet-stream")
 
 _WHERE = {
     "scale": "only beside a table of tracked markers: other formats are in SI units",
-    "frame_rate": "only beside a table of tracked markers: other formats tell times",
+    "frame_rate": "only beside a table of tracked markers: other formats have times",
     "rest": "only beside tracked markers or a format of topics, fields or columns",
     "mapping": "only beside a format of topics, fields or columns",
 }

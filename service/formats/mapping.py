@@ -35,10 +35,11 @@ COMPONENTS = {
 """Those of what may have a unit a component; one that begins with a minus turns that axis."""
 
 PRESSURE_ALONE = (
-    "three components of force an element, or displacement of markers: pressure alone tells no tangential force, "
-    "and so neither slip nor friction. Record a sensor of shear beside it, or the displacement of markers in its skin"
+    "three components of force an element, or displacement of markers: pressure alone has no tangential force, "
+    "from which neither slip nor friction can be found. Record a sensor of shear beside it, or the displacement of "
+    "markers in its skin"
 )
-"""What is asked of an array that tells pressure."""
+"""What is asked of an array of pressures."""
 LARGEST = 1e300
 """Of any number: a whole one may have more digits than a float can hold."""
 

@@ -35,7 +35,7 @@ def frame_of(rest: str, frames: int, load: FloatArray | None, place: FloatArray)
     """
     text = check(rest)
     if text == LEAST_CONTACT and load is not None and len(load) != frames:
-        raise InvalidInput("rest", f"{LEAST_CONTACT}, told of {len(load)} frames", f"{frames} frames, as displacement")
+        raise InvalidInput("rest", f"{LEAST_CONTACT}, of {len(load)} frames", f"{frames} frames, as displacement")
     if text == LEAST_CONTACT:
         return int(np.argmin(stretch(place) if load is None else load))
     frame = 0 if text == FIRST else int(text)

@@ -44,9 +44,9 @@ def grasp_report(seen: InspectedGrasp) -> Report:
     model = seen.model
     facts, support = ([], None) if model is None else wording.friction_facts(model)
     if support is None:
-        lead = f"This grasp alone tells no friction: {seen.refusal}."
+        lead = f"This grasp alone gives no friction: {seen.refusal}."
     else:
-        lead = f"Friction, as far as this grasp alone tells it, is {support.kind}: {support.advice}."
+        lead = f"Friction, from this grasp alone, is {support.kind}: {support.advice}."
     return Report(seen.name, lead, [*facts, *_seen_facts(seen)], _steps(seen), _sections(seen))
 
 

@@ -27,7 +27,7 @@ STICK_RATIO = (
 MODEL = (
     "μ = β₀ + β₁ v + β₂ fₙ + ε. β₀ is friction at rest and without load, β₁ [s/m] its change with the velocity v of "
     "the slip, β₂ [1/N] that with the normal force fₙ on an element, and σ the standard deviation of the scatter ε. "
-    "† marks a coefficient that the data do not tell; what it says counts for nothing outside of them."
+    "† marks a coefficient that the data do not determine: outside of their range it means nothing."
 )
 
 

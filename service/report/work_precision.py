@@ -95,7 +95,9 @@ def of_detection(log: "GraspLog", name: str, progress: "Progress") -> WorkPrecis
             wrong = (history.slip != slip)[contact]
             found.append(Setting(f"--method {method}", seconds, float(wrong.mean()) if wrong.size else 0.0))
     against = "the first of them" if log.truth is None else "truth"
-    return WorkPrecision(name, f"share of touching elements and frames told otherwise than by {against}", tuple(found))
+    return WorkPrecision(
+        name, f"share of touching elements and frames answered otherwise than by {against}", tuple(found)
+    )
 
 
 def _detected(log: "GraspLog", method: str) -> "tuple[SlipHistory, float]":

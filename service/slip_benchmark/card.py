@@ -18,11 +18,11 @@ mechanics and those faults, and with nothing else of a real sensor.
 - Seal, the SHA-256 of the phrase: `{seal}`. Whoever has the phrase makes the same scenes again with
   `stiction benchmark make --phrase TEXT --scenes {count} --output FOLDER`. Scores on a phrase that was known before
   a method was finished say less.
-- `inputs/NAME.npz`: what the sensor tells, a Stiction log without truth. `truth/NAME.npz`: what the simulator knows.
+- `inputs/NAME.npz`: what the sensor measures, a Stiction log without truth. `truth/NAME.npz`: what the simulator knows.
   `results/METHOD/NAME.npz`: predictions. `manifest.json`: kind, fault and hashes of each scene. Members, units and
   metrics: docs/slip-benchmark.md of Stiction.
 
-| kind | scenes | what it tells | elements | frames a second |
+| kind | scenes | what it measures | elements | frames a second |
 | --- | --- | --- | --- | --- |
 {kinds}
 

@@ -28,7 +28,7 @@ MEANING = (
     "F1 of slip over elements and frames in contact; false slip: share of sticking elements that are said to slip; "
     "delay of onsets that were found (median, below 0: early) and share of those that were missed; root mean square "
     "error of the stick ratio; F1 of frames of gross slip; relative error of friction and of forces where a method "
-    "tells them; Brier score of its probability. Means over scenes, without those for which a score has no meaning."
+    "gives them; Brier score of its probability. Means over scenes, without those for which a score has no meaning."
 )
 SIMULATION = (
     "All of this is simulation: it ranks methods by mechanics and faults that were put in, not on a real sensor."

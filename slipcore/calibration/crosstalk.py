@@ -17,7 +17,7 @@ def crosstalk(press: PressLog) -> list[PressResult]:
     if press.split is None:
         return ["the log has no forces"] * 2
     if press.depth == 0.0:
-        return ["no marker is pressed in, against which its motion sideways would tell of a load that leans"] * 2
+        return ["no marker is pressed in, against which its motion sideways would show a load that leans"] * 2
     shares, errors = _proportional(press)
     leaning = np.abs(marker_motion(press)[0].mean(axis=0)) * ESTIMATE.sideways_stiffness / press.depth
     errors = np.hypot(errors, leaning)

@@ -15,7 +15,7 @@ def gain(press: PressLog, known_force: float | None) -> PressResult:
     if press.split is None:
         return "the log has no forces"
     if press.zero is None:
-        return "no frames without contact tell its zero: begin before the touch"
+        return "no frames without contact, which show its zero: begin before the touch"
     if press.reaches_edge:
         return "the contact reaches the lattice's edge: press in its middle"
     held = press.split[press.held, ..., 2].sum(axis=(1, 2))

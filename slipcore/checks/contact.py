@@ -52,5 +52,5 @@ def moving_contact(seen: Subject) -> Iterator[Finding]:
     travel, moved = float(np.ptp(centre, axis=0).max()), float(np.ptp(below, axis=0).max())
     if travel > moved + seen.limits.travel * np.sqrt(seen.log.element_area):
         evidence = f"the contact travels {1e3 * travel:.2g} mm while the markers under it move {1e3 * moved:.2g} mm"
-        remedy = "hold the object so that it slides; one that rolls or rocks tells no friction"
+        remedy = "hold the object so that it slides; one that rolls or rocks shows no friction"
         yield Finding("contact travels", evidence, remedy)

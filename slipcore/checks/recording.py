@@ -20,7 +20,7 @@ def still_markers(seen: Subject) -> Iterator[Finding]:
     """A log without displacement."""
     if seen.log.has_displacement and not np.ptp(seen.log.displacement, axis=0).any():
         evidence = "no marker ever moves"
-        remedy = "map the field of displacements; of a sensor that tells forces alone, use method forces_only"
+        remedy = "map the field of displacements; of a sensor that measures forces alone, use method forces_only"
         yield Finding("no displacement", evidence, remedy)
 
 

@@ -39,7 +39,7 @@ class ScheduleDefaults(Options):
 
     rest: Annotated[float, Option(0.0, 1e3, "s", "15 frames: enough for an estimate of noise")] = 0.5
     press: Annotated[float, Option(0.0, 1e3, "s", "a grasp closes within a second")] = 1.0
-    settle: Annotated[float, Option(0.0, 1e3, "s", "tells pressing from shear")] = 0.5
+    settle: Annotated[float, Option(0.0, 1e3, "s", "separates pressing from shear")] = 0.5
     shear: Annotated[float, Option(0.0, 1e3, "s", "90 frames over the whole slip front")] = 3.0
     hold: Annotated[float, Option(0.0, 1e3, "s", "15 frames without motion")] = 0.5
 
@@ -307,8 +307,8 @@ class AccuracyDefaults(Options):
     coarsest_error: Annotated[float, Option(1e-3, 1.0, "-", "scenes of the library: 0.03 to 0.1")] = 0.05
     """On the coarsest grid, for what ``progress`` expects before the first estimate."""
     finest_cells: Annotated[int, Option(16, 100_000, "cells", "minutes a frame beyond")] = 700
-    most_substeps: Annotated[int, Option(1, 10_000, "steps", "halving further tells nothing new")] = 64
-    fewest_frames: Annotated[int, Option(3, 1000, "frames", "half of fewer tell little of a path")] = 8
+    most_substeps: Annotated[int, Option(1, 10_000, "steps", "halving further adds nothing")] = 64
+    fewest_frames: Annotated[int, Option(3, 1000, "frames", "half of fewer show little of a path")] = 8
     """From which on a log of half the frames shows what load steps leave."""
     least_growth: Annotated[float, Option(1.05, 10.0, "-", "less would show too little")] = 1.3
     """Of cells from one grid to the next, at least."""

@@ -39,4 +39,4 @@ def smoothing_found(kernels: dict[str, float]) -> tuple[Finding, ...]:
     if not widths:
         return ()
     evidence = f"noise of neighbours goes together as if {' and '.join(widths)} were smoothed (standard deviation)"
-    return (Finding("smoothed", evidence, "record fields that are not smoothed; slip is told from sharpened ones"),)
+    return (Finding("smoothed", evidence, "record fields that are not smoothed; slip is found from sharpened ones"),)

@@ -226,7 +226,9 @@ class GelCalibrationDefaults(Options):
     """Ways to the most probable gel, between which contacts are sought anew."""
     step: Annotated[float, Option(0.0, 1.0, "-", "trials")] = 2e-3
     """First step away from the most probable gel, as a share of the range."""
-    close: Annotated[float, Option(0.0, 1000.0, "nats", "what is left, the Gaussian around the best one tells")] = 10.0
+    close: Annotated[float, Option(0.0, 1000.0, "nats", "the rest follows from the Gaussian around the best one")] = (
+        10.0
+    )
     """Difference of log probability within which the way to the most probable gel ends."""
     fall: Annotated[float, Option(0.0, 10.0, "nats", "two standard deviations of a Gaussian")] = 2.0
     """By which the log probability is to fall over a step."""

@@ -29,7 +29,7 @@ from slipcore.forces.nodes import Nodes
 from slipcore.forces.recording import DisplacementData, error
 from slipcore.frames import FloatArray, GraspLog
 
-GIVEN, PRIORS = "given", "the prior's: the presses hardly tell it"
+GIVEN, PRIORS = "given", "the prior's: the presses hardly determine it"
 HALF_SPACE = "at least: against these contacts the gel may be as thick as a half-space"
 """What is said of an estimate."""
 _NORMAL = float(ndtri(0.5 + 0.5 * GEL_CALIBRATION.confidence))

@@ -726,7 +726,7 @@ def test_a_log_without_forces_is_fitted_by_its_gel(run: Run, gel: Path, tmp_path
 
 def test_a_log_without_forces_is_looked_at_by_its_gel(run: Run, felt: Path, gel: Path, tmp_path: Path) -> None:
     log = without_forces(formats.read(felt), tmp_path / "unfelt.npz")
-    assert "share of the resultant that data tell: x 100%, y 100%, z 100%" in run("check", log, "--gel", gel)[1]
+    assert "share of the resultant by the data: x 100%, y 100%, z 100%" in run("check", log, "--gel", gel)[1]
     with_forces, without = (json.loads(run("detect", log, "--json", *more)[1]) for more in (("--gel", gel), ()))
     assert with_forces["frames_in_contact"] == without["frames_in_contact"] > 0
     assert with_forces["contact_friction"] is not None

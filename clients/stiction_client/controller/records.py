@@ -67,7 +67,7 @@ def check(observation: Observation, last: float) -> None:
         if not 0.0 <= value < math.inf:
             raise InvalidArgument(name, value, "a finite magnitude of 0 or more; without one, leave the frame out")
     if not (math.isnan(observation.stick_ratio) or 0.0 <= observation.stick_ratio <= 1.0):
-        raise InvalidArgument("stick_ratio", observation.stick_ratio, "0 to 1, or NaN where none is told")
+        raise InvalidArgument("stick_ratio", observation.stick_ratio, "0 to 1, or NaN where none is known")
     if observation.slip_samples is not None:
         _check_samples(observation.slip_samples)
 

@@ -130,7 +130,7 @@ class DetectionOut(BaseModel):
         bool | None,
         Field(
             description="Whether the samples' velocities are relative to what seems to stick, for want of the object's "
-            "motion: they tell nothing of β₁; null without samples, or from an older version"
+            "motion: they say nothing of β₁; null without samples, or from an older version"
         ),
     ]
     seconds: Annotated[float, Field(description="What the detection took")]

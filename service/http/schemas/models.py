@@ -42,7 +42,7 @@ MODEL_EXAMPLE: JsonDict = {
     "created_at": MOMENT_EXAMPLE,
     "scales": None,
     "support": "supported",
-    "advice": "the samples tell the expected friction to within ± 2.3%",
+    "advice": "the samples determine the expected friction to within ± 2.3%",
 }
 
 
@@ -101,14 +101,14 @@ class FrictionModelOut(BaseModel):
     degrees_of_freedom: Annotated[float | None, Field(description="Of the coefficients' Student-t; null: normal")]
     scatter_degrees_of_freedom: Annotated[float | None, Field(description="Of the scatter's Student-t; null: normal")]
     domain: DomainOut
-    identifiable: Annotated[list[bool], Field(description="Whether the data tell β₀, β₁, β₂")]
+    identifiable: Annotated[list[bool], Field(description="Whether the data determine β₀, β₁, β₂")]
     element_area: Annotated[float, Field(description="m²")]
     diagnostics: dict[str, float | str | None]
     cost: CostOut
     created_at: datetime
     scales: Annotated[
         ScalesOut | None,
-        Field(description="Of the scatter; null: the method does not tell them apart, or it was stored without them"),
+        Field(description="Of the scatter; null: the method does not separate them, or it was stored without them"),
     ] = None
     support: SupportKind = "supported"
     advice: Advice = ""
@@ -242,7 +242,7 @@ class FrictionOut(BaseModel):
                     "within_domain": True,
                     "warning": None,
                     "support": "supported",
-                    "advice": "the samples tell the expected friction to within ± 3.1%",
+                    "advice": "the samples determine the expected friction to within ± 3.1%",
                 }
             ]
         }

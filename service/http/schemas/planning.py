@@ -77,7 +77,7 @@ class GraspForceOut(BaseModel):
                     "of": "contact",
                     "elements": 60.0,
                     "support": "supported",
-                    "advice": "the samples tell the expected friction to within ± 3.1%",
+                    "advice": "the samples determine the expected friction to within ± 3.1%",
                 }
             ]
         }
@@ -191,7 +191,7 @@ class RecognitionOut(BaseModel):
                             "version": 3,
                             "probability": 0.97,
                             "support": "supported",
-                            "advice": "the samples tell the expected friction to within ± 3.1%",
+                            "advice": "the samples determine the expected friction to within ± 3.1%",
                         }
                     ],
                     "unknown": 0.03,

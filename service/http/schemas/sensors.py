@@ -137,7 +137,9 @@ class EstimateOut(BaseModel):
     value: float | None
     low: float | None
     high: float | None
-    not_identified: Annotated[str | None, Field(description="Why these presses do not tell it; null where they do")]
+    not_identified: Annotated[
+        str | None, Field(description="Why it does not follow from these presses; null where it does")
+    ]
 
 
 class CalibrationOut(BaseModel):

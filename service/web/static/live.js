@@ -57,7 +57,7 @@ function drawTimes() {
   curve(0, column("stick_ratio"), 1, "stick");
   const [normal, tangential, command] = ["normal_force", "tangential_force", "command"].map(column);
   const force = most(normal, tangential, command);
-  axes(1, force, "force, N: normal ——  tangential - -  told to the gripper · ·");
+  axes(1, force, "force, N: normal ——  tangential - -  commanded · ·");
   curve(1, normal, force, "stick");
   curve(1, tangential, force, "slip", [5, 4]);
   curve(1, command, force, "text", [2, 3]);

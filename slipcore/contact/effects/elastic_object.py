@@ -17,7 +17,7 @@ class ElasticObject:
     poisson_ratio: float = SCENE.object_poisson_ratio
 
     why: ClassVar[str] = "a soft object makes the contact larger and the finger's share of the motion smaller"
-    cost: ClassVar[str] = "two applications a step, to tell the finger's displacement from the object's"
+    cost: ClassVar[str] = "two applications a step, to separate the finger's displacement from the object's"
 
     def __post_init__(self) -> None:
         if not self.young_modulus > 0.0:

@@ -53,13 +53,13 @@ def findings(common: FloatArray) -> tuple[Finding, ...]:
     found, frames, pulled = [], round(common[FORCE_FRAMES]), round(common[PULLED_FRAMES])
     if pulled:
         evidence = (
-            f"the object pulls in {pulled} of {frames} frames in which it touches; slip is told without them there"
+            f"the object pulls in {pulled} of {frames} frames in which it touches; slip is found without them there"
         )
         remedy = "give the force of the object on the sensor, in its frame"
         found.append(Finding("forces not believed", evidence, remedy))
     if common[TOLD_STEP] > 0.0:
         evidence = f"all places of markers are multiples of {1e6 * common[TOLD_STEP]:.3g} µm"
-        found.append(Finding("rounded", evidence, "record places as finely as the tracker tells them"))
+        found.append(Finding("rounded", evidence, "record places as finely as the tracker gives them"))
     elif common[LASTING] > NOISE.lasting_told:
         evidence = (
             f"markers part from their neighbours by {1e6 * common[LASTING]:.3g} µm that lasts from frame to frame"

@@ -303,5 +303,5 @@ def test_pressure_alone_is_refused_with_what_to_record(tmp_path: Path) -> None:
     path.write_text("t,P0,P1,P2,P3\n0,1,1,1,1\n1,1,1,1,2\n", encoding="utf-8")
     mapping = {"grid": [2, 2], "pitch": 1e-3, "time": "t"}
     for name in ("force", "pressure"):
-        with pytest.raises(InvalidInput, match=r"tells no tangential force.*neither slip nor friction.*Record"):
+        with pytest.raises(InvalidInput, match=r"no tangential force.*neither slip nor friction.*Record"):
             formats.read(path, mapping=json.dumps(mapping | {name: "P*"}))

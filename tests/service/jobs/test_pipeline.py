@@ -526,7 +526,7 @@ def test_forces_that_a_described_sensor_lacks_are_reconstructed(shop: Shop, blin
     assert found is not None
     assert found.findings is not None
     assert found.findings[0].name == "reconstructed forces"
-    assert "data tell: x 100%, y 100%, z 100%" in found.findings[0].evidence
+    assert "by the data: x 100%, y 100%, z 100%" in found.findings[0].evidence
 
 
 def test_a_gripper_that_reports_its_force_is_named_beside_the_gel(shop: Shop, blind: GraspLog) -> None:
@@ -575,7 +575,7 @@ def test_of_elements_forces_that_are_too_unsure_it_is_said(blind: GraspLog) -> N
     assert len(collected.samples) == 0
     assert because is not None
     assert because.startswith("elements' normal forces follow from displacement to ± ")
-    assert "tell the object's pose" in because
+    assert "record the object's pose" in because
 
 
 def test_of_forces_alone_it_is_said_that_they_tell_no_velocity(shop: Shop, ramp: GraspLog) -> None:
@@ -583,4 +583,4 @@ def test_of_forces_alone_it_is_said_that_they_tell_no_velocity(shop: Shop, ramp:
     job = shop.run(job_id)
     assert job.status == "refused"
     assert job.reason is not None
-    assert job.reason.startswith("forces alone tell slip but no velocity, so no friction samples")
+    assert job.reason.startswith("forces alone show slip but no velocity, so there are no friction samples")
