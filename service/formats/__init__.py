@@ -88,6 +88,9 @@ EXTRA = "formats"
 STORAGE = (".db3", ".mcap")
 """Names of rosbag2's storage files end so."""
 
+IN_FOLDERS = ("rosbag2", "parquet")
+"""Formats with a mapping of which a log may be a folder."""
+
 LEROBOT_INFO = "meta/info.json"
 """Where a LeRobot data set, which is a folder, describes itself."""
 
@@ -125,6 +128,8 @@ def read(path: Path, content_type: str | None = None, **settings: float | str | 
     given: dict[str, Any] = {key: value for key, value in settings.items() if value is not None}
     if "mapping" in given:
         given["mapping"] = parse_mapping(settings)
+    if isinstance(chosen := given.get("rest"), Path) and chosen.is_dir() and name not in IN_FOLDERS:
+        raise InvalidInput("rest", f"the folder {chosen}", f"a file, as of any {name}")
     if "rest" not in given or name == "tracked markers":
         return _reader(name)(path, **given)
     return _read_from_rest(_reader(name), path, given)

@@ -36,7 +36,11 @@ def read(path: Path, mapping: FieldMapping | None = None) -> GraspLog:
     """Read a grasp log from a table of frames. Raises ``InvalidInput`` naming the line, column or member."""
     table = _Table(path, mapping or UNMAPPED)
     log = assemble(table, table.mapping)
-    return replace(log, metadata={**log.metadata, **table.notes()})
+    notes = table.notes()
+    taken = log.metadata.keys() & notes
+    if taken:
+        raise InvalidInput("notes", f"of the name {min(taken)!r}", "names that the metadata do not have yet")
+    return replace(log, metadata={**log.metadata, **notes})
 
 
 def looks_like(start: bytes) -> bool:

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from service.formats import mapping as mappings
 from service.formats.assemble import as_array, assemble
+from service.formats.json_text import parse_object
 from service.formats.mapping import FieldMapping, Origin, default_origins
 from service.formats.members import DTYPES, ONCE
 from service.formats.messages import follow
@@ -72,10 +73,4 @@ def _document(path: Path) -> dict[str, Any]:
     size = path.stat().st_size
     if size > MAX_JSON_BYTES:
         raise InvalidInput("file", f"{size} bytes of JSON", f"at most {MAX_JSON_BYTES} bytes")
-    try:
-        document = json.loads(path.read_bytes())
-    except (ValueError, RecursionError) as error:
-        raise InvalidInput("file", f"not JSON ({str(error)[:80]})", "a JSON object") from error
-    if not isinstance(document, dict):
-        raise InvalidInput("file", f"JSON of a {type(document).__name__}", "a JSON object")
-    return document
+    return parse_object("file", path.read_bytes())

@@ -8,7 +8,8 @@ from typing import Any
 
 from service.formats import presets
 from service.formats import rest as rests
-from service.formats.members import DTYPES, ONCE
+from service.formats.json_text import parse_object
+from service.formats.members import DTYPES, MARKS, ONCE
 from slipcore.errors import InvalidInput
 
 MAX_MAPPING_BYTES = 64 * 1024
@@ -114,12 +115,7 @@ def parse(text: str) -> FieldMapping:
         raise InvalidInput("mapping", f"{len(text)} characters", f"at most {MAX_MAPPING_BYTES} bytes")
     if text.strip() in presets.PRESETS:
         text = json.dumps({"preset": text.strip()})
-    try:
-        given = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InvalidInput("mapping", f"not JSON ({error})", "a JSON object") from error
-    if not isinstance(given, dict):
-        raise InvalidInput("mapping", text[:60], "a JSON object")
+    given = parse_object("mapping", text)
     first, *others = [_parsed(each, given) for each in presets.alternatives(given)]
     return replace(first, alternatives=tuple(others))
 
@@ -154,6 +150,9 @@ def _required(name: str, told: Mapping[str, Any], origin: Origin) -> Origin:
 def _notes(given: Any) -> dict[str, str]:
     if not isinstance(given, dict) or len(given) > 100:
         raise InvalidInput("notes", repr(given)[:60], "an object of names and fields, 100 at most")
+    taken = given.keys() & MARKS
+    if taken:
+        raise InvalidInput("notes", f"of the name {min(taken)!r}", f"names other than {', '.join(MARKS)}")
     return {_text("notes", name): _text(f"notes, {name[:60]}", each) for name, each in given.items()}
 
 

@@ -1,12 +1,12 @@
 """The members that a grasp log is made of, by name: what every reader gathers and every writer writes."""
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from service.formats.json_text import parse
 from slipcore.errors import InvalidInput
 from slipcore.frames import FrictionLaw, GraspLog, GroundTruth
 
@@ -36,6 +36,10 @@ DTYPES = REQUIRED | OPTIONAL | TRUTH
 
 ONCE = ("position", "element_area", "gripper_force_deviation", "sensor", "metadata", "truth_friction")
 """Members of the whole log; of all others there is one entry a frame."""
+
+
+MARKS = ("mapping", "displacement", "position", "contact", "element_area", "rest", "start_time")
+"""Entries of the metadata in which a reader says what it did itself; nothing else that is noted has their names."""
 
 
 def grasp_log(members: Members) -> GraspLog:
@@ -80,10 +84,7 @@ def told_metadata(members: Members) -> dict[str, str]:
     """The entries of the metadata, none where there are no metadata."""
     text = _scalar_or(members, "metadata", "{}")
     allowed = "a JSON object of strings"
-    try:
-        entries = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InvalidInput("metadata", f"not JSON ({error})", allowed) from error
+    entries = parse("metadata", text, allowed)
     if not isinstance(entries, dict) or not all(isinstance(value, str) for value in entries.values()):
         raise InvalidInput("metadata", text[:100], allowed)
     return entries

@@ -1,6 +1,5 @@
 """Topics of messages as columns: the fields that a mapping asks for, with several topics brought together in time."""
 
-import json
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -8,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from service.formats.assemble import MAX_CONTENT_BYTES, as_array
+from service.formats.json_text import parse
 from service.formats.mapping import FieldMapping, Origin, default_origins
 from slipcore.errors import InvalidInput
 
@@ -161,10 +161,7 @@ def _stamp(value: Any) -> Any:
 
 def decode_json(content: bytes) -> object:
     """A message in JSON; raises ``InvalidInput``."""
-    try:
-        return json.loads(content)
-    except (ValueError, RecursionError) as error:
-        raise InvalidInput("message", f"not JSON ({str(error)[:80]})", "JSON, as its channel says") from error
+    return parse("message", content, "JSON, as its channel says")
 
 
 def _check_shapes(name: str, parts: list[NDArray[Any]]) -> None:

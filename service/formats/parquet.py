@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from service.formats import lerobot
 from service.formats import mapping as mappings
 from service.formats.assemble import MAX_CONTENT_BYTES, as_array, assemble
+from service.formats.json_text import parse_object
 from service.formats.mapping import FieldMapping, Origin, default_origins
 from service.formats.members import DTYPES, ONCE
 from slipcore.errors import InvalidInput
@@ -75,7 +76,7 @@ class _Columns:
         self._file = file
         self._names = set(file.schema_arrow.names)
         notes = file.schema_arrow.metadata or {}
-        self._log = _object("stiction_log", notes.get(LOG_KEY, b"{}"))
+        self._log = parse_object("stiction_log", notes.get(LOG_KEY, b"{}"))
         own = mappings.parse(notes[MAPPING_KEY].decode("utf-8", "replace")) if MAPPING_KEY in notes else None
         self.mapping = mappings.chosen_over(mapping, own).over(self._defaults())
         self._bytes = 0
@@ -174,16 +175,6 @@ def _dense(name: str, column: pa.Array, first_row: int) -> NDArray[Any]:
     if not any(is_kind(column.type) for is_kind in _VALUES):
         raise InvalidInput(name, f"of type {column.type}"[:100], "numbers, truth values or moments, in lists or not")
     return np.asarray(column.to_numpy(zero_copy_only=False)).reshape(shape)
-
-
-def _object(name: str, text: bytes) -> dict[str, Any]:
-    try:
-        found = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InvalidInput(name, f"not JSON ({str(error)[:80]})", "a JSON object") from error
-    if not isinstance(found, dict):
-        raise InvalidInput(name, repr(found)[:60], "a JSON object")
-    return found
 
 
 def _check_footer(path: Path) -> None:

@@ -22,17 +22,18 @@ from service.domain.recommended import AUTO
 from service.domain.stored_results import to_client_model
 from service.domain.upload import UploadRequest, check_target
 from service.formats.reading import Description
+from service.json_objects import RepeatedKey
 from service.stream import detectors
 from service.stream.errors import FINISHED, KEY_ENDED, NOT_UNDERSTOOD, REFUSED, SLOW_READER, STORAGE_AWAY, End
 from service.stream.messages import (
-    DECODE_BINARY,
-    DECODE_TEXT,
     UNNAMED,
     Finish,
     FrameIn,
     Incoming,
     Open,
     Resume,
+    decode_binary,
+    decode_text,
     packed,
     packed_or_none,
 )
@@ -81,6 +82,8 @@ def _decoded(decode: Callable[[bytes], Incoming], content: bytes) -> Incoming:
         return decode(content)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
         raise End(NOT_UNDERSTOOD, str(error)) from error
+    except RepeatedKey as error:
+        raise End(NOT_UNDERSTOOD, f"a message with {error}") from error
 
 
 class _Connection:
@@ -256,9 +259,9 @@ class _Connection:
             raise WebSocketDisconnect(event.get("code", 1000))
         text = event.get("text")
         if text is None:
-            return DECODE_BINARY, event.get("bytes") or b""
+            return decode_binary, event.get("bytes") or b""
         self._is_text, self._encode = True, msgspec.json.encode
-        return DECODE_TEXT, str(text).encode(errors="surrogatepass")
+        return decode_text, str(text).encode(errors="surrogatepass")
 
     async def _send(self, answer: dict[str, Any]) -> None:
         content = self._encode(answer)

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import msgspec
 
+from service.stream.keys_once import check_binary, check_text
 from slipcore.errors import InvalidInput
 
 Numbers = bytes | list[Any]
@@ -87,8 +88,22 @@ class Finish(msgspec.Struct, tag="finish", tag_field="type", forbid_unknown_fiel
 
 
 Incoming = Open | Resume | FrameIn | Finish
-DECODE_BINARY = msgspec.msgpack.Decoder(Incoming).decode
-DECODE_TEXT = msgspec.json.Decoder(Incoming).decode
+_DECODE_BINARY = msgspec.msgpack.Decoder(Incoming).decode
+_DECODE_TEXT = msgspec.json.Decoder(Incoming).decode
+
+
+def decode_binary(content: bytes) -> Incoming:
+    """A message of MessagePack; raises ``msgspec.MsgspecError``, ``RecursionError``, and ``RepeatedKey``."""
+    message: Incoming = _DECODE_BINARY(content)
+    check_binary(content)
+    return message
+
+
+def decode_text(content: bytes) -> Incoming:
+    """A message of JSON; raises ``UnicodeDecodeError``, too."""
+    message: Incoming = _DECODE_TEXT(content)
+    check_text(content)
+    return message
 
 
 def packed(name: str, numbers: Numbers) -> bytes | Sequence[float]:

@@ -21,14 +21,15 @@ from service.http.problems import (
     UNSUPPORTED_FORMAT,
     UPLOAD_TOO_LARGE,
 )
-from service.http.schemas.common import NAME_PATTERN
+from service.http.schemas.common import NAME_PATTERN, NAME_RULE, Reference
 from service.http.schemas.grasp_logs import GraspLogOut, NewWithdrawal, WithdrawnOut
 from service.http.schemas.jobs import JobOut
 from service.http.schemas.materials import EpochOut, MaterialChange, MaterialOut, MergedOut, NewEpoch, NewMerge
 
 router = APIRouter(prefix="/v1", route_class=JsonRoute)
 
-Alias = Annotated[str, Path(pattern=NAME_PATTERN, description="1 to 100 letters, digits, spaces and `._-`.")]
+Alias = Annotated[str, Path(pattern=NAME_PATTERN, description=NAME_RULE)]
+KnownAlias = Annotated[Reference, Path(max_length=100, description="As it is; earlier versions took spaces at its end")]
 _BODY = (UPLOAD_TOO_LARGE, UNSUPPORTED_FORMAT, INVALID_REQUEST, STORAGE_UNAVAILABLE)
 
 
@@ -68,7 +69,7 @@ def add_alias(context: CurrentContext, name: str, alias: Alias, principal: Curre
     status_code=204,
     responses=problems(NOT_OWNER, UNKNOWN_MATERIAL, UNKNOWN_ALIAS, INVALID_REQUEST, STORAGE_UNAVAILABLE),
 )
-def remove_alias(context: CurrentContext, name: str, alias: Alias, principal: CurrentPrincipal) -> Response:
+def remove_alias(context: CurrentContext, name: str, alias: KnownAlias, principal: CurrentPrincipal) -> Response:
     """The name is free then; a material's own name is no alias."""
     curate.remove_alias(context, name, alias, principal)
     return Response(status_code=204)

@@ -7,7 +7,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from db.text import is_storable
 
-NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}$"
+NAME_PATTERN = r"^[A-Za-z0-9]([A-Za-z0-9 ._-]{0,98}[A-Za-z0-9._-])?$"
+"""A space at an end nobody sees: two materials would seem to have one name."""
 MOMENT_EXAMPLE = "2026-11-21T08:41:00.123456Z"
 
 MOST = 1000
@@ -29,7 +30,8 @@ def _storable(text: str) -> str:
     return text
 
 
-Name = Annotated[str, Field(pattern=NAME_PATTERN, description="1 to 100 letters, digits, spaces and `._-`.")]
+NAME_RULE = "1 to 100 letters, digits, spaces and `._-`, of which the first is a letter or digit and the last no space."
+Name = Annotated[str, Field(pattern=NAME_PATTERN, description=NAME_RULE)]
 Text = Annotated[str, Field(max_length=10_000), AfterValidator(_storable)]
 Reason = Annotated[str, Field(min_length=1, max_length=1_000), AfterValidator(_storable)]
 """Why a log counts no more: kept with the log and in the audit trail. Those from before may be longer."""

@@ -75,6 +75,15 @@ def test_an_array_of_pillars_is_read_from_its_loggers_table(
     assert log.contact.reshape(FRAMES, -1).sum(axis=1).tolist() == [3, 3, 3, 9, 9]
 
 
+def test_a_note_does_not_overwrite_what_the_metadata_say(tmp_path: Path) -> None:
+    path = written(tmp_path / "log.csv", columns(np.random.default_rng(1)))
+    told = {"metadata": {"value": {"robot": "one"}}}
+    noted = read(path, **told, notes={"state": "P*_slipState"}).metadata
+    assert (noted["robot"], noted["state"]) == ("one", "-2 45 times")
+    with pytest.raises(InvalidInput, match="notes is of the name 'robot'; allowed: names that the metadata do not"):
+        read(path, **told, notes={"robot": "P*_slipState"})
+
+
 def test_a_column_is_the_grippers_force(tmp_path: Path) -> None:
     told = columns(np.random.default_rng(1)) | {"grip": ["0", "1500", "2500", "2500", "2400"]}
     log = read(written(tmp_path / "log.csv", told), gripper_force={"field": "grip", "unit": "mN"})

@@ -2,12 +2,15 @@
 
 import json
 import math
+import re
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from service.formats import mapping
+from service.formats import assemble, mapping
 from service.formats.mapping import Origin, parse
+from service.formats.members import MARKS
 from slipcore import InvalidInput
 
 
@@ -109,6 +112,8 @@ def test_what_is_named_goes_before_what_is_usual() -> None:
         ({"time": {"field": "a", "unit": "-s"}}, "unit of time"),
         ({"time": {"field": "a", "unit": ["s"]}}, "unit of time"),
         ({"speed": "v"}, "mapping"),
+        ({"notes": {"rest": "state"}}, "notes"),
+        ({"notes": {"mapping": "state"}}, "notes"),
     ],
 )
 def test_what_is_wrong_is_named(entries: dict[str, Any], name: str) -> None:
@@ -121,6 +126,19 @@ def test_what_is_wrong_is_named(entries: dict[str, Any], name: str) -> None:
 def test_what_is_no_object_is_refused(text: str) -> None:
     with pytest.raises(InvalidInput, match="mapping"):
         parse(text)
+
+
+@pytest.mark.parametrize("text", ['{"pitch": 1, "pitch": 2}', '{"time": {"field": "a", "f\\u0069eld": "b"}}'])
+def test_a_key_that_stands_twice_is_refused_by_name(text: str) -> None:
+    """The last would count, without a word."""
+    with pytest.raises(InvalidInput, match=r"mapping is with the key '(pitch|field)' more than once; allowed: each"):
+        parse(text)
+
+
+def test_a_readers_own_marks_are_named_where_notes_are_checked() -> None:
+    """The reader says in the metadata what it did: a noted column of that name would say something else."""
+    told = re.findall(r'metadata\["(\w+)"\] =', Path(assemble.__file__).read_text(encoding="utf-8"))
+    assert {*told, "mapping"} == set(MARKS)
 
 
 def test_as_many_fields_and_bytes_as_are_allowed_are_taken() -> None:

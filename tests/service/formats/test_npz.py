@@ -91,6 +91,7 @@ def test_a_missing_member_is_named(log: GraspLog, zip_of: ZipOf, name: str) -> N
         ("metadata", np.array("[1]"), "metadata is .*; allowed: a JSON object of strings"),
         ("metadata", np.array('{"a": 1}'), "allowed: a JSON object of strings"),
         ("metadata", np.array("{"), "metadata is not JSON"),
+        ("metadata", np.array('{"a": "1", "a": "2"}'), "metadata is with the key 'a' more than once"),
         ("truth_friction", np.zeros(3), r"truth_friction is of shape \[3\]"),
         ("truth_contact", np.ones((5, 3, 4)), "truth_contact is of dtype float64; allowed: bool"),
         ("truth_contact", np.ones((5, 3, 3), bool), r"truth.contact is bool of shape \[5, 3, 3\]"),

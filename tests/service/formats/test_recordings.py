@@ -508,7 +508,7 @@ def test_a_column_of_something_else_is_refused_by_name(
     ("notes", "mapping", "message"),
     [
         ("{", None, "stiction_log is not JSON .*; allowed: a JSON object"),
-        ("[]", None, r"stiction_log is \[\]; allowed: a JSON object"),
+        ("[]", None, r"stiction_log is JSON of a list; allowed: a JSON object"),
         ("{}", '{"episode": 1}', "episode is 1; allowed: a table with a column episode_index"),
         ("{}", None, "time is without rows; allowed: at least 2 frames"),
     ],
@@ -548,7 +548,13 @@ def test_hdf5_of_something_else_is_refused_by_name(log: GraspLog, tmp_path: Path
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [("[1]", "file is JSON of a list; allowed: a JSON object"), ('{"time": [0]}', "the file has the keys time")],
+    [
+        ("[1]", "file is JSON of a list; allowed: a JSON object"),
+        ('{"time": [0]}', "the file has the keys time"),
+        ('{"time": [0], "time": [1]}', "file is with the key 'time' more than once"),
+        ('{"frames": [{"force": 1, "force": 2}]}', "file is with the key 'force' more than once"),
+        ('{"mapping": {"pitch": 1, "pitch": 2}}', "file is with the key 'pitch' more than once"),
+    ],
 )
 def test_json_of_something_else_is_refused(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "log.json").write_text(text)

@@ -40,6 +40,14 @@ def test_each_alternative_of_a_preset_has_the_frame_at_rest(tmp_path: Path) -> N
         formats.read(path, mapping="papillarray", rest="99")
 
 
+def test_rest_in_a_folder_of_a_format_of_files_is_refused_by_name(tmp_path: Path) -> None:
+    tracked = tmp_path / "tracked.csv"
+    tracked.write_text("time,marker,x,y\n0,1,0,0\n1,1,0,0\n", encoding="utf-8")
+    for path in (log_of(tmp_path), tracked):
+        with pytest.raises(InvalidInput, match=r"rest is the folder .*; allowed: a file"):
+            formats.read(path, rest=tmp_path)
+
+
 def test_one_gripper_force_of_all_frames_is_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match="gripper_force is of shape"):
         formats.read(log_of(tmp_path), mapping=json.dumps({"gripper_force": {"value": 1.0}}), rest="least contact")

@@ -316,8 +316,12 @@ def test_an_opening_without_numbers_is_refused_by_name(make: Callable[..., Strea
         '{"type": "frame", "displacement": ' + "[" * 900 + "]" * 900 + ', "number": "x"}',
         "[" * 100_000,
         '{"type": "open"}',
+        '{"type": "finish", "store": true, "st\\u006fre": false}',
     ],
-    ids=["time", "force", "number", "number 2^80", "time 10^400", "900 deep and wrong", "100,000 deep", "no field"],
+    ids=[
+        *("time", "force", "number", "number 2^80", "time 10^400"),
+        *("900 deep and wrong", "100,000 deep", "no field", "twice"),
+    ],
 )
 def test_a_message_that_is_none_has_its_documented_code(make: Callable[..., Streams], message: str) -> None:
     closed = converse(make(), json.dumps(first()), message, raw=True).closed

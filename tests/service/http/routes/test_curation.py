@@ -47,6 +47,8 @@ def test_an_alias_comes_and_goes(client: httpx.Client, material: str) -> None:
         ("PATCH", "materials/{}", {"name": "fitted"}, 409, "material-exists"),
         ("PUT", "materials/{}/aliases/fitted", None, 409, "material-exists"),
         ("PUT", "materials/{}/aliases/%20", None, 422, "invalid-request"),
+        ("PUT", "materials/{}/aliases/felt%20", None, 422, "invalid-request"),
+        ("DELETE", "materials/{}/aliases/felt%20", None, 404, "unknown-alias"),
         ("PUT", "materials/felt/aliases/x", None, 404, "unknown-material"),
         ("DELETE", "materials/{0}/aliases/{0}", None, 404, "unknown-alias"),
         ("POST", "materials/{}/merges", {"source": "felt"}, 404, "unknown-material"),

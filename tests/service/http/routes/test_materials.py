@@ -37,6 +37,8 @@ def test_a_second_material_of_that_name_is_refused(client: httpx.Client, materia
     [
         ({"name": ""}, "name"),
         ({"name": " paper"}, "name"),
+        ({"name": "paper "}, "name"),
+        ({"name": "x" * 99 + " "}, "name"),
         ({"name": "a/b"}, "name"),
         ({"name": "ü"}, "name"),
         ({"name": "paper\n"}, "name"),
@@ -59,6 +61,19 @@ def test_a_material_that_cannot_be_is_refused_by_name(client: httpx.Client, body
 def test_every_wrong_value_is_listed(client: httpx.Client) -> None:
     problem = client.post("/v1/materials", json={"name": "", "description": 1}).json()
     assert [entry["name"] for entry in problem["errors"]] == ["name", "description"]
+
+
+@pytest.mark.parametrize("padding", ["", 5000 * " "], ids=["short", "long"])
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32", "latin-1"])
+def test_a_body_is_utf_8_without_a_mark_however_long(client: httpx.Client, encoding: str, padding: str) -> None:
+    content = ('{"name": "felt", "description": "weiß"}' + padding).encode(encoding)
+    answer = client.post("/v1/materials", content=content, headers={"content-type": "application/json"})
+    assert (answer.status_code, answer.json()["name"]) == (422, "body")
+    assert "another encoding than UTF-8 without a byte order mark" in answer.json()["value"]
+
+
+def test_names_differ_by_case(client: httpx.Client, material: str) -> None:
+    assert client.post("/v1/materials", json={"name": material.upper()}).status_code == 201
 
 
 @pytest.mark.parametrize(
