@@ -39,7 +39,7 @@ ATTEMPTS = 3
 """How often rows are copied where files that they refer to are deleted meanwhile, as old uploads are."""
 
 Report = Callable[[str, int], None]
-"""What is told what was copied, and how many of it."""
+"""What is given the kind of what was copied, and how many of it."""
 
 
 def backup(database: Database, blobs: BlobStore, folder: Path, report: Report) -> None:
@@ -103,7 +103,7 @@ def restore(
     """Fill an empty database and blob store from a backup; they become a store of their own, with an id of its own.
 
     Every blob must have the bytes that it is named for. A blob store of another database is only filled where it is
-    ``taken_over_by`` somebody, as the audit trail then tells; that database is refused there from then on. Raises
+    ``taken_over_by`` somebody, as the audit trail then records; that database is refused there from then on. Raises
     ``NotEmpty`` for a database that has any rows and for a store that has the backup's blobs or is inside the backup,
     ``StoreMismatch``, ``SchemaMismatch``, ``NotFound`` for a blob that is missing: all before anything is changed.
     ``BlobDamaged``, for a blob whose bytes have changed, and ``NotEmpty`` for a database that somebody else fills

@@ -22,7 +22,7 @@ from db.quarantine import FolderQuarantine, Quarantine, move, sync_folder
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 STORE_ID = "store-id"
-"""File beside the blobs that tells which store they belong to (``db.identity``)."""
+"""File beside the blobs that says which store they belong to (``db.identity``)."""
 
 MOST_CHECKED = 10_000
 """Blobs of which it is remembered when they were read last; when there are more, all are forgotten."""

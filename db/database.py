@@ -82,7 +82,7 @@ class Database:
 
     @contextmanager
     def connect(self, *, to_write: bool = False) -> Iterator[Connection]:
-        """A connection below the transactions of the stores: for migrations, whose errors tell the URL too.
+        """A connection below the transactions of the stores: for migrations, whose errors show the URL too.
 
         One that is opened ``to_write`` takes SQLite's write lock with each transaction, and renews the file's header.
         """

@@ -101,7 +101,7 @@ def _known_in_any_schema(database: Database) -> str | None:
 def adopt(database: Database, blobs: BlobStore, actor: Actor | None) -> AdoptedStore:
     """Join two because somebody says so, under a new id: whatever else worked with either is refused from then on.
 
-    The audit trail tells that ``actor`` did so; None: the caller, who is about to fill the tables, adds that entry.
+    The audit trail records that ``actor`` did so; None: the caller, who is about to fill the tables, adds that entry.
     """
     store_id = uuid.uuid4().hex
     with database.write() as session:

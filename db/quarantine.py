@@ -25,7 +25,7 @@ class Quarantine(Protocol):
 
 
 class FolderQuarantine:
-    """A folder beside the blobs; ``place`` tells where a blob belongs."""
+    """A folder beside the blobs; ``place`` shows where a blob belongs."""
 
     def __init__(self, folder: Path, place: Callable[[str], Path]) -> None:
         self._folder, self._place = folder, place

@@ -69,7 +69,7 @@ class NewModel:
     """A fitted friction model about to be stored; coefficients β₀ [-], β₁ [s/m], β₂ [1/N], ranges in m/s and N.
 
     ``degrees_of_freedom`` of the coefficients and ``scatter_degrees_of_freedom`` of ε are None where infinite;
-    ``scales`` is None where the method does not tell them apart, or the model was stored before they were kept.
+    ``scales`` is None where the method does not separate them, or the model was stored before they were kept.
     """
 
     method: str
@@ -195,7 +195,7 @@ class CalibrationPress:
 
 @dataclass(frozen=True, slots=True)
 class NewCalibration:
-    """What was found of a sensor's faults: the sensor ``model`` as its package tells it, without the zero of each
+    """What was found of a sensor's faults: the sensor ``model`` as its package gives it, without the zero of each
     element, and that ``offset``, float64 N row by row, None where it is unknown.
 
     ``created_by``: the access key with which it was asked for, None without one.
@@ -228,7 +228,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class ContactFriction:
-    """Friction that a contact as a whole tells, with its 95 % interval, and what it was found from.
+    """Friction of a contact as a whole, with its 95 % interval, and what it was found from.
 
     Where it ``is_bound``, friction is at least ``low``, and ``high`` is None.
     """

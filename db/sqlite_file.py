@@ -25,7 +25,7 @@ SIDE_FILES = ("-wal", "-shm")
 """What is beside the file as long as any connection has read from it: commits go to the first of them."""
 
 ANY_SIZE = "PRAGMA writable_schema = ON"
-"""Lets SQLite take a header that tells more pages than the file has, as it may in the middle of a checkpoint."""
+"""Lets SQLite take a header that states more pages than the file has, as it may in the middle of a checkpoint."""
 
 WITHOUT_LOG = "before a start on another copy, move away -wal and -shm beside it, which hold nothing of it"
 
@@ -170,7 +170,7 @@ class SqliteFile:
 def _belongs(found: FileHeader, log: list[FileHeader], known: FileHeader | None) -> bool:
     """Whether the ``found`` header of the file is one that the ``log`` holds or follows, none before the ``known`` one.
 
-    A log that holds none may have been emptied, which tells no more than the count.
+    A log that holds none may have been emptied, which says no more than the count.
     """
     if not log:
         return known is None or not is_older(found.generation, known.generation)

@@ -42,7 +42,7 @@ class UtcDateTime(TypeDecorator[datetime]):
     cache_ok = True
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002
-        """Refuse a moment without zone, since nobody could tell which one it is."""
+        """Refuse a moment without zone, since nobody could know which one it is."""
         if value is not None and value.tzinfo is None:
             raise ValueError(f"datetime is {value} without time zone; allowed: one with a zone")
         return None if value is None else value.astimezone(UTC)
@@ -126,7 +126,7 @@ class SensorCalibrationRow(Base):
     """One version of what is known of a sensor's faults; the newest corrects the logs that come in from then on.
 
     ``presses``: logs that it was made from, with the force where it was known; ``model``: the sensor model as
-    ``slipcore`` tells it, without the zero of each element, which is ``offset``: float64 N, row by row.
+    ``slipcore`` gives it, without the zero of each element, which is ``offset``: float64 N, row by row.
     """
 
     __tablename__ = "sensor_calibrations"

@@ -58,7 +58,7 @@ def _frames_of_page_1(file: int, head: bytes, page_size: int) -> Iterator[tuple[
 
 
 def _is_whole(head: bytes, frame: bytes, page: bytes, checksum: tuple[int, int]) -> bool:
-    """Whether a frame has the checksum that its head tells, which goes on from that of the frame before."""
+    """Whether a frame has the checksum that its head states, which goes on from that of the frame before."""
     covered = frame[:8] + page
     if len(covered) % 8:
         return False

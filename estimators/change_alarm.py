@@ -136,7 +136,7 @@ def watched(
 def _log_evidence(level: FloatArray, variance: FloatArray, shift: float, scatter_prior: ScatterPrior) -> FloatArray:
     """Log of p(levels | shifted from grasp j on) over p(levels | not), for each j [n].
 
-    Given τ all is Gaussian: with w = 1/(τ² + s²), flat level m and δ ~ N(0, shift²), sums of w, wy, wy² tell it.
+    Given τ all is Gaussian: with w = 1/(τ² + s²), flat level m and δ ~ N(0, shift²), sums of w, wy, wy² suffice.
     """
     centred = level - level.mean()
     weight = 1.0 / (TAUS[:, None] ** 2 + variance)

@@ -41,7 +41,7 @@ class Identifiability(Options):
     ill_conditioned: Annotated[float, Option(1.0, 1e15, "-", "three digits lost")] = 1e3
     """Scaled condition number from which the factor is computed again in extended precision."""
     hidden: Annotated[float, Option(1e-15, 0.1, "-", "rounding")] = 1e-8
-    """Share in a direction that is not seen from which a coefficient is not told."""
+    """Share in a direction that is not seen from which a coefficient is not identified."""
     rounding: Annotated[float, Option(1.0, 1000.0, "ulp", "rounding of a mean of many")] = 8.0
     """Spread of a column, in units of its mean's last digit, up to which it is constant."""
     interval: Annotated[float, Option(0.5, 0.9999, "-", "custom")] = 0.95
@@ -77,7 +77,7 @@ class Prior(Options):
     """Least part of the largest value of v or f_n that counts as the range seen."""
     velocity_effect: Annotated[float, Option(1e-4, 10.0, "-", "a usual margin, as of what is identifiable")] = 0.1
     """Standard deviation of what velocity changes over its reference span, as a part of friction, where the size of
-    β₁ matters and no sample tells it."""
+    β₁ matters and no sample shows it."""
     unknown_velocity: Annotated[float, Option(1e-6, 1.0, "m/s", "incipient slip: 0.1 to 10 mm/s")] = 1e-3
     """Root mean square of those unknown: then 2 % of friction; of rocks it is 1 to 3 % a decade (Marone, 1998)."""
     velocity_tilt: Annotated[float, Option(0.0, 10.0, "-", "a third slower or faster at half the force")] = 0.5
@@ -104,14 +104,14 @@ class Prior(Options):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PopulationSettings(Options):
-    """What other materials tell of how much grasps of one differ (``population.py``)."""
+    """What other materials say of how much grasps of one differ (``population.py``)."""
 
     fewest: Annotated[int, Option(2, 1000, "grasps", "three differences: fewer leave τ to its prior")] = 4
     """Of a material that counts."""
     outlier_share: Annotated[float, Option(0.0, 1.0, "-", "one in ten: an odd one decides nothing")] = 0.1
     """Probability that a material is none of the population but any."""
     quantiles: Annotated[int, Option(4, 10_000, "quantiles", "ratios of priors to a few per cent")] = 32
-    """Of what a material tells of τ, that are averaged over."""
+    """Of a material's information on τ, that are averaged over."""
     least: Annotated[float, Option(1e-6, 0.1, "-", "below what any sensor repeats")] = 1e-3
     """Scale of the population's τ from which is summed."""
     most: Annotated[float, Option(0.1, 100.0, "-", "absurd")] = 3.0
@@ -337,7 +337,7 @@ class ClusterSettings(Options):
     by_chance: Annotated[float, Option(0.0, 10.0, "standard errors", "usual for what differs from chance")] = 2.0
     """Of a variance of so many blocks: larger by less than that shows no errors that go together."""
     least_neighbours: Annotated[int, Option(2, 1000, "pairs", "a correlation to 0.25")] = 16
-    """Of places of a grasp beside each other, from which they tell whether neighbours are off alike."""
+    """Of places of a grasp beside each other, from which they show whether neighbours are off alike."""
     most_alike: Annotated[float, Option(0.0, 0.999, "-", "alike over 7 elements: wider than a contact shows")] = 0.99
     """Correlation of neighbours that is taken at most."""
     least_places: Annotated[float, Option(1.0, 100.0, "places", "a level and two slopes, and one to spare")] = 4.0
@@ -377,7 +377,7 @@ class RecognitionPrior(Options):
     scatter_freedom: Annotated[float, Option(0.1, 100.0, "-", "weak, yet proper")] = 2.0
     """Of the half-Student-t distribution of σ between materials, whose scale is the reference scatter."""
     least_scatter: Annotated[float, Option(1e-6, 0.1, "-", "a fifth of the reference: less is the sensor's")] = 0.01
-    """Of samples, of any material: less tells no material from another."""
+    """Of samples, of any material: less does not distinguish materials."""
     rounding: Annotated[float, Option(1e-6, 1.0, "-", "a hundredth of its variance")] = 0.1
     """Part of that below which a material's own scatter counts as so much."""
     nodes: Annotated[
@@ -460,7 +460,7 @@ class DesignSettings(Options):
     drop_probability: Annotated[float, Option(1e-9, 0.5, "-", "one in a thousand probes")] = 1e-3
     """With which a probe may drop what it bears."""
     least_speed: Annotated[float, Option(1e-6, 1.0, "m/s", "17 µm a frame at 30 fps: above markers' noise")] = 5e-4
-    """Slowest slip of a probe that a robot may choose unless it is told otherwise."""
+    """Slowest slip of a probe that a robot may choose unless another is given."""
     least_length: Annotated[float, Option(1e-6, 1.0, "m", "about an element's pitch")] = 5e-4
     """Shortest slip of a probe, in the same way."""
     slipping: Annotated[float, Option(0.01, 1.0, "-", "half way of the slip front")] = 0.5

@@ -14,7 +14,7 @@ from estimators.methods.automatic import choose, compared
 def needs_samples(method: str, grasps: int) -> bool:
     """Whether a ``method``, by default options, fits so many grasps from less than their samples worse than from them.
 
-    Moments tell exactly what a grasp and its places share. Least squares and the Bayesian default look at the elements
+    Moments hold exactly what a grasp and its places share. Least squares and the Bayesian default look at the elements
     of a single grasp, which they take from its samples.
     """
     return method not in {"conjugate", "hierarchical"} and (grasps < 2 or method not in {"ols", "bayes"})

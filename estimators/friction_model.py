@@ -29,7 +29,7 @@ class FrictionModel(LinearFriction):
     ``coefficients`` [3]: β₀ [-], β₁ [s/m], β₂ [1/N]; ``covariance`` [3, 3] of them; ``scale``: standard deviation σ
     of ε [-]; ``n`` samples of elements of ``element_area`` m²; ``degrees_of_freedom`` of the Student-t distribution
     that the coefficients follow and ``scatter_degrees_of_freedom`` of that which ε/σ follows; ``identifiable`` [3]
-    bool; ``draws`` [k, ≥ 4] of (β, σ, …) or None; ``scales`` of the scatter where the method tells them apart, when
+    bool; ``draws`` [k, ≥ 4] of (β, σ, …) or None; ``scales`` of the scatter where the method separates them, when
     σ is all of it, as one element in a new grasp shows it.
     """
 

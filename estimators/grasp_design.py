@@ -1,4 +1,4 @@
-"""What to record next: the grasp that most narrows what a planner is told, per second of robot time.
+"""What to record next: the grasp that most narrows what a planner is given, per second of robot time.
 
 A c-optimal design, one grasp ahead (Elfving, 1952; Chaloner & Verdinelli, 1995, Statistical Science 10:273): of all
 grasps that a robot can make, the one after which the friction at the planner's working point is known best.
@@ -25,7 +25,7 @@ NODES, WEIGHTS = np.array([-1.0, 0.0, 1.0]), np.array([1.0, 2.0, 1.0]) / 4.0
 
 
 SPEEDS, LENGTHS = DESIGN.least_speed * 2.0 ** np.arange(4), DESIGN.least_length * 2.0 ** np.arange(3)
-"""Of a probe's slip, m/s and m, that a robot may choose unless it is told otherwise."""
+"""Of a probe's slip, m/s and m, that a robot may choose unless another is given."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +176,7 @@ class Designs:
         return x.reshape(len(v), -1, 3), count
 
     def roots(self, model: FrictionModel) -> FloatArray:
-        """R [d, 3, 3] of what each grasp would tell of β, RᵀR: that of its places, less what how grasps vary hides.
+        """R [d, 3, 3] of what each grasp would say of β, RᵀR: that of its places, less what how grasps vary hides.
 
         With A = Q₀ᵀQ₀ of its places and scatter τ of the whole law, the information is A − A b bᵀ A τ²/(1 + τ² bᵀ A b),
         b = β (Sherman & Morrison), as in the fit; R = (1 − t a aᵀ) Q₀ with a = Q₀ b, 1 − t aᵀa = 1/√(1 + τ² aᵀa).
@@ -194,7 +194,7 @@ class Designs:
 
 
 def scatter(model: FrictionModel) -> tuple[float, float, float]:
-    """τ, ω and σ of the model; all scatter as that of whole grasps where its method does not tell them apart."""
+    """τ, ω and σ of the model; all scatter as that of whole grasps where its method does not separate them."""
     least = DESIGN.least_scatter * max(abs(float(model.coefficients[0])), DESIGN.least_scatter)
     if model.scales is None:
         middle = [1.0, *(0.5 * sum(ends) for ends in (model.domain.tangential_velocity, model.domain.normal_force))]

@@ -11,4 +11,4 @@ FitMethod = Literal[ModelMethod, "auto"]
 METHODS: tuple[FitMethod, ...] = get_args(FitMethod)
 
 SCATTER_METHODS = ("hierarchical", "bayes", "auto")
-"""Those whose model tells scatter between grasps, of which there is a prior."""
+"""Those whose model has the scatter between grasps, of which there is a prior."""

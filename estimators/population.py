@@ -1,4 +1,4 @@
-"""What other materials tell of how much grasps of one differ, before it has grasps of its own (empirical Bayes).
+"""What other materials say of how much grasps of one differ, before it has grasps of its own (empirical Bayes).
 
 Of a population of scale A, materials have scatter between grasps τ | A ~ half-normal(A). With A² ~ scaled inverse-χ² a
 material then has the half-Student-t prior of ``defaults.PRIOR`` where no other is known, and A² would go on being so
@@ -32,7 +32,7 @@ SIZES = np.geomspace(POPULATION.least, POPULATION.most, POPULATION.nodes)
 def population_scatter(models: Iterable[FrictionModel]) -> ScatterPrior:
     """The prior of scatter between grasps of a new material, by the ``models`` of others like it, one a material.
 
-    Those count that tell their ``scales`` and were fitted to four grasps or more; without any it is the default. Their
+    Those count that have ``scales`` and were fitted to four grasps or more; without any it is the default. Their
     order does not matter.
     """
     weak = ScatterPrior()
@@ -50,7 +50,7 @@ def population_scatter(models: Iterable[FrictionModel]) -> ScatterPrior:
 
 
 def told_scale(model: FrictionModel) -> Scale | None:
-    """What a model tells of its scatter between grasps by the default prior; None of too few grasps."""
+    """What a model says of its scatter between grasps by the default prior; None of too few grasps."""
     grasps = model.diagnostics.get("clusters") if model.diagnostics.get("cluster_kind") == "grasp" else None
     if model.scales is None or grasps is None or not float(grasps) >= POPULATION.fewest:
         return None

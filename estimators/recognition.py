@@ -38,7 +38,7 @@ def recognise(
     """Probability of each material, and of "unknown", for the samples of one grasp (or several of one thing).
 
     The likelihood is that of Gaussian errors: β of a material is normal with its model's covariance (and, where the
-    model tells its ``scales``, scatter of the whole law between grasps, which is Student-t as far as few grasps tell
+    model has ``scales``, scatter of the whole law between grasps, which is Student-t as few grasps are
     it, and what the grasp's places, of which it has only so many, shift; where the samples' velocities are unknown,
     what those change), σ² inverse-gamma with its degrees of freedom, all integrated out. "unknown" is the same for a
     surface of which only a population of materials is known: levels, slopes of several sizes, and scatter, each for

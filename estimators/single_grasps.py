@@ -33,7 +33,7 @@ def grasp_effects(model: FrictionModel, moments: Sequence[SufficientStatistics])
     """The effect u of each grasp in μ = (1 + u)(β₀ + β₁ v + β₂ f_n) + p + ε, from the moments of its samples.
 
     Given the model's scales, u, the places' p and ε are normal, and so is u given β and the samples (Searle et al.,
-    1992, ch. 7): its mean shrinks towards 0 where they tell little. The interval holds the uncertainty of β, too, and
+    1992, ch. 7): its mean shrinks towards 0 where they say little. The interval holds the uncertainty of β, too, and
     not that of the scales. Raises ``InvalidSamples`` for a model without ``scales``, and for moments that are not those
     of one grasp, place by place.
     """

@@ -188,7 +188,7 @@ class Settings(BaseSettings):
     @field_validator("webhook_url")
     @classmethod
     def _web_address(cls, url: str | None) -> str | None:
-        with suppress(ValueError):  # whose text may tell the address
+        with suppress(ValueError):  # whose text may hold the address
             parts = urlsplit(url or "")
             if url is None or (parts.scheme in {"http", "https"} and parts.hostname and parts.port != 0):
                 return url
@@ -215,7 +215,7 @@ def unknown_variables(environment: Iterable[str]) -> list[str]:
 
 
 def complaints(error: ValidationError) -> str:
-    """What is wrong with settings, a line each; the value of none that may hold a secret is told."""
+    """What is wrong with settings, a line each; no value that may hold a secret is shown."""
     return "\n".join(_complaint(str(each["loc"][0]), each["input"], each["msg"]) for each in error.errors())
 
 

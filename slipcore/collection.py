@@ -14,8 +14,8 @@ from slipcore.slip_state import SlipHistory
 
 
 class Collected(NamedTuple):
-    """What a grasp tells of friction: the ``samples`` that are trusted, those of all ``elements``, what the
-    ``contact`` as a whole tells (None without forces or contact), and why elements are left out (None: they are not).
+    """What a grasp says of friction: the ``samples`` that are trusted, those of all ``elements``, what the
+    ``contact`` as a whole shows (None without forces or contact), and why elements are left out (None: they are not).
     """
 
     samples: FrictionSamples
@@ -33,7 +33,7 @@ def collect_friction(log: GraspLog, history: SlipHistory, **options: float) -> C
     """Observe friction at the elements of ``log`` that slip by ``history``, and of contacts that slide or pivot.
 
     Where these contradict each other the contact is trusted: smoothed forces and tilted normals hardly change its
-    sums. Elements of a contact that rolls tell nothing, for what slips by its motion does not.
+    sums. Elements of a contact that rolls say nothing, for what slips by its motion does not.
     ``options``: see ``defaults.SampleOptions``. Raises ``NoForces`` for a log without forces, ``UnknownScale`` for one
     whose lengths are not in metres, ``InvalidInput`` for a history of another log and for bad options.
     """

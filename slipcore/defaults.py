@@ -62,17 +62,17 @@ class NoiseDefaults(Options):
     series: Annotated[int, Option(4, 100_000, "elements", "a frame then errs by 10 %, the median by 2 %")] = 64
     """That are looked at at most, evenly chosen."""
     least_series: Annotated[int, Option(2, 1000, "elements", "a median of fewer is one of them")] = 4
-    """That must have changed for a frame to tell anything."""
+    """That must have changed for a frame to count as evidence."""
     least_inner: Annotated[int, Option(1, 1_000_000, "elements", "fields bend from marker to marker on 10 × 10")] = 225
-    """With neighbours all around, from which these tell of noise that lasts."""
+    """With neighbours all around, from which these show noise that lasts."""
     least_step: Annotated[float, Option(0.0, 1e-3, "m", "digits of files, and rounding of floats")] = 1e-9
-    """By so much a place may miss a multiple of the step in which places are told."""
+    """By so much a place may miss a multiple of the step in which places are given."""
     finest_step: Annotated[float, Option(0.0, 1e-3, "m", "a third of it is less than any camera's noise")] = 2e-8
     """No finer one is told apart from none."""
     lasting_told: Annotated[
         float, Option(0.0, 1e-3, "m", "fields of tuning scenes without noise bend by up to 1.7 µm")
     ] = 2e-6
-    """Noise that lasts from frame to frame from which a finding tells of it; less may be the field's own bends."""
+    """Noise that lasts from frame to frame from which a finding reports it; less may be the field's own bends."""
     step_levels: Annotated[int, Option(2, 1000, "-", "two are multiples of their distance, by chance")] = 3
     """Different places from which they may be multiples of a step."""
 
@@ -88,11 +88,11 @@ class SmoothingDefaults(Options):
     frames: Annotated[int, Option(1, 1_000_000, "frames", "the median then errs by 2 %")] = 64
     """Looked at, evenly chosen."""
     least_frames: Annotated[int, Option(3, 1_000_000, "frames", "a median of ten")] = 12
-    """Of a recording whose smoothing is told."""
+    """Of a recording whose smoothing is estimated."""
     least_elements: Annotated[int, Option(1, 1_000_000, "elements", "as many as noise is estimated from")] = 64
     """With neighbours all around."""
     least_noise: Annotated[float, Option(0.0, 1e-3, "m", "motion that changes its speed bends as little")] = 1e-7
-    """Of markers, from which it tells how they are smoothed."""
+    """Of markers, from which it shows how they are smoothed."""
     least_force_noise: Annotated[float, Option(0.0, 1.0, "N", "as above, of forces")] = 1e-4
     """The same of forces."""
     largest_still: Annotated[float, Option(0.0, 1.0, "-", "5 % of markers may freeze")] = 0.1
@@ -204,7 +204,7 @@ TABLES = (NOISE, SMOOTHING, NUMERICS, MARKERS, PATCHES, COLLECTION)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContactOptions(Options):
-    """How any method tells which elements touch: from forces where there are any, from the pressed shape otherwise."""
+    """How any method finds which elements touch: from forces where there are any, from the pressed shape otherwise."""
 
     contact_pressure: Annotated[float, Option(0.0, 1e6, "Pa", "well under the ~100 kPa of a fingertip's grasp")] = 500.0
     """Least normal force over element area."""
@@ -307,7 +307,7 @@ class FilterOptions(ContactOptions):
     end_length: Annotated[float, Option(1e-9, 1.0, "m", "tuning scenes")] = 0.0001
     """Motion of the object within which slip ends."""
     hold_time: Annotated[float, Option(0.0, 1e6, "s", "tuning scenes")] = 0.5
-    """Without motion or change of load for so long, frames tell nothing more of slip."""
+    """Without motion or change of load for so long, frames say nothing more of slip."""
     hold_deviations: Annotated[float, Option(0.0, 100.0, "standard deviations", "one in 10⁶ frames of white noise")] = (
         5.0
     )
@@ -317,7 +317,7 @@ class FilterOptions(ContactOptions):
     outlier: Annotated[float, Option(0.1, 100.0, "-", "tuning scenes")] = 4.4
     """Squared misfit over its variance at which an element's weight falls to a quarter."""
     outlier_gate: Annotated[float, Option(1.0, 1000000.0, "-", "5 σ: a marker lost and found elsewhere")] = 25.0
-    """Squared distance over its variance from both predictions beyond which a marker tells nothing."""
+    """Squared distance over its variance from both predictions beyond which a marker says nothing."""
     outlier_spread: Annotated[float, Option(0.0, 10.0, "-", "half of the distance")] = 0.25
     """Share of that squared distance by which the variance of both predictions then grows."""
     motion_play: Annotated[
@@ -327,15 +327,15 @@ class FilterOptions(ContactOptions):
     surroundings_reach: Annotated[
         float, Option(0.0, 100.0, "contact radii", "½ of the motion on a half-space; 30 scenes of other phrases")
     ] = 0.5
-    """So far from all that touches, markers tell how the camera shakes."""
+    """So far from all that touches, markers show how the camera shakes."""
     surroundings_least: Annotated[int, Option(1, 1_000_000, "markers", "their mean is to be surer than one marker")] = 8
     """With fewer the camera is taken to stand still."""
     surroundings_memory: Annotated[float, Option(1.0, 1e6, "frames", "a second at 30 fps")] = 30.0
-    """Over so many frames it is told how much of their motion is jitter."""
+    """Over so many frames it is estimated how much of their motion is jitter."""
     surroundings_jitter: Annotated[float, Option(0.0, 1.0, "-", "a camera that stands still is left out of it")] = 0.5
     """Least share of jitter in their motion at which this is the camera's."""
     surroundings_outlier: Annotated[float, Option(1.0, 1e6, "median absolute deviations", "4 σ")] = 6.0
-    """Such a marker tells nothing in that step."""
+    """Such a marker says nothing in that step."""
     following_weight: Annotated[float, Option(0.0, 1000000.0, "-", "all of the motion, ± 0.2")] = 30.0
     """Prior weight of a surface that follows all of a given motion."""
     following_variance: Annotated[float, Option(0.0, 1.0, "-", "5 % of the motion")] = 0.0025
@@ -469,7 +469,7 @@ class ForcesOnlyOptions(ContactOptions):
     slip_level_width: Annotated[float, Option(1e-3, 10.0, "-", "tuning scenes")] = 0.05
     """Scale of the logistic function about it."""
     largest_level_odds: Annotated[float, Option(0.1, 100.0, "log-odds", "tuning scenes")] = 5.0
-    """Most that the force ratio tells."""
+    """Largest evidence from the force ratio."""
     part_spread: Annotated[float, Option(1e-3, 10.0, "-", "tuning scenes")] = 0.12
     """Scatter of the part of a change of load that a sticking element takes, around what it took before."""
     overload: Annotated[float, Option(1.0, 100.0, "-", "tuning scenes")] = 1.3
@@ -485,27 +485,27 @@ class ForcesOnlyOptions(ContactOptions):
     slip_part_spread: Annotated[float, Option(1e-3, 10.0, "-", "tuning scenes")] = 0.22
     """Scatter of that part."""
     part_weight: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes")] = 0.8
-    """Weight of what the part tells of an element."""
+    """Weight of what the part says of an element."""
     outlier_share: Annotated[float, Option(1e-6, 0.5, "-", "5 %")] = 0.05
-    """Share of elements of which the part tells nothing."""
+    """Share of elements of which the part says nothing."""
     least_change: Annotated[float, Option(1e-9, 1.0, "-", "tuning scenes")] = 0.0005
     """Change of an element's force ratio that counts as load, and of the normal force as pressing."""
     largest_share: Annotated[float, Option(1.0, 100.0, "-", "elements in the middle bear twice what is even")] = 3.0
     """How unevenly elements share a load, at most."""
     largest_gain: Annotated[float, Option(0.1, 100.0, "log-odds", "tuning scenes")] = 3.0
-    """Most that one change of load tells of an element."""
+    """Largest evidence on an element from one change of load."""
     memory: Annotated[float, Option(1e-3, 1e6, "-", "tuning scenes")] = 0.08
-    """Change of load over normal force within which what was told of an element fades."""
+    """Change of load over normal force within which the evidence on an element fades."""
     largest_log_odds: Annotated[float, Option(0.1, 100.0, "log-odds", "tuning scenes")] = 3.0
-    """Most that changes of load tell of an element."""
+    """Largest evidence on an element from changes of load."""
     taken_back: Annotated[float, Option(0.0, 100.0, "log-odds", "tuning scenes")] = 2.0
-    """What it tells for stick that an element's load is taken back."""
+    """Evidence for stick where an element's load is taken back."""
     pressing_share: Annotated[float, Option(0.01, 10.0, "-", "tuning scenes; Mindlin–Deresiewicz: 1")] = 1.6
     """All stick while the tangential load grows by less than this share of friction times the normal load's growth."""
     pressing_deviations: Annotated[float, Option(0.0, 100.0, "standard deviations", "3 σ")] = 3.0
     """Least growth of the normal force over its noise."""
     pressed_log_odds: Annotated[float, Option(0.0, 100.0, "log-odds", "tuning scenes")] = 8.0
-    """What that tells for stick."""
+    """Evidence for stick from that."""
     threshold: Annotated[float, Option(0.01, 0.99, "-", "tuning scenes; the reported probability is ½ there")] = 0.4
     """Least posterior of slip."""
 
@@ -515,9 +515,9 @@ class CoarseOptions(ForcesOnlyOptions):
     """Method ``coarse``: those of ``forces_only``, and what it is joined with method ``filter`` by."""
 
     filter_weight: Annotated[float, Option(0.0, 10.0, "-", "tuning scenes: the same by 0.01 from 0.25 to 0.5")] = 0.4
-    """Weight of the log-odds that method ``filter`` tells beside those of the forces."""
+    """Weight of the log-odds of method ``filter`` beside those of the forces."""
     largest_sum: Annotated[float, Option(1.0, 30.0, "log-odds", "tuning scenes")] = 9.0
-    """Most that either tells."""
+    """Largest log-odds of either."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -657,7 +657,7 @@ FORCES_METHOD = "forces_only"
 LOOKAHEAD = 2
 """Frames after it that a frame of a stored log is decided by; more than two gains little (tuning scenes)."""
 MOST_LOOKAHEAD = 100
-"""Frames; each one costs time and memory, and what lies further ahead tells nothing."""
+"""Frames; each one costs time and memory, and what lies further ahead says nothing."""
 
 FORMER_OPTIONS = frozenset(
     {"onset_time", "end_time", "motion_margin", "onset_under_restick", "following_least", "pressing_sideways_variances"}

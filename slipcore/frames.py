@@ -69,7 +69,7 @@ class GroundTruth:
 
 
 NONE = "none"
-"""In a log's metadata, for what its sensor does not tell."""
+"""In a log's metadata, for what its sensor does not measure."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,10 +81,10 @@ class GraspLog:
     None; ``normal`` [t, n, m, 3], outward unit vectors, or None (then taken from the deformed shape); ``object_pose``
     [t, 3], x m, y m and yaw rad of the object relative to the sensor, or None; ``contact`` [t, n, m] bool where it is
     known otherwise than from force or shape, or None; ``observed`` [t, n, m] bool, or None for all: where it is False
-    no marker tells of the element, and its displacement is a placeholder that only neighbours' derivatives may see;
+    no marker shows the element, and its displacement is a placeholder that only neighbours' derivatives may see;
     ``gripper_force`` [t] N, the normal force on the sensor that the gripper or a wrist reports, positive where the
     object presses, or None, and its standard ``gripper_force_deviation`` N, or None where that is not known.
-    A ``displacement`` of None, of a sensor that tells forces alone, is held as zeros: see ``has_displacement``.
+    A ``displacement`` of None, of a sensor that measures forces alone, is held as zeros: see ``has_displacement``.
 
     Arrays are held as read-only float64 or bool. Raises ``InvalidInput`` naming the field, its value and what is
     allowed.
@@ -150,12 +150,12 @@ class GraspLog:
 
     @property
     def is_scaled(self) -> bool:
-        """Whether lengths are true metres; False where the metadata tell that the scale is unknown, and one assumed."""
+        """Whether lengths are true metres; False where the metadata say that the scale is unknown, and one assumed."""
         return self.metadata.get("scale") != "unknown"
 
     @property
     def has_displacement(self) -> bool:
-        """Whether displacement was measured; False where the metadata tell that there are forces alone."""
+        """Whether displacement was measured; False where the metadata say that there are forces alone."""
         return self.metadata.get("displacement") != NONE
 
     def __len__(self) -> int:
@@ -260,7 +260,7 @@ def check_normal(normal: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
 
 
 def check_span(first: float, last: float) -> None:
-    """Times of a log's first and last frame, s: that a clock could have told them."""
+    """Times of a log's first and last frame, s: that a clock could have given them."""
     if not abs(first) <= LIMITS.clock or not last - first <= LIMITS.span:
         allowed = f"at most {LIMITS.span:g} s in all, begun within {LIMITS.clock:g} s of 0 (is it in s?)"
         raise InvalidInput("time", f"{first:.6g} to {last:.6g} s", allowed)
@@ -335,7 +335,7 @@ def _optional(name: str, value: ArrayLike | None, shape: tuple[int | None, ...])
 
 
 def _displacement(value: ArrayLike | None, force: ArrayLike | None, shape: tuple[int, ...]) -> FloatArray:
-    """The displacement, or zeros in the place of what a sensor of forces alone does not tell."""
+    """The displacement, or zeros in the place of what a sensor of forces alone does not measure."""
     if value is None and force is None:
         raise InvalidInput("displacement", "missing, as forces are", "displacement, force or both")
     return _array("displacement", np.zeros(shape) if value is None else value, shape)

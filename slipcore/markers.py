@@ -2,7 +2,7 @@
 
 Each element *is* one marker, at the marker's own place: nothing is interpolated. An element without a marker, or whose
 marker is lost in a frame, is not observed. Its displacement then is a placeholder that moves on as the markers around
-it do, so that its neighbours' derivatives and a detector's memory stay sound; a detector tells nothing of it.
+it do, so that its neighbours' derivatives and a detector's memory stay sound; a detector says nothing of it.
 """
 
 from collections.abc import Iterator, Mapping
@@ -89,11 +89,11 @@ def on_lattice(
     sensor: str = "unknown",
     metadata: Mapping[str, str] | None = None,
 ) -> tuple[GraspLog, MarkerLattice]:
-    """A grasp log of tracked dots, and the lattice that it lies on, which tells each element's marker.
+    """A grasp log of tracked dots, and the lattice that it lies on, which names each element's marker.
 
     ``time`` [t] s; ``markers`` [k, 3] m at rest; ``displacement`` [t, k, 3] m, NaN where a marker is lost; ``contact``
     [t, k] bool where it is known, as it must be for markers that are seen from above only: their displacement along z
-    is 0 then, and tells no contact. Raises ``InvalidInput``.
+    is 0 then, and shows no contact. Raises ``InvalidInput``.
     """
     lattice = MarkerLattice.over(markers)
     frames = list(_frames(lattice, np.asarray(displacement, dtype=np.float64)))

@@ -17,7 +17,7 @@ MACRO_SLIP: tuple[Regime, ...] = ("sliding", "pivoting")
 
 @dataclass(frozen=True, slots=True)
 class ContactFriction:
-    """Friction that the resultants of a contact tell, with its 95 % interval from ``low`` to ``high``.
+    """Friction that follows from the resultants of a contact, with its 95 % interval from ``low`` to ``high``.
 
     ``coefficient``: the median ratio of loads while these stood on the limit surface. Without such a plateau it
     ``is_bound``: the coefficient is the largest ratio of loads that was held, ``low`` is what friction is at least, and

@@ -104,8 +104,8 @@ class SlipHistory:
         """The history with what its neighbours say of each element that was not observed.
 
         Such an element touches where most of its observed neighbours do, and slips as probably as those that touch do
-        in the mean; where none was observed nothing is told. Of edges and corners a corner counts by half. ``observed``
-        still tells which elements these are; they have no velocity and no events.
+        in the mean; where none was observed nothing is known. Of edges and corners a corner counts half. ``observed``
+        still says which elements these are; they have no velocity and no events.
         """
         if self.observed is None:
             return self
@@ -202,7 +202,7 @@ def slip_events(time: FloatArray, contact: BoolArray, slip: BoolArray, observed:
     """The changes of state in ``contact`` and ``slip`` [t, n, m] at times [t] s.
 
     A release ends slip without an ``end``: what let go did not stick again. The first frame changes nothing, and
-    nothing is told of an element that was not ``observed`` [t, n, m] (None: all were) in both frames.
+    there is no answer for an element that was not ``observed`` [t, n, m] (None: all were) in both frames.
     """
     seen = True if observed is None else observed[:-1] & observed[1:]
     was, now = contact[:-1], contact[1:]

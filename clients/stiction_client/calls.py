@@ -104,7 +104,7 @@ class Ended(Generic[T]):
 
 
 def advance(call: Call[T], answer: Reply) -> Request | Pause | Ended[T]:
-    """Tell a call what came of its last step (None at the start) and get its next one."""
+    """Give a call the result of its last step (None at the start) and get its next one."""
     try:
         return call.throw(answer) if isinstance(answer, ConnectionFailed) else call.send(answer)
     except StopIteration as end:
@@ -188,7 +188,7 @@ def _listed(
 
 @dataclass(frozen=True, slots=True)
 class CachedModel:
-    """A material as the service last told it, with the tag of that answer and when it was asked (monotonic, s)."""
+    """A material as the service last gave it, with the tag of that answer and when it was asked (monotonic, s)."""
 
     material: Material
     tag: str

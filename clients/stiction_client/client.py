@@ -86,7 +86,7 @@ class FrictionClient:
 
         With ``material`` the service refits that material once the slip is detected; follow with ``wait``. The same
         content twice is one log. ``sensor`` and ``detector`` default to what the log and the service say.
-        ``scale`` (m per pixel) and ``frame_rate`` (1/s) are for a table of tracked markers that does not tell them,
+        ``scale`` (m per pixel) and ``frame_rate`` (1/s) are for a table of tracked markers that does not state them,
         ``mapping`` (or the name of a preset) for a recording whose topics, fields or columns have names of their own,
         ``rest`` the frame of either in which nothing touches: "first", "least contact" or its number.
         """

@@ -26,7 +26,7 @@ class ProblemError(StictionError):
     """The service refused a request (RFC 9457 problem).
 
     ``type`` is stable and made for programs, such as "/problems/unknown-material"; ``status`` is the HTTP status;
-    ``detail`` is for people; ``name``, ``value`` and ``allowed`` tell which input was wrong, where one was.
+    ``detail`` is for people; ``name``, ``value`` and ``allowed`` say which input was wrong, where one was.
     """
 
     def __init__(

@@ -16,7 +16,7 @@ NAMES, UNITS = ("beta0", "beta1", "beta2"), ("1", "s/m", "1/N")
 SYMBOLS = ("β₀ [-]", "β₁ [s/m]", "β₂ [1/N]", "σ [-]")
 
 Row = tuple[float, float, float, float, bool]
-"""Estimate, standard error, the ends of the 95 % interval, and whether the data tell it."""
+"""Estimate, standard error, the ends of the 95 % interval, and whether the data determine it."""
 
 
 def coefficient_table(rows: Sequence[Row], **about: object) -> "DataFrame":

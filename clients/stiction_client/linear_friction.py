@@ -21,7 +21,7 @@ KINDS = ("element", "contact")
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """A standard deviation as data tell it: ``value`` times a Student-t on ``degrees_of_freedom`` is what it draws."""
+    """A standard deviation as estimated: ``value`` times a Student-t on ``degrees_of_freedom`` is what it draws."""
 
     value: float
     degrees_of_freedom: float
@@ -188,7 +188,7 @@ class LinearFriction:
         return self.support_at(0.0, 0.5 * sum(self.domain.normal_force)).advice
 
     def to_dataframe(self) -> "DataFrame":
-        """A row for each coefficient and σ: unit, estimate, standard error, 95 % interval, whether the data tell it.
+        """A row for each coefficient and σ: unit, estimate, standard error, 95 % interval, if the data show it.
 
         Raises ``ModuleNotFoundError`` where pandas is not installed.
         """

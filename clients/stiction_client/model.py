@@ -38,7 +38,7 @@ class FrictionModel(LinearFriction):
     ``coefficients`` [3]: β₀ [-], β₁ [s/m], β₂ [1/N]; ``covariance`` [3, 3] of them; ``scale``: standard deviation of
     ε [-]; ``n`` samples of elements of ``element_area`` m²; ``degrees_of_freedom`` of the Student-t distribution that
     the coefficients follow, ``scatter_degrees_of_freedom`` of that which ε/σ follows; ``identifiable`` [3] bool;
-    ``scales`` of the scatter where the method tells them apart, when σ is all of it, as one element in a new grasp
+    ``scales`` of the scatter where the method separates them, when σ is all of it, as one element in a new grasp
     shows it; None also of a model that an older version stored; ``outdated``: the material's logs are others since.
     """
 
@@ -87,7 +87,7 @@ class FrictionModel(LinearFriction):
         )
 
     def to_json(self) -> dict[str, Any]:
-        """The model as the service tells it: what ``from_json`` reads."""
+        """The model as the service gives it: what ``from_json`` reads."""
         return {
             "material": self.material,
             "method": self.method,

@@ -22,7 +22,7 @@ SLIP_PROBABILITY = 1e-3
 """Default bound: one slip in a thousand grasps that bear the full load."""
 
 SLIP_PROBABILITIES = (1e-12, 0.5)
-"""What may be asked for. Below, no data tell, and the quantile of Student's t is no longer computed reliably; above,
+"""What may be asked for. Below, no data reach, and the quantile of Student's t is no longer computed reliably; above,
 the quantile would be more optimistic than the mean, and the capacity no longer have a single peak."""
 
 LARGEST = 1e9
@@ -145,7 +145,7 @@ def required_normal_force(
     predictive distribution of μ at its elements' normal force f, each weighted with itself: what a contact holds is
     Σ μ(fᵢ)·fᵢ. The uncertainty of all coefficients is in q, and the scatter ``of`` the "contact", which has a grasp's
     whole scatter and the mean of its ``elements``' own (as many as its area has, where None), or of one "element",
-    which is conservative. None: of the contact where the model tells its ``scales``, else of an element; without
+    which is conservative. None: of the contact where the model has ``scales``, else of an element; without
     scales all scatter counts as common to the elements in any case.
 
     Any argument but the model may be an array; all broadcast, and the answer is then ``RequiredForces``. For one

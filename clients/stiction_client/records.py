@@ -98,7 +98,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class ContactFriction:
-    """Friction that a contact as a whole tells, with its 95 % interval; where it ``is_bound`` friction is at least
+    """Friction of a contact as a whole, with its 95 % interval; where it ``is_bound`` friction is at least
     ``low``, and ``high`` is None.
     """
 
@@ -112,7 +112,7 @@ class ContactFriction:
 @dataclass(frozen=True, slots=True)
 class Detection:
     """What was seen in a grasp log: events of each kind, friction samples, frames, smallest stick ratio, and findings
-    against it (None where the service did not look for any), and what the contact as a whole tells of friction.
+    against it (None where the service did not look for any), and what the contact as a whole says of friction.
     ``velocity_is_relative``: whether the samples' velocities are relative to what seems to stick, for the log has no
     motion of the object (None where nobody noted it). ``calibration``: the version of its sensor's by which the log was
     corrected, and in ``corrections`` what that changed (None without).
@@ -280,7 +280,7 @@ class Recognition:
 class AuditEntry:
     """That ``actor`` (``key:ID``, ``anybody``, ``command:USER`` or ``service``) did ``action`` to ``subject``.
 
-    ``address`` and ``request_id`` tell from where, ``details`` what else there is to say.
+    ``address`` and ``request_id`` say from where, ``details`` what else there is to say.
     """
 
     id: int
@@ -299,6 +299,6 @@ class AuditEntry:
 
 
 def _values(kind: type[Any], record: Mapping[str, Any]) -> dict[str, Any]:
-    """Its fields; what a newer service adds is passed over, what an older one does not tell has its default."""
+    """Its fields; what a newer service adds is passed over, what an older one leaves out has its default."""
     known = (entry.name for entry in fields(kind) if entry.default is MISSING or entry.name in record)
     return {name: record[name] for name in known}

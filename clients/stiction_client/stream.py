@@ -97,7 +97,7 @@ class SlipStream:
     ) -> int:
         """Send a frame (s, m, N; m, m, rad; outward unit normals) and return its number.
 
-        ``command``: the normal force that the gripper is told, N; those who watch the stream see it. ``gripper_force``:
+        ``command``: the normal force commanded to the gripper, N; who watches the stream sees it. ``gripper_force``:
         the one that it reports, N, with its standard ``gripper_force_deviation`` N: forces that the service
         reconstructs add up to it. Raises ``InvalidArgument`` for what is no force.
         """

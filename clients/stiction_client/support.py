@@ -47,7 +47,7 @@ class Model(Protocol):
 
     @property
     def identifiable(self) -> NDArray[np.bool_]:
-        """Whether the data tell each coefficient, [3]."""
+        """Whether the data determine each coefficient, [3]."""
 
     @property
     def diagnostics(self) -> Mapping[str, Any]:
@@ -61,7 +61,7 @@ class Support:
     """What an answer rests on, and one sentence on what to do about it.
 
     ``kind``, the first that applies: "implausible" (friction cannot be so, or findings speak against the logs),
-    "stale" (the model is not the material's any more), "not identified" (the data do not tell friction there, or no
+    "stale" (the model is not the material's any more), "not identified" (the data do not show friction there, or no
     coefficient at all), "extrapolated" (beyond the data), "supported".
     """
 
@@ -199,7 +199,7 @@ def _interval(model: Model, v: Number, f_n: Number) -> tuple[Number, Number]:
 
 
 def _knows_no_velocity(model: Model) -> bool:
-    """Whether the model's samples tell nothing of velocity, for none of their objects' motion was recorded."""
+    """Whether the model's samples say nothing of velocity, for none of their objects' motion was recorded."""
     return "unknown_velocity" in model.diagnostics and not model.domain.tangential_velocity[1] > 0.0
 
 

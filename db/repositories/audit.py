@@ -1,4 +1,4 @@
-"""The audit trail: entries are added in the transaction of the change that they tell of, and never changed."""
+"""The audit trail: entries are added in the transaction of the change that they record, and never changed."""
 
 from collections.abc import Collection, Mapping
 from datetime import datetime

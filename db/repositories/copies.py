@@ -36,7 +36,7 @@ def stand_in(session: Session, log_id: str) -> str | None:
 def _better(session: Session, *of_these: ColumnElement[bool]) -> list[tuple[GraspLogRow, GraspLogRow]]:
     """Logs whose job has ended, each with a copy that has samples where it has none, may find some, or has other ones.
 
-    Neither is withdrawn. Of two jobs that were done, the later one tells: the sensor may have been described anew.
+    Neither is withdrawn. Of two jobs that were done, the later one counts: the sensor may have been described anew.
     """
     own_has, copy_has = (func.coalesce(each.count, 0) > 0 for each in (_OWN_SAMPLES, _COPY_SAMPLES))
     is_newer = _COPY_JOB.finished_at > _OWN_JOB.finished_at

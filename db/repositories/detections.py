@@ -98,7 +98,7 @@ def any_samples(session: Session, material_id: int) -> bool:
 
 
 def least_friction(session: Session, material_id: int) -> float | None:
-    """What friction is at least, by the loads that the contacts in a material's logs bore; None where none tells."""
+    """What friction is at least, by the loads that the contacts in a material's logs bore; None where none does."""
     query = (
         select(DetectionRow.contact_friction)
         .join(GraspLogRow, GraspLogRow.id == DetectionRow.grasp_log_id)

@@ -27,7 +27,7 @@ def claim(session: Session, owner: str, key: str, fingerprint: str, lifetime: ti
         with session.begin_nested():
             row = {"owner": owner, "key": key, "fingerprint": fingerprint, "answer": {}}
             session.execute(insert(IdempotencyKeyRow).values(**row))
-    except IntegrityError:  # tells the key, so nothing is raised from it: what fails below may be logged
+    except IntegrityError:  # names the key, so nothing is raised from it: what fails below may be logged
         pass
     else:
         return None

@@ -23,8 +23,8 @@ class ErrorsInVariables:
     The true f_n are taken as normal with the mean ``mean`` and variance ``variance`` − s², which gives each its
     expectation and variance from what was measured (regression calibration; Carroll et al., 2006, §4 and §8).
 
-    Coordinates (log R, x): R² = σ² + ``gain``² s² is the scatter of the measured ratio, which the samples tell well;
-    x² = ``gain`` s/σ, the share of the noise in it, they tell badly. Few samples leave an arc between σ = 0 and s = 0,
+    Coordinates (log R, x): R² = σ² + ``gain``² s² is the scatter of the measured ratio, well determined;
+    x² = ``gain`` s/σ, the share of the noise in it, is not. Few samples leave an arc between σ = 0 and s = 0,
     which is straight in these; the root bends the density to 0 where s ends. ``gain``: that of s in the ratio, 1/N.
     """
 

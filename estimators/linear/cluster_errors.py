@@ -42,7 +42,7 @@ def cluster_robust(square: FloatArray, score: FloatArray, scale: float) -> Float
     determines leaves no residual: both would come out as *certain*. So with fewer than ``few`` clusters a direction no
     direction is given less than the classical variance, with fewer clusters than directions + 2 none less than the
     mean over directions; and however many they are, a direction that one of them dominates is given no less than the
-    worst has: how far a cluster is off as a whole, only the others tell.
+    worst has: how far a cluster is off as a whole, only the others show.
     """
     count, size = score.shape
     values, vectors = np.linalg.eigh(square)
@@ -61,7 +61,7 @@ def satterthwaite(square: FloatArray, contrasts: FloatArray) -> FloatArray:
 
     The variance is a quadratic form in normal errors, (tr Γ)²/tr Γ² χ² as Bell & McCaffrey (2002) and Pustejovsky &
     Tipton (2018, eq. 11) match it; Γ_gh = δ_gh w_g'Q_g'Q_g w_g − z_g'z_h with w_g = A_g c and z_g = Q_g'Q_g w_g. Where
-    few clusters, or clusters that differ, tell a contrast, it is far below G − 1.
+    few clusters, or clusters that differ, determine a contrast, it is far below G − 1.
     """
     values, vectors = np.linalg.eigh(square)
     along = np.einsum("gij,ki->kgj", vectors, contrasts)

@@ -148,7 +148,7 @@ def relative(factor: Factor, whole: SufficientStatistics) -> Factor:
 
 
 def _range(values: FloatArray) -> tuple[float, float]:
-    """Least and greatest; at rest where no velocity is known: what is told then holds for the limit v → 0."""
+    """Least and greatest; at rest where no velocity is known: what is answered then holds for the limit v → 0."""
     return (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
 
 

@@ -46,7 +46,7 @@ def summarise(nodes: ScaleNodes, at: FloatArray) -> MixtureSummary:
 
 
 def scatter_alone(nodes: ScaleNodes, scatter_prior: ScatterPrior) -> Scale:
-    """The scale between grasps as the weak default prior would have left it: what the material tells by itself.
+    """The scale between grasps as the weak default prior would have left it: what the material shows by itself.
 
     The nodes' weights by the ratio of the priors (Hogg, Myers & Bovy, 2010, Astrophysical Journal 725:2166).
     """

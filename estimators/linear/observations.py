@@ -153,7 +153,7 @@ def velocity_unknown(grasp: "FrictionSamples") -> bool:
 
 
 def known_velocity(grasp: "FrictionSamples") -> FloatArray:
-    """Velocity [k] m/s of a grasp's samples, 0 where it is not known: β₁ is then not told by them."""
+    """Velocity [k] m/s of a grasp's samples, 0 where it is not known: β₁ then does not follow from them."""
     return np.zeros(len(grasp)) if velocity_unknown(grasp) else np.asarray(grasp.tangential_velocity, dtype=float)
 
 

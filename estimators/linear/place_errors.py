@@ -14,7 +14,7 @@ def error_of_places(data: FitData) -> FloatArray:
     """Covariance [3, 3] of the least-squares β of these grasps where friction scatters between places with variance 1.
 
     (XᵀX)⁻¹ (Σ t tᵀ) (XᵀX)⁻¹ with t = Σ w x over the samples of a place (Liang & Zeger, 1986); 0 along what the samples
-    don't tell.
+    don't determine it.
     """
     grasps = data.grasp_statistics()
     triangle = whole_triangle(data.factor).astype(float)[:, :3]

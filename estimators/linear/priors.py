@@ -47,7 +47,7 @@ class ScatterPrior:
 
 
 WEAK = ScatterPrior()
-"""Where no other material tells how much grasps differ."""
+"""Where no other material shows how much grasps differ."""
 
 
 def prior_rows(element_area: float, prior: Prior = PRIOR) -> FloatArray:

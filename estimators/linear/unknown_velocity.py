@@ -1,7 +1,7 @@
 """Friction at velocities that nobody measured: how far it may lie from friction at rest.
 
 Samples whose velocity is unknown count as of v = 0. They share an offset δ = β₁ v̄ then, of which only the size is
-known: E δ² = v̄² E β₁², with v̄ a usual speed of slip, and β₁ as the other samples tell it and, before them, a law that
+known: E δ² = v̄² E β₁², with v̄ a usual speed of slip, and β₁ by the other samples and, before them, a law that
 changes friction by a tenth over the reference span. Elements that press harder slip later, and may slip slower or
 faster: v goes as f_n^k with k of either sign, which tilts the offset by a part k (f_n/m − 1) about the mean force m.
 """

@@ -1,4 +1,4 @@
-"""What samples tell about the means of their places: freed of noise, and of errors that go together over time."""
+"""What samples say about the means of their places: freed of noise, and of errors that go together over time."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ def within_places(
     values: FloatArray, deviation: FloatArray, weight: FloatArray, time: FloatArray, noise: FloatArray
 ) -> FloatArray:
     """Triangular factor [3, 3] of the ``deviation`` [k, 3] of (v, f_n, μ) from the means of their places, as one
-    without noise and of independent errors would be that tells as much of slopes.
+    without noise and of independent errors would be that says as much of slopes.
 
     ``values`` [k, 3]: what deviates, at ``time`` [k] s; ``noise`` [2]: roots of the sums of squares that noise in v and
     f_n adds.
@@ -56,11 +56,11 @@ def _axes(rows: FloatArray) -> FloatArray:
 
 
 def _fewer(scores: FloatArray, time: FloatArray) -> FloatArray:
-    """Root [d, d] of the share of the samples that tell of each slope as independent ones would.
+    """Root [d, d] of the share of the samples that inform each slope as independent ones would.
 
-    A slope is told by the sum of its ``scores`` [k, d]; those of all have the sum of squares 1/k. Where errors go
+    A slope is determined by the sum of its ``scores`` [k, d]; those of all have the sum of squares 1/k. Where errors go
     together, the variance of sums over stretches of time, which all places share (Liang & Zeger, 1986), is larger than
-    that: so many times fewer samples tell of it (Kish, 1965, ch. 8). What chance makes of independent ones is none.
+    that: so many times fewer samples inform it (Kish, 1965, ch. 8). What chance makes of independent ones is none.
     """
     stretch = _stretches(time)
     sums = np.stack([np.bincount(stretch, column) for column in scores.T])

@@ -27,7 +27,7 @@ def choose(data: FitData) -> Choice:
     """All data for the hierarchical model, or those that are friction at all.
 
     What is shared within a grasp or a place widens the hierarchical model's scales and nothing else; false slip biases
-    it. Only samples tell of it: moments are taken as they are.
+    it. Only samples show that: moments are taken as they are.
     """
     if data.observations is not None:
         distance = distances(data, data.observations)
@@ -45,7 +45,7 @@ def distances(data: FitData, observations: Observations) -> FloatArray:
     """How far each sample [k] lies from the robust plane, in standard deviations, what is its place's taken away.
 
     Where most samples are of places with many, the others count as near; else all are judged by their distance from
-    the plane: a place that few samples tell of cannot be told from them. Where hardly anything scatters, what lies off
+    the plane: a place with few samples cannot be judged by them. Where hardly anything scatters, what lies off
     by less than a grip could notice is near (``least_scatter``).
     """
     linear = m_estimate(data, observations, LOSSES["tukey"]).linear

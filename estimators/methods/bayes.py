@@ -86,7 +86,7 @@ def fit(
     if isinstance(posterior, HierarchicalPosterior):
         diagnostics |= pooled_prior(posterior.grid.nodes, scatter_prior)
     independent = name != "hierarchical" and data.cluster_kind != "element"
-    if independent and data.observations is not None:  # moments cannot tell
+    if independent and data.observations is not None:  # moments cannot show it
         diagnostics["shared_by_elements"] = shared_by_elements(data)
     found = replace(found, monte_carlo_error=chain.monte_carlo_error)
     model = report(data, "bayes", found, begin, diagnostics)

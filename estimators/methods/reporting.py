@@ -29,7 +29,7 @@ def by_coefficient(name: str, values: FloatArray) -> Diagnostics:
 
 
 def pooled_prior(nodes: ScaleNodes, scatter_prior: ScatterPrior) -> Diagnostics:
-    """Of a prior of τ that is not the default: where it is from, in a sentence, and what the data tell without it."""
+    """Of a prior of τ that is not the default: where it is from, in a sentence, and what the data say without it."""
     if scatter_prior == ScatterPrior():
         return {}
     alone = scatter_alone(nodes, scatter_prior)
@@ -66,7 +66,7 @@ def report(
 ) -> FrictionModel:
     """The friction model, with what its uncertainty does to friction; ``begin``: when the fit began.
 
-    A method that tells ``scales`` allows for unknown velocities by itself; the errors of all others are widened here.
+    A method that has ``scales`` allows for unknown velocities by itself; the errors of all others are widened here.
     """
     linear = solve(data.factor, REFERENCE.spans(data.element_area)) if linear is None else linear
     if found.scales is None and data.unknown_velocity > 0.0:

@@ -42,7 +42,7 @@ def widened(found: PosteriorSummary, data: FitData, linear: LinearFit) -> Poster
 def slope_inflation(data: FitData, linear: LinearFit) -> float:
     """By what the error of β₁ grows if the samples of unknown velocity say nothing of it: were their offset any.
 
-    What they differ by from the others would tell it else, by the velocity taken for theirs.
+    What they differ by from the others would determine it else, by the velocity taken for theirs.
     """
     along = sensitivity(data, linear)
     left = float(data.unknown[0] - data.unknown @ along)

@@ -197,7 +197,7 @@ def _missing(chain: Chain, goal: float) -> float:
 
 
 def _judge(draws: FloatArray, acceptance: float, move: str) -> Chain:
-    """Drop the burn-in of five autocorrelation times and tell what the rest is worth."""
+    """Drop the burn-in of five autocorrelation times and say what the rest is worth."""
     burn_in = min(int(np.ceil(SAMPLING.window * autocorrelation_time(draws).max())), len(draws) // 2)
     kept = draws[burn_in:]
     times = autocorrelation_time(kept)

@@ -16,7 +16,7 @@ REWOUND = 1.0
 
 
 def seconds(sec: int, nanosec: int) -> float:
-    """A stamp of ROS in s; double precision tells 0.2 µs apart today."""
+    """A stamp of ROS in s; double precision resolves 0.2 µs today."""
     return sec + 1e-9 * nanosec
 
 
@@ -60,7 +60,7 @@ class Grip:
         self._begin()
 
     def on_stick_ratio(self, time: float, stick_ratio: float) -> None:
-        """A detector's stick ratio, NaN where it tells none; one that comes late is left out."""
+        """A detector's stick ratio, NaN where it gives none; one that comes late is left out."""
         if time >= self._ratio_time or self._ratio_time - time > REWOUND:
             self._ratio, self._ratio_time = stick_ratio, time
 

@@ -34,7 +34,7 @@ def make(
     processes: Processes = None,
     json: Json = False,
 ) -> None:
-    """Make sealed scenes: what a sensor tells of simulated grasps, and apart from that the truth."""
+    """Make sealed scenes: what a sensor measures of simulated grasps, and apart from that the truth."""
     from service.jobs.campaign import workers
     from service.slip_benchmark.kinds import kinds_named
     from service.slip_benchmark.making import make as make_scenes

@@ -146,7 +146,7 @@ def opened_blobs() -> "BlobStore":
 
 
 def command_actor() -> "Actor":
-    """Whoever runs this command, as the audit trail tells it."""
+    """Whoever runs this command, as the audit trail names it."""
     import getpass
 
     from db.records import Actor

@@ -1,4 +1,4 @@
-"""Ages and moments as a command line tells them."""
+"""Ages and moments as a command line prints them."""
 
 import re
 from datetime import UTC, datetime, timedelta

@@ -222,7 +222,7 @@ def rest_of(told: str | None) -> str | Path | None:
 
 
 def print_comparison(found: "ForceComparison") -> None:
-    """Print how a sensor's own forces agree with those that its gel would tell."""
+    """Print how a sensor's own forces agree with those that follow from its gel."""
     rows = [
         (name, number(agreement.ratio), number(agreement.correlation))
         for name, agreement in (
@@ -262,7 +262,7 @@ def model_record(model: "FrictionModel") -> dict[str, Any]:
 
 
 def print_model(model: "FrictionModel", title: str) -> None:
-    """Print a fitted model as a table: estimate, interval, and whether the data tell the coefficient at all."""
+    """Print a fitted model as a table: estimate, interval, and whether the data determine the coefficient at all."""
     names = ("β₀ [-]", "β₁ [s/m]", "β₂ [1/N]")
     rows: list[tuple[str, str, str, str]] = [
         (name, number(value), interval(bounds), "yes" if known else "no")

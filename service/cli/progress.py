@@ -16,7 +16,7 @@ Thing = TypeVar("Thing")
 
 
 class Line:
-    """A line on standard error that is written anew: what is being done, for how long and, once it is told which part
+    """A line on standard error that is written anew: what is being done, for how long and, once it is told the part
     is done, for how much longer.
     """
 

@@ -179,7 +179,7 @@ def _learnt(logs: list[Path], forces: list[float] | None, mapping: Path | None) 
 def _stored(
     logs: list[Path], forces: list[float] | None, sensor: str | None, url: str, key: str | None
 ) -> dict[str, Any]:
-    """The calibration that a service makes of these logs, as it tells it."""
+    """The calibration that a service makes of these logs, as it answers."""
     with connected(url, key) as client:
         receipts = [client.upload(path, sensor=sensor) for path in logs]
         known: Sequence[float | None] = forces or [None] * len(logs)

@@ -39,7 +39,7 @@ def draw_grasps(seen: Sequence[DetectedGrasp]) -> list[Picture]:
 
 
 def draw_models(answers: Sequence[Answer], seen: Sequence[DetectedGrasp]) -> list[Picture]:
-    """The models that the tables tell of: by the first method over the samples, by the last one as what it believes."""
+    """The models that the tables show: by the first method over the samples, by the last one as what it believes."""
     pictures = []
     for answer in answers:
         if answer.model is not None:

@@ -33,7 +33,7 @@ def running_server(folder: Path) -> Iterator[str]:
 def starting_server(folder: Path, say: Callable[[str], object] = print) -> Iterator[Callable[[], str]]:
     """The same, for who has something to do while the server starts: waits for it where the address is asked for.
 
-    ``say`` is told what is waited for where that takes long.
+    ``say`` is called with what is waited for where that takes long.
     """
     folder.mkdir(parents=True, exist_ok=True)
     port = _free_port()

@@ -16,7 +16,7 @@ MOST_SECONDS = 10.0
 """s that an answer may be kept back: a proxy lets a silent connection live longer, a stopping server waits for it."""
 
 LOOK_SECONDS = 0.25
-"""s between two looks at a job that may be done elsewhere, whose end nobody tells."""
+"""s between two looks at a job that may be done elsewhere, whose end nobody reports."""
 
 LOOKERS, MOST_LOOK_SECONDS = 16, 2.0
 """Waits of one client that look so often; with more of them each looks more seldom, down to this."""

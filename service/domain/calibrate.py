@@ -41,7 +41,7 @@ class Correction(NamedTuple):
 async def calibrate(
     context: Context, sensor: str, presses: Sequence[CalibrationPress], principal: Principal
 ) -> Calibration:
-    """Store what presses tell of a sensor's faults; its logs that come in from then on are corrected by it.
+    """Store what presses say of a sensor's faults; its logs that come in from then on are corrected by it.
 
     All keys' logs are: whoever may upload may calibrate it once, and only admins again. Raises ``NotFound`` for a
     sensor or a log, ``FileDeleted``, ``InsufficientScope``, and ``InvalidValue`` for logs that are another sensor's or

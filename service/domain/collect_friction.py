@@ -1,4 +1,4 @@
-"""What a log tells of friction, and where that is nothing, why."""
+"""What a log says of friction, and where that is nothing, why."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""What is told of a stored file whose bytes are not those of before."""
+"""What is reported of a stored file whose bytes are not those of before."""
 
 import logging
 from datetime import timedelta

@@ -1,4 +1,4 @@
-"""The errors of use cases: one small tree. Whoever serves a use case decides how each is told (``http/errors.py``)."""
+"""The errors of use cases: one small tree. Whoever serves a use case decides on the answer (``http/errors.py``)."""
 
 from collections.abc import Mapping, Sequence
 
@@ -112,7 +112,7 @@ class NoFeasibleForce(DomainError):
 
 
 class InvalidSamples(DomainError):
-    """Friction samples tell nothing."""
+    """Friction samples say nothing."""
 
 
 class ResultsNotReady(DomainError):

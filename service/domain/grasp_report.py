@@ -1,4 +1,4 @@
-"""Gather what the report of a grasp tells, and draw it up: of a file, or of a stored log with its results."""
+"""Gather what the report of a grasp says, and draw it up: of a file, or of a stored log with its results."""
 
 from pathlib import Path
 from time import perf_counter

@@ -1,4 +1,4 @@
-"""What the other materials of a sensor tell of one, before it has grasps of its own."""
+"""What the other materials of a sensor say of one, before it has grasps of its own."""
 
 from sqlalchemy.orm import Session
 

@@ -151,7 +151,7 @@ def _model(context: Context, task: GraspTask) -> KnownModel:
 
 
 def _given(task: GraspTask) -> dict[str, Any]:
-    """What a planner is told beside load and probability; raises ``InvalidArgument``."""
+    """What a planner is given beside load and probability; raises ``InvalidArgument``."""
     return {
         "contacts": stiction_client.grasp(task.contact_area, task.round_at, task.fingers, task.object_radius),
         "torque": task.torque,
@@ -170,7 +170,7 @@ def recognise(
 
     Compared are the models of a ``method``, or each material's recommended one. ``grasp`` is the id of a stored log, or
     samples; ``unknown`` the probability beforehand that it is none of them.
-    Raises ``InvalidSamples`` for those that tell nothing, ``ResultsNotReady``, ``NoModel``, ``InvalidValue``,
+    Raises ``InvalidSamples`` for those that say nothing, ``ResultsNotReady``, ``NoModel``, ``InvalidValue``,
     ``NotFound``.
     """
     stored = _candidates(context, names, method)

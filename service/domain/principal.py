@@ -20,7 +20,7 @@ class Principal:
 
     @property
     def actor(self) -> Actor:
-        """As the audit trail tells it."""
+        """As the audit trail names it."""
         name = "anybody" if self.key_id is None else f"key:{self.key_id}"
         return Actor(name, self.address, self.request_id)
 

@@ -11,7 +11,7 @@ RECONSTRUCTED = "reconstructed forces"
 """The finding of a log whose forces follow from its sensor's gel."""
 
 CONTRADICTED = "gripper's force contradicted"
-"""That of one whose gel tells another normal force than the gripper."""
+"""That of one whose gel implies another normal force than the gripper reports."""
 
 
 def needs_forces(log: "GraspLog") -> bool:

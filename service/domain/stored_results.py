@@ -99,7 +99,7 @@ def encode_samples(samples: FrictionSamples) -> bytes:
 
 
 def decode_samples(path: Path) -> FrictionSamples:
-    """The samples in a blob; those stored by older versions tell no noise of f_n and of v, and are all of elements
+    """The samples in a blob; those stored by older versions have no noise of f_n and of v, and are all of elements
     whose velocities count as the object's own: nobody noted whether its motion was known.
     """
     *arrays, common = _unpack(path)

@@ -16,7 +16,7 @@ def with_change(
 ) -> list[FrictionModel]:
     """The models, marked where friction of the newest ``logs``, oldest first, is another than of those before.
 
-    The first of the models that tells scatter between grasps apart is the law; without such a model nothing is marked.
+    The first of the models that separates scatter between grasps is the law; without such a model nothing is marked.
     ``prior``: what is expected of that scatter.
     """
     law = next((model for model in models if model.scales is not None), None)

@@ -99,7 +99,7 @@ def _episode(recording: DetectedLog, number: int, rate: int) -> Columns:
 
 
 def _once(recording: DetectedLog) -> dict[bytes, str]:
-    """What there is one of, as our own Parquet tables tell it."""
+    """What there is one of, as our own Parquet tables hold it."""
     arrays = members(recording.log)
     return {LOG_KEY: json.dumps({name: arrays[name].tolist() for name in OF_A_SENSOR if name in arrays})}
 

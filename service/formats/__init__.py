@@ -117,7 +117,7 @@ def read(path: Path, content_type: str | None = None, **settings: float | str | 
     """Read a grasp log of any known format: a file, or the folder of a Tac3D or rosbag2 recording or, with
     the episode in the mapping, of a LeRobot data set.
 
-    The format is what ``content_type`` names or, without one, what the file's content tells. ``settings``, where they
+    The format is what ``content_type`` names or, without one, what the file's content gives. ``settings``, where they
     are not None: of tracked markers ``scale`` (m per pixel) and ``frame_rate`` (1/s), of formats with topics, fields or
     columns the ``mapping`` (JSON); of both ``rest``, the frame at rest by the words of ``rest.py``, or a ``Path`` to a
     recording of the sensor alone in the same format. Raises ``UnsupportedFormat``, or ``InvalidInput`` for what is

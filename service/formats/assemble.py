@@ -33,7 +33,7 @@ class Recording(Protocol):
         """A field as an array, one entry a frame or ``once`` for the log; None where it isn't there."""
 
     def grid(self) -> tuple[int, int] | None:
-        """Markers along the two axes of the lattice, where the file tells it apart from the arrays' shapes."""
+        """Markers along the two axes of the lattice, where the file gives it beside the arrays' shapes."""
 
     def contents(self) -> str:
         """What is there, for an error's message."""

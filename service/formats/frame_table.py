@@ -84,7 +84,7 @@ class _Table:
         return found[0] if once else found
 
     def grid(self) -> None:
-        """Told by the mapping alone."""
+        """Given by the mapping alone."""
 
     def _chosen(self, mapping: FieldMapping) -> FieldMapping:
         """The first of a preset's alternatives whose columns are there, those apart that need not be."""
@@ -101,7 +101,7 @@ class _Table:
         return [field for field in fields if not self._columns(field)]
 
     def notes(self) -> dict[str, str]:
-        """What the columns to be noted tell: how often each of a few numbers, or the median of many."""
+        """What the columns to be noted hold: how often each of a few numbers, or the median of many."""
         told = {}
         for name, field in self.mapping.notes.items():
             found = self._values[:, [self._place[column] for column in self._columns(field)]]

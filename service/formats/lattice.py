@@ -1,4 +1,4 @@
-"""What the rest positions of a lattice of markers tell."""
+"""What follows from the rest positions of a lattice of markers."""
 
 import numpy as np
 

@@ -69,7 +69,7 @@ class Origin:
 
 @dataclass(frozen=True, slots=True)
 class FieldMapping:
-    """Origin of each member, and what the file may not tell: lattice, pitch (m), tolerance (s), episode, and the column
+    """Origin of each member, and what the file may lack: lattice, pitch (m), tolerance (s), episode, and the column
     that numbers the elements where a table has a row for each, and the frame at ``rest``, whose displacement is 0.
 
     ``text`` is the mapping as it was given, empty where none was. ``notes`` are fields kept in the metadata, by

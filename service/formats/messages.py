@@ -87,7 +87,7 @@ class MessageColumns:
         return np.stack(parts)[self._places(name, topic)]
 
     def grid(self) -> tuple[int, int] | None:
-        """As Stiction's own topic of the log tells it."""
+        """As Stiction's own topic of the log gives it."""
         told = self._values.get((LOG_TOPIC, "grid"))
         if told is None or told[0].shape != (2,) or told[0].dtype.kind not in "iu":
             return None

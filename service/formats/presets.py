@@ -11,7 +11,7 @@ from slipcore.errors import InvalidInput
 
 AXES = "XYZ"
 PRESSED = ["N", "N", "-N"]
-"""Sensors of vendors tell pressure as positive; here z points outwards."""
+"""Sensors of vendors give pressure as positive; here z points outwards."""
 
 
 def papillarray(array: int) -> list[dict[str, Any]]:

@@ -31,7 +31,7 @@ def frame_of(rest: str, frames: int, load: FloatArray | None, place: FloatArray)
     """The frame that ``rest`` names, of so many; the first of those with the least ``load`` [t] where it is the least
     contact, or of those in which a lattice of markers ``place`` [t, k, 3] is stretched least.
 
-    Raises ``InvalidInput`` for a number that is none of a frame, and where nothing tells of contact.
+    Raises ``InvalidInput`` for a number that is none of a frame, and where nothing shows contact.
     """
     text = check(rest)
     if text == LEAST_CONTACT and load is not None and len(load) != frames:
@@ -58,9 +58,9 @@ def unmoved(moved: FloatArray, observed: BoolArray | None) -> tuple[FloatArray, 
 
 
 def load_of(members: Members) -> FloatArray | None:
-    """How much touches in each frame [t]: elements in contact, or force, or the gripper's; None where none is told."""
+    """How much touches in each frame [t]: elements in contact, or force, or the gripper's; None where none is known."""
     for name in ("contact", "force", "gripper_force"):
-        if name in members and np.ndim(members[name]):  # one number for all frames tells nothing of rest
+        if name in members and np.ndim(members[name]):  # one number for all frames says nothing of rest
             told = np.abs(np.asarray(members[name], dtype=np.float64))
             return np.asarray(np.nan_to_num(told).reshape(len(told), -1).sum(axis=1))
     return None
@@ -70,7 +70,7 @@ def stretch(place: FloatArray) -> FloatArray:
     """Sum of squared distances [t] of neighbouring markers ``place`` [t, k, 3] of a lattice.
 
     Of places x + u it is that at rest, plus Σ|δu|², plus 2 Σ δx·δu, which on a lattice telescopes to its border: least
-    at rest where the border stands still. Raises ``InvalidInput`` for markers on no lattice, whose distances tell none.
+    at rest where the border stands still. Raises ``InvalidInput`` for markers on no lattice, whose distances show none.
     """
     from scipy.spatial import cKDTree
 

@@ -122,7 +122,7 @@ def _rest(position: FloatArray, displacement: FloatArray) -> tuple[FloatArray, d
 
     ``3D_Positions`` is the measured surface. In contact ``3D_Displacements`` is its distance from one rest shape; out
     of contact the sensor's software sets displacement and force to exactly 0 while the measured surface keeps its
-    noise, so only frames in contact tell the rest shape (all frames, where there is no contact at all).
+    noise, so only frames in contact show the rest shape (all frames, where there is no contact at all).
     """
     _check_finite("3D_Positions", position)
     _check_finite("3D_Displacements", displacement)

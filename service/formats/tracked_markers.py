@@ -27,7 +27,7 @@ ALIASES = {
 """Columns that are read, by the names that they may have."""
 FORCE = ("fx", "fy", "fz")
 SETTINGS = ("scale", "frame_rate", "sensor", "gripper_force_deviation", "rest")
-"""What lines before the header may tell: ``# scale: 2.5e-5``."""
+"""What lines before the header may state: ``# scale: 2.5e-5``."""
 SCALE, FRAME_RATE = (1e-9, 1.0), (1e-3, 1e6)
 """m per pixel (1 where the file is in metres) and frames a second that can be."""
 ASSUMED_WIDTH = 15e-3
@@ -82,7 +82,7 @@ def read_lines(
     given: Mapping[str, str] = MappingProxyType({}),
     places: Mapping[str, FloatArray] | None = None,
 ) -> GraspLog:
-    """Read a file's lines, with what is ``given`` in place of the settings that it tells, and ``places`` at rest [3] by
+    """Read a file's lines, with what is ``given`` in place of the settings in it, and ``places`` at rest [3] by
     the markers' names, in the file's unit, in place of a frame.
     """
     header = read_header(lines)
@@ -239,7 +239,7 @@ def _check_once(
 
 
 def _one_a_frame(frame: NDArray[np.intp], told: FloatArray, lines: FloatArray) -> FloatArray:
-    """What the rows of each frame tell alike, or one of them tells [t]; raises ``InvalidInput`` where none does."""
+    """What the rows of each frame state alike, or one of them states [t]; raises ``InvalidInput`` where none does."""
     values = np.full(int(frame.max()) + 1, np.nan)
     rows_telling = np.flatnonzero(np.isfinite(told))
     values[frame[rows_telling[::-1]]] = told[rows_telling[::-1]]
@@ -256,7 +256,7 @@ def _one_a_frame(frame: NDArray[np.intp], told: FloatArray, lines: FloatArray) -
 
 
 def _held(frame: NDArray[np.intp], marker: NDArray[np.intp], touching: FloatArray, shape: tuple[int, int]) -> BoolArray:
-    """Contact [t, k]; where it isn't told, as it was told last, at first none."""
+    """Contact [t, k]; where it isn't given, as it was given last, at first none."""
     told = np.full((*shape, 1), np.nan)
     told[frame, marker, 0] = touching
     held: BoolArray = _last_told(told)[..., 0] == 1.0
@@ -264,7 +264,7 @@ def _held(frame: NDArray[np.intp], marker: NDArray[np.intp], touching: FloatArra
 
 
 def _last_told(told: FloatArray) -> FloatArray:
-    """Numbers [t, k, c] as they were told last, at first 0."""
+    """Numbers [t, k, c] as they were given last, at first 0."""
     frames = np.arange(len(told))[:, None, None]
     last = np.maximum.accumulate(np.where(np.isnan(told), 0, frames), axis=0)
     return np.nan_to_num(np.take_along_axis(told, last, axis=0), nan=0.0)

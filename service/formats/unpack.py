@@ -79,7 +79,7 @@ class Unpacker:
 
 
 def _unpacked(content: bytes, compression: str, limit: int) -> bytes:
-    """At most one byte more than ``limit``, which tells that there is more."""
+    """At most one byte more than ``limit``, which shows that there is more."""
     if compression in ("", "none"):
         return content
     if compression == "lz4":

@@ -52,7 +52,7 @@ def is_public(path: str) -> bool:
 
 
 def challenge_of_scope(needed: str) -> str:
-    """What a client is told whose key may do less than it asks for (RFC 6750)."""
+    """What a client is answered whose key may do less than it asks for (RFC 6750)."""
     return f'{CHALLENGE}, error="insufficient_scope", scope="{needed}"'
 
 

@@ -46,7 +46,7 @@ class KeyCache:
     """Keys of the database, each read once every few seconds at most.
 
     Whatever is wrong with a key, an unknown id or another secret, costs one question to the database and two
-    comparisons: the time that a refusal takes does not tell which ids there are.
+    comparisons: the time that a refusal takes does not show which ids there are.
     """
 
     def __init__(self) -> None:
@@ -95,7 +95,7 @@ class KeyCache:
 
 
 class Authentication:
-    """Tells the routes who asks (``request.state.access``); answers by itself who has no key where one is needed."""
+    """Gives the routes who asks (``request.state.access``); answers by itself who has no key where one is needed."""
 
     def __init__(self, app: ASGIApp, authenticator: "Authenticator") -> None:
         self.app = app

@@ -103,7 +103,7 @@ def _parse_long(body: bytes) -> Any:
     except msgspec.DecodeError as error:
         raise json.JSONDecodeError(str(error), "", 0) from error
     if isinstance(parsed, (dict, list)) and _check_fields(parsed) < STRING.sub(b"", body).count(b":"):
-        json.loads(body, object_pairs_hook=_few_fields)  # tells which field stands twice
+        json.loads(body, object_pairs_hook=_few_fields)  # shows which field stands twice
     return parsed
 
 

@@ -44,7 +44,7 @@ DEFAULT_PORTS = {"http": "80", "https": "443"}
 
 
 def is_forwarded(scope: Scope) -> bool:
-    """Whether somebody asks for somebody else: both ends of the connection then tell nothing of who asks."""
+    """Whether somebody asks for somebody else: both ends of the connection then say nothing of who asks."""
     return any(name in FORWARDING or name.startswith(FORWARDING_PREFIXES) for name, _ in scope["headers"])
 
 

@@ -53,7 +53,7 @@ class Page:
     identity: str = "id"
 
     def window(self) -> Window:
-        """What the database is asked for: one entry more tells whether there are more. Raises ``Problem``."""
+        """What the database is asked for: one entry more shows whether there are more. Raises ``Problem``."""
         window = Window(self.sort.lstrip("-"), self.sort.startswith("-"), limit=self.limit + 1)
         return window if self.cursor is None else replace(window, after=self._after(self.cursor))
 

@@ -131,6 +131,6 @@ def problem_response(request: Request, problem: Problem) -> JSONResponse:
 
 
 def unexpected(request: Request, error: Exception) -> JSONResponse:
-    """The answer to an error that nothing else answers; the log tells what it was, the client does not get to know."""
+    """The answer to an error that nothing else answers; the log shows what it was, the client does not get to know."""
     logger.error("request failed", exc_info=error)
     return problem_response(request, Problem(INTERNAL_ERROR, "an unexpected error; the server's log has it"))

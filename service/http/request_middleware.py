@@ -116,7 +116,7 @@ def with_common_headers(headers: Headers, scope: Scope) -> Headers:
 
 
 def id_header(request_id: str) -> tuple[bytes, bytes]:
-    """The header by which an answer tells the id of its request."""
+    """The header by which an answer gives the id of its request."""
     return b"x-request-id", request_id.encode()
 
 

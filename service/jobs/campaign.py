@@ -1,6 +1,6 @@
 """Simulate scenes with many seeds each, on the processors of this machine or on the workers of a Dask cluster.
 
-A folder holds a campaign: ``campaign.json`` tells what is simulated, and how; beside it stands one log for each scene
+A folder holds a campaign: ``campaign.json`` says what is simulated, and how; beside it stands one log for each scene
 and seed, written whole or not at all. Whoever starts it again gets what is missing.
 """
 
@@ -100,7 +100,7 @@ def run(
 
 
 def _kept(done: Future[GraspLog], outcome: Outcome) -> Outcome:
-    """The log, once it is written; what was refused is told, and the others go on."""
+    """The log, once it is written; what was refused is reported, and the others go on."""
     try:
         log = done.result()
     except SlipcoreError as error:
@@ -112,7 +112,7 @@ def _kept(done: Future[GraspLog], outcome: Outcome) -> Outcome:
 
 
 def _write_plan(folder: Path, scenes: Sequence[Scene], promise: RequestedAccuracy) -> None:
-    """Tell what the folder holds; more scenes may come to it, but none may change."""
+    """Write down what the folder holds; more scenes may come to it, but none may change."""
     names = [_file_name(scene) for scene in scenes]
     for name in names:
         if names.count(name) > 1:

@@ -17,7 +17,7 @@ class LimitReached(WorkerDied):
 
 
 def reason_of(error: Exception) -> str:
-    """What the record of a job that failed tells of the error: its first line, as others may hold an SQL statement."""
+    """What the record of a job that failed says of the error: its first line, as others may hold an SQL statement."""
     return f"{type(error).__name__}: {error}".splitlines()[0]
 
 

@@ -49,7 +49,7 @@ def find_deletable(database: Database, blobs: BlobStore, grace: timedelta) -> It
 
 
 def delete_set_aside(database: Database, blobs: BlobStore, grace: timedelta, actor: Actor = audit.SERVICE) -> int:
-    """Delete them for good; returns how many. The audit trail tells that ``actor`` did so, before it is done."""
+    """Delete them for good; returns how many. The audit trail records that ``actor`` did so, before it is done."""
     count = 0
     for some in _portions(find_deletable(database, blobs, grace)):
         details = {"files": len(some), "grace_seconds": grace.total_seconds()}
@@ -61,7 +61,7 @@ def delete_set_aside(database: Database, blobs: BlobStore, grace: timedelta, act
 
 
 def _require_references(database: Database, blobs: BlobStore) -> None:
-    """That the database is the one of these blobs; one that knows none of them can tell of none that it may go."""
+    """That the database is the one of these blobs; one that knows none of them cannot say of any that it may go."""
     identity.verify(database, blobs)
     with database.read() as session:
         if references.any_referenced(session):

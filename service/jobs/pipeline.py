@@ -74,7 +74,7 @@ class Run:
     job: Job
     seconds: dict[str, float] = field(default_factory=dict)
     others_tell: bool = True
-    """Whether the other materials of its sensor tell how much grasps of one may differ."""
+    """Whether the other materials of its sensor show how much grasps of one may differ."""
 
     @property
     def total(self) -> float:
@@ -215,7 +215,7 @@ def _with_forces(run: Run, log: GraspLog, sensor: str) -> "tuple[GraspLog, Recon
 
 
 def _scatter_prior(run: Run, session: Session, material_id: int) -> ScatterPrior:
-    """How much grasps may differ before the material's own tell."""
+    """How much grasps may differ before the material's own show it."""
     return prior_from_others(session, material_id) if run.others_tell else ScatterPrior()
 
 

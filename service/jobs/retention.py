@@ -38,7 +38,7 @@ def prune(
 ) -> int:
     """Delete the files of all logs older than ``before`` whose jobs have ended; returns how many.
 
-    The audit trail tells that ``actor`` did so.
+    The audit trail records that ``actor`` did so.
     Ends early once ``stop`` says so. May run at any number of places at once, and be killed at any moment.
     """
     deleted = 0

@@ -1,4 +1,4 @@
-"""Tell an address of the operator's what the service itself has found, from the audit trail."""
+"""Send to an address of the operator's what the service itself has found, from the audit trail."""
 
 import asyncio
 import hashlib
@@ -19,7 +19,7 @@ from service.periodic_thread import PeriodicThread
 logger = logging.getLogger(__name__)
 
 ACTIONS: tuple[AuditAction, ...] = ("material.surface_changed", "blob.damaged")
-"""What is told: entries that nobody asked for, and that somebody should know of."""
+"""What is sent: entries that nobody asked for, and that somebody should know of."""
 
 LOOK_SECONDS = 5.0
 """s between two looks for new entries."""
@@ -132,7 +132,7 @@ async def _answer(url: str, content: bytes, headers: Mapping[str, str]) -> int:
             return answer.status_code
     except TimeoutError as error:
         raise DeliveryFailed(f"the address took longer than {TIMEOUT:g} s") from error
-    except (httpx.HTTPError, httpx.InvalidURL) as error:  # whose texts may tell the address
+    except (httpx.HTTPError, httpx.InvalidURL) as error:  # whose texts may hold the address
         raise DeliveryFailed(f"the address cannot be reached ({type(error).__name__})") from error
 
 

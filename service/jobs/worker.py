@@ -26,7 +26,7 @@ class StoreConfig:
     """Where a worker finds its work: database, folder of the blobs and, where they are in one, the object store.
 
     ``job_memory_bytes``: how much memory a job may take beside what the process had before the first;
-    ``scatter_from_other_materials``: whether they tell how much grasps of one may differ.
+    ``scatter_from_other_materials``: whether they show how much grasps of one may differ.
     """
 
     database_url: str

@@ -12,10 +12,10 @@ logger = logging.getLogger(__name__)
 
 LOGGED_A_SECOND = 100
 """Of requests that change nothing and went well; a record costs a third of what a look-up does. The others of a second
-are told together. Changes and errors have a record each."""
+are counted together. Changes and errors have a record each."""
 
 FLUSH_SECONDS = 1.0
-"""s after which the others are told."""
+"""s after which the others are written."""
 
 METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
 """Any other word may be a method of HTTP, too; each would be a label."""

@@ -1,4 +1,4 @@
-"""What a running service tells of itself at ``/metrics``, in the text format of Prometheus."""
+"""What a running service says of itself at ``/metrics``, in the text format of Prometheus."""
 
 import threading
 import time
@@ -30,7 +30,7 @@ class ScrubProgress(Protocol):
 
 
 class Metrics:
-    """Requests of this process; jobs of the whole service, as the database tells them, since this process began."""
+    """Requests of this process; jobs of the whole service, as the database gives them, since this process began."""
 
     def __init__(self) -> None:
         self.registry = CollectorRegistry(auto_describe=True)

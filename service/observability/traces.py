@@ -57,7 +57,7 @@ def place() -> str | None:
 
 
 def name_request(method: str, route: str) -> None:
-    """Tell of a request that the framework did not route, under what it is known."""
+    """Record a request that the framework did not route, under what it is known."""
     if _provider is not None:
         from opentelemetry.trace import get_current_span
 

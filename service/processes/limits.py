@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 def cpu_seconds(process_id: int) -> float | None:
-    """CPU time that a process has taken with all its threads, s; None where nobody tells, or once it is gone."""
+    """CPU time that a process has taken with all its threads, s; None where it is not known, or once it is gone."""
     try:
         stat = Path(f"/proc/{process_id}/stat").read_text(encoding="utf-8", errors="replace")
     except OSError:

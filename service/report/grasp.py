@@ -1,4 +1,4 @@
-"""The report of one grasp: what was seen, what that tells of friction, and what to do next."""
+"""The report of one grasp: what was seen, what that says of friction, and what to do next."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

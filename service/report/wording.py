@@ -1,4 +1,4 @@
-"""Sentences and tables that tell of a model, the same on every page."""
+"""Sentences and tables that describe a model, the same on every page."""
 
 from collections.abc import Mapping
 from typing import Protocol
@@ -76,7 +76,7 @@ def friction_facts(model: LinearFriction) -> tuple[list[Fact], Support]:
 
 
 def coefficient_table(models: Mapping[str, LinearFriction]) -> Table:
-    """Coefficients and σ of each model with 95 % intervals, which velocities are unknown, and what others told."""
+    """Coefficients and σ of each model with 95 % intervals, which velocities are unknown, and what came from others."""
     rows = [[name, *estimates(model), str(model.n)] for name, model in models.items()]
     remarks = ("unknown_velocity", "scatter_prior")
     told = {str(model.diagnostics.get(name) or "") for model in models.values() for name in remarks} - {""}

@@ -46,7 +46,7 @@ def correlated(size: float, memory: float = 0.9) -> Fault:
 
 
 def rounded(step: float) -> Fault:
-    """Displacement is told in steps, m."""
+    """Displacement is reported in steps, m."""
     return lambda log, _: replace(log, displacement=step * np.round(log.displacement / step))
 
 
@@ -72,7 +72,7 @@ def smoothed_then_noisy(width: float, size: float) -> Fault:
 
 
 def lagging(share: float, time: float) -> Fault:
-    """A share of the markers is told as it was so many seconds before."""
+    """A share of the markers is reported as it was so many seconds before."""
 
     def fault(log: GraspLog, rng: np.random.Generator) -> GraspLog:
         then = np.maximum(np.searchsorted(log.time, log.time - time, side="right") - 1, 0)
@@ -122,13 +122,13 @@ def changed_forces(change: Callable[[FloatArray], FloatArray]) -> Fault:
 
 
 def tilted(angle: float) -> Fault:
-    """Forces are told in a frame that is turned about y by an angle in degrees: all normals err by so much."""
+    """Forces are reported in a frame that is turned about y by an angle in degrees: all normals err by so much."""
     c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
     return changed_forces(lambda force: force @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]))
 
 
 def dome_forces(angle: float) -> Fault:
-    """Forces on a dome are told as if it were flat: they are tilted outwards by an angle in degrees at its edge."""
+    """Forces on a dome are reported as if it were flat: they are tilted outwards by an angle in degrees at its edge."""
 
     def fault(log: GraspLog, _: np.random.Generator) -> GraspLog:
         if log.force is None:

@@ -16,7 +16,7 @@ from slipcore.frames import GraspLog
 @dataclass(frozen=True, slots=True)
 class Kind:
     """A sensor: ``points`` along x and y at ``pitch`` m, ``frame_rate`` 1/s, standard deviation of ``force_noise`` N
-    (None: it tells no forces); ``in_plane``: it sees x and y alone, and which markers touch; what it ``says``.
+    (None: it measures no forces); ``in_plane``: it sees x and y alone, and which markers touch; what it ``says``.
     """
 
     name: str
@@ -60,7 +60,7 @@ class SensorFault:
     put_in: Fault
 
     def seen(self, kind: Kind, log: GraspLog, rng: np.random.Generator) -> GraspLog:
-        """The log as such a sensor tells it: nothing of the object, and no truth but beside it."""
+        """The log as such a sensor reports it: nothing of the object, and no truth but beside it."""
         told = self.put_in(replace(log, normal=None, object_pose=None), rng)
         told = MarkerNoise(self.marker_noise).observe(told, rng)
         if kind.force_noise is None:

@@ -20,7 +20,7 @@ from stiction_client import container
 
 
 def make(executor: Executor, phrase: str, scenes: int, kinds: tuple[Kind, ...], folder: Path) -> Iterator[SceneEntry]:
-    """Make the scenes that a folder lacks, and tell of each; whole ones of before are kept, and more may be asked for.
+    """Make the scenes that a folder lacks, and report each; whole ones of before are kept, and more may be asked for.
 
     Raises ``InvalidInput`` for an empty phrase, and for a folder of another phrase, of other kinds or another version.
     """

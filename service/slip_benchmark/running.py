@@ -28,7 +28,7 @@ from slipcore.frames import GraspLog
 from slipcore.slip_state import SlipHistory
 
 NEEDS_FORCES = ("force_ratio", "forces_only")
-"""Detectors that see nothing where the sensor tells no forces: there is nothing to score."""
+"""Detectors that see nothing where the sensor measures no forces: there is nothing to score."""
 MOST_OUTPUT = 300
 """Letters of what a failed program said that are kept."""
 
@@ -118,7 +118,7 @@ def _name(method: str | Program) -> str:
 
 
 def predict(folder: Path, scene: str, methods: Sequence[str | Program]) -> list[PredictionRun]:
-    """What each method says of a scene, written; what one refuses is told."""
+    """What each method says of a scene, written; what one refuses is reported."""
     ran = []
     for method in methods:
         began, refused = perf_counter(), None
@@ -135,7 +135,7 @@ def predict(folder: Path, scene: str, methods: Sequence[str | Program]) -> list[
 
 
 def _detect(method: str, seen: Path, prediction: Path) -> None:
-    from slipcore import detect_slip  # compiled: who only tells of results goes without
+    from slipcore import detect_slip  # compiled: who only reports results goes without
 
     log = formats.read(seen)
     if log.force is None and method in NEEDS_FORCES:

@@ -57,12 +57,12 @@ class SealedScene:
         return pairs[self.index % len(pairs)]
 
     def generator(self, attempt: int) -> np.random.Generator:
-        """What all of it is drawn with; nobody gets it from the hash that the manifest tells."""
+        """What all of it is drawn with; nobody gets it from the hash that the manifest gives."""
         digest = hashlib.sha256(f"{FORMAT} {VERSION}, scenes: {self.phrase}".encode()).digest()
         return np.random.default_rng(np.random.SeedSequence(int.from_bytes(digest), spawn_key=(self.index, attempt)))
 
     def make(self) -> tuple[GraspLog, GraspLog]:
-        """The grasp as it is, and as the sensor tells it, both at the sensor's frames and with the truth."""
+        """The grasp as it is, and as the sensor reports it, both at the sensor's frames and with the truth."""
         kind, fault = self.sensor
         for attempt in range(TRIES):
             rng = self.generator(attempt)
@@ -78,7 +78,7 @@ class SealedScene:
 
 
 def seal(phrase: str) -> str:
-    """What a manifest tells of its phrase: enough to recognise it, not enough to draw a scene."""
+    """What a manifest says of its phrase: enough to recognise it, not enough to draw a scene."""
     return hashlib.sha256(phrase.encode()).hexdigest()
 
 

@@ -107,7 +107,7 @@ def _record(summary: ScoreSummary) -> dict[str, Any]:
 
 
 def score(folder: Path, count: Callable[[float, str], None] = lambda _, __: None) -> Scores:
-    """Score each method that has results; ``count`` is told which part is done.
+    """Score each method that has results; ``count`` is given the part that is done.
 
     Raises ``InvalidInput`` for a folder that holds no whole benchmark, a changed one, or no results.
     """
@@ -123,7 +123,7 @@ def score(folder: Path, count: Callable[[float, str], None] = lambda _, __: None
 
 
 def _refused(folder: Path, method: str) -> dict[str, str]:
-    """Why a method has no prediction, by scene, as its run tells; nothing where there was none."""
+    """Why a method has no prediction, by scene, as its run states it; nothing where there was none."""
     path = folder / files.RESULTS / method / files.RUN
     try:
         return {str(name): str(why) for name, why in json.loads(path.read_text(encoding="utf-8"))["refused"].items()}

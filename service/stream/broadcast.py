@@ -15,7 +15,7 @@ MOST_WATCHERS, MOST_OF_ONE_OWNER = 200, 50
 
 
 class Broadcast:
-    """The newest frame of a session. ``count`` tells one from the next; after the last one it ``is_over``."""
+    """The newest frame of a session. ``count`` differs from one to the next; after the last one it ``is_over``."""
 
     def __init__(self) -> None:
         self.watchers, self.count, self.is_over = 0, 0, False

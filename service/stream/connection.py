@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 Store = Callable[[Spool, Description, UploadRequest], dict[str, Any]]
-"""Stores the log in a file that a detector wrote; returns what its client is told of it."""
+"""Stores the log in a file that a detector wrote; returns what its client is answered."""
 
 Sent = tuple[Callable[[bytes], Incoming], bytes]
 """A message as it came, and its decoder: in lists, 1 MiB of it may take 50 times as much."""

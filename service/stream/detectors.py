@@ -48,7 +48,7 @@ Numbers = bytes | Sequence[float]
 
 
 class PackedFrame(NamedTuple):
-    """A frame as it comes from the server's process; ``command`` is the normal force that the gripper is told, N, and
+    """A frame as it comes from the server's process; ``command`` is the normal force commanded to the gripper, N, and
     ``gripper_force`` the one that it reports, with its standard ``gripper_force_deviation``.
     """
 
@@ -215,7 +215,7 @@ def _detected(session: DetectorSession, frame: Frame) -> tuple[SlipState, dict[s
 
 
 def _with_forces(session: DetectorSession, frame: Frame, given: PackedFrame) -> tuple[Frame, dict[str, Any] | None]:
-    """The frame with reconstructed forces where it has none and its sensor's gel is known, and what is told of them."""
+    """The frame with reconstructed forces where it has none and its sensor's gel is known, and a report on them."""
     if session.forces is None:
         return frame, None
     if session.begun is None:
@@ -261,7 +261,7 @@ def write(name: str, target: Path, sensor: str) -> Description:
 
 
 def _with_reports(session: DetectorSession, log: GraspLog) -> GraspLog:
-    """With the gripper's force, where any frame told it; of others 0, which tells nothing. It is as sure as the least
+    """With the gripper's force, where any frame gave it; of others 0, which says nothing. It is as sure as the least
     sure.
     """
     if all(force is None for force in session.reported):

@@ -33,7 +33,7 @@ class Grip:
             self._state = GraspController.init(settings_of(control), model, materials)
 
     def step(self, frame: Frame, found: SlipState) -> dict[str, Any]:
-        """The command after a frame, as it is told; raises ``InvalidInput`` for what the controller cannot take."""
+        """The command after a frame, as it is sent; raises ``InvalidInput`` for what the controller cannot take."""
         with _named():
             observer, seen = self._observer.step(frame, found)
             self._state, command = GraspController.step(self._state, seen)

@@ -66,7 +66,7 @@ class Resume(msgspec.Struct, tag="resume", tag_field="type", forbid_unknown_fiel
 
 
 class FrameIn(msgspec.Struct, tag="frame", tag_field="type", forbid_unknown_fields=True):
-    """A frame; numbers grow from 0. ``command``: the normal force that the gripper is told, N, for those who watch;
+    """A frame; numbers grow from 0. ``command``: the normal force commanded to the gripper, N, for those who watch;
     ``gripper_force`` N and its standard ``gripper_force_deviation`` N: as of a log, by which forces are reconstructed.
     """
 

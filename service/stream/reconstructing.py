@@ -86,7 +86,7 @@ class Reconstructing:
     def step(
         self, frame: Frame, gripper_force: float | None = None, deviation: float | None = None
     ) -> tuple[Frame, dict[str, Any] | None]:
-        """The frame with forces, and what its client is told of them; raises ``InvalidInput``.
+        """The frame with forces, and what its client is answered of them; raises ``InvalidInput``.
 
         ``gripper_force`` N, and its standard ``deviation`` N: what the gripper reports.
         """

@@ -11,7 +11,7 @@ from service.stream.sessions import Streams
 from service.stream.sockets import KEY_SECONDS, close, until_one_ends
 
 MOST_ON_THE_WAY, READ_TOGETHER = 16, 8
-"""Frames that may be sent before they are read, and of how many each word of the watcher tells that it has read them.
+"""Frames that may be sent before they are read, and of how many each message of the watcher says that it has read them.
 
 Beyond the first, frames are left out: a slow network would keep minutes of old ones in its buffers.
 """
@@ -67,7 +67,7 @@ class _Watcher:
             await self._read.wait()
 
     async def listen(self) -> None:
-        """Each word of the watcher tells that it has read some frames; raises ``End`` where they were not sent."""
+        """Each message of the watcher says that it has read some frames; raises ``End`` where they were not sent."""
         while True:
             event = await self._socket.receive()
             if event["type"] == "websocket.disconnect":

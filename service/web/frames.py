@@ -1,6 +1,6 @@
 """What the player shows of one log, in one compact file (``service.packed_arrays``).
 
-Its header tells ``rows`` and ``columns`` of the lattice, how many frames of the log one frame shown stands for
+Its header gives ``rows`` and ``columns`` of the lattice, how many frames of the log one frame shown stands for
 (``step``), and what 127 means in ``displacement`` (m) and ``force`` (N). Of contact patches there is, for each in
 ``patch_frame``, its regime, and in ``patch_place`` its column and row and its direction along them. What is not known,
 because the upload was deleted or the log has no forces, is left out.

@@ -1,4 +1,4 @@
-"""What a page tells of a stored model: its friction at a working point, with the interval that a new grasp shows."""
+"""What a page says of a stored model: its friction at a working point, with the interval that a new grasp shows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -75,7 +75,7 @@ def next_of(stored: StoredModel, at: FrictionEstimate) -> RecordNext | None:
 
 @dataclass(frozen=True, slots=True)
 class Listed:
-    """A material in a list, with the model that is told of and its friction, where it has one."""
+    """A material in a list, with the model that is shown and its friction, where it has one."""
 
     material: Material
     stored: StoredModel | None
@@ -88,14 +88,14 @@ class Listed:
 
 
 def listed(material: Material, normal_force: float | None) -> Listed:
-    """A material as a list tells of it."""
+    """A material as a list shows it."""
     stored = usual_model(material.models)
     return Listed(material, stored, None if stored is None else friction_at(stored, normal_force))
 
 
 @dataclass(frozen=True, slots=True)
 class Coefficient:
-    """A coefficient of a model with its meaning, its 95 % interval, and whether the data tell it."""
+    """A coefficient of a model with its meaning, its 95 % interval, and whether the data determine it."""
 
     symbol: str
     meaning: str

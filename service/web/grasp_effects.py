@@ -53,7 +53,7 @@ class EffectChart:
 
 
 def differing(stored: StoredModel, logs: Sequence[SampledLog]) -> list[Differing]:
-    """Effects of the logs' grasps, in their order; none by a model that tells no scatter between grasps.
+    """Effects of the logs' grasps, in their order; none by a model without scatter between grasps.
 
     Logs whose moments an older version stored, without their places, are left out.
     """

@@ -40,7 +40,7 @@ X_TICKS = 5
 class Density:
     """A parameter's density as a line, and the part of it in the 95 % interval; ``zero``: where 0 stands, if in sight.
 
-    ``is_told``: whether the data tell it.
+    ``is_told``: whether the data determine it.
     """
 
     label: str

@@ -22,7 +22,7 @@ SWAGGER_UI_POLICY = POLICY.replace("img-src 'self'", "img-src 'self' data:")
 """Swagger UI's style has its pictures inside."""
 
 HEADERS = {"Content-Security-Policy": POLICY, "Referrer-Policy": "same-origin"}
-"""Of every page. Without a referrer a browser would not even tell where a form comes from (``Origin: null``)."""
+"""Of every page. Without a referrer a browser would not even send where a form comes from (``Origin: null``)."""
 
 
 def render(request: Request, template: str, status_code: int = 200, **given: Any) -> HTMLResponse:

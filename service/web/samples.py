@@ -3,7 +3,7 @@
 Of each sample ``velocity`` m/s, ``force`` N, ``friction``, its ``residual`` from the model, whether it is ``outside``
 of the band of 90 % of new observations, and ``seconds`` since the first sample of its log. On a lattice of
 ``lattice_velocity`` and ``lattice_force`` the model: ``mean``, ``low`` and ``high``. By place ``place_residual``, the
-mean residual of each element of the sensor, NaN without samples. The header tells ``rows`` and ``columns`` of that
+mean residual of each element of the sensor, NaN without samples. The header gives ``rows`` and ``columns`` of that
 sensor, how many ``logs`` these are of, how many samples they have (``of``), which ``share`` of them is outside, and in
 how many logs the velocity is unknown (``at_rest``).
 """

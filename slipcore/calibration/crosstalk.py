@@ -1,4 +1,4 @@
-"""Tangential force that a sensor tells of a body that is pressed straight down."""
+"""Tangential force that a sensor reports of a body that is pressed straight down."""
 
 import numpy as np
 

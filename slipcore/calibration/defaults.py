@@ -60,7 +60,7 @@ class EstimateDefaults(Options):
     kernel_passes: Annotated[int, Option(1, 100, "passes", "a third changes the width by less than 1 %")] = 3
     """Each takes its reach from the moments of the one before."""
     kernel_exponent: Annotated[float, Option(0.1, 2.0, "-", "a ball on a half-space (Hertz)")] = 0.6667
-    """Of the contact's area over force, by which reaches are told."""
+    """Of the contact's area over force, by which reaches are found."""
     kernel_force_range: Annotated[float, Option(0.0, 1.0, "-", "a third: extrapolated by as much again")] = 0.33
     """Largest smallest force of these, as a share of the greatest."""
     kernel_growth: Annotated[float, Option(0.0, 10.0, "-", "an eighth of what a ball's contact grows by")] = 0.1
@@ -80,15 +80,15 @@ class EstimateDefaults(Options):
     noise_share_of_frames: Annotated[float, Option(0.1, 1.0, "-", "each lag has as many pairs as the lag again")] = 0.5
     """The same, as a share of the frames."""
     noise_blocks: Annotated[int, Option(4, 1000, "blocks", "a standard error to 18 %")] = 16
-    """Groups of elements that are left out in turn: their scatter tells how sure the noise is."""
+    """Groups of elements that are left out in turn: their scatter shows how sure the noise is."""
     noise_memories: Annotated[int, Option(10, 10_000, "values", "steps of 5 %, refined")] = 19
     """Correlations from frame to frame that are tried between 0 and 1."""
 
     least_memory: Annotated[float, Option(0.0, 1.0, "-", "shorter noise is seen as well in three frames")] = 0.3
-    """Correlation of marker noise from frame to frame above which a detector is told how much there is."""
+    """Correlation of marker noise from frame to frame above which a detector is given its size."""
 
     wide_kernel: Annotated[float, Option(0.0, 100.0, "elements", "turns a pivot's friction by 2 %")] = 0.5
-    """Least width of a kernel that a detection is told of."""
+    """Least width of a kernel that a detection is given."""
 
 
 PRESS = PressDefaults()

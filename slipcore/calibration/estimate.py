@@ -27,7 +27,7 @@ class Estimate:
 
     @property
     def is_identified(self) -> bool:
-        """Whether the presses tell it."""
+        """Whether the presses determine it."""
         return self.not_identified is None
 
     @property
@@ -37,14 +37,14 @@ class Estimate:
 
 
 class PressEstimate(NamedTuple):
-    """What one press tells of a quantity: its value and standard error."""
+    """What one press says of a quantity: its value and standard error."""
 
     value: float
     error: float
 
 
 PressResult = PressEstimate | str
-"""Or why it tells nothing."""
+"""Or why it says nothing."""
 
 
 def unknown(name: str, unit: str, reason: str) -> Estimate:
@@ -55,7 +55,7 @@ def unknown(name: str, unit: str, reason: str) -> Estimate:
 def joined(name: str, unit: str, found: Sequence[PressResult]) -> Estimate:
     """One quantity of several presses: a random effect of each press beside its own error (DerSimonian and Laird).
 
-    Presses that tell nothing are left out; where none tells, the first says why.
+    Presses that say nothing are left out; where all do, the first says why.
     """
     known = [each for each in found if isinstance(each, PressEstimate)]
     if not known:

@@ -25,7 +25,7 @@ _TOLD = {
 
 class Corrected(NamedTuple):
     """A log with its sensor's faults taken out as far as they are known, what was ``changed``, in words, and the
-    ``options`` that tell a detector of faults that stay in it.
+    ``options`` that give a detector the faults that stay in it.
     """
 
     log: GraspLog

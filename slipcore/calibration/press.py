@@ -14,7 +14,7 @@ from slipcore.surface.log_normals import normals_of
 
 
 class InvalidPress(InvalidInput):
-    """Logs that are no pure presses; ``evidence`` tells by the log's number what was seen."""
+    """Logs that are no pure presses; ``evidence`` says by the log's number what was seen."""
 
     def __init__(self, evidence: dict[int, str]) -> None:
         self.evidence = evidence
@@ -142,7 +142,7 @@ def load_terms(press: PressLog) -> tuple[FloatArray, FloatArray]:
     """
     seen, zero = press.free | press.pressed, press.zero
     columns = [press.normal_force]
-    if zero is not None:  # else no free frames tell an offset from a share of an even load
+    if zero is not None:  # else no free frames separate an offset from a share of an even load
         columns.append(np.ones(len(press.log)))
         columns += [elapsed(press.log)] if zero.around else []
     return np.stack(columns, axis=1)[seen], press.tangential_force[seen]

@@ -329,11 +329,11 @@ class AccuracyDefaults(Options):
     step_order: Annotated[float, Option(0.5, 2.0, "-", "accuracy-contact.md: 1.5 to 1.9")] = 1.5
     """Of what load steps leave, for what can be reached."""
     overhead_cells: Annotated[float, Option(0.0, 1e6, "cells", "Table I, lifting and cup: 2,700 to 5,000")] = 4000.0
-    """What costs as much in a load step as all that does not grow with the grid, where nothing tells."""
+    """What costs as much in a load step as all that does not grow with the grid, where it was not measured."""
     overhead_spread: Annotated[float, Option(1.0, 100.0, "-", "coupled and layered scenes lie within")] = 4.0
     """Factor that runs may change it by, either way."""
     telling_growth: Annotated[float, Option(1.05, 100.0, "-", "times of smaller ones differ by noise")] = 1.5
-    """Of a grid's cells from which on two runs tell what costs what."""
+    """Of a grid's cells from which on two runs show what costs what."""
     held_back: Annotated[float, Option(0.0, 0.5, "-", "prices are off by a tenth")] = 0.08
     """Part of a budget that no run is planned into."""
     scouting_share: Annotated[float, Option(0.01, 0.9, "-", "the last run should have most of it")] = 0.2

@@ -33,7 +33,7 @@ class InfeasibleLoad(InvalidInput):
 class OutOfReach(InvalidInput, NotConverged):
     """A request that is refused before it is tried: ``least`` of its ``name`` can be asked for.
 
-    ``seconds`` is what that takes: by the runs that were made to tell, on this machine. It is a ``NotConverged``, too,
+    ``seconds`` is what that takes: by the runs that were made, on this machine. It is a ``NotConverged``, too,
     with ``least`` for its ``residual``: that is what an accuracy out of reach raised before it was refused.
     """
 
@@ -69,7 +69,7 @@ def _duration(seconds: float) -> str:
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C during a request; ``log`` is the best that was made until then, its metadata tell its accuracy."""
+    """Ctrl-C during a request; ``log`` is the best that was made until then, its metadata give its accuracy."""
 
     def __init__(self, log: GraspLog) -> None:
         self.log = log

@@ -1,10 +1,10 @@
-"""Whom a long computation tells how far it is."""
+"""To whom a long computation reports how far it is."""
 
 from collections.abc import Callable
 
 Progress = Callable[[float], None]
-"""Is told which part is done, from 0 to 1."""
+"""Takes the part that is done, from 0 to 1."""
 
 
 def no_progress(part: float) -> None:
-    """Nobody is told."""
+    """Reports to nobody."""

@@ -1,4 +1,4 @@
-"""Whole logs: the fold of the detector's steps, and what later frames tell of earlier ones."""
+"""Whole logs: the fold of the detector's steps, and what later frames say of earlier ones."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ def detect_slip(
 
     With a ``lookahead`` each frame is decided in the light of that many frames after it (see ``FixedLagSmoother``);
     with a ``sensor_model`` the log is first corrected by it (``SensorModel.apply``). Method "filter" sharpens what the
-    sensor smoothed, as far as the log's noise tells how widely, unless options tell it. A log without displacement is
+    sensor smoothed, as far as the log's noise shows how widely, unless options give it. A log without displacement is
     left to method "forces_only" where the default would see nothing. ``options`` are the method's, and
     ``kernel_width`` of ``defaults.PatchOptions``; what the sensor model knows of noise and smoothing goes before their
     defaults. Raises ``InvalidInput`` as ``init`` does, and for a log of another lattice than the sensor model's.

@@ -9,7 +9,7 @@ from slipcore.surface.smoothing import kernel_width, unsmoothed
 
 
 def kernels_of(log: GraspLog) -> dict[str, float]:
-    """Options of method "filter", m: how widely a sensor smooths displacement and forces, as far as noise tells."""
+    """Options of method "filter", m: how widely a sensor smooths displacement and forces, as far as noise shows it."""
     pitch, told = math.sqrt(log.element_area), {}
     if log.has_displacement:
         told["marker_kernel"] = pitch * kernel_width(log.time, log.displacement, SMOOTHING.least_noise)
@@ -21,7 +21,7 @@ def kernels_of(log: GraspLog) -> dict[str, float]:
 def sharpened(
     displacement: FloatArray, force: FloatArray | None, options: ContactOptions, element_area: float
 ) -> tuple[FloatArray, FloatArray | None]:
-    """Displacement and force [..., n, m, 3] without the smoothing that the options tell; the same if they tell none."""
+    """Displacement and force [..., n, m, 3] without the smoothing that the options give; the same if they give none."""
     if not isinstance(options, FilterOptions):
         return displacement, force
     pitch, noise = math.sqrt(element_area), options.smoothing_noise

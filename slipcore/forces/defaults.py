@@ -161,7 +161,7 @@ class ReconstructionDefaults(Options):
     contradicted_share: Annotated[
         float, Option(0.0, 1.0, "-", "of sure forces 0.3 %, of heavy-tailed ones some more")
     ] = 0.1
-    """Of the frames that touch, in which that must be so for it to be told."""
+    """Of the frames that touch, in which that must be so for it to be reported."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -169,7 +169,7 @@ class ForceStreamDefaults(Options):
     """Frames as they come (``stream.py``)."""
 
     frames: Annotated[int, Option(3, 1000, "frames", "half a second at 30 frames a second")] = 15
-    """First ones, which tell the noise of markers and have no forces; as many latest ones tell it again later."""
+    """First ones, which show the noise of markers and have no forces; as many latest ones show it again later."""
     least_noise: Annotated[float, Option(0.0, 1e-3, "m", "finer than cameras resolve")] = 1e-8
     """Of a marker's coordinate, where none shows: a sensor that rounds, or a simulated one."""
     stride: Annotated[int, Option(1, 1000, "frames", "a look takes 50 ms of CPU: 25 ms a frame")] = 2
@@ -243,7 +243,7 @@ class GelCalibrationDefaults(Options):
     lattice: Annotated[int, Option(3, 10_000, "points", "1e-3 of a quantile")] = 161
     """Of the posterior, along each quantity."""
     least_precision: Annotated[float, Option(0.0, 1.0, "-", "trials")] = 1e-6
-    """Of a quantity that nothing tells, in units of the steps tried."""
+    """Of a quantity that nothing determines, in units of the steps tried."""
     confidence: Annotated[float, Option(0.5, 0.999, "-", "usual")] = 0.95
     """Of intervals."""
     half_space: Annotated[float, Option(0.0, 1.0, "-", "two standard deviations of a Gaussian")] = 0.135

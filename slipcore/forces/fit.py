@@ -80,7 +80,7 @@ class TractionFit:
         return np.stack([np.linalg.norm(of @ part, axis=-1) for part in self.root.reshape(3, -1, self.root.shape[1])])
 
     def information(self) -> FloatArray:
-        """Share [3] of what is known of the resultant along each axis that the data tell, not the prior."""
+        """Share [3] of what is known of the resultant along each axis that comes from the data, not the prior."""
         whole = np.ones((1, self.prior_root.shape[1]))
         before = np.linalg.norm(whole @ self.prior_root, axis=(-2, -1))
         return np.asarray(1.0 - (self.deviation(whole)[:, 0] / before) ** 2)

@@ -32,7 +32,7 @@ class Gel:
 
     @classmethod
     def from_json(cls, told: Mapping[str, Any]) -> "Gel":
-        """As the service tells the gel of a sensor: a ``thickness`` of None is a half-space's. Raises ``InvalidInput``
+        """As the service gives the gel of a sensor: a ``thickness`` of None is a half-space's. Raises ``InvalidInput``
         for what is no number, another name or a missing modulus or ratio.
         """
         names = [each.name for each in fields(cls)]

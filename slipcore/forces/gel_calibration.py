@@ -38,9 +38,9 @@ _NORMAL = float(ndtri(0.5 + 0.5 * GEL_CALIBRATION.confidence))
 
 @dataclass(frozen=True, slots=True)
 class GelEstimate:
-    """A property of a gel with its 95 % interval; ``information``: share of what is known of it that the presses tell.
+    """A property of a gel with its 95 % interval; ``information``: share of what is known that is from the presses.
 
-    ``note``: "given"; that it is the prior's; or that the thickness has no upper end. Empty where the presses tell it.
+    ``note``: "given"; that it is the prior's; or that the thickness has no upper end. Empty where the presses show it.
     """
 
     name: str
@@ -54,7 +54,7 @@ class GelEstimate:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GelCalibration:
-    """The ``gel``, and how well the presses tell each of its properties.
+    """The ``gel``, and how well the presses determine each of its properties.
 
     ``correlation`` [3, 3]: between log Young's modulus, Poisson's ratio and the thickness; ``force`` [i] N of each
     press by this gel; ``misfit``: root mean square of what no gel explains of the displacement over its noise.
@@ -129,7 +129,7 @@ def _forces(logs: Sequence[GraspLog], known: Sequence[float | None] | None, youn
 
 
 def _presses(logs: Sequence[GraspLog], forces: list[float], marker_depth: float, noise: float | None) -> Presses:
-    """What the logs' holds tell."""
+    """What the logs' holds show."""
     first = logs[0]
     for log in logs:
         if not np.array_equal(log.position, first.position) or log.element_area != first.element_area:

@@ -25,7 +25,7 @@ class Reconstruction:
     ``force`` [t, n, m, 3] N on each element, z outward, with its standard ``deviation``; ``resultant`` [t, 3] N of the
     whole contact, also of what lies beyond the lattice, with ``resultant_deviation``; ``contact`` [t, n, m];
     ``kernel_width`` m: side of the square over which forces are in effect averaged; ``information`` [3]: share of what
-    is known of the resultant's x, y and z that data tell and not the prior; ``condition``: largest over smallest
+    is known of the resultant's x, y and z that is from the data, not the prior; ``condition``: largest over smallest
     singular value of the markers' response to traction on the contact (all three at the frame that moved markers most;
     NaN and no information without contact); ``noise`` m of a marker's coordinate that was assumed; ``given`` [t, 3]
     says which components of the resultant were known from elsewhere, and so count among data, and ``contradiction``
@@ -122,7 +122,7 @@ class _Recording:
     known: KnownForce
 
     def frame(self, t: int) -> tuple[ObservationModel, FloatArray]:
-        """What one frame tells: displacements, then its resultant."""
+        """What one frame measures: displacements, then its resultant."""
         data = self.shown.data[t]
         spread = error(data, self.shown.seen[t], self.shown.noise)
         return self.sensor.observation(spread, self.known[t]), self.sensor.data(data, self.known[t])

@@ -44,7 +44,7 @@ class DisplacementData:
 
 
 def axes_seen(displacement: FloatArray) -> tuple[int, ...]:
-    """Along which displacements [..., 3] tell something: markers whose z never changes are seen in the plane only."""
+    """Along which displacements [..., 3] show something: markers whose z never changes are seen in the plane only."""
     return (0, 1, 2) if displacement[..., 2].any() else (0, 1)
 
 

@@ -44,7 +44,7 @@ class SensorResponse:
 
     @property
     def sees_depth(self) -> bool:
-        """Whether its markers also tell how deep they are pressed."""
+        """Whether its markers also show how deep they are pressed."""
         return len(self.axes) == 3
 
     def observation(self, spread: FloatArray, known: KnownForce) -> ObservationModel:
@@ -53,5 +53,5 @@ class SensorResponse:
 
     @staticmethod
     def data(displacement: FloatArray, known: KnownForce) -> FloatArray:
-        """What it tells [m + 3]."""
+        """What it measures [m + 3]."""
         return np.concatenate((displacement, np.nan_to_num(known.force)))

@@ -1,4 +1,4 @@
-"""Pressure anywhere under the lattice, by one linear operator: for markers that also tell their depth.
+"""Pressure anywhere under the lattice, by one linear operator: for markers that also show their depth.
 
 With depth the problem is well-posed without knowing where the object touches, so one matrix, made once, shows in every
 frame where that is. In-plane markers alone need the contact first: shear that spreads from a point looks like pressure.

@@ -1,1 +1,1 @@
-"""Contact patches: where an object touches, followed over time, and what the whole patch tells of its friction."""
+"""Contact patches: where an object touches, followed over time, and what the whole patch says of its friction."""

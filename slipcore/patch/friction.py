@@ -10,7 +10,7 @@ from slipcore.patch_record import ContactFriction, Patch, bounds_of, frames_of, 
 
 
 def contact_friction(time: FloatArray, patches: Sequence[Patch], **options: float) -> ContactFriction | None:
-    """What the ``patches`` of a log tell of friction, at times [t] s; None without forces or contact.
+    """What the ``patches`` of a log say of friction, at times [t] s; None without forces or contact.
 
     ``options``: see ``defaults.PatchOptions``; raises ``InvalidInput`` for those that do not exist or are out of range.
     """

@@ -9,7 +9,7 @@ from slipcore.surface.strain import Lattice
 def normals_of(log: GraspLog) -> FloatArray:
     """Outward normals [t, n, m, 3] of a log, from the deformed shape where it has none.
 
-    Raises ``InvalidInput`` where such a log has no lattice that a shape can be told from.
+    Raises ``InvalidInput`` where such a log has no lattice from which a shape follows.
     """
     if log.normal is not None:
         return log.normal

@@ -35,10 +35,10 @@ def bend_of_noise(width: float) -> float:
 
 def kernel_width(time: FloatArray, field: FloatArray, least_noise: float) -> float:
     """Standard deviation, in elements, of the kernel that a sensor smooths a recorded ``field`` [t, n, m, c] with; 0
-    where its noise does not tell.
+    where its noise does not show it.
 
     What parts a frame from the line between its neighbours in time is noise; how much of that bends from element to
-    element tells the kernel. White noise that came after the smoothing hides it. ``least_noise``: below it is motion.
+    element shows the kernel. White noise that came after the smoothing hides it. ``least_noise``: below it is motion.
     """
     n, m = field.shape[1:3]
     if len(time) < SMOOTHING.least_frames or max(n - 2, 0) * max(m - 2, 0) < SMOOTHING.least_elements:

@@ -18,7 +18,7 @@ from stiction_client.model import FrictionModel
 class ControllerState:
     """A controller between two frames, never written to.
 
-    ``known``: the friction that ``hold`` goes by, None while there is none; ``learned``: what slipping elements told;
+    ``known``: the friction that ``hold`` goes by, None while there is none; ``learned``: friction of slipping elements;
     ``contradictions``: frames in a row that speak against ``known``; ``since``: when ``mode`` began, s;
     ``rested``: whether a load has come to rest, until which the first touch lasts; ``recognition``: the materials that
     it may be of; ``material``: which it was taken for, and its ``probability``.
@@ -81,7 +81,7 @@ def step(state: ControllerState, observation: Observation) -> tuple[ControllerSt
 
 
 def _sense(state: ControllerState, observation: Observation, elapsed: float) -> ControllerState:
-    """What the frame tells of load and friction."""
+    """What the frame says of load and friction."""
     load = state.load.step(observation, elapsed, state.settings)
     sticking = state.sticking.step(observation, load.size, state.settings)
     sampled = _sampled(observation, sticking, state.settings)
@@ -134,7 +134,7 @@ def _counts(state: ControllerState, samples: SlipSamples, agrees: bool) -> bool:
 def _contradicts(
     state: ControllerState, sticking: StickRatioEstimate, normal: float, size: float, friction: float
 ) -> bool | None:
-    """Whether a frame speaks against the friction that is known; None where it tells nothing of it.
+    """Whether a frame speaks against the friction that is known; None where it says nothing of it.
 
     Friction of slipping elements outside of what the model permits, or slip under a load that it says is held.
     """
@@ -193,7 +193,7 @@ def _recognised(state: ControllerState, normal: float) -> ControllerState:
 
 
 def _sharpened(state: ControllerState, known: KnownFriction, normal: float) -> ControllerState:
-    """With what this grasp's samples add; slip, where they told of more friction than a model, disproves them."""
+    """With what this grasp's samples add; slip, where they had more friction than a model, disproves them."""
     if not known.of_others:
         return replace(state, known=state.learned.known(state.settings) or known)
     if state.sticking.slips(state.settings) and state.load.size > 0.0 and known.sharpened > 1.0:
@@ -206,7 +206,7 @@ def _enter(state: ControllerState, mode: Mode) -> ControllerState:
 
 
 def _blind(state: ControllerState) -> bool:
-    """Whether neither a model nor the stick ratio tells how hard to hold a load."""
+    """Whether neither a model nor the stick ratio shows how hard to hold a load."""
     return (
         state.known is None
         and _loaded(state.load, state.settings)

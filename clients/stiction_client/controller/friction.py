@@ -16,7 +16,7 @@ from stiction_client.quantile import FrictionQuantile
 class KnownFriction:
     """A conservative ``quantile`` of a contact's friction over the normal force of its elements, ``unit``·F^(1/n) N.
 
-    ``deviations``: how many standard deviations it lies below the mean; ``of_others``: whether other grasps told it, so
+    ``deviations``: standard deviations that it lies below the mean; ``of_others``: it is of other grasps, so
     that samples of this one can sharpen it; ``sharpened``: the quantile of this grasp, by them, over that of any.
     """
 
@@ -31,7 +31,7 @@ class KnownFriction:
     def of_model(cls, model: FrictionModel, settings: ControlSettings) -> "KnownFriction":
         """What the planner's answers are computed from (``required_normal_force``).
 
-        Where the model tells its scales, of the contact: scatter within it averages over as many elements as touch
+        Where the model has scales, of the contact: scatter within it averages over as many elements as touch
         under ``least_force``, the fewest that there will be, so that one quantile serves all loads.
         """
         contact, area = settings.contact, model.element_area
@@ -42,7 +42,7 @@ class KnownFriction:
 
     @classmethod
     def learned(cls, low: float, mean: float, contact: Contact) -> "KnownFriction":
-        """One friction coefficient at any force: one grasp tells no slopes."""
+        """One friction coefficient at any force: one grasp does not determine slopes."""
         return cls(contact, FrictionQuantile(a=mean, c=0.0, s=mean - low, k=0.0, g=0.0), 1.0)
 
     def required(self, tangential: float, torque: float, most: float) -> float:
@@ -59,7 +59,7 @@ class KnownFriction:
         return low, 2.0 * mean - low
 
     def refuted(self, learned: "LearnedFriction", size: float, force: float, settings: ControlSettings) -> bool:
-        """Whether the latest samples together tell of less friction under ``force`` N than both errors explain.
+        """Whether the latest samples together speak for less friction under ``force`` N than both errors explain.
 
         A contact that bears a load of ``size`` N has at least that friction, whatever samples say.
         """
@@ -70,7 +70,7 @@ class KnownFriction:
         return mean - max(learned.mean, size / force) > settings.contradiction_deviations * error
 
     def sharpen(self, learned: "LearnedFriction", force: float, settings: ControlSettings) -> "KnownFriction":
-        """The same with what the samples of this grasp tell under ``force`` N, once ``contradiction_frames`` agree.
+        """The same with what the samples of this grasp say under ``force`` N, once ``contradiction_frames`` agree.
 
         The contact's friction is normal about the model's mean, with the model's scatter; the samples' mean is normal
         about the contact's, with their error. The quantile becomes that of the contact's friction given the samples.
@@ -95,7 +95,7 @@ class KnownFriction:
 
 @dataclass(frozen=True, slots=True)
 class LearnedFriction:
-    """The contact's friction by the elements that slipped: ``values`` of the latest frames that told it, by how many
+    """The contact's friction by the elements that slipped: ``values`` of the latest frames that had any, by how many
     elements (``counts``).
 
     ``sampled``: of the latest frames that had samples, those among them that the stick ratio contradicts.

@@ -12,7 +12,7 @@ from stiction_client.errors import InvalidArgument
 class LoadEstimate:
     """``size`` N of tangential force and torque together, how fast it grows, and since when it is ``steady`` (s).
 
-    ``rate`` N/s: told soon, and noisy; ``trend`` N/s: the same, told later and more exactly.
+    ``rate`` N/s: found soon, and noisy; ``trend`` N/s: the same, found later and more exactly.
     """
 
     size: float = 0.0

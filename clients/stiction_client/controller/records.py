@@ -1,4 +1,4 @@
-"""What the grip controller is told, and what it answers."""
+"""What the grip controller is given, and what it answers."""
 
 import math
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from stiction_client.errors import InvalidArgument
 
 Mode = Literal["feel", "learn", "hold", "alarm"]
 """feel: friction unknown, regulated by the stick ratio; learn: the same, and the force falls until enough slips to be
-sampled; hold: by a friction model; alarm: slip, evidence against the model, or nothing told."""
+sampled; hold: by a friction model; alarm: slip, evidence against the model, or nothing known."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +33,7 @@ class SlipSamples:
 class Observation:
     """One frame of one contact: ``time`` s, ``normal`` and ``tangential`` force N and ``torque`` N·m as magnitudes.
 
-    ``stick_ratio``: NaN where the detector tells none. ``slip_samples``: None where there are none.
+    ``stick_ratio``: NaN where the detector gives none. ``slip_samples``: None where there are none.
     """
 
     time: float

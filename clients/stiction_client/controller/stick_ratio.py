@@ -1,4 +1,4 @@
-"""Grip by the stick ratio alone: what it tells of friction before any model does."""
+"""Grip by the stick ratio alone: what it says of friction before any model does."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from stiction_client.controller.settings import ControlSettings
 
 @dataclass(frozen=True, slots=True)
 class StickRatioEstimate:
-    """The stick ratio as it was last ``told`` (s), and the ``friction`` that it speaks for; NaN before it told any.
+    """The stick ratio as it was last ``told`` (s), and the ``friction`` that it speaks for; NaN before there was any.
 
     ``slipping``: frames in a row in which next to nothing stuck.
     """
@@ -23,7 +23,7 @@ class StickRatioEstimate:
     def step(self, observation: Observation, size: float, settings: ControlSettings) -> "StickRatioEstimate":
         """The same after a frame under a load of ``size`` N.
 
-        A contact of which all sticks, or that bears nothing, tells no friction: what was felt before then stands.
+        A contact of which all sticks, or that bears nothing, shows no friction: what was found before then stands.
         """
         ratio = observation.stick_ratio
         if math.isnan(ratio):

@@ -20,7 +20,7 @@ FINGERTIP = 6e-5
 
 
 class Terms(TypedDict, total=False):
-    """On what terms friction is told: the ``contact_area`` m² over whose elements scatter averages out (a fingertip's
+    """On what terms friction is given: the ``contact_area`` m² over whose elements scatter averages out (a fingertip's
     unless given), and whether to ``allow_unidentified`` friction.
     """
 
@@ -39,9 +39,9 @@ def conservative_friction(
 ) -> float:
     """Quantile of a contact's μ at ``normal_force`` N an element and ``tangential_velocity`` m/s, as one number.
 
-    It is that of the mean over the elements of ``contact_area`` m², where the model tells its ``scales``; without them
+    It is that of the mean over the elements of ``contact_area`` m², where the model has ``scales``; without them
     all scatter counts as common to the elements. Raises ``InvalidArgument`` for a quantile above ½, where the quantile
-    of μ isn't positive, and for friction that the data do not tell, or that is implausible: pass
+    of μ isn't positive, and for friction that is not determined or implausible: pass
     ``allow_unidentified`` to have the quantile anyway.
     """
     if not 0.0 < quantile <= 0.5:

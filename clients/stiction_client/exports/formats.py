@@ -84,7 +84,7 @@ def moveit_max_contact_force(answer: RequiredForce) -> float:
 
 
 def contactile_answer(answer: RequiredForce | None) -> dict[str, float]:
-    """What Contactile's PapillArray tells its users: ``friction_est`` [-], -1 for none, and ``target_grip_force`` N."""
+    """What Contactile's PapillArray gives its users: ``friction_est`` [-], -1 for none, and ``target_grip_force`` N."""
     if answer is None:
         return {"friction_est": -1.0, "target_grip_force": -1.0}
     return {"friction_est": answer.friction_coefficient, "target_grip_force": answer.normal_force}

@@ -60,7 +60,7 @@ class _Sum:
 
 
 def touching(model: Any, data: Any, steps: int) -> list[Touch]:
-    """Step ``data`` and tell which geoms press on each other, each pair with its means over the ``steps``."""
+    """Step ``data`` and find which geoms press on each other, each pair with its means over the ``steps``."""
     sums: defaultdict[tuple[int, int], _Sum] = defaultdict(_Sum)
     for _ in range(steps):
         mujoco.mj_step(model, data)

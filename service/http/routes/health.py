@@ -14,7 +14,7 @@ router = APIRouter(tags=["health"], route_class=FairRoute)
 
 @router.get("/healthz", summary="Does the process live?", response_model_exclude_none=True)
 async def read_health(context: CurrentContext) -> HealthOut:
-    """Touches neither database nor disk: it tells what was last seen of them, some seconds ago."""
+    """Touches neither database nor disk: it shows what was last seen of them, some seconds ago."""
     trouble = context.watch.trouble if context.watch is not None else None
     return HealthOut() if trouble is None else HealthOut(status="degraded", trouble=trouble)
 

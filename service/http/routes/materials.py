@@ -157,7 +157,7 @@ def read_next_grasp(context: CurrentContext, name: str, asked: Annotated[NextGra
 def create_fit(
     context: CurrentContext, name: str, new: NewFit, key: KeyWithBody, principal: CurrentPrincipal
 ) -> Response:
-    """Over the samples of all its logs. Answers at once; the job at `Location` tells how it went."""
+    """Over the samples of all its logs. Answers at once; the job at `Location` shows how it went."""
     with context.queueing() as session:
 
         def create() -> RepeatableResponse:

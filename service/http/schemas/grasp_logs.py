@@ -103,7 +103,7 @@ class FindingOut(BaseModel):
 
 
 class ContactFrictionOut(BaseModel):
-    """Friction that the contact as a whole tells, whatever its elements show."""
+    """Friction of the contact as a whole, whatever its elements show."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [CONTACT_FRICTION_EXAMPLE]})
 
@@ -235,7 +235,7 @@ class WithdrawnOut(BaseModel):
 
 
 class UploadQuery(BaseModel):
-    """What is told of an upload beside its body: the parameters of its address."""
+    """What is said of an upload beside its body: the parameters of its address."""
 
     material: Annotated[
         str | None, Field(description="What was held; without it slip is only detected", examples=["paper"])

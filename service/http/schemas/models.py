@@ -70,7 +70,7 @@ class CostOut(BaseModel):
 
 
 class ScaleOut(BaseModel):
-    """A standard deviation as the data tell it."""
+    """A standard deviation as the data determine it."""
 
     value: float
     degrees_of_freedom: Annotated[float | None, Field(description="Of the Student-t that it scales; null: normal")]

@@ -109,7 +109,7 @@ MOST_SAMPLES = 75_000
 
 Item = TypeVar("Item")
 Column = Annotated[list[Item], Field(max_length=MOST_SAMPLES, fail_fast=True)]
-"""Of samples: the first that cannot be is told, and no more, for each would take its time."""
+"""Of samples: the first that cannot be is named, and no more, for each would take its time."""
 
 
 class SamplesIn(Body):
@@ -137,7 +137,7 @@ class SamplesIn(Body):
 
 
 class NewRecognition(Body):
-    """A grasp whose material is to be told: of a stored log, or of samples that are sent."""
+    """A grasp whose material is to be recognised: of a stored log, or of samples that are sent."""
 
     model_config = ConfigDict(
         json_schema_extra={

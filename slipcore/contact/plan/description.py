@@ -18,7 +18,7 @@ class Finger:
     """A gel fingertip: ``radius`` m (inf for a flat one), ``young_modulus`` Pa, ``poisson_ratio``, ``thickness`` m of
     the gel.
 
-    The gel is a half-space to the solver unless the scene has a bonded layer; its thickness tells whether it should.
+    The gel is a half-space to the solver unless the scene has a bonded layer; its thickness says whether it should.
     """
 
     radius: float = RAMP.sphere_radius

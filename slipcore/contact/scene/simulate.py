@@ -33,7 +33,7 @@ def simulate(
 
     ``accuracy`` is the largest of: absolute error of the stick ratio, relative L2 error over time of displacement and
     of force at the sensor's points, all before observation effects. ``seed`` draws random fields and noise. The
-    metadata tell tier, grid, steps, tolerance, estimated accuracy and seconds. ``progress`` is told which part is done.
+    metadata give tier, grid, steps, tolerance, estimated accuracy and seconds. ``progress`` is given the part done.
 
     Raises ``InfeasibleLoad`` where friction cannot carry a load, ``OutOfReach`` for an accuracy or seconds that cannot
     be kept, with what can, ``NotConverged`` and ``InvalidInput``; ``Interrupted``, with the best log until then, where

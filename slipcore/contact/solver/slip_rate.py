@@ -33,7 +33,7 @@ def solve_carrying(equations: StepEquations, carried: FloatArray, guess: Stress)
         solution = replace(equations, offset=equations.offset - carried).solve(guess)
         tangential, here = solution.tangential, carried[:, *solution.box]
         if tangential.sliding and all(equations.load.given):
-            break  # the load does not tell how far a sliding contact moves
+            break  # the load does not show how far a sliding contact moves
         ends = here.any(axis=0) & (~tangential.slides | ((tangential.slip * here).sum(axis=0) < 0.0))
         if not ends.any():
             return solution._replace(tangential=tangential._replace(slip=tangential.slip + here))

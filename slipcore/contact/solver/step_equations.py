@@ -94,7 +94,7 @@ class StepEquations:
             iterations += solution.iterations
             if not pressure.any():
                 return solution
-            if solution.iterations == 0 and goal > self.tolerance:  # too coarse to tell what this lift leads to
+            if solution.iterations == 0 and goal > self.tolerance:  # too coarse to show what this lift leads to
                 goal = max(self.tolerance, STEP.inexact * goal)
                 continue
             mapped = self._lift(traction)

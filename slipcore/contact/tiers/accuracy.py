@@ -43,10 +43,10 @@ def simulate_to(
 ) -> Refined:
     """The cheapest log that is estimated to be as accurate as asked, or the best one within ``seconds``, which it uses.
 
-    ``progress`` is told from the first run on.
+    ``progress`` is called from the first run on.
 
     Raises ``OutOfReach`` for an accuracy that neither the finest grid nor the most load steps would reach, and for
-    seconds in which nothing can be made whose error is known: both as soon as the coarsest runs tell.
+    seconds in which nothing can be made whose error is known: both as soon as the coarsest runs show it.
     ``NotConverged`` where the finest grid falls short after all; ``Stopped`` with the best log where Ctrl-C comes after
     the first.
     """

@@ -55,7 +55,7 @@ class Fidelity:
 
 
 def run(plan: Plan, fidelity: Fidelity | None = None, progress: Progress = no_progress) -> GraspLog:
-    """Simulate a plan; the log has no observation effects yet. ``progress`` is told after each frame.
+    """Simulate a plan; the log has no observation effects yet. ``progress`` is called after each frame.
 
     Raises ``InfeasibleLoad``, ``NotConverged`` and ``InvalidInput``.
     """

@@ -1,4 +1,4 @@
-"""The runs of one request: their clock, their pace, what is left of the budget, and whom to tell."""
+"""The runs of one request: their clock, their pace, what is left of the budget, and to whom to report."""
 
 import time
 from collections.abc import Iterable
@@ -75,7 +75,7 @@ class Runs:
         return self._sizes[rate].of(fidelity)
 
     def _tell(self, now: float, whole: float) -> None:
-        """Tell which part of the work, or of the budget, is done: never less than before."""
+        """Report which part of the work, or of the budget, is done: never less than before."""
         part = (self._done + now) / (self._done + max(whole, self._ahead))
         if np.isfinite(self.budget):
             part = self.spent / self.budget

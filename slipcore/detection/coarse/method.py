@@ -1,8 +1,8 @@
-"""For arrays of few elements that tell displacement and forces: methods ``forces_only`` and ``filter``, joined.
+"""For arrays of few elements that measure displacement and forces: methods ``forces_only`` and ``filter``, joined.
 
 An element that is not much smaller than the contact slips bit by bit: half of it slips while it still takes on load,
-and its mean displacement parts from the object's motion long before. How elements share the load tells more there, and
-where several stick beside each other their markers tell when one does not. Log-odds of both are added.
+and its mean displacement parts from the object's motion long before. How elements share the load says more there, and
+where several stick beside each other their markers show when one does not. Log-odds of both are added.
 """
 
 from typing import NamedTuple
@@ -81,7 +81,7 @@ def _log_odds(probability: FloatArray, options: CoarseOptions) -> FloatArray:
 
 
 def _sensor(lattice: Lattice, options: CoarseOptions) -> DetectorSetup:
-    """The lattice and options for the filter's kernel; contact is known, and only what pulls is told by them."""
+    """The lattice and options for the filter's kernel; contact is known, and only what pulls follows from them."""
     touch = np.array(ContactThreshold(0.0, 0.0, options.contact_noise, 1.0, 1.0, 0.0, 1.0, 0.0, 0.0))
     settings = by_place.METHOD.start(lattice, FilterOptions()).settings
     position, steps, inverse = map(np.array, (lattice.position, lattice.steps, lattice.inverse_jacobian))

@@ -21,7 +21,7 @@ from slipcore.frames import FloatArray
 
 class Increment(NamedTuple):
     """What is common to all elements of a step: its duration s, variance of a marker coordinate m², whether the growing
-    normal load makes everything stick again, and whether nothing has moved for so long that places tell nothing new.
+    normal load makes everything stick again, and whether nothing has moved for so long that places say nothing new.
     """
 
     interval: float
@@ -61,7 +61,7 @@ def update_element(
 
     With p the slip probability, a and b those that a sticking element begins to slip and a slipping one sticks:
     predicted p' = p(1 − b) + (1 − p)a; log-odds += log N(z; slip) − log N(z; stick) + those from forces. A marker far
-    from both predictions was lost and found elsewhere: it tells nothing, but is believed if it stays there.
+    from both predictions was lost and found elsewhere: it says nothing, but is believed if it stays there.
     """
     p, size2 = old[PROBABILITY, i, j], seen.motion_x * seen.motion_x + seen.motion_y * seen.motion_y
     onset, end = transitions(math.sqrt(size2), seen.readiness, increment, tuning)

@@ -1,4 +1,4 @@
-"""Whether anything happens: while neither the object nor the load moves, frames tell no more than the ones before."""
+"""Whether anything happens: while neither the object nor the load moves, frames say no more than the ones before."""
 
 import math
 

@@ -12,7 +12,7 @@ from it in the last two frames, of how many frames that is known, and what secon
 place, m, and yaw, rad; in how many frames of contact there were forces, and pulled; how far the camera moved, x, y m;
 and of the markers around the contact the last step, x, y m, by how much it differed from the one before, and what such
 differences say of jitter, m²; and of the frames since object or load last moved how many there are, and the means of
-pose and of load (N, or without forces m); and of markers the step in which places are told, m, and the noise that lasts
+pose and of load (N, or without forces m); and of markers the step in which places come, m, and the noise that lasts
 from frame to frame, m.
 """
 

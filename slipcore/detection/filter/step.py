@@ -56,7 +56,7 @@ def step_filter(
         after.common[FORCE_FRAMES] += 1.0
         after.common[PULLED_FRAMES] += 0.0 if has_force else 1.0
     if same(last.displacement, frame.displacement) and not touches_anew(after.contact, room.surface.stays):
-        after.elements[:] = before.elements  # a frame that repeats the last tells nothing
+        after.elements[:] = before.elements  # a frame that repeats the last says nothing
         after.elements[ONSET] = after.elements[END] = 0.0
     else:
         step_elements(sensor.position, last, frame, before, after, room, has_force, tuning)
@@ -128,7 +128,7 @@ def noise_of_frame(surface: Surface, tuning: Tuning) -> tuple[float, float]:
     marker_noise, pressing_noise, between_neighbours, told_step = surface.noise
     lasting = lasting_noise(marker_noise, between_neighbours, told_step, tuning)
     shown = tuning.noise_margin * known_or(marker_noise, tuning.unknown_noise)
-    variance = shown**2 + max(lasting, tuning.displacement_floor) ** 2  # a floor that is told is lasting noise, too
+    variance = shown**2 + max(lasting, tuning.displacement_floor) ** 2  # a floor that is given is lasting noise, too
     return variance, tuning.force_noise_margin * known_or(pressing_noise, 0.0)
 
 
@@ -158,7 +158,7 @@ def known_or(noise: float, otherwise: float) -> float:
 @compiled
 def rooms_of(rows: FloatArray, count: int) -> tuple[Anchors, AnchorMotion, FloatArray, FloatArray, FloatArray]:
     """Where ``rows`` take what is worked out of so many anchors: themselves, how they move, how much deeper they are,
-    change of force [3, k], and what this tells [2, k].
+    change of force [3, k], and the evidence of these [2, k].
     """
     r = rows[:, :count]
     anchors = Anchors(r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7])

@@ -21,11 +21,11 @@ def shift_of_surroundings(
     tuning: Tuning,
     common: FloatArray,
 ) -> tuple[float, float]:
-    """How far the camera has moved since the first frame, x and y m, as markers around the contact tell; in ``common``.
+    """How far the camera has moved since the first frame, x and y m, as markers around the contact show; in ``common``.
 
     It moves as they do in the mean while ``surroundings_jitter`` of their motion is jitter. Those count that lie
     ``surroundings_reach`` contact radii or more from what touches, without outliers: the mean of the same markers adds
-    up to no random walk. Fewer than ``surroundings_least`` tell nothing, nor do any where the object's pose is given:
+    up to no random walk. Fewer than ``surroundings_least`` say nothing, nor do any where the object's pose is given:
     their motion has the gel's own in it, too. ``distance`` [n, m], ``rows``: room.
     """
     if not frame.object_pose.size:

@@ -1,4 +1,4 @@
-"""Stick and slip from forces alone, for taxels and pillars that tell no displacement; no friction coefficient is given.
+"""Stick and slip from forces alone, for taxels and pillars without displacement; no friction coefficient is given.
 
 As the load grows, an element that slips takes ever less of it, until its force ratio stands at the friction
 coefficient, while its neighbours take over (Cattaneo, 1938; between pillars: Khamis et al., 2018). Which friction the
@@ -137,7 +137,7 @@ def look(
 
 
 def log_odds_told(seen: Sharing, gained: FloatArray, options: ForcesOnlyOptions) -> FloatArray:
-    """Log-odds of slip [k] from a change of the load: what the part tells where it grows, and stick where it is taken
+    """Log-odds of slip [k] from a change of the load: what the part says where it grows, and stick where it is taken
     back.
     """
     most, least = options.largest_gain, options.least_change
@@ -154,7 +154,7 @@ def friction_told(
     moved: float,
     options: ForcesOnlyOptions,
 ) -> FloatArray:
-    """Log weights [g] after elements of whose load more is told; what was known fades to the prior by the way moved."""
+    """Log weights [g] after elements of whose load more is known; what was known fades by the way moved."""
     at_limit, below = -np.logaddexp(0.0, -level), -np.logaddexp(0.0, level)
     loaded = seen.expected > options.least_change
     told = np.where(loaded, np.logaddexp(at_limit + slip, below + stick), 0.0)

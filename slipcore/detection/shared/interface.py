@@ -60,7 +60,7 @@ class CompiledMethod(NamedTuple, Generic[Options]):
     """A detection method whose whole step is one compiled call, ``run_filter`` or ``run_strain_rate``.
 
     ``revise``: the decision on a frame from the ``elements`` in its memory and in those of frames after it, and the
-    settings; None for a method that later frames tell nothing. ``findings``: what its memory's ``common`` says is
+    settings; None for a method to which later frames say nothing. ``findings``: what its memory's ``common`` says is
     inconsistent in the frames so far; None for a method that does not look.
     """
 

@@ -1,4 +1,4 @@
-"""Noise that three frames do not show: what of it lasts from frame to frame, and steps in which places are told."""
+"""Noise that three frames do not show: what of it lasts from frame to frame, and steps in which places are given."""
 
 import math
 
@@ -33,7 +33,7 @@ def step_lasting(
     noise: FloatArray, displacement: FloatArray, fresh: bool, after: FloatArray, series: FloatArray
 ) -> tuple[float, float, float]:
     """Learn from one more frame, unless it is not ``fresh``: standard deviation of a marker coordinate by how it parts
-    from its neighbours', m, NaN while unknown, and the steps in which places are told, in the plane and in depth, m, 0
+    from its neighbours', m, NaN while unknown, and the steps in which places are given, in the plane and in depth, m, 0
     if there is none. ``series`` [2, k]: room.
     """
     after[SPREAD:] = noise[SPREAD:]
