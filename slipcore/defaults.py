@@ -612,6 +612,12 @@ class CheckOptions(Options):
 
     longest_interval: Annotated[float, Option(0.0, 60.0, "s", "a slip front passes an element in a tenth")] = 1.0
     """Longest time between frames, in the median."""
+    largest_stretch: Annotated[float, Option(0.0, 100.0, "-", "no gel is half as large again; scenes 0.01")] = 0.5
+    """Largest strain of the whole lattice in the direction of its least, in the mean over the log."""
+    stretch_frames: Annotated[
+        int, Option(1, 1000000, "frames", "places are there in any frame; of long logs a few")
+    ] = 9
+    """Evenly chosen over the log, of whose mean that is taken."""
     repeated_share: Annotated[float, Option(0.0, 1.0, "-", "noise makes no two readings alike")] = 0.05
     """Largest share of frames that are copies of the one before."""
     largest_pressure: Annotated[float, Option(0.0, 1e12, "Pa", "gels tear and fingertips hurt below 1 MPa")] = 5e6
@@ -624,10 +630,20 @@ class CheckOptions(Options):
     """Largest sum of the elements' tangential forces over the normal force, without load."""
     travel: Annotated[float, Option(0.0, 1e3, "elements", "the centre of force errs by a fraction of one")] = 2.0
     """How much further than its markers a contact's centre may travel."""
-    friction_change: Annotated[float, Option(0.0, 10.0, "-", "simulated grasps 0.01, recordings 0.43 to 0.99")] = 0.3
+    partial_slip: Annotated[float, Option(0.0, 1.0, "-", "the rim of what is only pressed, up to 0.08 in scenes")] = 0.1
+    """Largest share of the contact in slip up to which nothing is taken to slip."""
+    friction_change: Annotated[float, Option(0.0, 10.0, "-", "simulated grasps 0.01, recordings 0.44 to 0.53")] = 0.3
     """Largest change of friction from the quarter of samples with the least force to that with the most."""
-    place_scatter: Annotated[float, Option(0.0, 10.0, "-", "simulated grasps 0.03, recordings 0.28 to 0.36")] = 0.15
+    place_scatter: Annotated[float, Option(0.0, 10.0, "-", "simulated grasps 0.03, recordings 0.19 to 0.31")] = 0.15
     """Largest standard deviation of friction between elements, as a share of it."""
+    scatter_share: Annotated[float, Option(0.0, 10.0, "-", "as for the scatter between elements")] = 0.15
+    """Largest standard deviation of friction about a law of speed and force, as a share of friction."""
+    scatter_over_repeats: Annotated[float, Option(1.0, 1e3, "-", "tuning scenes: 0.4 to 2.6 where so many repeat")] = (
+        3.0
+    )
+    """Largest multiple of the standard deviation of the same element's readings, from frame to frame, that this is."""
+    least_repeats: Annotated[int, Option(2, 1000000, "pairs", "a deviation to 16 %")] = 20
+    """Pairs of samples of one element in successive frames from which that deviation counts."""
     least_samples: Annotated[int, Option(8, 1000000, "samples", "quarters of ten samples")] = 40
     """Samples from which friction is compared."""
     samples_of_place: Annotated[int, Option(2, 1000000, "samples", "a mean to half of their scatter")] = 5

@@ -11,6 +11,7 @@ SEVERITIES: dict[str, Severity] = {
     "gripper's force contradicted": "note",
     "slow frames": "note",
     "no displacement": "note",
+    "places for displacement": "warning",
     "repeated frames": "note",
     "force too large": "warning",
     "force pulls": "warning",
@@ -22,8 +23,10 @@ SEVERITIES: dict[str, Severity] = {
     "no rest": "note",
     "sideways force without load": "warning",
     "contact travels": "warning",
+    "no slip": "note",
     "friction follows force": "warning",
     "friction differs by place": "warning",
+    "scatter beyond noise": "warning",
     "contact contradicts elements": "note",
 }
 """Of each finding's name. After a warning the ratio of an element's forces, or the force at which it was seen, is not

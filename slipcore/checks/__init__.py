@@ -13,6 +13,7 @@ from slipcore.element_forces import element_forces
 from slipcore.errors import NoForces, UnknownScale
 from slipcore.finding import SEVERITIES, Finding
 from slipcore.frames import GraspLog
+from slipcore.patch.friction import contact_friction
 from slipcore.samples import FrictionSamples, element_samples
 from slipcore.slip_state import SlipHistory
 from slipcore.surface.log_normals import normals_of
@@ -22,6 +23,7 @@ __all__ = ["AGAINST_FRICTION", "Finding", "check_log"]
 CHECKS: tuple[Check, ...] = (
     recording.time_unit,
     recording.still_markers,
+    recording.places_for_displacement,
     recording.repeated_frames,
     recording.force_unit,
     recording.force_sign,
@@ -30,8 +32,10 @@ CHECKS: tuple[Check, ...] = (
     recording.found_by_detector,
     contact.load_free_tangential_force,
     contact.moving_contact,
+    friction.no_slip,
     friction.friction_by_force,
     friction.friction_by_place,
+    friction.scatter_beyond_noise,
     friction.friction_against_contact,
 )
 """In the order in which findings are listed: the recording first, then what was found in it."""
@@ -52,7 +56,8 @@ def check_log(
     forces = None if log.force is None else element_forces(log.force, normals_of(log))
     pressing = np.zeros(log.displacement.shape[:3]) if forces is None else np.maximum(forces.pressing, 0.0)
     samples = _samples(log, history) if samples is None else samples
-    subject = Subject(log, history, forces, pressing, samples, limits)
+    contact = contact_friction(log.time, history.patches)
+    subject = Subject(log, history, forces, pressing, samples, contact, limits)
     return [finding for check in CHECKS for finding in check(subject)]
 
 

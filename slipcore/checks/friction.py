@@ -7,7 +7,21 @@ import numpy as np
 from slipcore.checks.subject import Subject
 from slipcore.collection import contradiction
 from slipcore.finding import Finding
-from slipcore.patch.friction import contact_friction
+from slipcore.frames import FloatArray
+from slipcore.samples import FrictionSamples
+
+
+def no_slip(seen: Subject) -> Iterator[Finding]:
+    """A load that never came near friction: neither does the contact slide as a whole, nor does a part of it slip."""
+    if seen.contact is None or not seen.contact.is_bound or not seen.held.any():
+        return
+    share = 1.0 - float(np.nanmin(seen.history.stick_ratio[seen.held], initial=1.0))
+    if share < seen.limits.partial_slip:
+        evidence = (
+            f"no more than {share:.0%} of the contact slips at a time, and it does not slide as a whole: "
+            f"friction is at least {seen.contact.low:.2f}, and nothing says how much more"
+        )
+        yield Finding("no slip", evidence, "load the object sideways until more than half of the contact slips")
 
 
 def friction_by_force(seen: Subject) -> Iterator[Finding]:
@@ -46,12 +60,40 @@ def friction_by_place(seen: Subject) -> Iterator[Finding]:
         yield Finding("friction differs by place", evidence, "calibrate the sensor's elements, or clean its surface")
 
 
+def scatter_beyond_noise(seen: Subject) -> Iterator[Finding]:
+    """Friction that scatters far more than the same element's readings do from one frame to the next."""
+    samples = seen.samples
+    if samples is None or len(samples) < seen.limits.least_samples:
+        return
+    left, frame = _left_by_law(samples), np.searchsorted(seen.log.time, samples.time)
+    order = np.lexsort((frame, samples.element))
+    again = (np.diff(samples.element[order]) == 0) & (np.diff(frame[order]) == 1)
+    if np.count_nonzero(again) < seen.limits.least_repeats:
+        return
+    repeats = float(np.sqrt(0.5 * np.mean(np.diff(left[order])[again] ** 2)))  # a difference holds the noise of both
+    scatter, middle = float(left.std()), float(samples.friction_coefficient.mean())
+    if scatter > max(seen.limits.scatter_over_repeats * repeats, seen.limits.scatter_share * middle):
+        evidence = (
+            f"friction scatters by {scatter / middle:.0%} about any law of speed and force, "
+            f"while an element's readings repeat to {repeats / middle:.0%} from frame to frame"
+        )
+        remedy = "more samples do not average this out: calibrate elements, zero and normals, or use the whole contact"
+        yield Finding("scatter beyond noise", evidence, remedy)
+
+
+def _left_by_law(samples: FrictionSamples) -> FloatArray:
+    """What the best linear law of speed and normal force leaves of friction, [k]."""
+    terms = np.stack([np.ones(len(samples)), samples.tangential_velocity, samples.normal_force], axis=-1)
+    terms /= np.maximum(np.abs(terms).max(axis=0), np.finfo(float).tiny)
+    law = np.linalg.lstsq(terms, samples.friction_coefficient, rcond=None)[0]
+    return np.asarray(samples.friction_coefficient - terms @ law)
+
+
 def friction_against_contact(seen: Subject) -> Iterator[Finding]:
     """Elements whose friction the whole contact contradicts."""
-    contact = contact_friction(seen.log.time, seen.history.patches)
-    if seen.samples is None or not len(seen.samples) or contact is None:
+    if seen.samples is None or not len(seen.samples) or seen.contact is None:
         return
-    evidence = contradiction(seen.samples, contact, seen.history.patches)
+    evidence = contradiction(seen.samples, seen.contact, seen.history.patches)
     if evidence is not None:
         remedy = "the contact is trusted, and no element: record a grasp that slides or pivots, or calibrate the sensor"
         yield Finding("contact contradicts elements", evidence, remedy)

@@ -24,6 +24,19 @@ def still_markers(seen: Subject) -> Iterator[Finding]:
         yield Finding("no displacement", evidence, remedy)
 
 
+def places_for_displacement(seen: Subject) -> Iterator[Finding]:
+    """Places of markers where their displacement should be: they spread as the lattice itself does."""
+    frames = np.linspace(0, len(seen.log) - 1, min(len(seen.log), seen.limits.stretch_frames)).astype(int)
+    moved = seen.log.displacement[frames].mean(axis=0)[..., :2].reshape(-1, 2)
+    place = seen.log.position[..., :2].reshape(-1, 2)
+    gradient = np.linalg.pinv(place - place.mean(axis=0)) @ (moved - moved.mean(axis=0))
+    least = float(np.linalg.svd(gradient, compute_uv=False)[-1])
+    if least > seen.limits.largest_stretch:
+        evidence = f"by their displacement the markers lie {least:.0%} further apart, in all directions, than at rest"
+        remedy = "give displacement from the place at rest; with `rest` a mapping takes places of markers"
+        yield Finding("places for displacement", evidence, remedy)
+
+
 def repeated_frames(seen: Subject) -> Iterator[Finding]:
     """A sensor that is slower than its recorder, or frozen."""
     fields = [field for field in (seen.log.displacement, seen.log.force) if field is not None and field.any()]

@@ -7,6 +7,7 @@ from slipcore.defaults import CheckOptions
 from slipcore.element_forces import ElementForces
 from slipcore.finding import Finding
 from slipcore.frames import BoolArray, FloatArray, GraspLog
+from slipcore.patch_record import ContactFriction
 from slipcore.samples import FrictionSamples
 from slipcore.slip_state import SlipHistory
 
@@ -15,6 +16,7 @@ from slipcore.slip_state import SlipHistory
 class Subject:
     """What the checks look at; ``forces``, with pressing parts [t, n, m] N, and ``samples`` where there are any.
 
+    ``contact``: friction of the contact as a whole, None without forces or contact.
     ``total``: normal force of all elements, [t] N; ``held``: frames with at least half of the largest, [t].
     """
 
@@ -23,6 +25,7 @@ class Subject:
     forces: ElementForces | None
     pressing: FloatArray
     samples: FrictionSamples | None
+    contact: ContactFriction | None
     limits: CheckOptions
     total: FloatArray = field(init=False)
     held: BoolArray = field(init=False)

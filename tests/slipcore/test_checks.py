@@ -96,8 +96,19 @@ def doubled(log: GraspLog) -> GraspLog:
     )
 
 
+def with_places(log: GraspLog) -> GraspLog:
+    """Where markers are, in the place of how far they have moved."""
+    return replace(log, displacement=log.position + log.displacement)
+
+
+def before_shear(log: GraspLog) -> GraspLog:
+    """The recording ends when the object is pressed and settled."""
+    return log.take(slice(0, 27))
+
+
 FAULTS: dict[str, Callable[[GraspLog], GraspLog]] = {
     "slow frames": lambda log: replace(log, time=1e3 * log.time),
+    "places for displacement": with_places,
     "no displacement": lambda log: replace(log, displacement=np.zeros_like(log.displacement)),
     "repeated frames": doubled,
     "force too large": lambda log: with_force(log, 1e2 * np.asarray(log.force)),
@@ -106,8 +117,10 @@ FAULTS: dict[str, Callable[[GraspLog], GraspLog]] = {
     "no rest": lambda log: log.take(slice(30, None)),
     "sideways force without load": with_sideways,
     "contact travels": rolling,
+    "no slip": before_shear,
     "friction follows force": with_smoothed_normal,
     "friction differs by place": with_gains,
+    "scatter beyond noise": with_gains,
 }
 
 
@@ -125,6 +138,31 @@ def test_nothing_is_found_in_a_log_without_fault(long_ramp: GraspLog, short_ramp
 @pytest.mark.parametrize("name", ["cond1", "cond1_layer5c", "reversal", "ring"])
 def test_nothing_but_its_beginning_is_found_in_scenes_of_another_solver(name: str, scene: Scene) -> None:
     assert names(scene(name, marker_noise=3e-6, force_noise=2e-3)) <= {"no rest"}
+
+
+def test_places_are_found_without_forces_and_whichever_way_the_lattice_lies(short_ramp: GraspLog) -> None:
+    alone = replace(short_ramp, force=None, normal=None, object_pose=None)
+    turn = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
+    turned = replace(alone, position=alone.position @ turn, displacement=alone.displacement @ turn)
+    for log in (alone, turned):
+        assert "places for displacement" in names(with_places(log))
+        assert "places for displacement" not in names(log)
+
+
+def test_slip_of_a_twentieth_is_none_and_of_a_fifth_is_some(short_ramp: GraspLog) -> None:
+    assert short_ramp.truth is not None
+    slipping = 1.0 - np.nan_to_num(short_ramp.truth.stick_ratio, nan=1.0)
+    for share, said in ((0.05, True), (0.2, False)):
+        ends = int(np.flatnonzero(slipping > share)[0])
+        assert ("no slip" in names(short_ramp.take(slice(0, ends)))) == said
+
+
+def test_noise_by_which_friction_scatters_is_no_scatter_beyond_noise(long_ramp: GraspLog) -> None:
+    """With 5 mN friction scatters by 13 %, and so do an element's readings from frame to frame."""
+    force = np.asarray(long_ramp.force)
+    noisy = with_force(long_ramp, force + 5e-3 * np.random.default_rng(5).standard_normal(force.shape))
+    assert "scatter beyond noise" not in names(noisy, scatter_share=0.05)
+    assert "scatter beyond noise" in names(with_gains(long_ramp), scatter_share=0.05)
 
 
 def test_of_real_recordings_it_is_said_why_their_friction_is_wrong(recording: GraspLog) -> None:
