@@ -11,9 +11,8 @@ from slipcore.calibration.gain import gain
 from slipcore.calibration.kernel import kernel_width, squared_width
 from slipcore.calibration.marker_noise import marker_noise
 from slipcore.calibration.model import AXES, SensorModel
-from slipcore.calibration.press import InvalidPress, PressLog, find_press, press_fault
+from slipcore.calibration.press import InvalidPress, PressLog, find_press, known_forces, press_fault
 from slipcore.calibration.zero import drifts, offsets
-from slipcore.defaults import LIMITS
 from slipcore.errors import InvalidInput, UnknownScale
 from slipcore.frames import FloatArray, GraspLog
 
@@ -25,7 +24,8 @@ def calibrate_sensor(logs: Sequence[GraspLog], known_force: Sequence[float | Non
     says why it is not identified. Raises ``InvalidInput`` for logs of several sensors or lattices, ``UnknownScale`` for
     lengths that are not in metres, ``InvalidPress`` for logs that are not pure presses, with what was seen in each.
     """
-    known = _checked(logs, known_force)
+    known = known_forces(logs, known_force)
+    _check_alike(logs)
     presses = [find_press(log) for log in logs]
     faulty = {number: seen for number, press in enumerate(presses) if (seen := press_fault(press)) is not None}
     if faulty:
@@ -42,23 +42,13 @@ def calibrate_sensor(logs: Sequence[GraspLog], known_force: Sequence[float | Non
     )
 
 
-def _checked(logs: Sequence[GraspLog], known_force: Sequence[float | None] | None) -> Sequence[float | None]:
-    if not logs:
-        raise InvalidInput("logs", "none", "at least one press")
-    known = [None] * len(logs) if known_force is None else known_force
-    if len(known) != len(logs):
-        raise InvalidInput("known_force", f"{len(known)} forces", f"one for each of {len(logs)} logs, or None")
-    least, most = LIMITS.press
-    for force in known:
-        if force is not None and not least <= force <= most:
-            raise InvalidInput("known_force", force, f"{least:g} to {most:g} N")
+def _check_alike(logs: Sequence[GraspLog]) -> None:
     for name in ("sensor", "grid"):
         values = sorted({str(getattr(log, name)) for log in logs})
         if len(values) > 1:
             raise InvalidInput("logs", f"of several {name}s: {', '.join(values)}", "one sensor at a time")
     if not all(log.is_scaled for log in logs):
         raise UnknownScale("a sensor is calibrated in metres, and the scale of a log is unknown")
-    return known
 
 
 def _estimates(presses: list[PressLog], known_force: Sequence[float | None]) -> list[Estimate]:

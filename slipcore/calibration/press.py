@@ -1,13 +1,13 @@
 """A press of a body straight down: which frames are free of contact, which are pressed, and whether it is pure."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from slipcore.calibration.defaults import PRESS
 from slipcore.calibration.zero import Zero, elapsed, find_zero
-from slipcore.defaults import DEVIATION_TO_SIGMA
+from slipcore.defaults import DEVIATION_TO_SIGMA, LIMITS
 from slipcore.errors import InvalidInput
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.surface.log_normals import normals_of
@@ -26,6 +26,23 @@ class InvalidPress(InvalidInput):
 
     def __reduce__(self) -> tuple[type["InvalidPress"], tuple[dict[int, str]]]:
         return type(self), (self.evidence,)
+
+
+def known_forces(logs: Sequence[GraspLog], known_force: Sequence[float | None] | None) -> list[float | None]:
+    """The normal force of each press, N, None where it is not known; ``known_force`` of None: of none.
+
+    Raises ``InvalidInput`` without logs, where there are more or fewer forces than these, and for one out of range.
+    """
+    if not logs:
+        raise InvalidInput("logs", "none", "at least one press")
+    known: list[float | None] = [None] * len(logs) if known_force is None else list(known_force)
+    if len(known) != len(logs):
+        raise InvalidInput("known_force", f"{len(known)} forces", f"one for each of {len(logs)} logs, or None")
+    least, most = LIMITS.press
+    for force in known:
+        if force is not None and not least <= force <= most:
+            raise InvalidInput("known_force", force, f"{least:g} to {most:g} N")
+    return known
 
 
 @dataclass(frozen=True, slots=True, eq=False)

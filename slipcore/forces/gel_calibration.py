@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 from scipy.special import ndtri
 
-from slipcore.defaults import LIMITS
+from slipcore.calibration.press import known_forces
 from slipcore.errors import InvalidInput
 from slipcore.forces.bounded_gaussian import BoundedGaussian, through
 from slipcore.forces.defaults import GEL, GEL_CALIBRATION
@@ -114,15 +114,7 @@ def _checked(young: float | None, ratio: float | None, thickness: float | None, 
 
 
 def _forces(logs: Sequence[GraspLog], known: Sequence[float | None] | None, young: float | None) -> list[float]:
-    if not logs:
-        raise InvalidInput("logs", "none", "at least one press")
-    given = [None] * len(logs) if known is None else list(known)
-    if len(given) != len(logs):
-        raise InvalidInput("known_force", f"{len(given)} forces", f"one for each of {len(logs)} logs, or None")
-    least, most = LIMITS.press
-    for force in given:
-        if force is not None and not least <= force <= most:
-            raise InvalidInput("known_force", force, f"{least:g} to {most:g} N")
+    given = known_forces(logs, known)
     if young is None and all(force is None for force in given):
         raise InvalidInput("known_force", "none", "at least one, or a given young_modulus")
     return [math.nan if force is None else float(force) for force in given]
