@@ -2,7 +2,7 @@
 
 import importlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from types import ModuleType
 from typing import Any
@@ -137,17 +137,11 @@ def read(path: Path, content_type: str | None = None, **settings: float | str | 
 
 def _read_from_rest(reader: Callable[..., GraspLog], path: Path, given: dict[str, Any]) -> GraspLog:
     """A log of a format that takes a mapping, with displacement from the frame or the file that is at ``rest``."""
-    chosen = given.pop("rest")
+    chosen, mapping = given.pop("rest"), given.get("mapping", mappings.UNMAPPED)
     if not isinstance(chosen, Path):
-        mapping = given.get("mapping", mappings.UNMAPPED).at_rest(rest.check(chosen))
-        return reader(path, **{**given, "mapping": mapping})
-    log, alone = reader(path, **given), reader(chosen, **given)
-    if alone.grid != log.grid:
-        raise InvalidInput("rest", f"a file of {alone.grid} elements", f"{log.grid}, as the log")
-    place, known = rest.unmoved(alone.displacement, alone.observed)
-    observed = log.observed if known.all() else known & (True if log.observed is None else log.observed)
-    moved, metadata = log.displacement - place, {**log.metadata, "rest": chosen.name}
-    return replace(log, displacement=moved, observed=observed, metadata=metadata)
+        return reader(path, **{**given, "mapping": mapping.at_rest(rest.check(chosen))})
+    alone = reader(chosen, **{**given, "mapping": mapping.at_rest(rest.ALL_FRAMES)})
+    return reader(path, **{**given, "mapping": mapping.at_rest(rest.SensorAlone.of(alone, chosen.name))})
 
 
 def episodes_of(folder: Path, mapping: str | None = None) -> list[int]:

@@ -89,38 +89,45 @@ def _log(
 
 
 def _from_rest(members: dict[str, NDArray[Any]], mapping: FieldMapping, metadata: dict[str, str]) -> None:
-    """Displacement from the frame at rest. Where displacement and position are the same fields, these are places.
+    """Displacement from rest. Where displacement and position are the same fields, these are places.
 
-    Of an element that is not observed in that frame no displacement is known in any: it counts as observed in none.
+    Of an element that is not observed at rest no displacement is known in any frame: it counts as observed in none.
     """
     moved = np.asarray(members["displacement"], dtype=np.float64)
     if moved.ndim < 2 or not moved.size:
         raise InvalidInput("displacement", f"of shape {moved.shape}", "frames, elements and components, one at least")
     places = mapping.origins["displacement"].fields == mapping.origins["position"].fields != ()
-    if not places and "position" in members and members["position"].shape == moved.shape[1:]:
-        at = members["position"] + moved
-    else:
-        at = moved
+    if mapping.rest == rest.ALL_FRAMES and not places:
+        return
     observed = members.get("observed")
-    if observed is not None:
-        observed = check_mask("observed", observed, moved.shape[:-1])
-        at = np.where(observed[..., None], at, np.nan)
-    flat = at.reshape(len(moved), -1, moved.shape[-1])
-    frame = rest.frame_of(mapping.rest or rest.FIRST, len(moved), rest.load_of(members), flat)
-    if places:
-        members["position"] = moved[frame] if observed is None else _places(moved, observed, frame)
-    members["displacement"], metadata["rest"] = moved - moved[frame], f"frame {frame}"
-    if observed is not None:
-        members["observed"] = observed & observed[frame]
-
-
-def _places(at: FloatArray, observed: BoolArray, frame: int) -> FloatArray:
-    """Places of a frame [n, m, c], of elements not observed in it those that they have on the median."""
-    usual, ever = rest.unmoved(at, observed)
-    if not ever.all():
-        element = np.argwhere(~ever)[0].tolist()
+    seen = np.ones(moved.shape[:-1], bool) if observed is None else check_mask("observed", observed, moved.shape[:-1])
+    if places and not seen.any(axis=0).all():
+        element = np.argwhere(~seen.any(axis=0))[0].tolist()
         raise InvalidInput("position", f"of element {element} observed in no frame", "a place of each element")
-    return np.where(observed[frame][..., None], at[frame], usual)
+    if isinstance(mapping.rest, rest.SensorAlone):
+        zero, known = mapping.rest.zero(moved.shape[1:], places)
+        metadata["rest"] = mapping.rest.name
+    elif mapping.rest == rest.ALL_FRAMES:
+        zero, known = rest.unmoved(moved, seen)
+    else:
+        frame = _frame_at_rest(members, mapping.rest, moved, None if places else members.get("position"), seen)
+        known = seen[frame]
+        zero = np.where(known[..., None], moved[frame], rest.unmoved(moved, seen)[0] if places else 0.0)
+        metadata["rest"] = f"frame {frame}"
+    if places:
+        members["position"] = zero
+    members["displacement"] = np.where(known[..., None], moved - zero, 0.0)
+    if not known.all():
+        members["observed"] = seen & known
+
+
+def _frame_at_rest(
+    members: Members, chosen: str | None, moved: FloatArray, position: NDArray[Any] | None, seen: BoolArray
+) -> int:
+    """The frame that is at rest, of elements ``moved`` [t, n, m, c] from a ``position`` [n, m, c] if known."""
+    at = moved if position is None or position.shape != moved.shape[1:] else position + moved
+    shown = np.where(seen[..., None], at, np.nan).reshape(len(moved), -1, moved.shape[-1])
+    return rest.frame_of(chosen or rest.FIRST, len(moved), rest.load_of(members), shown)
 
 
 def _require(name: str, members: Members, recording: Recording) -> None:

@@ -70,7 +70,8 @@ class Origin:
 @dataclass(frozen=True, slots=True)
 class FieldMapping:
     """Origin of each member, and what the file may lack: lattice, pitch (m), tolerance (s), episode, and the column
-    that numbers the elements where a table has a row for each, and the frame at ``rest``, whose displacement is 0.
+    that numbers the elements where a table has a row for each, and the frame or file at ``rest``, whose
+    displacement is 0.
 
     ``text`` is the mapping as it was given, empty where none was. ``notes`` are fields kept in the metadata, by
     name. A ``preset`` may have ``alternatives``, of which the first whose fields are there is taken.
@@ -82,14 +83,14 @@ class FieldMapping:
     tolerance: float | None = None
     episode: int | None = None
     element: str | None = None
-    rest: str | None = None
+    rest: str | rests.SensorAlone | None = None
     text: str = ""
     notes: Mapping[str, str] = field(default_factory=dict)
     alternatives: "tuple[FieldMapping, ...]" = ()
     preset: bool = False
 
-    def at_rest(self, rest: str | None) -> "FieldMapping":
-        """This mapping, in each of its alternatives, with another frame at rest, unless that is None."""
+    def at_rest(self, rest: str | rests.SensorAlone | None) -> "FieldMapping":
+        """This mapping, in each of its alternatives, with another frame or file at rest, unless that is None."""
         if rest is None:
             return self
         return replace(self, rest=rest, alternatives=tuple(replace(each, rest=rest) for each in self.alternatives))

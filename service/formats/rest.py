@@ -1,12 +1,18 @@
 """Where markers are at rest: in a frame that is chosen, or in a recording of the sensor alone (docs/formats.md)."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from service.formats.members import Members
 from slipcore.errors import InvalidInput
-from slipcore.frames import BoolArray, FloatArray
+from slipcore.frames import BoolArray, FloatArray, GraspLog
 
 FIRST, LEAST_CONTACT = "first", "least contact"
+ALL_FRAMES = "all frames"
+"""As of a recording of the sensor alone, which nobody says of a log: places count from their median, and displacement
+as it is.
+"""
 ALLOWED = f"{FIRST}, {LEAST_CONTACT}, or the number of a frame from 0 (local commands: or a file)"
 MOST_DIGITS = 9
 NEIGHBOUR = 1.25
@@ -44,16 +50,37 @@ def frame_of(rest: str, frames: int, load: FloatArray | None, place: FloatArray)
     return frame
 
 
-def unmoved(moved: FloatArray, observed: BoolArray | None) -> tuple[FloatArray, BoolArray]:
-    """Median over frames of what elements ``moved`` [t, n, m, c] where they were ``observed`` [t, n, m], and which were
-    observed at all [n, m]; of the others it is 0.
+@dataclass(frozen=True, slots=True, eq=False)
+class SensorAlone:
+    """A recording of the sensor alone: ``position`` and median ``displacement`` [n, m, 3] m of its elements, of which
+    those ``known`` [n, m] were observed, and the ``name`` of its file.
     """
-    if observed is None:
-        return np.asarray(np.median(moved, axis=0)), np.ones(moved.shape[1:3], bool)
-    ever = np.asarray(observed.any(axis=0))
-    shown = np.where(observed[..., None], moved, np.nan)[:, ever]
+
+    position: FloatArray
+    displacement: FloatArray
+    known: BoolArray
+    name: str
+
+    @classmethod
+    def of(cls, log: GraspLog, name: str) -> "SensorAlone":
+        """As a log that was read with ``ALL_FRAMES`` at rest has it."""
+        seen = np.ones(log.displacement.shape[:-1], bool) if log.observed is None else log.observed
+        return cls(log.position, *unmoved(log.displacement, seen), name)
+
+    def zero(self, shape: tuple[int, ...], places: bool) -> tuple[FloatArray, BoolArray]:
+        """What counts as 0 of a log's ``places``, or displacement, of this shape; raises ``InvalidInput``."""
+        if self.position.shape != shape:
+            raise InvalidInput("rest", f"a file of {self.known.shape} elements", f"{shape[:-1]}, as the log")
+        return (self.position if places else self.displacement), self.known
+
+
+def unmoved(moved: FloatArray, seen: BoolArray) -> tuple[FloatArray, BoolArray]:
+    """Median over frames of what elements ``moved`` [t, n, m, c] where they were ``seen`` [t, n, m], and which were
+    seen at all [n, m]; of the others it is 0.
+    """
+    ever = np.asarray(seen.any(axis=0))
     rest: FloatArray = np.zeros(moved.shape[1:])
-    rest[ever] = np.nanmedian(shown, axis=0)
+    rest[ever] = np.nanmedian(np.where(seen[..., None], moved, np.nan)[:, ever], axis=0)
     return rest, ever
 
 

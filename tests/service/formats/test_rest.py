@@ -56,7 +56,7 @@ def test_one_gripper_force_of_all_frames_is_refused_by_name(tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("members", "rest", "said"),
     [
-        ({"contact": [[[True] * 2] * 2] * 5 + [[[False] * 2] * 2]}, "least contact", "told of 6 frames"),
+        ({"contact": [[[True] * 2] * 2] * 5 + [[[False] * 2] * 2]}, "least contact", "least contact, of 6 frames"),
         ({"displacement": np.zeros((3, 2, 2, 0)).tolist()}, "first", "displacement is of shape"),
     ],
     ids=["contact of other frames", "no components"],
@@ -117,3 +117,30 @@ def test_places_of_what_is_not_observed_at_rest_are_its_usual_ones(tmp_path: Pat
     never = np.where(np.arange(4).reshape(2, 2) == 3, False, OBSERVED)
     with pytest.raises(InvalidInput, match=r"position is of element \[1, 1\] observed in no frame"):
         formats.read(log_of(tmp_path, displacement=places.tolist(), observed=never.tolist()), mapping=mapping)
+
+
+@pytest.mark.parametrize("own", [False, True], ids=["given", "the log's own"])
+def test_a_file_at_rest_goes_before_a_frame_of_the_mapping(tmp_path: Path, own: bool) -> None:
+    """The mapping's frame had been taken, and the file had been named as what was."""
+    (tmp_path / "alone").mkdir()
+    mapping = {"displacement": "displacement", "rest": "first"}
+    within = {"mapping": mapping} if own else {}
+    alone = log_of(tmp_path / "alone", displacement=np.full(MOVED.shape, 3e-4).tolist(), **within)
+    log = formats.read(log_of(tmp_path, **within), rest=alone, mapping=None if own else json.dumps(mapping))
+    np.testing.assert_allclose(log.displacement, MOVED - 3e-4, rtol=0, atol=1e-18)
+    assert log.metadata["rest"] == "log.json"
+
+
+def test_places_count_from_those_of_a_file_at_rest(tmp_path: Path) -> None:
+    """They had been refused as displacements of centimetres, or the log's own first places had been taken."""
+    (tmp_path / "alone").mkdir()
+    mapping = json.dumps({"position": "displacement", "displacement": "displacement"})
+    places = PLACES + np.array([0.05, 0.0, 0.0])
+    alone = log_of(tmp_path / "alone", displacement=np.stack([places] * 3).tolist())
+    log = formats.read(log_of(tmp_path, displacement=(places + MOVED).tolist()), rest=alone, mapping=mapping)
+    np.testing.assert_array_equal(log.position, places)
+    np.testing.assert_allclose(log.displacement, MOVED, rtol=0, atol=1e-16)
+    (tmp_path / "other").mkdir()
+    small = {"displacement": np.stack([PLACES[:1]] * 2).tolist(), "time": [0.0, 1.0]}
+    with pytest.raises(InvalidInput, match=r"rest is a file of \(1, 2\) elements; allowed: \(2, 2\), as the log"):
+        formats.read(tmp_path / "log.json", rest=log_of(tmp_path / "other", **small), mapping=mapping)
