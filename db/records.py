@@ -57,11 +57,16 @@ class Scale:
 
 @dataclass(frozen=True, slots=True)
 class Scales:
-    """How friction scatters: between grasps, as a part of friction itself; between places and within, as friction."""
+    """How friction scatters: between grasps, as a part of friction itself; between places and within, as friction.
+
+    ``between_sensors``: where grasps are of several, how much these differ and what each shows, as
+    ``stiction_client.SensorScale.to_json`` has it.
+    """
 
     between_grasps: Scale
     between_places: Scale
     within: Scale
+    between_sensors: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -291,13 +296,14 @@ class SampleSummary:
 class SamplesOfLog:
     """Where the samples of one log are: in the blob of hash ``samples_blob``, and their ``moments`` where known.
 
-    ``findings``: names of what was found against the log.
+    ``findings``: names of what was found against the log; ``sensor``: its name.
     """
 
     grasp_log_id: str
     samples_blob: str
     moments: bytes | None
     findings: tuple[str, ...] = ()
+    sensor: str = ""
 
 
 @dataclass(frozen=True, slots=True)

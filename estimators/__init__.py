@@ -10,7 +10,7 @@ from estimators.warm_up import warm_up
 if TYPE_CHECKING:
     from estimators.change_alarm import ChangeAlarm
     from estimators.fitting import fit, needs_samples
-    from estimators.friction_model import Cost, Domain, FrictionModel, Scale, Scales
+    from estimators.friction_model import Cost, Domain, FrictionModel, Scale, Scales, SensorFriction, SensorScale
     from estimators.grasp_design import NextGrasp, Probing, WorkingPoint, next_grasp
     from estimators.moments import Moments
     from estimators.not_converged import NotConverged
@@ -28,6 +28,8 @@ _LAZY = {
     "FrictionModel": "estimators.friction_model",
     "Scale": "estimators.friction_model",
     "Scales": "estimators.friction_model",
+    "SensorFriction": "estimators.friction_model",
+    "SensorScale": "estimators.friction_model",
     "GraspEffect": "estimators.single_grasps",
     "grasp_effects": "estimators.single_grasps",
     "Moments": "estimators.moments",
@@ -61,6 +63,8 @@ __all__ = [
     "Scale",
     "Scales",
     "ScatterPrior",
+    "SensorFriction",
+    "SensorScale",
     "TooFewSamples",
     "WorkingPoint",
     "fit",

@@ -127,9 +127,12 @@ def watched(
     rate: float = ALARM.rate,
     scatter_prior: ScatterPrior = WEAK,
 ) -> ChangeAlarm:
-    """The alarm after these grasps, oldest first; ``scatter_prior``: that by which the model was fitted."""
+    """The alarm after these grasps, oldest first; ``scatter_prior``: that by which the model was fitted.
+
+    Each is compared with what its sensor shows, so that another sensor's gain passes for no change.
+    """
     alarm = ChangeAlarm.init(rate, scatter_prior=scatter_prior)
-    told = [grasp_level(model, grasp) for grasp in grasps[-ALARM.longest :]]
+    told = [grasp_level(model.of_sensor(grasp.sensor), grasp) for grasp in grasps[-ALARM.longest :]]
     return replace(alarm, levels=tuple(level for level, _ in told), variances=tuple(error for _, error in told))
 
 

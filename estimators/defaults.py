@@ -73,6 +73,10 @@ class Prior(Options):
     """Scale of the half-Student-t prior of the scatter between grasps, as a part of the friction itself."""
     grasp_degrees_of_freedom: Annotated[float, Option(1.0, 100.0, "-", "one in ten lies above 13 %")] = 7.0
     """Of that prior. Three leave a single grasp without any model at a slip probability of 1e-3."""
+    sensor_scatter: Annotated[float, Option(1e-4, 10.0, "-", "two forces, each calibrated to 5 %: their ratio")] = 0.07
+    """Scale of the half-Student-t prior of how much sensors differ in f_t/f_n, as a part of it."""
+    sensor_degrees_of_freedom: Annotated[float, Option(1.0, 100.0, "-", "weak: two hardly tell their scale")] = 4.0
+    """Of that prior."""
     least_span: Annotated[float, Option(1e-9, 1.0, "-", "where all are equal, any prior of a slope is one")] = 1e-3
     """Least part of the largest value of v or f_n that counts as the range seen."""
     velocity_effect: Annotated[float, Option(1e-4, 10.0, "-", "a usual margin, as of what is identifiable")] = 0.1
@@ -255,8 +259,14 @@ class GridSettings(Options):
     """Between grasps."""
     least_omega: Annotated[float, Option(1e-9, 0.1, "-", "what does not matter")] = 1e-5
     """Between places."""
+    least_gain: Annotated[float, Option(1e-9, 0.1, "-", "a tenth of a per cent matters to no grip")] = 1e-3
+    """Between sensors."""
     most_scatter: Annotated[float, Option(0.1, 100.0, "-", "absurd")] = 3.0
-    """Of either."""
+    """Of any."""
+    gain_nodes: Annotated[int, Option(4, 100, "nodes", "to 1 % of the error of β₀; nine: to 8 %")] = 12
+    """Of the scale between sensors, where there are several."""
+    beside_gains: Annotated[int, Option(4, 200, "nodes", "trials")] = 14
+    """Of each other scale then, in place of ``fine``."""
     coarse: Annotated[int, Option(4, 100, "nodes", "trials")] = 12
     """A scale, of the first two grids."""
     fine: Annotated[int, Option(4, 200, "nodes", "trials")] = 20

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from estimators.defaults import IDENTIFIABILITY
 from estimators.errors import InvalidSamples
 from slipcore.references import ESTIMATION, LIKELIHOODS, cited
-from stiction_client.linear_friction import LinearFriction, Scale, Scales
+from stiction_client.linear_friction import LinearFriction, Scale, Scales, SensorFriction, SensorScale
 from stiction_client.model import Cost
 from stiction_client.support import Domain
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-__all__ = ["Cost", "Domain", "FrictionModel", "Scale", "Scales"]
+__all__ = ["Cost", "Domain", "FrictionModel", "Scale", "Scales", "SensorFriction", "SensorScale"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

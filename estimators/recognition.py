@@ -163,7 +163,10 @@ def _shared(data: FitData, places: FloatArray, model: FrictionModel) -> FloatArr
         return covariance[None]
     covariance += model.scales.between_places.value**2 * places
     between = model.scales.between_grasps
-    law = between.value**2 * np.outer(model.coefficients, model.coefficients)
+    square = np.outer(model.coefficients, model.coefficients)
+    if model.scales.between_sensors is not None:
+        covariance += model.scales.between_sensors.scale.value**2 * square
+    law = between.value**2 * square
     if not math.isfinite(between.degrees_of_freedom):
         return (covariance + law)[None]
     ratio = between.degrees_of_freedom / special.chdtri(between.degrees_of_freedom, _NODES)

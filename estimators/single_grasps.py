@@ -34,8 +34,9 @@ def grasp_effects(model: FrictionModel, moments: Sequence[SufficientStatistics])
 
     Given the model's scales, u, the places' p and ε are normal, and so is u given β and the samples (Searle et al.,
     1992, ch. 7): its mean shrinks towards 0 where they say little. The interval holds the uncertainty of β, too, and
-    not that of the scales. Raises ``InvalidSamples`` for a model without ``scales``, and for moments that are not those
-    of one grasp, place by place.
+    not that of the scales. A grasp is compared with what its sensor shows, where the model knows that.
+    Raises ``InvalidSamples`` for a model without ``scales``, and for moments that are not those of one grasp, place by
+    place.
     """
     if model.scales is None:
         raise InvalidSamples("model", f"by {model.method}, without scales", "one that separates scatter between grasps")
@@ -43,7 +44,7 @@ def grasp_effects(model: FrictionModel, moments: Sequence[SufficientStatistics])
         return []
     grasps = [_only_grasp(part.at_element_area(model.element_area)) for part in moments]
     unit = sum(each.total_weight for each in grasps) / sum(each.weight_square for each in grasps)
-    return [_effect(model, grasp, unit) for grasp in grasps]
+    return [_effect(model.of_sensor(grasp.sensor), grasp, unit) for grasp in grasps]
 
 
 def _only_grasp(moments: SufficientStatistics) -> GraspStatistics:

@@ -95,6 +95,7 @@ def _contact_samples(log: GraspLog, patches: Sequence[Patch], elements: Friction
         normal_force_noise=elements.normal_force_noise,
         velocity_noise=elements.velocity_noise,
         kind=np.full(len(on), "contact", KIND),
+        sensor=log.sensor,
     )
 
 

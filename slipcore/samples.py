@@ -28,6 +28,9 @@ UNITS = {"tangential_velocity": "m/s", "normal_force": "N", "tangential_force": 
 NUMBERS = ("element_area", "normal_force_noise", "velocity_noise")
 """What is one number for all samples."""
 
+SENSOR = "sensor"
+"""What is one name for all samples."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrictionSamples:
@@ -41,7 +44,8 @@ class FrictionSamples:
     ``tangential_velocity``. ``kind``: "element", or "contact" where the whole of a patch slid or
     pivoted: its ``normal_force`` is then the mean of its elements, weighted by force, and its ``element`` lies beyond
     the lattice. ``velocity_is_relative``: whether the velocity is that relative to what seems to stick, for want of the
-    object's motion; once all of the contact slides evenly that is far too small.
+    object's motion; once all of the contact slides evenly that is far too small. ``sensor``: the name of the sensor
+    that recorded them, or "" where that is not known.
     """
 
     friction_coefficient: FloatArray
@@ -56,6 +60,7 @@ class FrictionSamples:
     velocity_noise: float = 0.0
     kind: NDArray[np.str_] = field(default_factory=lambda: np.empty(0, KIND))
     velocity_is_relative: BoolArray = field(default_factory=lambda: np.empty(0, bool))
+    sensor: str = ""
 
     def __post_init__(self) -> None:
         count = len(self.friction_coefficient)
@@ -71,7 +76,7 @@ class FrictionSamples:
     @classmethod
     def arrays(cls) -> tuple[str, ...]:
         """Names of the arrays [k]."""
-        return tuple(entry.name for entry in fields(cls) if entry.name not in NUMBERS)
+        return tuple(entry.name for entry in fields(cls) if entry.name not in (*NUMBERS, SENSOR))
 
     def __len__(self) -> int:
         return len(self.friction_coefficient)
@@ -124,11 +129,13 @@ class FrictionSamples:
         alike = [part.at_element_area(area) for part in parts]
         joined = {name: np.concatenate([getattr(part, name) for part in alike]) for name in cls.arrays()}
         count = [len(part) for part in alike]
+        sensors = {part.sensor for part in alike}
         return cls(
             **joined,
             element_area=area,
             normal_force_noise=_root_mean_square([part.normal_force_noise for part in alike], count),
             velocity_noise=_root_mean_square([part.velocity_noise for part in alike], count),
+            sensor=sensors.pop() if len(sensors) == 1 else "",
         )
 
 
@@ -183,6 +190,7 @@ def element_samples(log: GraspLog, history: SlipHistory, **options: float) -> Fr
         normal_force_noise=noise.normal / math.sqrt(2.0),  # the mean of two frames
         velocity_noise=_root_mean_square(velocity_noise, np.ones(len(frame))),
         velocity_is_relative=np.full(len(friction), log.object_pose is None),
+        sensor=log.sensor,
     )
 
 

@@ -50,7 +50,10 @@ ABSENT: dict[str, dict[str, str]] = {
         ),
         "estimators.defaults.RECOGNITION": "least_scatter level scatter_freedom scatter_nodes slope unknown",
         "estimators.defaults.POPULATION": "quantiles",
-        "estimators.defaults.PRIOR": "unknown_velocity velocity_effect velocity_tilt",
+        "estimators.defaults.GRID": "beside_gains gain_nodes least_gain",
+        "estimators.defaults.PRIOR": (
+            "sensor_degrees_of_freedom sensor_scatter unknown_velocity velocity_effect velocity_tilt"
+        ),
         "estimators.defaults.SAMPLING": "nearer nearer_starts",
         "filter": (
             "force_kernel hold_deviations lasting_least lasting_ratio lasting_share marker_kernel "

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
         sdf_surface,
         urdf_gazebo,
     )
-    from stiction_client.linear_friction import Scale, Scales
+    from stiction_client.linear_friction import Scale, Scales, SensorFriction, SensorScale
     from stiction_client.model import Cost, FrictionModel
     from stiction_client.planner import RequiredForce, RequiredForces, required_normal_force
     from stiction_client.records import (
@@ -106,6 +106,8 @@ _LAZY = {
     "FrictionModel": "stiction_client.model",
     "Scale": "stiction_client.linear_friction",
     "Scales": "stiction_client.linear_friction",
+    "SensorFriction": "stiction_client.linear_friction",
+    "SensorScale": "stiction_client.linear_friction",
     "RequiredForce": "stiction_client.planner",
     "RequiredForces": "stiction_client.planner",
     "required_normal_force": "stiction_client.planner",
@@ -166,6 +168,8 @@ __all__ = [
     "RequiredForces",
     "Scale",
     "Scales",
+    "SensorFriction",
+    "SensorScale",
     "SlipSamples",
     "StaleModel",
     "StictionError",

@@ -2,15 +2,15 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, ClassVar, cast
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from stiction_client.elementwise import FloatArray, Number
 from stiction_client.errors import InvalidArgument
-from stiction_client.support import Domain, Kind, Support, extrapolation, support, widening
+from stiction_client.support import Domain, Kind, Support, extrapolation, notes, support, widening
 
 if TYPE_CHECKING:
     from stiction_client.labelled import DataFrame, Dataset, Row
@@ -43,23 +43,83 @@ class Scale:
 
 
 @dataclass(frozen=True, slots=True)
+class SensorFriction:
+    """Friction as one known sensor shows it: by which part its ratio of forces exceeds the sensors' average, ``gain``
+    with its ``standard_error``; the other fields are those of a model of this sensor alone, new grasps of it.
+    """
+
+    gain: float
+    standard_error: float
+    coefficients: tuple[float, ...]
+    covariance: tuple[tuple[float, ...], ...]
+    degrees_of_freedom: float
+    scale: float
+    scatter_degrees_of_freedom: float
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "SensorFriction":
+        """The sensor in the service's answer."""
+        return cls(
+            float(record["gain"]),
+            float(record["standard_error"]),
+            tuple(float(each) for each in record["coefficients"]),
+            tuple(tuple(float(each) for each in row) for row in record["covariance"]),
+            degrees_from_json(record["degrees_of_freedom"]),
+            float(record["scale"]),
+            degrees_from_json(record["scatter_degrees_of_freedom"]),
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """What ``from_json`` reads."""
+        told = {each.name: getattr(self, each.name) for each in fields(self)}
+        degrees = ("degrees_of_freedom", "scatter_degrees_of_freedom")
+        lists = {"coefficients": list(self.coefficients), "covariance": [list(row) for row in self.covariance]}
+        return told | lists | {name: degrees_to_json(told[name]) for name in degrees}
+
+
+@dataclass(frozen=True, slots=True)
+class SensorScale:
+    """How much sensors differ in the friction that they show, as a part of it, and what each known one of the
+    ``sensors`` shows, by name.
+    """
+
+    scale: Scale
+    sensors: Mapping[str, SensorFriction]
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "SensorScale":
+        """The scale and the sensors in the service's answer."""
+        sensors = {name: SensorFriction.from_json(each) for name, each in record["sensors"].items()}
+        return cls(Scale.from_json(record), sensors)
+
+    def to_json(self) -> dict[str, Any]:
+        """What ``from_json`` reads."""
+        return {**self.scale.to_json(), "sensors": {name: each.to_json() for name, each in self.sensors.items()}}
+
+
+@dataclass(frozen=True, slots=True)
 class Scales:
     """How friction scatters: ``between_grasps`` τ, as a part of friction itself; ``between_places`` ω of a grasp and
-    ``within`` a place σ, as friction [-].
+    ``within`` a place σ, as friction [-]; ``between_sensors``, as a part of friction, where grasps are of several.
     """
 
     between_grasps: Scale
     between_places: Scale
     within: Scale
+    between_sensors: SensorScale | None = None
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "Scales":
         """The scales in the service's answer."""
-        return cls(*(Scale.from_json(record[each.name]) for each in fields(cls)))
+        sensors = record.get("between_sensors")
+        each = (Scale.from_json(record[name]) for name in ("between_grasps", "between_places", "within"))
+        grasps, places, within = each
+        return cls(grasps, places, within, None if sensors is None else SensorScale.from_json(sensors))
 
-    def to_json(self) -> dict[str, dict[str, float | None]]:
-        """What ``from_json`` reads."""
-        return {each.name: getattr(self, each.name).to_json() for each in fields(self)}
+    def to_json(self) -> dict[str, Any]:
+        """What ``from_json`` reads; without ``between_sensors`` where grasps are of one."""
+        told = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {name: scale.to_json() for name, scale in told.items() if scale is not None}
 
 
 class LinearFriction:
@@ -120,7 +180,8 @@ class LinearFriction:
         """Friction coefficient expected at v (m/s) and f_n (N an element), or a quantile of what a new grasp shows.
 
         ``of``: one "element", or a "contact", whose friction is the mean over its ``elements``: scatter between grasps
-        stays, that between places and within them averages out. A model without ``scales`` takes all of its scatter
+        stays, and that between sensors where grasps are of several (``of_sensor``: of one that is known); that between
+        places and within them averages out. A model without ``scales`` takes all of its scatter
         as shared.
 
         The quantile includes the scatter and the uncertainty of the coefficients, whose distances from the mean add
@@ -156,7 +217,31 @@ class LinearFriction:
             return 0.0, cast(Number, special.stdtrit(self.scatter_degrees_of_freedom, quantile) * self.scale)
         place, within = self.scales.between_places.quantile(quantile), self.scales.within.quantile(quantile)
         own = ((place * place + within * within) / elements) ** 0.5
-        return self.scales.between_grasps.quantile(quantile), own
+        shared, sensors = self.scales.between_grasps.quantile(quantile), self.scales.between_sensors
+        if sensors is not None:
+            gain = sensors.scale.quantile(quantile)
+            shared = cast(Number, (shared * shared + gain * gain) ** 0.5)
+        return shared, own
+
+    def of_sensor(self, name: str) -> Self:
+        """The model of friction as the sensor of this name shows it, its own gain in the coefficients.
+
+        Of a sensor of which the model has no grasp, and where all grasps are of one, the model itself: its quantiles
+        allow for the gain of any sensor.
+        """
+        known = None if self.scales is None else self.scales.between_sensors
+        if self.scales is None or known is None or name not in known.sensors:
+            return self
+        sensor = known.sensors[name]
+        return replace(  # type: ignore[type-var]  # every model is a record
+            self,
+            coefficients=np.array(sensor.coefficients),
+            covariance=np.array(sensor.covariance),
+            degrees_of_freedom=sensor.degrees_of_freedom,
+            scale=sensor.scale,
+            scatter_degrees_of_freedom=sensor.scatter_degrees_of_freedom,
+            scales=replace(self.scales, between_sensors=None),
+        )
 
     def extrapolation(self, tangential_velocity: float, normal_force: float) -> str | None:
         """Which of v (m/s) and f_n (N an element) lies outside the data behind the model; None where neither does.
@@ -186,6 +271,11 @@ class LinearFriction:
     def advice(self) -> str:
         """What to do about it."""
         return self.support_at(0.0, 0.5 * sum(self.domain.normal_force)).advice
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What else is to be known of the model, in sentences: such as whether its sensors differ."""
+        return notes(self.diagnostics)
 
     def to_dataframe(self) -> "DataFrame":
         """A row for each coefficient and σ: unit, estimate, standard error, 95 % interval, if the data show it.

@@ -48,7 +48,8 @@ class RequiredForce:
     ``friction_coefficient``: the conservative quantile there; ``within_domain``: whether velocity and element force lie
     where the model was observed; ``warning``: which of them does not, or what else speaks against the answer, or None;
     ``of``: whether the quantile is that of one "element" or of the mean over the contact's ``elements``; ``support``
-    and ``advice``: what the answer rests on, and what to do about it (``support.Support``).
+    and ``advice``: what the answer rests on, and what to do about it (``support.Support``); ``notes``: what else is to
+    be known of the model.
     """
 
     normal_force: float
@@ -64,6 +65,7 @@ class RequiredForce:
     elements: float = 1.0
     support: Kind = "supported"
     advice: str = ""
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -286,6 +288,7 @@ def _one(question: _Question, tangential_load: Number) -> RequiredForce:
         elements=float(question.elements),
         support=support.kind,
         advice=support.advice,
+        notes=question.model.notes,
     )
 
 

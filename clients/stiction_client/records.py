@@ -198,7 +198,7 @@ class FrictionAnswer:
     ``friction_coefficient`` is the mean, or the quantile asked for ``of`` one "element", or of the mean over the
     ``elements`` of a "contact"; ``warning`` says what was extrapolated; ``chosen_because``, why this model answers,
     where no method was named; ``support`` and ``advice``, what the answer rests on and what to do about it (None where
-    an older service answers).
+    an older service answers); ``notes``, what else is to be known of the model.
     """
 
     material: str
@@ -216,11 +216,12 @@ class FrictionAnswer:
     chosen_because: str | None = None
     support: str | None = None
     advice: str | None = None
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "FrictionAnswer":
         """The lookup in the service's answer."""
-        return cls(**_values(cls, record))
+        return cls(**_values(cls, record) | {"notes": tuple(record.get("notes", ()))})
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,10 @@ from stiction_client.elementwise import FloatArray, Number, greatest, least, log
 Kind = Literal["supported", "extrapolated", "not identified", "stale", "implausible"]
 
 OUTDATED = "the material's logs are others since, and it was not fitted again by this method: ask for a fit"
+SENSOR_GAIN = "sensor_gain"
+"""Diagnostic, a sentence: whether the data determine a sensor's own gain, of a model of several sensors."""
+NOTES = (SENSOR_GAIN,)
+"""Diagnostics that whoever reads an answer is to know beside it."""
 SUPERSEDED = "a newer version took its place: fetch the current model"
 
 
@@ -93,6 +97,11 @@ def support(model: Model, tangential_velocity: float, normal_force: float, stale
     if outside is not None:
         return Support("extrapolated", f"{outside}: record a grasp there")
     return Support("supported", f"the samples determine the expected friction to within ± {part:.1%}")
+
+
+def notes(diagnostics: Mapping[str, Any]) -> tuple[str, ...]:
+    """Sentences on a model that its answers carry, whatever they rest on."""
+    return tuple(str(diagnostics[name]) for name in NOTES if diagnostics.get(name))
 
 
 def kinds(

@@ -7,7 +7,7 @@ from sqlalchemy import ColumnElement, Row, Select, delete, select, update
 from sqlalchemy.orm import Session
 
 from db.records import ContactFriction, Detection, Finding, SampledLog, SamplesOfLog, SampleSummary
-from db.tables import DetectionRow, GraspLogRow, SampleSummaryRow
+from db.tables import DetectionRow, GraspLogRow, SampleSummaryRow, SensorRow
 
 
 def add(session: Session, log_id: str, detection: Detection, samples: SampleSummary) -> None:
@@ -60,7 +60,7 @@ def newest_sampled_logs(session: Session, material_id: int, most: int) -> list[S
     return list(found.values())
 
 
-def _samples(material_id: int) -> Select[tuple[str, str, str, bytes | None, list[Any] | None]]:
+def _samples(material_id: int) -> Select[tuple[str, str, str, bytes | None, list[Any] | None, str]]:
     return (
         select(
             GraspLogRow.sha256,
@@ -68,8 +68,10 @@ def _samples(material_id: int) -> Select[tuple[str, str, str, bytes | None, list
             SampleSummaryRow.samples_blob,
             SampleSummaryRow.moments,
             DetectionRow.findings,
+            SensorRow.name.label("sensor"),
         )
         .join(SampleSummaryRow)
+        .join(SensorRow, SensorRow.id == GraspLogRow.sensor_id)
         .outerjoin(DetectionRow, DetectionRow.grasp_log_id == GraspLogRow.id)
         .where(*_that_count(material_id))
     )
@@ -77,7 +79,7 @@ def _samples(material_id: int) -> Select[tuple[str, str, str, bytes | None, list
 
 def _samples_of_log(row: Row[Any]) -> SamplesOfLog:
     findings = tuple(finding["name"] for finding in row.findings or ())
-    return SamplesOfLog(row.id, row.samples_blob, row.moments, findings)
+    return SamplesOfLog(row.id, row.samples_blob, row.moments, findings, row.sensor)
 
 
 def set_moments(session: Session, log_id: str, moments: bytes) -> None:

@@ -13,6 +13,7 @@ from db.tables import FrictionModelRow, GraspLogRow, MaterialNameRow, MaterialRo
 
 NEWEST_FIRST = Window("id", descending=True)
 
+BETWEEN_SENSORS = "between_sensors"
 _OTHERWISE = {"tangential_velocity", "normal_force", "scales"}
 _PLAIN = tuple(entry.name for entry in fields(NewModel) if entry.name not in _OTHERWISE)
 
@@ -154,7 +155,7 @@ def _row(material_id: int, job_id: str, version: int, model: NewModel) -> Fricti
         tangential_velocity_max=model.tangential_velocity[1],
         normal_force_min=model.normal_force[0],
         normal_force_max=model.normal_force[1],
-        scales=None if model.scales is None else asdict(model.scales),
+        scales=None if model.scales is None else _kept(model.scales),
         **{name: getattr(model, name) for name in _PLAIN},
     )
 
@@ -180,5 +181,12 @@ def _record(row: FrictionModelRow, material: str) -> StoredModel:
     return StoredModel(row.id, material, row.version, row.current, row.outdated, row.created_at, model)
 
 
+def _kept(scales: Scales) -> dict[str, Any]:
+    """Scales as they are stored: without that between sensors where there is one, as older versions have it."""
+    return {name: scale for name, scale in asdict(scales).items() if scale is not None}
+
+
 def _scales(kept: Mapping[str, Any]) -> Scales:
-    return Scales(**{name: Scale(**scale) for name, scale in kept.items()})
+    sensors = kept.get(BETWEEN_SENSORS)
+    each = {name: Scale(**scale) for name, scale in kept.items() if name != BETWEEN_SENSORS}
+    return Scales(**each, between_sensors=sensors)

@@ -1,6 +1,6 @@
 """Scatter between grasps, between places and within: emcee walks on the three scales, all else is integrated out."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from estimators.defaults import GRID, SAMPLING
 from estimators.likelihoods.posterior import PosteriorSummary
 from estimators.linear.fit_data import FitData
-from estimators.linear.hierarchical import Products
+from estimators.linear.hierarchical import Products, Whole
 from estimators.linear.mixture_summary import summarise
 from estimators.linear.posterior_grid import PosteriorGrid, ScaleNodes, posterior_grid
 from estimators.linear.priors import WEAK, ScatterPrior, structured
+from estimators.linear.sensor_gains import gains
 from estimators.sampling.normal_score import NormalScore, normal_score
 from estimators.sampling.proposal import StudentMixture, standard
 
@@ -20,57 +21,53 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HierarchicalPosterior:
-    """Posterior of (log σ, log τ, log ω), whose cost a point does not grow with the grasps behind it.
+    """Posterior of (log σ, log τ, log ω) and, of several sensors, log κ; a point costs as much however many grasps.
 
-    The sums over grasps are tabulated by ``grid`` and interpolated between its nodes. Whitened: log λ = 2 log τ/σ and
-    log ρ = 2 log ω/σ are ``scores`` of standard normals that follow their own marginals; log σ is standardised given
-    them. ``at`` (1, v, f_n) [3] is where friction is summarised.
+    The sums over grasps are tabulated by ``grid`` and interpolated between its nodes. Whitened: log λ = 2 log τ/σ,
+    log ρ = 2 log ω/σ and log ν = 2 log κ/σ are ``scores`` of standard normals that follow their own marginals; log σ is
+    standardised given them. ``at`` (1, v, f_n) [3] is where friction is summarised.
     """
 
     grid: PosteriorGrid
-    scores: tuple[NormalScore, NormalScore]
+    scores: tuple[NormalScore, ...]
     at: FloatArray
     prior: str
-    sampled: tuple[str, ...] = ("log_sigma", "log_tau", "log_omega")
-    names: tuple[str, ...] = ("beta0", "beta1", "beta2", "sigma", "tau", "omega")
-    proposal: StudentMixture = field(default_factory=lambda: standard(3))
+    sampled: tuple[str, ...]
+    names: tuple[str, ...]
+    proposal: StudentMixture
     local: float = 0.0
 
     def log_probability(self, whitened: FloatArray) -> FloatArray:
         """Log posterior density [k] in whitened coordinates; -inf outside the grid, where there is next to none."""
-        (log_lambda, slope), (log_rho, other) = (
-            score(column) for score, column in zip(self.scores, whitened[:, 1:].T, strict=True)
-        )
-        products = self.products(log_lambda, log_rho)
-        centre, spread = self.grid.model.log_sigma(products)
-        log_sigma = centre + spread * whitened[:, 0]
-        log = self.grid.model.conditional(products, log_lambda, log_rho, log_sigma).log_density + slope + other
-        return np.where(self._inside(log_lambda, log_rho), log, -np.inf)
+        ratios, slopes = self._ratios(whitened)
+        whole, scales = self._at(whitened, ratios)
+        log = self.grid.model.conditional(whole, scales).log_density
+        for slope in slopes:
+            log = log + slope
+        return np.where(self._inside(ratios), log, -np.inf)
 
     def products(self, log_lambda: FloatArray, log_rho: FloatArray) -> Products:
         """The sums over grasps at points [k]: polynomials between the grid's nodes, those at its edge beyond."""
-        first, left = _taps(self.grid.log_lambda, log_lambda)
-        second, right = _taps(self.grid.log_rho, log_rho)
-        columns = len(self.grid.log_rho)
+        first, left = _taps(self.grid.axes[0], log_lambda)
+        second, right = _taps(self.grid.axes[1], log_rho)
+        columns = len(self.grid.axes[1])
         node = (first[:, :, None] * columns + second[:, None, :]).reshape(len(first), -1)
         weight = (left[:, :, None] * right[:, None, :]).reshape(len(first), -1)
         square, log_determinant, unknown = self.grid.products
         return Products(
-            np.einsum("kt,kti->ki", weight, square[node]),
+            np.einsum("kt,kt...->k...", weight, square[node]),
             np.einsum("kt,kt->k", weight, log_determinant[node]),
-            np.einsum("kt,kti->ki", weight, unknown[node]),
+            np.einsum("kt,kt...->k...", weight, unknown[node]),
         )
 
     def nodes(self, whitened: FloatArray) -> ScaleNodes:
-        """Draws [k, 3] as nodes of equal weight, with what is known of β given each."""
-        log_lambda, log_rho = (score(column)[0] for score, column in zip(self.scores, whitened[:, 1:].T, strict=True))
-        products = self.products(log_lambda, log_rho)
-        centre, spread = self.grid.model.log_sigma(products)
-        log_sigma = centre + spread * whitened[:, 0]
-        given = self.grid.model.conditional(products, log_lambda, log_rho, log_sigma)
-        sigma = np.exp(log_sigma)
-        scatter = np.stack([sigma, sigma * np.exp(0.5 * log_lambda), sigma * np.exp(0.5 * log_rho)], axis=1)
-        return ScaleNodes(np.full(len(sigma), 1.0 / len(sigma)), scatter, given.mean, given.covariance)
+        """Draws [k, 3 or 4] as nodes of equal weight, with what is known of β and of the gains given each."""
+        whole, scales = self._at(whitened, self._ratios(whitened)[0])
+        model = self.grid.model
+        given, sigma = model.conditional(whole, scales), np.exp(scales[0])
+        scatter = np.stack([sigma, *(sigma * np.exp(0.5 * ratio) for ratio in scales[1:])], axis=1)
+        found = gains(model, whole, given, sigma) if len(scales) > 3 else None
+        return ScaleNodes(np.full(len(sigma), 1.0 / len(sigma)), scatter, given.mean, given.covariance, found)
 
     def summarise(self, whitened: FloatArray, rng: np.random.Generator, /) -> PosteriorSummary:
         """β given each (σ, τ, ω) is exactly normal: its mean and covariance need no draws of it."""
@@ -88,23 +85,42 @@ class HierarchicalPosterior:
             scales=found.scales,
         )
 
-    def _inside(self, log_lambda: FloatArray, log_rho: FloatArray) -> NDArray[np.bool_]:
-        lambdas, rhos = self.grid.log_lambda, self.grid.log_rho
-        return np.asarray(
-            (log_lambda >= lambdas[0]) & (log_lambda <= lambdas[-1]) & (log_rho >= rhos[0]) & (log_rho <= rhos[-1])
-        )
+    def _ratios(self, whitened: FloatArray) -> tuple[FloatArray, list[FloatArray]]:
+        """log λ, log ρ and log ν [2 or 3, k], and the logarithms of their slopes over the whitened coordinates."""
+        scored = [score(column) for score, column in zip(self.scores, whitened[:, 1:].T, strict=True)]
+        return np.stack([value for value, _ in scored]), [slope for _, slope in scored]
+
+    def _at(self, whitened: FloatArray, ratios: FloatArray) -> tuple[Whole, FloatArray]:
+        """The sums at points [k], and log σ with the ratios, [3 or 4, k]."""
+        model = self.grid.model
+        whole = model.whole(self.products(ratios[0], ratios[1]), *ratios[2:])
+        centre, spread = model.log_sigma(whole)
+        return whole, np.stack([centre + spread * whitened[:, 0], *ratios])
+
+    def _inside(self, ratios: FloatArray) -> NDArray[np.bool_]:
+        within = [(ratio >= axis[0]) & (ratio <= axis[-1]) for ratio, axis in zip(ratios, self.grid.axes, strict=True)]
+        return np.asarray(np.all(within, axis=0))
 
 
 def hierarchical(data: FitData, scatter_prior: ScatterPrior = WEAK) -> HierarchicalPosterior:
     """Posterior from each grasp's statistics by place."""
     grid = posterior_grid(data, scatter_prior)
-    peak = grid.log_marginal.max()
-    density = np.exp(grid.log_marginal - peak)
-    scores = (
-        _score(grid.log_lambda, np.log(density.sum(axis=1))),
-        _score(grid.log_rho, np.log(density.sum(axis=0))),
+    density = np.exp(grid.log_marginal - grid.log_marginal.max())
+    scores, axes = [], range(len(grid.axes))
+    for axis in axes:
+        others = tuple(other for other in axes if other != axis)
+        with np.errstate(divide="ignore"):  # next to no density is none where gains were left out
+            scores.append(_score(grid.axes[axis], np.log(density.sum(axis=others))))
+    scales = ("sigma", "tau", "omega", "kappa")[: 1 + len(axes)]
+    return HierarchicalPosterior(
+        grid=grid,
+        scores=tuple(scores),
+        at=data.mean_row(),
+        prior=structured(scatter_prior, len(grid.model.sensors)),
+        sampled=tuple(f"log_{name}" for name in scales),
+        names=("beta0", "beta1", "beta2", *scales),
+        proposal=standard(len(scales)),
     )
-    return HierarchicalPosterior(grid=grid, scores=scores, at=data.mean_row(), prior=structured(scatter_prior))
 
 
 def _score(nodes: FloatArray, log_density: FloatArray) -> NormalScore:

@@ -1,7 +1,7 @@
 """What the data say, in the form that every method reads: a factor, its clusters and, where kept, the samples."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias, cast
 
 import numpy as np
@@ -12,7 +12,7 @@ from estimators.errors import InvalidSamples, TooFewSamples
 from estimators.friction_model import Domain
 from estimators.linear.grasp_statistics import Columns, GraspStatistics
 from estimators.linear.least_squares import Factor, factorise
-from estimators.linear.observations import Observations, codes_of, observe
+from estimators.linear.observations import IntArray, Observations, codes_of, observe
 from estimators.linear.statistics import SufficientStatistics
 
 if TYPE_CHECKING:
@@ -160,20 +160,22 @@ def _statistics_of_samples(observations: Observations) -> tuple[GraspStatistics,
     values, order = observations.columns(), np.argsort(observations.grasp, kind="stable")
     place = observations.cluster if observations.cluster_kind == "time block" else observations.element
     ends = np.flatnonzero(np.diff(observations.grasp[order])) + 1
-    return tuple(
-        GraspStatistics.from_columns(
-            Columns(
-                values[rows],
-                observations.weight[rows],
-                codes_of(place[rows]),
-                observations.time[rows],
-                observations.element[rows],
-            ),
-            observations.noise[observations.grasp[rows[0]]],
-            bool(observations.velocity_is_relative[rows[0]]),
-        )
-        for rows in np.split(order, ends)
+    return tuple(_statistics_of_grasp(observations, values, place, rows) for rows in np.split(order, ends))
+
+
+def _statistics_of_grasp(
+    observations: Observations, values: FloatArray, place: IntArray, rows: IntArray
+) -> GraspStatistics:
+    columns = Columns(
+        values[rows],
+        observations.weight[rows],
+        codes_of(place[rows]),
+        observations.time[rows],
+        observations.element[rows],
     )
+    grasp, unknown = observations.grasp[rows[0]], bool(observations.velocity_is_relative[rows[0]])
+    found = GraspStatistics.from_columns(columns, observations.noise[grasp], unknown)
+    return replace(found, sensor=observations.sensors[grasp])
 
 
 def _of_one_place(block: SufficientStatistics) -> GraspStatistics:

@@ -47,7 +47,8 @@ class GraspStatistics:
     freed of noise and of errors that go together.
     ``total_weight`` Σw and ``weight_square`` Σw² give the effective number of samples. ``velocity_unknown``: v is
     that relative to what seems to stick, and counts as 0. ``share``: the part of the places that they count as, where
-    neighbours are off alike (``place_correlation``).
+    neighbours are off alike (``place_correlation``). ``sensor``: the name of the grasp's sensor, "" where it is not
+    known; whoever stores these statistics keeps it beside them, for ``to_bytes`` does not.
 
     Exact up to ``most_places`` places; beyond, places whose weights differ by a few per cent count as alike.
     """
@@ -61,6 +62,7 @@ class GraspStatistics:
     weight_square: float
     velocity_unknown: bool = False
     share: float = 1.0
+    sensor: str = ""
 
     @property
     def independent(self) -> FloatArray:

@@ -6,6 +6,9 @@ p ~ N(0, ω²), ε ~ N(0, σ²/w_k): a grasp scales the whole law, a place shift
 Given λ = τ²/σ² and ρ = ω²/σ², the places are integrated out by giving the mean of a place of weight W the weight
 W/(1 + ρW) (Lindley & Smith, 1972), the grasp by the rank-one update of Sherman and Morrison along h = x·b̂, with b̂ near
 the coefficients' mean; determinants follow from the same two. What is left is a normal density of β.
+
+Where grasps are of several sensors, that of sensor j observes ``μ = (1 + s_j + u_g) x·β + …`` with s ~ N(0, κ²), its
+own gain: given ν = κ²/σ² one more such update of the sums over its grasps.
 """
 
 from collections.abc import Sequence
@@ -31,7 +34,7 @@ WHOLE[FIRST, SECOND] = WHOLE[SECOND, FIRST] = np.arange(10)
 
 
 class Conditional(NamedTuple):
-    """What follows at points [k]: the log density of (log σ, log λ, log ρ), mean [k, 3] and covariance of β."""
+    """What follows at points [k]: the log density of the logarithms of the scales, mean [k, 3] and covariance of β."""
 
     log_density: FloatArray
     mean: FloatArray
@@ -39,14 +42,41 @@ class Conditional(NamedTuple):
 
 
 class Products(NamedTuple):
-    """Sums over all grasps at points [k]: the ``square`` [k, 10] of the rows (γ | residual), and a log determinant.
-
-    ``unknown`` [k, 10]: the part of the grasps of unknown velocity.
+    """Sums over the grasps of each of s sensors at points [k]: the ``square`` [k, s, 10] of the rows (γ | residual),
+    and a log determinant [k] of all. ``unknown`` [k, s, 10]: the part of the grasps of unknown velocity.
     """
 
     square: FloatArray
     log_determinant: FloatArray
     unknown: FloatArray
+
+    def at(self, points: NDArray[np.int64]) -> "Products":
+        """Those at some of the points."""
+        return Products(*(part[points] for part in self))
+
+
+class Whole(NamedTuple):
+    """Sums over all sensors at points [k], their gains integrated out: ``square`` [k, 10], its log determinant [k], and
+    what it has of the columns that unknown velocities are off by: ``along`` [k, 2, 4] of the rows, ``size`` [k, 2, 2].
+    ``weight`` [k, s] times ``gain`` [k, s, 4] is how each sensor's gain follows from (γ | residual), and ``off``
+    [k, s, 2] how from these columns.
+    """
+
+    square: FloatArray
+    log_determinant: FloatArray
+    along: FloatArray
+    size: FloatArray
+    weight: FloatArray
+    gain: FloatArray
+    off: FloatArray
+
+    def repeated(self, times: int) -> "Whole":
+        """Each point so many times."""
+        return Whole(*(np.repeat(part, times, axis=0) for part in self))
+
+    def at(self, points: NDArray[np.int64]) -> "Whole":
+        """The sums at some of the points."""
+        return Whole(*(part[points] for part in self))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +87,7 @@ class Hierarchical:
     of squares of (γ | residual), ``count`` and ``weight`` [m] as in ``GraspStatistics``; ``start`` [g]: where those of
     each grasp begin; ``within`` [g, 10]; ``prior`` [10] the same of the prior; ``direction`` [3]: the γ of b̂;
     ``unknown`` [g]: grasps of unknown velocity, whose friction is off, all alike, by N(0, ``offset``) times each of the
-    columns that ``off_by`` [2, 3] are the γ of.
+    columns that ``off_by`` [2, 3] are the γ of. ``sensor`` [g]: of which of the ``sensors`` each grasp is.
     """
 
     group: FloatArray
@@ -72,13 +102,16 @@ class Hierarchical:
     unknown: NDArray[np.bool_]
     offset: float
     off_by: FloatArray
+    sensor: NDArray[np.int64]
+    sensors: tuple[str, ...]
     scatter_prior: ScatterPrior = WEAK
 
     def products(self, log_lambda: FloatArray, log_rho: FloatArray) -> Products:
         """Sums at all pairs of λ [l] and ρ [r], as [l · r] points of which ρ varies fastest."""
         cells = [self._given_rho(np.exp(log_lambda), rho) for rho in np.exp(log_rho)]
         square, log_determinant, unknown = (np.stack(part, axis=1) for part in zip(*cells, strict=True))
-        return Products(square.reshape(-1, 10), log_determinant.reshape(-1), unknown.reshape(-1, 10))
+        shape = (-1, len(self.sensors), 10)
+        return Products(square.reshape(shape), log_determinant.reshape(-1), unknown.reshape(shape))
 
     def _given_rho(self, ratio: FloatArray, rho: float) -> Products:
         """Sums for all λ [l]: what a grasp says across h stays, what it says along h shrinks by 1/(1 + λ h'h)."""
@@ -88,18 +121,52 @@ class Hierarchical:
         size = np.maximum(along[:, :3] @ self.direction, np.finfo(float).tiny)
         outer = along[:, FIRST] * along[:, SECOND] / size[:, None]
         growth = 1.0 + ratio[:, None] * size
+        across = grasp - outer
         square, unknown = (
-            (grasp - outer)[chosen].sum(axis=0) + (1.0 / growth[:, chosen]) @ outer[chosen]
-            for chosen in (np.ones_like(self.unknown), self.unknown)
+            np.stack(
+                [
+                    across[chosen].sum(axis=0) + (1.0 / growth[:, chosen]) @ outer[chosen]
+                    for chosen in ((self.sensor == code) & counts for code in range(len(self.sensors)))
+                ],
+                axis=1,
+            )
+            for counts in (True, self.unknown)
         )
         places = float(self.count @ np.log1p(rho * self.weight))
         return Products(square, places + np.log(growth).sum(axis=1), unknown)
 
-    def conditional(
-        self, products: Products, log_lambda: FloatArray, log_rho: FloatArray, log_sigma: FloatArray
-    ) -> Conditional:
-        """Density of (log σ, log λ, log ρ) at points [k] with all else integrated out, and β given them."""
-        told, determinant = self._without_offset(products, log_sigma)
+    def whole(self, products: Products, log_nu: FloatArray | None = None) -> Whole:
+        """The sums over all sensors at points [k]; ``log_nu`` [k] of the scale between sensors, None of one sensor.
+
+        A sensor's gain has the column h = x·b̂, and is integrated out as a grasp's.
+        """
+        rows, unknown = products.square[..., WHOLE[:, :3]], products.unknown[..., WHOLE[:, :3]]
+        along = unknown @ self.off_by.T  # [k, s, 4, 2]
+        size = self.off_by @ along[..., :3, :]
+        if log_nu is None:
+            square, determinant = products.square[:, 0], products.log_determinant
+            none = np.zeros((len(square), 0))
+            nothing = none, np.zeros((*none.shape, 4)), np.zeros((*none.shape, 2))
+            return Whole(square, determinant, along[:, 0].swapaxes(1, 2), size[:, 0], *nothing)
+        gain = rows @ self.direction  # [k, s, 4]
+        growth = 1.0 + np.exp(log_nu)[:, None] * np.maximum(gain[..., :3] @ self.direction, 0.0)
+        weight = np.exp(log_nu)[:, None] / growth
+        square = products.square - weight[..., None] * gain[..., FIRST] * gain[..., SECOND]
+        shared = self.direction @ along[..., :3, :]  # [k, s, 2]
+        if self.unknown.any():
+            along = along - (weight[..., None] * gain)[..., None] * shared[..., None, :]
+            size = size - (weight[..., None] * shared)[..., None] * shared[..., None, :]
+        determinant = products.log_determinant + np.log(growth).sum(axis=1)
+        summed = square.sum(axis=1), determinant, along.sum(axis=1).swapaxes(1, 2), size.sum(axis=1)
+        return Whole(*summed, weight, gain, weight[..., None] * shared)
+
+    def conditional(self, whole: Whole, scales: FloatArray) -> Conditional:
+        """Density at points [k] with all else integrated out, and β given them.
+
+        ``scales``: log σ, log λ, log ρ and, of several sensors, log ν, [3 or 4, k].
+        """
+        log_sigma, log_lambda, log_rho, *log_nu = scales
+        told, determinant = self._without_offset(whole, log_sigma)
         square = told + self.prior
         precision = square[:, WHOLE[:3, :3]]
         covariance = np.linalg.inv(precision)
@@ -108,27 +175,32 @@ class Hierarchical:
         log_tau, log_omega = log_sigma + 0.5 * log_lambda, log_sigma + 0.5 * log_rho
         log = -0.5 * (misfit + determinant + np.linalg.slogdet(precision)[1])
         log += -self.effective_n * log_sigma + log_prior(log_sigma, log_tau, log_omega, self.scatter_prior)
+        for ratio in log_nu:
+            log += log_prior_of_gains(log_sigma + 0.5 * ratio)
         root = self.pooled.root
         return Conditional(log, self.pooled.mean + gamma @ root.T, root @ covariance @ root.T)
 
-    def _without_offset(self, products: Products, log_sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _without_offset(self, whole: Whole, log_sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The sums over σ², [k, 10], and their log determinant [k], with what unknown velocities are off by integrated
         out: rank-one updates as that of a grasp.
         """
-        square, determinant = products.square * np.exp(-2.0 * log_sigma)[:, None], products.log_determinant
+        unit = np.exp(-2.0 * log_sigma)[:, None]
+        square, determinant = whole.square * unit, whole.log_determinant
         if not self.unknown.any():
             return square, determinant
-        told = products.unknown * np.exp(-2.0 * log_sigma)[:, None]
-        for column in self.off_by:
-            along = told[:, WHOLE[:, :3]] @ column  # [k, 4]
-            growth = 1.0 + self.offset * (along[:, :3] @ column)
-            lost = self.offset / growth[:, None] * along[:, FIRST] * along[:, SECOND]
-            told, square, determinant = told - lost, square - lost, determinant + np.log(growth)
+        along, size = whole.along * unit[..., None], whole.size * unit[..., None]
+        for column in range(len(self.off_by)):
+            own, growth = along[:, column], 1.0 + self.offset * size[:, column, column]
+            share = (self.offset / growth)[:, None]
+            square = square - share * own[:, FIRST] * own[:, SECOND]
+            along = along - (share * size[:, column])[..., None] * own[:, None]
+            size = size - (share * size[:, column])[..., None] * size[:, None, column]
+            determinant = determinant + np.log(growth)
         return square, determinant
 
-    def log_sigma(self, products: Products) -> tuple[FloatArray, float]:
+    def log_sigma(self, whole: Whole) -> tuple[FloatArray, float]:
         """Mean [k] and spread of log σ at points [k], the priors of β, τ and ω left aside: σ² is inverse-gamma then."""
-        square = products.square
+        square = whole.square
         precision = square[:, WHOLE[:3, :3]] + ROUNDING * np.eye(3)
         solved = np.linalg.solve(precision, square[:, WHOLE[:3, 3], None])[..., 0]
         misfit = square[:, WHOLE[3, 3]] - np.einsum("ki,ki->k", solved, square[:, WHOLE[:3, 3]])
@@ -152,6 +224,12 @@ def log_prior(
     return np.asarray(scatter + grasp + place)
 
 
+def log_prior_of_gains(log_kappa: FloatArray) -> FloatArray:
+    """Log density [k] of log κ: half-Student-t; see ``defaults.PRIOR``."""
+    kappa = np.exp(log_kappa)
+    return log_half_student(kappa, PRIOR.sensor_scatter, PRIOR.sensor_degrees_of_freedom) + log_kappa
+
+
 def hierarchical(
     grasps: Sequence[GraspStatistics],
     pooled: NormalInverseGamma,
@@ -165,6 +243,7 @@ def hierarchical(
     unit = total / sum(grasp.weight_square for grasp in grasps)
     group = np.concatenate([_group_squares(grasp, pooled) for grasp in grasps])
     sizes = [len(grasp.count) for grasp in grasps]
+    sensors, sensor = np.unique([grasp.sensor for grasp in grasps], return_inverse=True)
     return Hierarchical(
         group=np.ascontiguousarray(group.T),
         count=np.concatenate([grasp.independent for grasp in grasps]),
@@ -178,6 +257,8 @@ def hierarchical(
         unknown=np.array([grasp.velocity_unknown for grasp in grasps]),
         offset=offset_variance(float(centre @ pooled.mean), float(pooled.mean[1]), float(pooled.covariance[1, 1])),
         off_by=np.stack([_direction(pooled, each) for each in columns_off(float(centre[2]))]),
+        sensor=sensor,
+        sensors=tuple(sensors.tolist()),
         scatter_prior=scatter_prior,
     )
 

@@ -1,5 +1,6 @@
 """What a friction model needs of the hierarchical posterior: coefficients and scales, each with a Student-t's tails."""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -7,10 +8,11 @@ from numpy.typing import NDArray
 from scipy import special
 
 from estimators.defaults import IDENTIFIABILITY
-from estimators.friction_model import Scale, Scales
+from estimators.friction_model import Scale, Scales, SensorFriction, SensorScale
 from estimators.linear.normal_mixture import Student, matched_student, mixture_quantile
 from estimators.linear.posterior_grid import ScaleNodes
 from estimators.linear.priors import ScatterPrior
+from estimators.linear.sensor_gains import Gains
 
 FloatArray = NDArray[np.float64]
 
@@ -29,20 +31,63 @@ class MixtureSummary(NamedTuple):
 
 def summarise(nodes: ScaleNodes, at: FloatArray) -> MixtureSummary:
     """Summary of nodes; the degrees of freedom are those of friction expected ``at`` (1, v, f_n), [3]."""
+    found = _coefficients(nodes, at)
+    sigma, tau, omega, *kappa = nodes.scatter.T
+    zero = np.zeros(len(sigma))
+    grasps, places, within = (Scale(*matched_student(nodes.weight, zero, scale)) for scale in (tau, omega, sigma))
+    scales = Scales(grasps, places, within)
+    friction = at @ found.mean
+    together = np.sqrt((tau * friction) ** 2 + omega**2 + sigma**2)
+    if nodes.gains is not None:
+        scale = Scale(*matched_student(nodes.weight, zero, kappa[0]))
+        scales = replace(scales, between_sensors=SensorScale(scale, _sensors(nodes, nodes.gains, at)))
+        together = np.hypot(together, kappa[0] * friction)
+    return MixtureSummary(
+        coefficients=found.mean,
+        covariance=found.covariance,
+        degrees_of_freedom=found.degrees_of_freedom,
+        scales=scales,
+        scatter=matched_student(nodes.weight, zero, together),
+    )
+
+
+class _Coefficients(NamedTuple):
+    mean: FloatArray
+    covariance: FloatArray
+    degrees_of_freedom: float
+
+
+def _coefficients(nodes: ScaleNodes, at: FloatArray) -> _Coefficients:
     mean, covariance = nodes.moments()
     away = nodes.mean - mean
     expected = matched_student(nodes.weight, away @ at, np.sqrt(np.einsum("kij,i,j->k", nodes.covariance, at, at)))
-    sigma, tau, omega = nodes.scatter.T
-    zero = np.zeros(len(sigma))
-    scales = (Scale(*matched_student(nodes.weight, zero, scale)) for scale in (tau, omega, sigma))
-    together = np.sqrt((tau * (at @ mean)) ** 2 + omega**2 + sigma**2)
-    return MixtureSummary(
-        coefficients=mean,
-        covariance=_widened(covariance, nodes, away, expected.degrees_of_freedom),
-        degrees_of_freedom=expected.degrees_of_freedom,
-        scales=Scales(*scales),
-        scatter=matched_student(nodes.weight, zero, together),
-    )
+    freedom = expected.degrees_of_freedom
+    return _Coefficients(mean, _widened(covariance, nodes, away, freedom), freedom)
+
+
+def _sensors(nodes: ScaleNodes, gains: Gains, at: FloatArray) -> dict[str, SensorFriction]:
+    """What each sensor shows: (1 + s) β along the mean of β, s and β normal together at each node."""
+    mean, covariance = gains.moments(nodes.weight)
+    law = nodes.weight @ nodes.mean
+    sigma, tau, omega = nodes.scatter.T[:3]
+    found = {}
+    for place, name in enumerate(gains.names):
+        own, shared = gains.mean[:, place], gains.with_coefficients[:, place, :, None] * law
+        variance = gains.covariance[:, place, place]
+        spread = nodes.covariance + shared + shared.swapaxes(1, 2) + variance[:, None, None] * np.outer(law, law)
+        of_it = _coefficients(nodes._replace(mean=nodes.mean + own[:, None] * law, covariance=spread), at)
+        together = np.sqrt((tau * (at @ of_it.mean)) ** 2 + omega**2 + sigma**2)
+        scatter = matched_student(nodes.weight, np.zeros(len(sigma)), together)
+        found[name] = SensorFriction(
+            gain=float(mean[place]),
+            standard_error=float(np.sqrt(covariance[place, place])),
+            coefficients=tuple(of_it.mean.tolist()),
+            covariance=tuple(tuple(row) for row in of_it.covariance.tolist()),
+            degrees_of_freedom=of_it.degrees_of_freedom,
+            scale=scatter.scale,
+            scatter_degrees_of_freedom=scatter.degrees_of_freedom,
+        )
+    return found
 
 
 def scatter_alone(nodes: ScaleNodes, scatter_prior: ScatterPrior) -> Scale:

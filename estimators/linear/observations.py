@@ -25,7 +25,8 @@ class Observations:
     relative, scaled so that it sums to the effective number of samples (Kish); ``element`` as labelled in its grasp;
     ``grasp`` and ``cluster``: codes from 0, where a cluster is what shares errors (``cluster_kind``);
     ``element_area`` m²; ``noise`` [grasps, 2], that still in the velocities, m/s, and normal forces, N, of each;
-    ``velocity_is_relative``: where the velocity is unknown, and 0 in ``tangential_velocity`` (``known_velocity``).
+    ``velocity_is_relative``: where the velocity is unknown, and 0 in ``tangential_velocity`` (``known_velocity``);
+    ``sensors``: the name of the sensor of each grasp, "" where it is not known.
     """
 
     friction: FloatArray
@@ -41,6 +42,7 @@ class Observations:
     element_area: float
     noise: FloatArray
     velocity_is_relative: NDArray[np.bool_]
+    sensors: tuple[str, ...]
 
     def __len__(self) -> int:
         return len(self.friction)
@@ -114,6 +116,7 @@ def observe(samples: "FrictionSamples | Sequence[FrictionSamples]") -> Observati
         element_area=area,
         noise=np.array([noise_of(part) for part in parts]),
         velocity_is_relative=relative,
+        sensors=tuple(part.sensor for part in parts),
     )
 
 

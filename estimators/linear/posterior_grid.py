@@ -10,25 +10,29 @@ from scipy import special
 
 from estimators.defaults import GRID
 from estimators.linear.fit_data import FitData
-from estimators.linear.hierarchical import Hierarchical, Products, hierarchical
+from estimators.linear.hierarchical import Hierarchical, Products, Whole, hierarchical
 from estimators.linear.normal_inverse_gamma import exact_posterior
 from estimators.linear.priors import WEAK, ScatterPrior, weak_spans
+from estimators.linear.sensor_gains import Gains, gains
 from estimators.linear.unknown_velocity import offset_variance
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 
 SIGMA_NODES, SIGMA_WEIGHTS = hermegauss(GRID.sigma_nodes)
 
 
 class ScaleNodes(NamedTuple):
-    """Weighted points of the posterior: ``weight`` [m] that sums to 1, ``scatter`` [m, 3] of (σ, τ, ω), and β given
-    them, normal with ``mean`` [m, 3] and ``covariance`` [m, 3, 3].
+    """Weighted points of the posterior: ``weight`` [m] that sums to 1, ``scatter`` [m, 3 or 4] of (σ, τ, ω) and, of
+    several sensors, κ; β given them, normal with ``mean`` [m, 3] and ``covariance`` [m, 3, 3]; and those sensors'
+    ``gains``.
     """
 
     weight: FloatArray
     scatter: FloatArray
     mean: FloatArray
     covariance: FloatArray
+    gains: Gains | None = None
 
     def moments(self) -> tuple[FloatArray, FloatArray]:
         """Mean [3] and covariance [3, 3] of β."""
@@ -40,23 +44,25 @@ class ScaleNodes(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PosteriorGrid:
-    """Nodes over ``log_lambda`` [l] and ``log_rho`` [r], with the sums there and ``log_marginal`` [l, r]."""
+    """Nodes over ``axes``, log λ [l], log ρ [r] and, of several sensors, log ν [q]; with the sums at the first two, and
+    ``log_marginal`` [l, r (, q)].
+    """
 
     model: Hierarchical
-    log_lambda: FloatArray
-    log_rho: FloatArray
+    axes: tuple[FloatArray, ...]
     products: Products
     log_marginal: FloatArray
     nodes: ScaleNodes
 
     def prior_shift(self) -> FloatArray:
         """Move of each coefficient, in standard deviations, were the prior of β twice as wide; at the scales' mode."""
-        best = int(np.argmax(self.log_marginal))
-        row, column = np.unravel_index(best, self.log_marginal.shape)
-        products = Products(*(part[[best]] for part in self.products))
-        point = products, self.log_lambda[[row]], self.log_rho[[column]], self.model.log_sigma(products)[0]
+        best = np.unravel_index(int(np.argmax(self.log_marginal)), self.log_marginal.shape)
+        ratios = np.array([[axis[place]] for axis, place in zip(self.axes, best, strict=True)])
+        cell = np.array([best[0] * len(self.axes[1]) + best[1]])
+        whole = self.model.whole(self.products.at(cell), *ratios[2:])
+        scales = np.stack([self.model.log_sigma(whole)[0], *ratios])
         wide = replace(self.model, prior=0.25 * self.model.prior, offset=4.0 * self.model.offset)
-        narrow, other = self.model.conditional(*point), wide.conditional(*point)
+        narrow, other = self.model.conditional(whole, scales), wide.conditional(whole, scales)
         return np.asarray(np.abs(other.mean - narrow.mean)[0] / np.sqrt(np.diag(narrow.covariance[0])))
 
 
@@ -71,8 +77,9 @@ def posterior_grid(data: FitData, scatter_prior: ScatterPrior = WEAK) -> Posteri
     spans = weak_spans(data.domain, data.element_area)
     model = hierarchical(grasps, pooled, spans, data.mean_row(), scatter_prior)
     box = _widest(model)
+    fine = GRID.fine if len(box) == 2 else GRID.beside_gains
     for turn in range(GRID.rounds):
-        grid = _evaluated(model, box, GRID.coarse if turn < 2 else GRID.fine)
+        grid = _evaluated(model, box, GRID.coarse if turn < 2 else fine)
         closer = _closer(grid)
         settled = turn >= 2 and bool((np.ptp(closer, axis=1) > GRID.settled * np.ptp(box, axis=1)).all())
         if settled:
@@ -85,39 +92,62 @@ def posterior_grid(data: FitData, scatter_prior: ScatterPrior = WEAK) -> Posteri
 
 
 def _widest(model: Hierarchical) -> FloatArray:
-    """Range of (log λ, log ρ), [2, 2], that covers the scales for any σ that the data allow."""
+    """Range of log λ, log ρ and, of several sensors, log ν, [2 or 3, 2], for any σ that the data allow."""
     most = float(np.log(model.pooled.scale))
     far = np.array([GRID.no_scatter])
-    least = float(model.log_sigma(model.products(far, far))[0][0])
+    alone = [-far] if len(model.sensors) > 1 else []
+    least = float(model.log_sigma(model.whole(model.products(far, far), *alone))[0][0])
     low, high = min(least, most), max(least, most)
     last = np.log(GRID.most_scatter) - low
-    return 2.0 * np.array([[np.log(first) - high, last] for first in (GRID.least_tau, GRID.least_omega)])
+    firsts = [GRID.least_tau, GRID.least_omega, *(GRID.least_gain for _ in alone)]
+    return 2.0 * np.array([[np.log(first) - high, last] for first in firsts])
 
 
 def _evaluated(model: Hierarchical, box: FloatArray, count: int) -> PosteriorGrid:
-    log_lambda, log_rho = (np.linspace(low, high, count) for low, high in box)
-    products = model.products(log_lambda, log_rho)
-    centre, spread = model.log_sigma(products)
+    nodes_of = (count, count, GRID.gain_nodes)[: len(box)]
+    axes = tuple(np.linspace(low, high, nodes) for (low, high), nodes in zip(box, nodes_of, strict=True))
+    products = model.products(axes[0], axes[1])
+    ratios = np.stack([each.ravel() for each in np.meshgrid(*axes, indexing="ij")])
+    cells = np.arange(count * count)
+    whole = model.whole(products) if len(axes) == 2 else _with_gains(model, products, cells, ratios[2])
+    centre, spread = model.log_sigma(whole)
+    matters = np.arange(len(centre)) if len(axes) == 2 else _that_matter(model, whole, np.stack([centre, *ratios]))
+    if len(matters) < len(centre):
+        whole, ratios, centre = whole.at(matters), ratios[:, matters], centre[matters]
+    nodes = len(SIGMA_NODES)
     log_sigma = (centre[:, None] + spread * SIGMA_NODES).ravel()
-    pairs = [axis.ravel() for axis in np.meshgrid(log_lambda, log_rho, indexing="ij")]
-    lambdas, rhos = (np.repeat(axis, len(SIGMA_NODES)) for axis in pairs)
-    repeated = Products(*(np.repeat(part, len(SIGMA_NODES), axis=0) for part in products))
-    given = model.conditional(repeated, lambdas, rhos, log_sigma)
-    log = given.log_density.reshape(-1, len(SIGMA_NODES)) + np.log(SIGMA_WEIGHTS) + 0.5 * SIGMA_NODES**2
+    scales = np.stack([log_sigma, *(np.repeat(axis, nodes) for axis in ratios)])
+    repeated = whole.repeated(nodes)
+    given = model.conditional(repeated, scales)
+    log = given.log_density.reshape(-1, nodes) + np.log(SIGMA_WEIGHTS) + 0.5 * SIGMA_NODES**2
     weight = special.softmax(log).ravel()
     sigma = np.exp(log_sigma)
-    scatter = np.stack([sigma, sigma * np.exp(0.5 * lambdas), sigma * np.exp(0.5 * rhos)], axis=1)
-    marginal = special.logsumexp(log, axis=1).reshape(count, count)
+    scatter = np.stack([sigma, *(sigma * np.exp(0.5 * axis) for axis in scales[1:])], axis=1)
+    marginal = np.full([len(axis) for axis in axes], -np.inf)
+    marginal.flat[matters] = special.logsumexp(log, axis=1)
+    found = gains(model, repeated, given, sigma) if len(axes) > 2 else None
     return PosteriorGrid(
-        model, log_lambda, log_rho, products, marginal, ScaleNodes(weight, scatter, given.mean, given.covariance)
+        model, axes, products, marginal, ScaleNodes(weight, scatter, given.mean, given.covariance, found)
     )
 
 
+def _with_gains(model: Hierarchical, products: Products, cells: IntArray, log_nu: FloatArray) -> Whole:
+    """The sums at each cell of (λ, ρ) with each of the nodes of ``log_nu``, which varies fastest."""
+    return model.whole(products.at(np.repeat(cells, len(log_nu) // len(cells))), log_nu)
+
+
+def _that_matter(model: Hierarchical, whole: Whole, scales: FloatArray) -> IntArray:
+    """The points whose density, at the likeliest σ, is not next to none: an axis more would cost as many times."""
+    log = model.conditional(whole, scales).log_density
+    return np.flatnonzero(log > log.max() - GRID.depth)
+
+
 def _closer(grid: PosteriorGrid) -> FloatArray:
-    """The box [2, 2] in which the density matters, a node wider on each side."""
+    """The box [2 or 3, 2] in which the density matters, a node wider on each side."""
     matters = grid.log_marginal > grid.log_marginal.max() - GRID.depth
-    box = np.empty((2, 2))
-    for axis, values in enumerate((grid.log_lambda, grid.log_rho)):
-        inside = np.flatnonzero(matters.any(axis=1 - axis))
+    box = np.empty((len(grid.axes), 2))
+    for axis, values in enumerate(grid.axes):
+        others = tuple(other for other in range(len(grid.axes)) if other != axis)
+        inside = np.flatnonzero(matters.any(axis=others))
         box[axis] = values[max(inside[0] - 1, 0)], values[min(inside[-1] + 1, len(values) - 1)]
     return box

@@ -90,12 +90,17 @@ def positive_friction() -> str:
     return conjugate_prior() + "; mean friction above 0 over the data's domain"
 
 
-def structured(scatter_prior: ScatterPrior = WEAK) -> str:
-    """The prior of the hierarchical model in words and numbers."""
+def structured(scatter_prior: ScatterPrior = WEAK, sensors: int = 1) -> str:
+    """The prior of the hierarchical model of grasps of so many ``sensors``, in words and numbers."""
+    gains = (
+        f"between sensors kappa ~ half-Student-t on {PRIOR.sensor_degrees_of_freedom:g} with scale "
+        f"{PRIOR.sensor_scatter:g}; "
+    )
     return (
         f"friction at the mean of the data ~ N({REFERENCE.friction:g}, {PRIOR.width:g}^2), each slope times its span "
         f"~ N(0, {PRIOR.width:g}^2), the spans {REFERENCE.tangential_velocity:g} m/s and {REFERENCE.pressure:g} Pa "
-        f"times the element area, or the range seen if less; between grasps {scatter_prior}; between places omega ~ "
+        f"times the element area, or the range seen if less; between grasps {scatter_prior}; "
+        f"{gains if sensors > 1 else ''}between places omega ~ "
         f"half-Student-t on {PRIOR.effect_degrees_of_freedom:g} with scale {REFERENCE.scatter:g}; sigma^2 ~ "
         f"IG({PRIOR.degrees_of_freedom / 2:g}, {PRIOR.degrees_of_freedom / 2 * REFERENCE.scatter**2:g})"
     )

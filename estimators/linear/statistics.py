@@ -71,6 +71,7 @@ class SufficientStatistics:
         element = np.asarray(samples.element, dtype=np.int64)[used]
         columns_of_grasp = Columns(np.stack([v, f_n, mu]).T, weight, place, time, element)
         grasp = GraspStatistics.from_columns(columns_of_grasp, noise_of(samples), unknown)
+        grasp = replace(grasp, sensor=samples.sensor)
         return cls(
             factorise(columns_of_grasp.values, weight),
             float(weight @ weight),
@@ -105,6 +106,10 @@ class SufficientStatistics:
         return replace(
             self, factor=factor, domain=domain, element_area=element_area, grasps=grasps, unknown_force=force
         )
+
+    def of_sensor(self, name: str) -> Self:
+        """The same of a sensor of this name, which ``to_bytes`` does not keep."""
+        return replace(self, grasps=tuple(replace(grasp, sensor=name) for grasp in self.grasps))
 
     def merge(self, *others: Self) -> Self:
         """Moments of all samples behind these; any order and any grouping agree to rounding."""

@@ -8,7 +8,7 @@ from estimators.linear.fit_data import FitData
 from estimators.linear.mixture_summary import summarise
 from estimators.linear.posterior_grid import posterior_grid
 from estimators.linear.priors import WEAK, ScatterPrior, structured
-from estimators.methods.reporting import Diagnostics, by_coefficient, pooled_prior, report
+from estimators.methods.reporting import Diagnostics, by_coefficient, pooled_prior, report, sensor_gain
 
 
 def fit(data: FitData, scatter_prior: ScatterPrior = WEAK) -> FrictionModel:
@@ -19,9 +19,12 @@ def fit(data: FitData, scatter_prior: ScatterPrior = WEAK) -> FrictionModel:
     begin = time.perf_counter()
     grid = posterior_grid(data, scatter_prior)
     found = summarise(grid.nodes, data.mean_row())
-    diagnostics: Diagnostics = {"prior": structured(scatter_prior), "nodes": float(len(grid.nodes.weight))}
+    diagnostics: Diagnostics = {
+        "prior": structured(scatter_prior, len(grid.model.sensors)),
+        "nodes": float(len(grid.nodes.weight)),
+    }
     diagnostics |= by_coefficient("prior_sensitivity", grid.prior_shift())
-    diagnostics |= pooled_prior(grid.nodes, scatter_prior)
+    diagnostics |= pooled_prior(grid.nodes, scatter_prior) | sensor_gain(grid.nodes)
     summary = PosteriorSummary(
         found.coefficients,
         found.covariance,

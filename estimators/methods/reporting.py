@@ -5,16 +5,19 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.defaults import REFERENCE
+from estimators.defaults import IDENTIFIABILITY, REFERENCE
 from estimators.friction_model import Cost, FrictionModel, Scales
 from estimators.likelihoods.posterior import PosteriorSummary
 from estimators.linear.fit_data import FitData
 from estimators.linear.least_squares import LinearFit, solve
 from estimators.linear.mixture_summary import scatter_alone
+from estimators.linear.normal_mixture import mixture_quantile
 from estimators.linear.posterior_grid import ScaleNodes
 from estimators.linear.priors import ScatterPrior
+from estimators.linear.sensor_gains import Gains
 from estimators.methods.identifiability import effects, identifiable
 from estimators.methods.unknown_velocity import in_words, slope_inflation, widened
+from stiction_client.support import SENSOR_GAIN
 
 FloatArray = NDArray[np.float64]
 Diagnostics = dict[str, float | str]
@@ -40,6 +43,44 @@ def pooled_prior(nodes: ScaleNodes, scatter_prior: ScatterPrior) -> Diagnostics:
         ALONE: alone.value,
         f"{ALONE}_degrees_of_freedom": alone.degrees_of_freedom,
     }
+
+
+def sensor_gain(nodes: ScaleNodes) -> Diagnostics:
+    """Of grasps of several sensors: in a sentence, whether they separate its gain from scatter."""
+    if nodes.gains is None:
+        return {}
+    mean, covariance = nodes.gains.moments(nodes.weight)
+    own = np.diag(covariance)
+    variance = np.maximum(own[:, None] + own - 2.0 * covariance, np.finfo(float).tiny)
+    apart = np.abs(mean[:, None] - mean) / np.sqrt(variance)
+    first, second = np.unravel_index(int(np.argmax(apart)), apart.shape)
+    low, high = _difference(nodes, nodes.gains, int(first), int(second))
+    names = nodes.gains.names[first], nodes.gains.names[second]
+    if low * high > 0.0:
+        more, less = names if low > 0.0 else names[::-1]
+        least, most = sorted((abs(low), abs(high)))
+        return {
+            SENSOR_GAIN: f"sensor {more!r} shows {least:.1%} to {most:.1%} more friction than {less!r}: calibrate them "
+            "against each other, or ask for friction of the one that grasps"
+        }
+    first, second = np.unravel_index(int(np.argmax(variance)), variance.shape)
+    low, high = _difference(nodes, nodes.gains, int(first), int(second))
+    most = max(-low, high)
+    if most <= IDENTIFIABILITY.effect:
+        return {SENSOR_GAIN: f"its {len(mean)} sensors agree to within {most:.1%} of friction"}
+    return {
+        SENSOR_GAIN: "a sensor's own gain cannot be separated from scatter between grasps (two of its sensors may "
+        f"differ by {most:.0%}): record more grasps with each sensor"
+    }
+
+
+def _difference(nodes: ScaleNodes, gains: Gains, first: int, second: int) -> tuple[float, float]:
+    """The 95 % interval of how much one sensor's gain exceeds another's."""
+    covariance = gains.covariance
+    variance = covariance[:, first, first] + covariance[:, second, second] - 2.0 * covariance[:, first, second]
+    mean, deviation = gains.mean[:, first] - gains.mean[:, second], np.sqrt(np.maximum(variance, 0.0))
+    low, high = mixture_quantile(nodes.weight, mean, deviation, IDENTIFIABILITY.ends)
+    return float(low), float(high)
 
 
 def describe(data: FitData, linear: LinearFit) -> Diagnostics:
@@ -100,4 +141,6 @@ def _scale_diagnostics(scales: Scales) -> Diagnostics:
     for name in ("between_grasps", "between_places", "within"):
         scale = getattr(scales, name)
         told |= {f"scale_{name}": scale.value, f"scale_{name}_degrees_of_freedom": scale.degrees_of_freedom}
+    if scales.between_sensors is not None:
+        told["scale_between_sensors"] = scales.between_sensors.scale.value
     return told

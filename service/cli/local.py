@@ -247,7 +247,7 @@ def model_record(model: "FrictionModel") -> dict[str, Any]:
         "n": model.n,
         "degrees_of_freedom": model.degrees_of_freedom,
         "scatter_degrees_of_freedom": model.scatter_degrees_of_freedom,
-        "scales": None if model.scales is None else asdict(model.scales),
+        "scales": None if model.scales is None else model.scales.to_json(),
         "domain": {
             "tangential_velocity": model.domain.tangential_velocity,
             "normal_force": model.domain.normal_force,
@@ -258,6 +258,7 @@ def model_record(model: "FrictionModel") -> dict[str, Any]:
         "cost": {"seconds": model.cost.seconds, "monte_carlo_error": model.cost.monte_carlo_error},
         "support": model.support,
         "advice": model.advice,
+        "notes": model.notes,
     }
 
 
@@ -275,6 +276,8 @@ def print_model(model: "FrictionModel", title: str) -> None:
     typer.echo(f"{model.support}: {model.advice}")
     if "unknown_velocity" in model.diagnostics:
         typer.echo(str(model.diagnostics["unknown_velocity"]))
+    for note in model.notes:
+        typer.echo(note)
 
 
 def _detection_summary(log: "GraspLog", history: "SlipHistory", seconds: float) -> dict[str, Any]:

@@ -262,6 +262,7 @@ def _friction_lines(answer: "FrictionAnswer") -> list[tuple[str, str | None]]:
         ("because", answer.chosen_because),
         ("warning", answer.warning),
         ("support", answer.support and _support(answer.support, answer.advice, answer.warning)),
+        *(("note", note) for note in answer.notes),
     ]
 
 
@@ -294,4 +295,5 @@ def _grip_lines(grip: "RequiredForce", model: "FrictionModel") -> list[tuple[str
         ("model", f"{model.method}, version {model.version}"),
         ("warning", grip.warning),
         ("support", _support(grip.support, grip.advice, grip.warning)),
+        *(("note", note) for note in grip.notes),
     ]

@@ -28,7 +28,8 @@ class Friction(NamedTuple):
     """Friction coefficient of a material at a tangential velocity m/s and a normal force of an element N.
 
     ``friction_coefficient``: the quantile that was asked for, or the mean, at least 0; ``within_domain``: the samples
-    reach there; ``support`` and ``advice``: what the answer rests on, and what to do about it.
+    reach there; ``support`` and ``advice``: what the answer rests on, and what to do about it;
+    ``notes``: what else is to be known of the model.
     """
 
     material: str
@@ -46,6 +47,7 @@ class Friction(NamedTuple):
     warning: str | None
     support: Kind
     advice: str
+    notes: tuple[str, ...]
 
 
 def look_up(known: KnownModel, question: FrictionQuery) -> Friction:
@@ -78,4 +80,5 @@ def look_up(known: KnownModel, question: FrictionQuery) -> Friction:
         warning=support.warning(outside, nothing, known.disagreement, outdated),
         support=support.kind,
         advice=support.advice,
+        notes=model.notes,
     )

@@ -74,6 +74,7 @@ class GraspForce:
     elements: float
     support: Kind
     advice: str
+    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

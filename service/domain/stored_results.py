@@ -100,14 +100,16 @@ def encode_samples(samples: FrictionSamples) -> bytes:
 
 def decode_samples(path: Path) -> FrictionSamples:
     """The samples in a blob; those stored by older versions have no noise of f_n and of v, and are all of elements
-    whose velocities count as the object's own: nobody noted whether its motion was known.
+    whose velocities count as the object's own: nobody noted whether its motion was known. Of which sensor they are, the
+    log's record says.
     """
     *arrays, common = _unpack(path)
     of_contact = arrays.pop() if len(arrays) == len(SAMPLE_ARRAYS) - 1 else np.zeros(len(arrays[0]), bool)
     element_area, noise, is_relative, velocity_noise = (*np.atleast_1d(common).tolist(), 0.0, 0.0, 0.0)[:4]
     derived = [np.where(of_contact, "contact", "element"), ~of_contact & bool(is_relative)]
+    columns: dict[str, Any] = dict(zip(SAMPLE_ARRAYS, [*arrays, *derived], strict=True))
     return FrictionSamples(
-        **dict(zip(SAMPLE_ARRAYS, [*arrays, *derived], strict=True)),
+        **columns,
         element_area=element_area,
         normal_force_noise=noise,
         velocity_noise=velocity_noise,
@@ -225,12 +227,18 @@ def to_client_model(stored: StoredModel) -> "stiction_client.FrictionModel":
 
 def _stored_scales(scales: "estimators.Scales") -> Scales:
     each = (scales.between_grasps, scales.between_places, scales.within)
-    return Scales(*(Scale(float(scale.value), finite_or_none(scale.degrees_of_freedom)) for scale in each))
+    grasps, places, within = (Scale(float(scale.value), finite_or_none(scale.degrees_of_freedom)) for scale in each)
+    sensors = scales.between_sensors
+    return Scales(grasps, places, within, None if sensors is None else sensors.to_json())
 
 
 def _scales(stored: Scales) -> "estimators.Scales":
     each = (stored.between_grasps, stored.between_places, stored.within)
-    return estimators.Scales(*(estimators.Scale(scale.value, _or_infinite(scale.degrees_of_freedom)) for scale in each))
+    plain = (estimators.Scale(scale.value, _or_infinite(scale.degrees_of_freedom)) for scale in each)
+    grasps, places, within = plain
+    sensors = stored.between_sensors
+    told = None if sensors is None else estimators.SensorScale.from_json(sensors)
+    return estimators.Scales(grasps, places, within, told)
 
 
 def _or_infinite(degrees_of_freedom: float | None) -> float:

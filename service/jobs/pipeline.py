@@ -248,7 +248,7 @@ def _fit_by(
     """From the moments where the method needs no more, or of more than ``most_sampled`` logs; else from the samples."""
     data: list[Moments] | list[FrictionSamples]
     if len(parts) <= most_sampled and estimators.needs_samples(method, len(parts)):
-        data = [decode_samples(run.blobs.path(part.samples_blob)) for part in parts]
+        data = [replace(decode_samples(run.blobs.path(part.samples_blob)), sensor=part.sensor) for part in parts]
     else:
         data = [_moments(run, part) for part in parts]
     prior_or_none = prior if method in SCATTER_METHODS else None
@@ -259,9 +259,9 @@ def _fit_by(
 def _moments(run: Run, part: SamplesOfLog) -> Moments:
     """Those stored, unless by a version that did not yet keep each place."""
     known = None if part.moments is None else Moments.from_bytes(part.moments)
-    if known is not None and known.grasps:
-        return known
-    return Moments.from_samples(decode_samples(run.blobs.path(part.samples_blob)))
+    if known is None or not known.grasps:
+        known = Moments.from_samples(decode_samples(run.blobs.path(part.samples_blob)))
+    return known.of_sensor(part.sensor)
 
 
 def _note_missing_moments(run: Run) -> None:

@@ -76,10 +76,11 @@ def friction_facts(model: LinearFriction) -> tuple[list[Fact], Support]:
 
 
 def coefficient_table(models: Mapping[str, LinearFriction]) -> Table:
-    """Coefficients and σ of each model with 95 % intervals, which velocities are unknown, and what came from others."""
+    """Coefficients and σ of each model with 95 % intervals; which velocities are unknown, what came from others."""
     rows = [[name, *estimates(model), str(model.n)] for name, model in models.items()]
     remarks = ("unknown_velocity", "scatter_prior")
     told = {str(model.diagnostics.get(name) or "") for model in models.values() for name in remarks} - {""}
+    told |= {note for model in models.values() for note in model.notes}
     caption = "; ".join(["Estimates and 95 % intervals", *sorted(told)])
     return Table(caption, ("method", "β₀ [-]", "β₁ [s/m]", "β₂ [1/N]", "σ [-]", "samples"), rows)
 

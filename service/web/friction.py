@@ -25,7 +25,8 @@ BEYOND = 1.25
 class FrictionEstimate:
     """Friction coefficient at a tangential velocity, m/s, and a normal force of an element, N, with its interval.
 
-    ``disagreement`` with the material's models by other methods, where there is any.
+    ``disagreement`` with the material's models by other methods, where there is any; ``notes``: what else is to be
+    known of the model.
     """
 
     tangential_velocity: float
@@ -34,6 +35,7 @@ class FrictionEstimate:
     interval: tuple[float, float]
     support: Support
     disagreement: str | None = None
+    notes: tuple[str, ...] = ()
 
 
 def usual_model(models: Sequence[StoredModel], method: str | None = None) -> StoredModel | None:
@@ -63,7 +65,8 @@ def friction_at(
     v, f_n = tangential_velocity, middle_force(stored) if normal_force is None else normal_force
     low, high = (float(model.predict(v, f_n, quantile=level)) for level in LEVELS)
     support = model.support_at(v, f_n, OUTDATED if stored.outdated else None)
-    return FrictionEstimate(v, f_n, float(model.predict(v, f_n)), (low, high), support, disagreeing(stored, others))
+    mean, apart = float(model.predict(v, f_n)), disagreeing(stored, others)
+    return FrictionEstimate(v, f_n, mean, (low, high), support, apart, model.notes)
 
 
 def next_of(stored: StoredModel, at: FrictionEstimate) -> RecordNext | None:

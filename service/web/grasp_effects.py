@@ -61,7 +61,8 @@ def differing(stored: StoredModel, logs: Sequence[SampledLog]) -> list[Differing
         return []
     from estimators import Moments, grasp_effects  # loads the numerics, which the server starts without
 
-    moments = [(log, Moments.from_bytes(log.samples.moments)) for log in logs if log.samples.moments]
+    kept = [(log, log.samples.moments) for log in logs if log.samples.moments]
+    moments = [(log, Moments.from_bytes(content).of_sensor(log.samples.sensor)) for log, content in kept]
     known = [(log, each) for log, each in moments if len(each.grasps) == 1]
     effects = grasp_effects(to_friction_model(stored.model), [each for _, each in known])
     return [Differing(log, effect) for (log, _), effect in zip(known, effects, strict=True)]

@@ -11,7 +11,7 @@ import estimators
 from db.records import StoredModel
 from service.domain.stored_results import to_friction_model, to_new_model
 from service.http.schemas.models import FrictionModelOut
-from stiction_client import FrictionModel, InvalidArgument, Scale, Scales
+from stiction_client import FrictionModel, InvalidArgument, Scale, Scales, SensorFriction, SensorScale
 
 Make = Callable[..., FrictionModel]
 
@@ -20,14 +20,14 @@ def on_the_service(model: FrictionModel) -> estimators.FrictionModel:
     shared = {field.name for field in fields(estimators.FrictionModel)} & {
         field.name for field in fields(FrictionModel)
     }
-    there = {name: getattr(model, name) for name in shared}
-    if model.scales is not None:
-        each = [getattr(model.scales, field.name) for field in fields(Scales)]
-        there["scales"] = estimators.Scales(*(estimators.Scale(s.value, s.degrees_of_freedom) for s in each))
-    return estimators.FrictionModel(**there)
+    return estimators.FrictionModel(**{name: getattr(model, name) for name in shared})
 
 
 SCALES = Scales(Scale(0.07, 3.5), Scale(0.02, np.inf), Scale(0.03, 1e4))
+LEFT = SensorFriction(
+    0.1, 0.02, (0.5, 0.0, -0.1), ((1e-4, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.1)), 9.0, 0.03, np.inf
+)
+OF_SENSORS = replace(SCALES, between_sensors=SensorScale(Scale(0.08, 3.0), {"left": LEFT}))
 
 
 @pytest.mark.parametrize("degrees_of_freedom", [1.0, 2.5, 11.0, 1e6, np.inf])
@@ -59,7 +59,21 @@ def test_what_is_predicted_must_be_known(make_model: Make, of: str, elements: fl
         make_model().predict(0.0, 0.1, 0.01, of=of, elements=elements)
 
 
-@pytest.mark.parametrize("scales", [None, SCALES])
+def test_a_known_sensor_has_its_own_law_and_another_may_have_any(make_model: Make) -> None:
+    alone, model = (replace(make_model(), scales=scales) for scales in (SCALES, OF_SENSORS))
+    np.testing.assert_allclose(
+        model.scatter(0.01)[0],
+        np.hypot(SCALES.between_grasps.quantile(0.01), Scale(0.08, 3.0).quantile(0.01)),
+        rtol=1e-12,
+    )
+    assert model.predict(0.0, 0.1, 0.01) < alone.predict(0.0, 0.1, 0.01)
+    assert model.of_sensor("right") is model
+    left = model.of_sensor("left")
+    assert left.predict(0.0, 0.1) == pytest.approx(0.49)
+    assert (left.scales, left.degrees_of_freedom, left.scale) == (SCALES, 9.0, 0.03)
+
+
+@pytest.mark.parametrize("scales", [None, SCALES, OF_SENSORS])
 def test_a_model_is_the_same_after_the_way_from_a_fit_to_a_planner_and_back(
     make_model: Make, scales: Scales | None
 ) -> None:

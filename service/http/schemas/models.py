@@ -19,6 +19,7 @@ SupportKind = Annotated[
     Field(description="What the answer rests on: the last of these that applies"),
 ]
 Advice = Annotated[str, Field(description="What to do about it, in one sentence")]
+Notes = Annotated[list[str], Field(description="What else is to be known of the model, in sentences")]
 
 CHOSEN_EXAMPLE = "hierarchical: friction may scatter between grasps, between places and within them"
 
@@ -43,6 +44,7 @@ MODEL_EXAMPLE: JsonDict = {
     "scales": None,
     "support": "supported",
     "advice": "the samples determine the expected friction to within ± 2.3%",
+    "notes": [],
 }
 
 
@@ -76,12 +78,33 @@ class ScaleOut(BaseModel):
     degrees_of_freedom: Annotated[float | None, Field(description="Of the Student-t that it scales; null: normal")]
 
 
+class SensorFrictionOut(BaseModel):
+    """Friction as one sensor shows it: what differs from the model of all of them."""
+
+    gain: Annotated[float, Field(description="By which part its friction exceeds the sensors' average")]
+    standard_error: Annotated[float, Field(description="Of the gain")]
+    coefficients: Annotated[list[float], Field(description="β₀ [-], β₁ [s/m], β₂ [1/N]")]
+    covariance: Annotated[list[list[float]], Field(description="Of the coefficients, 3×3")]
+    degrees_of_freedom: Annotated[float | None, Field(description="Of the coefficients' Student-t; null: normal")]
+    scale: Annotated[float, Field(description="σ, standard deviation of ε [-]")]
+    scatter_degrees_of_freedom: Annotated[float | None, Field(description="Of the scatter's Student-t; null: normal")]
+
+
+class SensorScaleOut(ScaleOut):
+    """How much sensors differ, and what each of them shows."""
+
+    sensors: Annotated[dict[str, SensorFrictionOut], Field(description="By name")]
+
+
 class ScalesOut(BaseModel):
     """How friction scatters."""
 
     between_grasps: Annotated[ScaleOut, Field(description="As a part of friction itself")]
     between_places: Annotated[ScaleOut, Field(description="Of one grasp, as friction [-]")]
     within: Annotated[ScaleOut, Field(description="A place, as friction [-]")]
+    between_sensors: Annotated[
+        SensorScaleOut | None, Field(description="As a part of friction itself; null: all grasps are of one sensor")
+    ] = None
 
 
 class FrictionModelOut(BaseModel):
@@ -112,12 +135,14 @@ class FrictionModelOut(BaseModel):
     ] = None
     support: SupportKind = "supported"
     advice: Advice = ""
+    notes: Notes = []
 
     @classmethod
     def of(cls, stored: StoredModel) -> "FrictionModelOut":
         """The stored model as an answer, with what it rests on at rest and in the middle of its normal forces."""
         model = to_client_model(stored)
-        return cls.model_validate({**model.to_json(), "support": model.support, "advice": model.advice})
+        told = {"support": model.support, "advice": model.advice, "notes": list(model.notes)}
+        return cls.model_validate(model.to_json() | told)
 
 
 class FrictionModelsOut(BaseModel):
@@ -243,6 +268,7 @@ class FrictionOut(BaseModel):
                     "warning": None,
                     "support": "supported",
                     "advice": "the samples determine the expected friction to within ± 3.1%",
+                    "notes": [],
                 }
             ]
         }
@@ -263,6 +289,7 @@ class FrictionOut(BaseModel):
     warning: str | None
     support: SupportKind
     advice: Advice
+    notes: Notes
 
     @classmethod
     def json_of(cls, friction: Friction) -> str:

@@ -8,7 +8,7 @@ from estimators.method_names import FitMethod
 from service.domain.look_up import Averaged
 from service.domain.plan import GraspTask
 from service.http.schemas.common import Area, Body, Force, Reference, Velocity
-from service.http.schemas.models import CHOSEN_EXAMPLE, Advice, ChosenBecause, SupportKind
+from service.http.schemas.models import CHOSEN_EXAMPLE, Advice, ChosenBecause, Notes, SupportKind
 from service.http.schemas.results import SAMPLES_EXAMPLE
 
 
@@ -78,6 +78,7 @@ class GraspForceOut(BaseModel):
                     "elements": 60.0,
                     "support": "supported",
                     "advice": "the samples determine the expected friction to within ± 3.1%",
+                    "notes": [],
                 }
             ]
         }
@@ -102,6 +103,7 @@ class GraspForceOut(BaseModel):
     elements: Annotated[float, Field(description="Over how many elements it averages out")]
     support: SupportKind
     advice: Advice
+    notes: Notes
 
 
 MOST_SAMPLES = 75_000

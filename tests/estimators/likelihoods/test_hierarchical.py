@@ -47,8 +47,7 @@ def test_the_sampled_posterior_is_the_one_on_the_grid(samples: Make, count: int)
 def test_sums_between_nodes_are_those_of_the_grasps_themselves(samples: Make) -> None:
     posterior = hierarchical(gather(grasps(samples, 5)))
     grid, rng = posterior.grid, np.random.default_rng(0)
-    log_lambda = rng.uniform(grid.log_lambda[0], grid.log_lambda[-1], 40)
-    log_rho = rng.uniform(grid.log_rho[0], grid.log_rho[-1], 40)
+    log_lambda, log_rho = (rng.uniform(axis[0], axis[-1], 40) for axis in grid.axes)
     found = posterior.products(log_lambda, log_rho)
     exact = [grid.model.products(log_lambda[[k]], log_rho[[k]]) for k in range(40)]
     away = found.log_determinant - np.array([sums.log_determinant[0] for sums in exact])

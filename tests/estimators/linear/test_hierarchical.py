@@ -11,7 +11,7 @@ import estimators
 from estimators.defaults import GRID, PRIOR, REFERENCE
 from estimators.linear import posterior_grid as grids
 from estimators.linear.fit_data import FitData, gather
-from estimators.linear.hierarchical import hierarchical, log_prior
+from estimators.linear.hierarchical import hierarchical, log_prior, log_prior_of_gains
 from estimators.linear.normal_inverse_gamma import exact_posterior
 from estimators.linear.normal_mixture import matched_student, mixture_quantile
 from estimators.linear.posterior_grid import posterior_grid
@@ -33,9 +33,10 @@ def grasp(seed: int, tau: float = 0.06, omega: float = 0.02, sigma: float = 0.03
 
 
 def dense(
-    data: FitData, about: np.ndarray, offset: float, sigma: float, tau: float, omega: float
+    data: FitData, about: np.ndarray, offset: float, scales: tuple[float, ...], kappa: float = 0.0
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """Log density of μ, and mean and covariance of β, from covariance matrices of all samples."""
+    sigma, tau, omega = scales
     seen = data.observations
     assert seen is not None
     x = np.column_stack([np.ones(len(seen)), seen.tangential_velocity, seen.normal_force])
@@ -46,6 +47,8 @@ def dense(
         off = np.where(seen.velocity_is_relative, x @ column, 0.0)
         noise += offset * np.outer(off, off)
     noise += tau**2 * (seen.grasp[:, None] == seen.grasp) * np.outer(expected, expected)
+    sensor = np.array(seen.sensors)[seen.grasp]
+    noise += kappa**2 * (sensor[:, None] == sensor) * np.outer(expected, expected)
     rows = np.diag(np.concatenate([[1.0], weak_spans(data.domain, data.element_area)]))
     rows[0] = data.mean_row()
     width = PRIOR.width * np.linalg.inv(rows)
@@ -68,14 +71,36 @@ def test_density_and_coefficients_are_those_of_the_dense_model(count: int, unkno
     ours, theirs = [], []
     for sigma, tau, omega in points:
         ratios = np.log([tau**2 / sigma**2]), np.log([omega**2 / sigma**2])
-        given = model.conditional(model.products(*ratios), *ratios, np.log([sigma]))
-        log, mean, covariance = dense(data, about, model.offset, sigma, tau, omega)
+        given = model.conditional(model.whole(model.products(*ratios)), np.stack([np.log([sigma]), *ratios]))
+        log, mean, covariance = dense(data, about, model.offset, (sigma, tau, omega))
         np.testing.assert_allclose(given.mean[0], mean, rtol=1e-8)
         np.testing.assert_allclose(given.covariance[0], covariance, rtol=1e-7, atol=1e-12)
         ours.append(given.log_density[0] - log_prior(*np.log([[sigma], [tau], [omega]]))[0])
         theirs.append(log)
     for (a, b), (c, d) in zip(pairwise(ours), pairwise(theirs), strict=True):
         np.testing.assert_allclose(a - b, c - d, rtol=1e-8, atol=1e-7)
+
+
+@pytest.mark.parametrize("unknown", [0, 2])
+def test_density_and_coefficients_of_several_sensors_are_those_of_the_dense_model(unknown: int) -> None:
+    grasps = [replace(grasp(k), velocity_is_relative=np.full(60, k < unknown)) for k in range(5)]
+    data = gather([replace(part, sensor="left" if k in {0, 2, 3} else "right") for k, part in enumerate(grasps)])
+    about = np.array([0.42, 6.0, -0.5])
+    spans = weak_spans(data.domain, data.element_area)
+    model = hierarchical(data.grasp_statistics(), exact_posterior(data), spans, data.mean_row()).centred_at(about)
+    points = [(0.03, 0.05, 0.02, 0.1), (0.02, 0.2, 0.001, 0.01), (0.05, 0.001, 0.05, 1.0), (0.03, 0.5, 0.3, 1e-4)]
+    ours, theirs = [], []
+    for sigma, tau, omega, kappa in points:
+        ratios = 2.0 * np.log(np.array([[tau], [omega], [kappa]]) / sigma)
+        whole = model.whole(model.products(ratios[0], ratios[1]), ratios[2])
+        given = model.conditional(whole, np.stack([np.log([sigma]), *ratios]))
+        log, mean, covariance = dense(data, about, model.offset, (sigma, tau, omega), kappa)
+        np.testing.assert_allclose(given.mean[0], mean, rtol=1e-8)  # of what is summed in another order
+        np.testing.assert_allclose(given.covariance[0], covariance, rtol=1e-7, atol=1e-12)
+        prior = log_prior(*np.log([[sigma], [tau], [omega]])) + log_prior_of_gains(np.log([kappa]))
+        ours.append((given.log_density - prior)[0])
+        theirs.append(log)
+    np.testing.assert_allclose(np.diff(ours), np.diff(theirs), rtol=1e-8, atol=1e-7)
 
 
 @pytest.mark.parametrize("count", [1, 4])

@@ -20,6 +20,21 @@ FREEDOM = st.none() | st.floats(1.0, 1e9)
 RANGE = st.tuples(st.floats(0.0, 1.0), st.floats(1.0, 10.0))
 SCALE = st.builds(Scale, POSITIVE, FREEDOM)
 TEXT = st.text(max_size=20)
+THREE = st.lists(NUMBERS, min_size=3, max_size=3)
+SENSOR = st.fixed_dictionaries(
+    {
+        "gain": NUMBERS,
+        "standard_error": POSITIVE,
+        "coefficients": THREE,
+        "covariance": st.lists(THREE, min_size=3, max_size=3),
+        "degrees_of_freedom": FREEDOM,
+        "scale": POSITIVE,
+        "scatter_degrees_of_freedom": FREEDOM,
+    }
+)
+SENSORS = st.fixed_dictionaries(
+    {"value": POSITIVE, "degrees_of_freedom": FREEDOM, "sensors": st.dictionaries(TEXT, SENSOR, max_size=2)}
+)
 
 
 @st.composite
@@ -41,7 +56,7 @@ def new_models(draw: st.DrawFn) -> NewModel:
         diagnostics=draw(st.dictionaries(TEXT, st.none() | NUMBERS | TEXT, max_size=3)),
         cost_seconds=draw(POSITIVE),
         monte_carlo_error=draw(POSITIVE),
-        scales=draw(st.none() | st.builds(Scales, SCALE, SCALE, SCALE)),
+        scales=draw(st.none() | st.builds(Scales, SCALE, SCALE, SCALE, st.none() | SENSORS)),
     )
 
 

@@ -32,6 +32,8 @@ def test_samples_come_back_to_the_last_bit(samples: FrictionSamples, tmp_path: P
     found = stored_results.decode_samples(path)
     assert len(samples) > 0
     for entry in fields(FrictionSamples):
+        if entry.name == "sensor":  # which the log's record has
+            continue
         stored, original = getattr(found, entry.name), getattr(samples, entry.name)
         np.testing.assert_array_equal(stored, original)
         assert np.asarray(stored).dtype == np.asarray(original).dtype

@@ -84,6 +84,8 @@ def test_what_goes_over_the_wire_has_an_example() -> None:
         "CostOut",
         "ScaleOut",
         "ScalesOut",
+        "SensorFrictionOut",
+        "SensorScaleOut",
         "RecommendedOut",
         "WithdrawalOut",
         "EventCounts",

@@ -20,8 +20,16 @@ from db.repositories import detections, friction_models, grasp_logs, jobs, mater
 from db.tables import JobRow, SampleSummaryRow
 from estimators import InvalidSamples, Moments, ScatterPrior
 from service.domain.collect_friction import collect
+from service.domain.look_up import FrictionQuery, look_up
+from service.domain.model_cache import KnownModel
 from service.domain.recommended import recommended
-from service.domain.stored_results import SAMPLE_ARRAYS, encode_samples, summarise_samples
+from service.domain.stored_results import (
+    SAMPLE_ARRAYS,
+    encode_samples,
+    summarise_samples,
+    to_client_model,
+    to_friction_model,
+)
 from service.domain.surface_change import MARK
 from service.jobs import pipeline
 from slipcore import FrictionSamples, GraspLog, forces
@@ -41,10 +49,10 @@ class Shop:
         with database.write() as session:
             self.material_id = materials.create(session, "paper", "").id
 
-    def ingest(self, content: bytes) -> tuple[str, str]:
+    def ingest(self, content: bytes, sensor: str = "s") -> tuple[str, str]:
         """A stored log of paper with its queued job."""
         sha256 = self.blobs.put(content)
-        log = NewGraspLog(sha256, len(content), "npz", "strain_rate", self.material_id, "s", 82, 2.7, (8, 8))
+        log = NewGraspLog(sha256, len(content), "npz", "strain_rate", self.material_id, sensor, 82, 2.7, (8, 8))
         with self.database.write() as session:
             log_id = grasp_logs.add(session, log)
             return log_id, jobs.add(session, "ingest", "ols", material_id=self.material_id, grasp_log_id=log_id)
@@ -122,6 +130,25 @@ def test_an_ingest_keeps_the_models_current_that_planners_ask_for(shop: Shop, co
     best = recommended(shop.material().models)
     assert best is not None
     assert (best.stored.model.method, best.stored.model.scales is None) == ("hierarchical", False)
+
+
+@pytest.mark.parametrize("most_sampled", [0, 30])
+def test_what_sensors_differ_by_is_stored_and_told(
+    shop: Shop, content: bytes, most_sampled: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pipeline, "SAMPLED_AT_INGEST", most_sampled)
+    shop.run(shop.ingest(content)[1])
+    shop.run(shop.ingest(content + b"\0", "other")[1])
+    stored = next(each for each in shop.material().models if each.model.method == "hierarchical")
+    assert stored.model.scales is not None
+    assert stored.model.scales.between_sensors is not None
+    assert set(stored.model.scales.between_sensors["sensors"]) == {"s", "other"}
+    model = to_client_model(stored)
+    assert model.of_sensor("s").scales != model.scales
+    assert len(model.notes) == 1
+    known = KnownModel(stored, to_friction_model(stored.model), "", 0.0, 0.0)
+    answer = look_up(known, FrictionQuery(0.0, 0.05, 0.01))
+    assert answer.notes == model.notes == (stored.model.diagnostics["sensor_gain"],)
 
 
 def test_an_ingest_of_many_logs_looks_at_moments_alone(
