@@ -5,13 +5,14 @@ import itertools
 import json
 import re
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import AbstractContextManager, closing
 from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import httpx
 import numpy as np
 import pytest
 
@@ -24,7 +25,6 @@ from service import exports, formats
 from service.cli import app, main, progress, streaming
 from service.cli.exit_codes import INPUT_REFUSED, INTERRUPTED, NOT_FEASIBLE, SERVICE_REFUSED
 from service.cli.output import plain
-from service.demo.server import running_server
 from service.settings import Settings
 from slipcore import GraspLog, contact, detect_slip
 from slipcore.contact import tangential_ramp
@@ -34,6 +34,7 @@ from stiction_client import FrictionClient, container
 
 WRONG_USAGE = 2
 Run = Callable[..., tuple[int, str, str]]
+Serving = Callable[[Settings], AbstractContextManager[httpx.Client]]
 ROOT = Path(__file__).parents[2]
 
 
@@ -74,9 +75,9 @@ def presses(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 
 
 @pytest.fixture(scope="module")
-def url(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    with running_server(tmp_path_factory.mktemp("service")) as address:
-        yield address
+def url(tmp_path_factory: pytest.TempPathFactory, serving: Serving) -> Iterator[str]:
+    with serving(Settings(data_folder=tmp_path_factory.mktemp("service"))) as client:
+        yield str(client.base_url)
 
 
 def command_names() -> list[str]:

@@ -3,13 +3,17 @@
 import re
 import shlex
 import shutil
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
+import httpx
 import pytest
 
 from service.cli import main
-from service.demo.server import running_server
+from service.settings import Settings
 
+Serving = Callable[[Settings], AbstractContextManager[httpx.Client]]
 ROOT = Path(__file__).parents[2]
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
 TOLERANCE = 0.05
@@ -35,12 +39,12 @@ def agree(told: str, printed: str) -> bool:
 
 
 def test_the_tutorial_goes_as_it_says(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], serving: Serving
 ) -> None:
     shutil.copytree(ROOT / "examples" / "practice", tmp_path / "examples" / "practice")
     monkeypatch.chdir(tmp_path)
-    with running_server(tmp_path / "service") as url:
-        monkeypatch.setenv("STICTION_URL", url)
+    with serving(Settings(data_folder=tmp_path / "service")) as client:
+        monkeypatch.setenv("STICTION_URL", str(client.base_url))
         for command, told in transcript():
             with pytest.raises(SystemExit):
                 main(shlex.split(command))
