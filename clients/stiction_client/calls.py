@@ -143,8 +143,7 @@ def grasp_log(log_id: str) -> Call[GraspLogReceipt]:
 
 def grasp_logs(material: str | None, limit: int) -> Call[list[GraspLogReceipt]]:
     """Ask for the newest logs."""
-    answer = yield from _get("/v1/grasp-logs", _given(material=material, limit=limit))
-    return _record(lambda record: [GraspLogReceipt.from_json(item) for item in record["items"]], answer)
+    return (yield from _listed("/v1/grasp-logs", GraspLogReceipt.from_json, limit, material=material))
 
 
 def create_material(name: str, description: str) -> Call[Material]:
@@ -300,8 +299,7 @@ def job(job_id: str) -> Call[Job]:
 
 def jobs(status: str | None, limit: int) -> Call[list[Job]]:
     """Ask for the newest jobs."""
-    answer = yield from _get("/v1/jobs", _given(status=status, limit=limit))
-    return _record(lambda record: [Job.from_json(item) for item in record["items"]], answer)
+    return (yield from _listed("/v1/jobs", Job.from_json, limit, status=status))
 
 
 def cancel(job_id: str) -> Call[Job]:

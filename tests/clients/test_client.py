@@ -495,6 +495,15 @@ def test_the_newest_logs_of_a_material_are_asked_for(ask: Ask, service: Service,
     assert dict(server.requests[0].url.params) == {"material": "paper", "limit": "1"}
 
 
+def test_more_entries_than_a_page_holds_are_asked_for_in_pages(
+    ask: Ask, service: Service, answers: SimpleNamespace
+) -> None:
+    server = service({"items": [answers.job] * 1000, "next": "more"}, {"items": [answers.job] * 200, "next": "others"})
+    assert len(ask(server, "jobs", None, 1200)) == 1200
+    asked = [dict(request.url.params) for request in server.requests]
+    assert asked == [{"limit": "1000"}, {"limit": "200", "cursor": "more"}]
+
+
 @pytest.mark.parametrize("name", ["", ".", "..", "..."])
 def test_a_name_that_leads_to_another_route_is_refused_here(ask: Ask, service: Service, name: str) -> None:
     server = service({})
