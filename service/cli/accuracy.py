@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.local import Mapping, Picture, mapping_text, refuse_inputs
+from service.cli.local import Mapping, Picture, read_log, refuse_inputs
 from service.cli.output import print_json, print_table
 from service.cli.progress import counted, shown_progress
 from service.cli.remote import DEFAULT_URL, Key, Url, connected
@@ -69,11 +69,10 @@ def _of_scene(name: str, seconds: float, seed: int) -> "WorkPrecision":
 def _of_logs(paths: list[Path], mapping: Path | None) -> "list[WorkPrecision]":
     """Of detection in the first log, and of a fit to all of them where they have slip enough."""
     from estimators import TooFewSamples
-    from service import formats
     from service.report import work_precision
     from slipcore import InvalidInput, collect_samples, detect_slip
 
-    logs = [formats.read(path, mapping=mapping_text(mapping)) for path in paths]
+    logs = [read_log(path, mapping) for path in paths]
     with shown_progress(f"detecting slip in {paths[0].name} by every method") as tell:
         found = [work_precision.of_detection(logs[0], paths[0].name, tell)]
     try:

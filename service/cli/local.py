@@ -62,9 +62,8 @@ def detect(
     picture: Picture = None,
 ) -> None:
     """Detect local slip in one grasp log and say what was seen."""
-    from service import formats
 
-    grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping), rest=rest_of(rest))
+    grasp = read_log(log, mapping, scale, frame_rate, rest)
     with shown_progress(f"looking at {log.name}"):
         seen = look(grasp, method, sensor_model, gel)
     if picture is not None:
@@ -90,9 +89,8 @@ def check(
     json: Json = False,
 ) -> None:
     """Look for what makes the friction of a grasp log doubtful, and say what to do (docs/checks.md)."""
-    from service import formats
 
-    grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping), rest=rest_of(rest))
+    grasp = read_log(log, mapping, scale, frame_rate, rest)
     with shown_progress(f"looking at {log.name}"):
         seen = look(grasp, method, sensor_model, gel)
     findings, contact = seen.findings(), _contact_record(seen.log, seen.history)
@@ -126,11 +124,10 @@ def fit(
 ) -> None:
     """Fit the stochastic linear friction model to the slip seen in one or more grasp logs."""
     from estimators import fit as fit_model
-    from service import formats
     from service.domain.doubtful_logs import with_doubts
 
     def found(path: Path) -> "tuple[FrictionSamples, list[Finding]]":
-        seen = look(formats.read(path, mapping=mapping_text(mapping)), detector, sensor_model, gel)
+        seen = look(read_log(path, mapping), detector, sensor_model, gel)
         return seen.samples(), seen.findings()
 
     seen = list(counted(map(found, logs), len(logs), "logs looked at"))
@@ -155,12 +152,11 @@ def convert(
     rest: Rest = None,
 ) -> None:
     """Write a grasp log of any format as a Stiction NPZ, Parquet or MCAP, bit for bit."""
-    from service import formats
     from service.formats import writing
 
     name = writing.format_of(output)
     refuse_inputs(output, log, mapping)
-    grasp = formats.read(log, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping), rest=rest_of(rest))
+    grasp = read_log(log, mapping, scale, frame_rate, rest)
     write_whole(output, lambda beside: writing.write(grasp, beside, name))
     typer.echo(f"{output}: {len(grasp)} frames of {grasp.grid[0]} × {grasp.grid[1]} markers")
 
@@ -181,13 +177,13 @@ def export(
     gel: GelFile = None,
 ) -> None:
     """Write grasp logs with the slip detected in them for Foxglove, Rerun or LeRobot (docs/exports.md)."""
-    from service import exports, formats
+    from service import exports
 
     target = exports.target_of(output)
     exports.check_output(output, target)
 
     def recorded(path: Path) -> exports.DetectedLog:
-        seen = look(formats.read(path, mapping=mapping_text(mapping)), method, sensor_model, gel)
+        seen = look(read_log(path, mapping), method, sensor_model, gel)
         return exports.DetectedLog(seen.log, seen.history, path.name)
 
     recordings = list(counted(map(recorded, logs), len(logs), "logs looked at"))
@@ -205,6 +201,19 @@ def refuse_inputs(output: Path, *inputs: Path | None) -> None:
             continue
         if output.samefile(path) or output.resolve().is_relative_to(path.resolve()):
             raise InvalidInput("output", f"{output}, which is read", "another file")
+
+
+def read_log(
+    path: Path,
+    mapping: Path | None = None,
+    scale: float | None = None,
+    frame_rate: float | None = None,
+    rest: str | None = None,
+) -> "GraspLog":
+    """The log in a file, by what the options of a command say about it."""
+    from service import formats
+
+    return formats.read(path, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping), rest=rest_of(rest))
 
 
 def mapping_text(path: Path | None) -> str | None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from service.cli.local import DETECTOR_HELP, FrameRate, Mapping, Rest, Scale, mapping_text, refuse_inputs, rest_of
+from service.cli.local import DETECTOR_HELP, FrameRate, Mapping, Rest, Scale, read_log, refuse_inputs
 from service.cli.remote import DEFAULT_URL, Key, Url, connected
 
 if TYPE_CHECKING:
@@ -58,11 +58,9 @@ def _of_log(
     mapping: Path | None,
     rest: str | None,
 ) -> "Report":
-    from service import formats
     from service.domain.grasp_report import report_of_log
 
-    log = formats.read(path, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping), rest=rest_of(rest))
-    return report_of_log(log, path.name, method)
+    return report_of_log(read_log(path, mapping, scale, frame_rate, rest), path.name, method)
 
 
 def _of_material(name: str, url: str, key: str | None) -> "Report":

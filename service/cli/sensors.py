@@ -8,13 +8,17 @@ from typing import Annotated, Any
 import typer
 
 from service.cli.local import Mapping as MappingFile
-from service.cli.local import mapping_text, refuse_inputs
+from service.cli.local import read_log, refuse_inputs
 from service.cli.output import print_json, print_table
 from service.cli.remote import DEFAULT_URL, Json, Key, Url, connected
 from service.formatting import interval, number
 from service.whole_files import write_whole
 
 app = typer.Typer(help="Show sensors, describe their gels, and learn their faults.", no_args_is_help=True)
+
+StoredSensor = Annotated[
+    str | None, typer.Option("--sensor", help="With --store: name of the sensor, where its logs do not give it.")
+]
 
 THICKEST = 1.0
 """m; what is thicker the service takes for a half-space."""
@@ -72,9 +76,7 @@ def calibrate(
         bool,
         typer.Option("--store", help="Send the logs to a service, which corrects the sensor's later logs by them."),
     ] = False,
-    sensor: Annotated[
-        str | None, typer.Option(help="With --store: name of the sensor, where its logs do not give it.")
-    ] = None,
+    sensor: StoredSensor = None,
     url: Url = DEFAULT_URL,
     key: Key = None,
     json: Json = False,
@@ -117,22 +119,19 @@ def calibrate_gel(
         Path | None, typer.Option("--output", "-o", help="Write the gel to this JSON, for --gel.")
     ] = None,
     store: Annotated[bool, typer.Option("--store", help="Describe the sensor's gel in a service so.")] = False,
-    sensor: Annotated[
-        str | None, typer.Option(help="With --store: name of the sensor, where its logs do not give it.")
-    ] = None,
+    sensor: StoredSensor = None,
     url: Url = DEFAULT_URL,
     key: Key = None,
     json: Json = False,
 ) -> None:
     """Learn a gel's stiffness, Poisson's ratio and thickness from presses with known forces."""
-    from service import formats
     from service.cli.progress import shown_progress
     from slipcore.forces import calibrate_gel as calibrated
 
     if output is not None:
         refuse_inputs(output, *logs, mapping)
     forces = _known_forces(known_force, len(logs))
-    presses = [formats.read(path, mapping=mapping_text(mapping)) for path in logs]
+    presses = [read_log(path, mapping) for path in logs]
     name = _sensor_name(sensor, presses[0].sensor) if store else ""
     with shown_progress("learning the gel"):
         found = calibrated(presses, forces, young_modulus, poisson_ratio, thickness, marker_depth, noise)
@@ -170,10 +169,9 @@ def _gel_cells(estimate: Mapping[str, Any]) -> tuple[str, str, str, str, str]:
 
 def _learnt(logs: list[Path], forces: list[float] | None, mapping: Path | None) -> dict[str, Any]:
     """The sensor model of presses on this machine, as JSON has it."""
-    from service import formats
     from slipcore import calibrate_sensor
 
-    return calibrate_sensor([formats.read(path, mapping=mapping_text(mapping)) for path in logs], forces).to_json()
+    return calibrate_sensor([read_log(path, mapping) for path in logs], forces).to_json()
 
 
 def _stored(

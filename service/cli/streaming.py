@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from service.cli.local import DETECTOR_HELP, FrameRate, Json, Mapping, Rest, Scale, mapping_text, rest_of
+from service.cli.local import DETECTOR_HELP, FrameRate, Json, Mapping, Rest, Scale, read_log
 from service.cli.output import print_json, print_lines
 from service.cli.remote import DEFAULT_URL, Key, Url
 from service.formatting import number
@@ -40,15 +40,12 @@ def stream(
     json: Json = False,
 ) -> None:
     """Replay a grasp log to a service in real time, as a live stream that can be watched in the dashboard."""
-    from service import formats
     from slipcore.defaults import DEFAULT_METHOD
     from slipcore.errors import InvalidInput
     from stiction_client.stream import SlipStream
 
     with _file(log) as path:
-        grasp = formats.read(
-            path, scale=scale, frame_rate=frame_rate, mapping=mapping_text(mapping), rest=rest_of(rest)
-        )
+        grasp = read_log(path, mapping, scale, frame_rate, rest)
     if grasp.displacement is None:
         raise InvalidInput("displacement", "missing", "a log with displacements: a live stream needs them")
     options: dict[str, Any] = {"sensor": grasp.sensor, "material": material, "keep": store}
