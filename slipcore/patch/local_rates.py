@@ -45,15 +45,10 @@ def _fill_rates(
 
 @compiled
 def _fill_lines(time: FloatArray, series: FloatArray, window: float, slope: FloatArray, error: FloatArray) -> None:
-    begin = first = last = 0
-    while begin < len(series):
-        first, end, reach = _stretch(time, begin, window, first, last)
-        origin, last, (sums, _) = first, end, _running_sums(time[first:reach], series[first:reach])
-        for e in range(begin, end):
-            first, last = _window(time, e, window, first, last)
-            if math.isfinite(series[e]):
-                slope[e], error[e] = _line(sums[first - origin], sums[last - origin])
-        begin = end
+    sums, _ = _sums_in_windows(time, series, window)
+    for e in range(len(series)):
+        if math.isfinite(series[e]):
+            slope[e], error[e] = _line(sums[e])
 
 
 @compiled
@@ -65,16 +60,27 @@ def _fill_means(time: FloatArray, values: FloatArray, bounds: IntArray, window: 
 
 @compiled
 def _fill_mean(time: FloatArray, series: FloatArray, window: float, mean: FloatArray) -> None:
+    sums, middle = _sums_in_windows(time, series, window)
+    for e in range(len(series)):
+        if sums[e, 0] > 0.0:
+            mean[e] = middle[e] + sums[e, 2] / sums[e, 0]
+
+
+@compiled
+def _sums_in_windows(time: FloatArray, series: FloatArray, window: float) -> tuple[FloatArray, FloatArray]:
+    """Sums [k, 6] of ``_running_sums`` over each frame's window, and the mean [k] about which its values are taken."""
+    sums, middle = np.empty((len(series), 6)), np.empty(len(series))
     begin = first = last = 0
     while begin < len(series):
         first, end, reach = _stretch(time, begin, window, first, last)
-        origin, last, (sums, middle) = first, end, _running_sums(time[first:reach], series[first:reach])
+        origin, last, (running, centre) = first, end, _running_sums(time[first:reach], series[first:reach])
         for e in range(begin, end):
             first, last = _window(time, e, window, first, last)
-            count = sums[last - origin, 0] - sums[first - origin, 0]
-            if count > 0.0:
-                mean[e] = middle + (sums[last - origin, 2] - sums[first - origin, 2]) / count
+            for column in range(6):
+                sums[e, column] = running[last - origin, column] - running[first - origin, column]
+            middle[e] = centre
         begin = end
+    return sums, middle
 
 
 @compiled
@@ -126,12 +132,12 @@ def _middle(series: FloatArray) -> float:
 
 
 @compiled
-def _line(first: FloatArray, last: FloatArray) -> tuple[float, float]:
-    """Slope of the line through what is between two of the ``_running_sums``, and its standard error."""
-    n, st, sy = last[0] - first[0], last[1] - first[1], last[2] - first[2]
+def _line(sums: FloatArray) -> tuple[float, float]:
+    """Slope of the line through what has these sums [6] (see ``_running_sums``), and its standard error."""
+    n, st, sy, stt, sty, syy = sums
     if n < _RATE_FRAMES:
         return math.nan, math.nan
-    spread = last[3] - first[3] - st * st / n
-    slope = (last[4] - first[4] - st * sy / n) / spread
-    rest = max(last[5] - first[5] - sy * sy / n - slope * slope * spread, 0.0)
+    spread = stt - st * st / n
+    slope = (sty - st * sy / n) / spread
+    rest = max(syy - sy * sy / n - slope * slope * spread, 0.0)
     return slope, math.sqrt(rest / (n - 2.0) / spread)
