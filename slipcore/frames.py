@@ -71,6 +71,9 @@ class GroundTruth:
 NONE = "none"
 """In a log's metadata, for what its sensor does not measure."""
 
+UNNAMED = "unknown"
+"""The sensor of logs that name none."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GraspLog:
@@ -97,7 +100,7 @@ class GraspLog:
     force: FloatArray | None = None
     normal: FloatArray | None = None
     object_pose: FloatArray | None = None
-    sensor: str = "unknown"
+    sensor: str = UNNAMED
     metadata: Mapping[str, str] = field(default_factory=dict)
     truth: GroundTruth | None = None
     contact: BoolArray | None = None

@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from slipcore.defaults import MARKERS
 from slipcore.errors import InvalidInput
-from slipcore.frames import BoolArray, FloatArray, GraspLog
+from slipcore.frames import UNNAMED, BoolArray, FloatArray, GraspLog
 from slipcore.surface.strain import lattice_steps
 
 
@@ -86,7 +86,7 @@ def on_lattice(
     markers: ArrayLike,
     displacement: ArrayLike,
     contact: ArrayLike | None = None,
-    sensor: str = "unknown",
+    sensor: str = UNNAMED,
     metadata: Mapping[str, str] | None = None,
 ) -> tuple[GraspLog, MarkerLattice]:
     """A grasp log of tracked dots, and the lattice that it lies on, which names each element's marker.

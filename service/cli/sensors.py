@@ -151,8 +151,10 @@ def calibrate_gel(
 
 
 def _sensor_name(given: str | None, logged: str) -> str:
+    from slipcore.frames import UNNAMED
+
     name = given or logged
-    if name == "unknown":
+    if name == UNNAMED:
         raise typer.BadParameter("--store for logs that name no sensor; needed: --sensor")
     return name
 

@@ -15,6 +15,7 @@ from service.domain.changes import record
 from service.domain.context import Context
 from service.domain.errors import FileDeleted, InsufficientScope, InvalidValue
 from service.domain.principal import Principal
+from service.domain.sensors import check_name
 from slipcore.errors import SlipcoreError
 
 if TYPE_CHECKING:
@@ -117,13 +118,20 @@ def _check_right(known_version: int | None, principal: Principal) -> None:
 
 
 def _hashes(context: Context, sensor: str, presses: Sequence[CalibrationPress], principal: Principal) -> list[str]:
-    """Of the logs; each must be of this sensor, and they must not be too much together."""
+    """Of the logs, each of which is one of this sensor's, is not withdrawn and counts once; together not too much."""
+    check_name(sensor)
     with context.database.read() as session:
         _check_right(sensors.get(session, sensor).calibration, principal)
         logs = [grasp_logs.get(session, press.grasp_log) for press in presses]
+    first_of: dict[str, str] = {}
     for log in logs:
         if log.sensor != sensor:
             raise InvalidValue("grasp_log", f"{log.id}, of sensor {log.sensor}", f"a log of sensor {sensor}")
+        if log.withdrawal is not None:
+            raise InvalidValue("grasp_log", f"{log.id}, withdrawn", "a log that is not withdrawn")
+        if log.sha256 in first_of:
+            raise InvalidValue("grasp_log", f"{log.id}, with the content of {first_of[log.sha256]}", "each press once")
+        first_of[log.sha256] = log.id
         if not log.has_file:
             raise FileDeleted(f"the file of grasp log {log.id} was deleted, as old uploads are here")
     elements = sum(log.frames * log.grid[0] * log.grid[1] for log in logs)

@@ -7,8 +7,15 @@ from db.repositories import sensors
 from service.domain import quotas
 from service.domain.changes import record
 from service.domain.context import Context
-from service.domain.errors import InsufficientScope
+from service.domain.errors import InsufficientScope, InvalidValue
 from service.domain.principal import Principal
+from slipcore.frames import UNNAMED
+
+NAMELESS = (UNNAMED, "stream")
+"""Sensors of logs and streams that name none: any sensor's may be among them."""
+
+CALIBRATIONS = "/calibrations"
+"""What follows a sensor's name where its calibrations are asked for."""
 
 
 def find(context: Context, name: str) -> Sensor:
@@ -21,8 +28,9 @@ def describe(context: Context, name: str, gel: Gel, principal: Principal) -> Sen
     """Store the mechanics of a sensor's gel: forces of logs that come in from then on follow from it.
 
     All keys' logs of that sensor do: whoever may upload may describe it once, and only admins otherwise. Raises
-    ``InsufficientScope``, and ``QuotaExceeded`` for a key that has changed as much as it may.
+    ``InvalidValue``, ``InsufficientScope``, and ``QuotaExceeded`` for a key that has changed as much as it may.
     """
+    check_name(name)
     with context.database.write() as session:
         known = sensors.hold(session, name)
         if known.gel == gel:
@@ -32,3 +40,14 @@ def describe(context: Context, name: str, gel: Gel, principal: Principal) -> Sen
         quotas.check_change(session, context.settings, principal.key_id)
         record(session, principal, "sensor.described", name, asdict(gel))
         return sensors.describe(session, name, gel)
+
+
+def check_name(name: str) -> None:
+    """Raises ``InvalidValue`` for a name of which not one sensor alone can be described or calibrated."""
+    if name in NAMELESS:
+        allowed = (
+            "a name of one sensor, which its uploads and streams give by `sensor`; logs without one share this name"
+        )
+        raise InvalidValue("sensor", repr(name), allowed)
+    if name.endswith(CALIBRATIONS) or f"{CALIBRATIONS}/" in name:
+        raise InvalidValue("sensor", repr(name), f"a name without {CALIBRATIONS}, where calibrations are found")

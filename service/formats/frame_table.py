@@ -78,10 +78,21 @@ class _Table:
             return None
         found: NDArray[Any] = self._values[:, places if ANY_NUMBER in field else places[0]]
         if self._order is not None:
-            found = found[self._order[:, 0] if name in OF_FRAMES else self._order]
+            found = found[self._order]
+            found = self._one_a_frame(name, found) if name in OF_FRAMES else found
         if name in MASKS and np.isin(found, (0.0, 1.0)).all():
             found = found == 1.0
         return found[0] if once else found
+
+    @staticmethod
+    def _one_a_frame(name: str, found: NDArray[Any]) -> NDArray[Any]:
+        """What all rows of a frame state alike, of ``found`` [t, e, ...]."""
+        other = np.argwhere(found != found[:, :1])
+        if len(other):
+            frame, row, *component = other[0]
+            values = f"{found[frame, 0, *component]:g} and {found[frame, row, *component]:g} in rows of frame {frame}"
+            raise InvalidInput(name, values, "one value in all rows of a frame")
+        return np.asarray(found[:, 0])
 
     def grid(self) -> None:
         """Given by the mapping alone."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from service.formats.json_text import parse
 from slipcore.errors import InvalidInput
-from slipcore.frames import FrictionLaw, GraspLog, GroundTruth
+from slipcore.frames import UNNAMED, FrictionLaw, GraspLog, GroundTruth
 
 Members = Mapping[str, NDArray[Any]]
 
@@ -52,7 +52,7 @@ def grasp_log(members: Members) -> GraspLog:
         force=members.get("force"),
         normal=members.get("normal"),
         object_pose=members.get("object_pose"),
-        sensor=_scalar_or(members, "sensor", "unknown"),
+        sensor=_scalar_or(members, "sensor", UNNAMED),
         metadata=told_metadata(members),
         truth=_truth(members),
         contact=members.get("contact"),

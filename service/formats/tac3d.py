@@ -12,7 +12,7 @@ from service.formats.archive import open_archive, read_member
 from service.formats.lattice import element_area
 from service.formats.npy import MAX_ARRAY_BYTES, read_array
 from slipcore.errors import InvalidInput
-from slipcore.frames import FloatArray, GraspLog
+from slipcore.frames import UNNAMED, FloatArray, GraspLog
 
 REQUIRED = ("3D_Positions", "3D_Displacements", "index", "sendTimestamp")
 OPTIONAL = ("3D_Forces", "3D_Normals")
@@ -77,7 +77,7 @@ def _from_zip(path: Path) -> tuple[str, Fields]:
             )
         fields = {member.stem: read_member(archive, str(member), member.stem) for member in wanted}
     name = PurePosixPath(folders[0]).name if folders else ""
-    return name or "unknown", fields
+    return name or UNNAMED, fields
 
 
 def _lattice(name: str, array: NDArray[Any]) -> FloatArray:

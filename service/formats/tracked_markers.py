@@ -16,7 +16,7 @@ from service.formats.delimited import parse_number, rows, split_header, text_lin
 from service.formats.npy import MAX_ARRAY_BYTES
 from slipcore.defaults import LIMITS
 from slipcore.errors import InvalidInput
-from slipcore.frames import BoolArray, FloatArray, GraspLog
+from slipcore.frames import UNNAMED, BoolArray, FloatArray, GraspLog
 
 ALIASES = {
     "time": "time", "frame": "frame", "marker": "marker", "particle": "marker", "id": "marker", "track_id": "marker",
@@ -300,7 +300,7 @@ def _grasp_log(
         scale * at,
         scale * (place - at),
         None if contact is None else contact[:, known],
-        settings.get("sensor", "unknown"),
+        settings.get("sensor", UNNAMED),
         metadata,
     )
     if tracks.force is not None:  # an element without a marker of its own bears none, or a force would count twice

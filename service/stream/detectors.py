@@ -23,7 +23,7 @@ from service.stream.live_frame import pack_frame
 from service.stream.messages import Control
 from service.stream.reconstructing import Reconstructing
 from slipcore import Frame, FrictionSamples, GraspLog, InvalidInput, SlipState, collect_samples
-from slipcore.frames import check_displacement, check_gripper_report, check_span
+from slipcore.frames import UNNAMED, check_displacement, check_gripper_report, check_span
 from stiction_client import container
 
 if TYPE_CHECKING:
@@ -389,7 +389,7 @@ def _log(session: DetectorSession, frames: Sequence[Frame], sensor: str, metadat
         force=stacked("force"),
         object_pose=stacked("object_pose"),
         normal=stacked("normal"),
-        sensor=sensor or "unknown",
+        sensor=sensor or UNNAMED,
         metadata=metadata,
     )
 

@@ -47,8 +47,16 @@ def _check_alike(logs: Sequence[GraspLog]) -> None:
         values = sorted({str(getattr(log, name)) for log in logs})
         if len(values) > 1:
             raise InvalidInput("logs", f"of several {name}s: {', '.join(values)}", "one sensor at a time")
+    for number, log in enumerate(logs):
+        same = next((k for k in range(number) if _is_same(log, logs[k])), None)
+        if same is not None:
+            raise InvalidInput("logs", f"number {number}, the same press as {same}", "each press once")
     if not all(log.is_scaled for log in logs):
         raise UnknownScale("a sensor is calibrated in metres, and the scale of a log is unknown")
+
+
+def _is_same(log: GraspLog, other: GraspLog) -> bool:
+    return np.array_equal(log.time, other.time) and np.array_equal(log.displacement, other.displacement)
 
 
 def _estimates(presses: list[PressLog], known_force: Sequence[float | None]) -> list[Estimate]:

@@ -249,6 +249,22 @@ def test_a_missing_row_or_column_of_a_long_table_is_refused_by_name(tmp_path: Pa
         formats.read(path, mapping=json.dumps(LONG | {"element": "id"}))
 
 
+def test_rows_of_a_frame_state_its_gripper_force_alike(tmp_path: Path) -> None:
+    """That of the lowest element had been taken."""
+    path, _ = long_table(tmp_path / "log.csv")
+    header, *rows = path.read_text(encoding="utf-8").splitlines()
+    mapping = json.dumps(LONG | {"gripper_force": "grip"})
+
+    def read(rise: float) -> GraspLog:
+        stated = [f"{row};{3.0 + rise * (float(row.split(';')[0]) - 10.0)}" for row in rows]
+        path.write_text("\n".join([f"{header};grip", *stated]), encoding="utf-8")
+        return formats.read(path, mapping=mapping)
+
+    np.testing.assert_array_equal(read(0.0).gripper_force, 3.0)
+    with pytest.raises(InvalidInput, match=r"gripper_force is 3 and 3\.5 in rows of frame 0; allowed: one value in"):
+        read(0.5)
+
+
 def test_a_component_without_columns_is_named(tmp_path: Path) -> None:
     path = written(tmp_path / "log.csv", columns(np.random.default_rng(1)))
     with pytest.raises(InvalidInput, match=r"force is not there \(P\*_FN\); allowed: the columns T_us, P0_DX"):

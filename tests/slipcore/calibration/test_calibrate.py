@@ -241,6 +241,8 @@ def test_logs_that_do_not_belong_together_are_refused(ball: GraspLog) -> None:
         calibrate_sensor([])
     with pytest.raises(InvalidInput, match="one sensor at a time"):
         calibrate_sensor([ball, replace(ball, sensor="another")])
+    with pytest.raises(InvalidInput, match="logs is number 1, the same press as 0; allowed: each press once"):
+        calibrate_sensor([ball, replace(ball, metadata={"copy": "yes"})])
     with pytest.raises(InvalidInput, match="one for each of 1 logs"):
         calibrate_sensor([ball], [1.0, 2.0])
     with pytest.raises(InvalidInput, match="1e-06 to 10000 N"):

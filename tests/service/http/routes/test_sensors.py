@@ -16,8 +16,11 @@ from db.repositories import calibrations, detections, jobs, materials, runners, 
 from db.tables import DetectionRow
 from service.domain.calibrate import OFFSET, corrected
 from service.domain.reconstruct import RECONSTRUCTED
+from service.domain.sensors import NAMELESS
 from service.jobs import pipeline
-from slipcore import GraspLog, calibrate_sensor
+from service.stream import messages
+from slipcore import GraspLog, calibrate_sensor, frames
+from slipcore.defaults import METHOD_NAMES
 from stiction_client import FrictionClient, calls
 from stiction_client.container import encode
 
@@ -77,6 +80,34 @@ def test_a_list_of_sensors_comes_in_parts(client: httpx.Client, monkeypatch: pyt
 def test_an_impossible_gel_is_refused(client: httpx.Client, change: dict[str, Any]) -> None:
     refused = client.put("/v1/sensors/other", json=GEL | change)
     assert (refused.status_code, refused.json()["type"]) == (422, "/problems/invalid-request")
+
+
+@pytest.mark.parametrize("name", [*NAMELESS, "x/calibrations", "x/calibrations/3"])
+def test_a_name_that_is_not_one_sensors_is_not_described(client: httpx.Client, name: str) -> None:
+    """All logs that name none would be reconstructed, or corrected, by one sensor's gel or faults."""
+    refused = client.put(f"/v1/sensors/{name}", json=GEL)
+    assert (refused.status_code, refused.json()["type"]) == (422, "/problems/invalid-request")
+    assert refused.json()["detail"].startswith(f"sensor is {name!r}; allowed: a name ")
+
+
+def test_logs_that_name_no_sensor_calibrate_none(client: httpx.Client, ball: GraspLog, upload: Any) -> None:
+    log = upload(client, encode(FAULTS.put_into(ball, 14)), sensor=frames.UNNAMED).raise_for_status().json()["id"]
+    refused = client.post(f"/v1/sensors/{frames.UNNAMED}/calibrations", json={"presses": [{"grasp_log": log}]})
+    assert refused.json()["detail"].startswith("sensor is 'unknown'; allowed: a name of one sensor")
+    assert messages.UNNAMED in NAMELESS
+
+
+def test_each_press_counts_once_and_withdrawn_ones_do_not(client: httpx.Client, ball: GraspLog, upload: Any) -> None:
+    """The intervals of one press that was named 32 times were narrower by a factor of five."""
+    content = encode(FAULTS.put_into(ball, 15))
+    first, same = (upload(client, content, sensor="one", detector=each).json()["id"] for each in METHOD_NAMES[:2])
+    path = "/v1/sensors/one/calibrations"
+    for logs in ((first, first), (first, same)):
+        refused = client.post(path, json={"presses": [{"grasp_log": log} for log in logs]})
+        assert f"{logs[1]}, with the content of {first}; allowed: each press once" in refused.json()["detail"]
+    client.put(f"/v1/grasp-logs/{same}/withdrawal", json={"reason": "wet"}).raise_for_status()
+    refused = client.post(path, json={"presses": [{"grasp_log": same}]})
+    assert f"{same}, withdrawn; allowed: a log that is not withdrawn" in refused.json()["detail"]
 
 
 def test_one_key_describes_a_sensor_for_all_and_only_an_admin_does_so_again(
