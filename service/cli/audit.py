@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from service.cli.output import print_json, print_table, when
-from service.cli.remote import DEFAULT_URL, Json, Key, Url, connected
+from service.cli.remote import DEFAULT_URL, Json, Key, Limit, Url, connected
 
 COLUMNS = ("at", "actor", "address", "action", "subject", "details")
 
@@ -16,7 +16,7 @@ def audit(
     actor: Annotated[str | None, typer.Option(help="Only what it did, such as key:3f9c2a7b51de.")] = None,
     action: Annotated[str | None, typer.Option(help="Only this, such as grasp_log.withdrawn.")] = None,
     subject: Annotated[str | None, typer.Option(help="Only what was done to this material, log, job or key.")] = None,
-    limit: Annotated[int, typer.Option(min=1, help="So many at most.")] = 20,
+    limit: Limit = 20,
     url: Url = DEFAULT_URL,
     key: Key = None,
     json: Json = False,

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from service.cli.output import print_json, print_table, when
-from service.cli.remote import DEFAULT_URL, Json, Key, Url, connected
+from service.cli.remote import DEFAULT_URL, Json, Key, Limit, Url, connected
 
 app = typer.Typer(help="Look at the jobs of a service, and cancel them.", no_args_is_help=True)
 COLUMNS = ("id", "kind", "status", "stage", "material", "reason", "created_at")
@@ -17,7 +17,7 @@ def list_jobs(
     status: Annotated[
         str | None, typer.Option(help="Only queued, running, done, failed, refused or cancelled ones.")
     ] = None,
-    limit: Annotated[int, typer.Option(min=1, help="So many at most.")] = 20,
+    limit: Limit = 20,
     url: Url = DEFAULT_URL,
     key: Key = None,
     json: Json = False,

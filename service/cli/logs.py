@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from service.cli.output import print_json, print_lines, print_table, when
-from service.cli.remote import DEFAULT_URL, Json, Key, Url, connected
+from service.cli.remote import DEFAULT_URL, Json, Key, Limit, Url, connected
 from service.formatting import number, size
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ LogId = Annotated[str, typer.Argument(metavar="ID", help="The log's id, as `uplo
 @app.command("list")
 def list_logs(
     material: Annotated[str | None, typer.Option(help="Only those of this material.")] = None,
-    limit: Annotated[int, typer.Option(min=1, help="So many at most.")] = 20,
+    limit: Limit = 20,
     url: Url = DEFAULT_URL,
     key: Key = None,
     json: Json = False,

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 Url = Annotated[str, typer.Option("--url", envvar="STICTION_URL", help="Address of the service.")]
 Key = Annotated[str | None, typer.Option("--key", envvar="STICTION_KEY", help="Access key, where the service asks.")]
+Limit = Annotated[int, typer.Option("--limit", min=1, help="So many at most.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
 MaterialName = Annotated[str, typer.Argument(help="Name of a material.")]
 Method = Annotated[
