@@ -4,10 +4,11 @@ Presses whose forces are known (benchmarks/gel_scenes.py) are seen by simulated 
 alone, in several draws of noise. Each factor is varied against one case (20 × 20 markers on the surface of a layer of
 5 mm, ν 0.49, a sphere, 1 µm of noise): gel and noise, contact, depth of the markers, lattice, and the gel's
 description, which is then wrong. It is also learnt from presses (benchmarks/gel_presses.py), frames are followed as
-they come (benchmarks/gel_stream.py), and grasps are taken to friction and slip with the gripper's force alone
-(benchmarks/gel_friction.py). In the plane the normal force on a half-space is given. Peers are given the same
-displacements. Errors are those of resultants, of the field of forces on elements, and their growth with noise; how
-often stated intervals of 95 % hold the truth is told for each group.
+they come (benchmarks/gel_stream.py), displacement is cut at the end of a range (benchmarks/gel_saturation.py), and
+grasps are taken to friction and slip with the gripper's force alone (benchmarks/gel_friction.py). In the plane the
+normal force on a half-space is given. Peers are given the same displacements. Errors are those of resultants, of the
+field of forces on elements, and their growth with noise; how often stated intervals of 95 % hold the truth is reported
+for each group.
 
 `--export FOLDER` writes the cases on which peers are tried as `.npz`; `--external NAME=FOLDER` scores what another
 method made of them: files of the same names, with `force` [t, n, m, 3] N. Writes forces-GROUP.json, prints a
@@ -30,7 +31,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.ndimage import uniform_filter
 
-from benchmarks import gel_friction, gel_presses, gel_stream
+from benchmarks import gel_friction, gel_presses, gel_saturation, gel_stream
 from benchmarks.gel_peers import PEERS, export, imported, made
 from benchmarks.gel_presses import calibrated, calibration_table
 from benchmarks.gel_scenes import CONTACTS, LATTICES, Truth, press, repeated, seen
@@ -56,6 +57,7 @@ NORMAL_95 = 1.959964
 STICTION = "stiction"
 GROUPS = ("gel and noise", "contact", "marker depth", "lattice", "wrong description")
 PEERS_GROUP, CALIBRATION_GROUP, STREAM_GROUP, FRICTION_GROUP = "peers", "gel calibration", "stream", "friction"
+SATURATION_GROUP = "saturation"
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,6 +316,14 @@ def follow(arguments: argparse.Namespace) -> None:
     write([asdict(each) for each in found], {STREAM_GROUP: text}, arguments, "forces-stream.json")
 
 
+def saturate(arguments: argparse.Namespace) -> None:
+    """Displacement at the end of a sensor's range."""
+    found = gel_saturation.detections()
+    text = gel_saturation.detection_table(found)
+    print(f"{SATURATION_GROUP}\n\n{text}\n", flush=True)
+    write([asdict(each) for each in found], {SATURATION_GROUP: text}, arguments, "forces-saturation.json")
+
+
 def grip(arguments: argparse.Namespace) -> None:
     """Grasps to friction and slip, each taking seconds; lines of forces-friction.jsonl are not made again."""
     pictures = picture_folder(arguments)
@@ -330,7 +340,7 @@ def main() -> None:
     """Measure, print and write, group by group."""
     parser = options(__doc__)
     parser.add_argument("--draws", type=int, default=5, help="of noise, for each frame")
-    alone = {CALIBRATION_GROUP: calibrate, STREAM_GROUP: follow, FRICTION_GROUP: grip}
+    alone = {CALIBRATION_GROUP: calibrate, STREAM_GROUP: follow, SATURATION_GROUP: saturate, FRICTION_GROUP: grip}
     every = (*GROUPS, PEERS_GROUP, *alone)
     parser.add_argument("--only", nargs="+", choices=every, default=every)
     parser.add_argument("--seeds", nargs=2, type=int, default=(40, 20), help="of friction: with depth, in the plane")

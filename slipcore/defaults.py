@@ -143,6 +143,30 @@ class MarkerDefaults(Options):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class SaturationDefaults(Options):
+    """When the largest of all readings is the end of a sensor's range (``saturation.py``)."""
+
+    elements: Annotated[int, Option(2, 1000, "elements", "tuning presses")] = 3
+    """That must show the largest reading at once."""
+    equal: Annotated[float, Option(0.0, 1e-3, "-", "rounding, where a place at rest was taken from each reading")] = (
+        1e-9
+    )
+    """By which share readings of the same digits may differ."""
+    compared: Annotated[float, Option(0.0, 1.0, "-", "noise about 0 tells nothing of the digits")] = 0.1
+    """Of the largest reading, above which others tell whether readings repeat anyhow."""
+    least_others: Annotated[int, Option(2, 1000, "readings", "fewer may be distinct by chance")] = 10
+    """Of them, to tell so."""
+    distinct: Annotated[float, Option(0.0, 1.0, "-", "by symmetry at least half are equal")] = 0.9
+    """Share of them that differ from each other, from which readings never repeat by rounding or symmetry."""
+    ring: Annotated[int, Option(1, 100, "elements", "beside the plateau, where the gel moves as under it")] = 1
+    """Around a plateau of rounded readings, which must move on while the plateau stays."""
+    growth: Annotated[float, Option(0.0, 1.0, "-", "tuning presses")] = 0.15
+    """Share of its largest by which that must change."""
+    steps: Annotated[float, Option(1.0, 100.0, "steps", "tuning presses")] = 3.0
+    """Of rounding, by which the plateau's readings would have changed as well."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PatchDefaults(Options):
     """What no user needs to choose of contact patches (``patch/``)."""
 
@@ -196,9 +220,10 @@ NOISE = NoiseDefaults()
 SMOOTHING = SmoothingDefaults()
 NUMERICS = NumericsDefaults()
 MARKERS = MarkerDefaults()
+SATURATION = SaturationDefaults()
 PATCHES = PatchDefaults()
 COLLECTION = CollectionDefaults()
-TABLES = (NOISE, SMOOTHING, NUMERICS, MARKERS, PATCHES, COLLECTION)
+TABLES = (NOISE, SMOOTHING, NUMERICS, MARKERS, SATURATION, PATCHES, COLLECTION)
 """What is not an option of a method."""
 
 

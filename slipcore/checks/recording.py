@@ -6,6 +6,7 @@ import numpy as np
 
 from slipcore.checks.subject import Subject
 from slipcore.finding import Finding
+from slipcore.saturation import saturated
 
 
 def time_unit(seen: Subject) -> Iterator[Finding]:
@@ -72,14 +73,17 @@ def force_sign(seen: Subject) -> Iterator[Finding]:
 
 def saturation(seen: Subject) -> Iterator[Finding]:
     """Readings at the end of their range."""
-    for name, field in (("displacement", seen.log.displacement), ("force", seen.log.force)):
+    measured = None if seen.log.metadata.get("force") == "reconstructed" else seen.log.force
+    contact = seen.history.contact
+    touched = int(np.count_nonzero(contact.any(axis=0)))
+    for name, field in (("displacement", seen.log.displacement), ("force", measured)):
         if field is None or not field.any():
             continue
-        size, contact = np.abs(field).max(axis=-1), seen.history.contact
-        at_most = ((size == size.max(where=contact, initial=0.0)) & contact).any(axis=0)
-        ended, touched = int(np.count_nonzero(at_most)), int(np.count_nonzero(contact.any(axis=0)))
+        at_end = saturated(field, seen.log.observed) & contact[..., None]
+        ended = int(np.count_nonzero(at_end.any(axis=(0, 3))))
         if ended > max(seen.limits.symmetric, seen.limits.saturated_share * touched):
-            evidence = f"{ended} of the {touched} elements that touch reach the largest {name}, to the last digit"
+            axes = " and ".join(axis for k, axis in enumerate("xyz") if at_end[..., k].any())
+            evidence = f"{ended} of the {touched} elements that touch reach the largest {name} along {axes}"
             yield Finding("saturation", evidence, "press less, or choose a wider range of the sensor")
 
 

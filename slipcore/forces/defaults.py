@@ -148,7 +148,7 @@ class ReconstructionDefaults(Options):
     step_error: Annotated[float, Option(0.0, 1.0, "-", "an ellipse, a cone and a block on 4 mm")] = 0.05
     """The same of an element's force, as a share of its range among the element and those around it."""
     step_error_in_plane: Annotated[float, Option(0.0, 1.0, "-", "an ellipse, a cone and a block on 4 mm")] = 0.25
-    """The same of a normal force where markers are seen in the plane alone: contacts that explain the displacement
+    """The same of a normal force whose marker is seen in the plane alone: contacts that explain the displacement
     alike differ so much at their rims."""
     force_tolerance: Annotated[float, Option(1e-6, 1.0, "-", "usual of force sensors")] = 0.01
     """Standard deviation of a given total force, as a share of it, and of this share of the largest given one."""

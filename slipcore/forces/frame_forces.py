@@ -37,7 +37,8 @@ class Reader:
     """Reads forces from frames by one ``key``'s fit.
 
     ``response`` [m, 3 j] of what is observed and ``elements`` [e, j] N of the j nodes in contact; before any misfit,
-    ``deviation`` [3, e] N of elements' forces, and ``total`` [3] N of the resultant.
+    ``deviation`` [3, e] N of elements' forces, and ``total`` [3] N of the resultant; ``depth_seen`` [e]: whether their
+    markers' z was.
     """
 
     sensor: SensorResponse
@@ -46,6 +47,7 @@ class Reader:
     elements: FloatArray
     deviation: FloatArray
     total: FloatArray
+    depth_seen: BoolArray
 
     @classmethod
     def of(cls, sensor: SensorResponse, key: Key) -> "Reader":
@@ -54,7 +56,8 @@ class Reader:
         response = observation.response[:, :, support].reshape(len(observation.noise), -1)
         elements = sensor.elements[:, support]
         total = sensor.load * key.fit.deviation(np.ones((1, elements.shape[1])))[:, 0]
-        return cls(sensor, key, response, elements, key.fit.deviation(elements), total)
+        depth_seen = sensor.depth_seen(observation)
+        return cls(sensor, key, response, elements, key.fit.deviation(elements), total, depth_seen)
 
     @property
     def given(self) -> bool:
@@ -77,7 +80,7 @@ class Reader:
         of_all = RECONSTRUCTION.resultant_error * np.linalg.norm(resultant)
         return FrameForces(
             force,
-            np.hypot(spread, _step_error(force, in_plane=not sensor.sees_depth)),
+            np.hypot(spread, _step_error(force, self.depth_seen.reshape(grid))),
             resultant,
             np.hypot(misfit * self.total, of_all),
             _touching(-force[..., 2], spread[..., 2]) & covered,
@@ -97,10 +100,11 @@ def _touching(normal: FloatArray, deviation: FloatArray) -> BoolArray:
     return np.asarray(normal > np.maximum(RECONSTRUCTION.element_significance * deviation, least))
 
 
-def _step_error(force: FloatArray, in_plane: bool) -> FloatArray:
-    """Standard deviation [n, m, 3] of what bilinear tractions and the contact leave wrong where force steps."""
-    share = np.full(3, RECONSTRUCTION.step_error)
-    if in_plane:
-        share[2] = RECONSTRUCTION.step_error_in_plane
+def _step_error(force: FloatArray, depth_seen: BoolArray) -> FloatArray:
+    """Standard deviation [n, m, 3] of what bilinear tractions and the contact leave wrong where force steps, more of
+    normal forces where z was not seen.
+    """
+    share = np.full(force.shape, RECONSTRUCTION.step_error)
+    share[~depth_seen, 2] = RECONSTRUCTION.step_error_in_plane
     around = 3, 3, 1
     return np.asarray(share * (maximum_filter(force, around) - minimum_filter(force, around)))

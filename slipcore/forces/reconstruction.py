@@ -29,7 +29,8 @@ class Reconstruction:
     singular value of the markers' response to traction on the contact (all three at the frame that moved markers most;
     NaN and no information without contact); ``noise`` m of a marker's coordinate that was assumed; ``given`` [t, 3]
     says which components of the resultant were known from elsewhere, and so count among data, and ``contradiction``
-    [t, 3] by how many standard deviations they differ from what is found where something touches (else NaN).
+    [t, 3] by how many standard deviations they differ from what is found where something touches (else NaN);
+    ``saturated`` [t, n, m, 3]: displacements at the end of the sensor's range, taken as not seen.
     """
 
     force: FloatArray
@@ -43,6 +44,7 @@ class Reconstruction:
     noise: float
     given: BoolArray
     contradiction: FloatArray
+    saturated: BoolArray
 
     @property
     def contradicted(self) -> float:
@@ -78,7 +80,7 @@ def reconstruct(
     of the object on the sensor, NaN where unknown, and its standard ``total_force_deviation`` N (None: 1 % of it);
     without it the log's own ``gripper_force`` is taken where it is above 0. ``noise`` m of a marker's coordinate (None:
     estimated from the log); ``criterion`` that chooses the strength of the prior. Markers whose z never changes count
-    as seen in the plane only.
+    as seen in the plane only, and displacements at the end of the sensor's range as not seen along that axis.
     Raises ``UnknownScale`` for a log not in metres and ``InvalidInput`` for what does not fit.
     """
     shown = DisplacementData.of(log, noise)
@@ -90,7 +92,7 @@ def reconstruct(
     known = KnownForce.of(total_force, total_force_deviation, len(log))
     known.check(name, gel, log.element_area * math.prod(log.grid))
     recording = _Recording(sensor, shown, known)
-    result = _no_forces(log, shown.noise, known.given)
+    result = _no_forces(log, shown, known.given)
     touched, strongest = shown.touched(), shown.strongest()
     if not touched.any():
         return result
@@ -128,7 +130,7 @@ class _Recording:
         return self.sensor.observation(spread, self.known[t]), self.sensor.data(data, self.known[t])
 
 
-def _no_forces(log: GraspLog, noise: float, given: BoolArray) -> Reconstruction:
+def _no_forces(log: GraspLog, shown: DisplacementData, given: BoolArray) -> Reconstruction:
     """Forces of zero, to be written to."""
     shape = log.displacement.shape
     return Reconstruction(
@@ -140,9 +142,10 @@ def _no_forces(log: GraspLog, noise: float, given: BoolArray) -> Reconstruction:
         kernel_width=float("nan"),
         information=np.zeros(3),
         condition=float("nan"),
-        noise=noise,
+        noise=shown.noise,
         given=given,
         contradiction=np.full((len(log), 3), np.nan),
+        saturated=shown.saturated,
     )
 
 

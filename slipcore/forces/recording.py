@@ -1,24 +1,28 @@
 """What a log shows of its markers: displacements as rows of data, which of them were seen, and their noise."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slipcore.errors import InvalidInput, UnknownScale
 from slipcore.forces.defaults import RECONSTRUCTION
 from slipcore.frames import BoolArray, FloatArray, GraspLog
+from slipcore.saturation import saturated
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DisplacementData:
     """Displacements ``data`` [t, m] m along the ``axes`` that are seen, one after the other, z into the gel; which are
-    ``seen`` [t, m]; and the ``noise`` m of each.
+    ``seen`` [t, m]; the ``noise`` m of each; and which of the log's [t, n, m, 3] are ``saturated``, and so not seen.
     """
 
     data: FloatArray
     seen: BoolArray
     axes: tuple[int, ...]
     noise: float
+    saturated: BoolArray
 
     @classmethod
     def of(cls, log: GraspLog, noise: float | None) -> "DisplacementData":
@@ -28,11 +32,12 @@ class DisplacementData:
         if not log.is_scaled:
             raise UnknownScale("forces follow from displacement in m, and the log's scale is unknown")
         axes = axes_seen(log.displacement)
-        data, seen = rows(log.displacement, log.observed, axes)
         if noise is None:
-            return cls(data, seen, axes, noise_of(log.time, log.displacement))
+            noise = noise_of(log.time, log.displacement)
         check_noise(noise)
-        return cls(data, seen, axes, noise)
+        data, seen = rows(log.displacement, log.observed, axes)
+        at_end = saturated(log.displacement, log.observed)
+        return cls(data, seen & ~_by_axis(at_end, axes), axes, noise, at_end)
 
     def touched(self) -> BoolArray:
         """Frames [t] in which markers moved by more than noise."""
@@ -50,9 +55,14 @@ def axes_seen(displacement: FloatArray) -> tuple[int, ...]:
 
 def rows(displacement: FloatArray, observed: BoolArray | None, axes: tuple[int, ...]) -> tuple[FloatArray, BoolArray]:
     """Data [t, m] m of displacements [t, n, m, 3] along some axes, z into the gel, and which of them were seen."""
-    inwards = np.moveaxis(displacement * [1.0, 1.0, -1.0], -1, 1)[:, list(axes)]
-    seen = np.ones(inwards.shape, bool) if observed is None else observed[:, None] & (inwards == inwards)
-    return inwards.reshape(len(inwards), -1), seen.reshape(len(inwards), -1)
+    data = _by_axis(displacement * [1.0, 1.0, -1.0], axes)
+    known = np.ones(displacement.shape[:3], bool) if observed is None else observed
+    return data, _by_axis(np.broadcast_to(known[..., None], displacement.shape), axes)
+
+
+def _by_axis(field: NDArray[Any], axes: tuple[int, ...]) -> NDArray[Any]:
+    """Rows [t, m] of a field [t, n, m, 3], one axis after the other."""
+    return np.moveaxis(field, -1, 1)[:, list(axes)].reshape(len(field), -1)
 
 
 def moved(data: FloatArray, seen: BoolArray, noise: float) -> BoolArray:

@@ -9,7 +9,7 @@ from slipcore.forces.gel import Gel
 from slipcore.forces.known import KnownForce
 from slipcore.forces.nodes import Nodes
 from slipcore.forces.response import response_matrix
-from slipcore.frames import FloatArray
+from slipcore.frames import BoolArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +50,13 @@ class SensorResponse:
     def observation(self, spread: FloatArray, known: KnownForce) -> ObservationModel:
         """Of a frame whose displacements have the standard deviations ``spread`` [m] m, and what is known of it."""
         return ObservationModel(self.observed, np.concatenate((spread, known.noise)))
+
+    def depth_seen(self, observation: ObservationModel) -> BoolArray:
+        """Whose markers' z was seen in a frame, [e]."""
+        count = len(self.elements)
+        if not self.sees_depth:
+            return np.zeros(count, dtype=bool)
+        return np.asarray(np.isfinite(observation.noise[2 * count : 3 * count]))
 
     @staticmethod
     def data(displacement: FloatArray, known: KnownForce) -> FloatArray:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import binary_propagation, generate_binary_structure
 
 from slipcore.forces.defaults import RECONSTRUCTION
 from slipcore.forces.fit import ObservationModel, TractionFit, TractionPrior, choose_prior, fit
@@ -11,6 +12,8 @@ from slipcore.forces.strength import Criterion
 from slipcore.forces.support import better_support, relevant_nodes, widened
 from slipcore.forces.whole_lattice import WholeLattice, whole_lattice
 from slipcore.frames import BoolArray, FloatArray
+
+EDGES_AND_CORNERS = generate_binary_structure(2, 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +58,7 @@ class Tracker:
             if lattice is None:
                 noise = float(np.min(observation.noise[:count]))
                 lattice = lattice_of(sensor, noise, float(np.sqrt(np.mean(data[:count] ** 2))))
-            support = _pressed(lattice, data[:count], nodes.grid.shape)
+            support = _pressed(sensor, lattice, observation, data)
         else:
             support = relevant_nodes(observation, data, np.ones(nodes.grid.shape, dtype=bool))
         prior = choose_prior(observation, data, nodes, support.ravel(), criterion)
@@ -69,7 +72,7 @@ class Tracker:
             return self
         if self.lattice is None:
             return self._sought_in_the_plane(observation, data)
-        support = _pressed(self.lattice, data[: len(self.sensor.response)], self.sensor.nodes.grid.shape)
+        support = _pressed(self.sensor, self.lattice, observation, data)
         return self._on(observation, data, support, self.prior)
 
     def _sought_in_the_plane(self, observation: ObservationModel, data: FloatArray) -> "Tracker":
@@ -94,10 +97,16 @@ def lattice_of(sensor: SensorResponse, noise: float, typical: float) -> WholeLat
     return whole_lattice(everywhere, sensor.nodes, typical)
 
 
-def _pressed(lattice: WholeLattice, data: FloatArray, shape: tuple[int, int]) -> BoolArray:
-    """Nodes [ny, nx] with a pressure that is not noise, and one row around them; never none."""
-    pressure, deviation = lattice.operator @ data, lattice.deviation
+def _pressed(
+    sensor: SensorResponse, lattice: WholeLattice, observation: ObservationModel, data: FloatArray
+) -> BoolArray:
+    """Nodes [ny, nx] with a pressure that is not noise, those beside them where depth is not seen, and one row around
+    both; never none.
+    """
+    pressure, deviation = lattice.operator @ data[: len(sensor.response)], lattice.deviation
     noise = RECONSTRUCTION.node_significance * deviation
     least = np.maximum(noise, RECONSTRUCTION.node_share * pressure.max())
-    pressed = (pressure > least) | (pressure == pressure.max())
-    return widened(pressed.reshape(shape), 1)
+    pressed = ((pressure > least) | (pressure == pressure.max())).reshape(sensor.nodes.grid.shape)
+    unseen = np.zeros_like(pressed)
+    unseen.flat[sensor.elements[~sensor.depth_seen(observation)].argmax(axis=1)] = True
+    return widened(np.asarray(binary_propagation(pressed, EDGES_AND_CORNERS, pressed | unseen)), 1)

@@ -9,6 +9,7 @@ import pytest
 from benchmarks.forces import STICTION, Case, compared, coverage, errors, errors_table, picture, pooled, score
 from benchmarks.gel_peers import PEERS, export, imported, pseudo_inverse
 from benchmarks.gel_presses import Calibration, calibration_table
+from benchmarks.gel_saturation import ROUNDED, Detection, cut, detection_table
 from benchmarks.gel_scenes import CELL, CONTACTS, FRICTION, LATTICES, TANGENTIAL_SHARE, Lattice, press, repeated, seen
 from slipcore.contact.reference import CattaneoMindlin, HertzContact, half_space
 from slipcore.forces import Gel, GelEstimate, reconstruct
@@ -148,3 +149,14 @@ def test_a_learnt_gel_is_tabled_with_its_errors_and_what_its_intervals_hold() ->
         "| with z | 5 mm | 1 | +2 (± 3) | -0.01 (± 0.015) | +10 (± 6) % | 2 of 3 | 1 / 2 | 10 / 20 | 3 / 4 | 20 |"
     )
     assert "| given | at least 5.2 mm | 2 of 3 |" in second
+
+
+def test_logs_that_are_cut_are_counted_beside_those_that_are_not() -> None:
+    found = [Detection("20 × 20", "any", 0.0, 1.0, 0, 4), Detection("20 × 20", "z", 0.0, 0.5, 3, 4)]
+    blank = [Detection(lattice, "any", step, 1.0, 0, 4) for lattice in LATTICES for step in ROUNDED]
+    row = detection_table([*blank, *found]).splitlines()[2]
+    assert row == "| 20 × 20 | z | – | 0% | – | – | – | – | 75% | – |"
+    field = np.array([-3.0, 1.0, 2.0]).reshape(1, 1, 3, 1) * np.ones(3)
+    seen_field, is_cut = cut(field, slice(2, 3), 0.5, 0.2)
+    np.testing.assert_allclose(seen_field[0, 0, :, 2], [-1.6, 1.0, 1.6], rtol=1e-12)  # 1.5 is half between two steps
+    assert is_cut.sum() == 2

@@ -84,6 +84,13 @@ def saturated(log: GraspLog) -> GraspLog:
     return with_force(log, np.clip(log.force, -most, most))
 
 
+def pressed_beyond_its_range(log: GraspLog) -> GraspLog:
+    """Depth is seen up to half of the largest."""
+    seen = log.displacement.copy()
+    seen[..., 2] = np.maximum(seen[..., 2], 0.5 * seen[..., 2].min())
+    return replace(log, displacement=seen)
+
+
 def doubled(log: GraspLog) -> GraspLog:
     """A recorder of twice the sensor's rate."""
     kept = np.arange(len(log)) // 2
@@ -183,6 +190,13 @@ def test_a_hold_of_few_rounded_readings_is_no_saturation(long_ramp: GraspLog) ->
         normal=None if long_ramp.normal is None else long_ramp.normal[middle],
     )
     assert "saturation" not in names(small)
+
+
+def test_displacement_beyond_the_range_is_found_with_its_axis(long_ramp: GraspLog) -> None:
+    log = pressed_beyond_its_range(long_ramp)
+    (found,) = [each for each in check_log(log, detect_slip(log)) if each.name == "saturation"]
+    assert found.evidence.endswith("reach the largest displacement along z")
+    assert "press less" in found.remedy
 
 
 def test_a_log_without_any_tangential_force_is_looked_through(long_ramp: GraspLog) -> None:

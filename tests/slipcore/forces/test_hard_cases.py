@@ -38,6 +38,22 @@ def test_saturated_markers_that_are_told_as_not_seen_leave_the_force_known(press
     np.testing.assert_allclose(masked, total, rtol=0.0, atol=0.05 * abs(total[2]))  # as of a lattice cut by its edge
 
 
+def test_displacement_at_the_end_of_its_range_is_taken_as_not_seen_though_nobody_says_so(pressed: Pressed) -> None:
+    """Clipped at half of the largest depth, as of a camera that sees no further; else F_z is 1.7 N too small."""
+    log = pressed([3, 6], noise=NOISE, crop=AROUND)
+    assert log.force is not None
+    clipped = log.displacement.copy()
+    clipped[..., 2] = np.maximum(clipped[..., 2], 0.5 * clipped[..., 2].min())
+    found = reconstruct(replace(log, displacement=clipped, force=None), GEL, noise=NOISE)
+    np.testing.assert_array_equal(found.saturated, clipped != log.displacement)
+    whole = reconstruct(replace(log, force=None), GEL, noise=NOISE)
+    assert not whole.saturated.any()
+    away = np.abs(found.resultant - whole.resultant)
+    assert (away < 3.0 * np.hypot(found.resultant_deviation, whole.resultant_deviation)).all()
+    hidden = found.saturated[1, ..., 2]
+    assert found.deviation[1, hidden, 2].mean() > 1.5 * whole.deviation[1, hidden, 2].mean()
+
+
 @pytest.mark.parametrize("factor", [1e-6, 1e6])
 def test_ratios_of_forces_do_not_depend_on_the_unit_of_force(pressed: Pressed, factor: float) -> None:
     log = pressed([6, 6], noise=NOISE, crop=INSIDE)

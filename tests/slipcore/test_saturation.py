@@ -1,0 +1,62 @@
+"""Readings at the end of a sensor's range."""
+
+import numpy as np
+import pytest
+
+from slipcore import GraspLog
+from slipcore.frames import FloatArray
+from slipcore.saturation import saturated
+
+
+def pressed(shape: str, noise: float = 1e-6) -> FloatArray:
+    """Displacements [30, 12, 12, 3] m that grow, stay and shrink: of a dome, or of a flat punch as wide as half."""
+    load = np.concatenate((np.linspace(0.0, 1.0, 12), np.ones(8), np.linspace(0.9, 0.0, 10)))
+    x, y = np.meshgrid(np.arange(12) - 5.3, np.arange(12) - 5.8, indexing="ij")
+    away = np.hypot(x, y)
+    depth = np.exp(-0.5 * (away / 3.0) ** 2) if shape == "dome" else np.minimum(1.0, 2.5 * np.exp(-away / 3.5))
+    field = np.multiply.outer(load, np.stack((2e-5 * x * depth, 2e-5 * y * depth, -4e-4 * depth), axis=-1))
+    return np.asarray(field + noise * np.random.default_rng(3).standard_normal(field.shape))
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-6, 2e-5])
+@pytest.mark.parametrize("shape", ["dome", "flat punch"])
+def test_what_is_clipped_along_one_axis_is_found_there_and_nowhere_else(shape: str, step: float) -> None:
+    field = pressed(shape)
+    field = np.round(field / step) * step if step else field
+    clipped = field.copy()
+    clipped[..., 2] = np.maximum(clipped[..., 2], -2e-4)
+    at_end = np.isclose(clipped, -2e-4, rtol=1e-9, atol=0.0)  # multiples of a step differ in their last bits
+    np.testing.assert_array_equal(saturated(clipped), at_end)
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-6, 5e-6, 2e-5, 5e-5])
+@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-5])
+@pytest.mark.parametrize("shape", ["dome", "flat punch"])
+def test_equal_readings_by_rounding_are_no_end_of_a_range(shape: str, noise: float, step: float) -> None:
+    field = pressed(shape, noise)
+    assert not saturated(np.round(field / step) * step if step else field).any()
+
+
+def test_copies_of_frames_and_frozen_markers_are_no_end_of_a_range() -> None:
+    field = pressed("dome")
+    field[14:, 5, 6] = field[14, 5, 6] * 1.2  # the largest from then on, again and again
+    assert not saturated(np.repeat(field, 2, axis=0)).any()
+
+
+def test_markers_that_were_not_seen_do_not_count() -> None:
+    field = pressed("dome")
+    field[..., 2] = np.maximum(field[..., 2], -2e-4)
+    assert not saturated(field, (field[..., 2] > -2e-4)).any()
+
+
+def test_a_field_of_zeros_has_no_end() -> None:
+    assert not saturated(np.zeros((5, 4, 4, 3))).any()
+
+
+def test_real_recordings_are_within_their_range_until_it_is_cut(recording: GraspLog) -> None:
+    assert recording.force is not None
+    for field in (recording.displacement, recording.force):
+        assert not saturated(field).any()
+        top = 0.7 * np.abs(field[..., 2]).max()
+        cut = np.clip(field, [-np.inf, -np.inf, -top], [np.inf, np.inf, top])
+        assert saturated(cut)[cut != field].all()
