@@ -59,17 +59,16 @@ def tables(database: Database) -> set[str]:
     return set(inspect(database.engine).get_table_names()) - {"alembic_version"}
 
 
-def shape(database: Database) -> dict[str, tuple[set[str | None], ...]]:
+def shape(database: Database) -> dict[tuple[str | None, str], tuple[set[str | None], ...]]:
     """The tables, each with the names of its columns, indexes and unique constraints."""
-    found = inspect(database.engine)
-    return {
-        name: (
-            {column["name"] for column in found.get_columns(name)},
-            {index["name"] for index in found.get_indexes(name)},
-            {rule["name"] for rule in found.get_unique_constraints(name)},
-        )
-        for name in tables(database)
-    }
+    with database.connect() as connection:  # one for all questions, of all tables at once
+        found = inspect(connection)
+        kinds = found.get_multi_columns(), found.get_multi_indexes(), found.get_multi_unique_constraints()
+        return {
+            table: tuple({each["name"] for each in of_kind.get(table, ())} for of_kind in kinds)
+            for table in kinds[0]
+            if table[1] != "alembic_version"
+        }
 
 
 def test_models_and_migrations_agree(database: Database) -> None:
