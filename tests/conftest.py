@@ -70,7 +70,7 @@ def template(postgresql: PostgreSQL) -> str:
 def migrations() -> Iterator[Remembered]:
     """What the migrations make of an empty file, and how it compares with the tables of the code, once a process.
 
-    They run where a test asks for ``real_migrations``, on PostgreSQL, and in other processes.
+    They run where a test asks for ``real_migrations``, and in other processes.
     """
     with pytest.MonkeyPatch.context() as patched:
         remembered = Remembered()

@@ -10,10 +10,22 @@ from alembic.config import Config
 from alembic.migration import MigrationContext
 from sqlalchemy import Connection, event
 
+OWN = "current_schema()::regnamespace"
 SCHEMA = {
     "sqlite": "SELECT sql FROM sqlite_master WHERE sql IS NOT NULL ORDER BY rowid",
-    "postgresql": "SELECT tablename FROM pg_tables WHERE schemaname = current_schema()",
+    "postgresql": f"""
+        SELECT concat_ws(' ', relname, attname, format_type(atttypid, atttypmod), attnotnull, attidentity, attgenerated)
+        FROM pg_attribute JOIN pg_class ON pg_class.oid = attrelid
+        WHERE relnamespace = {OWN} AND relkind IN ('r', 'p') AND attnum > 0 AND NOT attisdropped
+        UNION ALL SELECT indexdef FROM pg_indexes WHERE schemaname = current_schema()
+        UNION ALL SELECT concat_ws(' ', conrelid::regclass, conname, pg_get_constraintdef(oid))
+        FROM pg_constraint WHERE connamespace = {OWN}
+        UNION ALL SELECT concat_ws(' ', relname, objsubid, description)
+        FROM pg_description JOIN pg_class ON pg_class.oid = objoid WHERE relnamespace = {OWN}
+        ORDER BY 1""",
 }
+"""Queries for all that Alembic compares of a database: of an empty one they find nothing."""
+
 LEFT_OUT = ("PRAGMA", "SELECT pg_catalog", "SELECT alembic_version", "SELECT sql", "BEGIN")
 """How statements begin that change nothing and take no lock, and the one that begins a transaction."""
 
@@ -44,11 +56,9 @@ class Remembered:
                     cursor.execute(statement, parameters)
 
     def compare(self, context: MigrationContext, metadata: Any) -> Any:
-        """How a schema differs from the code's tables; on SQLite its statements tell all of it."""
+        """How a schema differs from the code's tables, worked out once for each schema."""
         connection = context.connection
         assert connection is not None
-        if connection.dialect.name != "sqlite":
-            return self.real_compare(context, metadata)
         schema = _schema(connection)
         if schema not in self._differences:
             self._differences[schema] = self.real_compare(context, metadata)
