@@ -1,5 +1,5 @@
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
 from threading import Thread
@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from sqlalchemy import select, update
 
+import estimators
 import slipcore
 from db.blobs import BlobStore
 from db.database import Database
@@ -35,6 +36,7 @@ from service.domain.principal import Principal
 from service.jobs import pipeline
 from service.settings import Settings
 from slipcore import Finding
+from tests.service.remembered import remembering
 
 Repack = Callable[..., bytes]
 ANYWHERE = FrictionQuery(0.0, 0.1, None)
@@ -98,6 +100,14 @@ class Shop:
         with self.database.read() as session:
             (found,) = [each for each in materials.get(session, material).models if each.model.method == method]
         return found.version, found.model.n, found.outdated
+
+
+@pytest.fixture(scope="module", autouse=True)
+def numerics_done_once() -> Iterator[None]:
+    """Of the three logs that all jobs here are about."""
+    functions = ((slipcore, name) for name in ("detect_slip", "collect_friction", "check_log"))
+    with remembering(*functions, (estimators, "fit")):
+        yield
 
 
 @pytest.fixture

@@ -35,6 +35,7 @@ from service.jobs import pipeline
 from slipcore import FrictionSamples, GraspLog, forces
 from slipcore.forces import reconstruct
 from stiction_client.container import encode
+from tests.service.remembered import remembering
 
 RunWith = Callable[[Callable[[Session], object]], Job]
 
@@ -85,6 +86,13 @@ class Shop:
     def material(self) -> Material:
         with self.database.read() as session:
             return materials.get(session, "paper")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def detected_once() -> Iterator[None]:
+    """Slip and samples of the log that most jobs here are about; fits are done each time."""
+    with remembering(*((slipcore, name) for name in ("detect_slip", "collect_friction", "check_log"))):
+        yield
 
 
 @pytest.fixture
