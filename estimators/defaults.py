@@ -485,6 +485,18 @@ class DesignSettings(Options):
     """Of a model, in parts of friction."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InfluenceSettings(Options):
+    """When a grasp is named that lowers the friction that a planner may count on (``influence.py``)."""
+
+    fall: Annotated[float, Option(1e-3, 1.0, "-", "a tenth of a grip force is a usual margin")] = 0.1
+    """Of that friction, in parts of it, beyond which the grasp is looked for."""
+    undone: Annotated[float, Option(0.0, 1.0, "-", "more than all others together")] = 0.5
+    """Part of the fall that leaving the grasp out must undo."""
+    lowest: Annotated[int, Option(1, 1000, "grasps", "a fit each; the newest and the highest beside them")] = 3
+    """Of least friction that are left out in turn."""
+
+
 STEP_SHARES = (1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.001)
 """Shares of a Newton step that Laplace's approximation tries at once: trials on skewed posteriors."""
 WEIGHT_POWERS = (1.0, 0.7, 0.5, 0.3, 0.2, 0.1, 0.05, 0.02)
@@ -504,6 +516,7 @@ LINEAR = LinearSettings()
 RECOGNITION = RecognitionPrior()
 REFERENCE = Reference()
 IDENTIFIABILITY = Identifiability()
+INFLUENCE = InfluenceSettings()
 POPULATION = PopulationSettings()
 PRIOR = Prior()
 PROPOSAL = ProposalSettings()
@@ -511,7 +524,7 @@ ROBUST = RobustSettings()
 SAMPLING = ChainSettings()
 
 TABLES = (
-    ALARM, AUTOMATIC, CHANGE, CLUSTERS, DESIGN, GRID, LINEAR, RECOGNITION, REFERENCE, IDENTIFIABILITY, POPULATION,
-    PRIOR, PROPOSAL, ROBUST, SAMPLING,
+    ALARM, AUTOMATIC, CHANGE, CLUSTERS, DESIGN, GRID, LINEAR, RECOGNITION, REFERENCE, IDENTIFIABILITY, INFLUENCE,
+    POPULATION,    PRIOR, PROPOSAL, ROBUST, SAMPLING,
 )  # fmt: skip
 """All tables of estimators."""

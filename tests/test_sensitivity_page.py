@@ -51,6 +51,7 @@ ABSENT: dict[str, dict[str, str]] = {
         "estimators.defaults.RECOGNITION": "least_scatter level scatter_freedom scatter_nodes slope unknown",
         "estimators.defaults.POPULATION": "quantiles",
         "estimators.defaults.GRID": "beside_gains gain_nodes least_gain",
+        "estimators.defaults.INFLUENCE": "lowest undone",
         "estimators.defaults.PRIOR": (
             "sensor_degrees_of_freedom sensor_scatter unknown_velocity velocity_effect velocity_tilt"
         ),

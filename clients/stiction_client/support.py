@@ -17,7 +17,9 @@ Kind = Literal["supported", "extrapolated", "not identified", "stale", "implausi
 OUTDATED = "the material's logs are others since, and it was not fitted again by this method: ask for a fit"
 SENSOR_GAIN = "sensor_gain"
 """Diagnostic, a sentence: whether the data determine a sensor's own gain, of a model of several sensors."""
-NOTES = (SENSOR_GAIN,)
+WEAKENING = "weakening"
+"""Diagnostic, a sentence: which log lowers the friction that a planner may count on."""
+NOTES = (WEAKENING, SENSOR_GAIN)
 """Diagnostics that whoever reads an answer is to know beside it."""
 SUPERSEDED = "a newer version took its place: fetch the current model"
 

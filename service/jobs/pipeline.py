@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from time import perf_counter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from sqlalchemy.orm import Session
 
@@ -19,7 +19,7 @@ import estimators
 import slipcore
 from db.blobs import BlobStore, disk_errors_named
 from db.database import Database
-from db.records import Claim, Job, SamplesOfLog, SampleSummary
+from db.records import Claim, Job, NewModel, SamplesOfLog, SampleSummary
 from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, materials_of_logs, sensors
 from estimators import EstimatorError, FrictionModel, Moments, ScatterPrior
 from estimators.method_names import SCATTER_METHODS
@@ -39,6 +39,7 @@ from service.domain.stored_results import (
     to_new_model,
 )
 from service.domain.surface_change import MARK, with_change
+from service.domain.weakening import with_weakening
 from service.observability import logs, traces
 from service.processes import limits
 from slipcore import FrictionSamples, GraspLog, SlipcoreError
@@ -183,21 +184,19 @@ def fit_material(run: Run) -> None:
         with run.stage("friction_model"):
             with run.database.read() as session:
                 material_id = jobs.material_id(session, run.job.id)
-                parts = detections.samples_of_material(session, material_id)
-                prior = _scatter_prior(run, session, material_id)
-            models = _fit(run, parts, prior)
+                basis = _basis(run, session, material_id)
+            models = _fit(run, basis)
         with run.database.write() as session:
             friction_models.lock(session, material_id)
             is_still = jobs.material_id(session, run.job.id) == material_id  # copies stay with one that was merged
-            if is_still and detections.samples_of_material(session, material_id) == parts:
+            if is_still and detections.samples_of_material(session, material_id) == basis.parts:
                 _store_models(run, session, material_id, models)
                 return
     with run.database.write() as session:  # logs come in faster than they are fitted: the other fits wait for this one
         material_id = materials.still(session, jobs.material_id(session, run.job.id))
         friction_models.lock(session, material_id)
         with run.timed("friction_model"):
-            parts = detections.samples_of_material(session, material_id)
-            models = _fit(run, parts, _scatter_prior(run, session, material_id))
+            models = _fit(run, _basis(run, session, material_id))
         _store_models(run, session, material_id, models)
 
 
@@ -214,18 +213,34 @@ def _with_forces(run: Run, log: GraspLog, sensor: str) -> "tuple[GraspLog, Recon
         return with_forces(log, asdict(gel))
 
 
-def _scatter_prior(run: Run, session: Session, material_id: int) -> ScatterPrior:
-    """How much grasps may differ before the material's own show it."""
-    return prior_from_others(session, material_id) if run.others_tell else ScatterPrior()
+class Basis(NamedTuple):
+    """What a material is fitted by: the samples of its logs, how much grasps may differ before its own show it, and its
+    current models by method.
+    """
+
+    parts: list[SamplesOfLog]
+    prior: ScatterPrior
+    before: dict[str, NewModel]
 
 
-def _fit(run: Run, parts: Sequence[SamplesOfLog], prior: ScatterPrior) -> list[FrictionModel]:
+def _basis(run: Run, session: Session, material_id: int) -> Basis:
+    before = friction_models.all_current(session, [material_id]).get(material_id, [])
+    return Basis(
+        detections.samples_of_material(session, material_id),
+        prior_from_others(session, material_id) if run.others_tell else ScatterPrior(),
+        {stored.model.method: stored.model for stored in before},
+    )
+
+
+def _fit(run: Run, basis: Basis) -> list[FrictionModel]:
     """The models of the job's methods."""
+    parts, prior, before = basis
     if not parts:
         raise InsufficientData("no grasp log of this material has friction samples yet")
     ingested = run.job.kind == "ingest"
     models = _all_that_fit(run, parts, prior) if ingested else [_fit_by(run, parts, run.job.method, len(parts), prior)]
-    return with_change(models, [_moments(run, part) for part in parts], prior)
+    moments = {part.grasp_log_id: _moments(run, part) for part in parts}
+    return with_weakening(with_change(models, list(moments.values()), prior), before, moments, prior)
 
 
 def _all_that_fit(run: Run, parts: Sequence[SamplesOfLog], prior: ScatterPrior) -> list[FrictionModel]:

@@ -25,6 +25,7 @@ from service.domain.model_cache import KnownModel
 from service.domain.recommended import recommended
 from service.domain.stored_results import (
     SAMPLE_ARRAYS,
+    decode_samples,
     encode_samples,
     summarise_samples,
     to_client_model,
@@ -157,6 +158,27 @@ def test_what_sensors_differ_by_is_stored_and_told(
     known = KnownModel(stored, to_friction_model(stored.model), "", 0.0, 0.0)
     answer = look_up(known, FrictionQuery(0.0, 0.05, 0.01))
     assert answer.notes == model.notes == (stored.model.diagnostics["sensor_gain"],)
+
+
+def test_a_log_that_lowers_what_may_be_counted_on_is_named(
+    shop: Shop, content: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pipeline, "SAMPLED_AT_INGEST", 0)
+    ids = []
+    for suffix in (b"", b"\0", b"\0\0"):
+        log_id, job_id = shop.ingest(content + suffix)
+        shop.run(job_id)
+        ids.append(log_id)
+    kept = shop.log(ids[1]).samples
+    assert kept is not None
+    samples = decode_samples(shop.blobs.path(kept.samples_blob))
+    weak = Moments.from_samples(replace(samples, friction_coefficient=0.4 * samples.friction_coefficient))
+    with shop.database.write() as session:
+        detections.set_moments(session, ids[1], weak.to_bytes())
+    shop.run(shop.fit("hierarchical"))
+    stored = next(each for each in shop.material().models if each.model.method == "hierarchical")
+    assert stored.model.diagnostics["weakened_by"] == ids[1]
+    assert to_client_model(stored).notes[0].startswith(f"by log {ids[1]}, of ")
 
 
 def test_an_ingest_of_many_logs_looks_at_moments_alone(

@@ -1,0 +1,54 @@
+"""The log that lowers what a planner may count on is named, as long as it does."""
+
+from collections.abc import Sequence
+
+import estimators
+from db.records import NewModel
+from estimators import FrictionModel, Moments, ScatterPrior
+from service.domain.stored_results import to_new_model
+from service.domain.weakening import BEFORE, EFFECT, LOG, with_weakening
+from tests.estimators.test_influence import grasp
+
+PRIOR = ScatterPrior()
+
+
+def fitted(logs: dict[str, Moments], before: Sequence[FrictionModel] = ()) -> list[FrictionModel]:
+    """What a fit of these logs stores, beside the models before."""
+    models = [estimators.fit(list(logs.values()), method=method) for method in ("hierarchical", "ols")]
+    stored: dict[str, NewModel] = {model.method: to_new_model(model) for model in before}
+    return with_weakening(models, stored, logs, PRIOR)
+
+
+def logs(effects: Sequence[float]) -> dict[str, Moments]:
+    """A log of each effect, named by its place."""
+    return {f"log{k}": grasp(k, effect) for k, effect in enumerate(effects)}
+
+
+def test_the_log_is_named_with_what_to_do_while_most_of_the_fall_is_its() -> None:
+    before = fitted(logs([0.0] * 5))
+    assert before[0].notes == ()
+    first = fitted(logs([0.0] * 5 + [-0.4]), before)
+    told = first[0].diagnostics
+    assert told[LOG] == "log5"
+    assert -0.45 < float(told[EFFECT]) < -0.2
+    assert first[0].notes == (told["weakening"],)
+    assert "by log log5" in first[0].notes[0]
+    assert "withdraw it if something was wrong" in first[0].notes[0]
+    assert LOG not in first[1].diagnostics  # least squares tells no scatter between grasps apart
+    second = fitted(logs([0.0] * 5 + [-0.4, 0.0]), first)
+    assert second[0].diagnostics[LOG] == "log5"
+    assert second[0].diagnostics[BEFORE] == told[BEFORE]
+    third = fitted(logs([0.0] * 5 + [-0.4, 0.0, -0.7]), second)
+    assert third[0].diagnostics[LOG] == "log7"  # a fall of its own, whatever weakened the model before
+    withdrawn = {name: part for name, part in logs([0.0] * 5 + [-0.4, 0.0]).items() if name != "log5"}
+    assert fitted(withdrawn, second)[0].notes == ()
+
+
+def test_a_log_that_agrees_is_not_looked_for() -> None:
+    before = fitted(logs([0.0] * 5))
+    assert fitted(logs([0.0] * 6), before)[0].notes == ()
+
+
+def test_a_first_fit_has_nothing_to_compare_with() -> None:
+    models = [estimators.fit(list(logs([0.0, -0.4]).values()), method="hierarchical")]
+    assert with_weakening(models, {}, logs([0.0, -0.4]), PRIOR) == models
