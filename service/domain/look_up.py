@@ -14,7 +14,8 @@ Averaged = Literal["element", "contact"]
 class FrictionQuery:
     """Tangential velocity m/s, normal force of an element N, and a quantile in (0, 1) or None for the mean.
 
-    ``of``: one "element", or the mean over the ``elements`` of a "contact".
+    ``of``: one "element", or the mean over the ``elements`` of a "contact". ``sensor``: the name of that which grasps;
+    of one whose own gain the model does not know, and without any, the answer allows for any gain.
     """
 
     tangential_velocity: float
@@ -22,6 +23,7 @@ class FrictionQuery:
     quantile: float | None
     of: Averaged = "element"
     elements: int = 1
+    sensor: str | None = None
 
 
 class Friction(NamedTuple):
@@ -53,7 +55,8 @@ class Friction(NamedTuple):
 def look_up(known: KnownModel, question: FrictionQuery) -> Friction:
     """The answer of a material's current model."""
     v, f_n = question.tangential_velocity, question.normal_force
-    stored, model = known.stored, known.model
+    stored = known.stored
+    model = known.model if question.sensor is None else known.model.of_sensor(question.sensor)
     mean = float(model.predict(v, f_n))
     asked = (
         mean

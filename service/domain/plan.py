@@ -34,7 +34,8 @@ class GraspTask:
 
     ``contact_area`` m² of one finger; ``round_at``: normal force N under which a round fingertip has that area;
     ``object_radius``: of a round object about whose axis the torque is; ``normal_force_limit`` N: what it may bear.
-    ``of`` and ``elements``: whose scatter of friction counts, as ``required_normal_force`` takes them.
+    ``of`` and ``elements``: whose scatter of friction counts, as ``required_normal_force`` takes them; ``sensor``: the
+    name of that which grasps, as in ``FrictionQuery``.
     """
 
     material: str
@@ -51,6 +52,7 @@ class GraspTask:
     normal_force_limit: float | None
     of: Averaged | None
     elements: float | None
+    sensor: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +111,7 @@ class Recognition:
 def grasp_force(context: Context, task: GraspTask) -> GraspForce:
     """The smallest normal force that holds; raises ``NoFeasibleForce``, ``InvalidValue``, ``NoModel``, ``NotFound``."""
     known = _model(context, task)
-    model = to_client_model(known.stored)
+    model = _of_sensor(known, task)
     try:
         found = stiction_client.required_normal_force(
             model, task.tangential_load, task.slip_probability, **_given(task)
@@ -136,13 +138,18 @@ def grasp_force(context: Context, task: GraspTask) -> GraspForce:
 
 def force_curve(context: Context, task: GraspTask, probabilities: NDArray[np.float64]) -> ForceCurve:
     """The same question for each of some slip probabilities [n]; raises ``InvalidValue``, ``NoModel``, ``NotFound``."""
-    model = to_client_model(_model(context, task).stored)
+    model = _of_sensor(_model(context, task), task)
     load = np.full_like(probabilities, task.tangential_load)
     try:
         found = stiction_client.required_normal_force(model, load, probabilities, **_given(task))
     except stiction_client.InvalidArgument as error:
         raise InvalidValue(error.name, error.value, error.allowed) from error
     return ForceCurve(probabilities, *found.feasible_interval)
+
+
+def _of_sensor(known: KnownModel, task: GraspTask) -> stiction_client.FrictionModel:
+    model = to_client_model(known.stored)
+    return model if task.sensor is None else model.of_sensor(task.sensor)
 
 
 def _model(context: Context, task: GraspTask) -> KnownModel:

@@ -140,4 +140,4 @@ def _read(query: bytes) -> tuple[str, FrictionQuery] | None:
         asked = LookUpQuery.model_validate(dict(parse_qsl(query.decode("latin-1"), keep_blank_values=True)))
     except ValueError:  # pydantic's, or of the address
         return None
-    return asked.method, FrictionQuery(asked.v, asked.fn, asked.quantile, *asked.averaged())
+    return asked.method, FrictionQuery(asked.v, asked.fn, asked.quantile, *asked.averaged(), asked.sensor)

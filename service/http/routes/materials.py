@@ -128,7 +128,7 @@ async def read_friction(
     who has it.
     """
     known = await context.models.get(context.database, name, asked.method)
-    question = FrictionQuery(asked.v, asked.fn, asked.quantile, *asked.averaged())
+    question = FrictionQuery(asked.v, asked.fn, asked.quantile, *asked.averaged(), asked.sensor)
     return conditional(request, known.tag, lambda: FrictionOut.json_of(look_up(known, question)))
 
 

@@ -10,7 +10,7 @@ from db.records import StoredModel
 from estimators.method_names import FitMethod
 from service.domain.look_up import Averaged, Friction
 from service.domain.stored_results import to_client_model
-from service.http.schemas.common import MOMENT_EXAMPLE, Body, Force, Next, Velocity
+from service.http.schemas.common import MOMENT_EXAMPLE, Body, Force, Next, Reference, Velocity
 
 ChosenBecause = Annotated[str | None, Field(description="Why this model answers; null where a method was named")]
 
@@ -19,6 +19,10 @@ SupportKind = Annotated[
     Field(description="What the answer rests on: the last of these that applies"),
 ]
 Advice = Annotated[str, Field(description="What to do about it, in one sentence")]
+GraspingSensor = Annotated[
+    Reference | None,
+    Field(max_length=200, description="That grasps: its own gain counts where the model knows it, else that of any"),
+]
 Notes = Annotated[list[str], Field(description="What else is to be known of the model, in sentences")]
 
 CHOSEN_EXAMPLE = "hierarchical: friction may scatter between grasps, between places and within them"
@@ -178,6 +182,7 @@ class LookUpQuery(BaseModel):
     elements: Annotated[
         int | None, Field(ge=1, le=10**9, description="Elements of the contact, over which scatter averages out")
     ] = None
+    sensor: GraspingSensor = None
 
     @model_validator(mode="after")
     def _counted(self) -> Self:

@@ -8,7 +8,7 @@ from estimators.method_names import FitMethod
 from service.domain.look_up import Averaged
 from service.domain.plan import GraspTask
 from service.http.schemas.common import Area, Body, Force, Reference, Velocity
-from service.http.schemas.models import CHOSEN_EXAMPLE, Advice, ChosenBecause, Notes, SupportKind
+from service.http.schemas.models import CHOSEN_EXAMPLE, Advice, ChosenBecause, GraspingSensor, Notes, SupportKind
 from service.http.schemas.results import SAMPLES_EXAMPLE
 
 
@@ -48,6 +48,7 @@ class NewGraspForce(Body):
     elements: Annotated[
         float | None, Field(ge=1.0, le=1e12, description="Of a contact; without, as many as its area has")
     ] = None
+    sensor: GraspingSensor = None
 
     def task(self) -> GraspTask:
         """The same as the planner takes it."""

@@ -54,6 +54,18 @@ def test_a_quantile_is_of_what_was_asked_for(
     assert (answer.of, answer.elements) == (of, elements)
 
 
+def test_friction_of_the_sensor_that_grasps_has_its_own_gain(
+    ask: Callable[..., Any], model: estimators.FrictionModel
+) -> None:
+    one = estimators.Scale(0.05, 9.0)
+    shown = estimators.SensorFriction(0.1, 0.01, (0.7, 0.0, 0.0), ((1e-4, 0.0, 0.0),) * 3, 9.0, 0.05, 9.0)
+    scales = estimators.Scales(one, one, one, estimators.SensorScale(one, {"left": shown}))
+    several = replace(model, scales=scales)
+    f_n = sum(model.domain.normal_force) / 2.0
+    means = [ask(several, FrictionQuery(0.0, f_n, None, sensor=name)).mean for name in (None, "right", "left")]
+    assert means == [float(several.predict(0.0, f_n))] * 2 + [0.7]
+
+
 def test_slower_than_the_samples_is_inside_and_faster_is_not(
     ask: Callable[..., Any], model: estimators.FrictionModel
 ) -> None:
