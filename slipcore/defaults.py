@@ -659,7 +659,7 @@ class CheckOptions(Options):
     """Largest share of the contact in slip up to which nothing is taken to slip."""
     friction_change: Annotated[float, Option(0.0, 10.0, "-", "simulated grasps 0.01, recordings 0.44 to 0.53")] = 0.3
     """Largest change of friction from the quarter of samples with the least force to that with the most."""
-    place_scatter: Annotated[float, Option(0.0, 10.0, "-", "simulated grasps 0.03, recordings 0.19 to 0.31")] = 0.15
+    place_scatter: Annotated[float, Option(0.0, 10.0, "-", "simulated grasps 0.03, recordings 0.20 to 0.31")] = 0.15
     """Largest standard deviation of friction between elements, as a share of it."""
     scatter_share: Annotated[float, Option(0.0, 10.0, "-", "as for the scatter between elements")] = 0.15
     """Largest standard deviation of friction about a law of speed and force, as a share of friction."""

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from service.slip_benchmark.faults import correlated
 from slipcore import (
     FrictionSamples,
     GraspLog,
@@ -31,6 +32,21 @@ def test_friction_of_a_ramp_is_found_within_two_percent_from_detected_slip(frict
     assert len(samples) > 100
     found = np.average(samples.friction_coefficient, weights=samples.weight)
     assert found == pytest.approx(friction, rel=0.02)
+
+
+def test_noise_that_lasts_counts_by_what_of_it_changes_over_a_motion() -> None:
+    """The velocity of a sensor that low-passes is far better than its places are."""
+    size, memory = 5e-6, 0.9
+    log = tangential_ramp(friction=0.5, force_noise=2e-3, seed=20)
+    noisy = correlated(size, memory)(log, np.random.default_rng(8))
+    history = detect_slip(noisy)
+    assert "lasting noise" in {finding.name for finding in history.findings}
+    samples = element_samples(noisy, history)
+    two_frames = log.time[2] - log.time[0]
+    assert samples.velocity_noise == pytest.approx(size * np.sqrt(2.0 * (1.0 - memory**2)) / two_frames, rel=0.15)
+    assert history.noise > 2.0 * samples.velocity_noise * two_frames / np.sqrt(2.0)
+    assert len(samples) > 100
+    assert np.average(samples.friction_coefficient, weights=samples.weight) == pytest.approx(0.5, rel=0.03)
 
 
 def test_friction_of_a_ramp_without_noise_is_exact() -> None:
