@@ -6,16 +6,18 @@ the working load, β₂, and F1 of slip, before and after. Friction of a contact
 what single presses tell of all faults at once, too. Writes calibration.json and calibration.png.
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks.detector_accuracy import mean_known
 from benchmarks.pages import options, picture_folder, save, table, write
 from benchmarks.patch_grasps import PIVOT, Setting, grasp
 from benchmarks.presses import WHITE_SHARE, Faults, pressed
-from estimators import fit
+from estimators import TooFewSamples, fit
 from slipcore import (
     ContactFriction,
     GraspLog,
@@ -93,12 +95,18 @@ def measure(seeds: int) -> Iterator[Row]:
 
 
 def outcome(logs: list[GraspLog], model: SensorModel | None) -> tuple[float, float, float]:
-    """Error of friction at the working load, that of β₂, and F1; by the elements, whether they are believed or not."""
+    """Error of friction at the working load, that of β₂, and F1; by the elements, whether they are believed or not.
+
+    The errors are NaN where so little slip is found that there is no fit.
+    """
     histories = [detect_slip(log, lookahead=2, sensor_model=model) for log in logs]
     used = logs if model is None else [model.apply(log).log for log in logs]
     samples = [collect_friction(log, history).elements for log, history in zip(used, histories, strict=True)]
-    found = fit(samples, method="ols")
     scores = [f1(log, history.slip) for log, history in zip(logs, histories, strict=True)]
+    try:
+        found = fit(samples, method="ols")
+    except TooFewSamples:
+        return np.nan, np.nan, float(np.mean(scores))
     return float(found.predict(*WORKING_LOAD)) - FRICTION, float(found.coefficients[2]), float(np.mean(scores))
 
 
@@ -110,8 +118,9 @@ def f1(log: GraspLog, slip: np.ndarray) -> float:
 
 
 def _over_seeds(found: np.ndarray) -> Result:
-    error, slope = np.sqrt((found[:, :2] ** 2).mean(axis=0))
-    return Result(float(error), float(slope), float(found[:, 2].mean()))
+    """Root mean square of the errors, where there was a fit, and the mean of F1; ``found`` [seeds, 3]."""
+    error, slope = (math.sqrt(mean_known(list(errors**2))) for errors in found[:, :2].T)
+    return Result(error, slope, float(found[:, 2].mean()))
 
 
 def draw(rows: list[Row]) -> Figure:

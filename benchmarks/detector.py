@@ -5,6 +5,7 @@ and takes them as one batch through `detect_slip`. The log is a simulated ramp w
 that is found. Then every method is scored on scenes with truth (benchmarks/detector_accuracy.py). Prints tables and
 writes detector.json, detector.png, detector_accuracy.json, detector_accuracy.png, detector_reliability.json and .png
 (is a reported probability the share that slips?) and detector_conditions.json (benchmarks/detector_conditions.py).
+`--only accuracy --page docs/detector.md` renews the tables of scores there.
 """
 
 import argparse
@@ -17,7 +18,7 @@ from time import perf_counter
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks import detector_accuracy, detector_conditions
+from benchmarks import detector_accuracy, detector_conditions, pages
 from benchmarks.detector_scenes import cases, observed
 from service.formats import tac3d
 from slipcore import METHODS, GraspLog, SlipDetector, detect_slip
@@ -108,17 +109,19 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("benchmarks/results"), help="folder for JSON and picture")
     parser.add_argument("--recordings", type=Path, default=RECORDINGS, help="folder of Tac3D recordings")
     parser.add_argument("--repeats", type=int, default=5, help="streams and batches of each log")
+    parser.add_argument("--page", type=Path, help="page whose tables and pictures of accuracy are renewed")
     parser.add_argument("--only", choices=("cost", "accuracy"), help="leave out the other")
     arguments = parser.parse_args()
     arguments.output.mkdir(parents=True, exist_ok=True)
     if arguments.only != "accuracy":
         report_costs(arguments)
     if arguments.only != "cost":
-        report_accuracy(arguments.output)
+        report_accuracy(arguments)
 
 
-def report_accuracy(output: Path) -> None:
+def report_accuracy(arguments: argparse.Namespace) -> None:
     """Score all methods on the unseen scenes."""
+    output, pictures = arguments.output, pages.picture_folder(arguments)
     rows = [
         row
         for scenes in ("scoring", "reference")
@@ -129,7 +132,7 @@ def report_accuracy(output: Path) -> None:
     print(detector_accuracy.table(rows))
     text = json.dumps(detector_accuracy.as_json(rows), indent=1)
     (output / "detector_accuracy.json").write_text(text, encoding="utf-8")
-    detector_accuracy.draw(rows).savefig(output / "detector_accuracy.png", dpi=150)
+    pages.save(detector_accuracy.draw(rows), pictures / "detector_accuracy.png")
     calibrated = {
         inputs: detector_accuracy.reliability(
             (case, detect_slip(observed(case.log, 1e-6, detector_accuracy.FORCE_NOISE, inputs, seed=7)))
@@ -138,10 +141,13 @@ def report_accuracy(output: Path) -> None:
         for inputs in detector_accuracy.INPUTS
     }
     (output / "detector_reliability.json").write_text(json.dumps(calibrated, indent=1), encoding="utf-8")
-    detector_accuracy.draw_reliability(calibrated).savefig(output / "detector_reliability.png", dpi=150)
+    pages.save(detector_accuracy.draw_reliability(calibrated), pictures / "detector_reliability.png")
     conditions = list(detector_conditions.measure())
     (output / "detector_conditions.json").write_text(json.dumps(conditions, indent=1), encoding="utf-8")
     print(detector_conditions.table(conditions))
+    if arguments.page is not None:
+        made = detector_accuracy.tables_of_unseen(rows) | {"conditions": detector_conditions.table(conditions)}
+        pages.renew(arguments.page, made)
 
 
 def report_costs(arguments: argparse.Namespace) -> None:

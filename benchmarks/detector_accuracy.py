@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
+from benchmarks import pages
 from benchmarks.detector_scenes import Case, cases, observed
 from slipcore import LOOKAHEAD, METHODS, GraspLog, SlipHistory, detect_slip
 from slipcore.frames import BoolArray
@@ -199,6 +200,41 @@ def table(rows: list[Summary]) -> str:
         for r in rows
     ]
     return "\n".join(lines)
+
+
+def tables_of_unseen(rows: list[Summary]) -> dict[str, str]:
+    """Of the set ``scoring``: F1, stick-ratio error and worst scene over noise, and all methods with forces at 1 µm."""
+    unseen = [row for row in rows if row.scenes == "scoring"]
+    return {"accuracy": _over_noise(unseen), "methods": _of_methods(unseen)}
+
+
+def _over_noise(rows: list[Summary]) -> str:
+    found = {(row.method, row.inputs, row.noise): row for row in rows}
+    kept = [(method, inputs) for method in ("filter", AHEAD) for inputs in ("force", "displacement", "motion")]
+    kept.append(("strain_rate, best", "force"))
+    names = {"force": "forces", "displacement": "displacement alone", "motion": "forces and object motion"}
+    lines = []
+    for method, inputs in kept:
+        cells = [found[method, inputs, noise] for noise in NOISES]
+        lines.append(
+            [f"{method}; {names[inputs]}", *(f"{c.f1:.3f} / {c.stick_ratio_error:.3f} ({c.worst:.2f})" for c in cells)]
+        )
+    return pages.table(("method; input", *(f"{1e6 * noise:.0f} µm" for noise in NOISES)), lines)
+
+
+def _of_methods(rows: list[Summary]) -> str:
+    chosen = sorted((row for row in rows if (row.inputs, row.noise) == ("force", 1e-6)), key=lambda row: -row.f1)
+    lines = [
+        [
+            row.method,
+            f"{row.f1:.3f}",
+            *(f"{score:.2f}" for score in (row.worst, *(row.phases[name] for name in PHASES))),
+            f"{row.onset_error:.1f}",
+            f"{row.false_slip:.2%}",
+        ]
+        for row in chosen
+    ]
+    return pages.table(("method", "F1", "worst", *PHASES, "onset", "false slip in pressing"), lines)
 
 
 def draw(rows: list[Summary]) -> Figure:

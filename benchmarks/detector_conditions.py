@@ -44,7 +44,7 @@ def retimed(factor: float) -> Callable[[GraspLog, np.random.Generator], GraspLog
 CHANGES: dict[str, Callable[[GraspLog, np.random.Generator], GraspLog]] = {
     "as it is": lambda log, _: log,
     "a tenth of the frames dropped": dropped(0.1),
-    "1 % outlier markers": outliers,
+    "1 % of the markers off by 50 µm": outliers,
     "drift of 10 µm/s": drift,
     "a tenth of the speed and frame rate": retimed(0.1),
     "ten times the speed and frame rate": retimed(10.0),

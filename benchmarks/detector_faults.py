@@ -5,7 +5,7 @@ solver, which nothing was chosen on. F1 of method "filter" with forces, from dis
 pose, and of the paper's method with forces beside it. Writes detector_faults.json.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -109,16 +109,16 @@ COLUMNS = (
 def measure(scenes: list[Case], faults: dict[str, Fault]) -> Iterator[Cost]:
     """What each fault costs."""
     for name, fault in faults.items():
-        filtered = {inputs: _mean(scenes, fault, inputs, "filter") for inputs in INPUTS}
-        yield Cost(name, **filtered, strain_rate=_mean(scenes, fault, "force", "strain_rate"))
+        filtered = {inputs: mean_f1(scenes, fault, inputs, "filter") for inputs in INPUTS}
+        yield Cost(name, **filtered, strain_rate=mean_f1(scenes, fault, "force", "strain_rate"))
         if name in CALIBRATED:
-            told = {inputs: _mean(scenes, fault, inputs, "filter", **CALIBRATED[name]) for inputs in INPUTS}
+            told = {inputs: mean_f1(scenes, fault, inputs, "filter", **CALIBRATED[name]) for inputs in INPUTS}
             yield Cost(f"{name}, calibrated", **told, strain_rate=np.nan)
         if name == LOST:
             for row, judge in (("filled", _filled), ("of observed ones", _observed)):
-                judged = {inputs: _mean(scenes, fault, inputs, "filter", judge=judge) for inputs in INPUTS}
+                judged = {inputs: mean_f1(scenes, fault, inputs, "filter", judge=judge) for inputs in INPUTS}
                 yield Cost(
-                    f"{name}, {row}", **judged, strain_rate=_mean(scenes, fault, "force", "strain_rate", judge=judge)
+                    f"{name}, {row}", **judged, strain_rate=mean_f1(scenes, fault, "force", "strain_rate", judge=judge)
                 )
 
 
@@ -137,10 +137,20 @@ def _all(case: Case, log: GraspLog, history: SlipHistory) -> float:
     return score(case, log, history).f1
 
 
-def _mean(scenes: list[Case], fault: Fault, inputs: str, method: str, *, judge: Judge = _all, **known: float) -> float:
+def mean_f1(
+    scenes: Sequence[Case],
+    fault: Fault,
+    inputs: str,
+    method: str,
+    *,
+    noise: tuple[float, float] = (MARKER_NOISE, FORCE_NOISE),
+    judge: Judge = _all,
+    **known: float,
+) -> float:
+    """Mean F1 over scenes that are seen with ``noise``, m and N, and a fault; ``known``: what the method is told."""
     found = []
     for seed, case in enumerate(scenes):
-        log = fault(observed(case.log, MARKER_NOISE, FORCE_NOISE, inputs, seed), np.random.default_rng(1000 + seed))
+        log = fault(observed(case.log, *noise, inputs, seed), np.random.default_rng(1000 + seed))
         found.append(judge(case, log, detect_slip(log, method, sensor_model=None, **known)))
     return float(np.mean(found))
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.calibration import FAULTS, PRESSED_WITH, grasps, outcome
+from benchmarks.calibration import FAULTS, PRESSED_WITH, _over_seeds, grasps, outcome
 from benchmarks.presses import pressed
 from slipcore import GraspLog, calibrate_sensor
 
@@ -22,3 +22,12 @@ def test_friction_of_a_sensor_that_errs_comes_out_right_once_it_is_calibrated(
     assert abs(before[0]) > 0.02
     assert abs(after[0]) < 0.01
     assert np.isfinite(after).all()
+
+
+def test_grasps_in_which_too_little_slips_for_a_fit_have_a_score_and_no_error(clean: list[GraspLog]) -> None:
+    error, slope, f1 = outcome([log.take(slice(0, 60)) for log in clean], None)
+    assert np.isnan([error, slope]).all()
+    assert 0.0 < f1 <= 1.0
+    some = np.array([[error, slope, f1], [0.3, -0.4, 0.5], [0.1, 0.2, 0.6]])
+    assert _over_seeds(some).friction == pytest.approx(np.sqrt(0.05))
+    assert np.isnan(_over_seeds(some[:1]).slope)

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 from benchmarks.detector_accuracy import (
+    AHEAD,
+    INPUTS,
+    NOISES,
     ONSET_REACH,
     PHASES,
     Count,
@@ -14,6 +17,7 @@ from benchmarks.detector_accuracy import (
     onset_error,
     summarise,
     table,
+    tables_of_unseen,
 )
 from benchmarks.detector_conditions import CHANGES, drift, outliers, retimed
 from benchmarks.known_truth import Finding
@@ -75,6 +79,22 @@ def test_phases_are_pooled_over_scenes_that_slip_and_false_slip_counts_in_all() 
     assert (found.onset_error, found.false_slip) == (3.0, pytest.approx(0.02))
     assert "| scoring | force | 1 | filter | 0.600 | 0.40 (swing) | 0.300 |" in table([found])
     assert len(draw([found]).axes) == 3
+
+
+def test_the_page_has_unseen_scenes_alone_each_score_in_its_place() -> None:
+    every = [
+        summarise(scenes, inputs, noise, method, [score("pull", f1, Count(4, 4, 2))])
+        for scenes, f1 in (("scoring", 0.75), ("reference", 0.25))
+        for inputs in INPUTS
+        for noise in NOISES
+        for method in ("filter", AHEAD, "strain_rate, best")
+    ]
+    made = tables_of_unseen(every)
+    assert "0.25" not in made["accuracy"]
+    assert made["accuracy"].splitlines()[2] == "| filter; forces |" + " 0.750 / 0.100 (0.75) |" * len(NOISES)
+    assert len(made["accuracy"].splitlines()) == 2 + 7
+    assert made["methods"].splitlines()[2].startswith("| filter | 0.750 | 0.75 | 0.50 |")
+    assert len(made["methods"].splitlines()) == 2 + 3
 
 
 def test_a_mean_leaves_out_what_is_not_known() -> None:
