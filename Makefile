@@ -108,7 +108,7 @@ $(SHIPPED)/.installed: $(VENV)/.installed
 	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(SHIPPED)
 	$(UV) install --quiet --python $(SHIPPED)/bin/python --constraint constraints.txt --build-constraint constraints.txt \
 	    --editable ./clients --editable '.[dask,formats,notebook,otel,postgresql,s3]'
-	rm -f $(SHIPPED)/lib/*/site-packages/*.dist-info/direct_url.json  # they tell where this was built
+	rm -f $(SHIPPED)/lib/*/site-packages/*.dist-info/direct_url.json  # they say where this was built
 	@touch $@
 
 sbom: $(SHIPPED)/.installed  ## write sbom.cdx.json, the software bill of materials (CycloneDX)

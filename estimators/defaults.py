@@ -75,7 +75,7 @@ class Prior(Options):
     """Of that prior. Three leave a single grasp without any model at a slip probability of 1e-3."""
     sensor_scatter: Annotated[float, Option(1e-4, 10.0, "-", "two forces, each calibrated to 5 %: their ratio")] = 0.07
     """Scale of the half-Student-t prior of how much sensors differ in f_t/f_n, as a part of it."""
-    sensor_degrees_of_freedom: Annotated[float, Option(1.0, 100.0, "-", "weak: two hardly tell their scale")] = 4.0
+    sensor_degrees_of_freedom: Annotated[float, Option(1.0, 100.0, "-", "weak: two hardly show their scale")] = 4.0
     """Of that prior."""
     least_span: Annotated[float, Option(1e-9, 1.0, "-", "where all are equal, any prior of a slope is one")] = 1e-3
     """Least part of the largest value of v or f_n that counts as the range seen."""

@@ -68,7 +68,7 @@ class NoiseDefaults(Options):
     least_step: Annotated[float, Option(0.0, 1e-3, "m", "digits of files, and rounding of floats")] = 1e-9
     """By so much a place may miss a multiple of the step in which places are given."""
     finest_step: Annotated[float, Option(0.0, 1e-3, "m", "a third of it is less than any camera's noise")] = 2e-8
-    """No finer one is told apart from none."""
+    """No finer one is distinguished from none."""
     lasting_told: Annotated[
         float, Option(0.0, 1e-3, "m", "fields of tuning scenes without noise bend by up to 1.7 µm")
     ] = 2e-6
@@ -152,10 +152,10 @@ class SaturationDefaults(Options):
         1e-9
     )
     """By which share readings of the same digits may differ."""
-    compared: Annotated[float, Option(0.0, 1.0, "-", "noise about 0 tells nothing of the digits")] = 0.1
-    """Of the largest reading, above which others tell whether readings repeat anyhow."""
+    compared: Annotated[float, Option(0.0, 1.0, "-", "noise about 0 says nothing of the digits")] = 0.1
+    """Of the largest reading, above which others show whether readings repeat anyhow."""
     least_others: Annotated[int, Option(2, 1000, "readings", "fewer may be distinct by chance")] = 10
-    """Of them, to tell so."""
+    """Of them, to say so."""
     distinct: Annotated[float, Option(0.0, 1.0, "-", "by symmetry at least half are equal")] = 0.9
     """Share of them that differ from each other, from which readings never repeat by rounding or symmetry."""
     ring: Annotated[int, Option(1, 100, "elements", "beside the plateau, where the gel moves as under it")] = 1

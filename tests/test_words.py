@@ -1,6 +1,7 @@
 """Private words that were replaced by the field's terms do not come back as names in the code."""
 
 import io
+import re
 import tokenize
 from collections.abc import Iterator
 from pathlib import Path
@@ -83,7 +84,24 @@ def test_a_private_word_is_found(text: str) -> None:
     assert FORMER & set(names(text))
 
 
+def pages() -> dict[str, str]:
+    """The text of each page, by its name, in small letters."""
+    paths = [*ROOT.glob("docs/*.md"), ROOT / "README.md", ROOT / "ARCHITECTURE.md", ROOT / "Makefile"]
+    return {path.name: path.read_text(encoding="utf-8").lower() for path in paths}
+
+
 def test_no_page_or_message_has_one_of_the_phrases() -> None:
-    pages = [*ROOT.glob("docs/*.md"), ROOT / "README.md", ROOT / "ARCHITECTURE.md", ROOT / "Makefile"]
-    texts = {path: path.read_text(encoding="utf-8").lower() for path in pages}
-    assert {path.name: phrase for path, text in texts.items() for phrase in PHRASES if phrase in text} == {}
+    assert {name: phrase for name, text in pages().items() for phrase in PHRASES if phrase in text} == {}
+
+
+TELL = re.compile(r".{0,30}\b(?:tells?|telling|told)\b(?! to\b).{0,30}")
+"""Data determine, sensors measure, files state and pages say or report; nobody is told but to do something."""
+
+
+def test_no_page_says_that_a_thing_tells_another() -> None:
+    assert {name: found for name, text in pages().items() if (found := TELL.findall(text))} == {}
+
+
+@pytest.mark.parametrize(("text", "is_found"), [("what the data tell", True), ("told to stop", False)])
+def test_a_thing_that_tells_is_found(text: str, is_found: bool) -> None:
+    assert bool(TELL.search(text)) == is_found

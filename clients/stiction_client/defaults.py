@@ -21,7 +21,7 @@ has no better."""
 
 LEAST_CERTAIN = 0.3
 """-, 0 to 0.5: largest probability at whose quantile a model's scatter is read; near a half it lies at the mean, and
-tells none."""
+shows none."""
 
 MOST_STEPS = 200
 """-, 50 and more: steps of a search; a root that only touches takes 50, any other fewer than 20."""

@@ -216,7 +216,7 @@ def _queue_refits(session: Session, material_id: int, methods: Iterable[str], ke
 
 
 def _follow_up(context: Context, queued: list[Job]) -> list[Job]:
-    """Tell those who hold models, and those who make them."""
+    """Notify those who hold models, and those who make them."""
     context.models.seen()
     if queued:
         context.jobs.wake()

@@ -11,7 +11,7 @@ AUTO = "auto"
 """In place of a method's name: the recommended model."""
 
 PREFERENCE = ("hierarchical", "bayes", "ols", "robust")
-"""From the one that tells grasps apart to those whose errors only allow for that. An exact conjugate posterior takes
+"""From the one that separates grasps to those whose errors only allow for that. An exact conjugate posterior takes
 all samples for independent, and is never recommended."""
 
 

@@ -23,7 +23,7 @@ def with_weakening(
     """The models, those marked by which a planner may count on less by more than a tenth than ``before``, by method.
 
     The mark names the log, of the ``logs`` by id and oldest first, without which most of that is undone. It stays while
-    this is so. Only models that tell scatter between grasps apart are compared.
+    this is so. Only models that separate scatter between grasps are compared.
     """
     return [_marked(model, before.get(model.method), logs, prior) for model in models]
 

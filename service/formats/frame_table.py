@@ -23,7 +23,7 @@ TRUTH = {"True": "1", "False": "0"}
 """As pandas and ROS write them."""
 MOST_STATES = 12
 """-, distinct numbers of a noted column that are counted one by one; of more, as of a measured quantity, the median
-tells more.
+says more.
 """
 OF_FRAMES = ("time", "object_pose", "gripper_force", "gripper_force_deviation", "sensor", "metadata", "element_area")
 """Members that are the same for all elements of a frame."""

@@ -52,7 +52,7 @@ class _Datasets:
         return _plain(name, found[()])
 
     def grid(self) -> None:
-        """Told by the arrays' shapes alone."""
+        """Given by the arrays' shapes alone."""
 
     def contents(self) -> str:
         """The file's first datasets and groups."""

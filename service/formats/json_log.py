@@ -53,7 +53,7 @@ class _Document:
                 raise InvalidInput(name, f"in {having} of {len(frames)} frames", "in each of them, or in none")
 
     def grid(self) -> None:
-        """Told by the arrays' shapes alone."""
+        """Given by the arrays' shapes alone."""
 
     def contents(self) -> str:
         """The object's keys."""

@@ -96,7 +96,7 @@ class _Columns:
         return array[0] if once and len(array) else array
 
     def grid(self) -> None:
-        """Told by the arrays' shapes alone."""
+        """Given by the arrays' shapes alone."""
 
     def contents(self) -> str:
         """The columns."""

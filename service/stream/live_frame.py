@@ -20,7 +20,7 @@ def pack_frame(
 ) -> bytes:
     """One frame (``service.packed_arrays``): ``state`` of each element (0 no contact, 1 sticks, 2 slips), and numbers.
 
-    ``force`` [n, m, 3] N, of which only the resultants are told; ``command`` N, what the gripper was told to press
+    ``force`` [n, m, 3] N, of which only the resultants are sent; ``command`` N, what the gripper was told to press
     with; ``friction``: what is expected of new observations by now.
     """
     rows, columns = state.contact.shape
@@ -35,5 +35,5 @@ def pack_frame(
 
 
 def pack_end(because: str, grasp_log: str | None) -> bytes:
-    """The last that they are told: why it ended, and the id of the log that it became, if it became one."""
+    """The last that they are sent: why it ended, and the id of the log that it became, if it became one."""
     return pack_arrays({"ended": because, "grasp_log": grasp_log}, {})

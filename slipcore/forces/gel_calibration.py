@@ -368,7 +368,7 @@ def _may_be_a_half_space(search: _GelSearch, found: _Found) -> bool:
 
 def _confounded(search: _GelSearch, found: _Found) -> bool:
     """Whether Young's modulus and Poisson's ratio show only together: in the plane a half-space moves in proportion to
-    (1 + ν)(1 − 2ν)/E, and what tells them apart is the prior of shear.
+    (1 + ν)(1 − 2ν)/E, and what separates them is the prior of shear.
     """
     return 0 in search.free and len(search.presses.axes) == 2 and _may_be_a_half_space(search, found)
 

@@ -41,7 +41,7 @@ class ForceStream:
     """Forces of one sensor's frames as they come, found as ``reconstruct`` finds those of a whole log.
 
     ``position`` [n, m, 3] m of markers at rest, ``element_area`` m², ``noise`` m of a marker's coordinate (None: the
-    first 15 frames tell it, and have no forces). With an ``executor`` of one thread, frames never wait: contacts are
+    first 15 frames show it, and have no forces). With an ``executor`` of one thread, frames never wait: contacts are
     sought there, in the newest frame, and forces are by the last one found. Without, a frame waits where it is time to
     seek. Raises ``InvalidInput`` for what cannot be a sensor.
     """
