@@ -150,7 +150,7 @@ class ModelCache:
     def seen(self, *changes: Hashable) -> None:
         """That models, or names of materials, changed, as can be seen in the database by now.
 
-        ``changes`` are the evidence of that, such as jobs that have ended: none of them counts a second time. They are told
+        ``changes`` show it, such as jobs that have ended: none of them counts a second time. They are told
         apart by what they are and not by when they were, since clocks differ and are set.
         """
         if not changes or self._has_new(changes):
