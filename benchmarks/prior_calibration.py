@@ -107,8 +107,8 @@ def below_on_grid(data: list[FrictionSamples], truth: np.ndarray) -> np.ndarray:
     weight /= weight.sum()
     deviation = np.sqrt(np.einsum("kii->ki", nodes.covariance))
     of_law = weight @ special.ndtr((truth[:3] - nodes.mean) / deviation)
-    width = 0.5 * np.array([np.diff(axis[:2])[0] for axis in (grid.log_lambda, grid.log_rho)])
-    of_effects = weight @ np.clip((truth[3:5] - np.log(nodes.scatter[:, 1:])) / width + 0.5, 0.0, 1.0)
+    width = 0.5 * np.array([np.diff(axis[:2])[0] for axis in grid.axes[:2]])
+    of_effects = weight @ np.clip((truth[3:5] - np.log(nodes.scatter[:, 1:3])) / width + 0.5, 0.0, 1.0)
     share, log_sigma = (each.reshape(-1, len(SIGMA_NODES)) for each in (weight, np.log(nodes.scatter[:, 0])))
     pairs = np.maximum(share.sum(axis=1), np.finfo(float).tiny)
     mean = (share * log_sigma).sum(axis=1) / pairs
