@@ -81,18 +81,20 @@ def _uncounted(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 @overload
 def compiled(function: Kernel, /) -> Kernel: ...
 @overload
-def compiled(*, fastmath: set[str] | bool) -> Callable[[Kernel], Kernel]: ...
-def compiled(function: Kernel | None = None, /, *, fastmath: set[str] | bool = False) -> Any:
+def compiled(*, fastmath: set[str] | bool = False, inline: bool = False) -> Callable[[Kernel], Kernel]: ...
+def compiled(function: Kernel | None = None, /, *, fastmath: set[str] | bool = False, inline: bool = False) -> Any:
     """Compile a function at its first call for given types; a division by zero is as IEEE 754 has it.
 
-    ``fastmath`` names the liberties that LLVM may take with sums and products.
+    ``fastmath`` names the liberties that LLVM may take with sums and products. With ``inline`` the function becomes
+    part of those that call it: tuples of many arrays or numbers are otherwise handed on word by word, 0.1 to 0.2 µs a
+    call, which is more than what is done with them where elements are few.
     """
-    return _compile(fastmath)(function) if function else _compile(fastmath)
+    return _compile(fastmath, inline)(function) if function else _compile(fastmath, inline)
 
 
-def _compile(fastmath: set[str] | bool) -> Callable[[Kernel], Kernel]:
+def _compile(fastmath: set[str] | bool, inline: bool) -> Callable[[Kernel], Kernel]:
     def decorate(function: Kernel) -> Kernel:
-        kernel: Any = njit(error_model="numpy", fastmath=fastmath)(function)
+        kernel: Any = njit(error_model="numpy", fastmath=fastmath, forceinline=inline)(function)
         if not config.DISABLE_JIT:
             kernel._cache = _KernelCache(function)
         return cast("Kernel", kernel)

@@ -105,7 +105,7 @@ def memory_at(results: FrameResults, rings: Rings, k: int) -> Memory:
     return Memory(results.contact[k], results.slip[k], results.probability[k], noise, elements, common)
 
 
-@compiled
+@compiled(inline=True)
 def revise(
     sensor: DetectorSetup, log: LogArrays, rings: Rings, k: int, last: int, room: Workspace, results: FrameResults
 ) -> None:

@@ -53,7 +53,7 @@ class PlaceEstimate(NamedTuple):
     variance: float
 
 
-@compiled
+@compiled(inline=True)
 def update_element(
     old: FloatArray, new: FloatArray, i: int, j: int, seen: Measurement, increment: Increment, tuning: Tuning
 ) -> None:

@@ -60,7 +60,7 @@ def follow_forces(elements: FloatArray, surface: Surface, has_force: bool, gain:
                 after[TANGENTIAL, i, j] = b + weight * (surface.tangential[i, j] - b)
 
 
-@compiled
+@compiled(inline=True)
 def weigh_forces(
     elements: FloatArray,
     places: NDArray[np.int64],

@@ -10,7 +10,7 @@ from slipcore.detection.shared.records import FrameArrays
 from slipcore.frames import FloatArray
 
 
-@compiled
+@compiled(inline=True)
 def step_hold(
     anchors: Anchors,
     pose: Pose,

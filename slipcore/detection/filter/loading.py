@@ -68,7 +68,7 @@ def step_loading(
     )
 
 
-@compiled
+@compiled(inline=True)
 def restick_under_load(
     before: FloatArray,
     after: FloatArray,

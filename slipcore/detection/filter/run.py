@@ -23,7 +23,7 @@ def run_filter(
     return filter_frame(sensor, last, frame, before, after, workspace(n, m), velocity)
 
 
-@compiled
+@compiled(inline=True)
 def filter_frame(
     sensor: DetectorSetup,
     last: FrameArrays,

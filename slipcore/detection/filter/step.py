@@ -37,7 +37,7 @@ from slipcore.detection.shared.records import Decision, DetectorSetup, FrameArra
 from slipcore.frames import BoolArray, FloatArray
 
 
-@compiled
+@compiled(inline=True)
 def step_filter(
     sensor: DetectorSetup,
     last: FrameArrays,
@@ -63,7 +63,7 @@ def step_filter(
     decide(after.elements[PROBABILITY], tuning.threshold, room.decision)
 
 
-@compiled
+@compiled(inline=True)
 def step_elements(
     position: FloatArray,
     last: FrameArrays,
@@ -122,7 +122,7 @@ def step_elements(
         update_element(elements, after.elements, i, j, seen, increment, tuning)
 
 
-@compiled
+@compiled(inline=True)
 def noise_of_frame(surface: Surface, tuning: Tuning) -> tuple[float, float]:
     """Variance of a marker coordinate, m², and deviation of an element's force, N, that are reckoned with."""
     marker_noise, pressing_noise, between_neighbours, told_step = surface.noise
@@ -132,7 +132,7 @@ def noise_of_frame(surface: Surface, tuning: Tuning) -> tuple[float, float]:
     return variance, tuning.force_noise_margin * known_or(pressing_noise, 0.0)
 
 
-@compiled
+@compiled(inline=True)
 def lasting_noise(marker_noise: float, between_neighbours: float, step: float, tuning: Tuning) -> float:
     """What of a marker coordinate's noise three frames do not show, m: rounding to a ``step``, and what parts it from
     its neighbours by far more than from one frame to the next.
@@ -214,7 +214,7 @@ def force_change(places: NDArray[np.int64], before: FloatArray, now: FloatArray,
             change[a, e] = now[i, j, a] - before[i, j, a]
 
 
-@compiled
+@compiled(inline=True)
 def start_elements(
     position: FloatArray,
     displacement: FloatArray,

@@ -25,7 +25,7 @@ _LEAST_SPREAD = NUMERICS.least_spread
 NOT_GIVEN = np.zeros(0)
 
 
-@compiled
+@compiled(inline=True)
 def step_pose(
     anchors: Anchors,
     before: Pose,

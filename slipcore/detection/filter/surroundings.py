@@ -10,7 +10,7 @@ from slipcore.frames import BoolArray, FloatArray
 from slipcore.noise import median
 
 
-@compiled
+@compiled(inline=True)
 def shift_of_surroundings(
     last: FrameArrays,
     frame: FrameArrays,

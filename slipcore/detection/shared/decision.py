@@ -8,7 +8,7 @@ from slipcore.detection.shared.rigid_motion import RigidMotion, fit_motion
 from slipcore.frames import FloatArray
 
 
-@compiled
+@compiled(inline=True)
 def apply_decision(
     position: FloatArray,
     last: FrameArrays,

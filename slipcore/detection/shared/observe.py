@@ -14,7 +14,7 @@ from slipcore.surface.normals import split_forces, surface_normals
 SERIES = NOISE.series
 
 
-@compiled
+@compiled(inline=True)
 def observe(sensor: DetectorSetup, frame: FrameArrays, before: Memory, after: Memory, room: Workspace) -> bool:
     """Fill ``room.surface``, what all methods see of a frame, and in the memory ``after`` contact and the state of the
     noise estimate. Whether there are forces, and they do not pull: an object cannot, and contact is then by shape.
