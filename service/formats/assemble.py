@@ -44,6 +44,8 @@ def assemble(recording: Recording, mapping: FieldMapping) -> GraspLog:
     members: dict[str, NDArray[Any]] = {}
     metadata: dict[str, str] = {"mapping": mapping.text} if mapping.text else {}
     for name, origin in mapping.origins.items():
+        if name == "position" and mapping.is_of_places:
+            continue
         array = _read(recording, name, origin)
         if array is None and origin.explicit:
             raise InvalidInput(name, f"not there ({origin})", recording.contents())
@@ -69,7 +71,7 @@ def _log(
     if "position" not in members and mapping.pitch is not None:
         members["position"] = flat_lattice(members["displacement"].shape[1:3], mapping.pitch)
         metadata["position"] = f"a flat lattice of pitch {mapping.pitch:g} m"
-    if mapping.rest is not None:
+    if mapping.rest is not None or mapping.is_of_places:
         _from_rest(members, mapping, metadata)
     _require("position", members, recording)
     unseen = len(mapping.origins["displacement"].fields) == 2 and not {"force", "contact"} & members.keys()
@@ -89,14 +91,14 @@ def _log(
 
 
 def _from_rest(members: dict[str, NDArray[Any]], mapping: FieldMapping, metadata: dict[str, str]) -> None:
-    """Displacement from rest. Where displacement and position are the same fields, these are places.
+    """Displacement from rest, which is the first frame's where none is named of markers' places.
 
     Of an element that is not observed at rest no displacement is known in any frame: it counts as observed in none.
     """
     moved = np.asarray(members["displacement"], dtype=np.float64)
     if moved.ndim < 2 or not moved.size:
         raise InvalidInput("displacement", f"of shape {moved.shape}", "frames, elements and components, one at least")
-    places = mapping.origins["displacement"].fields == mapping.origins["position"].fields != ()
+    places = mapping.is_of_places
     if mapping.rest == rest.ALL_FRAMES and not places:
         return
     observed = members.get("observed")
@@ -112,6 +114,8 @@ def _from_rest(members: dict[str, NDArray[Any]], mapping: FieldMapping, metadata
     else:
         frame = _frame_at_rest(members, mapping.rest, moved, None if places else members.get("position"), seen)
         known = seen[frame]
+        if not known.any():
+            raise InvalidInput("rest", f"frame {frame}, with no element observed", "a frame in which some are observed")
         zero = np.where(known[..., None], moved[frame], rest.unmoved(moved, seen)[0] if places else 0.0)
         metadata["rest"] = f"frame {frame}"
     if places:
@@ -127,7 +131,10 @@ def _frame_at_rest(
     """The frame that is at rest, of elements ``moved`` [t, n, m, c] from a ``position`` [n, m, c] if known."""
     at = moved if position is None or position.shape != moved.shape[1:] else position + moved
     shown = np.where(seen[..., None], at, np.nan).reshape(len(moved), -1, moved.shape[-1])
-    return rest.frame_of(chosen or rest.FIRST, len(moved), rest.load_of(members), shown)
+    load = rest.load_of(members)
+    if load is not None and load.shape == moved.shape[:1]:
+        load = np.where(seen.reshape(len(seen), -1).any(axis=1), load, np.inf)
+    return rest.frame_of(chosen or rest.FIRST, len(moved), load, shown)
 
 
 def _require(name: str, members: Members, recording: Recording) -> None:

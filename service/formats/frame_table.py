@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from service.formats.assemble import MASKS, MAX_CONTENT_BYTES, assemble
 from service.formats.delimited import parse_number, rows, split_header, text_lines
 from service.formats.mapping import UNMAPPED, FieldMapping, default_origins
+from service.formats.members import of_all_frames
 from slipcore.errors import InvalidInput
 from slipcore.frames import FloatArray, GraspLog
 
@@ -82,7 +83,7 @@ class _Table:
             found = self._one_a_frame(name, found) if name in OF_FRAMES else found
         if name in MASKS and np.isin(found, (0.0, 1.0)).all():
             found = found == 1.0
-        return found[0] if once else found
+        return of_all_frames(name, found) if once else found
 
     @staticmethod
     def _one_a_frame(name: str, found: NDArray[Any]) -> NDArray[Any]:

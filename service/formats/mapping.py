@@ -89,6 +89,12 @@ class FieldMapping:
     alternatives: "tuple[FieldMapping, ...]" = ()
     preset: bool = False
 
+    @property
+    def is_of_places(self) -> bool:
+        """Whether displacement and position are the same fields: these are places of the markers then."""
+        moved, at = (self.origins.get(name, Origin()) for name in ("displacement", "position"))
+        return (moved.topic, moved.fields) == (at.topic, at.fields) and moved.fields != ()
+
     def at_rest(self, rest: str | rests.SensorAlone | None) -> "FieldMapping":
         """This mapping, in each of its alternatives, with another frame or file at rest, unless that is None."""
         if rest is None:

@@ -73,10 +73,14 @@ def gather(path: Path, columns: MessageColumns) -> None:
 
 
 def _own_mapping(path: Path) -> FieldMapping:
-    for record in _records(path):
-        if isinstance(record, Metadata) and record.name == MAPPING_RECORD and "mapping" in record.metadata:
-            return mappings.parse(record.metadata["mapping"])
-    return mappings.UNMAPPED
+    found = [
+        record.metadata["mapping"]
+        for record in _records(path)
+        if isinstance(record, Metadata) and record.name == MAPPING_RECORD and "mapping" in record.metadata
+    ]
+    if len(found) > 1:
+        raise InvalidInput("mapping", f"in {len(found)} metadata records {MAPPING_RECORD!r}", "one of them")
+    return mappings.parse(found[0]) if found else mappings.UNMAPPED
 
 
 def _records(path: Path) -> Iterator[McapRecord]:

@@ -42,6 +42,18 @@ MARKS = ("mapping", "displacement", "position", "contact", "element_area", "rest
 """Entries of the metadata in which a reader says what it did itself; nothing else that is noted has their names."""
 
 
+def of_all_frames(name: str, stated: NDArray[Any]) -> NDArray[Any]:
+    """What all frames [t, ...] state alike of the whole log; raises ``InvalidInput`` where they differ."""
+    alike = (stated == stated[:1]) | ((stated != stated) & (stated[:1] != stated[:1]))  # NaN is not equal to itself
+    if not alike.all():
+        frame = int(np.argwhere(~alike)[0][0])
+        allowed = "one value of the whole log"
+        if name == "position":
+            allowed += "; where its fields are places of moving markers, map displacement to the same fields"
+        raise InvalidInput(name, f"other in frame {frame} than in frame 0", allowed)
+    return np.asarray(stated[0])
+
+
 def grasp_log(members: Members) -> GraspLog:
     """The log of these members; raises ``InvalidInput`` naming the one that is wrong."""
     return GraspLog(

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from service.formats.assemble import MAX_CONTENT_BYTES, as_array
 from service.formats.json_text import parse
 from service.formats.mapping import FieldMapping, Origin, default_origins
+from service.formats.members import of_all_frames
 from slipcore.errors import InvalidInput
 
 FRAME_TOPIC, LOG_TOPIC = "/stiction/frame", "/stiction/log"
@@ -70,7 +71,7 @@ class MessageColumns:
                 self._keep(topic, field, as_array(f"{field} of {topic}", value))
 
     def column(self, name: str, topic: str | None, field: str, once: bool) -> NDArray[Any] | None:
-        """A field of all messages of a topic, or ``once`` of the first; None where none has it."""
+        """A field of all messages of a topic, or ``once`` what all of them state; None where none has it."""
         if topic not in self._received:
             return None
         if field == RECEIVED:
@@ -79,7 +80,8 @@ class MessageColumns:
         if parts is None:
             return None
         if once:
-            return parts[0]
+            _check_shapes(name, parts)
+            return of_all_frames(name, np.stack(parts))
         if len(parts) != len(self._received[topic]):
             value = f"in {len(parts)} of {len(self._received[topic])} messages of {topic}"
             raise InvalidInput(name, value, f"{field} in each of them")

@@ -17,7 +17,7 @@ from service.formats import mapping as mappings
 from service.formats.assemble import MAX_CONTENT_BYTES, as_array, assemble
 from service.formats.json_text import parse_object
 from service.formats.mapping import FieldMapping, Origin, default_origins
-from service.formats.members import DTYPES, ONCE
+from service.formats.members import DTYPES, ONCE, of_all_frames
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
 from stiction_client.container import members
@@ -84,7 +84,7 @@ class _Columns:
         self._rows = self._episode()
 
     def column(self, name: str, _topic: str | None, field: str, once: bool) -> NDArray[Any] | None:
-        """A column with an entry a row, or ``once`` its first; None where it isn't there."""
+        """A column with an entry a row, or ``once`` what all rows state; None where it isn't there."""
         if once and field == name and name in self._log:
             return as_array(name, self._log[name])
         if field not in self._names:
@@ -93,7 +93,7 @@ class _Columns:
         if isinstance(self._rows, np.ndarray) and len(array) != len(self._rows):
             raise InvalidInput(name, f"of {len(array)} rows", f"{len(self._rows)} rows, as in {EPISODE}")
         array = array[self._rows]
-        return array[0] if once and len(array) else array
+        return of_all_frames(name, array) if once and len(array) else array
 
     def grid(self) -> None:
         """Given by the arrays' shapes alone."""

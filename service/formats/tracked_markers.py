@@ -99,11 +99,17 @@ def at_rest(path: Path, given: Mapping[str, str] = MappingProxyType({})) -> dict
     return {tracks.names[k]: np.nanmedian(tracks.place[:, k], axis=0) for k in np.flatnonzero(seen)}
 
 
+class RepeatedSetting(InvalidInput):
+    """A setting that stands twice before the header."""
+
+
 def looks_like(start: bytes) -> bool:
     """Whether a file that begins so has a header of tracked markers."""
     try:
         lines = start.decode("utf-8", errors="ignore").splitlines()
         read_header(iter(lines))
+    except RepeatedSetting:
+        return True
     except InvalidInput:
         return False
     return True
@@ -115,9 +121,11 @@ def read_header(lines: Iterator[str]) -> Header:
     for number, line in enumerate(lines, start=1):
         text = line.strip("\ufeff \r\n")
         if text.startswith("#"):
-            name, _, value = text[1:].partition(":")
-            if name.strip() in SETTINGS:
-                settings.setdefault(name.strip(), value.strip())
+            name, _, value = (part.strip() for part in text[1:].partition(":"))
+            if name in settings:
+                raise RepeatedSetting(f"line {number}, {name}", "a second time", "each setting once")
+            if name in SETTINGS:
+                settings[name] = value
         elif text:
             return _columns(text, settings, number)
     raise InvalidInput("file", "without a header", "a line that names the columns: time or frame, marker, x, y")

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from service import formats
 from service.formats import frame_table
+from service.formats.members import of_all_frames
 from slipcore import GraspLog, InvalidInput
 from slipcore.markers import contact_by_motion
 
@@ -263,6 +264,25 @@ def test_rows_of_a_frame_state_its_gripper_force_alike(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read(0.0).gripper_force, 3.0)
     with pytest.raises(InvalidInput, match=r"gripper_force is 3 and 3\.5 in rows of frame 0; allowed: one value in"):
         read(0.5)
+
+
+def test_a_position_that_changes_is_refused(tmp_path: Path) -> None:
+    """The first frame's had been taken."""
+    path, _ = long_table(tmp_path / "log.csv")
+    header, *rows = path.read_text(encoding="utf-8").splitlines()
+    last = max(range(len(rows)), key=lambda k: float(rows[k].split(";")[3]))
+    rows[last] = ";".join([*rows[last].split(";")[:-1], "9.0"])
+    path.write_text("\n".join([header, *rows]), encoding="utf-8")
+    with pytest.raises(InvalidInput, match="position is other in frame 3 than in frame 0; allowed: one value of the"):
+        formats.read(path, mapping=json.dumps(LONG))
+
+
+def test_what_frames_state_alike_of_a_log_is_taken_once() -> None:
+    stated = np.array([[1.0, np.nan]] * 3)
+    np.testing.assert_array_equal(of_all_frames("element_area", stated), stated[0])
+    stated[2, 1] = 2.0
+    with pytest.raises(InvalidInput, match="element_area is other in frame 2 than in frame 0"):
+        of_all_frames("element_area", stated)
 
 
 def test_a_component_without_columns_is_named(tmp_path: Path) -> None:

@@ -144,3 +144,21 @@ def test_places_count_from_those_of_a_file_at_rest(tmp_path: Path) -> None:
     small = {"displacement": np.stack([PLACES[:1]] * 2).tolist(), "time": [0.0, 1.0]}
     with pytest.raises(InvalidInput, match=r"rest is a file of \(1, 2\) elements; allowed: \(2, 2\), as the log"):
         formats.read(tmp_path / "log.json", rest=log_of(tmp_path / "other", **small), mapping=mapping)
+
+
+def test_places_count_from_the_first_frame_unless_another_is_named(tmp_path: Path) -> None:
+    """Without `rest` the places had been taken for displacement."""
+    mapping = json.dumps({"position": "displacement", "displacement": "displacement"})
+    log = formats.read(log_of(tmp_path, displacement=(PLACES - 5e-4 + MOVED).tolist()), mapping=mapping)
+    np.testing.assert_allclose(log.displacement, MOVED - MOVED[0], rtol=0, atol=1e-16)
+    np.testing.assert_array_equal(log.position, PLACES - 5e-4 + MOVED[0])
+    assert log.metadata["rest"] == "frame 0"
+
+
+def test_a_frame_in_which_nothing_is_observed_is_not_at_rest(tmp_path: Path) -> None:
+    observed, contact = np.ones((3, 2, 2), bool), np.ones((3, 2, 2), bool)
+    observed[1] = contact[1] = contact[2, 0] = False
+    path = log_of(tmp_path, observed=observed.tolist(), contact=contact.tolist())
+    assert formats.read(path, rest="least contact").metadata["rest"] == "frame 2"
+    with pytest.raises(InvalidInput, match="rest is frame 1, with no element observed; allowed: a frame in which some"):
+        formats.read(path, rest="1")

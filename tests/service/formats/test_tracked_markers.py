@@ -135,6 +135,12 @@ def test_a_column_is_the_grippers_force(write: Write, rows: str) -> None:
     np.testing.assert_array_equal(log.gripper_force, [0.0, 1.5, 3.0])
 
 
+def test_a_setting_that_stands_twice_is_refused(write: Write) -> None:
+    """The first had counted."""
+    with pytest.raises(InvalidInput, match="line 2, scale is a second time; allowed: each setting once"):
+        formats.read(write(table(head="# scale: 2e-4\n# scale: 1e-4\n")))
+
+
 def test_an_unknown_scale_is_told_and_friction_refused(write: Write) -> None:
     log = formats.read(write(table(head="")))
     assert not log.is_scaled
@@ -163,7 +169,7 @@ def test_what_is_given_goes_before_what_the_file_says(write: Write) -> None:
     log = formats.read(path, scale=5e-5, frame_rate=20.0)
     np.testing.assert_allclose(log.time, [0.0, 0.05, 0.1])
     assert log.metadata["scale"] == "5e-05 m per pixel"
-    path.write_bytes(b"# scale: 5e-05\n# frame_rate: 20.0\n" + path.read_bytes())
+    path.write_bytes(path.read_bytes().replace(b"# scale: 1e-4\n", b"# scale: 5e-05\n# frame_rate: 20.0\n"))
     np.testing.assert_array_equal(formats.read(path).displacement, log.displacement)
 
 
