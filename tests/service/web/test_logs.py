@@ -1,4 +1,3 @@
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +8,7 @@ import pytest
 
 from slipcore import GraspLog
 from stiction_client.container import encode
-from tests.service.stored import wait_for_empty_spool
+from tests.service.stored import stored_files, wait_for_empty_spool
 from tests.service.web.conftest import HTML
 
 ON_SQLITE = pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
@@ -158,13 +157,12 @@ def test_a_log_whose_slip_history_is_missing_says_so(
     page_of: Callable[[str], Any],
 ) -> None:
     other = repack({**members, "time": members["time"] + 5.0})  # a history of its own
+    before = stored_files(client)
     log = upload(client, other).json()
     wait(client, log["job"]["id"])
     assert "Stick–slip map" in str(page_of(f"/logs/{log['id']}").found)
-    folder = Path(client.headers["x-data-folder"])
-    before = time.time() - 20.0
-    newest = [path for path in folder.rglob("*") if path.is_file() and len(path.name) == 64]
-    hidden = [(path, path.read_bytes()) for path in newest if path.stat().st_mtime > before]
+    hidden = [(path, path.read_bytes()) for path in map(Path, stored_files(client) - before)]
+    assert hidden
     for path, _ in hidden:
         path.unlink()
     try:

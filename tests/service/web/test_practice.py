@@ -9,6 +9,7 @@ import pytest
 from service.demo import inputs
 from service.settings import Settings
 from tests.service.web.conftest import HTML, OWN
+from tests.waiting import wait_until
 
 FRICTION = {"cardboard": 0.45}
 
@@ -36,4 +37,4 @@ def test_a_button_uploads_the_simulated_grasps_once(empty: httpx.Client, tmp_pat
     assert "simulated cardboard" in empty.get("/").text
     uploaded: list[Any] = empty.get("/v1/audit?action=grasp_log.uploaded").json()["items"]
     assert [entry["details"]["new"] for entry in uploaded] == [True, True]
-    assert list((tmp_path / "spool").iterdir()) == []
+    wait_until(lambda: not list((tmp_path / "spool").iterdir()), "the files of the uploads to go")
