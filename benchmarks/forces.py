@@ -4,8 +4,9 @@ Presses whose forces are known (benchmarks/gel_scenes.py) are seen by simulated 
 alone, in several draws of noise. Each factor is varied against one case (20 × 20 markers on the surface of a layer of
 5 mm, ν 0.49, a sphere, 1 µm of noise): gel and noise, contact, depth of the markers, lattice, and the gel's
 description, which is then wrong. It is also learnt from presses (benchmarks/gel_presses.py), frames are followed as
-they come (benchmarks/gel_stream.py), displacement is cut at the end of a range (benchmarks/gel_saturation.py), and
-grasps are taken to friction and slip with the gripper's force alone (benchmarks/gel_friction.py). In the plane the
+they come (benchmarks/gel_stream.py), displacement is cut at the end of a range (benchmarks/gel_saturation.py), an
+independent solver's scenes are read (benchmarks/gel_references.py), and grasps are taken to friction and slip with the
+gripper's force alone (benchmarks/gel_friction.py). In the plane the
 normal force on a half-space is given. Peers are given the same displacements. Errors are those of resultants, of the
 field of forces on elements, and their growth with noise; how often stated intervals of 95 % hold the truth is reported
 for each group.
@@ -31,7 +32,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.ndimage import uniform_filter
 
-from benchmarks import gel_friction, gel_presses, gel_saturation, gel_stream
+from benchmarks import gel_friction, gel_presses, gel_references, gel_saturation, gel_stream
 from benchmarks.gel_peers import PEERS, export, imported, made
 from benchmarks.gel_presses import calibrated, calibration_table
 from benchmarks.gel_scenes import CONTACTS, LATTICES, Truth, press, repeated, seen
@@ -57,7 +58,9 @@ NORMAL_95 = 1.959964
 STICTION = "stiction"
 GROUPS = ("gel and noise", "contact", "marker depth", "lattice", "wrong description")
 PEERS_GROUP, CALIBRATION_GROUP, STREAM_GROUP, FRICTION_GROUP = "peers", "gel calibration", "stream", "friction"
-SATURATION_GROUP = "saturation"
+SATURATION_GROUP, COVERAGE_GROUP, REFERENCES_GROUP = "saturation", "coverage", "independent scenes"
+COVERAGE_DRAWS = 3
+COVERED_CONTACTS = ("sphere", "ring")
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +127,14 @@ def cases(group: str) -> Iterator[Case]:
             yield from (replace(base, lattice="10 × 7", noise=noise) for noise in (1e-6, 10e-6))
         else:
             yield from (replace(base, wrong=wrong) for wrong in WRONG)
+
+
+def covered() -> Iterator[Case]:
+    """Cases by which stated intervals are judged: sensors, noises and two contacts, with depth and in the plane."""
+    for depth_seen in (True, False):
+        for gel, lattice in (*((gel, "20 × 20") for gel in GELS), ("5 mm", "10 × 7")):
+            base = Case(COVERAGE_GROUP, depth_seen, lattice, gel, given=not depth_seen and gel == "half-space")
+            yield from (replace(base, noise=noise, contact=contact) for noise in NOISES for contact in COVERED_CONTACTS)
 
 
 def compared() -> list[Case]:
@@ -252,6 +263,20 @@ def errors_table(scores: list[Score]) -> str:
     return table(columns, rows)
 
 
+def coverage_table(scores: list[Score]) -> str:
+    """How many intervals hold the truth, by sensor and noise, contacts together."""
+    columns = ("seen", "gel", "markers", "noise, µm", *QUANTITIES, "frames")
+    groups: dict[tuple[str, str, str, str], list[Score]] = {}
+    for entry in scores:
+        case = entry.case
+        groups.setdefault((case.seen, case.gel, case.lattice, f"{1e6 * case.noise:g}"), []).append(entry)
+    rows = [
+        (*key, *coverage(own), sum(entry.inside["resultant, normal"][1] for entry in own))
+        for key, own in groups.items()
+    ]  # fmt: skip
+    return table(columns, rows)
+
+
 def peers_table(scores: list[Score]) -> str:
     """All methods on the sphere on 5 mm."""
     columns = ("seen", "noise, µm", "method", "resultant", "field", "CPU to set up, s", "CPU a frame, ms")
@@ -324,6 +349,26 @@ def saturate(arguments: argparse.Namespace) -> None:
     write([asdict(each) for each in found], {SATURATION_GROUP: text}, arguments, "forces-saturation.json")
 
 
+def cover(arguments: argparse.Namespace) -> None:
+    """Whether stated intervals hold the truth as often as they say; a line a case while it goes on."""
+    found = list[Score]()
+    for case in covered():
+        found.append(score(case, COVERAGE_DRAWS))
+        about = f"{case.seen}, {case.gel}, {case.lattice}, {case.contact}, {1e6 * case.noise:g} µm"
+        print(f"{about}: {', '.join(coverage(found[-1:]))}", flush=True)
+    text = coverage_table(found)
+    print(f"{COVERAGE_GROUP}\n\n{text}\n", flush=True)
+    write([asdict(each) for each in found], {COVERAGE_GROUP: text}, arguments, "forces-coverage.json")
+
+
+def refer(arguments: argparse.Namespace) -> None:
+    """Scenes whose truth is another solver's."""
+    found = list(gel_references.references())
+    text = gel_references.references_table(found)
+    print(f"{REFERENCES_GROUP}\n\n{text}\n", flush=True)
+    write([asdict(each) for each in found], {REFERENCES_GROUP: text}, arguments, "forces-independent-scenes.json")
+
+
 def grip(arguments: argparse.Namespace) -> None:
     """Grasps to friction and slip, each taking seconds; lines of forces-friction.jsonl are not made again."""
     pictures = picture_folder(arguments)
@@ -340,7 +385,14 @@ def main() -> None:
     """Measure, print and write, group by group."""
     parser = options(__doc__)
     parser.add_argument("--draws", type=int, default=5, help="of noise, for each frame")
-    alone = {CALIBRATION_GROUP: calibrate, STREAM_GROUP: follow, SATURATION_GROUP: saturate, FRICTION_GROUP: grip}
+    alone = {
+        CALIBRATION_GROUP: calibrate,
+        STREAM_GROUP: follow,
+        SATURATION_GROUP: saturate,
+        COVERAGE_GROUP: cover,
+        REFERENCES_GROUP: refer,
+        FRICTION_GROUP: grip,
+    }
     every = (*GROUPS, PEERS_GROUP, *alone)
     parser.add_argument("--only", nargs="+", choices=every, default=every)
     parser.add_argument("--seeds", nargs=2, type=int, default=(40, 20), help="of friction: with depth, in the plane")

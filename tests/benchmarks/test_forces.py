@@ -6,7 +6,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.forces import STICTION, Case, compared, coverage, errors, errors_table, picture, pooled, score
+from benchmarks import gel_references
+from benchmarks.forces import (
+    QUANTITIES,
+    STICTION,
+    Case,
+    Score,
+    compared,
+    coverage,
+    coverage_table,
+    covered,
+    errors,
+    errors_table,
+    picture,
+    pooled,
+    score,
+)
 from benchmarks.gel_peers import PEERS, export, imported, pseudo_inverse
 from benchmarks.gel_presses import Calibration, calibration_table
 from benchmarks.gel_saturation import ROUNDED, Detection, cut, detection_table
@@ -160,3 +175,22 @@ def test_logs_that_are_cut_are_counted_beside_those_that_are_not() -> None:
     seen_field, is_cut = cut(field, slice(2, 3), 0.5, 0.2)
     np.testing.assert_allclose(seen_field[0, 0, :, 2], [-1.6, 1.0, 1.6], rtol=1e-12)  # 1.5 is half between two steps
     assert is_cut.sum() == 2
+
+
+def test_intervals_are_counted_over_contacts_and_apart_by_noise() -> None:
+    cases = list(covered())
+    assert len({(case.depth_seen, case.gel, case.lattice, case.noise) for case in cases}) * 2 == len(cases)
+    held = dict.fromkeys(QUANTITIES, (3, 4))
+    own = [Score(case, STICTION, (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), inside=held) for case in cases[:3]]
+    first, second = coverage_table(own).splitlines()[2:]
+    assert first == "| with z | half-space | 20 × 20 | 0 | 75% | 75% | 75% | 75% | 8 |"
+    assert second.endswith("| 4 |")
+
+
+def test_an_independent_scene_is_read_with_the_load_that_it_was_made_with() -> None:
+    log, total = gel_references.read("cond1_layer5c")
+    np.testing.assert_allclose(total[-1], [3.975, 0.0, -10.0], rtol=0.0, atol=0.03)
+    assert log.displacement[-1, ..., 2].min() < -2e-4  # pressed in, z outward
+    assert "| cond1 | with z | 1 | 10 | 20 | 50% | 100% | 0% | 4 |" in gel_references.references_table(
+        [gel_references.Reference("cond1", "with z", 1e-6, (0.1, 0.2), (2, 4, 0), 4)]
+    )
