@@ -251,7 +251,7 @@ class _Connection:
         return {"type": "finished", "grasp_log": stored}
 
     def _upload(self, opening: Open) -> UploadRequest:
-        return UploadRequest(opening.material, opening.sensor, opening.detector, principal=self._principal)
+        return UploadRequest(opening.material, opening.sensor or None, opening.detector, principal=self._principal)
 
     async def _receive(self) -> Sent:
         event = await self._socket.receive()

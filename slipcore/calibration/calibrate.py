@@ -56,7 +56,10 @@ def _check_alike(logs: Sequence[GraspLog]) -> None:
 
 
 def _is_same(log: GraspLog, other: GraspLog) -> bool:
-    return np.array_equal(log.time, other.time) and np.array_equal(log.displacement, other.displacement)
+    return all(
+        np.array_equal(getattr(log, name), getattr(other, name))  # None is equal to None alone
+        for name in ("time", "displacement", "force")
+    )
 
 
 def _estimates(presses: list[PressLog], known_force: Sequence[float | None]) -> list[Estimate]:

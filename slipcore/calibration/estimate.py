@@ -70,9 +70,10 @@ def _random_effects(known: np.ndarray) -> tuple[float, float, float]:
     values, variances = known[:, 0], np.maximum(known[:, 1] ** 2, np.finfo(float).tiny)
     if len(values) == 1:
         return float(values[0]), float(known[0, 1]), math.inf
-    weights = 1.0 / variances
+    least = variances.min()
+    weights = least / variances  # not 1/variances, whose squares overflow where there is no noise
     fixed = np.average(values, weights=weights)
-    excess = weights @ (values - fixed) ** 2 - (len(values) - 1)
+    excess = weights @ (values - fixed) ** 2 - (len(values) - 1) * least
     between = max(excess / (weights.sum() - (weights**2).sum() / weights.sum()), 0.0)
     weights = 1.0 / (variances + between)
     freedom = math.inf if between == 0.0 else len(values) - 1.0

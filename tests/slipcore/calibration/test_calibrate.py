@@ -243,6 +243,8 @@ def test_logs_that_do_not_belong_together_are_refused(ball: GraspLog) -> None:
         calibrate_sensor([ball, replace(ball, sensor="another")])
     with pytest.raises(InvalidInput, match="logs is number 1, the same press as 0; allowed: each press once"):
         calibrate_sensor([ball, replace(ball, metadata={"copy": "yes"})])
+    forces_alone = replace(ball, displacement=np.zeros_like(ball.displacement), metadata={"displacement": "none"})
+    assert calibrate_sensor([forces_alone, replace(forces_alone, force=1.01 * ball.force)]).presses == 2, "not the same"
     with pytest.raises(InvalidInput, match="one for each of 1 logs"):
         calibrate_sensor([ball], [1.0, 2.0])
     with pytest.raises(InvalidInput, match="1e-06 to 10000 N"):

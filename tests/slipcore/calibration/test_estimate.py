@@ -62,3 +62,12 @@ def test_zero_within_the_interval_is_no_difference(low: float, high: float, is_s
 )
 def test_the_error_of_a_mean_is_that_of_a_series_with_memory(residual: list[float], error: float) -> None:
     assert error_of_mean(np.array(residual)) == pytest.approx(error, rel=1e-12)
+
+
+def test_presses_without_noise_are_joined_as_those_with_next_to_none() -> None:
+    """The square of an error of 0, as a weight, overflowed."""
+    results = [PressEstimate(1.0, 0.0), PressEstimate(1.1, 0.0)]
+    exact = joined("gain", "-", results)
+    nearly = joined("gain", "-", [PressEstimate(each.value, 1e-9) for each in results])
+    assert exact.value == pytest.approx(1.05, rel=1e-12, abs=0.0)
+    np.testing.assert_allclose([exact.low, exact.high], [nearly.low, nearly.high], rtol=1e-9, atol=0)
