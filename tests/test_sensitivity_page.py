@@ -22,6 +22,7 @@ ABSENT: dict[str, dict[str, str]] = {
         ),
         "slipcore.defaults.PATCHES": "least_square_arm",
         "slipcore.defaults.COLLECTION": "agreement least_samples",
+        "slipcore.defaults.SATURATION": "compared distinct elements equal growth least_others ring",
         "slipcore.contact.defaults.INTERIOR": "most_points",
         "slipcore.contact.defaults.PROJECTION": (
             "bracket certificate flat growth longest ridge search_steps slope tight"

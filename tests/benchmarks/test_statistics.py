@@ -113,7 +113,7 @@ def test_recognition_is_summed_up_by_size_and_strangers() -> None:
     lines = recognition.summary(trials)
     assert lines[2] == "| 5 | 80.0% | 80.0% | 100% of 1 | 25.00% |"
     assert lines[-2] == "| all | 94.1% | 80.0% | 100% of 4 | 7.69% |"
-    assert "Unknown: 4 grasps; told: 4 expected, with a standard error of 2." in lines[-1]
+    assert "Unknown: 4 grasps; stated: 4 expected, with a standard error of 2." in lines[-1]
 
 
 def test_grasps_of_a_material_differ_by_an_intercept() -> None:

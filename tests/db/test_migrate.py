@@ -185,7 +185,8 @@ def test_models_of_before_scales_are_read_with_those_that_their_diagnostics_tell
     scales: Scales,
 ) -> None:
     told: dict[str, float | str | None] = {}
-    for name, scale in asdict(scales).items():
+    for name in ("between_grasps", "between_places", "within"):  # that between sensors was not there yet
+        scale = asdict(scales)[name]
         told |= {f"scale_{name}": scale["value"], f"scale_{name}_degrees_of_freedom": scale["degrees_of_freedom"]}
     fill(database, new_log(material_id=1), detection, samples, new_model())
     with database.write() as session:
