@@ -44,6 +44,8 @@ class Identifiability(Options):
     """Share in a direction that is not seen from which a coefficient is not identified."""
     rounding: Annotated[float, Option(1.0, 1000.0, "ulp", "rounding of a mean of many")] = 8.0
     """Spread of a column, in units of its mean's last digit, up to which it is constant."""
+    compared: Annotated[int, Option(1, 1000, "sensors", "their pairs, of those that differ most, are few")] = 4
+    """With the largest gains and with the least: of so many twice, all pairs are compared."""
     interval: Annotated[float, Option(0.5, 0.9999, "-", "custom")] = 0.95
     """Level of the intervals that are reported and that calibrated standard errors are made for."""
 
@@ -279,6 +281,8 @@ class GridSettings(Options):
     """Share of a grid that must matter for it to be the last."""
     no_scatter: Annotated[float, Option(10.0, 300.0, "-", "e⁶⁰: any scatter between explains all within")] = 60.0
     """Logarithm of the variance between over that within at which the least σ is looked for."""
+    block_bytes: Annotated[int, Option(2**10, 2**40, "B", "beside what a fit takes anyway, little")] = 2**24
+    """Of points whose sums over each of many sensors are in memory at a time."""
     taps: Annotated[int, Option(2, 12, "nodes", "a cubic's error showed in the log density")] = 6
     """A scale, that sums over grasps are interpolated from where emcee walks."""
     middle: Annotated[float, Option(0.6, 0.999, "-", "of a 95 % interval")] = 0.975

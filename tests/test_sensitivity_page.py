@@ -51,7 +51,8 @@ ABSENT: dict[str, dict[str, str]] = {
         ),
         "estimators.defaults.RECOGNITION": "least_scatter level scatter_freedom scatter_nodes slope unknown",
         "estimators.defaults.POPULATION": "quantiles",
-        "estimators.defaults.GRID": "beside_gains gain_nodes least_gain",
+        "estimators.defaults.GRID": "beside_gains block_bytes gain_nodes least_gain",
+        "estimators.defaults.IDENTIFIABILITY": "compared",
         "estimators.defaults.INFLUENCE": "lowest undone",
         "estimators.defaults.PRIOR": (
             "sensor_degrees_of_freedom sensor_scatter unknown_velocity velocity_effect velocity_tilt"

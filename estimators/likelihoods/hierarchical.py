@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 from estimators.defaults import GRID, SAMPLING
 from estimators.likelihoods.posterior import PosteriorSummary
 from estimators.linear.fit_data import FitData
-from estimators.linear.hierarchical import Products, Whole
+from estimators.linear.hierarchical import Conditional, Products, Whole, blocks_of
 from estimators.linear.mixture_summary import summarise
 from estimators.linear.posterior_grid import PosteriorGrid, ScaleNodes, posterior_grid
 from estimators.linear.priors import WEAK, ScatterPrior, structured
-from estimators.linear.sensor_gains import gains
+from estimators.linear.sensor_gains import Gains
 from estimators.sampling.normal_score import NormalScore, normal_score
 from estimators.sampling.proposal import StudentMixture, standard
 
@@ -46,14 +46,17 @@ class HierarchicalPosterior:
             log = log + slope
         return np.where(self._inside(ratios), log, -np.inf)
 
-    def products(self, log_lambda: FloatArray, log_rho: FloatArray) -> Products:
-        """The sums over grasps at points [k]: polynomials between the grid's nodes, those at its edge beyond."""
+    def products(self, log_lambda: FloatArray, log_rho: FloatArray, of: Products | None = None) -> Products:
+        """The sums over grasps at points [k]: polynomials between the grid's nodes, those at its edge beyond.
+
+        ``of``: those at the nodes, by default of all sensors.
+        """
         first, left = _taps(self.grid.axes[0], log_lambda)
         second, right = _taps(self.grid.axes[1], log_rho)
         columns = len(self.grid.axes[1])
         node = (first[:, :, None] * columns + second[:, None, :]).reshape(len(first), -1)
         weight = (left[:, :, None] * right[:, None, :]).reshape(len(first), -1)
-        square, log_determinant, unknown = self.grid.products
+        square, log_determinant, unknown = self.grid.products if of is None else of
         return Products(
             np.einsum("kt,kt...->k...", weight, square[node]),
             np.einsum("kt,kt->k", weight, log_determinant[node]),
@@ -63,11 +66,19 @@ class HierarchicalPosterior:
     def nodes(self, whitened: FloatArray) -> ScaleNodes:
         """Draws [k, 3 or 4] as nodes of equal weight, with what is known of β and of the gains given each."""
         whole, scales = self._at(whitened, self._ratios(whitened)[0])
-        model = self.grid.model
-        given, sigma = model.conditional(whole, scales), np.exp(scales[0])
+        given, sigma = self.grid.model.conditional(whole, scales), np.exp(scales[0])
         scatter = np.stack([sigma, *(sigma * np.exp(0.5 * ratio) for ratio in scales[1:])], axis=1)
-        found = gains(model, whole, given, sigma) if len(scales) > 3 else None
-        return ScaleNodes(np.full(len(sigma), 1.0 / len(sigma)), scatter, given.mean, given.covariance, found)
+        weight = np.full(len(sigma), 1.0 / len(sigma))
+        return ScaleNodes(weight, scatter, given.mean, given.covariance, *self._gains(scales, given))
+
+    def _gains(self, scales: FloatArray, given: Conditional) -> list[Gains]:
+        """Of several sensors, what is known of their gains at points, given the scales [4, k]."""
+
+        def of_sensor(place: int) -> Products:
+            return self.products(scales[1], scales[2], self.grid.products.of_sensor(place))
+
+        points, sigma = np.arange(scales.shape[1]), np.exp(scales[0])
+        return [Gains(self.grid.model, of_sensor, points, np.exp(log_nu), sigma, given) for log_nu in scales[3:]]
 
     def summarise(self, whitened: FloatArray, rng: np.random.Generator, /) -> PosteriorSummary:
         """β given each (σ, τ, ω) is exactly normal: its mean and covariance need no draws of it."""
@@ -93,7 +104,11 @@ class HierarchicalPosterior:
     def _at(self, whitened: FloatArray, ratios: FloatArray) -> tuple[Whole, FloatArray]:
         """The sums at points [k], and log σ with the ratios, [3 or 4, k]."""
         model = self.grid.model
-        whole = model.whole(self.products(ratios[0], ratios[1]), *ratios[2:])
+        floats = 2 * self.grid.products.square[0].size * GRID.taps**2
+        parts = [
+            model.whole(self.products(*ratios[:2, own]), *ratios[2:, own]) for own in blocks_of(len(whitened), floats)
+        ]
+        whole = Whole(*(np.concatenate(part) for part in zip(*parts, strict=True)))
         centre, spread = model.log_sigma(whole)
         return whole, np.stack([centre + spread * whitened[:, 0], *ratios])
 

@@ -13,13 +13,14 @@ own gain: given ν = κ²/σ² one more such update of the sums over its grasps.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from estimators.defaults import PRIOR, REFERENCE, ROUNDING
+from estimators.defaults import GRID, PRIOR, REFERENCE, ROUNDING
 from estimators.linear.grasp_statistics import GraspStatistics
 from estimators.linear.normal_inverse_gamma import NormalInverseGamma
 from estimators.linear.priors import WEAK, ScatterPrior, log_half_student
@@ -50,33 +51,43 @@ class Products(NamedTuple):
     log_determinant: FloatArray
     unknown: FloatArray
 
-    def at(self, points: NDArray[np.int64]) -> "Products":
+    def at(self, points: NDArray[np.int64] | slice) -> "Products":
         """Those at some of the points."""
         return Products(*(part[points] for part in self))
+
+    def of_sensor(self, place: int) -> "Products":
+        """Those of one of the sensors, [k, 1, 10]."""
+        own = slice(place, place + 1)
+        return Products(self.square[:, own], self.log_determinant, self.unknown[:, own])
 
 
 class Whole(NamedTuple):
     """Sums over all sensors at points [k], their gains integrated out: ``square`` [k, 10], its log determinant [k], and
     what it has of the columns that unknown velocities are off by: ``along`` [k, 2, 4] of the rows, ``size`` [k, 2, 2].
-    ``weight`` [k, s] times ``gain`` [k, s, 4] is how each sensor's gain follows from (γ | residual), and ``off``
-    [k, s, 2] how from these columns.
     """
 
     square: FloatArray
     log_determinant: FloatArray
     along: FloatArray
     size: FloatArray
-    weight: FloatArray
-    gain: FloatArray
-    off: FloatArray
 
     def repeated(self, times: int) -> "Whole":
         """Each point so many times."""
         return Whole(*(np.repeat(part, times, axis=0) for part in self))
 
-    def at(self, points: NDArray[np.int64]) -> "Whole":
+    def at(self, points: NDArray[np.int64] | slice) -> "Whole":
         """The sums at some of the points."""
         return Whole(*(part[points] for part in self))
+
+
+class GainColumns(NamedTuple):
+    """A sensor's gain in sums over its grasps: the products of its column h = x·b̂ with the rows, ``rows`` [..., 4],
+    with itself, ``size`` [...], and with the columns that unknown velocities are off by, ``off`` [..., 2].
+    """
+
+    rows: FloatArray
+    size: FloatArray
+    off: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +98,8 @@ class Hierarchical:
     of squares of (γ | residual), ``count`` and ``weight`` [m] as in ``GraspStatistics``; ``start`` [g]: where those of
     each grasp begin; ``within`` [g, 10]; ``prior`` [10] the same of the prior; ``direction`` [3]: the γ of b̂;
     ``unknown`` [g]: grasps of unknown velocity, whose friction is off, all alike, by N(0, ``offset``) times each of the
-    columns that ``off_by`` [2, 3] are the γ of. ``sensor`` [g]: of which of the ``sensors`` each grasp is.
+    columns that ``off_by`` [2, 3] are the γ of. Grasps are in the order of their ``sensors``: those of the j-th are
+    from ``first[j]`` to ``first[j + 1]``, of [s + 1].
     """
 
     group: FloatArray
@@ -102,7 +114,7 @@ class Hierarchical:
     unknown: NDArray[np.bool_]
     offset: float
     off_by: FloatArray
-    sensor: NDArray[np.int64]
+    first: NDArray[np.int64]
     sensors: tuple[str, ...]
     scatter_prior: ScatterPrior = WEAK
 
@@ -121,44 +133,51 @@ class Hierarchical:
         size = np.maximum(along[:, :3] @ self.direction, np.finfo(float).tiny)
         outer = along[:, FIRST] * along[:, SECOND] / size[:, None]
         growth = 1.0 + ratio[:, None] * size
-        across = grasp - outer
-        square, unknown = (
-            np.stack(
-                [
-                    across[chosen].sum(axis=0) + (1.0 / growth[:, chosen]) @ outer[chosen]
-                    for chosen in ((self.sensor == code) & counts for code in range(len(self.sensors)))
-                ],
-                axis=1,
-            )
-            for counts in (True, self.unknown)
-        )
+        across, left = grasp - outer, 1.0 / growth
+        square, unknown = np.zeros((2, len(ratio), len(self.sensors), 10))
+        for place, own in enumerate(slice(*ends) for ends in pairwise(self.first)):
+            square[:, place] = across[own].sum(axis=0) + left[:, own] @ outer[own]
+            if (chosen := self.unknown[own]).any():
+                unknown[:, place] = across[own][chosen].sum(axis=0) + left[:, own][:, chosen] @ outer[own][chosen]
         places = float(self.count @ np.log1p(rho * self.weight))
         return Products(square, places + np.log(growth).sum(axis=1), unknown)
 
     def whole(self, products: Products, log_nu: FloatArray | None = None) -> Whole:
-        """The sums over all sensors at points [k]; ``log_nu`` [k] of the scale between sensors, None of one sensor.
+        """The sums over all sensors at the points [k] of ``products``; without ``log_nu`` those of the only one.
 
-        A sensor's gain has the column h = x·b̂, and is integrated out as a grasp's.
+        ``log_nu`` [k · q] of the scale between sensors: q for each of these points, and the sums at as many points. In
+        blocks, which bound what numbers of each sensor are in memory.
         """
-        rows, unknown = products.square[..., WHOLE[:, :3]], products.unknown[..., WHOLE[:, :3]]
-        along = unknown @ self.off_by.T  # [k, s, 4, 2]
-        size = self.off_by @ along[..., :3, :]
+        square, unknown = products.square.sum(axis=1), products.unknown.sum(axis=1)
+        along = unknown[:, WHOLE[:, :3]] @ self.off_by.T  # [k, 4, 2]
+        whole = Whole(square, products.log_determinant, along.swapaxes(1, 2), self.off_by @ along[:, :3])
         if log_nu is None:
-            square, determinant = products.square[:, 0], products.log_determinant
-            none = np.zeros((len(square), 0))
-            nothing = none, np.zeros((*none.shape, 4)), np.zeros((*none.shape, 2))
-            return Whole(square, determinant, along[:, 0].swapaxes(1, 2), size[:, 0], *nothing)
-        gain = rows @ self.direction  # [k, s, 4]
-        growth = 1.0 + np.exp(log_nu)[:, None] * np.maximum(gain[..., :3] @ self.direction, 0.0)
-        weight = np.exp(log_nu)[:, None] / growth
-        square = products.square - weight[..., None] * gain[..., FIRST] * gain[..., SECOND]
-        shared = self.direction @ along[..., :3, :]  # [k, s, 2]
+            return whole
+        nu = np.exp(log_nu).reshape(len(square), -1)
+        # of each sensor less than a matrix [4, 4] for each ν, and four for its products, columns and their squares
+        blocks = blocks_of(len(nu), len(self.sensors) * WHOLE.size * (len(WHOLE) + nu.shape[1]))
+        parts = [self._with_gains(whole.at(own), products.at(own), nu[own]) for own in blocks]
+        return Whole(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+
+    def _with_gains(self, whole: Whole, products: Products, nu: FloatArray) -> Whole:
+        """The sums at each of the points [k] with the gains of each of its ν [k, q] integrated out as grasps are."""
+        rows, size, off = self.gain_columns(products)
+        growth = 1.0 + nu[..., None] * size[:, None]  # [k, q, s]
+        weight = nu[..., None] / growth
+        determinant = whole.log_determinant[:, None] + np.log(growth).sum(axis=2)
+        square = whole.square[:, None] - weight @ (rows[..., FIRST] * rows[..., SECOND])
+        along, own = (np.repeat(part[:, None], nu.shape[1], axis=1) for part in (whole.along, whole.size))
         if self.unknown.any():
-            along = along - (weight[..., None] * gain)[..., None] * shared[..., None, :]
-            size = size - (weight[..., None] * shared)[..., None] * shared[..., None, :]
-        determinant = products.log_determinant + np.log(growth).sum(axis=1)
-        summed = square.sum(axis=1), determinant, along.sum(axis=1).swapaxes(1, 2), size.sum(axis=1)
-        return Whole(*summed, weight, gain, weight[..., None] * shared)
+            shape = (*off.shape[:2], -1)
+            along -= (weight @ (off[..., None] * rows[..., None, :]).reshape(shape)).reshape(along.shape)
+            own -= (weight @ (off[..., None] * off[..., None, :]).reshape(shape)).reshape(own.shape)
+        return Whole(*(part.reshape(-1, *part.shape[2:]) for part in (square, determinant, along, own)))
+
+    def gain_columns(self, products: Products) -> GainColumns:
+        """Those of each sensor at points [k, s]: its gain is ν/(1 + ν ``size``) times what the others add up to."""
+        rows = products.square[..., WHOLE[:, :3]] @ self.direction
+        unknown = products.unknown[..., WHOLE[:3, :3]] @ self.direction
+        return GainColumns(rows, np.maximum(rows[..., :3] @ self.direction, 0.0), unknown @ self.off_by.T)
 
     def conditional(self, whole: Whole, scales: FloatArray) -> Conditional:
         """Density at points [k] with all else integrated out, and β given them.
@@ -214,6 +233,12 @@ class Hierarchical:
         return replace(self, direction=_direction(self.pooled, coefficients))
 
 
+def blocks_of(points: int, floats: int) -> list[slice]:
+    """The points in blocks that each take ``GRID.block_bytes`` at most, where one takes so many ``floats``."""
+    block = max(1, GRID.block_bytes // (np.dtype(float).itemsize * floats))
+    return [slice(begin, begin + block) for begin in range(0, points, block)]
+
+
 def log_prior(
     log_sigma: FloatArray, log_tau: FloatArray, log_omega: FloatArray, scatter_prior: ScatterPrior = WEAK
 ) -> FloatArray:
@@ -238,12 +263,13 @@ def hierarchical(
     scatter_prior: ScatterPrior = WEAK,
 ) -> Hierarchical:
     """The model of these grasps, b̂ the pooled fit; the prior is of friction at ``centre`` and slopes over ``spans``."""
+    grasps = sorted(grasps, key=lambda grasp: grasp.sensor)
     total = sum(grasp.total_weight for grasp in grasps)
     alike = sum(float((grasp.count - grasp.independent).sum()) for grasp in grasps)
     unit = total / sum(grasp.weight_square for grasp in grasps)
     group = np.concatenate([_group_squares(grasp, pooled) for grasp in grasps])
     sizes = [len(grasp.count) for grasp in grasps]
-    sensors, sensor = np.unique([grasp.sensor for grasp in grasps], return_inverse=True)
+    sensors, first = np.unique([grasp.sensor for grasp in grasps], return_index=True)
     return Hierarchical(
         group=np.ascontiguousarray(group.T),
         count=np.concatenate([grasp.independent for grasp in grasps]),
@@ -257,7 +283,7 @@ def hierarchical(
         unknown=np.array([grasp.velocity_unknown for grasp in grasps]),
         offset=offset_variance(float(centre @ pooled.mean), float(pooled.mean[1]), float(pooled.covariance[1, 1])),
         off_by=np.stack([_direction(pooled, each) for each in columns_off(float(centre[2]))]),
-        sensor=sensor,
+        first=np.append(first, len(grasps)),
         sensors=tuple(sensors.tolist()),
         scatter_prior=scatter_prior,
     )

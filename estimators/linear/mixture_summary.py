@@ -67,20 +67,20 @@ def _coefficients(nodes: ScaleNodes, at: FloatArray) -> _Coefficients:
 
 def _sensors(nodes: ScaleNodes, gains: Gains, at: FloatArray) -> dict[str, SensorFriction]:
     """What each sensor shows: (1 + s) β along the mean of β, s and β normal together at each node."""
-    mean, covariance = gains.moments(nodes.weight)
     law = nodes.weight @ nodes.mean
     sigma, tau, omega = nodes.scatter.T[:3]
     found = {}
     for place, name in enumerate(gains.names):
-        own, shared = gains.mean[:, place], gains.with_coefficients[:, place, :, None] * law
-        variance = gains.covariance[:, place, place]
-        spread = nodes.covariance + shared + shared.swapaxes(1, 2) + variance[:, None, None] * np.outer(law, law)
-        of_it = _coefficients(nodes._replace(mean=nodes.mean + own[:, None] * law, covariance=spread), at)
+        own = gains.of(place)
+        shared = own.with_coefficients[:, :, None] * law
+        spread = nodes.covariance + shared + shared.swapaxes(1, 2) + own.variance[:, None, None] * np.outer(law, law)
+        of_it = _coefficients(nodes._replace(mean=nodes.mean + own.mean[:, None] * law, covariance=spread), at)
         together = np.sqrt((tau * (at @ of_it.mean)) ** 2 + omega**2 + sigma**2)
         scatter = matched_student(nodes.weight, np.zeros(len(sigma)), together)
+        gain, variance = own.moments(nodes.weight)
         found[name] = SensorFriction(
-            gain=float(mean[place]),
-            standard_error=float(np.sqrt(covariance[place, place])),
+            gain=gain,
+            standard_error=float(np.sqrt(variance)),
             coefficients=tuple(of_it.mean.tolist()),
             covariance=tuple(tuple(row) for row in of_it.covariance.tolist()),
             degrees_of_freedom=of_it.degrees_of_freedom,

@@ -13,7 +13,7 @@ from estimators.linear.fit_data import FitData
 from estimators.linear.hierarchical import Hierarchical, Products, Whole, hierarchical
 from estimators.linear.normal_inverse_gamma import exact_posterior
 from estimators.linear.priors import WEAK, ScatterPrior, weak_spans
-from estimators.linear.sensor_gains import Gains, gains
+from estimators.linear.sensor_gains import Gains
 from estimators.linear.unknown_velocity import offset_variance
 
 FloatArray = NDArray[np.float64]
@@ -108,8 +108,7 @@ def _evaluated(model: Hierarchical, box: FloatArray, count: int) -> PosteriorGri
     axes = tuple(np.linspace(low, high, nodes) for (low, high), nodes in zip(box, nodes_of, strict=True))
     products = model.products(axes[0], axes[1])
     ratios = np.stack([each.ravel() for each in np.meshgrid(*axes, indexing="ij")])
-    cells = np.arange(count * count)
-    whole = model.whole(products) if len(axes) == 2 else _with_gains(model, products, cells, ratios[2])
+    whole = model.whole(products, *ratios[2:])
     centre, spread = model.log_sigma(whole)
     matters = np.arange(len(centre)) if len(axes) == 2 else _that_matter(model, whole, np.stack([centre, *ratios]))
     if len(matters) < len(centre):
@@ -117,23 +116,18 @@ def _evaluated(model: Hierarchical, box: FloatArray, count: int) -> PosteriorGri
     nodes = len(SIGMA_NODES)
     log_sigma = (centre[:, None] + spread * SIGMA_NODES).ravel()
     scales = np.stack([log_sigma, *(np.repeat(axis, nodes) for axis in ratios)])
-    repeated = whole.repeated(nodes)
-    given = model.conditional(repeated, scales)
+    given = model.conditional(whole.repeated(nodes), scales)
     log = given.log_density.reshape(-1, nodes) + np.log(SIGMA_WEIGHTS) + 0.5 * SIGMA_NODES**2
     weight = special.softmax(log).ravel()
     sigma = np.exp(log_sigma)
     scatter = np.stack([sigma, *(sigma * np.exp(0.5 * axis) for axis in scales[1:])], axis=1)
     marginal = np.full([len(axis) for axis in axes], -np.inf)
     marginal.flat[matters] = special.logsumexp(log, axis=1)
-    found = gains(model, repeated, given, sigma) if len(axes) > 2 else None
+    cell = matters // (marginal.size // (count * count))
+    gains = [Gains(model, products.of_sensor, cell, np.exp(log_nu), sigma, given) for log_nu in ratios[2:]]
     return PosteriorGrid(
-        model, axes, products, marginal, ScaleNodes(weight, scatter, given.mean, given.covariance, found)
+        model, axes, products, marginal, ScaleNodes(weight, scatter, given.mean, given.covariance, *gains)
     )
-
-
-def _with_gains(model: Hierarchical, products: Products, cells: IntArray, log_nu: FloatArray) -> Whole:
-    """The sums at each cell of (λ, ρ) with each of the nodes of ``log_nu``, which varies fastest."""
-    return model.whole(products.at(np.repeat(cells, len(log_nu) // len(cells))), log_nu)
 
 
 def _that_matter(model: Hierarchical, whole: Whole, scales: FloatArray) -> IntArray:

@@ -49,12 +49,13 @@ def sensor_gain(nodes: ScaleNodes) -> Diagnostics:
     """Of grasps of several sensors: in a sentence, whether they separate its gain from scatter."""
     if nodes.gains is None:
         return {}
-    mean, covariance = nodes.gains.moments(nodes.weight)
+    compared = _compared(nodes.weight, nodes.gains)
+    mean, covariance = nodes.gains.moments(nodes.weight, compared)
     own = np.diag(covariance)
     variance = np.maximum(own[:, None] + own - 2.0 * covariance, np.finfo(float).tiny)
     apart = np.abs(mean[:, None] - mean) / np.sqrt(variance)
-    first, second = np.unravel_index(int(np.argmax(apart)), apart.shape)
-    low, high = _difference(nodes, nodes.gains, int(first), int(second))
+    first, second = (compared[place] for place in np.unravel_index(int(np.argmax(apart)), apart.shape))
+    low, high = _difference(nodes.weight, nodes.gains, first, second)
     names = nodes.gains.names[first], nodes.gains.names[second]
     if low * high > 0.0:
         more, less = names if low > 0.0 else names[::-1]
@@ -63,23 +64,32 @@ def sensor_gain(nodes: ScaleNodes) -> Diagnostics:
             SENSOR_GAIN: f"sensor {more!r} shows {least:.1%} to {most:.1%} more friction than {less!r}: calibrate them "
             "against each other, or ask for friction of the one that grasps"
         }
-    first, second = np.unravel_index(int(np.argmax(variance)), variance.shape)
-    low, high = _difference(nodes, nodes.gains, int(first), int(second))
+    first, second = (compared[place] for place in np.unravel_index(int(np.argmax(variance)), variance.shape))
+    low, high = _difference(nodes.weight, nodes.gains, first, second)
     most = max(-low, high)
     if most <= IDENTIFIABILITY.effect:
-        return {SENSOR_GAIN: f"its {len(mean)} sensors agree to within {most:.1%} of friction"}
+        return {SENSOR_GAIN: f"its {len(nodes.gains.names)} sensors agree to within {most:.1%} of friction"}
     return {
         SENSOR_GAIN: "a sensor's own gain cannot be separated from scatter between grasps (two of its sensors may "
         f"differ by {most:.0%}): record more grasps with each sensor"
     }
 
 
-def _difference(nodes: ScaleNodes, gains: Gains, first: int, second: int) -> tuple[float, float]:
+def _compared(weight: FloatArray, gains: Gains) -> list[int]:
+    """Places of the sensors whose gains are compared: of many those at either end, and the two that are known least."""
+    count, ends = len(gains.names), IDENTIFIABILITY.compared
+    if count <= 2 * ends:
+        return list(range(count))
+    mean, variance = np.array([gains.of(place).moments(weight) for place in range(count)]).T
+    order = np.argsort(mean / np.sqrt(variance))
+    return sorted({*order[:ends].tolist(), *order[-ends:].tolist(), *np.argsort(variance)[-2:].tolist()})
+
+
+def _difference(weight: FloatArray, gains: Gains, first: int, second: int) -> tuple[float, float]:
     """The 95 % interval of how much one sensor's gain exceeds another's."""
-    covariance = gains.covariance
-    variance = covariance[:, first, first] + covariance[:, second, second] - 2.0 * covariance[:, first, second]
-    mean, deviation = gains.mean[:, first] - gains.mean[:, second], np.sqrt(np.maximum(variance, 0.0))
-    low, high = mixture_quantile(nodes.weight, mean, deviation, IDENTIFIABILITY.ends)
+    mean, variance = gains.difference(first, second)
+    deviation = np.sqrt(np.maximum(variance, 0.0))
+    low, high = mixture_quantile(weight, mean, deviation, IDENTIFIABILITY.ends)
     return float(low), float(high)
 
 
