@@ -34,7 +34,7 @@ def mixture_quantile(weight: FloatArray, mean: FloatArray, deviation: FloatArray
         low, high = np.where(over < 0.0, at, low), np.where(over < 0.0, high, at)
         slope = np.exp(-0.5 * score**2) @ (weight / safe) / np.sqrt(2.0 * np.pi)
         step = at - over / np.maximum(slope, np.finfo(float).tiny)
-        moved = np.where((step > low) & (step < high), step, 0.5 * (low + high))
+        moved = np.where((step >= low) & (step <= high), step, 0.5 * (low + high))
         if np.abs(moved - at).max() <= close:
             return np.asarray(moved)
         at = moved

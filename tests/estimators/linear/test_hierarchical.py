@@ -1,11 +1,12 @@
 """The hierarchical model against the dense normal density that it stands for."""
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import special, stats
 
 import estimators
 from estimators.defaults import GRID, PRIOR, REFERENCE
@@ -195,6 +196,17 @@ def test_the_quantile_of_a_mixture_is_where_its_distribution_says() -> None:
     weight, mean, deviation = np.array([0.2, 0.5, 0.3]), np.array([-1.0, 0.0, 2.0]), np.array([0.5, 0.1, 1.0])
     at = mixture_quantile(weight, mean, deviation, [1e-3, 0.3, 0.9])
     np.testing.assert_allclose(stats.norm(mean, deviation).cdf(at[:, None]) @ weight, [1e-3, 0.3, 0.9], atol=1e-9)
+
+
+def test_a_quantile_that_newton_meets_exactly_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    ndtr, most = Mock(wraps=special.ndtr), 0
+    monkeypatch.setattr(special, "ndtr", ndtr)
+    for parts, spread in product((2, 3, 5, 10), np.linspace(0.02, 0.6, 30)):
+        ndtr.reset_mock()
+        weight, deviation = np.full(parts, 1.0 / parts), np.linspace(1.0, 1.0 + spread, parts)
+        mixture_quantile(weight, np.zeros(parts), deviation, [0.975, 0.999])
+        most = max(most, ndtr.call_count)
+    assert most <= 7  # quadratic convergence; bisection from an exact quantile: 14
 
 
 def test_a_narrow_range_of_force_far_from_zero_pulls_nothing() -> None:
