@@ -98,31 +98,42 @@ def _from_rest(members: dict[str, NDArray[Any]], mapping: FieldMapping, metadata
     moved = np.asarray(members["displacement"], dtype=np.float64)
     if moved.ndim < 2 or not moved.size:
         raise InvalidInput("displacement", f"of shape {moved.shape}", "frames, elements and components, one at least")
-    places = mapping.is_of_places
-    if mapping.rest == rest.ALL_FRAMES and not places:
+    if mapping.rest == rest.ALL_FRAMES and not mapping.is_of_places:
         return
-    observed = members.get("observed")
-    seen = np.ones(moved.shape[:-1], bool) if observed is None else check_mask("observed", observed, moved.shape[:-1])
-    if places and not seen.any(axis=0).all():
-        element = np.argwhere(~seen.any(axis=0))[0].tolist()
-        raise InvalidInput("position", f"of element {element} observed in no frame", "a place of each element")
-    if isinstance(mapping.rest, rest.SensorAlone):
-        zero, known = mapping.rest.zero(moved.shape[1:], places)
-        metadata["rest"] = mapping.rest.name
-    elif mapping.rest == rest.ALL_FRAMES:
-        zero, known = rest.unmoved(moved, seen)
-    else:
-        frame = _frame_at_rest(members, mapping.rest, moved, None if places else members.get("position"), seen)
-        known = seen[frame]
-        if not known.any():
-            raise InvalidInput("rest", f"frame {frame}, with no element observed", "a frame in which some are observed")
-        zero = np.where(known[..., None], moved[frame], rest.unmoved(moved, seen)[0] if places else 0.0)
-        metadata["rest"] = f"frame {frame}"
-    if places:
+    seen = _observed(members, moved, mapping.is_of_places)
+    zero, known, metadata["rest"] = _at_rest(members, mapping, moved, seen)
+    if mapping.is_of_places:
         members["position"] = zero
     members["displacement"] = np.where(known[..., None], moved - zero, 0.0)
     if not known.all():
         members["observed"] = seen & known
+
+
+def _observed(members: Members, moved: FloatArray, places: bool) -> BoolArray:
+    """Which elements ``moved`` [t, n, m, c] are seen [t, n, m]; one that never is has no place."""
+    told = members.get("observed")
+    seen = np.ones(moved.shape[:-1], bool) if told is None else check_mask("observed", told, moved.shape[:-1])
+    if places and not seen.any(axis=0).all():
+        element = np.argwhere(~seen.any(axis=0))[0].tolist()
+        raise InvalidInput("position", f"of element {element} observed in no frame", "a place of each element")
+    return seen
+
+
+def _at_rest(
+    members: Members, mapping: FieldMapping, moved: FloatArray, seen: BoolArray
+) -> tuple[FloatArray, BoolArray, str]:
+    """What of elements ``moved`` [t, n, m, c] counts as 0 [n, m, c], of which of them that is known, and its source."""
+    places = mapping.is_of_places
+    if isinstance(mapping.rest, rest.SensorAlone):
+        return *mapping.rest.zero(moved.shape[1:], places), mapping.rest.name
+    if mapping.rest == rest.ALL_FRAMES:
+        return *rest.unmoved(moved, seen), rest.ALL_FRAMES
+    frame = _frame_at_rest(members, mapping.rest, moved, None if places else members.get("position"), seen)
+    known = seen[frame]
+    if not known.any():
+        raise InvalidInput("rest", f"frame {frame}, with no element observed", "a frame in which some are observed")
+    otherwise = rest.unmoved(moved, seen)[0] if places else 0.0
+    return np.where(known[..., None], moved[frame], otherwise), known, f"frame {frame}"
 
 
 def _frame_at_rest(
