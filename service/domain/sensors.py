@@ -42,6 +42,11 @@ def describe(context: Context, name: str, gel: Gel, principal: Principal) -> Sen
         return sensors.describe(session, name, gel)
 
 
+def grasping(name: str) -> str:
+    """The sensor that a log counts as in its material's fit: without a name all are one, however they came."""
+    return UNNAMED if name in NAMELESS else name
+
+
 def check_name(name: str) -> None:
     """Raises ``InvalidValue`` for a name of which not one sensor alone can be described or calibrated."""
     if name in NAMELESS:

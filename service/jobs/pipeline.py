@@ -30,6 +30,7 @@ from service.domain.doubtful_logs import with_doubts
 from service.domain.other_materials import prior_from_others
 from service.domain.queueing import INGEST_METHODS, queue_cheap_refits
 from service.domain.reconstruct import bytes_needed, needs_forces, reconstruction_findings, with_forces
+from service.domain.sensors import grasping
 from service.domain.stored_results import (
     decode_samples,
     encode_history,
@@ -263,7 +264,9 @@ def _fit_by(
     """From the moments where the method needs no more, or of more than ``most_sampled`` logs; else from the samples."""
     data: list[Moments] | list[FrictionSamples]
     if len(parts) <= most_sampled and estimators.needs_samples(method, len(parts)):
-        data = [replace(decode_samples(run.blobs.path(part.samples_blob)), sensor=part.sensor) for part in parts]
+        data = [
+            replace(decode_samples(run.blobs.path(part.samples_blob)), sensor=grasping(part.sensor)) for part in parts
+        ]
     else:
         data = [_moments(run, part) for part in parts]
     prior_or_none = prior if method in SCATTER_METHODS else None
@@ -276,7 +279,7 @@ def _moments(run: Run, part: SamplesOfLog) -> Moments:
     known = None if part.moments is None else Moments.from_bytes(part.moments)
     if known is None or not known.grasps:
         known = Moments.from_samples(decode_samples(run.blobs.path(part.samples_blob)))
-    return known.of_sensor(part.sensor)
+    return known.of_sensor(grasping(part.sensor))
 
 
 def _note_missing_moments(run: Run) -> None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from db.records import SampledLog, StoredModel
+from service.domain.sensors import grasping
 from service.domain.stored_results import to_friction_model
 from service.web.charts import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, Axis, Tick
 
@@ -62,7 +63,7 @@ def differing(stored: StoredModel, logs: Sequence[SampledLog]) -> list[Differing
     from estimators import Moments, grasp_effects  # loads the numerics, which the server starts without
 
     kept = [(log, log.samples.moments) for log in logs if log.samples.moments]
-    moments = [(log, Moments.from_bytes(content).of_sensor(log.samples.sensor)) for log, content in kept]
+    moments = [(log, Moments.from_bytes(content).of_sensor(grasping(log.samples.sensor))) for log, content in kept]
     known = [(log, each) for log, each in moments if len(each.grasps) == 1]
     effects = grasp_effects(to_friction_model(stored.model), [each for _, each in known])
     return [Differing(log, effect) for (log, _), effect in zip(known, effects, strict=True)]

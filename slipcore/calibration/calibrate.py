@@ -24,8 +24,8 @@ def calibrate_sensor(logs: Sequence[GraspLog], known_force: Sequence[float | Non
     says why it is not identified. Raises ``InvalidInput`` for logs of several sensors or lattices, ``UnknownScale`` for
     lengths that are not in metres, ``InvalidPress`` for logs that are not pure presses, with what was seen in each.
     """
-    known = known_forces(logs, known_force)
     _check_alike(logs)
+    known = known_forces(logs, known_force)
     presses = [find_press(log) for log in logs]
     faulty = {number: seen for number, press in enumerate(presses) if (seen := press_fault(press)) is not None}
     if faulty:
@@ -47,19 +47,8 @@ def _check_alike(logs: Sequence[GraspLog]) -> None:
         values = sorted({str(getattr(log, name)) for log in logs})
         if len(values) > 1:
             raise InvalidInput("logs", f"of several {name}s: {', '.join(values)}", "one sensor at a time")
-    for number, log in enumerate(logs):
-        same = next((k for k in range(number) if _is_same(log, logs[k])), None)
-        if same is not None:
-            raise InvalidInput("logs", f"number {number}, the same press as {same}", "each press once")
     if not all(log.is_scaled for log in logs):
         raise UnknownScale("a sensor is calibrated in metres, and the scale of a log is unknown")
-
-
-def _is_same(log: GraspLog, other: GraspLog) -> bool:
-    return all(
-        np.array_equal(getattr(log, name), getattr(other, name))  # None is equal to None alone
-        for name in ("time", "displacement", "force")
-    )
 
 
 def _estimates(presses: list[PressLog], known_force: Sequence[float | None]) -> list[Estimate]:

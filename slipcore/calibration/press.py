@@ -31,10 +31,15 @@ class InvalidPress(InvalidInput):
 def known_forces(logs: Sequence[GraspLog], known_force: Sequence[float | None] | None) -> list[float | None]:
     """The normal force of each press, N, None where it is not known; ``known_force`` of None: of none.
 
-    Raises ``InvalidInput`` without logs, where there are more or fewer forces than these, and for one out of range.
+    Raises ``InvalidInput`` without logs, for a press that is there twice, which would count as two that agree, where
+    there are more or fewer forces than logs, and for one out of range.
     """
     if not logs:
         raise InvalidInput("logs", "none", "at least one press")
+    for number, log in enumerate(logs):
+        same = next((k for k in range(number) if _is_same(log, logs[k])), None)
+        if same is not None:
+            raise InvalidInput("logs", f"number {number}, the same press as {same}", "each press once")
     known: list[float | None] = [None] * len(logs) if known_force is None else list(known_force)
     if len(known) != len(logs):
         raise InvalidInput("known_force", f"{len(known)} forces", f"one for each of {len(logs)} logs, or None")
@@ -43,6 +48,13 @@ def known_forces(logs: Sequence[GraspLog], known_force: Sequence[float | None] |
         if force is not None and not least <= force <= most:
             raise InvalidInput("known_force", force, f"{least:g} to {most:g} N")
     return known
+
+
+def _is_same(log: GraspLog, other: GraspLog) -> bool:
+    return all(
+        np.array_equal(getattr(log, name), getattr(other, name))  # None is equal to None alone
+        for name in ("time", "displacement", "force")
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -23,6 +23,7 @@ from service.domain.collect_friction import collect
 from service.domain.look_up import FrictionQuery, look_up
 from service.domain.model_cache import KnownModel
 from service.domain.recommended import recommended
+from service.domain.sensors import NAMELESS
 from service.domain.stored_results import (
     SAMPLE_ARRAYS,
     decode_samples,
@@ -139,6 +140,18 @@ def test_an_ingest_keeps_the_models_current_that_planners_ask_for(shop: Shop, co
     best = recommended(shop.material().models)
     assert best is not None
     assert (best.stored.model.method, best.stored.model.scales is None) == ("hierarchical", False)
+
+
+@pytest.mark.parametrize("most_sampled", [0, 30])
+def test_logs_and_streams_that_name_no_sensor_are_of_one(
+    shop: Shop, content: bytes, most_sampled: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They had been fitted as of two, whose gains are unknown: with intervals twice as wide."""
+    monkeypatch.setattr(pipeline, "SAMPLED_AT_INGEST", most_sampled)
+    for k, name in enumerate(NAMELESS):
+        shop.run(shop.ingest(content + k * b"\0", name)[1])
+    scales = [each.model.scales for each in shop.material().models if each.model.method == "hierarchical"]
+    assert [each is not None and each.between_sensors for each in scales] == [None]
 
 
 @pytest.mark.parametrize("most_sampled", [0, 30])

@@ -220,6 +220,11 @@ def test_what_cannot_be_is_closed_with_a_reason(
     assert reason in closed.value.rcvd.reason
 
 
+def test_a_stream_may_leave_its_sensors_name_empty(served: Served, ramp: GraspLog) -> None:
+    with served.connect() as socket:
+        assert ask(socket, opening(ramp, sensor="", keep=True))["type"] == "opened"
+
+
 def test_a_reader_that_does_not_read_is_dropped(
     served: Served, ramp: GraspLog, monkeypatch: pytest.MonkeyPatch
 ) -> None:
