@@ -6,8 +6,6 @@ from typing import Literal
 Severity = Literal["warning", "note"]
 """A warning makes friction doubtful; a note says what was not seen, or what was done about it."""
 
-LASTING_NOISE = "lasting noise"
-
 SEVERITIES: dict[str, Severity] = {
     "reconstructed forces": "note",
     "gripper's force contradicted": "note",
@@ -19,7 +17,7 @@ SEVERITIES: dict[str, Severity] = {
     "force pulls": "warning",
     "forces not believed": "note",
     "rounded": "note",
-    LASTING_NOISE: "note",
+    "lasting noise": "note",
     "smoothed": "note",
     "saturation": "warning",
     "no rest": "note",

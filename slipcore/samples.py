@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from slipcore.defaults import SampleOptions, choose_options
 from slipcore.element_forces import ElementForces, element_forces
 from slipcore.errors import InvalidInput, NoForces, UnknownScale
-from slipcore.finding import LASTING_NOISE
 from slipcore.frames import BoolArray, FloatArray, GraspLog
 from slipcore.slip_state import SlipHistory
 from slipcore.surface.log_normals import normals_of
@@ -261,7 +260,7 @@ def _noise_of_motion(log: GraspLog, history: SlipHistory) -> float:
     White noise counts as a whole. Noise of variance σ² that lasts, r from each frame to the next (an autoregressive
     process), shows three frames a variance of σ² (1 − r)(3 − r)/3, and over two frames σ² (1 − r²) of it changes.
     """
-    if not any(finding.name == LASTING_NOISE for finding in history.findings):
+    if not any(finding.name == "lasting noise" for finding in history.findings):
         return history.noise
     from slipcore.noise import estimate_noise  # compiled, as above
 

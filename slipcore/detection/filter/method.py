@@ -24,7 +24,7 @@ from slipcore.detection.filter.step import decide
 from slipcore.detection.filter.tuning import LEAST_TRANSITION, THRESHOLD, settings_of
 from slipcore.detection.shared.interface import CompiledMethod, Start
 from slipcore.detection.shared.records import Decision
-from slipcore.finding import LASTING_NOISE, Finding
+from slipcore.finding import Finding
 from slipcore.frames import FloatArray
 from slipcore.surface.strain import Lattice
 
@@ -64,7 +64,7 @@ def findings(common: FloatArray) -> tuple[Finding, ...]:
         evidence = (
             f"markers part from their neighbours by {1e6 * common[LASTING]:.3g} µm that lasts from frame to frame"
         )
-        found.append(Finding(LASTING_NOISE, evidence, "record without a low-pass; calibrate the sensor"))
+        found.append(Finding("lasting noise", evidence, "record without a low-pass; calibrate the sensor"))
     return tuple(found)
 
 
