@@ -17,8 +17,8 @@ import scipy.linalg
 from benchmarks.gel_scenes import CONTACTS, Lattice, Truth, press, seen
 from slipcore import GraspLog
 from slipcore.forces import Gel
-from slipcore.forces.nodes import Nodes
-from slipcore.forces.response import response_matrix
+from slipcore.forces.operator.nodes import Nodes
+from slipcore.forces.operator.response import response_matrix
 from slipcore.frames import FloatArray
 
 OUTWARD = np.array([1.0, 1.0, -1.0])

@@ -15,7 +15,7 @@ from benchmarks.gel_scenes import Lattice, press, repeated, seen
 from benchmarks.pages import table
 from slipcore import GraspLog
 from slipcore.forces import Gel, GelEstimate, calibrate_gel, reconstruct
-from slipcore.forces.gel_calibration import GIVEN
+from slipcore.forces.gel_calibration.calibrate import GIVEN
 from slipcore.frames import FloatArray
 
 LATTICE = Lattice((14, 14), 7)

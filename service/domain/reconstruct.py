@@ -21,7 +21,7 @@ def needs_forces(log: "GraspLog") -> bool:
 
 def bytes_needed(log: "GraspLog") -> int:
     """What a reconstruction of its forces takes of memory at least; raises ``InvalidInput`` for an absurd lattice."""
-    from slipcore.forces import look  # few logs need it
+    from slipcore.forces.tracking import look  # few logs need it
 
     return look.bytes_needed(log.position, log.element_area)
 

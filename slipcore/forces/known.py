@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from slipcore.defaults import LIMITS
 from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import RECONSTRUCTION
-from slipcore.forces.gel import Gel
+from slipcore.forces.operator.gel import Gel
 from slipcore.frames import BoolArray, FloatArray
 
 OUTWARD = np.array([1.0, 1.0, -1.0])

@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike
 
 from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import FORCE_STREAM
-from slipcore.forces.frame_forces import FrameForces
-from slipcore.forces.gel import Gel
 from slipcore.forces.known import KnownForce, contradicts, reported
-from slipcore.forces.look import ContactTracking, MarkerReading, bytes_needed
-from slipcore.forces.nodes import Nodes
+from slipcore.forces.operator.gel import Gel
+from slipcore.forces.operator.nodes import Nodes
 from slipcore.forces.recording import axes_seen, check_noise, moved, noise_of, rows
-from slipcore.forces.sensor import SensorResponse
+from slipcore.forces.tracking.frame_forces import FrameForces
+from slipcore.forces.tracking.look import ContactTracking, MarkerReading, bytes_needed
+from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.frames import BoolArray, FloatArray, check_displacement, check_gripper_report, check_mask
 
 

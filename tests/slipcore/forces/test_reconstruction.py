@@ -9,7 +9,7 @@ import pytest
 
 from slipcore import GraspLog, InvalidInput, UnknownScale
 from slipcore.forces import Gel, Reconstruction, reconstruct
-from slipcore.forces.support import better_support
+from slipcore.forces.inverse.support import better_support
 
 GEL = Gel(young_modulus=1e6, poisson_ratio=0.49, thickness=5e-3)
 Pressed = Callable[..., GraspLog]
@@ -204,7 +204,7 @@ def test_noise_alone_is_no_reason_to_seek_the_contact_again(pressed: Pressed, mo
         sought.append(1)
         return better_support(*arguments)
 
-    monkeypatch.setattr("slipcore.forces.tracking.better_support", counted)
+    monkeypatch.setattr("slipcore.forces.tracking.tracker.better_support", counted)
     reconstruct(pressed([0] * 4, noise=3e-6, axes=2, crop=MIDDLE), GEL, noise=3e-6)
     assert len(sought) == 1
 

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from slipcore.forces.defaults import RECONSTRUCTION
-from slipcore.forces.sensor import SensorResponse
-from slipcore.forces.tracking import Key
+from slipcore.forces.tracking.sensor import SensorResponse
+from slipcore.forces.tracking.tracker import Key
 from slipcore.frames import BoolArray, FloatArray
 
 

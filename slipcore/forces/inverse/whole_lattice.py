@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slipcore.forces.covariance import covariance_root, solve_root
 from slipcore.forces.defaults import LATTICE
-from slipcore.forces.fit import ObservationModel
-from slipcore.forces.nodes import Nodes
-from slipcore.forces.prior import factors, usual
+from slipcore.forces.inverse.covariance import covariance_root, solve_root
+from slipcore.forces.inverse.fit import ObservationModel
+from slipcore.forces.inverse.prior import factors, usual
+from slipcore.forces.operator.nodes import Nodes
 from slipcore.frames import FloatArray
 
 

@@ -13,10 +13,9 @@ from scipy.special import ndtri
 
 from slipcore.calibration.press import known_forces
 from slipcore.errors import InvalidInput
-from slipcore.forces.bounded_gaussian import BoundedGaussian, through
 from slipcore.forces.defaults import GEL, GEL_CALIBRATION
-from slipcore.forces.gel import Gel
-from slipcore.forces.gel_likelihood import (
+from slipcore.forces.gel_calibration.bounded_gaussian import BoundedGaussian, through
+from slipcore.forces.gel_calibration.likelihood import (
     Elasticity,
     EvaluatedGel,
     PressData,
@@ -25,7 +24,8 @@ from slipcore.forces.gel_likelihood import (
     evaluate_gel,
     first_contacts,
 )
-from slipcore.forces.nodes import Nodes
+from slipcore.forces.operator.gel import Gel
+from slipcore.forces.operator.nodes import Nodes
 from slipcore.forces.recording import DisplacementData, error
 from slipcore.frames import FloatArray, GraspLog
 

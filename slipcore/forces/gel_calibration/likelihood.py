@@ -12,11 +12,11 @@ import numpy as np
 
 from slipcore.contact.elasticity.grid import bounding_box
 from slipcore.forces.defaults import GEL, GEL_CALIBRATION, RECONSTRUCTION
-from slipcore.forces.fit import ObservationModel, TractionPrior, choose_prior, fit, log_evidence
-from slipcore.forces.gel import Gel
-from slipcore.forces.nodes import Nodes
-from slipcore.forces.response import response_matrix
-from slipcore.forces.support import better_support, widened
+from slipcore.forces.inverse.fit import ObservationModel, TractionPrior, choose_prior, fit, log_evidence
+from slipcore.forces.inverse.support import better_support, widened
+from slipcore.forces.operator.gel import Gel
+from slipcore.forces.operator.nodes import Nodes
+from slipcore.forces.operator.response import response_matrix
 from slipcore.frames import BoolArray, FloatArray
 
 Seek = Literal["nothing", "support", "both"]

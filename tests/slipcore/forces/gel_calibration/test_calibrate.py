@@ -9,8 +9,8 @@ import pytest
 
 from slipcore import GraspLog, InvalidInput, UnknownScale
 from slipcore.forces import Gel, GelCalibration, GelEstimate, calibrate_gel, reconstruct
-from slipcore.forces.bounded_gaussian import through
-from slipcore.forces.gel_calibration import GIVEN, HALF_SPACE
+from slipcore.forces.gel_calibration.bounded_gaussian import through
+from slipcore.forces.gel_calibration.calibrate import GIVEN, HALF_SPACE
 
 FORCES = [5.0, 10.0]
 """N of the frames in which the sphere is only pressed."""

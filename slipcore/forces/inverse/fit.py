@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from slipcore.forces.covariance import solve_root
 from slipcore.forces.defaults import FIT
-from slipcore.forces.nodes import Nodes
-from slipcore.forces.prior import Smoothness, choices, factors, usual
-from slipcore.forces.strength import Criterion, Spectrum
+from slipcore.forces.inverse.covariance import solve_root
+from slipcore.forces.inverse.prior import Smoothness, choices, factors, usual
+from slipcore.forces.inverse.strength import Criterion, Spectrum
+from slipcore.forces.operator.nodes import Nodes
 from slipcore.frames import BoolArray, FloatArray
 
 

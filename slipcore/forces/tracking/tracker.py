@@ -6,11 +6,11 @@ import numpy as np
 from scipy.ndimage import binary_propagation, generate_binary_structure
 
 from slipcore.forces.defaults import RECONSTRUCTION
-from slipcore.forces.fit import ObservationModel, TractionFit, TractionPrior, choose_prior, fit
-from slipcore.forces.sensor import SensorResponse
-from slipcore.forces.strength import Criterion
-from slipcore.forces.support import better_support, relevant_nodes, widened
-from slipcore.forces.whole_lattice import WholeLattice, whole_lattice
+from slipcore.forces.inverse.fit import ObservationModel, TractionFit, TractionPrior, choose_prior, fit
+from slipcore.forces.inverse.strength import Criterion
+from slipcore.forces.inverse.support import better_support, relevant_nodes, widened
+from slipcore.forces.inverse.whole_lattice import WholeLattice, whole_lattice
+from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.frames import BoolArray, FloatArray
 
 EDGES_AND_CORNERS = generate_binary_structure(2, 2)

@@ -5,8 +5,8 @@ from threading import Thread
 import numpy as np
 import pytest
 
-from slipcore.forces.covariance import covariance_root, solve_root
-from slipcore.forces.strength import Spectrum
+from slipcore.forces.inverse.covariance import covariance_root, solve_root
+from slipcore.forces.inverse.strength import Spectrum
 
 
 @pytest.mark.parametrize(("m", "p"), [(1, 1), (5, 3), (40, 90), (90, 40), (3, 0)])

@@ -5,9 +5,9 @@ import pytest
 
 from slipcore import InvalidInput
 from slipcore.forces.defaults import NODES as OF_NODES
-from slipcore.forces.gel import Gel
-from slipcore.forces.nodes import Nodes
-from slipcore.forces.response import response_matrix
+from slipcore.forces.operator.gel import Gel
+from slipcore.forces.operator.nodes import Nodes
+from slipcore.forces.operator.response import response_matrix
 
 PITCH = 0.5e-3
 LINE = PITCH * (np.arange(9) - 4.0)

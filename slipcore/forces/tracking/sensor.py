@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from slipcore.forces.fit import ObservationModel
-from slipcore.forces.gel import Gel
+from slipcore.forces.inverse.fit import ObservationModel
 from slipcore.forces.known import KnownForce
-from slipcore.forces.nodes import Nodes
-from slipcore.forces.response import response_matrix
+from slipcore.forces.operator.gel import Gel
+from slipcore.forces.operator.nodes import Nodes
+from slipcore.forces.operator.response import response_matrix
 from slipcore.frames import BoolArray, FloatArray
 
 

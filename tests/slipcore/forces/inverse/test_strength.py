@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from slipcore.forces.strength import Criterion, Spectrum
+from slipcore.forces.inverse.strength import Criterion, Spectrum
 
 SINGULAR, COUNT, REST = 2.0, 4, 1.6
 """Value of both singular directions; number of data, and the sum of squares of those that neither reaches."""

@@ -9,8 +9,8 @@ from slipcore.contact.elasticity.influence import ElasticBody, HalfSpace
 from slipcore.contact.elasticity.interior import Below, Interior
 from slipcore.contact.elasticity.operator import ElasticOperator
 from slipcore.forces.defaults import RESPONSE
-from slipcore.forces.gel import Gel
-from slipcore.forces.nodes import Nodes
+from slipcore.forces.operator.gel import Gel
+from slipcore.forces.operator.nodes import Nodes
 from slipcore.frames import FloatArray
 
 ODD_X, ODD_Y = frozenset({"xy", "zx", "xz"}), frozenset({"xy", "zy", "yz"})

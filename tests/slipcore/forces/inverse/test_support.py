@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.linalg import hadamard
 
-from slipcore.forces.covariance import covariance_root
-from slipcore.forces.fit import ObservationModel
-from slipcore.forces.support import condensed, node_relevance, relevant_nodes, widened
+from slipcore.forces.inverse.covariance import covariance_root
+from slipcore.forces.inverse.fit import ObservationModel
+from slipcore.forces.inverse.support import condensed, node_relevance, relevant_nodes, widened
 
 NODES = 16
 

@@ -13,10 +13,10 @@ import numpy as np
 import scipy.linalg
 from scipy.ndimage import binary_closing, binary_dilation, binary_erosion, convolve1d, generate_binary_structure
 
-from slipcore.forces.covariance import covariance_root, solve_root
 from slipcore.forces.defaults import STRENGTH, SUPPORT
-from slipcore.forces.fit import ObservationModel, TractionPrior, log_evidence
-from slipcore.forces.nodes import Nodes
+from slipcore.forces.inverse.covariance import covariance_root, solve_root
+from slipcore.forces.inverse.fit import ObservationModel, TractionPrior, log_evidence
+from slipcore.forces.operator.nodes import Nodes
 from slipcore.frames import BoolArray, FloatArray
 
 STEPS: tuple[Callable[[BoolArray], BoolArray], ...] = (binary_dilation, binary_erosion, binary_closing)

@@ -1,0 +1,1 @@
+"""A gel's stiffness and thickness from presses with known forces."""

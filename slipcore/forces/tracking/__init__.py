@@ -1,0 +1,1 @@
+"""One contact followed from frame to frame."""
