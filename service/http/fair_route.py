@@ -12,6 +12,7 @@ from fastapi.routing import APIRoute
 from service.domain.receive import unless_gone
 from service.http.access import CurrentPrincipal
 from service.http.dependencies import CurrentContext
+from service.http.parameters import KNOWN_PARAMETERS, query_names
 
 
 async def gone(request: Request) -> None:
@@ -31,15 +32,20 @@ class FairRoute(APIRoute):
     """A route that, where a thread answers it, takes a turn before that, once its body is there and it may be asked.
 
     The turn ends with the making of the answer, however slowly that is read. A route that is a coroutine has its work
-    done by ``Context.threads``. Who has gone gives up its place, here or there.
+    done by ``Context.threads``. Who has gone gives up its place, here or there. A route of the REST API refuses
+    ``parameters`` that it does not know.
     """
 
     def __init__(
         self, path: str, endpoint: Callable[..., Any], *, dependencies: list[Dependency] | None = None, **options: Any
     ) -> None:
+        needed = [*(dependencies or ())]
+        if path.startswith("/v1/"):
+            needed.append(KNOWN_PARAMETERS)
         if not iscoroutinefunction(endpoint):
-            dependencies = [*(dependencies or ()), Depends(_turn, scope="function")]
-        super().__init__(path, endpoint, dependencies=dependencies, **options)
+            needed.append(Depends(_turn, scope="function"))
+        super().__init__(path, endpoint, dependencies=needed, **options)
+        self.parameters = query_names(self)
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """The handler, which of a coroutine without a body is given up once its client has gone."""

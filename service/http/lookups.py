@@ -18,6 +18,7 @@ from service.domain.look_up import FrictionQuery, look_up
 from service.domain.model_cache import KnownModel
 from service.http.authentication import Authenticator
 from service.http.conditional import is_one_of, unchanged, whole
+from service.http.parameters import wrong_parameter
 from service.http.request_middleware import (
     Headers,
     id_header,
@@ -137,7 +138,10 @@ def _read(query: bytes) -> tuple[str, FrictionQuery] | None:
     if b"%00" in query:
         return None
     try:
-        asked = LookUpQuery.model_validate(dict(parse_qsl(query.decode("latin-1"), keep_blank_values=True)))
+        given = parse_qsl(query.decode("latin-1"), keep_blank_values=True)
+        asked = LookUpQuery.model_validate(dict(given))
     except ValueError:  # pydantic's, or of the address
+        return None
+    if wrong_parameter((name for name, _ in given), LookUpQuery.model_fields) is not None:
         return None
     return asked.method, FrictionQuery(asked.v, asked.fn, asked.quantile, *asked.averaged(), asked.sensor)

@@ -54,7 +54,6 @@ def test_a_fit_is_queued_once_under_one_key(client: Any, database: Database) -> 
     ("path", "more"),
     [
         ("/v1/materials", {"json": {"name": "steel"}}),
-        ("/v1/materials?x=1", {"json": {"name": "paper"}}),
         ("/v1/materials/paper/fits", {"json": {}}),
         ("/v1/grasp-logs", {"content": b"no log", "headers": NPZ}),
     ],
@@ -67,6 +66,13 @@ def test_a_key_stands_for_one_request(client: Any, database: Database, path: str
     assert (refused.status_code, refused.json()["type"]) == (422, "/problems/idempotency-key-reused")
     assert refused.json()["value"] == "k"
     assert (count(database, MaterialRow), count(database, JobRow), count(database, GraspLogRow)) == (1, 0, 0)
+
+
+def test_a_key_stands_for_one_request_with_its_parameters(client: Any, content: bytes) -> None:
+    more = {"content": content, "headers": NPZ}
+    assert send(client, "/v1/grasp-logs", **more).status_code == 202
+    refused = send(client, "/v1/grasp-logs?detector=strain_rate", **more)
+    assert (refused.status_code, refused.json()["type"]) == (422, "/problems/idempotency-key-reused")
 
 
 def test_what_was_refused_may_be_mended_under_its_key(client: Any, database: Database) -> None:
