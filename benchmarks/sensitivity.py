@@ -18,19 +18,19 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import estimators
-from benchmarks import forces as of_gels
-from benchmarks.control_episodes import run as run_task
-from benchmarks.control_episodes import world_of
-from benchmarks.control_outcomes import outcome_of
-from benchmarks.control_strategies import Controlled, model_of, settings_of
-from benchmarks.control_tasks import LIFTS, PAPER
-from benchmarks.detector_accuracy import FORCE_NOISE, INPUTS, score
-from benchmarks.detector_coarse import coarse
-from benchmarks.detector_scenes import Case, cases, observed, phases, scoring, simulated
+from benchmarks.calibration.patch_grasps import PIVOT, SLIDE, Course, Setting
+from benchmarks.calibration.patch_grasps import grasp as moving_grasp
+from benchmarks.control.episodes import run as run_task
+from benchmarks.control.episodes import world_of
+from benchmarks.control.outcomes import outcome_of
+from benchmarks.control.strategies import Controlled, model_of, settings_of
+from benchmarks.control.tasks import LIFTS, PAPER
+from benchmarks.detector.accuracy import FORCE_NOISE, INPUTS, score
+from benchmarks.detector.coarse import coarse
+from benchmarks.detector.scenes import Case, cases, observed, phases, scoring, simulated
+from benchmarks.estimators.scatter import TRUTH, Kind, grasp
+from benchmarks.forces import __main__ as of_gels
 from benchmarks.pages import options, picture_folder, save, write
-from benchmarks.patch_grasps import PIVOT, SLIDE, Course, Setting
-from benchmarks.patch_grasps import grasp as moving_grasp
-from benchmarks.scatter import TRUTH, Kind, grasp
 from estimators import defaults as of_estimators
 from slipcore import METHODS, FrictionSamples, GraspLog, PatchOptions, detect_slip
 from slipcore import defaults as of_slipcore

@@ -1,6 +1,6 @@
 """Every default of estimators, with unit, valid range and source.
 
-"Trials": chosen by benchmarks/estimators.py on simulated samples, at the same result; "bound": stops what does not
+"Trials": chosen by benchmarks/estimators on simulated samples, at the same result; "bound": stops what does not
 converge, with an error or with what was found. What ±50 % of each changes stands in docs/sensitivity.md.
 """
 

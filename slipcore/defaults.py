@@ -284,7 +284,7 @@ class StrainRateOptions(ContactOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FilterOptions(ContactOptions):
-    """Method ``filter``: chosen on simulated scenes (benchmarks/detector_scenes.py, set ``tuning``)."""
+    """Method ``filter``: chosen on simulated scenes (benchmarks/detector/scenes.py, set ``tuning``)."""
 
     contact_depth_share: Annotated[
         float, Option(0.0, 0.99, "-", "½ on a half-space (Hertz), less on a bonded gel; tuning scenes")
@@ -463,7 +463,7 @@ class ForceRatioOptions(ContactOptions):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForcesOnlyOptions(ContactOptions):
-    """Method ``forces_only``: chosen on coarse arrays (benchmarks/detector_coarse.py, set ``tuning``)."""
+    """Method ``forces_only``: chosen on coarse arrays (benchmarks/detector/coarse.py, set ``tuning``)."""
 
     contact_force_share: Annotated[float, Option(0.0, 0.9, "-", "taxels at the rim bear little")] = 0.03
     """Least share of the frame's largest normal force."""

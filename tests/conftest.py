@@ -24,7 +24,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from benchmarks.postgresql import MEMORY, NoPrograms, PostgreSQL, has_room, running_postgresql
+from benchmarks.service.postgresql import MEMORY, NoPrograms, PostgreSQL, has_room, running_postgresql
 from db import migrate
 from db.database import Database
 from db.records import Claim

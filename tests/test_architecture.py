@@ -233,7 +233,7 @@ def test_one_module_decides_how_kernels_are_compiled_and_kept() -> None:
     assert [path for path in paths if "numba" in third_party(path)] == [ROOT / "slipcore/compilation.py"]
 
 
-@pytest.mark.parametrize("package", [*ALLOWED, "service"])
+@pytest.mark.parametrize("package", [*ALLOWED, "service", "benchmarks"])
 def test_no_modules_import_one_another_in_a_circle(package: str) -> None:
     folder = ROOT / package
     modules = modules_of(folder.parent, folder.name)
@@ -241,7 +241,7 @@ def test_no_modules_import_one_another_in_a_circle(package: str) -> None:
     assert circle(graph_of(modules)) == []
 
 
-@pytest.mark.parametrize("package", [*ALLOWED, "service"])
+@pytest.mark.parametrize("package", [*ALLOWED, "service", "benchmarks"])
 def test_no_folders_import_one_another_in_a_circle(package: str) -> None:
     folder = ROOT / package
     modules = modules_of(folder.parent, folder.name)
@@ -636,7 +636,7 @@ WIDE = {
 """Functions that take more, with the reason. A command has a parameter for each of its options."""
 
 
-@pytest.mark.parametrize("package", [*ALLOWED, "service"])
+@pytest.mark.parametrize("package", [*ALLOWED, "service", "benchmarks"])
 def test_no_function_takes_more_than_eight_parameters_and_all_are_typed(package: str) -> None:
     files = [path for path in (ROOT / package).rglob("*.py") if ROOT / "service" / "cli" not in path.parents]
     found = {name: given for path in files for name, given in parameters(path).items()}

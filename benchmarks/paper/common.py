@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 
-from benchmarks.detector_scenes import simulated
+from benchmarks.detector.scenes import simulated
 from slipcore import GraspLog, SlipHistory, detect_slip
 from slipcore.contact.effects import ForceNoise, MarkerNoise, SensorSampling
 from slipcore.contact.plan.plan import Effect

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks.detector_scenes import simulated
+from benchmarks.detector.scenes import simulated
 from benchmarks.pages import table
 from benchmarks.paper.common import Finding, draw_field, strain_rates, tidy
 from slipcore import GraspLog

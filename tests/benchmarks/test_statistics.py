@@ -9,9 +9,11 @@ import mpmath
 import numpy as np
 import pytest
 
-from benchmarks import http_load, ingest, nist, paper_friction, recognition, stream
-from benchmarks.markers import DOTS, LOST, SIDE, STEP, without
-from benchmarks.planner import answer, bracketed, seconds
+from benchmarks.detector.markers import DOTS, LOST, SIDE, STEP, without
+from benchmarks.estimators import nist, recognition
+from benchmarks.paper import friction as paper_friction
+from benchmarks.planner.__main__ import answer, bracketed, seconds
+from benchmarks.service import http_load, ingest, stream
 from estimators.defaults import RECOGNITION, REFERENCE
 from estimators.recognition import SLOPES
 

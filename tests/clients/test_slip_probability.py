@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import estimators
-from benchmarks.scatter import AREA, CONTACT, Kind, achieved, grasp
+from benchmarks.estimators.scatter import AREA, CONTACT, Kind, achieved, grasp
 from db.records import StoredModel
 from service.domain.stored_results import to_new_model
 from service.http.schemas.models import FrictionModelOut

@@ -3,7 +3,7 @@
 import pytest
 from scipy import stats
 
-from benchmarks.coverage import KINDS, METHODS, covered
+from benchmarks.estimators.coverage import KINDS, METHODS, covered
 
 OWN = [name for name, method in METHODS.items() if method.own]
 

@@ -8,7 +8,7 @@ import pytest
 from scipy import special, stats
 
 import estimators
-from benchmarks import scatter
+from benchmarks.estimators import scatter
 from estimators import recognise
 from estimators.defaults import RECOGNITION
 from estimators.linear.fit_data import gather

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from benchmarks.unknown_motion import Finding, findings
+from benchmarks.end_to_end.unknown_motion import Finding, findings
 from estimators import FrictionModel, Moments, fit, recognise
 from estimators.defaults import PRIOR
 from estimators.errors import InvalidSamples

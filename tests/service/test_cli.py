@@ -16,7 +16,7 @@ import httpx
 import numpy as np
 import pytest
 
-from benchmarks.presses import Faults, pressed
+from benchmarks.calibration.presses import Faults, pressed
 from db.blobs import BlobStore
 from db.database import Database
 from db.records import NewGraspLog

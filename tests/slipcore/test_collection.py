@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.patch_grasps import PIVOT, SLIDE, Setting, grasp
+from benchmarks.calibration.patch_grasps import PIVOT, SLIDE, Setting, grasp
 from slipcore import GraspLog, check_log, collect_friction, collect_samples, detect_slip
 from slipcore.samples import element_samples
 from tests.slipcore.conftest import RECORDINGS, read_recording

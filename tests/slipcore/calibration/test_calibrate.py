@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.patch_grasps import PIVOT, Setting, grasp
-from benchmarks.presses import Faults, pressed
+from benchmarks.calibration.patch_grasps import PIVOT, Setting, grasp
+from benchmarks.calibration.presses import Faults, pressed
 from slipcore import (
     GraspLog,
     InvalidInput,

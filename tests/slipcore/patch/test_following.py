@@ -4,7 +4,7 @@ import tracemalloc
 
 import numpy as np
 
-from benchmarks.patch_grasps import PIVOT, SLIDE, Setting, grasp
+from benchmarks.calibration.patch_grasps import PIVOT, SLIDE, Setting, grasp
 from slipcore import GraspLog
 from slipcore.patch.following import follow_patches
 from slipcore.patch.friction import contact_friction

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.patch_grasps import PITCH, PIVOT, SLIDE, Setting, grasp, ramp_and_go
+from benchmarks.calibration.patch_grasps import PITCH, PIVOT, SLIDE, Setting, grasp, ramp_and_go
 from slipcore import GraspLog, InvalidInput, detect_slip
 from slipcore.detection.batch import with_patches
 from slipcore.patch.following import follow_patches

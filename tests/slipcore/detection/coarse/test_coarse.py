@@ -1,14 +1,14 @@
-"""Forces and places joined, on arrays of separate pillars in closed form (benchmarks/pillars.py)."""
+"""Forces and places joined, on arrays of separate pillars in closed form (benchmarks/detector/pillars.py)."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from benchmarks.detector_accuracy import count
-from benchmarks.detector_coarse import false_slip
-from benchmarks.detector_scenes import observed
-from benchmarks.pillars import Grasp
+from benchmarks.detector.accuracy import count
+from benchmarks.detector.coarse import false_slip
+from benchmarks.detector.pillars import Grasp
+from benchmarks.detector.scenes import observed
 from slipcore import detect_slip
 
 CASE = Grasp("ramp", 0.5, (0.0, 0.2, 0.7, 0.9, 2.4), (-1e-4, -1e-4, 1e-3, 1e-3, 1e-3),

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.detector_scenes import simulated, tuning
+from benchmarks.detector.scenes import simulated, tuning
 from slipcore import GraspLog, SlipHistory, detect_slip
 from slipcore.contact import RampSchedule, tangential_ramp
 

@@ -1,13 +1,13 @@
-"""Slip from forces alone, on arrays of separate pillars in closed form (benchmarks/pillars.py)."""
+"""Slip from forces alone, on arrays of separate pillars in closed form (benchmarks/detector/pillars.py)."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from benchmarks.detector_accuracy import count
-from benchmarks.detector_scenes import observed
-from benchmarks.pillars import Grasp
+from benchmarks.detector.accuracy import count
+from benchmarks.detector.pillars import Grasp
+from benchmarks.detector.scenes import observed
 from slipcore import GraspLog, InvalidInput, SlipDetector, SlipHistory, detect_slip
 from slipcore.detection.forces_only.method import frictions
 

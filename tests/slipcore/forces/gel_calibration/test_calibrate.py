@@ -70,7 +70,7 @@ def test_without_any_force_thickness_and_ratio_follow_from_the_displacement(logs
 
 @pytest.mark.long
 def test_a_half_space_has_a_least_thickness_alone() -> None:
-    from benchmarks.gel_scenes import Lattice, press, seen
+    from benchmarks.forces.scenes import Lattice, press, seen
 
     lattice, rng = Lattice((12, 12), 8), np.random.default_rng(2)
     truth = press("sphere", Gel(1e6, 0.48), lattice, steps=((0.5, 0.0),) * 2)

@@ -1,0 +1,1 @@
+"""A sensor's faults from presses."""

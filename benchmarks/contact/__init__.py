@@ -1,0 +1,1 @@
+"""The simulator: accuracy, speed, other programs and references."""

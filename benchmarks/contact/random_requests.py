@@ -1,0 +1,135 @@
+"""Random requests over all effects of mechanics, for `benchmarks.contact_promise --requests N`: is the estimate right?
+
+The truth is a run on twice the cells, in twice the load steps a frame, of what a request came to. It errs by itself, at
+first order by half as much: a true error is known to about that.
+"""
+
+import json
+import time
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.contact.random_scenes import random_scene
+from slipcore.contact.errors import InfeasibleLoad, NotConverged, OutOfReach
+from slipcore.contact.plan.plan import Plan
+from slipcore.contact.progress import Progress
+from slipcore.contact.scene import Scene
+from slipcore.contact.tiers.accuracy import Refined, difference, simulate_to
+from slipcore.contact.tiers.boundary_elements import run
+
+ASKED = (0.1, 0.05, 0.03)
+"""By turns."""
+TUNING = 10_000
+"""Seeds from here on are for choosing defaults, those below for reports."""
+LONG, LONGER = 8, 8.0
+"""Every so many scenes one lasts so many seconds."""
+FACTOR = 3.0
+"""Of the true error that an estimate should lie within."""
+KINDS = ("NormalTangentialCoupling", "FiniteLayer", "Viscoelasticity", "VelocityFriction", "long")
+
+
+class TooLong(Exception):
+    """A scene took more processor seconds than are allowed."""
+
+
+@dataclass(frozen=True, slots=True)
+class RandomRequest:
+    """One request: its scene's seed and ``kinds`` (effects, and "long"), what it ``became`` ("answered", "refused",
+    "infeasible", "not converged", "too long"), the accuracy ``asked``, ``estimated`` and ``true`` (0 without an
+    answer), and processor ``seconds``, the truth not among them.
+    """
+
+    seed: int
+    kinds: tuple[str, ...]
+    became: str
+    asked: float
+    estimated: float
+    true: float
+    seconds: float
+
+
+def scene_of(seed: int) -> Scene:
+    """The random scene, or one that is held for longer."""
+    scene = random_scene(seed)
+    return replace(scene, duration=LONGER) if seed % LONG == LONG - 1 else scene
+
+
+def until(end: float) -> Progress:
+    """A listener that ends a run at a processor time."""
+
+    def heard(_: float) -> None:
+        if time.process_time() > end:
+            raise TooLong
+
+    return heard
+
+
+def request(seed: int, cap: float) -> RandomRequest:
+    """Ask one scene; it and its truth take ``cap`` processor seconds at most."""
+    scene, asked, began = scene_of(seed), ASKED[seed % len(ASKED)], time.process_time()
+    kinds = tuple(sorted(type(effect).__name__ for effect in scene.present()))
+    kinds += ("long",) if scene.duration == LONGER else ()
+    listener, estimated, true, seconds = until(began + cap), 0.0, 0.0, 0.0
+    try:
+        plan = scene.plan(seed)
+        found = simulate_to(plan, accuracy=asked, progress=listener)
+        seconds, estimated = time.process_time() - began, found.error.largest
+        true = true_error(plan, found, listener)
+        became = "answered"
+    except OutOfReach:
+        became = "refused"
+    except InfeasibleLoad:
+        became = "infeasible"
+    except NotConverged:
+        became = "not converged"
+    except TooLong:
+        became = "too long"
+    return RandomRequest(seed, kinds, became, asked, estimated, true, seconds or time.process_time() - began)
+
+
+def true_error(plan: Plan, found: Refined, progress: Progress) -> float:
+    """Of the log of a request, whose points a scene without a sensor has of its own."""
+    finer = replace(found.fidelity, cells=2 * found.fidelity.cells, substeps=2 * found.fidelity.substeps)
+    return difference(found.log, run(plan, finer, progress)).largest
+
+
+def requests(path: Path, seeds: Iterable[int], cap: float, seconds: float = np.inf) -> list[RandomRequest]:
+    """All requests of these seeds, within so many processor seconds; those in ``path`` are not made again."""
+    entries = json.loads(path.read_text()) if path.exists() else []
+    known = [RandomRequest(**{**entry, "kinds": tuple(entry["kinds"])}) for entry in entries]
+    done, began, wanted = {entry.seed for entry in known}, time.process_time(), list(seeds)
+    for seed in (seed for seed in wanted if seed not in done):
+        if time.process_time() - began > seconds:
+            break
+        known.append(request(seed, cap))
+        path.write_text(json.dumps([asdict(entry) for entry in known], indent=1))
+        print(known[-1], flush=True)
+    return [entry for entry in known if entry.seed in set(wanted)]
+
+
+def table(made: list[RandomRequest]) -> str:
+    """How requests ended, how often their accuracy was kept, and how far estimates were off, by effect."""
+    lines = [
+        "| scenes | requests | answered | refused | too long | kept | within a factor of 3 | below a third "
+        "| median estimate/true | median seconds |",
+        "|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for kind in ("all", *KINDS):
+        own = [entry for entry in made if kind == "all" or kind in entry.kinds]
+        own = [entry for entry in own if entry.became != "infeasible"]
+        answered = [entry for entry in own if entry.became == "answered"]
+        if not answered:
+            continue
+        ratio = np.array([entry.estimated / max(entry.true, np.finfo(float).tiny) for entry in answered])
+        kept = np.mean([entry.true <= entry.asked for entry in answered])
+        counts = [sum(entry.became == ended for entry in own) for ended in ("refused", "too long")]
+        within, below = ((ratio >= 1.0 / FACTOR) & (ratio <= FACTOR)).mean(), (ratio < 1.0 / FACTOR).mean()
+        lines.append(
+            f"| {kind} | {len(own)} | {len(answered)} | {counts[0]} | {counts[1]} | {100 * kept:.0f} % "
+            f"| {100 * within:.0f} % | {100 * below:.0f} % | {np.median(ratio):.1f} "
+            f"| {np.median([entry.seconds for entry in answered]):.1f} |"
+        )
+    return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""Grip control in closed loops."""

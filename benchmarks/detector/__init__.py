@@ -1,0 +1,1 @@
+"""Slip found in simulated and recorded frames, against what is true."""

@@ -1,0 +1,1 @@
+"""From raw grasps to friction, and on to a grip."""

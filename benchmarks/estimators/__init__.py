@@ -1,0 +1,1 @@
+"""Friction models of samples whose friction is known."""

@@ -1,0 +1,151 @@
+"""How many probes it takes: `python -m benchmarks.estimators.next_grasp [--output FOLDER] [--materials N]`.
+
+Materials of all kinds (level, slopes, scatter) are probed by a robot that reads the hierarchical fit after each probe
+and asks for the next (`estimators.next_grasp`), by one that goes through a fixed schedule of three normal forces by
+three speeds, and by one that always makes the same grasp in the middle. Grasps come from a generator that is not the
+model: Hertzian pressure whose rim slips, log-normal scatter between grasps. Counted are the probes after which the
+conservative friction (1 % quantile of a contact of 60 elements) at the planner's working point is within 10 % of that
+of who knows the law and all scales, and stays so for two more. Writes next_grasp.json.
+"""
+
+import os
+
+os.environ["OMP_NUM_THREADS"] = "1"  # before numpy is first imported: small products gain nothing from threads
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
+import argparse
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import cycle, islice, product
+from pathlib import Path
+
+import numpy as np
+from scipy import special
+
+import estimators
+from estimators.grasp_design import Probing, WorkingPoint, next_grasp
+from slipcore.samples import FrictionSamples
+
+SIDE, AREA, RATE = 11, 1e-6, 30.0
+FORCES, SPEEDS, LENGTH = (0.05, 0.45), (5e-4, 4e-3), 1e-3
+MOST, STAYS, WITHIN = 30, 2, 0.1
+QUANTILE, ELEMENTS = 1e-2, 60
+
+Grasp = tuple[float, float, float]
+"""Mean normal force of an element N, speed m/s and length m of the slip."""
+
+Choose = Callable[[estimators.FrictionModel, int], Grasp]
+"""The next grasp, by what so many grasps have told."""
+
+
+@dataclass(frozen=True, slots=True)
+class Material:
+    """The law (β₀, β₁, β₂), its scatter between grasps, between places and within, and where it is to be held."""
+
+    law: np.ndarray
+    scales: tuple[float, float, float]
+    working_point: WorkingPoint
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator) -> "Material":
+        """One of a population: slopes change friction by some hundredths over 5 mm/s and 0.2 N."""
+        level = rng.uniform(0.25, 0.8)
+        law = np.array([level, rng.normal(0.0, 0.1 * level) / 5e-3, rng.normal(-0.05, 0.1) * level / 0.2])
+        scales = (0.05 * np.exp(0.4 * rng.standard_normal()), 0.02, 0.03)
+        force = float(np.exp(rng.uniform(*np.log(FORCES))))
+        return cls(law, scales, WorkingPoint(force, 0.0, QUANTILE, ELEMENTS))
+
+    def conservative(self) -> float:
+        """The quantile that who knows all would tell."""
+        between, places, within = self.scales
+        friction = float(self.law @ [1.0, 0.0, self.working_point.normal_force])
+        spread = np.sqrt(np.log1p(between**2))
+        shared = friction * (1.0 - np.exp(spread * special.ndtri(QUANTILE) - 0.5 * spread**2))
+        own = special.ndtri(QUANTILE) * np.hypot(places, within) / np.sqrt(ELEMENTS)
+        return friction - float(np.hypot(shared, own))
+
+
+def probe(material: Material, grasp: Grasp, rng: np.random.Generator) -> estimators.Moments:
+    """What one grasp tells."""
+    force, speed, length = grasp
+    axis = np.linspace(-1.0, 1.0, SIDE)
+    radius = np.hypot(*np.meshgrid(axis, axis)).ravel()
+    pressure = np.sqrt(np.maximum(1.0 - radius**2, 0.0))
+    rim = (radius > 0.5) & (pressure > 0.1)
+    frames = max(int(RATE * length / speed), 2)
+    f_n = np.tile(force * pressure[rim] / pressure[pressure > 0.0].mean(), frames)
+    v = speed * np.tile(radius[rim] - 0.45, frames) * rng.uniform(0.5, 1.5, frames).repeat(rim.sum())
+    between, places, within = material.scales
+    spread = np.sqrt(np.log1p(between**2))
+    factor = np.exp(spread * rng.standard_normal() - 0.5 * spread**2)
+    mu = factor * (material.law @ [np.ones(len(v)), v, f_n]) + within * rng.standard_normal(len(v))
+    mu += np.tile(places * rng.standard_normal(int(rim.sum())), frames)
+    element, time = np.tile(np.flatnonzero(rim), frames), np.arange(frames).repeat(rim.sum()) / RATE
+    return estimators.Moments.from_samples(FrictionSamples(mu, v, f_n, mu * f_n, time, element, np.ones(len(v)), AREA))
+
+
+def needed(material: Material, choose: Choose, seed: int) -> tuple[int, float]:
+    """Probes and seconds of robot time until the conservative friction is right; of ``MOST`` probes where it is not."""
+    rng, truth = np.random.default_rng(seed), material.conservative()
+    point, grasp = material.working_point, (0.15, 2e-3, LENGTH)  # the first is everybody's
+    data, seconds, held = [], [], 0
+    for count in range(1, MOST + 1):
+        data.append(probe(material, grasp, rng))
+        seconds.append(Probing().seconds + grasp[2] / grasp[1])
+        model = estimators.fit(data, method="hierarchical")
+        told = float(model.predict(0.0, point.normal_force, QUANTILE, of="contact", elements=ELEMENTS))
+        held = held + 1 if abs(told / truth - 1.0) <= WITHIN else 0
+        if held > STAYS:
+            return count - STAYS, float(sum(seconds[: count - STAYS]))
+        grasp = choose(model, count)
+    return MOST, float(sum(seconds))
+
+
+def designed(material: Material) -> Choose:
+    """Asks for what to record next."""
+    probing = Probing(normal_force=FORCES, speed=(5e-4, 1e-3, 2e-3, 4e-3), length=(LENGTH,))
+
+    def choose(model: estimators.FrictionModel, grasps: int) -> Grasp:
+        told = next_grasp(model, material.working_point, probing, grasps)
+        return told.normal_force, told.speed, told.slip_length
+
+    return choose
+
+
+def scheduled(model: estimators.FrictionModel, grasps: int) -> Grasp:
+    """Three forces by three speeds, again and again."""
+    del model
+    grid = product(np.geomspace(*FORCES, 3), np.geomspace(*SPEEDS, 3))
+    force, speed = next(islice(cycle(grid), grasps - 1, None))
+    return float(force), float(speed), LENGTH
+
+
+def same(model: estimators.FrictionModel, grasps: int) -> Grasp:
+    """The first grasp again."""
+    del model, grasps
+    return 0.15, 2e-3, LENGTH
+
+
+def main() -> None:
+    """Run the campaign and print it as a table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--output", type=Path, default=Path("benchmarks/results"))
+    parser.add_argument("--materials", type=int, default=200)
+    options = parser.parse_args()
+    options.output.mkdir(parents=True, exist_ok=True)
+    population = [Material.drawn(np.random.default_rng([1, number])) for number in range(options.materials)]
+    rows = {}
+    for name in ("next_grasp", "schedule", "same grasp"):
+        choices = [{"next_grasp": designed(m), "schedule": scheduled, "same grasp": same}[name] for m in population]
+        found = np.array([needed(*pair, seed) for seed, pair in enumerate(zip(population, choices, strict=True))])
+        rows[name] = found.tolist()
+        quartiles = np.quantile(found[:, 0], [0.25, 0.5, 0.75, 0.9])
+        never = float(np.mean(found[:, 0] == MOST))
+        cells = f"{' '.join(f'{x:g}' for x in quartiles)} | {np.median(found[:, 1]):.0f} | {never:.1%}"
+        print(f"| {name} | {cells} |", flush=True)
+    (options.output / "next_grasp.json").write_text(json.dumps(rows) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

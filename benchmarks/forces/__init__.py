@@ -1,0 +1,1 @@
+"""Forces reconstructed from displacement, against those that are true."""

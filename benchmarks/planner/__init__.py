@@ -1,0 +1,1 @@
+"""Grip forces of a planner: how hard, how fast, and in MuJoCo."""

@@ -1,0 +1,1 @@
+"""Load, uploads, streams and pages of a running service."""

@@ -1,0 +1,57 @@
+"""Random requests: what is counted, what is kept, what is ended."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.contact import random_requests
+from benchmarks.contact.random_requests import RandomRequest, TooLong, request, requests, scene_of, table, until
+from slipcore.contact.errors import OutOfReach
+
+ANSWERED = RandomRequest(0, ("FiniteLayer",), "answered", 0.1, 0.04, 0.02, 1.0)
+
+
+def test_estimates_are_counted_within_a_factor_of_three_and_below_a_third() -> None:
+    made = [
+        ANSWERED,
+        replace(ANSWERED, seed=1, estimated=0.09, true=0.02),
+        replace(ANSWERED, seed=2, kinds=(), estimated=0.04, true=0.15),
+        replace(ANSWERED, seed=3, kinds=(), became="refused"),
+        replace(ANSWERED, seed=4, became="infeasible"),
+    ]
+    whole, layered = table(made).splitlines()[2:]
+    assert whole == "| all | 4 | 3 | 1 | 0 | 67 % | 33 % | 33 % | 2.0 | 1.0 |"
+    assert layered == "| FiniteLayer | 2 | 2 | 0 | 0 | 100 % | 50 % | 0 % | 3.2 | 1.0 |"
+
+
+def test_requests_go_on_where_they_ended(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    asked: list[int] = []
+
+    def counted(seed: int, _: float) -> RandomRequest:
+        asked.append(seed)
+        return replace(ANSWERED, seed=seed)
+
+    monkeypatch.setattr(random_requests, "request", counted)
+    requests(tmp_path / "requests.json", range(3), 1.0)
+    made = requests(tmp_path / "requests.json", range(1, 5), 1.0)
+    assert asked == [0, 1, 2, 3, 4]
+    assert {entry.seed for entry in made} == {1, 2, 3, 4}
+    assert ANSWERED in requests(tmp_path / "requests.json", range(5), 1.0)
+
+
+def test_refused_and_long_scenes_are_counted_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuses(*_: object, **__: object) -> None:
+        raise OutOfReach("accuracy", 0.1, 0.2, 5.0)
+
+    monkeypatch.setattr(random_requests, "simulate_to", refuses)
+    assert request(0, 1.0).became == "refused"
+    monkeypatch.undo()
+    assert request(0, 0.0).became == "too long"
+    with pytest.raises(TooLong):
+        until(-np.inf)(0.5)
+
+
+def test_every_eighth_scene_is_held_for_longer() -> None:
+    assert [scene_of(seed).duration for seed in range(6, 9)] == [2.0, 8.0, 2.0]

@@ -1,0 +1,166 @@
+import dataclasses
+import math
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks.control import __main__ as control
+from benchmarks.control.__main__ import campaign, episode
+from benchmarks.control.episodes import FRAME, START, Episode, least_force, run, world_of
+from benchmarks.control.outcomes import SIGNATURES, outcome_of, scores
+from benchmarks.control.strategies import (
+    CONTROLLERS,
+    EXPLORED_SLIP,
+    Controlled,
+    Fixed,
+    Reflex,
+    exploration,
+    model_of,
+    settings_of,
+)
+from benchmarks.control.tasks import ALL, LIFT, LIFTS, PAPER, STEP, TASKS, lift
+from slipcore.contact.reduced import GRAVITY, Load
+from stiction_client import Contact, GraspController, Observation
+
+TASK = LIFTS[4]
+
+
+def test_the_least_force_is_the_limit_surface_s() -> None:
+    world = dataclasses.replace(world_of(TASK, 0), friction=np.full((1, 20, 20), 0.45))
+    assert least_force(world, Load(0.1)) == pytest.approx(0.981 / 0.45, rel=1e-3)
+    force = least_force(world, Load(0.1, moment=2e-3))
+    arm = float(Contact.round(math.pi * world.contact(5.0).contact_radius ** 2, at_force=5.0).arm(force))
+    assert math.hypot(0.981, 2e-3 / arm) == pytest.approx(0.45 * force, rel=1e-3)
+
+
+def test_two_fingers_share_the_load() -> None:
+    block = next(task for task in PAPER if len(task.friction) == 2)
+    world = dataclasses.replace(
+        world_of(block, 0), friction=np.stack([np.full((20, 20), each) for each in block.friction])
+    )
+    least = [least_force(world, Load(0.2), finger) for finger in (0, 1)]
+    assert least == pytest.approx([0.1 * GRAVITY / friction for friction in block.friction])
+
+
+@pytest.mark.parametrize("name", [*CONTROLLERS, "known, half of slip missed"])
+def test_the_controller_holds_a_lift_seen_by_the_real_detector(name: str) -> None:
+    score = scores(name, [outcome_of(episode(dataclasses.replace(TASK, seconds=2.5), name, 0), name, 0)])
+    assert score["held"] == "1/1"
+    assert 1.0 < float(str(score["final"])) < 2.6
+
+
+@pytest.mark.parametrize(("friction", "name"), [(0.45, "paper"), (0.57, None)])
+def test_the_controller_recognises_in_the_reduced_world(friction: float, name: str | None) -> None:
+    """Within a second of the load, where its first touch lets some slip; a stranger stays unknown, and is held, too."""
+    task = dataclasses.replace(lift(0.05, friction), seconds=1.4)
+    world = world_of(task, 1000)
+    materials = {"paper": model_of(0.45, world), "rubber": model_of(0.7, world)}
+    strategy = Controlled(GraspController.init(settings_of(world), materials=materials))
+    lifted = run(task, world, [strategy], 1000)
+    assert strategy.state.material == name
+    assert lifted.time[-1] < LIFT + 1.0
+    assert lifted.slipped[-1, 0] < 1e-5
+
+
+def test_a_detector_that_misses_all_slip_tells_that_all_sticks() -> None:
+    task = dataclasses.replace(TASK, seconds=1.0)
+    world = world_of(task, 0)
+
+    class Still:
+        def __call__(self, seen: Observation) -> float:  # noqa: ARG002 - whatever is seen
+            return START
+
+    told = {missed: run(task, world, [Still()], 0, missed).told for missed in (0.0, 1.0)}
+    assert np.nanmin(told[1.0]) == 1.0
+    assert np.nanmin(told[0.0]) < 0.9
+
+
+def test_an_exploration_finds_the_friction_of_its_world() -> None:
+    world = world_of(TASK, 3)
+    found, seconds = exploration(world, 0)
+    assert found == pytest.approx(world.friction.mean(), rel=0.05)
+    assert 0.5 < seconds < 2.0
+    assert EXPLORED_SLIP < 3e-3
+
+
+def test_a_reflex_presses_harder_only_while_it_sees_slip() -> None:
+    reflex, ratios = Reflex(), [1.0, 0.6, 0.5, 0.0, 1.0, math.nan]
+    forces = [reflex(Observation(count * FRAME, 1.0, 0.5, 0.0, ratio)) for count, ratio in enumerate(ratios)]
+    assert forces == [1.0, 1.0, 1.5, 2.0, 2.0, 2.0]
+
+
+def test_a_fixed_friction_presses_by_the_load() -> None:
+    strategy = Fixed(settings_of(world_of(TASK, 0)), 0.25)
+    forces = [strategy(Observation(count * FRAME, 1.0, 0.5)) for count in range(1, 300)]
+    assert forces[-1] == pytest.approx(2.0)  # after the lead for the load that came at once
+
+
+def made(normal: list[float], **changed: Any) -> Episode:
+    """One finger, a frame every half second, of which 1 N would always do."""
+    force = np.array(normal)[:, None]
+    ones = np.ones_like(force)
+    time = 0.5 * np.arange(1, len(normal) + 1)
+    plain = Episode("task", math.inf, time, force, force, ones, ones, ones, 0.0 * ones)
+    return dataclasses.replace(plain, **changed)
+
+
+def test_scores_are_of_what_was_held() -> None:
+    lost = np.array([[0.0], [0.0], [9e-3]])
+    made_ = [made([2.0, 3.0, 1.5]), made([2.0, 0.5, 0.5], slipped=lost), made([3.0, 1.2, 1.2], limit=2.7)]
+    score = scores("x", [outcome_of(each, "x", seed) for seed, each in enumerate(made_)])
+    assert score["held"] == "2/3"
+    assert score["crushed"] == "1/1"
+    assert score["peak"] == 3.0
+    assert score["final"] == pytest.approx(1.35)
+    assert score["as_asked"] == 50.0
+    assert score["final_worst"] == 1.5
+    assert score["slip_mm"] == pytest.approx(9.0)
+    assert score["reaction_ms"] == pytest.approx(2e3 * FRAME)
+
+
+def test_signatures_tell_the_paper_s_from_others() -> None:
+    cap, knife, block = SIGNATURES
+    rises = made([1.0] * 4 + [4.0] + [4.5 + 0.2 * count for count in range(9)])
+    even = made([1.0 + 0.1 * count for count in range(14)])
+    assert cap.tell([cap.ratio(rises), cap.ratio(even)]).endswith("1/2")
+    falls, rose = made([1.0] * 4 + [2.0] * 2 + [3.0, 1.5]), made([2.0] * 7 + [2.5])
+    assert knife.tell([knife.ratio(falls), knife.ratio(rose)]).endswith("1/2")
+    two = np.array([[3.0, 2.0]])
+    faces = [dataclasses.replace(made([3.0]), normal=normal) for normal in (two, two[:, ::-1])]
+    assert block.tell([block.ratio(each) for each in faces]).endswith("1/2")
+    assert outcome_of(dataclasses.replace(made([3.0]), task=block.task.name, normal=two), "x", 0).signature == 1.5
+    assert math.isnan(outcome_of(made([3.0]), "x", 0).signature)
+
+
+def test_a_campaign_goes_on_where_it_was_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[int, int, list[str]]] = []
+
+    def outcomes(job: tuple[int, int, list[str]]) -> list[control.Outcome]:
+        asked.append(job)
+        task, seed, names = job
+        return [outcome_of(dataclasses.replace(made([2.0]), task=ALL[task].name), name, seed) for name in names]
+
+    monkeypatch.setattr(control, "ProcessPoolExecutor", lambda processes: ThreadPoolExecutor(processes))
+    monkeypatch.setattr(control, "_outcomes", outcomes)
+    keep = tmp_path / "kept.jsonl"
+    first = list(campaign({"known": 2}, 1, keep))
+    assert len(first) == len(asked) == 2 * len(ALL)
+    asked.clear()
+    again = list(campaign({"known": 2, "unknown": 1}, 1, keep))
+    assert asked == [(task, 0, ["unknown"]) for task in range(len(ALL))]
+    assert [each[:3] for each in again[: len(first)]] == [each[:3] for each in first]
+    assert len(list(campaign({"known": 1}, 1, keep))) == len(ALL)
+
+
+def test_there_are_twelve_lifts_and_the_paper_s_six_tasks_by_names_of_their_own() -> None:
+    assert (len(LIFTS), len(PAPER)) == (12, 6)
+    assert len({task.name for task in ALL}) == 19
+
+
+def test_a_step_of_load_comes_faster_than_the_paper_s_sudden_load() -> None:
+    sudden = next(task for task in PAPER if task.name == "sudden load and twist")
+    assert STEP.load(4.03).resultant() == pytest.approx(sudden.load(4.15).resultant())
+    assert STEP not in TASKS
