@@ -64,6 +64,9 @@ PAGE = 1000
 
 NOT_MODIFIED = 304
 
+OF_PROBLEMS = frozenset({"type", "title", "status", "detail", "instance", "name", "value", "allowed"})
+"""Members of a problem that are arguments of their own, or say what is known: RFC 9457's, and this service's."""
+
 
 @dataclass(frozen=True, slots=True)
 class Request:
@@ -431,7 +434,8 @@ def _refuse(response: httpx.Response) -> NoReturn:
     except (JSONDecodeError, UnicodeDecodeError, KeyError, TypeError, AttributeError) as error:
         raise UnexpectedAnswer(f"{_summary(response)}, which is no problem+json") from error
     named = {name: None if problem.get(name) is None else str(problem[name]) for name in ("name", "value", "allowed")}
-    raise problems.BY_TYPE.get(kind, ProblemError)(kind, response.status_code, detail, **named)
+    facts = {name: value for name, value in problem.items() if name not in OF_PROBLEMS}
+    raise problems.BY_TYPE.get(kind, ProblemError)(kind, response.status_code, detail, **named, facts=facts)
 
 
 def _record(read: Callable[[Any], T], record: Any) -> T:

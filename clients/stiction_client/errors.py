@@ -1,6 +1,7 @@
 """The exceptions of the client: one small tree."""
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 
 class StictionError(Exception):
@@ -26,7 +27,8 @@ class ProblemError(StictionError):
     """The service refused a request (RFC 9457 problem).
 
     ``type`` is stable and made for programs, such as "/problems/unknown-material"; ``status`` is the HTTP status;
-    ``detail`` is for people; ``name``, ``value`` and ``allowed`` say which input was wrong, where one was.
+    ``detail`` is for people; ``name``, ``value`` and ``allowed`` say which input was wrong, where one was; ``facts``:
+    what else the problem's type tells (docs/problems.md), such as ``owners`` or ``largest_load``.
     """
 
     def __init__(
@@ -37,10 +39,13 @@ class ProblemError(StictionError):
         name: str | None = None,
         value: str | None = None,
         allowed: str | None = None,
+        facts: Mapping[str, Any] | None = None,
     ) -> None:
         self.type, self.status, self.detail = type, status, detail
         self.name, self.value, self.allowed = name, value, allowed
-        super().__init__(type, status, detail, name, value, allowed)
+        self.facts = dict(facts or {})
+        # not super(): a problem that is an error of this package as well has other arguments there
+        StictionError.__init__(self, type, status, detail, name, value, allowed, self.facts)
 
     def __str__(self) -> str:
         return f"{self.detail} ({self.status}, {self.type})"

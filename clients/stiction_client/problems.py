@@ -3,7 +3,10 @@
 Each is a ``ProblemError``, whose ``type`` says the same; a type that this version doesn't know stays one.
 """
 
+import math
 import re
+from collections.abc import Mapping
+from typing import Any
 
 from stiction_client import errors
 from stiction_client.errors import ProblemError
@@ -81,8 +84,25 @@ class NoModel(ProblemError, errors.NoModel):
     """The material has no model by this method yet."""
 
 
-class NoFeasibleForce(ProblemError):
-    """No normal force holds the load."""
+class NoFeasibleForce(ProblemError, errors.NoFeasibleForce):
+    """No normal force holds the load, says the service: ``stiction_client.NoFeasibleForce`` with its numbers."""
+
+    def __init__(
+        self,
+        type: str,  # noqa: A002 - as of each problem
+        status: int,
+        detail: str,
+        name: str | None = None,
+        value: str | None = None,
+        allowed: str | None = None,
+        facts: Mapping[str, Any] | None = None,
+    ) -> None:
+        super().__init__(type, status, detail, name, value, allowed, facts)
+        self.tangential_load, self.reason = math.nan, detail  # the load is what was asked
+        self.largest_load = float(self.facts.get("largest_load", math.nan))
+        self.normal_force = float(self.facts.get("normal_force", math.nan))
+        self.cause = str(self.facts.get("cause", ""))
+        self.largest_observed = self.facts.get("largest_observed")
 
 
 class JobEnded(ProblemError):
