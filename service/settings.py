@@ -76,6 +76,11 @@ class Settings(BaseSettings):
     port: Annotated[int, Field(ge=0, le=65535)] = Field(
         default=8000, description="Port to listen on; 0 takes a free one."
     )
+    lookup_port: Annotated[int, Field(ge=0, le=65535)] | None = Field(
+        default=None,
+        description="Port of a second server process, without workers, for look-ups that wait for no upload; 0 takes a "
+        "free one. Default: none.",
+    )
     access: Literal["auto", "keys", "open"] = Field(
         default="auto",
         description="Who must send a key: all but users of this machine (auto), everybody (keys), or nobody (open).",

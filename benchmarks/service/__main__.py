@@ -4,8 +4,9 @@ Uploads, one after the other, of 200-frame logs of 20×20 elements with forces: 
 fit by least squares; then fits of the same material, asked for one after the other: by `bayes`, and by `conjugate`,
 which is a job with next to nothing to compute. Then look-ups on 32 connections, beside bare Starlette routes that
 return the same bytes by the same uvicorn, without a log, on h11 and asyncio and on httptools and uvloop: requests a
-second, CPU seconds a request of the server, and latencies, alone, while uploads run, and where each asks the database.
-Each server has one core, the callers and the workers share the others.
+second, CPU seconds a request of the server, and latencies, alone, while uploads run, the same from a process for
+look-ups (STICTION_LOOKUP_PORT), and where each asks the database. What answers look-ups has one core; the callers, the
+workers and, beside a process for look-ups, the server share the others.
 Writes service.json and service.png.
 """
 
@@ -27,7 +28,17 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.pages import options, picture_folder, save, write
-from benchmarks.service.http_load import CALLERS, CONNECTIONS, Load, Target, in_turn, leave_first_core, load, pin
+from benchmarks.service.http_load import (
+    CALLERS,
+    CONNECTIONS,
+    Load,
+    Target,
+    child_listening,
+    in_turn,
+    leave_first_core,
+    load,
+    pin,
+)
 from benchmarks.service.postgresql import running_postgresql
 from slipcore import GraspLog
 from slipcore.contact import RampSchedule, tangential_ramp
@@ -175,11 +186,18 @@ def ready(folder: Path, **settings: str) -> Iterator[tuple[str, int, int]]:
 
 
 @contextmanager
-def serving(**settings: str) -> Iterator[tuple[str, int, int]]:
+def informed(**settings: str) -> Iterator[tuple[str, int, int]]:
     """A service with one worker that is ready and knows the material: its URL, port and process."""
     with tempfile.TemporaryDirectory() as folder, ready(Path(folder), **settings) as (url, port, process):
         FrictionClient(url).create_material(MATERIAL)
         uploads(url, [content(seed) for seed in range(3)])
+        yield url, port, process
+
+
+@contextmanager
+def serving(**settings: str) -> Iterator[tuple[str, int, int]]:
+    """The same, with a core of its own."""
+    with informed(**settings) as (url, port, process):
         pin(process)
         yield url, port, process
 
@@ -193,6 +211,8 @@ def measure() -> tuple[list[Requests], list[Load]]:
             fits(url, "conjugate", UPLOADS),
         ]
         loads = looked_up(url, port, process)
+    bodies = [content(300 + MOST_BESIDE + k) for k in range(MOST_BESIDE)]
+    loads.append(looked_up_apart(bodies))
     uncached = {"STICTION_LOOKUP_SECONDS": "0"}
     with serving(**uncached) as (_, port, process):
         loads.append(load(Target("look-up, asking SQLite", port, process, LOOK_UP)))
@@ -217,8 +237,26 @@ def looked_up(url: str, port: int, process: int) -> list[Load]:
         ]
         alone = in_turn(targets)
     busy = Target("look-up beside uploads and fits", port, process, LOOK_UP)
-    bodies = iter([content(300 + k) for k in range(MOST_BESIDE)])
-    return [*alone, beside(lambda: uploads(url, [next(bodies)]), lambda: load(busy, 10.0))]
+    bodies = [content(300 + k) for k in range(MOST_BESIDE)]
+    return [*alone, beside_uploads(url, bodies, busy)]
+
+
+def looked_up_apart(bodies: list[bytes]) -> Load:
+    """Look-ups from a process for them, which has a core of its own, while the server takes uploads."""
+    port = free_port()
+    with informed(STICTION_LOOKUP_PORT=str(port)) as (url, _, server):
+        own = f"http://127.0.0.1:{port}"
+        httpx.get(own + LOOK_UP, timeout=60.0).raise_for_status()  # waits for its start
+        process = child_listening(server, port)
+        pin(process)
+        what = "look-up beside uploads and fits, from a process for look-ups"
+        return beside_uploads(url, bodies, Target(what, port, process, LOOK_UP))
+
+
+def beside_uploads(url: str, bodies: list[bytes], target: Target) -> Load:
+    """What look-ups take while one log after the other is uploaded and fitted."""
+    left = iter(bodies)
+    return beside(lambda: uploads(url, [next(left)]), lambda: in_turn([target], 3, 5.0)[0])
 
 
 @contextmanager

@@ -29,22 +29,26 @@ DatabaseUrl = Annotated[str | None, typer.Option(help="SQLAlchemy URL in place o
 def serve(
     host: Annotated[str | None, typer.Option(help="Address to listen on.")] = None,
     port: Annotated[int | None, typer.Option(help="Port to listen on.")] = None,
+    lookup_port: Annotated[
+        int | None, typer.Option(help="Port of a second process for look-ups, which wait for no upload there.")
+    ] = None,
     data_folder: DataFolder = None,
     database_url: DatabaseUrl = None,
 ) -> None:
     """Run the web service until it is told to stop (every setting: docs/settings.md)."""
+    from service.lookup_server import server_of
     from service.processes.side_process import SWITCH_SECONDS
-    from service.serving import Server, configuration
 
     sys.setswitchinterval(SWITCH_SECONDS)  # who is answered by the event loop does not wait for threads
-    settings = _settings(host=host, port=port, data_folder=data_folder, database_url=database_url)
+    settings = _settings(
+        host=host, port=port, lookup_port=lookup_port, data_folder=data_folder, database_url=database_url
+    )
     _prepare(settings)
-    chosen = configuration(settings)
-    server = Server(chosen)
+    server = server_of(settings)
     with suppress(SystemExit):  # its own, of a start that failed
         server.run()
     if not server.started:
-        error = getattr(getattr(chosen.app, "state", None), "start_error", None)
+        error = getattr(getattr(server.config.app, "state", None), "start_error", None)
         if error is None:
             _require_address(settings)
         elif exit_code(error) is not None:

@@ -16,6 +16,7 @@ DOCUMENTED = dict(
 
 
 UNSET = {
+    "lookup_port": "none",
     "keep_uploads_days": "for ever",
     "keep_unreferenced_days": "for ever",
     "keep_audit_days": "for ever",
@@ -73,6 +74,7 @@ def test_the_databases_password_is_not_shown() -> None:
     [
         ("port", 65536),
         ("port", -1),
+        ("lookup_port", 65536),
         ("max_upload_bytes", 0),
         ("access", "none"),
         ("idempotency_hours", 0.0),

@@ -17,8 +17,12 @@ from service.cli.exit_codes import INPUT_REFUSED
         (["--database-url", "mysql://x/y"], "begins with mysql://; allowed: sqlite:// or postgresql://"),
         (["--host", "nowhere.invalid"], "STICTION_HOST (--host) is 'nowhere.invalid' and STICTION_PORT (--port) 0: "),
         (["--host", "192.0.2.1"], "STICTION_HOST (--host) is '192.0.2.1' and STICTION_PORT (--port) 0: "),
+        (
+            ["--lookup-port", "0", "--host", "192.0.2.1"],
+            "STICTION_LOOKUP_PORT (--lookup-port) is 0, with ",
+        ),
     ],
-    ids=["folder", "database", "host", "address"],
+    ids=["folder", "database", "host", "address", "lookup_port"],
 )
 def test_the_last_line_of_a_refused_start_says_what_is_wrong(tmp_path: Path, wrong: list[str], why: str) -> None:
     environment = os.environ | {
