@@ -14,6 +14,7 @@ from estimators.linear.fit_data import FitData
 from estimators.linear.least_squares import LinearFit, factorise, solve, triangular_inverse, upper_triangle
 from estimators.linear.observations import Observations
 from estimators.linear.orthonormal import orthonormal
+from slipcore.medians import medians
 
 FloatArray = NDArray[np.float64]
 
@@ -92,7 +93,7 @@ def high_breakdown(design: FloatArray, response: FloatArray, rng: np.random.Gene
     elemental = np.linalg.solve(design[rows[regular]], response[rows[regular], None])[..., 0]
     elemental = np.vstack([elemental, _least_squares(design, response)])  # should no subset be regular
     shown = rng.choice(count, min(count, ROBUST.subset_samples), replace=False)
-    median = np.median(np.abs(response[shown] - elemental @ design[shown].T), axis=1)
+    median = medians(np.abs(response[shown] - elemental @ design[shown].T))
     best = elemental[np.argsort(median)[: ROBUST.improved]]
     planes = [_concentrate(design[shown], response[shown], coefficients) for coefficients in best]
     return _concentrate(design, response, min(planes, key=lambda plane: plane.scale).coefficients)

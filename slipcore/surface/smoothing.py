@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 
 from slipcore.defaults import DEVIATION_TO_SIGMA, SMOOTHING
 from slipcore.frames import FloatArray
+from slipcore.medians import medians
 
 
 def transfer(width: float, frequency: FloatArray) -> FloatArray:
@@ -61,9 +62,9 @@ def kernel_width(time: FloatArray, field: FloatArray, least_noise: float) -> flo
 
 def _size(field: FloatArray) -> FloatArray:
     """Standard deviation of each frame [t], m or N, by medians about what all elements have in common."""
-    flat = field.reshape(len(field), -1, field.shape[-1])
-    flat = np.abs(flat - np.median(flat, axis=1, keepdims=True))
-    size: FloatArray = DEVIATION_TO_SIGMA * np.median(flat.reshape(len(field), -1), axis=1)
+    components = np.ascontiguousarray(np.moveaxis(field.reshape(len(field), -1, field.shape[-1]), -1, 1))
+    apart = np.abs(components - medians(components)[:, :, None])
+    size: FloatArray = DEVIATION_TO_SIGMA * medians(apart.reshape(len(field), -1))
     return size
 
 
