@@ -25,7 +25,7 @@ field's spots are as large as half of the contact, which does not average them o
 LIFTED = (0.3, 0.45, 0.7)
 """Friction of the materials among which the object's is recognised."""
 OFTEN, LIGHT = 1e-2, 0.5
-"""Slip in one of a hundred loads; N of a least force below that of the first touch."""
+"""Slip in one of a hundred loads; N of the least force, below that of the first touch: light loads need less."""
 
 FIXED = 0.2
 """Friction of the fixed strategy."""
@@ -93,7 +93,7 @@ class Approach:
 
 def settings_of(world: World, most: float = MOST, **changed: float) -> ControlSettings:
     """The controller's defaults for this finger."""
-    given: dict[str, Any] = {"least_force": START, "most_force": min(most, MOST)} | changed
+    given: dict[str, Any] = {"least_force": LIGHT, "touch_force": START, "most_force": min(most, MOST)} | changed
     return ControlSettings(contact=contact_of(world), **given)
 
 
@@ -176,9 +176,7 @@ def exploration(world: World, finger: int) -> tuple[float, float]:
 CONTROLLERS = {
     "known": Approach(partial(with_model, 1.0)),
     "unknown": Approach(without_model),
-    "known, 1 in 100 may slip": Approach(
-        partial(with_model, 1.0, slip_probability=OFTEN, least_force=LIGHT, touch_force=START)
-    ),
+    "known, 1 in 100 may slip": Approach(partial(with_model, 1.0, slip_probability=OFTEN)),
     "one of three": Approach(among_three),
 }
 MISLED = {

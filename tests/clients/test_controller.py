@@ -146,6 +146,28 @@ def test_what_disagrees_is_few_or_has_nothing_to_add_sharpens_nothing(make_model
     assert certain.sharpen(agreed, 3.0, SETTINGS) is certain
 
 
+def test_fewer_samples_do_not_replace_those_that_a_quantile_is_sharpened_by(make_model: Make) -> None:
+    """Nor do single elements at rest, whose force over pressure is little: they would make it ask for ever more."""
+    known = KnownFriction.of_model(model_of(make_model, 0.45), SETTINGS)
+    many = known.sharpen(LearnedFriction((0.45,) * 8, (8,) * 8), 3.0, SETTINGS)
+    assert many.sharpen(LearnedFriction((0.40,) * 8, (1,) * 8), 3.0, SETTINGS) is many
+    more = many.sharpen(LearnedFriction((0.44,) * 8, (9,) * 8), 3.0, SETTINGS)
+    assert more.sharpened < many.sharpened
+
+
+@pytest.mark.parametrize("stick_ratio", [0.25, math.nan])
+def test_a_load_of_all_that_the_contact_bears_is_answered_as_slip(stick_ratio: float, make_model: Make) -> None:
+    """What a sliding contact bears is its friction, not the load, and a detector may still see some of it stick."""
+    state = GraspController.init(SETTINGS, model_of(make_model, 0.45))
+    reasons = []
+    for frame in range(1, 4):
+        state, command = GraspController.step(state, Observation(frame * FRAME, 2.0, 0.90, 0.0, stick_ratio))
+        reasons.append(command.reason)
+    assert reasons[0] != "slip"
+    assert reasons[1:] == ["slip", "slip"]
+    assert command.normal_force == pytest.approx(2.0 * (1.0 + SETTINGS.reflex_gain))
+
+
 def test_slip_disproves_samples_that_told_of_more_friction(make_model: Make) -> None:
     state = GraspController.init(SETTINGS, model_of(make_model, 0.45))
     slipping = SlipSamples(np.full(10, 0.48), np.full(10, 0.05))

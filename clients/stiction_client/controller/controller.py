@@ -19,7 +19,8 @@ class ControllerState:
     """A controller between two frames, never written to.
 
     ``known``: the friction that ``hold`` goes by, None while there is none; ``learned``: friction of slipping elements;
-    ``contradictions``: frames in a row that speak against ``known``; ``since``: when ``mode`` began, s;
+    ``contradictions``: frames in a row that speak against ``known``; ``overloaded``: frames in a row with as much load
+    as all of the contact can bear by it; ``since``: when ``mode`` began, s;
     ``rested``: whether a load has come to rest, until which the first touch lasts; ``recognition``: the materials that
     it may be of; ``material``: which it was taken for, and its ``probability``.
     """
@@ -34,6 +35,7 @@ class ControllerState:
     sticking: StickRatioEstimate = field(default_factory=StickRatioEstimate)
     learned: LearnedFriction = field(default_factory=LearnedFriction)
     contradictions: int = 0
+    overloaded: int = 0
     rested: bool = False
     recognition: GripRecognition | None = None
     material: str | None = None
@@ -96,8 +98,10 @@ def _sense(state: ControllerState, observation: Observation, elapsed: float) -> 
         count = 0 if samples is None else samples.normal_force.size
         recognition = recognition.step(observation.time, _loaded(load, state.settings), told, count, state.settings)
     against = _contradicts(state, sticking, observation.normal, load.size, friction)
+    overloaded = state.overloaded + 1 if _overloaded(state, observation.normal, load.size) else 0
     contradictions = state.contradictions if against is None else state.contradictions + 1 if against else 0
     seen = replace(state, time=observation.time, load=load, sticking=sticking, learned=learned, recognition=recognition)
+    seen = replace(seen, overloaded=overloaded)
     return replace(seen, contradictions=contradictions, rested=state.rested or _settled(seen))
 
 
@@ -149,6 +153,16 @@ def _contradicts(
     return None if math.isnan(friction) and math.isnan(sticking.stick_ratio) else False
 
 
+def _overloaded(state: ControllerState, normal: float, size: float) -> bool:
+    """Whether the load is what next to all of the contact bears, by the mean of its friction.
+
+    A contact that slides bears no more than its friction: how much more is asked of it cannot be measured.
+    """
+    if state.known is None or normal == 0.0:
+        return False
+    return size > utilisation(state.settings.reflex_stick_ratio) * state.known.expected(normal) * normal
+
+
 def _decide(state: ControllerState, observation: Observation) -> ControllerState:
     """The mode after a frame. Evidence against what is known discards it, and all that was learnt with it."""
     settings = state.settings
@@ -197,7 +211,7 @@ def _sharpened(state: ControllerState, known: KnownFriction, normal: float) -> C
     if not known.of_others:
         return replace(state, known=state.learned.known(state.settings) or known)
     if state.sticking.slips(state.settings) and state.load.size > 0.0 and known.sharpened > 1.0:
-        return replace(state, known=replace(known, sharpened=1.0), learned=LearnedFriction())
+        return replace(state, known=replace(known, sharpened=1.0, shifted=1.0, samples=0), learned=LearnedFriction())
     return replace(state, known=known.sharpen(state.learned, normal, state.settings))
 
 
@@ -224,6 +238,12 @@ def _settled(state: ControllerState) -> bool:
     return _loaded(state.load, state.settings) and state.time - state.load.steady >= state.settings.settle_time
 
 
+def _slips(state: ControllerState) -> bool:
+    """Whether next to all of the contact slips, by the detector or by what is known of friction."""
+    settings = state.settings
+    return state.load.size > 0.0 and (state.sticking.slips(settings) or state.overloaded >= settings.reflex_frames)
+
+
 def _floor(settings: ControlSettings, rested: bool) -> float:
     """The least force, N: after a load has come to rest, and before."""
     return settings.least_force if rested else max(settings.least_force, settings.touch_force)
@@ -233,7 +253,7 @@ def _demands(state: ControllerState, observation: Observation) -> list[_Demand]:
     """All that asks for a force; the largest is followed."""
     settings = state.settings
     demands = [_Demand(_floor(settings, state.rested), "least force")]
-    slips = state.sticking.slips(settings) and state.load.size > 0.0
+    slips = _slips(state)
     growth = 1.0 if slips else state.load.growth(settings)  # in slip, what is measured grows with the grip
     if slips:
         demands.append(_Demand(observation.normal * (1.0 + settings.reflex_gain), "slip"))

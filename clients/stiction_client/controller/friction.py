@@ -17,7 +17,8 @@ class KnownFriction:
     """A conservative ``quantile`` of a contact's friction over the normal force of its elements, ``unit``·F^(1/n) N.
 
     ``deviations``: standard deviations that it lies below the mean; ``of_others``: it is of other grasps, so
-    that samples of this one can sharpen it; ``sharpened``: the quantile of this grasp, by them, over that of any.
+    that samples of this one can sharpen it; ``sharpened``: the quantile of this grasp, by them, over that of any;
+    ``shifted``: likewise its mean; ``samples``: of how many elements these are.
     """
 
     contact: Contact
@@ -26,6 +27,8 @@ class KnownFriction:
     deviations: float = NORMAL_DEVIATIONS
     of_others: bool = False
     sharpened: float = 1.0
+    shifted: float = 1.0
+    samples: int = 0
 
     @classmethod
     def of_model(cls, model: FrictionModel, settings: ControlSettings) -> "KnownFriction":
@@ -53,6 +56,10 @@ class KnownFriction:
         least, _, holds = loaded.interval(loaded.root(most))
         return float(loaded.force(least)) if holds else math.inf
 
+    def expected(self, force: float) -> float:
+        """The mean of this grasp's friction under ``force`` N."""
+        return self.shifted * self._low_and_mean(force)[1]
+
     def bounds(self, force: float) -> tuple[float, float]:
         """The quantile under ``force`` N, and its mirror image above the mean."""
         low, mean = self._low_and_mean(force)
@@ -74,16 +81,24 @@ class KnownFriction:
 
         The contact's friction is normal about the model's mean, with the model's scatter; the samples' mean is normal
         about the contact's, with their error. The quantile becomes that of the contact's friction given the samples.
+        Of samples from different times the most are taken: later ones are often of single elements, which a detector
+        takes for slipping while they rest.
         """
-        if not self.of_others or force == 0.0 or not learned.agrees(settings.contradiction_frames, settings):
+        count = sum(learned.counts)
+        if not self.of_others or force == 0.0 or count < self.samples:
+            return self
+        if not learned.agrees(settings.contradiction_frames, settings):
             return self
         low, mean = self._low_and_mean(force)
         if not 0.0 < low < mean:
             return self
         scatter, error = (mean - low) / self.deviations, learned.error(settings) * learned.mean
         weight = scatter**2 / (scatter**2 + error**2)
-        posterior = mean + weight * (learned.mean - mean) - self.deviations * math.sqrt(weight) * error
-        return replace(self, sharpened=posterior / low) if posterior > 0.0 else self
+        expected = mean + weight * (learned.mean - mean)
+        posterior = expected - self.deviations * math.sqrt(weight) * error
+        if posterior <= 0.0:
+            return self
+        return replace(self, sharpened=posterior / low, shifted=expected / mean, samples=count)
 
     def _low_and_mean(self, force: float) -> tuple[float, float]:
         element = self.unit * (force if self.contact.power == 1 else force ** (1.0 / 3.0))

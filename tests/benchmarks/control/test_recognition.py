@@ -1,0 +1,40 @@
+import dataclasses
+import math
+
+import numpy as np
+
+from benchmarks.control.episodes import START, world_of
+from benchmarks.control.recognition import Grasp, TruePhysics, counted, grasp
+from benchmarks.control.tasks import LIFTS
+from slipcore.contact.reduced import Load
+
+SLIPPERY, ROUGH = LIFTS[0], LIFTS[8]
+
+
+def test_true_slip_is_none_at_rest_and_all_in_an_overloaded_contact() -> None:
+    world = dataclasses.replace(world_of(SLIPPERY, 0), friction=np.full((1, 20, 20), 0.3))
+    physics, command, generator = TruePhysics(), np.array([START]), np.random.default_rng(0)
+    state = physics.init(world, START)
+    for mass in (0.0, 0.01, 0.1):  # the last one is 1 N, where 0.3 N can be borne
+        state = physics.step(world, state, command, Load(max(mass, 1e-3), 1.0 if mass == 0.0 else 0.0), 1 / 60)
+        physics.observe(world, state, 0, generator)
+    assert physics.slipping[0] == 0
+    assert physics.slipping[0] <= physics.slipping[1] < physics.slipping[2]
+    assert physics.stick_ratio(world, state, 0) == 0.0
+
+
+def test_a_grip_for_the_most_slippery_material_lets_nothing_slip_of_the_roughest() -> None:
+    """Its load is a third of what the contact can bear at most, and its rise with the force makes all of it stick."""
+    lifted = grasp(dataclasses.replace(ROUGH, seconds=1.6), 1000)
+    assert lifted.frames == 0
+    assert lifted.used < 0.5
+    assert lifted.named is None
+    assert lifted.held
+
+
+def test_grasps_are_counted_by_what_was_named_and_when() -> None:
+    right, late = Grasp(0.3, "0.3", 0.4, 12, 0.9, held=True), Grasp(0.3, "0.3", 2.0, 4, 0.7, held=True)
+    other, never = Grasp(0.3, "0.45", 0.5, 0, 0.8, held=False), Grasp(0.3, None, math.inf, 0, 0.6, held=True)
+    row = counted(0.3, [right, late, other, never])
+    asked = {"named": "1/4", "ever": "2/4", "wrong": "1/4", "slips": "2/4", "lasts": "1/4", "used": 0.75, "held": "3/4"}
+    assert row == {"friction": 0.3} | asked
