@@ -15,8 +15,8 @@ def test_true_slip_is_none_at_rest_and_all_in_an_overloaded_contact() -> None:
     world = dataclasses.replace(world_of(SLIPPERY, 0), friction=np.full((1, 20, 20), 0.3))
     physics, command, generator = TruePhysics(), np.array([START]), np.random.default_rng(0)
     state = physics.init(world, START)
-    for mass in (0.0, 0.01, 0.1):  # the last one is 1 N, where 0.3 N can be borne
-        state = physics.step(world, state, command, Load(max(mass, 1e-3), 1.0 if mass == 0.0 else 0.0), 1 / 60)
+    for supported in (1.0, 0.9, 0.0):  # the last one leaves 1 N, where 0.3 N can be borne
+        state = physics.step(world, state, command, Load(0.1, supported), 1 / 60)
         physics.observe(world, state, 0, generator)
     assert physics.slipping[0] == 0
     assert physics.slipping[0] <= physics.slipping[1] < physics.slipping[2]
