@@ -5,7 +5,8 @@ of its own samples. For each grasp after which it may have changed, the evidence
 shift from there on, over that with none; level, shift and τ are integrated out. Were nothing changed, each would be a
 martingale of mean 1 from its start, and their sum over all starts grows by 1 a grasp: it reaches 1/``rate`` no sooner
 than after 1/``rate`` grasps on average, however often one looks (Shiryaev–Roberts; Shin, Ramdas & Rinaldo, 2024,
-"E-detectors", New England Journal of Statistics in Data Science 2:229).
+"E-detectors", New England Journal of Statistics in Data Science 2:229). Changes of the newest grasp alone are left out
+of the sum: what is less reaches no bound sooner, and one odd grasp is no change.
 """
 
 import math
@@ -71,12 +72,15 @@ class ChangeAlarm:
 
     @property
     def e_values(self) -> FloatArray:
-        """Evidence [grasps] that friction has changed just before each grasp; 0 for those of the ``reference``."""
+        """Evidence [grasps] that friction has changed just before each grasp; 0 for those of the ``reference``, and for
+        the newest, by which no change is seen to last.
+        """
         count = len(self.levels)
         if count <= self.reference:
             return np.zeros(count)
         log = _log_evidence(np.array(self.levels), np.array(self.variances), self.shift, self.scatter_prior)
         log[: self.reference] = -np.inf
+        log[count - ALARM.lasting + 1 :] = -np.inf
         return np.exp(np.minimum(log, CHANGE.largest_exponent))
 
     @property
@@ -101,6 +105,29 @@ class ChangeAlarm:
             return 0.0
         before, after = np.mean(self.levels[: self.since]), np.mean(self.levels[self.since :])
         return float(after / before - 1.0) if before else 0.0
+
+
+def noticeable(alarm: ChangeAlarm, grasps: int = ALARM.soon) -> float:
+    """The least part by which friction would have to fall for so many ``grasps`` in a row to raise the alarm.
+
+    These are taken to scatter as the last ones do. 1 where no fall would; raises ``InvalidSamples`` without grasps.
+    """
+    if not alarm.levels or grasps < 1:
+        raise InvalidSamples("grasps", min(len(alarm.levels), grasps), "at least 1, and one or more before")
+    last = np.resize(alarm.levels[-grasps:], grasps)
+    coming = last - last.mean() + np.mean(alarm.levels)
+    variances = (*alarm.variances, *np.resize(alarm.variances[-grasps:], grasps).tolist())
+
+    def noticed(fall: float) -> bool:
+        return replace(alarm, levels=(*alarm.levels, *((1.0 - fall) * coming).tolist()), variances=variances).changed
+
+    missed, found = 0.0, 1.0
+    if not noticed(found):
+        return found
+    while found - missed > ALARM.fall_digits:
+        middle = 0.5 * (missed + found)
+        missed, found = (missed, middle) if noticed(middle) else (middle, found)
+    return found
 
 
 def grasp_level(model: FrictionModel, grasp: GraspStatistics) -> tuple[float, float]:

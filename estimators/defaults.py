@@ -448,6 +448,14 @@ class AlarmSettings(Options):
     """Standard deviation of a change of friction, as a part of it."""
     reference: Annotated[int, Option(1, 1000, "grasps", "fewer do not show their scatter")] = 3
     """Before which none can have happened."""
+    lasting: Annotated[int, Option(1, 100, "grasps", "heavy tails bring one odd grasp, seldom two")] = 2
+    """Since a change, before which it raises no alarm."""
+    soon: Annotated[int, Option(1, 1000, "grasps", "a planner would rather not grip five times in vain")] = 5
+    """Within which a change should be noticed."""
+    settled: Annotated[int, Option(2, 1000, "grasps", "with fewer, it is their number that hides a change")] = 10
+    """From which grasps that differ too much for that are noted."""
+    fall_digits: Annotated[float, Option(1e-6, 0.1, "-", "in whole per cent it is told")] = 5e-3
+    """To which the least fall that would be noticed is found."""
     longest: Annotated[int, Option(10, 1_000_000, "grasps", "a change so long ago is the material")] = 1000
     """That are looked at: those before say no more of τ."""
     least_tau: Annotated[float, Option(1e-6, 0.1, "-", "below what any sensor repeats")] = 1e-3

@@ -19,7 +19,9 @@ SENSOR_GAIN = "sensor_gain"
 """Diagnostic, a sentence: whether the data determine a sensor's own gain, of a model of several sensors."""
 WEAKENING = "weakening"
 """Diagnostic, a sentence: which log lowers the friction that a planner may count on."""
-NOTES = (WEAKENING, SENSOR_GAIN)
+UNNOTICED = "unnoticed_change"
+"""Diagnostic, a sentence: which change of its friction grasps of a material differ too much to show soon."""
+NOTES = (WEAKENING, SENSOR_GAIN, UNNOTICED)
 """Diagnostics that whoever reads an answer is to know beside it."""
 SUPERSEDED = "a newer version took its place: fetch the current model"
 

@@ -4,17 +4,22 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from estimators import FrictionModel, Moments, ScatterPrior
-from estimators.change_alarm import ChangeAlarm, watched
+from estimators.change_alarm import ChangeAlarm, noticeable, watched
+from estimators.defaults import ALARM
 from estimators.linear.priors import WEAK
+from stiction_client.support import UNNOTICED
 
 MARK = "surface_change"
 """Diagnostic of a model in whose data the surface has changed."""
+NOTICEABLE = "noticeable_change"
+"""Diagnostic of any other, of enough grasps: the fall of friction, as a part of it, that five more would show."""
 
 
 def with_change(
     models: Sequence[FrictionModel], logs: Sequence[Moments], prior: ScatterPrior = WEAK
 ) -> list[FrictionModel]:
-    """The models, marked where friction of the newest ``logs``, oldest first, is another than of those before.
+    """The models, marked where friction of the newest ``logs``, oldest first, is another than of those before; else
+    with the fall of friction that would be noticed soon, and a sentence where that is more than matters to a grip.
 
     The first of the models that separates scatter between grasps is the law; without such a model nothing is marked.
     ``prior``: what is expected of that scatter.
@@ -24,10 +29,23 @@ def with_change(
         return list(models)
     grasps = [grasp for log in logs for grasp in log.at_element_area(law.element_area).grasps]
     alarm = watched(law, grasps, scatter_prior=prior)
-    if not alarm.changed:
-        return list(models)
-    told = _sentence(alarm)
-    return [replace(model, diagnostics={**model.diagnostics, MARK: told}) for model in models]
+    told: dict[str, float | str] = {MARK: _sentence(alarm)} if alarm.changed else _limits(alarm)
+    return [replace(model, diagnostics={**model.diagnostics, **told}) for model in models] if told else list(models)
+
+
+def _limits(alarm: ChangeAlarm) -> dict[str, float | str]:
+    """What the alarm would notice within a few grasps; nothing of fewer grasps than it needs before a change."""
+    grasps = len(alarm.levels)
+    if grasps < alarm.reference:
+        return {}
+    fall = noticeable(alarm)
+    if grasps < ALARM.settled or fall <= alarm.shift:
+        return {NOTICEABLE: fall}
+    told = (
+        f"grasps of this material differ so much that a fall of its friction by less than {fall:.0%} is likely to go "
+        f"unnoticed for {ALARM.soon} grasps: look at the surface yourself, and record in one way"
+    )
+    return {NOTICEABLE: fall, UNNOTICED: told}
 
 
 def _sentence(alarm: ChangeAlarm) -> str:

@@ -8,7 +8,7 @@ from scipy import stats
 
 import estimators
 from estimators import ChangeAlarm, InvalidSamples, Moments
-from estimators.change_alarm import TAUS, grasp_level, watched
+from estimators.change_alarm import TAUS, grasp_level, noticeable, watched
 from estimators.defaults import PRIOR
 from slipcore.samples import FrictionSamples
 
@@ -81,6 +81,47 @@ def test_a_drop_is_found_sooner_where_other_materials_scatter_little() -> None:
     assert found == 10
 
 
+def test_one_odd_grasp_is_no_change_and_two_are() -> None:
+    level = (1.0 + 0.02 * np.random.default_rng(2).standard_normal(12)).tolist()
+    assert not alarm_of([*level, 0.6]).changed
+    again = alarm_of([*level, 0.6, 0.6])
+    assert again.changed
+    assert again.since == 12
+
+
+def test_heavy_tails_raise_an_alarm_in_a_thousand_grasps_at_most() -> None:
+    """Levels on 5 degrees of freedom, each alarm answered by a new beginning; 2 in 1,000 by the newest grasp alone."""
+    alarms, grasps = 0, 0
+    for seed in range(1000, 1020):
+        rng, alarm = np.random.default_rng(seed), ChangeAlarm.init()
+        for level in 1.0 + 0.05 * rng.standard_t(5.0, 200) / math.sqrt(5.0 / 3.0):
+            alarm, grasps = alarm.step(float(level), 1e-4), grasps + 1
+            if alarm.changed:
+                alarms, alarm = alarms + 1, ChangeAlarm.init()
+    assert alarms <= 1e-3 * grasps
+
+
+def test_about_half_of_the_falls_that_are_called_noticeable_are_noticed() -> None:
+    found = []
+    for seed in range(60):
+        rng = np.random.default_rng([9, seed])
+        alarm = alarm_of((1.0 + rng.choice([0.03, 0.06, 0.1]) * rng.standard_normal(12)).tolist())
+        scatter = float(np.std(alarm.levels))
+        for level in (1.0 - noticeable(alarm)) * (1.0 + scatter * rng.standard_normal(5)):
+            alarm = alarm.step(float(level), 1e-4)
+            if alarm.changed:
+                break
+        found.append(alarm.changed)
+    assert 0.3 < np.mean(found) < 0.7  # four standard errors about one half, and some for what is not known of τ
+
+
+def test_a_fall_that_no_number_of_grasps_shows_is_all_of_friction() -> None:
+    assert noticeable(alarm_of([1.0, 1.0]), grasps=1) == 1.0
+    for alarm, grasps in ((ChangeAlarm.init(), 5), (alarm_of([1.0]), 0)):
+        with pytest.raises(InvalidSamples, match="grasps"):
+            noticeable(alarm, grasps)
+
+
 def test_few_grasps_tell_of_no_change() -> None:
     for levels in ([], [1.0], [1.0, 0.2], [1.0, 1.0, 0.5]):
         alarm = alarm_of(levels)
@@ -113,7 +154,8 @@ def test_the_level_of_a_grasp_is_its_part_of_the_law() -> None:
     assert levels[-1] / np.mean(levels[:-1]) == pytest.approx(0.67, abs=0.02)
     alarm = watched(model, grasps)
     assert alarm.levels == tuple(levels)
-    assert alarm.e_values.argmax() == 7
+    again = alarm.step(alarm.levels[-1], alarm.variances[-1])  # the newest grasp alone is no change
+    assert again.e_values.argmax() == 7
 
 
 @pytest.mark.parametrize(("level", "variance"), [(math.nan, 0.0), (1.0, -1.0), (1.0, math.inf)])

@@ -3,8 +3,9 @@ import pytest
 
 import estimators
 from estimators import Moments
-from service.domain.surface_change import MARK, with_change
+from service.domain.surface_change import MARK, NOTICEABLE, with_change
 from slipcore.samples import FrictionSamples
+from stiction_client.support import UNNOTICED, notes
 
 
 def logs(levels: list[float]) -> list[Moments]:
@@ -32,8 +33,26 @@ def test_friction_that_changed_marks_every_model(new: float, told: str) -> None:
         assert model.support == "stale"
 
 
-def test_friction_that_stays_marks_nothing() -> None:
+def test_friction_that_stays_says_which_fall_would_be_noticed() -> None:
     grasps = logs([0.5] * 16)
+    model = estimators.fit(grasps, method="hierarchical")
+    (marked,) = with_change([model], grasps)
+    assert marked.diagnostics.keys() - model.diagnostics.keys() == {NOTICEABLE}
+    assert 0.03 < float(marked.diagnostics[NOTICEABLE]) < 0.12
+    assert notes(marked.diagnostics) == notes(model.diagnostics)
+
+
+def test_grasps_that_differ_too_much_to_show_a_change_say_so() -> None:
+    grasps = logs([0.5, 0.35, 0.62, 0.45, 0.7, 0.4, 0.55, 0.38, 0.66, 0.47, 0.58, 0.41])
+    (marked,) = with_change([estimators.fit(grasps, method="hierarchical")], grasps)
+    fall = float(marked.diagnostics[NOTICEABLE])
+    assert fall > 0.3
+    assert f"a fall of its friction by less than {fall:.0%}" in str(marked.diagnostics[UNNOTICED])
+    assert marked.diagnostics[UNNOTICED] in notes(marked.diagnostics)
+
+
+def test_two_grasps_say_nothing_of_changes() -> None:
+    grasps = logs([0.5] * 2)
     model = estimators.fit(grasps, method="hierarchical")
     assert with_change([model], grasps) == [model]
 
