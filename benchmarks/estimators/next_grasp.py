@@ -2,10 +2,12 @@
 
 Materials of all kinds (level, slopes, scatter) are probed by a robot that reads the hierarchical fit after each probe
 and asks for the next (`estimators.next_grasp`), by one that goes through a fixed schedule of three normal forces by
-three speeds, and by one that always makes the same grasp in the middle. Grasps come from a generator that is not the
-model: Hertzian pressure whose rim slips, log-normal scatter between grasps. Counted are the probes after which the
-conservative friction (1 % quantile of a contact of 60 elements) at the planner's working point is within 10 % of that
-of who knows the law and all scales, and stays so for two more. Writes next_grasp.json.
+three speeds, by one that always makes the same grasp in the middle, and by one that no robot is: each of its grasps has
+many places over all forces and speeds and determines the whole law, but for how that grasp differs from others: no
+choice of grasps can do with fewer. Grasps come from a generator that is not the model: Hertzian pressure whose rim
+slips, log-normal scatter between grasps. Counted are the probes after which the conservative friction (1 % quantile of
+a contact of 60 elements) at the planner's working point is within 10 % of that of who knows the law and all scales, and
+stays so for two more. Writes next_grasp.json.
 """
 
 import os
@@ -38,6 +40,9 @@ Grasp = tuple[float, float, float]
 Choose = Callable[[estimators.FrictionModel, int], Grasp]
 """The next grasp, by what so many grasps have told."""
 
+PLACES, FRAMES = 60, 40
+"""Of a grasp that determines the law."""
+
 
 @dataclass(frozen=True, slots=True)
 class Material:
@@ -66,6 +71,10 @@ class Material:
         return friction - float(np.hypot(shared, own))
 
 
+Probed = Callable[[Material, Grasp, np.random.Generator], estimators.Moments]
+"""What a grasp of a material gives."""
+
+
 def probe(material: Material, grasp: Grasp, rng: np.random.Generator) -> estimators.Moments:
     """What one grasp tells."""
     force, speed, length = grasp
@@ -76,26 +85,40 @@ def probe(material: Material, grasp: Grasp, rng: np.random.Generator) -> estimat
     frames = max(int(RATE * length / speed), 2)
     f_n = np.tile(force * pressure[rim] / pressure[pressure > 0.0].mean(), frames)
     v = speed * np.tile(radius[rim] - 0.45, frames) * rng.uniform(0.5, 1.5, frames).repeat(rim.sum())
+    return told(material, v, f_n, np.tile(np.flatnonzero(rim), frames), rng)
+
+
+def probe_of_all(material: Material, grasp: Grasp, rng: np.random.Generator) -> estimators.Moments:
+    """What a grasp would tell whose places have all forces and speeds there are, whichever is asked for."""
+    del grasp
+    f_n = np.tile(np.exp(rng.uniform(*np.log(FORCES), PLACES)), FRAMES)
+    return told(material, rng.uniform(0.0, SPEEDS[1], len(f_n)), f_n, np.tile(np.arange(PLACES), FRAMES), rng)
+
+
+def told(
+    material: Material, v: np.ndarray, f_n: np.ndarray, element: np.ndarray, rng: np.random.Generator
+) -> estimators.Moments:
+    """Moments of one grasp's samples, [frames × places] of them at these v, f_n and elements, frame by frame."""
     between, places, within = material.scales
     spread = np.sqrt(np.log1p(between**2))
     factor = np.exp(spread * rng.standard_normal() - 0.5 * spread**2)
     mu = factor * (material.law @ [np.ones(len(v)), v, f_n]) + within * rng.standard_normal(len(v))
-    mu += np.tile(places * rng.standard_normal(int(rim.sum())), frames)
-    element, time = np.tile(np.flatnonzero(rim), frames), np.arange(frames).repeat(rim.sum()) / RATE
+    mu += (places * rng.standard_normal(int(element.max()) + 1))[element]
+    time = np.arange(len(v)) // len(np.unique(element)) / RATE
     return estimators.Moments.from_samples(FrictionSamples(mu, v, f_n, mu * f_n, time, element, np.ones(len(v)), AREA))
 
 
-def needed(material: Material, choose: Choose, seed: int) -> tuple[int, float]:
+def needed(material: Material, choose: Choose, seed: int, probed: Probed = probe) -> tuple[int, float]:
     """Probes and seconds of robot time until the conservative friction is right; of ``MOST`` probes where it is not."""
     rng, truth = np.random.default_rng(seed), material.conservative()
     point, grasp = material.working_point, (0.15, 2e-3, LENGTH)  # the first is everybody's
     data, seconds, held = [], [], 0
     for count in range(1, MOST + 1):
-        data.append(probe(material, grasp, rng))
+        data.append(probed(material, grasp, rng))
         seconds.append(Probing().seconds + grasp[2] / grasp[1])
         model = estimators.fit(data, method="hierarchical")
-        told = float(model.predict(0.0, point.normal_force, QUANTILE, of="contact", elements=ELEMENTS))
-        held = held + 1 if abs(told / truth - 1.0) <= WITHIN else 0
+        counted_on = float(model.predict(0.0, point.normal_force, QUANTILE, of="contact", elements=ELEMENTS))
+        held = held + 1 if abs(counted_on / truth - 1.0) <= WITHIN else 0
         if held > STAYS:
             return count - STAYS, float(sum(seconds[: count - STAYS]))
         grasp = choose(model, count)
@@ -107,8 +130,8 @@ def designed(material: Material) -> Choose:
     probing = Probing(normal_force=FORCES, speed=(5e-4, 1e-3, 2e-3, 4e-3), length=(LENGTH,))
 
     def choose(model: estimators.FrictionModel, grasps: int) -> Grasp:
-        told = next_grasp(model, material.working_point, probing, grasps)
-        return told.normal_force, told.speed, told.slip_length
+        asked = next_grasp(model, material.working_point, probing, grasps)
+        return asked.normal_force, asked.speed, asked.slip_length
 
     return choose
 
@@ -127,6 +150,15 @@ def same(model: estimators.FrictionModel, grasps: int) -> Grasp:
     return 0.15, 2e-3, LENGTH
 
 
+ROBOTS: dict[str, tuple[Callable[[Material], Choose], Probed]] = {
+    "next_grasp": (designed, probe),
+    "schedule": (lambda _: scheduled, probe),
+    "same grasp": (lambda _: same, probe),
+    "each grasp determines the law": (lambda _: same, probe_of_all),
+}
+"""How each chooses, and what its grasps are."""
+
+
 def main() -> None:
     """Run the campaign and print it as a table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -136,9 +168,8 @@ def main() -> None:
     options.output.mkdir(parents=True, exist_ok=True)
     population = [Material.drawn(np.random.default_rng([1, number])) for number in range(options.materials)]
     rows = {}
-    for name in ("next_grasp", "schedule", "same grasp"):
-        choices = [{"next_grasp": designed(m), "schedule": scheduled, "same grasp": same}[name] for m in population]
-        found = np.array([needed(*pair, seed) for seed, pair in enumerate(zip(population, choices, strict=True))])
+    for name, (chooser, probed) in ROBOTS.items():
+        found = np.array([needed(m, chooser(m), seed, probed) for seed, m in enumerate(population)])
         rows[name] = found.tolist()
         quartiles = np.quantile(found[:, 0], [0.25, 0.5, 0.75, 0.9])
         never = float(np.mean(found[:, 0] == MOST))
