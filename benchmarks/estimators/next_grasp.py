@@ -7,7 +7,8 @@ many places over all forces and speeds and determines the whole law, but for how
 choice of grasps can do with fewer. Grasps come from a generator that is not the model: Hertzian pressure whose rim
 slips, log-normal scatter between grasps. Counted are the probes after which the conservative friction (1 % quantile of
 a contact of 60 elements) at the planner's working point is within 10 % of that of who knows the law and all scales, and
-stays so for two more. Writes next_grasp.json.
+stays so for two more. With ``--others`` the prior of how much grasps differ is that from so many other materials of
+the population, of six grasps of the schedule each. Writes next_grasp.json.
 """
 
 import os
@@ -33,6 +34,8 @@ SIDE, AREA, RATE = 11, 1e-6, 30.0
 FORCES, SPEEDS, LENGTH = (0.05, 0.45), (5e-4, 4e-3), 1e-3
 MOST, STAYS, WITHIN = 30, 2, 0.1
 QUANTILE, ELEMENTS = 1e-2, 60
+RECORDED = 6
+"""Grasps of each other material."""
 
 Grasp = tuple[float, float, float]
 """Mean normal force of an element N, speed m/s and length m of the slip."""
@@ -108,7 +111,13 @@ def told(
     return estimators.Moments.from_samples(FrictionSamples(mu, v, f_n, mu * f_n, time, element, np.ones(len(v)), AREA))
 
 
-def needed(material: Material, choose: Choose, seed: int, probed: Probed = probe) -> tuple[int, float]:
+def needed(
+    material: Material,
+    choose: Choose,
+    seed: int,
+    probed: Probed = probe,
+    prior: estimators.ScatterPrior | None = None,
+) -> tuple[int, float]:
     """Probes and seconds of robot time until the conservative friction is right; of ``MOST`` probes where it is not."""
     rng, truth = np.random.default_rng(seed), material.conservative()
     point, grasp = material.working_point, (0.15, 2e-3, LENGTH)  # the first is everybody's
@@ -116,7 +125,7 @@ def needed(material: Material, choose: Choose, seed: int, probed: Probed = probe
     for count in range(1, MOST + 1):
         data.append(probed(material, grasp, rng))
         seconds.append(Probing().seconds + grasp[2] / grasp[1])
-        model = estimators.fit(data, method="hierarchical")
+        model = estimators.fit(data, method="hierarchical", scatter_prior=prior or estimators.ScatterPrior())
         counted_on = float(model.predict(0.0, point.normal_force, QUANTILE, of="contact", elements=ELEMENTS))
         held = held + 1 if abs(counted_on / truth - 1.0) <= WITHIN else 0
         if held > STAYS:
@@ -136,7 +145,7 @@ def designed(material: Material) -> Choose:
     return choose
 
 
-def scheduled(model: estimators.FrictionModel, grasps: int) -> Grasp:
+def scheduled(model: estimators.FrictionModel | None, grasps: int) -> Grasp:
     """Three forces by three speeds, again and again."""
     del model
     grid = product(np.geomspace(*FORCES, 3), np.geomspace(*SPEEDS, 3))
@@ -144,10 +153,21 @@ def scheduled(model: estimators.FrictionModel, grasps: int) -> Grasp:
     return float(force), float(speed), LENGTH
 
 
-def same(model: estimators.FrictionModel, grasps: int) -> Grasp:
+def same(model: estimators.FrictionModel | None, grasps: int) -> Grasp:
     """The first grasp again."""
     del model, grasps
     return 0.15, 2e-3, LENGTH
+
+
+def known(materials: int) -> estimators.ScatterPrior:
+    """The prior of how much grasps differ, by so many other materials."""
+    models = []
+    for number in range(materials):
+        rng = np.random.default_rng([2, number])
+        material = Material.drawn(rng)
+        data = [probe(material, scheduled(None, count), rng) for count in range(1, RECORDED + 1)]
+        models.append(estimators.fit(data, method="hierarchical"))
+    return estimators.population_scatter(models)
 
 
 ROBOTS: dict[str, tuple[Callable[[Material], Choose], Probed]] = {
@@ -164,12 +184,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, default=Path("benchmarks/results"))
     parser.add_argument("--materials", type=int, default=200)
+    parser.add_argument("--others", type=int, default=0, help="materials known before")
     options = parser.parse_args()
     options.output.mkdir(parents=True, exist_ok=True)
     population = [Material.drawn(np.random.default_rng([1, number])) for number in range(options.materials)]
-    rows = {}
+    rows, prior = {}, known(options.others)
     for name, (chooser, probed) in ROBOTS.items():
-        found = np.array([needed(m, chooser(m), seed, probed) for seed, m in enumerate(population)])
+        found = np.array([needed(m, chooser(m), seed, probed, prior) for seed, m in enumerate(population)])
         rows[name] = found.tolist()
         quartiles = np.quantile(found[:, 0], [0.25, 0.5, 0.75, 0.9])
         never = float(np.mean(found[:, 0] == MOST))
