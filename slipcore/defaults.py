@@ -164,6 +164,12 @@ class SaturationDefaults(Options):
     """Share of its largest by which that must change."""
     steps: Annotated[float, Option(1.0, 100.0, "steps", "tuning presses")] = 3.0
     """Of rounding, by which the plateau's readings would have changed as well."""
+    kept: Annotated[int, Option(2, 10_000, "frames", "half a second at 30 frames a second, and ever fewer before")] = 32
+    """Of a stream, by which rounded readings are judged."""
+    stride: Annotated[int, Option(1, 1000, "frames", "it takes 1 ms of CPU")] = 4
+    """Of a stream that is judged so."""
+    again: Annotated[int, Option(1, 1000, "frames", "three of 400 readings are equal once by chance")] = 3
+    """Of a stream, not the same, in which so many elements reach its largest reading, before it is judged."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -63,6 +63,16 @@ def contradicted(share: float) -> "list[Finding]":
     return [Finding(CONTRADICTED, evidence, "make sure that it is this finger's, in N, and the gel's description")]
 
 
+def at_end_of_range(elements: int) -> "list[Finding]":
+    """That some of a frame's displacements are at the end of the sensor's range, where so many elements' are."""
+    from slipcore import Finding
+
+    if not elements:
+        return []
+    evidence = f"displacements of {elements} elements are at the end of the sensor's range and count as not seen"
+    return [Finding("saturation", evidence, "press less, or choose a wider range of the sensor")]
+
+
 def _by_the_gripper(reconstruction: "Reconstruction") -> str:
     """That the resultant was given, where it was."""
     return " and from the normal force that the gripper reports" if reconstruction.given[:, 2].any() else ""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from service.domain.reconstruct import contradicted
+from service.domain.reconstruct import at_end_of_range, contradicted
 from service.processes.fair_executor import FairExecutor
 from slipcore import Frame, InvalidInput
 
@@ -105,6 +105,7 @@ class Reconstructing:
         forces, touching = found.forces, found.forces.contact
         if touching.any():
             self.noise = float(np.median(forces.deviation[..., 2][touching]))
+        findings = [*at_end_of_range(found.saturated), *contradicted(self.stream.contradicted)]
         told = {
             "source": "reconstructed",
             "resultant": forces.resultant.tolist(),
@@ -113,7 +114,7 @@ class Reconstructing:
             "wait_for": found.wait_for,
             "given": found.given,
             "contradiction": None if isnan(found.contradiction) else found.contradiction,
-            "findings": [asdict(finding) for finding in contradicted(self.stream.contradicted)],
+            "findings": [asdict(finding) for finding in findings],
         }
         normal = np.broadcast_to([0.0, 0.0, 1.0], forces.force.shape)  # loads act on the undeformed plane
         return frame._replace(force=forces.force, normal=normal), told

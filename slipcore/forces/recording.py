@@ -35,9 +35,8 @@ class DisplacementData:
         if noise is None:
             noise = noise_of(log.time, log.displacement)
         check_noise(noise)
-        data, seen = rows(log.displacement, log.observed, axes)
         at_end = saturated(log.displacement, log.observed)
-        return cls(data, seen & ~_by_axis(at_end, axes), axes, noise, at_end)
+        return cls(*rows(log.displacement, seen_along(log.observed, at_end), axes), axes, noise, at_end)
 
     def touched(self) -> BoolArray:
         """Frames [t] in which markers moved by more than noise."""
@@ -53,11 +52,14 @@ def axes_seen(displacement: FloatArray) -> tuple[int, ...]:
     return (0, 1, 2) if displacement[..., 2].any() else (0, 1)
 
 
-def rows(displacement: FloatArray, observed: BoolArray | None, axes: tuple[int, ...]) -> tuple[FloatArray, BoolArray]:
-    """Data [t, m] m of displacements [t, n, m, 3] along some axes, z into the gel, and which of them were seen."""
-    data = _by_axis(displacement * [1.0, 1.0, -1.0], axes)
-    known = np.ones(displacement.shape[:3], bool) if observed is None else observed
-    return data, _by_axis(np.broadcast_to(known[..., None], displacement.shape), axes)
+def rows(displacement: FloatArray, seen: BoolArray, axes: tuple[int, ...]) -> tuple[FloatArray, BoolArray]:
+    """Data [t, m] m of displacements [t, n, m, 3] along some axes, z into the gel, and which were ``seen``, alike."""
+    return _by_axis(displacement * [1.0, 1.0, -1.0], axes), _by_axis(seen, axes)
+
+
+def seen_along(observed: BoolArray | None, at_end: BoolArray) -> BoolArray:
+    """Displacements [..., n, m, 3] of markers that were ``observed`` [..., n, m] and not ``at_end`` of their range."""
+    return ~at_end if observed is None else observed[..., None] & ~at_end
 
 
 def _by_axis(field: NDArray[Any], axes: tuple[int, ...]) -> NDArray[Any]:

@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,11 +13,12 @@ from slipcore.forces.defaults import FORCE_STREAM
 from slipcore.forces.known import KnownForce, contradicts, reported
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.nodes import Nodes
-from slipcore.forces.recording import axes_seen, check_noise, moved, noise_of, rows
+from slipcore.forces.recording import axes_seen, check_noise, moved, noise_of, rows, seen_along
 from slipcore.forces.tracking.frame_forces import FrameForces
 from slipcore.forces.tracking.look import ContactTracking, MarkerReading, bytes_needed
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.frames import BoolArray, FloatArray, check_displacement, check_gripper_report, check_mask
+from slipcore.saturation import RangeWatch
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,7 +28,8 @@ class StreamedForces:
     Forces are zero where nothing touches, and where they are not known yet, because they ``wait_for`` what that says:
     "noise", "set-up" or "contact". ``given``: whether they are by the gripper's force, too, and ``contradiction`` by
     how many standard deviations this differs from what is found; NaN without one, and while markers have moved on from
-    where the contact was last sought.
+    where the contact was last sought. ``saturated``: how many elements show displacement at the end of the sensor's
+    range, by the frames until then; it counts as not seen.
     """
 
     forces: FrameForces
@@ -35,6 +37,7 @@ class StreamedForces:
     wait_for: str | None = None
     given: bool = False
     contradiction: float = float("nan")
+    saturated: int = 0
 
 
 class ForceStream:
@@ -68,6 +71,7 @@ class ForceStream:
         self._position, self._area, self._gel, self._executor = place, element_area, gel, executor
         self._given, self._noise = noise, noise
         self._recent: deque[tuple[float, FloatArray]] = deque(maxlen=FORCE_STREAM.frames)
+        self._range = RangeWatch()
         self._axes: tuple[int, ...] = (0, 1)
         self._data = np.zeros(0)
         self._largest, self._compared, self._contradicted = 0.0, 0, 0
@@ -96,9 +100,19 @@ class ForceStream:
 
         Raises ``InvalidInput`` for what is no such frame, and is then as before.
         """
-        moved_by, seen = self._checked(time, displacement, observed)
+        moved_by, marked = self._checked(time, displacement, observed)
         known = self._reported(gripper_force, gripper_force_deviation)
         self._largest = max(self._largest, gripper_force or 0.0)
+        at_end = self._range.step(moved_by, marked)
+        found = self._found(time, moved_by, seen_along(marked, at_end), known)
+        return replace(found, saturated=int(np.count_nonzero(at_end.any(axis=-1))))
+
+    def close(self) -> None:
+        """Give up the look for a contact that waits for its executor, if one does: no more frames come."""
+        if self._look is not None:
+            self._look[1].cancel()
+
+    def _found(self, time: float, moved_by: FloatArray, seen: BoolArray, known: KnownForce) -> StreamedForces:
         self._remember(time, moved_by)
         if len(axes_seen(moved_by)) > len(self._axes):
             self._axes, self._tracking, self._data = axes_seen(moved_by), None, np.zeros(0)
@@ -122,11 +136,6 @@ class ForceStream:
         n, m = self._position.shape[:2]
         forces = reader.read(frame.data, (n, m))
         return StreamedForces(forces, time - self._tracking.time, None, reader.given, self._compare(frame, forces))
-
-    def close(self) -> None:
-        """Give up the look for a contact that waits for its executor, if one does: no more frames come."""
-        if self._look is not None:
-            self._look[1].cancel()
 
     def _checked(
         self, time: float, displacement: ArrayLike, observed: ArrayLike | None
@@ -172,13 +181,13 @@ class ForceStream:
         return noise_of(np.array([time for time, _ in self._recent]), np.stack([each for _, each in self._recent]))
 
     def _marker_frame(
-        self, time: float, displacement: FloatArray, observed: BoolArray | None, known: KnownForce
+        self, time: float, displacement: FloatArray, told: BoolArray, known: KnownForce
     ) -> MarkerReading:
         """The frame, and whether something touches in it; noise is that of the frames just before a touch.
 
         A marker that is not seen stays where it was, until a contact is sought without it; so does a gripper's force.
         """
-        (data,), (seen,) = rows(displacement[None], None if observed is None else observed[None], self._axes)
+        (data,), (seen,) = rows(displacement[None], told[None], self._axes)
         there = np.concatenate((seen, known.given))
         self._data = np.where(there, SensorResponse.data(data, known), self._data if self._data.size else 0.0)
         data, before = self._data[: len(seen)], self._touched

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from slipcore import GraspLog
+from slipcore.defaults import SATURATION
 from slipcore.frames import FloatArray
-from slipcore.saturation import saturated
+from slipcore.saturation import RangeWatch, saturated
 
 
 def pressed(shape: str, noise: float = 1e-6) -> FloatArray:
@@ -60,3 +61,43 @@ def test_real_recordings_are_within_their_range_until_it_is_cut(recording: Grasp
         top = 0.7 * np.abs(field[..., 2]).max()
         cut = np.clip(field, [-np.inf, -np.inf, -top], [np.inf, np.inf, top])
         assert saturated(cut)[cut != field].all()
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-6, 2e-5])
+@pytest.mark.parametrize("shape", ["dome", "flat punch"])
+def test_in_a_stream_clipped_readings_are_found_while_they_come(shape: str, step: float) -> None:
+    field = pressed(shape)
+    field = np.round(field / step) * step if step else field
+    clipped = field.copy()
+    clipped[..., 2] = np.maximum(clipped[..., 2], -2e-4)
+    watch = RangeWatch()
+    found = np.stack([watch.step(frame) for frame in clipped])
+    at_end = np.isclose(clipped, -2e-4, rtol=1e-9, atol=0.0)
+    assert not (found & ~at_end).any()
+    held = slice(12, None)  # the load has grown beyond the range for some frames
+    np.testing.assert_array_equal(found[held], at_end[held])
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-6, 5e-6, 2e-5, 5e-5])
+@pytest.mark.parametrize("shape", ["dome", "flat punch"])
+def test_in_a_stream_equal_readings_by_rounding_are_no_end_of_a_range(shape: str, step: float) -> None:
+    field = pressed(shape)
+    watch = RangeWatch()
+    assert not any(watch.step(np.round(frame / step) * step if step else frame).any() for frame in field)
+
+
+def test_a_range_goes_on_where_a_larger_reading_comes() -> None:
+    field = pressed("dome")
+    clipped = field.copy()
+    clipped[:15, ..., 2] = np.maximum(clipped[:15, ..., 2], -2e-4)
+    watch = RangeWatch()
+    found = [watch.step(frame).any() for frame in clipped]
+    assert found[14]
+    assert not any(found[15:])
+
+
+def test_a_stream_remembers_few_frames() -> None:
+    watch, rng = RangeWatch(), np.random.default_rng(5)
+    for _ in range(300):
+        watch.step(rng.standard_normal((4, 4, 3)))
+    assert len(watch._kept) <= SATURATION.kept

@@ -243,3 +243,22 @@ def test_what_does_not_fit_is_refused_by_name_and_changes_nothing(pressed: Press
         with pytest.raises(InvalidInput, match=said):
             stream.step(time, displacement)
     assert stream._tracking is None
+
+
+def test_displacement_at_the_end_of_the_range_counts_as_not_seen(pressed: Pressed) -> None:
+    log = pressed([0, 1], noise=NOISE, crop=AROUND)
+    grown = np.linspace(0.2, 1.0, 8)[:, None, None, None] * log.displacement[1]
+    end = 0.6 * grown[..., 2].min()
+    stream = made(log, noise=NOISE)
+    for k in range(3):
+        stream.step(0.1 * k, still(log, 3, k))
+    rng = np.random.default_rng(8)
+    shown = grown + NOISE * rng.standard_normal(grown.shape)
+    shown[..., 2] = np.maximum(shown[..., 2], end)
+    shown = np.concatenate((shown, shown[-1:] + NOISE * rng.standard_normal((4, *shown.shape[1:]))))
+    shown[..., 2] = np.maximum(shown[..., 2], end)
+    shown[8:, ..., 2][shown[7:8, ..., 2].repeat(4, axis=0) == end] = end
+    found = [stream.step(1.0 + 0.1 * k, each) for k, each in enumerate(shown)]
+    assert found[0].saturated == 0
+    assert found[-1].saturated == np.count_nonzero(shown[-1, ..., 2] == end)
+    assert abs(found[-1].forces.resultant[2] - total(log, 1)[2]) < 0.05 * abs(total(log, 1)[2])
