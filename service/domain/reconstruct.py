@@ -45,6 +45,7 @@ def reconstruction_findings(reconstruction: "Reconstruction | None") -> "list[Fi
         f"forces follow from displacement by the sensor's gel{_by_the_gripper(reconstruction)}, in effect "
         f"averaged over {1e3 * reconstruction.kernel_width:.2g} mm; share of the resultant by the data: {shares}"
     )
+    evidence += f"; a normal force of {reconstruction.unnoticed[2]:.2g} N or less would move no marker beyond noise"
     if reconstruction.saturated.any():
         count = reconstruction.saturated.any(axis=(0, 3)).sum()
         evidence += f"; displacements of {count} elements at the end of the sensor's range count as not seen"

@@ -145,11 +145,6 @@ class ReconstructionDefaults(Options):
     of it."""
     element_error: Annotated[float, Option(0.0, 1.0, "-", "scenes")] = 1e-2
     """The same of an element's force, as a share of the largest."""
-    step_error: Annotated[float, Option(0.0, 1.0, "-", "an ellipse, a cone and a block on 4 mm")] = 0.05
-    """The same of an element's force, as a share of its range among the element and those around it."""
-    step_error_in_plane: Annotated[float, Option(0.0, 1.0, "-", "an ellipse, a cone and a block on 4 mm")] = 0.25
-    """The same of a normal force whose marker is seen in the plane alone: contacts that explain the displacement
-    alike differ so much at their rims."""
     force_tolerance: Annotated[float, Option(1e-6, 1.0, "-", "usual of force sensors")] = 0.01
     """Standard deviation of a given total force, as a share of it, and of this share of the largest given one."""
     least_force: Annotated[float, Option(0.0, 1e-3, "N", "far below what force sensors resolve")] = 1e-9

@@ -30,7 +30,8 @@ class Reconstruction:
     NaN and no information without contact); ``noise`` m of a marker's coordinate that was assumed; ``given`` [t, 3]
     says which components of the resultant were known from elsewhere, and so count among data, and ``contradiction``
     [t, 3] by how many standard deviations they differ from what is found where something touches (else NaN);
-    ``saturated`` [t, n, m, 3]: displacements at the end of the sensor's range, taken as not seen.
+    ``saturated`` [t, n, m, 3]: displacements at the end of the sensor's range, taken as not seen; ``unnoticed`` [3] N:
+    forces that would move markers by no more than noise, as which nothing is taken where nothing touches.
     """
 
     force: FloatArray
@@ -45,6 +46,7 @@ class Reconstruction:
     given: BoolArray
     contradiction: FloatArray
     saturated: BoolArray
+    unnoticed: FloatArray
 
     @property
     def contradicted(self) -> float:
@@ -92,8 +94,10 @@ def reconstruct(
     known = KnownForce.of(total_force, total_force_deviation, len(log))
     known.check(name, gel, log.element_area * math.prod(log.grid))
     recording = _Recording(sensor, shown, known)
-    result = _no_forces(log, shown, known.given)
     touched, strongest = shown.touched(), shown.strongest()
+    result = _no_forces(log, shown, known.given, sensor.unnoticed(shown.noise))
+    for t in map(int, np.flatnonzero(~touched)):
+        _write_frame(result, t, FrameForces.unnoticed(log.grid, result.unnoticed, known[t]))
     if not touched.any():
         return result
     tracker = Tracker.of(sensor, *recording.frame(strongest), criterion)
@@ -130,7 +134,7 @@ class _Recording:
         return self.sensor.observation(spread, self.known[t]), self.sensor.data(data, self.known[t])
 
 
-def _no_forces(log: GraspLog, shown: DisplacementData, given: BoolArray) -> Reconstruction:
+def _no_forces(log: GraspLog, shown: DisplacementData, given: BoolArray, unnoticed: FloatArray) -> Reconstruction:
     """Forces of zero, to be written to."""
     shape = log.displacement.shape
     return Reconstruction(
@@ -146,6 +150,7 @@ def _no_forces(log: GraspLog, shown: DisplacementData, given: BoolArray) -> Reco
         given=given,
         contradiction=np.full((len(log), 3), np.nan),
         saturated=shown.saturated,
+        unnoticed=unnoticed,
     )
 
 

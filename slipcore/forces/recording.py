@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from slipcore.errors import InvalidInput, UnknownScale
 from slipcore.forces.defaults import RECONSTRUCTION
@@ -71,7 +71,12 @@ def moved(data: FloatArray, seen: BoolArray, noise: float) -> BoolArray:
     """Frames [...] of data [..., m] in which markers moved by more than noise."""
     count = np.maximum(seen.sum(axis=-1), 1)
     power = np.sum(np.where(seen, data, 0.0) ** 2, axis=-1) / count
-    return np.asarray(power > noise**2 * (1.0 + RECONSTRUCTION.significant * np.sqrt(2.0 / count)))
+    return np.asarray(power > noise**2 * (1.0 + least_power(count)))
+
+
+def least_power(count: ArrayLike) -> FloatArray:
+    """Mean square of the motion of so many coordinates, in squares of their noise, from which on it is no noise."""
+    return np.asarray(RECONSTRUCTION.significant * np.sqrt(2.0 / np.asarray(count)))
 
 
 def error(data: FloatArray, seen: BoolArray, noise: float) -> FloatArray:

@@ -129,7 +129,7 @@ class ForceStream:
         if not self._tracking.is_ready:
             return self._none("set-up")
         if not self._touched:
-            return self._none()
+            return self._untouched(self._tracking.sensor, frame)
         reader = self._tracking.reader
         if reader is None:
             return self._none("contact")
@@ -180,9 +180,7 @@ class ForceStream:
             return self._given
         return noise_of(np.array([time for time, _ in self._recent]), np.stack([each for _, each in self._recent]))
 
-    def _marker_frame(
-        self, time: float, displacement: FloatArray, told: BoolArray, known: KnownForce
-    ) -> MarkerReading:
+    def _marker_frame(self, time: float, displacement: FloatArray, told: BoolArray, known: KnownForce) -> MarkerReading:
         """The frame, and whether something touches in it; noise is that of the frames just before a touch.
 
         A marker that is not seen stays where it was, until a contact is sought without it; so does a gripper's force.
@@ -233,6 +231,11 @@ class ForceStream:
         if found.sensor.axes == self._axes:
             self._tracking = found if self._touched and touch == self._touches else found.untouched()
 
-    def _none(self, wait_for: str | None = None) -> StreamedForces:
+    def _untouched(self, sensor: SensorResponse, frame: MarkerReading) -> StreamedForces:
+        n, m = self._position.shape[:2]
+        forces = FrameForces.unnoticed((n, m), sensor.unnoticed(frame.noise), frame.known)
+        return StreamedForces(forces, given=bool(frame.known.given.any()))
+
+    def _none(self, wait_for: str) -> StreamedForces:
         n, m = self._position.shape[:2]
         return StreamedForces(FrameForces.none((n, m)), wait_for=wait_for)

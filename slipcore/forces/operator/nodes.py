@@ -1,6 +1,6 @@
 """Where traction is sought: a lattice of nodes under the markers and a margin around them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +33,12 @@ class Nodes:
         nx, ny = map(int, along)
         x, y = 0.5 * (low + high)
         return cls(Grid((ny, nx), (pitch, pitch), (float(x), float(y))))
+
+    @property
+    def between(self) -> "Nodes":
+        """In the middle of each four: where a traction that is bilinear between nodes has none of its own."""
+        ny, nx = self.grid.shape
+        return Nodes(replace(self.grid, shape=(ny - 1, nx - 1)))
 
     def __len__(self) -> int:
         return self.grid.shape[0] * self.grid.shape[1]

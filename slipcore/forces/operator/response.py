@@ -1,7 +1,9 @@
 """Displacement of markers by traction on the surface: the forward operator."""
 
+from collections.abc import Sequence
+
 import numpy as np
-from scipy.ndimage import convolve1d, map_coordinates
+from scipy.ndimage import convolve1d, map_coordinates, spline_filter
 
 from slipcore.contact.elasticity.bonded_layer import LayerBase
 from slipcore.contact.elasticity.grid import Grid
@@ -23,19 +25,27 @@ def response_matrix(gel: Gel, nodes: Nodes, position: FloatArray) -> FloatArray:
     ``position`` [j, 2] m: markers at rest, at the gel's ``marker_depth``. Directions are x, y and *into* the gel, of
     displacement first and of traction (x, y, pressure) last. Normal and tangential directions are coupled.
     """
-    pitch, cells, finer = nodes.grid.pitch[0], RESPONSE.cells, RESPONSE.finer
-    offset = (position[:, None, :] - nodes.places()[None]) / (pitch / cells)
-    reach = int(np.ceil(np.abs(offset).max())) + 3  # a cubic spline ends three cells beyond
+    return response_matrices(gel, [nodes], position)[0]
+
+
+def response_matrices(gel: Gel, lattices: Sequence[Nodes], position: FloatArray) -> list[FloatArray]:
+    """``response_matrix`` of several lattices of nodes of one pitch."""
+    pitch, cells, finer = lattices[0].grid.pitch[0], RESPONSE.cells, RESPONSE.finer
+    offsets = [(position[:, None, :] - nodes.places()[None]) / (pitch / cells) for nodes in lattices]
+    reach = int(np.ceil(max(np.abs(offset).max() for offset in offsets))) + 3  # a cubic spline ends three cells beyond
     close = RESPONSE.near * cells
     far, near = hat_responses(gel, pitch, cells, reach), hat_responses(gel, pitch, cells * finer, close * finer)
     middle = (slice(reach - close, reach + close + 1),) * 2
-    matrix = np.empty((3, len(position), 3, len(nodes)))
+    matrices = [np.empty((3, len(position), 3, len(nodes))) for nodes in lattices]
     for component, table in far.items():
         table[middle] = near[component][::finer, ::finer]
-        value = map_coordinates(table, [offset[..., 1] + reach, offset[..., 0] + reach], order=3)
-        for to, by in _places(component):
-            matrix[to, :, by] = value
-    return matrix
+        spline = spline_filter(table, order=3, mode="mirror")
+        for matrix, offset in zip(matrices, offsets, strict=True):
+            at = [offset[..., 1] + reach, offset[..., 0] + reach]
+            value = map_coordinates(spline, at, order=3, mode="mirror", prefilter=False)
+            for to, by in _places(component):
+                matrix[to, :, by] = value
+    return matrices
 
 
 def hat_responses(gel: Gel, pitch: float, cells: int, reach: int) -> dict[Below, FloatArray]:

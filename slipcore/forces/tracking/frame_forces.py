@@ -3,11 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import maximum_filter, minimum_filter
+from scipy.ndimage import maximum_filter
 
 from slipcore.forces.defaults import RECONSTRUCTION
+from slipcore.forces.known import OUTWARD, KnownForce
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.forces.tracking.tracker import Key
+from slipcore.forces.tracking.unresolved import Unresolved
 from slipcore.frames import BoolArray, FloatArray
 
 
@@ -27,9 +29,20 @@ class FrameForces:
 
     @classmethod
     def none(cls, grid: tuple[int, int]) -> "FrameForces":
-        """Of a frame in which nothing touches."""
+        """Of a frame of which nothing is known yet."""
         force, total = np.zeros((*grid, 3)), np.zeros(3)
         return cls(force, force, total, total, np.zeros(grid, dtype=bool))
+
+    @classmethod
+    def unnoticed(cls, grid: tuple[int, int], limit: FloatArray, known: KnownForce) -> "FrameForces":
+        """Of a frame whose markers do not move beyond noise: none, up to the ``limit`` [3] N that they would not show,
+        unless the resultant is ``known``. Where on the elements it acts is not.
+        """
+        share = np.where(known.given, limit**2 / (limit**2 + known.deviation**2), 0.0)
+        total = share * np.nan_to_num(known.force) * OUTWARD
+        left = np.where(known.given, np.sqrt(share) * known.deviation, limit)
+        deviation = np.broadcast_to(limit, (*grid, 3))
+        return cls(np.zeros((*grid, 3)), deviation, total, left, np.zeros(grid, dtype=bool))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,8 +50,8 @@ class Reader:
     """Reads forces from frames by one ``key``'s fit.
 
     ``response`` [m, 3 j] of what is observed and ``elements`` [e, j] N of the j nodes in contact; before any misfit,
-    ``deviation`` [3, e] N of elements' forces, and ``total`` [3] N of the resultant; ``depth_seen`` [e]: whether their
-    markers' z was.
+    ``deviation`` [3, e] N of elements' forces, and ``total`` [3] N of the resultant; ``unresolved``: what bilinear
+    tractions leave wrong.
     """
 
     sensor: SensorResponse
@@ -47,7 +60,7 @@ class Reader:
     elements: FloatArray
     deviation: FloatArray
     total: FloatArray
-    depth_seen: BoolArray
+    unresolved: Unresolved
 
     @classmethod
     def of(cls, sensor: SensorResponse, key: Key) -> "Reader":
@@ -56,8 +69,8 @@ class Reader:
         response = observation.response[:, :, support].reshape(len(observation.noise), -1)
         elements = sensor.elements[:, support]
         total = sensor.load * key.fit.deviation(np.ones((1, elements.shape[1])))[:, 0]
-        depth_seen = sensor.depth_seen(observation)
-        return cls(sensor, key, response, elements, key.fit.deviation(elements), total, depth_seen)
+        unresolved = Unresolved.of(sensor, key.fit)
+        return cls(sensor, key, response, elements, key.fit.deviation(elements), total, unresolved)
 
     @property
     def given(self) -> bool:
@@ -68,22 +81,33 @@ class Reader:
         """Forces of a frame's ``data`` [m] m on elements of this grid; what the fit leaves unexplained beyond noise
         widens their deviations.
         """
-        sensor, outward = self.sensor, np.array([1.0, 1.0, -1.0])
+        outward = np.array([1.0, 1.0, -1.0])
         traction = self.key.fit.traction(data)
-        misfit = self._misfit(traction, data)
+        of_elements, of_resultant = self._deviations(traction, data)
         force = ((self.elements @ traction.T) * outward).reshape(*grid, 3)
-        spread = np.hypot(
-            misfit * self.deviation.T.reshape(force.shape), RECONSTRUCTION.element_error * np.abs(force).max()
-        )
-        covered = self.elements.sum(axis=1).reshape(grid) > RECONSTRUCTION.covered * sensor.load
-        resultant = sensor.load * traction.sum(axis=1) * outward
-        of_all = RECONSTRUCTION.resultant_error * np.linalg.norm(resultant)
+        resultant = self.sensor.load * traction.sum(axis=1) * outward
+        deviation = np.hypot(of_elements.T.reshape(force.shape), RECONSTRUCTION.element_error * np.abs(force).max())
+        covered = self.elements.sum(axis=1).reshape(grid) > RECONSTRUCTION.covered * self.sensor.load
         return FrameForces(
             force,
-            np.hypot(spread, _step_error(force, self.depth_seen.reshape(grid))),
+            deviation,
             resultant,
-            np.hypot(misfit * self.total, of_all),
-            _touching(-force[..., 2], spread[..., 2]) & covered,
+            np.hypot(of_resultant, RECONSTRUCTION.resultant_error * np.linalg.norm(resultant)),
+            _touching(-force[..., 2], deviation[..., 2]) & covered,
+        )
+
+    def _deviations(self, traction: FloatArray, data: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Standard deviations of elements' forces [3, e] N and of the resultant [3] N: by the data, by what bilinear
+        tractions leave wrong, and by how much the bound on pulling changes what the data say.
+        """
+        misfit = self._misfit(traction, data)
+        bound = traction - (self.key.fit.operator @ data).reshape(traction.shape)
+        unresolved, of_resultant = self.unresolved.deviations(traction)
+        of_elements = np.zeros_like(self.deviation)
+        of_elements[:, self.unresolved.near] = unresolved
+        return (
+            np.sqrt((misfit * self.deviation) ** 2 + of_elements**2 + (bound @ self.elements.T) ** 2),
+            np.sqrt((misfit * self.total) ** 2 + of_resultant**2 + (self.sensor.load * bound.sum(axis=1)) ** 2),
         )
 
     def _misfit(self, traction: FloatArray, data: FloatArray) -> float:
@@ -98,13 +122,3 @@ def _touching(normal: FloatArray, deviation: FloatArray) -> BoolArray:
     near = RECONSTRUCTION.rim_share * maximum_filter(normal, 3)
     least = np.maximum(near, RECONSTRUCTION.element_share * normal.max())
     return np.asarray(normal > np.maximum(RECONSTRUCTION.element_significance * deviation, least))
-
-
-def _step_error(force: FloatArray, depth_seen: BoolArray) -> FloatArray:
-    """Standard deviation [n, m, 3] of what bilinear tractions and the contact leave wrong where force steps, more of
-    normal forces where z was not seen.
-    """
-    share = np.full(force.shape, RECONSTRUCTION.step_error)
-    share[~depth_seen, 2] = RECONSTRUCTION.step_error_in_plane
-    around = 3, 3, 1
-    return np.asarray(share * (maximum_filter(force, around) - minimum_filter(force, around)))

@@ -124,5 +124,5 @@ def bytes_needed(position: FloatArray, element_area: float) -> int:
     """
     place = position[..., :2].reshape(-1, 2)
     nodes, elements = len(Nodes.around(place, element_area)), len(place)
-    observed, over_elements, lattice = 9 * (elements + 1) * nodes, elements * nodes, 3 * elements * nodes
+    observed, over_elements, lattice = 18 * (elements + 1) * nodes, 2 * elements * nodes, 3 * elements * nodes
     return (observed + over_elements + lattice) * position.itemsize

@@ -4,11 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from slipcore.forces.defaults import STRENGTH
 from slipcore.forces.inverse.fit import ObservationModel
 from slipcore.forces.known import KnownForce
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.nodes import Nodes
-from slipcore.forces.operator.response import response_matrix
+from slipcore.forces.operator.response import response_matrices
+from slipcore.forces.recording import least_power
 from slipcore.frames import BoolArray, FloatArray
 
 
@@ -16,7 +18,9 @@ from slipcore.frames import BoolArray, FloatArray
 class SensorResponse:
     """For tractions in Young's moduli: ``observed`` [m + 3, 3, k], what markers move by along the ``axes`` that are
     seen, m, and the resultant, N; ``elements`` [e, k] N of theirs by tractions at nodes, and ``load`` N, the force by a
-    traction of 1 at one node.
+    traction of 1 at one node. ``observed_between`` [m + 3, 3, l] and ``elements_between`` [e, l]: the same of tractions
+    that are largest midway between nodes. ``motion`` [3] m: by how much, in root mean square, markers move at
+    least where the gel bears a ``most`` N of load along each axis, on one element or on all alike.
     """
 
     nodes: Nodes
@@ -24,18 +28,34 @@ class SensorResponse:
     elements: FloatArray
     load: float
     axes: tuple[int, ...]
+    observed_between: FloatArray
+    elements_between: FloatArray
+    motion: FloatArray
+    most: float
 
     @classmethod
     def of(cls, position: FloatArray, element_area: float, gel: Gel, axes: tuple[int, ...]) -> "SensorResponse":
         """With markers at ``position`` [n, m, 3] m."""
         place = position[..., :2].reshape(-1, 2)
-        nodes, young, markers = Nodes.around(place, element_area), gel.young_modulus, len(axes) * len(place)
-        load = young * nodes.area
-        observed = np.empty((markers + 3, 3, len(nodes)))
-        response = response_matrix(gel, nodes, place)[list(axes)]
-        np.multiply(young, response.reshape(markers, 3, len(nodes)), out=observed[:markers])
-        observed[markers:] = load * np.eye(3)[..., None]
-        return cls(nodes, observed, young * nodes.over_elements(place), load, axes)
+        nodes, young = Nodes.around(place, element_area), gel.young_modulus
+        load, between = young * nodes.area, nodes.between
+        at_nodes, midway = (
+            _observed(young * response[list(axes)], load)
+            for response in response_matrices(gel, (nodes, between), place)
+        )
+        elements = young * nodes.over_elements(place)
+        under = at_nodes[:-3, :, elements.any(axis=0)]
+        most = STRENGTH.largest * load * under.shape[-1]
+        over_between = young * between.over_elements(place)
+        return cls(nodes, at_nodes, elements, load, axes, midway, over_between, _least_motion(under, most / load), most)
+
+    def unnoticed(self, noise: float) -> FloatArray:
+        """The largest resultant [3] N along each axis that moves markers by no more than their ``noise`` m; at most
+        what the gel bears.
+        """
+        level = noise * np.sqrt(least_power(len(self.response)))
+        seen = self.motion > level
+        return self.most * np.where(seen, level / np.where(seen, self.motion, 1.0), 1.0)
 
     @property
     def response(self) -> FloatArray:
@@ -62,3 +82,19 @@ class SensorResponse:
     def data(displacement: FloatArray, known: KnownForce) -> FloatArray:
         """What it measures [m + 3]."""
         return np.concatenate((displacement, np.nan_to_num(known.force)))
+
+
+def _least_motion(response: FloatArray, total: float) -> FloatArray:
+    """Root mean square [3] m of a ``response`` [m, 3, k] m to tractions of this ``total``, on the one node or on all
+    alike that moves markers least.
+    """
+    alone = total * np.linalg.norm(response, axis=0).min(axis=1)
+    together = total / response.shape[-1] * np.linalg.norm(response.sum(axis=2), axis=0)
+    return np.asarray(np.minimum(alone, together) / np.sqrt(len(response)))
+
+
+def _observed(response: FloatArray, load: float) -> FloatArray:
+    """Response [d, j, 3, k] m of markers, and below it that of the resultant, N: [m + 3, 3, k]."""
+    markers, k = response.shape[0] * response.shape[1], response.shape[-1]
+    resultant = np.broadcast_to(load * np.eye(3)[..., None], (3, 3, k))
+    return np.concatenate((response.reshape(markers, 3, k), resultant))

@@ -10,6 +10,8 @@ import pytest
 from slipcore import GraspLog, InvalidInput, UnknownScale
 from slipcore.forces import Gel, Reconstruction, reconstruct
 from slipcore.forces.inverse.support import better_support
+from slipcore.forces.recording import least_power
+from slipcore.forces.tracking.sensor import SensorResponse
 
 GEL = Gel(young_modulus=1e6, poisson_ratio=0.49, thickness=5e-3)
 Pressed = Callable[..., GraspLog]
@@ -121,6 +123,35 @@ def test_nothing_touches_where_nothing_moves_but_noise(pressed: Pressed) -> None
         assert not found.contact.any()
         assert not found.information.any()
         assert found.force_noise == 0.0
+
+
+def test_a_load_that_moves_no_marker_may_be_there_all_the_same(pressed: Pressed) -> None:
+    """An incompressible half-space moves none sideways: up to what a gel bears, or as the gripper reports."""
+    log = pressed(LATE, noise=1e-6, axes=2, crop=INSIDE)
+    still = replace(log, displacement=np.zeros(log.displacement.shape), gripper_force=np.array([8.0, 0.0]))
+    alone = reconstruct(replace(still, gripper_force=None), Gel(1e6, 0.5), noise=1e-6)
+    assert not alone.resultant.any()
+    assert (alone.resultant_deviation[:, 2] == alone.unnoticed[2]).all()
+    assert alone.unnoticed[2] == pytest.approx(1e6 * 64 * log.element_area, rel=0.6)
+    assert (alone.deviation == alone.unnoticed).all()
+    given = reconstruct(still, Gel(1e6, 0.5), noise=1e-6)
+    np.testing.assert_allclose(given.resultant[:, 2], [-8.0, 0.0], rtol=1e-4)
+    np.testing.assert_allclose(given.resultant_deviation[0, 2], 0.08, rtol=1e-4)
+    assert given.resultant_deviation[1, 2] == alone.unnoticed[2]
+
+
+@pytest.mark.parametrize(("axes", "gel"), [(3, GEL), (2, GEL), (2, Gel(1e6, 0.45))])
+def test_what_is_unnoticed_is_what_touches_no_marker_by_more_than_noise(pressed: Pressed, axes: int, gel: Gel) -> None:
+    log = pressed([3, 3], axes=axes, crop=INSIDE)
+    sensor = SensorResponse.of(log.position, log.element_area, gel, tuple(range(axes)))
+    alike = np.flatnonzero(sensor.elements.any(axis=0))
+    for factor, noticed in ((0.9, False), (1.1, True)):
+        load = factor * sensor.unnoticed(1e-6) / sensor.load
+        spread = sensor.response[:, :, alike].mean(axis=2) * load
+        alone = sensor.response[:, :, alike] * load[:, None]
+        moves = np.sqrt(np.mean(np.concatenate((spread[..., None], alone), axis=2) ** 2, axis=0)).min(axis=1)
+        level = 1e-6 * np.sqrt(least_power(len(spread)))
+        assert ((moves > level) == noticed).all()
 
 
 @pytest.mark.parametrize("axes", [2, 3])
