@@ -5,6 +5,7 @@ import logging
 import signal
 import socket
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.context import SpawnProcess
 
@@ -43,9 +44,9 @@ class LookupServer:
         """Where it answers."""
         return dashboard(self._socket.getsockname())
 
-    def start(self) -> None:
-        """Begin to serve."""
-        self._keeping = asyncio.create_task(self._keep())
+    def start(self, is_wanted: Callable[[], bool]) -> None:
+        """Begin to serve, and go on as long as that is wanted: a signal to end may reach all processes at once."""
+        self._keeping = asyncio.create_task(self._keep(is_wanted))
 
     async def stop(self) -> None:
         """End the process once it has answered what it was asked."""
@@ -62,19 +63,27 @@ class LookupServer:
         process.kill()
         process.join()
 
-    async def _keep(self) -> None:
-        while True:
-            process = spawned.CONTEXT.Process(target=_serve, args=(self._socket, self._settings, logs.current()))
-            process.start()
-            self._process = process
-            logger.info("look-ups are answered at %s by process %d", self.address, process.pid)
-            await _end_of(process)
-            logger.error("process %d, which answers look-ups, has ended and is started anew", process.pid)
-            await asyncio.sleep(RESTART_SECONDS)
+    async def _keep(self, is_wanted: Callable[[], bool]) -> None:
+        while is_wanted():
+            try:
+                await self._serve_once()
+            except OSError:  # such as no memory for it now
+                logger.exception("no process for look-ups could be started")
+            if is_wanted():
+                logger.error("the process that answers look-ups is started anew")
+                await asyncio.sleep(RESTART_SECONDS)
+
+    async def _serve_once(self) -> None:
+        process = spawned.CONTEXT.Process(target=_serve, args=(self._socket, self._settings, logs.current()))
+        process.start()
+        self._process = process
+        logger.info("look-ups are answered at %s by process %d", self.address, process.pid)
+        await _end_of(process)
+        logger.info("process %d, which answered look-ups, has ended", process.pid)
 
 
 class ServerWithLookups(Server):
-    """Has a process for look-ups beside it, from when it is ready until all else has ended."""
+    """Has a process for look-ups beside it, from when it is ready until it has ended."""
 
     def __init__(self, config: uvicorn.Config, lookups: LookupServer) -> None:
         super().__init__(config)
@@ -84,7 +93,7 @@ class ServerWithLookups(Server):
         """Begin to listen; the second process finds the database as this one has made it."""
         await super().startup(sockets)
         if self.started:
-            self._lookups.start()
+            self._lookups.start(lambda: not self.should_exit)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """End, and after that the second process."""

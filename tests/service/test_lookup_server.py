@@ -1,5 +1,7 @@
 """A process for look-ups beside the server: the same data, lost and started anew, ended with it."""
 
+import asyncio
+import errno
 import os
 import re
 import signal
@@ -12,7 +14,8 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.lookup_server import server_of
+from service.lookup_server import LookupServer, server_of
+from service.processes import spawned
 from service.serving import Server
 from service.settings import Settings
 from tests.waiting import wait_until
@@ -27,9 +30,13 @@ class Service:
     """``stiction serve`` with a process for look-ups, by what it logs."""
 
     def __init__(self, folder: Path) -> None:
-        self._log = folder / "log"
+        self.folder, self._log = folder, folder / "log"
         command = [sys.executable, "-m", "service.cli", "serve", "--port", "0", "--lookup-port", "0"]
-        settings = {"STICTION_DATA_FOLDER": str(folder / "data"), "STICTION_WORKERS": "0"}
+        settings = {
+            "STICTION_DATA_FOLDER": str(folder / "data"),
+            "STICTION_WORKERS": "0",
+            "STICTION_SHUTDOWN_SECONDS": "3",  # longer than the wait before a lost process is started anew
+        }
         with self._log.open("w") as log:
             self.process = subprocess.Popen(command, env=os.environ | settings, stderr=log)
         wait_until(lambda: LOOK_UPS.search(self.log) or self.process.poll() is not None, "the start")
@@ -76,7 +83,8 @@ def test_look_ups_have_a_process_that_is_started_anew_and_ends_with_the_server(s
     assert httpx.get(material, timeout=PATIENCE).json()["name"] == "paper"  # it waited, and was not refused
     same, second = service.look_ups
     assert (same, second != first) == (address, True)
-    assert f"process {first}, which answers look-ups, has ended and is started anew" in service.log
+    assert f"process {first}, which answered look-ups, has ended" in service.log
+    assert "ERROR service.lookup_server: the process that answers look-ups is started anew" in service.log
 
     service.process.terminate()
     service.process.wait(PATIENCE)
@@ -85,12 +93,53 @@ def test_look_ups_have_a_process_that_is_started_anew_and_ends_with_the_server(s
     assert "Traceback" not in service.log
 
 
+def test_a_signal_to_all_processes_ends_them_and_starts_none(service: Service) -> None:
+    address, process = service.look_ups
+    httpx.get(f"{address}/healthz", timeout=PATIENCE).raise_for_status()
+    host, port = service.url.removeprefix("http://").split(":")
+    with socket.create_connection((host, int(port))) as upload:  # which the server waits for
+        head = "POST /v1/grasp-logs HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1000\r\n"
+        upload.sendall(f"{head}Content-Type: application/vnd.stiction.grasp-log+npz\r\n\r\nPK".encode())
+        wait_until(lambda: list((service.folder / "data/spool").iterdir()), "the upload to begin", 30.0)
+        service.process.terminate()
+        os.kill(process, signal.SIGTERM)
+        service.process.wait(PATIENCE)
+    assert is_gone(process)
+    assert service.look_ups == (address, process)
+    assert "started anew" not in service.log
+
+
 def test_the_process_ends_when_the_server_is_killed(service: Service) -> None:
     address, process = service.look_ups
     httpx.get(f"{address}/healthz", timeout=PATIENCE).raise_for_status()
     service.process.kill()
     service.process.wait()
     wait_until(lambda: is_gone(process), "the process to end", PATIENCE)
+
+
+def test_a_process_that_cannot_be_started_is_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    tries: list[object] = []
+
+    def fail(**given: object) -> None:
+        tries.append(given)
+        raise OSError(errno.EAGAIN, "no more processes")
+
+    monkeypatch.setattr("service.lookup_server.RESTART_SECONDS", 0.0)
+    monkeypatch.setattr(spawned.CONTEXT, "Process", fail)
+
+    async def serve() -> None:
+        lookups = LookupServer(Settings(data_folder=tmp_path, lookup_port=0))
+        lookups.start(lambda: len(tries) < 3)
+        async with asyncio.timeout(PATIENCE):
+            while len(tries) < 3:
+                await asyncio.sleep(0.0)
+        await lookups.stop()
+
+    asyncio.run(serve())
+    assert len(tries) == 3
+    assert caplog.text.count("no process for look-ups could be started") == 3
 
 
 def test_a_port_that_is_taken_is_refused_by_name(tmp_path: Path) -> None:
