@@ -73,6 +73,15 @@ def test_many_materials_give_a_key_no_more_turns(database: Database, paper: int)
         assert len(many) == 20
 
 
+def test_a_job_that_goes_before_an_older_one_of_its_key_takes_that_ones_turn(database: Database, paper: int) -> None:
+    with database.write() as session:
+        card = materials.create(session, "card", "").id
+        first, second = add(session, paper, 2, LARGE)
+        (other,) = add(session, card, 1, LARGE)
+        small = add(session, paper, 3, SMALL)
+        assert served(session) == [first, small[0], other, small[1], second, small[2]]
+
+
 def test_short_jobs_do_not_wait_behind_long_ones(database: Database, paper: int) -> None:
     with database.write() as session:
         long = add(session, paper, 5, is_long=True)

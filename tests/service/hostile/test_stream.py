@@ -85,6 +85,22 @@ def test_a_key_has_a_part_of_the_sessions_only(make: Callable[..., Streams]) -> 
     run(go)
 
 
+def test_no_more_sessions_are_open_than_there_is_room_for(
+    make: Callable[..., Streams], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("service.stream.sessions.MOST_SESSIONS", 2)
+
+    async def go() -> None:
+        streams = make(per_owner=50)
+        for key in ("one", "two"):
+            await streams.open(opening(), key, "")
+        with pytest.raises(End, match="2 sessions are open") as refused:
+            await streams.open(opening(), "three", "")
+        assert refused.value.code == TOO_MANY
+
+    run(go)
+
+
 def test_who_is_refused_holds_no_place(make: Callable[..., Streams]) -> None:
     async def go() -> None:
         streams = make(per_owner=1)

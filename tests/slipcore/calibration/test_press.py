@@ -37,6 +37,14 @@ def test_a_wide_contact_reaches_the_edge(width: float, reaches: bool) -> None:
     assert press(share=shares(width)).reaches_edge is reaches
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize(("row", "reaches"), [(0, True), (1, False), (6, False), (7, True)])
+def test_only_the_outermost_elements_are_the_edge(axis: int, row: int, reaches: bool) -> None:
+    share = np.zeros((8, 8))
+    share[row, 2:6] = 0.25
+    assert press(share=np.moveaxis(share, 0, axis)).reaches_edge is reaches
+
+
 def test_without_depth_the_forces_tell_the_level() -> None:
     flat = replace(straight(), displacement=np.zeros_like(straight().displacement))
     seen = find_press(flat)

@@ -101,6 +101,7 @@ def test_bodies_apart_have_no_pressure_and_no_nan(sphere) -> None:
         solved = solve_normal(case.operators, case.grid, case.height, **given)
         assert not solved.pressure.any()
         assert np.isfinite(solved.gap).all()
+        assert (solved.force, solved.residual, solved.iterations) == (0.0, 0.0, 0)
 
 
 @pytest.mark.parametrize(
