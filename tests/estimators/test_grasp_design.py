@@ -150,6 +150,7 @@ def test_a_working_point_that_cannot_be_is_refused(changes: dict[str, float]) ->
         replace(POINT, **changes)
 
 
-def test_forces_that_cannot_be_are_refused() -> None:
+@pytest.mark.parametrize("forces", [(0.2, 0.1), (0.0, 0.1), (-0.1, 0.1), (0.1, math.inf), (math.nan, 0.1)])
+def test_forces_that_cannot_be_are_refused(forces: tuple[float, float]) -> None:
     with pytest.raises(InvalidSamples, match="normal_force"):
-        next_grasp(model(), POINT, Probing(normal_force=(0.2, 0.1)))
+        next_grasp(model(), POINT, Probing(normal_force=forces))

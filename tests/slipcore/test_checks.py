@@ -4,6 +4,8 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -11,6 +13,8 @@ import pytest
 from service.domain.reconstruct import CONTRADICTED, RECONSTRUCTED
 from slipcore import Finding, GraspLog, InvalidInput, check_log, detect_slip
 from slipcore.checks import AGAINST_FRICTION
+from slipcore.checks.contact import _load_ratio
+from slipcore.checks.subject import Subject
 from slipcore.contact import RampSchedule, tangential_ramp
 from slipcore.finding import SEVERITIES
 
@@ -207,6 +211,22 @@ def test_frames_that_pull_among_others_that_press_are_looked_through(long_ramp: 
     force = np.asarray(long_ramp.force).copy()
     force[:10] = [0.1, 0.0, 1e-3]
     assert "force pulls" not in names(with_force(long_ramp, force))
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_moment_is_a_load_on_several_elements_and_none_on_one(count: int) -> None:
+    """Two elements are pulled apart sideways by half of what presses them, and so is one of its own accord."""
+    position, force = np.zeros((3, 1, 3)), np.zeros((1, 3, 1, 3))
+    position[:, 0, 0] = np.arange(3)
+    force[0, :count, 0] = [[0.0, 0.5, -1.0], [0.0, -0.5, -1.0]][:count]
+    pressing = -force[..., 2]
+    seen = SimpleNamespace(
+        log=SimpleNamespace(force=force, position=position),
+        pressing=pressing,
+        total=pressing.sum(axis=(1, 2)),
+        held=np.array([True]),
+    )
+    np.testing.assert_allclose(_load_ratio(cast("Subject", seen)), [0.5], rtol=1e-12, err_msg="rounding")
 
 
 def test_a_limit_can_be_moved_and_a_wrong_one_is_refused(long_ramp: GraspLog) -> None:

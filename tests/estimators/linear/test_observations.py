@@ -53,6 +53,13 @@ def test_weights_of_zero_are_left_out_and_all_zero_is_refused(samples: Make) -> 
         estimators.fit(replace(whole, weight=np.zeros(200)))
 
 
+def test_weights_that_make_samples_worth_no_more_than_three_are_refused(samples: Make) -> None:
+    few = replace(take(samples(10), slice(4)), weight=np.array([1.0, 1.0, 0.5, 0.01]))
+    with pytest.raises(estimators.TooFewSamples, match=r"worth 2\.8 by their weights") as caught:
+        estimators.fit(few)
+    assert caught.value.allowed == "more than 3"
+
+
 def test_weights_matter_only_relative_to_each_other(samples: Make) -> None:
     weight = np.random.default_rng(3).uniform(0.2, 1.0, 200)
     one, tiny = (observe(samples(200, weight=scale * weight)) for scale in (1.0, 1e-12))

@@ -11,6 +11,7 @@ from db.records import Finding
 from service.domain.doubtful_logs import with_doubts
 from service.domain.grasp_report import inspect_grasp, report_of_stored
 from service.domain.stored_results import encode_history, encode_samples
+from service.formatting import NOTHING
 from service.report.grasp import InspectedGrasp, grasp_report
 from service.report.page import render
 from slipcore import GraspLog, detect_slip
@@ -39,6 +40,20 @@ def test_a_grasp_that_slips_is_told_with_its_friction_and_what_to_record_next(se
     assert any(step.startswith("Record next: press with") for step in report.steps)
     assert [section.heading for section in report.sections] == ["Slip over time", "Friction model", "What was detected"]
     assert len(list(report.pictures)) == 3
+
+
+def test_what_was_detected_stands_in_a_table(seen: InspectedGrasp) -> None:
+    def told(inspected: InspectedGrasp) -> dict[str, str]:
+        (table,) = grasp_report(inspected).sections[-1].tables
+        return dict(table.rows)
+
+    found = told(seen)
+    assert found["detector"] == seen.detection.method
+    assert (int(found["onsets of slip"]), int(found["ends of slip"])) == (seen.detection.onsets, seen.detection.ends)
+    noise, unit = found["noise of a marker"].split()
+    assert float(noise) == pytest.approx(1.0, rel=0.3)  # what the log was made with
+    assert unit == "µm"
+    assert told(replace(seen, detection=replace(seen.detection, noise=None)))["noise of a marker"] == NOTHING
 
 
 def test_terms_are_explained_on_the_page_that_uses_them(seen: InspectedGrasp) -> None:

@@ -35,6 +35,14 @@ def test_what_is_too_small_is_named(contact, at_limit, sheared: bool, said: str)
     assert said in sentence
 
 
+@pytest.mark.parametrize("x", [-20, 0, 20])
+@pytest.mark.parametrize("y", [-20, 0, 20])
+def test_a_contact_at_any_edge_of_the_grid_is_said_to_reach_it(x: int, y: int) -> None:
+    contact = np.roll(np.pad(disk(12.0), 20), (x, y), (0, 1))[20:-20, 20:-20]
+    said = unresolved(contact, np.zeros_like(contact), sheared=False)
+    assert any("edge of the grid" in sentence for sentence in said) == bool(x or y)
+
+
 def test_a_contact_that_only_sticks_needs_no_slip_zone() -> None:
     assert unresolved(disk(15.0), disk(0.0), sheared=False) == ()
 

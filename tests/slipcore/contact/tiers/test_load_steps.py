@@ -10,7 +10,7 @@ from slipcore.contact.effects import LoadPath, NormalTangentialCoupling, Tangent
 from slipcore.contact.scene import Press, Scene
 from slipcore.contact.tiers.accuracy import difference
 from slipcore.contact.tiers.boundary_elements import Fidelity, run
-from slipcore.contact.tiers.load_steps import load_steps
+from slipcore.contact.tiers.load_steps import growths, load_steps
 
 GROWTH = 0.1
 SHEARED = Scene("sheared", (TangentialLoad((1.0, 0.0), start=1.0, duration=1.0),), press=Press(8.0, 1.0))
@@ -48,6 +48,14 @@ def test_no_step_grows_the_contact_too_far_while_the_object_is_pulled() -> None:
         assert (np.diff(times) > 0.0).all()
         assert np.diff(radii(scene, times)).max() <= GROWTH * (1.0 + 1e-9)
     assert [len(times) for times in steps] == [9, 4, 2, 2]
+
+
+def test_the_radius_grows_by_the_same_between_frames_and_bends_while_the_object_is_pulled() -> None:
+    path = LoadPath((0.0, 0.3, 2.0), force_x=(0.0, 0.0, 1.0))
+    scene = replace(SHEARED, effects=(path,))
+    radius = radii(scene, np.array([0.0, 0.3, 0.5, 1.0]))
+    grown = growths(scene.plan(), np.array([0.0, 0.5, 1.0, 1.5]))  # up to the bend nothing pulls
+    np.testing.assert_allclose(grown, [0.0, *np.diff(radius)[1:], 0.0], rtol=1e-12, atol=1e-15, err_msg="rounding")
 
 
 @pytest.mark.long
