@@ -121,6 +121,13 @@ def test_a_folder_holds_one_phrase(mine: Path, tmp_path: Path) -> None:
         list(make(Here(), " ", 2, PILLARS, tmp_path / "new"))
     with pytest.raises(InvalidInput, match="a new or empty one"):
         list(make(Here(), PHRASE, 2, PILLARS, mine / "inputs"))
+    with pytest.raises(InvalidInput, match="a new or empty one"):
+        list(make(Here(), PHRASE, 2, PILLARS, mine / files.CARD))
+
+
+def test_a_folder_may_be_there_if_it_is_empty(tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    assert len(list(make(Here(), PHRASE, 1, PILLARS, tmp_path / "empty"))) == 1
 
 
 def test_each_kind_has_each_of_its_faults_once_in_a_round() -> None:

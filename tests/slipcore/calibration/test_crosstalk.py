@@ -7,7 +7,7 @@ import pytest
 
 from slipcore.calibration.crosstalk import crosstalk, inward_share
 from slipcore.calibration.estimate import PressEstimate
-from slipcore.calibration.press import find_press
+from slipcore.calibration.press import PressLog, find_press
 from tests.slipcore.calibration.straight_press import LOAD, STEP, places, press, straight
 
 
@@ -45,6 +45,13 @@ def test_without_forces_or_depth_there_is_no_share() -> None:
     flat = replace(straight(), displacement=np.zeros_like(straight().displacement))
     assert ["a load that leans" in str(each) for each in crosstalk(find_press(flat))] == [True] * 2
     assert inward_share(find_press(replace(straight(), force=None))) == "the log has no forces"
+
+
+def test_without_a_frame_at_rest_zeros_of_elements_are_not_in_the_error() -> None:
+    seen = press()
+    found = inward_share(PressLog(seen.log, seen.level, np.zeros_like(seen.free)))
+    assert isinstance(found, PressEstimate)
+    assert found.error == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("share", [0.1, -0.04])
