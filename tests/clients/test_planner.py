@@ -17,7 +17,7 @@ from stiction_client import (
     Scales,
     required_normal_force,
 )
-from stiction_client.quantile import FrictionQuantile
+from stiction_client.quantile import FrictionQuantile, _peak_of_hyperbola
 
 Make = Callable[..., FrictionModel]
 
@@ -273,6 +273,13 @@ def test_a_limit_on_the_force_bounds_answer_and_interval(make_model: Make) -> No
         required_normal_force(model, 3.0, contact_area=AREA, normal_force_limit=5.0)
 
 
+def test_a_limit_that_is_just_what_is_needed_holds(make_model: Make) -> None:
+    for load in np.linspace(0.5, 3.5, 30):
+        needed = required_normal_force(make_model(), float(load), contact_area=AREA).normal_force
+        limited = required_normal_force(make_model(), float(load), contact_area=AREA, normal_force_limit=needed)
+        assert limited.normal_force == pytest.approx(needed, rel=1e-12)
+
+
 def test_friction_too_uncertain_to_promise_any_is_refused(make_model: Make) -> None:
     model = make_model((0.3, 0.0, 0.0), np.diag([0.04, 0.0, 0.0]), degrees_of_freedom=3.0)
     with pytest.raises(NoFeasibleForce, match="no load is held so at any force") as caught:
@@ -440,3 +447,15 @@ def test_a_nearly_singular_covariance_gives_no_invalid_root(make_model: Make) ->
     answer = required_normal_force(model, 2.0, contact_area=AREA)
     assert answer.friction_coefficient * answer.normal_force == pytest.approx(2.0, rel=1e-12)
     assert np.isfinite(answer.feasible_interval[1])
+
+
+@pytest.mark.parametrize(("c", "s", "k", "g"), [(0.2, 0.5, 0.1, 0.3), (0.29, 0.1, -0.4, 0.3), (-0.2, 0.5, -2.0, 0.3)])
+def test_the_peak_of_a_hyperbola_is_where_it_falls_off_on_both_sides(c: float, s: float, k: float, g: float) -> None:
+    def height(force: float) -> float:
+        return c * force - float(np.hypot(s, k + g * force))
+
+    peak = _peak_of_hyperbola(c, s, k, g)
+    assert peak > 0.0
+    assert height(peak) > max(height(0.99 * peak), height(1.01 * peak))
+    assert _peak_of_hyperbola(-g, s, k, g) == 0.0
+    assert _peak_of_hyperbola(g, s, k, g) == np.inf

@@ -140,6 +140,19 @@ def test_a_first_start_that_died_before_its_row_begins_anew(
         join(database, blobs)
 
 
+def test_files_of_a_first_start_that_died_can_be_filled_while_there_are_none(
+    database: Database, blobs: BlobStore, other: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as dying:
+        dying.setattr(stores, "set_id", raising)
+        with pytest.raises(Died):
+            join(database, blobs)
+    identity.check_to_fill(other, blobs)
+    blobs.put(b"somebody's")
+    with pytest.raises(StoreMismatch):
+        identity.check_to_fill(other, blobs)
+
+
 def test_a_first_start_that_died_after_its_row_goes_on(
     database: Database, blobs: BlobStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -14,7 +14,7 @@ from slipcore import (
     detect_slip,
 )
 from slipcore.contact import RampSchedule, Scene, simulate, tangential_ramp
-from slipcore.samples import _as_friction_averages, element_samples
+from slipcore.samples import _as_friction_averages, _ForceNoise, _ratio, element_samples
 
 
 @pytest.fixture(scope="module")
@@ -292,3 +292,13 @@ def test_without_the_object_s_motion_velocities_are_relative(ramp: tuple[GraspLo
     both = FrictionSamples.concatenate([unposed, posed])
     assert both.velocity_is_relative.tolist() == [True] * len(unposed) + [False] * len(posed)
     assert both.take(both.velocity_is_relative).velocity_is_relative.all()
+
+
+def test_noise_of_forces_leaves_friction_as_it_is_on_average() -> None:
+    """The next terms, of (σ/f)⁴ = 1e-4, are below what is asked."""
+    rng, count, noise = np.random.default_rng(3), 10**6, _ForceNoise(0.1, 0.04)
+    tangential = np.hypot(
+        0.4 + noise.tangential * rng.standard_normal(count), noise.tangential * rng.standard_normal(count)
+    )
+    normal = 1.0 + noise.normal * rng.standard_normal(count)
+    assert _ratio(tangential, normal, noise).mean() == pytest.approx(0.4, rel=3e-3)

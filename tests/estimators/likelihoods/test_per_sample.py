@@ -8,6 +8,7 @@ import pytest
 from scipy import integrate, stats
 
 import estimators
+from estimators.defaults import PRIOR
 from estimators.likelihoods import errors_in_variables, kernels, outlier, student_t
 from estimators.likelihoods.per_sample import Rows
 from estimators.sampling.laplace import refine
@@ -38,6 +39,21 @@ def test_student_t_is_scipys() -> None:
     ]
     constant = 0.5 * np.log(np.pi) * part.weight.sum()  # left out
     np.testing.assert_allclose(found - constant, wanted, rtol=1e-12)
+
+
+def test_the_prior_of_outliers_is_that_of_their_part() -> None:
+    """Beta(1, c) of the part π, by whichever coordinate it is told: its density there has the factor dπ."""
+    root, step = np.linspace(0.1, 0.75, 8), 1e-6
+
+    def at(place: np.ndarray) -> np.ndarray:
+        return np.column_stack([np.full_like(place, -3.0), place, np.ones_like(place), np.zeros_like(place)])
+
+    one = outlier.Outlier()
+    part = one.natural(at(root))[:, 1]
+    change = (one.natural(at(root + step))[:, 1] - one.natural(at(root - step))[:, 1]) / (2.0 * step)
+    density = stats.beta(1.0, PRIOR.clean).logpdf(part) + np.log(change)
+    difference = one.log_prior(at(root)) - density
+    np.testing.assert_allclose(difference, difference[0], rtol=0.0, atol=1e-8, err_msg="finite differences")
 
 
 def test_outlier_is_the_mixture_of_two_normals() -> None:

@@ -3,7 +3,8 @@
 import pickle
 from dataclasses import replace
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -27,6 +28,16 @@ SCENES = {
     "twist": Scene("twist", (Torsion(8e-3), SENSOR)),
     "reversal": Scene("reversal", (LoadPath((1.0, 1.5, 2.0), force_x=(0.0, 3.0, -1.0)), SENSOR)),
 }
+
+
+@pytest.mark.parametrize(
+    ("target", "tolerance"),
+    [(0.01, ACCURACY.solver_share * 0.01), (1e-9, ACCURACY.tightest), (0.0, ACCURACY.timed_tolerance)],
+)
+def test_the_solver_is_a_share_as_wrong_as_what_is_asked(target: float, tolerance: float) -> None:
+    search = cast("_AccuracySearch", SimpleNamespace(target=target))
+    assert ACCURACY.tightest <= tolerance <= ACCURACY.loosest
+    assert _AccuracySearch.at(search, 20, 1).tolerance == pytest.approx(tolerance, rel=1e-12)
 
 
 @pytest.mark.parametrize(("name", "accuracies"), [("shear", (0.1, 0.03)), ("twist", (0.05,)), ("reversal", (0.05,))])
