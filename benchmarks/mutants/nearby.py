@@ -14,19 +14,18 @@ class Nearby:
         self._tests, self._paths = tests, paths
 
     def files(self, path: str) -> list[str]:
-        """Test files about a module, the nearest first; else about those that import it; else those of its folder."""
+        """Test files about a module, the nearest first; then about those that import it; then those of its folder."""
         found = self._about(path)
-        if not found:
-            users = [user for user in self._paths if self._imports(user, path)]
-            found = list(dict.fromkeys(file for user in users for file in self._about(user)))
-        folder = _folder(path)
-        while not found:
-            found = [file for file in self._tests if file.startswith(f"{folder}/")]
+        for user in self._paths:
+            found += self._about(user) if self._imports(user, path) else []
+        folder, beside = _folder(path), list[str]()
+        while not beside:
+            beside = [file for file in self._tests if file.startswith(f"{folder}/")]
             folder = folder.rpartition("/")[0]
-        return found
+        return list(dict.fromkeys(found + beside))
 
     def _about(self, path: str) -> list[str]:
-        public = _defined(self._root / path)
+        public = defined(self._root / path)
         scores = {file: self._score(file, path, public) for file in self._tests}
         return sorted((file for file, score in scores.items() if score > 0), key=lambda file: -scores[file])
 
@@ -65,7 +64,7 @@ def _imported(path: Path) -> set[str]:
     return found
 
 
-def _defined(path: Path) -> set[str]:
+def defined(path: Path) -> set[str]:
     """The public functions and classes of a module."""
     return {
         node.name

@@ -67,6 +67,41 @@ def test_flaky():
 """
 
 
+KERNELS = """\
+from numba import njit
+
+def _doubled(x):
+    return 2 * x
+
+FACTOR = _doubled(8)
+
+@njit
+def square(x):
+    return x * x
+
+@njit
+def fourth_power(x):
+    return square(square(x))
+
+def scaled(x):
+    def inner():
+        return FACTOR + x
+    return inner()
+"""
+
+KERNEL_TESTS = """\
+from slipcore import kernels
+
+
+def test_fourth_power():
+    assert kernels.fourth_power(2.0) == 16.0
+
+
+def test_scaled():
+    assert kernels.scaled(1) == 17
+"""
+
+
 @pytest.fixture
 def copy(tmp_path: Path) -> ScratchCopy:
     """Of a small repository, as covered: ``test_total`` runs a loop, the others ``is_large``."""
@@ -229,8 +264,11 @@ def test_where_nothing_is_known_of_lines_the_files_nearby_are_tried(copy: Scratc
 @pytest.mark.parametrize(
     ("module", "files"),
     [
-        ("slipcore/shape/cone.py", ["shape/test_cone.py", "test_names.py"]),  # its own first
-        ("slipcore/shape/hidden.py", ["shape/test_solver.py"]),  # no test imports it, but that of what uses it does
+        ("slipcore/shape/cone.py", ["shape/test_cone.py", "test_names.py", "shape/test_solver.py"]),  # its own first
+        (
+            "slipcore/shape/hidden.py",
+            ["shape/test_solver.py", "shape/test_cone.py"],
+        ),  # no test imports it; what uses it has one
         ("slipcore/shape/unused.py", ["shape/test_cone.py", "shape/test_solver.py"]),
         ("slipcore/empty/unused.py", ["shape/test_cone.py", "shape/test_solver.py", "test_names.py"]),
     ],
@@ -252,6 +290,35 @@ def test_files_about_a_module_are_found_nearest_first(tmp_path: Path, module: st
         (tmp_path / name).write_text(text)
     nearby = Nearby(tmp_path, [name for name in sources if not name.startswith("tests")])
     assert nearby.files(module) == [f"tests/slipcore/{file}" for file in files]
+
+
+@pytest.fixture
+def court_in_place(copy: ScratchCopy) -> Iterator[Court]:
+    (copy.root / "slipcore/kernels.py").write_text(KERNELS)
+    (copy.root / "tests/slipcore/test_kernels.py").write_text(KERNEL_TESTS)
+    copy.data.unlink()
+    paths = ["slipcore/kernels.py", "slipcore/program.py"]
+    with closing(Court(copy, paths, libraries="", least=2.0, in_place=True)) as court:
+        yield court
+
+
+@pytest.mark.parametrize(
+    ("path", "old", "new", "test"),
+    [
+        ("program", "and", "or", "test_program.py::test_is_large"),
+        ("program", ">", ">=", ""),
+        ("program", "3", "4", ""),  # a constant of a module: imported anew
+        ("kernels", "*", "/", "test_kernels.py::test_scaled"),  # of a function that ran at import
+        ("kernels", "x * x", "None", "test_kernels.py::test_fourth_power"),  # compiled, with what calls it
+        ("kernels", "+", "-", "test_kernels.py::test_scaled"),  # of a function inside of another
+    ],
+)
+def test_a_change_made_in_place_is_noticed_as_one_that_is_imported(
+    copy: ScratchCopy, court_in_place: Court, path: str, old: str, new: str, test: str
+) -> None:
+    edit = next(e for e in edits(copy.root, f"slipcore/{path}.py") if (e.old, e.new) == (old, new))
+    assert court_in_place.try_mutant(edit).by == (test and f"tests/slipcore/{test}")
+    assert not court_in_place.try_mutant(edit.undone()).is_killed
 
 
 def test_a_run_that_was_stopped_goes_on(tmp_path: Path) -> None:
