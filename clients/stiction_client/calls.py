@@ -36,7 +36,9 @@ from stiction_client.records import AuditEntry, FrictionAnswer, GraspLogReceipt,
 ATTEMPTS = 3
 """Times that a request is tried before a broken connection, or a service that is busy, is an error."""
 
-BUSY = frozenset({429, 503})
+AWAY = frozenset({502, 503, 504})
+"""Statuses by which a service, or a proxy before it, says that it is not there now."""
+BUSY = AWAY | {429}
 """Statuses with which the service asks for patience."""
 
 LONGEST_RETRY = 30.0
@@ -226,12 +228,17 @@ def model(name: str, method: str, kept: dict[str, CachedModel], stale_after: flo
 
 
 def _ask_again(name: str, known: CachedModel | None) -> Call[CachedModel]:
-    """Ask for a material; it isn't sent once more if it is as ``known``."""
+    """Ask for a material; it isn't sent once more if it is as ``known``.
+
+    Raises ``ConnectionFailed`` also where one is known and the service, or a proxy before it, answers that it is away.
+    """
     request = Request("GET", f"/v1/materials/{_part(name)}", tag=None if known is None else known.tag)
     asked = time.monotonic()
     response = yield from _send(request)
     if known is not None and response.status_code == NOT_MODIFIED:
         return replace(known, asked=asked)
+    if known is not None and response.status_code in AWAY:
+        raise ConnectionFailed(_summary(response))
     return CachedModel(_record(Material.from_json, _content(response)), response.headers.get("etag", ""), asked)
 
 

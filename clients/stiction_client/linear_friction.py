@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from stiction_client import recorded
 from stiction_client.elementwise import FloatArray, Number
 from stiction_client.errors import InvalidArgument
 from stiction_client.support import Domain, Kind, Support, extrapolation, notes, support, widening
@@ -29,7 +30,10 @@ class Scale:
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "Scale":
         """The scale in the service's answer."""
-        return cls(float(record["value"]), degrees_from_json(record["degrees_of_freedom"]))
+        return cls(
+            recorded.number("value", record["value"], least=0.0),
+            recorded.degrees_of_freedom(record["degrees_of_freedom"]),
+        )
 
     def to_json(self) -> dict[str, float | None]:
         """What ``from_json`` reads."""
@@ -60,13 +64,13 @@ class SensorFriction:
     def from_json(cls, record: Mapping[str, Any]) -> "SensorFriction":
         """The sensor in the service's answer."""
         return cls(
-            float(record["gain"]),
-            float(record["standard_error"]),
-            tuple(float(each) for each in record["coefficients"]),
-            tuple(tuple(float(each) for each in row) for row in record["covariance"]),
-            degrees_from_json(record["degrees_of_freedom"]),
-            float(record["scale"]),
-            degrees_from_json(record["scatter_degrees_of_freedom"]),
+            recorded.number("gain", record["gain"]),
+            recorded.number("standard_error", record["standard_error"], least=0.0),
+            tuple(recorded.coefficients(record["coefficients"]).tolist()),
+            tuple(tuple(row) for row in recorded.covariance(record["covariance"]).tolist()),
+            recorded.degrees_of_freedom(record["degrees_of_freedom"]),
+            recorded.number("scale", record["scale"], least=0.0),
+            recorded.degrees_of_freedom(record["scatter_degrees_of_freedom"]),
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -321,11 +325,6 @@ class LinearFriction:
         return float(elements)
 
 
-def degrees_from_json(value: float | None) -> float:
-    """Degrees of freedom as JSON has them: null is infinitely many, a normal distribution."""
-    return math.inf if value is None else float(value)
-
-
 def degrees_to_json(value: float) -> float | None:
-    """What ``degrees_from_json`` reads."""
+    """What ``recorded.degrees_of_freedom`` reads."""
     return value if math.isfinite(value) else None

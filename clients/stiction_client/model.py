@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stiction_client import recorded
 from stiction_client.elementwise import FloatArray
 from stiction_client.errors import InvalidArgument
 from stiction_client.linear_friction import (
     LinearFriction,
     Scales,
-    degrees_from_json,
     degrees_to_json,
 )
 from stiction_client.support import OUTDATED, SUPERSEDED, Domain
@@ -63,27 +63,30 @@ class FrictionModel(LinearFriction):
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "FrictionModel":
-        """The model in the service's answer; degrees of freedom of null mean a normal distribution."""
+        """The model in the service's answer; degrees of freedom of null mean a normal distribution.
+
+        Raises ``ValueError`` for what no fit gives: text or ``true`` for a number, a negative variance.
+        """
         domain, cost = record["domain"], record["cost"]
         return cls(
             material=record["material"],
             method=record["method"],
             version=record["version"],
-            coefficients=np.array(record["coefficients"], dtype=np.float64).reshape(3),
-            covariance=np.array(record["covariance"], dtype=np.float64).reshape(3, 3),
-            scale=float(record["scale"]),
-            n=int(record["n"]),
-            degrees_of_freedom=degrees_from_json(record["degrees_of_freedom"]),
-            scatter_degrees_of_freedom=degrees_from_json(record["scatter_degrees_of_freedom"]),
-            domain=Domain(_pair(domain["tangential_velocity"]), _pair(domain["normal_force"])),
-            identifiable=np.array(record["identifiable"], dtype=np.bool_).reshape(3),
-            element_area=float(record["element_area"]),
-            cost=Cost(float(cost["seconds"]), float(cost["monte_carlo_error"])),
-            current=bool(record["current"]),
+            coefficients=recorded.coefficients(record["coefficients"]),
+            covariance=recorded.covariance(record["covariance"]),
+            scale=recorded.number("scale", record["scale"], least=0.0),
+            n=int(recorded.number("n", record["n"], least=0.0)),
+            degrees_of_freedom=recorded.degrees_of_freedom(record["degrees_of_freedom"]),
+            scatter_degrees_of_freedom=recorded.degrees_of_freedom(record["scatter_degrees_of_freedom"]),
+            domain=Domain(*(recorded.span(name, domain[name]) for name in ("tangential_velocity", "normal_force"))),
+            identifiable=np.array([recorded.truth("identifiable", each) for each in record["identifiable"]]).reshape(3),
+            element_area=recorded.number("element_area", record["element_area"], above=0.0),
+            cost=Cost(*(recorded.number(name, cost[name]) for name in ("seconds", "monte_carlo_error"))),
+            current=recorded.truth("current", record["current"]),
             diagnostics=dict(record["diagnostics"]),
             created_at=record["created_at"],
             scales=None if record.get("scales") is None else Scales.from_json(record["scales"]),
-            outdated=bool(record.get("outdated", False)),
+            outdated=recorded.truth("outdated", record.get("outdated", False)),
         )
 
     def to_json(self) -> dict[str, Any]:
@@ -140,8 +143,3 @@ class FrictionModel(LinearFriction):
     def stale(self) -> str | None:
         """Why this is not the material's model any more; None while it is."""
         return OUTDATED if self.outdated else None if self.current else SUPERSEDED
-
-
-def _pair(values: Any) -> tuple[float, float]:
-    low, high = values
-    return float(low), float(high)

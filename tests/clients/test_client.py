@@ -442,6 +442,43 @@ def test_away_from_the_service_the_last_model_is_used_with_a_warning(
             client.model("another")
 
 
+OF_STORE = {"type": "/problems/storage-unavailable", "title": "", "status": 503, "detail": "the database is away"}
+
+
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize(
+    ("status", "answer"),
+    [(502, {"text": "<html>Bad Gateway</html>"}), (504, {"text": ""}), (503, {"text": "<html>"}),
+     (503, {"json": OF_STORE})],
+    ids=["bad gateway", "gateway timeout", "a proxy's 503", "the service's own 503"],
+)  # fmt: skip
+def test_behind_a_proxy_that_says_the_service_is_away_the_last_model_is_used(
+    answers: SimpleNamespace, status: int, answer: dict[str, Any]
+) -> None:
+    asked: list[httpx.Request] = []
+
+    def service(request: httpx.Request) -> httpx.Response:
+        asked.append(request)
+        return httpx.Response(200, json=answers.material) if len(asked) == 1 else httpx.Response(status, **answer)
+
+    with FrictionClient("http://stiction", transport=httpx.MockTransport(service)) as client:
+        first = client.model("paper")
+        with pytest.warns(StaleModel, match="going on with the model of 'paper'"):
+            assert client.model("paper") is first
+        assert len(asked) == 1 + calls.ATTEMPTS
+        with pytest.raises(ProblemError if "json" in answer else UnexpectedAnswer):
+            client.model("another")
+
+
+@pytest.mark.usefixtures("quick")
+def test_a_refusal_is_no_absence(answers: SimpleNamespace) -> None:
+    told = [httpx.Response(200, json=answers.material), httpx.Response(403, json=OF_STORE | {"status": 403})]
+    with FrictionClient("http://stiction", transport=httpx.MockTransport(lambda _: told.pop(0))) as client:
+        client.model("paper")
+        with pytest.raises(ProblemError):
+            client.model("paper")
+
+
 def test_url_and_key_are_those_of_the_environment(
     answers: SimpleNamespace, service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,3 +1,5 @@
+import json
+import re
 from collections.abc import Callable
 from dataclasses import fields, replace
 from datetime import UTC, datetime
@@ -115,6 +117,42 @@ def test_leaving_the_data_is_named(make_model: Make) -> None:
     both = model.extrapolation(0.005, 0.5)
     assert both is not None
     assert both.endswith("; normal force extrapolated to 0.5 N an element, observed 0.002 to 0.3")
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "told"),
+    [
+        (("coefficients", 0), True, "coefficients, which is True, no number"),
+        (("coefficients", 0), "0.4", "coefficients, which is '0.4', no number"),
+        (("coefficients", 0), float("nan"), "coefficients, which is nan"),
+        (("covariance", 0, 0), -1.0, "covariance, with the variance -1"),
+        (("covariance", 0, 1), 1e-6, "covariance, which is not symmetric"),
+        (("covariance", 0, 0), 1e-30, "covariance, by which some friction has a negative variance"),
+        (("covariance", 2, 2), float("nan"), "covariance, which is nan"),
+        (("scale",), -1.0, "scale, which is -1; allowed: finite, 0 or more"),
+        (("degrees_of_freedom",), 0, "degrees_of_freedom, which is 0; allowed: finite, above 0"),
+        (("element_area",), 0.0, "element_area, which is 0; allowed: finite, above 0"),
+        (("domain", "normal_force"), [0.3, 0.1], "normal_force, from 0.3 to 0.1"),
+        (("identifiable", 1), "false", "identifiable, which is 'false', neither true nor false"),
+        (("scales", "between_sensors", "sensors", "left", "coefficients", 0), True, "coefficients, which is True"),
+        (("scales", "between_grasps", "value"), "0.1", "value, which is '0.1', no number"),
+    ],
+)
+def test_a_file_with_what_no_fit_gives_is_refused_by_name(
+    make_model: Make, tmp_path: Path, path: tuple[str | int, ...], value: object, told: str
+) -> None:
+    model = make_model()
+    off = np.array([[0.0, 1e-5, 0.0], [1e-5, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    replace(model, scales=OF_SENSORS, covariance=model.covariance + off).save(tmp_path / "paper.json")
+    FrictionModel.load(tmp_path / "paper.json")
+    whole = json.loads((tmp_path / "paper.json").read_text())
+    part = whole["model"]
+    for step in path[:-1]:
+        part = part[step]
+    part[path[-1]] = value
+    (tmp_path / "paper.json").write_text(json.dumps(whole))
+    with pytest.raises(InvalidArgument, match=re.escape(told)):
+        FrictionModel.load(tmp_path / "paper.json")
 
 
 def test_a_saved_model_comes_back_to_the_last_bit(make_model: Make, tmp_path: Path) -> None:

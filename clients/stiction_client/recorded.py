@@ -1,0 +1,62 @@
+"""Numbers as a service or a file gives them: numbers, and such as a fit can have."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from stiction_client.elementwise import FloatArray
+
+ROUNDING = 1e-6
+"""Share of the standard deviations by which a covariance may fall short of one: float64 leaves 1e-12."""
+
+
+def number(name: str, value: object, *, least: float = -math.inf, above: float = -math.inf) -> float:
+    """A finite number of at least ``least`` and above ``above``; raises ``ValueError`` naming another thing."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise ValueError(f"{name}, which is {value!r:.40}, no number")
+    found = float(value)
+    if not (math.isfinite(found) and found >= least and found > above):
+        allowed = f"above {above:g}" if math.isfinite(above) else f"{least:g} or more"
+        raise ValueError(f"{name}, which is {found:g}; allowed: finite, {allowed}")
+    return found
+
+
+def truth(name: str, value: object) -> bool:
+    """``true`` or ``false``; raises ``ValueError`` for another thing, which Python may take for either."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise ValueError(f"{name}, which is {value!r:.40}, neither true nor false")
+    return bool(value)
+
+
+def degrees_of_freedom(value: object) -> float:
+    """As JSON has them: null is infinitely many, a normal distribution."""
+    return math.inf if value is None else number("degrees_of_freedom", value, above=0.0)
+
+
+def span(name: str, values: Any) -> tuple[float, float]:
+    """A range whose ends stand in order."""
+    low, high = (number(name, each) for each in values)
+    if low > high:
+        raise ValueError(f"{name}, from {low:g} to {high:g}")
+    return low, high
+
+
+def coefficients(values: Any) -> FloatArray:
+    """Three finite numbers."""
+    return np.array([number("coefficients", each) for each in values], dtype=np.float64).reshape(3)
+
+
+def covariance(values: Any) -> FloatArray:
+    """[3, 3], symmetric and of no negative variance in any direction; raises ``ValueError``."""
+    found = np.array([[number("covariance", each) for each in row] for row in values], dtype=np.float64).reshape(3, 3)
+    variance = found.diagonal()
+    if (variance < 0.0).any():
+        raise ValueError(f"covariance, with the variance {variance.min():g}")
+    size = np.sqrt(np.outer(variance, variance))
+    if (np.abs(found - found.T) > ROUNDING * size).any():
+        raise ValueError("covariance, which is not symmetric")
+    correlation = np.divide(found, size, out=np.zeros_like(found), where=size > 0.0)
+    if (found[size == 0.0] != 0.0).any() or np.linalg.eigvalsh(correlation).min() < -ROUNDING:
+        raise ValueError("covariance, by which some friction has a negative variance")
+    return found
