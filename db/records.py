@@ -252,7 +252,8 @@ class Detection:
     ``noise`` m; ``seconds`` that the detection took; ``onsets`` … ``releases`` count events; ``findings`` against the
     log, None where an older version did not look for any; ``contact_friction``: None where nothing is known of it.
     ``calibration``: the version of its sensor's by which the log was corrected, and in ``corrections`` how; None where
-    there was none.
+    there was none. ``gel``: the mechanics of its sensor's gel as they were described then; None also where an older
+    version did not note them.
     """
 
     method: str
@@ -270,6 +271,7 @@ class Detection:
     contact_friction: ContactFriction | None = None
     calibration: int | None = None
     corrections: tuple[str, ...] | None = None
+    gel: Gel | None = None
 
 
 @dataclass(frozen=True, slots=True)

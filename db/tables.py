@@ -281,6 +281,7 @@ class DetectionRow(Base):
     contact_friction: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
     calibration: Mapped[int | None]
     corrections: Mapped[list[Any] | None] = mapped_column(JSON(none_as_null=True))
+    gel: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
     created_at: Mapped[datetime] = mapped_column(default=now)
 
 

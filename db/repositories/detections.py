@@ -6,7 +6,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Row, Select, delete, select, update
 from sqlalchemy.orm import Session
 
-from db.records import ContactFriction, Detection, Finding, SampledLog, SamplesOfLog, SampleSummary
+from db.records import ContactFriction, Detection, Finding, Gel, SampledLog, SamplesOfLog, SampleSummary
 from db.tables import DetectionRow, GraspLogRow, SampleSummaryRow, SensorRow
 
 
@@ -125,7 +125,9 @@ def detection_record(row: DetectionRow | None) -> Detection | None:
     findings = None if row.findings is None else tuple(Finding(**each) for each in row.findings)
     contact = None if row.contact_friction is None else ContactFriction(**row.contact_friction)
     corrections = None if row.corrections is None else tuple(row.corrections)
-    return Detection(**found | {"findings": findings, "contact_friction": contact, "corrections": corrections})
+    gel = None if row.gel is None else Gel(**row.gel)
+    told = {"findings": findings, "contact_friction": contact, "corrections": corrections, "gel": gel}
+    return Detection(**found | told)
 
 
 def samples_record(row: SampleSummaryRow | None, *, with_moments: bool = True) -> SampleSummary | None:

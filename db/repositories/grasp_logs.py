@@ -139,6 +139,14 @@ def restore(session: Session, log_id: str) -> bool:
     return was_withdrawn
 
 
+def change_sensor(session: Session, log_id: str, sensor: str) -> None:
+    """Let a log be another sensor's, as if it were sent now; raises ``NotFound``."""
+    row = _locked(session, log_id)
+    row.sensor_id = sensors.find_or_add(session, sensor)
+    row.calibration = calibrations.newest_version(session, row.sensor_id)
+    session.flush()
+
+
 def move(session: Session, source_id: int, target_id: int) -> None:
     """Give a material's logs to another; those that it has already, by content and detector, stay where they are.
 

@@ -138,6 +138,11 @@ def start_stage(session: Session, claim: Claim, stage: str, seconds: Mapping[str
     _change_claimed(session, claim, stage=stage, seconds=dict(seconds))
 
 
+def hold(session: Session, job_id: str) -> str:
+    """The status of a job, which nobody takes up or ends until the transaction ends."""
+    return session.execute(select(JobRow.status).where(JobRow.id == job_id).with_for_update()).scalar_one()
+
+
 def requeue(session: Session, job_id: str, requested_by: str | None = None) -> None:
     """Put a job that has ended back into the queue, as if it had just been added; nothing happens to another.
 

@@ -51,13 +51,16 @@ def _without_samples(log: GraspLog, history: SlipHistory) -> str:
 
 
 def _without_forces(log: GraspLog) -> str:
+    from service.domain.sensors import NAMELESS  # with the database, which local commands go without
+
     told = "the log has no forces; friction is tangential over normal force. "
     if left_out := log.metadata.get("columns_left_out"):
         told += f"If they are among the columns that were left out ({left_out[:80]}), say which in a mapping. "
-    return told + (
-        "If a sensor sees only its markers move, "
-        f"describe the gel of sensor {log.sensor!r}, from which forces follow, and send the log again"
-    )
+    if log.sensor in NAMELESS:
+        gel = "describe its gel, from which forces follow, and send the log again with the sensor's name (`sensor=`)"
+    else:
+        gel = f"describe the gel of sensor {log.sensor!r}, from which forces follow, and send the log again"
+    return f"{told}If a sensor sees only its markers move, {gel}"
 
 
 def _bound(contact: ContactFriction | None) -> str | None:

@@ -2,6 +2,8 @@
 
 from dataclasses import asdict
 
+from sqlalchemy.orm import Session
+
 from db.records import Gel, Sensor
 from db.repositories import sensors
 from service.domain import quotas
@@ -32,6 +34,7 @@ def describe(context: Context, name: str, gel: Gel, principal: Principal) -> Sen
     """
     check_name(name)
     with context.database.write() as session:
+        check_spelling(session, name)
         known = sensors.hold(session, name)
         if known.gel == gel:
             return known
@@ -45,6 +48,19 @@ def describe(context: Context, name: str, gel: Gel, principal: Principal) -> Sen
 def grasping(name: str) -> str:
     """The sensor that a log counts as in its material's fit: without a name all are one, however they came."""
     return UNNAMED if name in NAMELESS else name
+
+
+def as_found(session: Session, name: str) -> str:
+    """The sensor that a log names itself: without spaces at its ends, which nobody sees, unless it is stored so."""
+    if name == name.strip() or sensors.find(session, name) is not None:
+        return name
+    return name.strip() or UNNAMED
+
+
+def check_spelling(session: Session, name: str) -> None:
+    """Raises ``InvalidValue`` for a new name with spaces at its ends: two sensors would seem to have one."""
+    if as_found(session, name) != name:
+        raise InvalidValue("sensor", repr(name), "a name without spaces at its ends")
 
 
 def check_name(name: str) -> None:

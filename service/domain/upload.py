@@ -13,12 +13,19 @@ from db.blobs import Spool, disk_errors_named
 from db.errors import AlreadyExists, NotFound, StorageUnavailable
 from db.records import NewGraspLog, StoredGraspLog
 from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, stores, uploads
+from db.repositories import sensors as stored_sensors
 from service import formats
-from service.domain import curate, quotas
+from service.domain import curate, quotas, sensors
 from service.domain.context import Context
-from service.domain.errors import InvalidGraspLog, InvalidValue, UnsupportedFormat
+from service.domain.errors import (
+    InsufficientScope,
+    InvalidGraspLog,
+    InvalidValue,
+    ResultsNotReady,
+    UnsupportedFormat,
+)
 from service.domain.keys import check_not_ended
-from service.domain.ownership import check_may_add
+from service.domain.ownership import check_may_add, check_may_change
 from service.domain.principal import ANONYMOUS, Principal
 from service.domain.queueing import INGEST_METHODS, queue
 from service.domain.receive import UNPACKING_BYTES, check_encoding, check_expansion, check_size, unless_gone, unpack
@@ -64,6 +71,7 @@ class ReceivedLog:
     """A log on disk that is not stored yet; ``body_sha256``: of the bytes as they were sent.
 
     ``new_material``: the name of a material that is to be made known with it, of which ``log`` has no key.
+    ``names_sensor``: whether its sensor was named beside the body.
     """
 
     spool: Spool
@@ -71,6 +79,7 @@ class ReceivedLog:
     body_sha256: str
     principal: Principal
     new_material: str | None = None
+    names_sensor: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +120,7 @@ async def received(
             kept, description = await _unpack_and_read(context, spools, body, encoding, request)
         new_material = request.material if material_id is None else None
         log = _new_log(kept, description, request, material_id)
-        yield ReceivedLog(kept, log, body.sha256, request.principal, new_material)
+        yield ReceivedLog(kept, log, body.sha256, request.principal, new_material, request.sensor is not None)
 
 
 async def upload(context: Context, chunks: AsyncIterator[bytes], request: UploadRequest) -> StoredUpload:
@@ -153,15 +162,18 @@ def store(context: Context, received: ReceivedLog, make_rows: Callable[[Session]
 
 
 def accept(session: Session, context: Context, received: ReceivedLog) -> StoredUpload:
-    """Store a new log with its job; a known one that may end otherwise now has its job done again (``_may_differ``).
+    """Store a new log with its job; a known one that may end otherwise now has its job done again (``_may_differ``),
+    and so has one of which another sensor is named now.
 
     Key and quotas are looked at once more: it may have been revoked, and others of it stored, since this one's body
-    began. Raises ``KeyEnded``, ``NotOwner``, ``QuotaExceeded`` and ``StorageQuotaExceeded``.
+    began. Raises ``KeyEnded``, ``NotOwner``, ``QuotaExceeded``, ``StorageQuotaExceeded``, and for another sensor as
+    ``_change_sensor``.
     """
     settings, principal = context.settings, received.principal
     check_not_ended(session, principal.key_id)
     quotas.lock(session, settings, principal.key_id)
-    log = replace(received.log, material_id=_material(session, context.settings, received))
+    material_id, sensor = _material(session, settings, received), sensors.as_found(session, received.log.sensor)
+    log, told = replace(received.log, material_id=material_id, sensor=sensor), dict[str, object]()
     quotas.check_log(session, settings, principal.key_id, log)
     try:
         log_id, is_new = grasp_logs.add(session, log), True
@@ -177,14 +189,18 @@ def accept(session: Session, context: Context, received: ReceivedLog) -> StoredU
     except AlreadyExists:
         log_id, is_new = grasp_logs.find_id(session, log.sha256, log.material_id, log.detector), False
         known = grasp_logs.get(session, log_id)
-        if not _may_differ(session, known):
+        is_others = received.names_sensor and known.sensor != sensor
+        if not is_others and not _may_differ(session, known):
             return StoredUpload(known, is_new)
         quotas.check_job(session, settings, principal.key_id)
+        if is_others:
+            _change_sensor(session, known, material_id, sensor, principal)
+            told = {"sensor": sensor, "sensor_before": known.sensor}
         if known.job.status in {"done", "refused"}:
             _forget(session, log_id, log.material_id)
         jobs.requeue(session, known.job.id, requested_by=principal.key_id)
     stored = grasp_logs.get(session, log_id)
-    told = {"material": stored.material, "sha256": stored.sha256, "bytes": stored.bytes, "new": is_new}
+    told |= {"material": stored.material, "sha256": stored.sha256, "bytes": stored.bytes, "new": is_new}
     audit.add(session, principal.actor, "grasp_log.uploaded", log_id, told)
     return StoredUpload(stored, is_new)
 
@@ -196,17 +212,34 @@ def _forget(session: Session, log_id: str, material_id: int | None) -> None:
     detections.remove(session, log_id)
 
 
+def _change_sensor(
+    session: Session, log: StoredGraspLog, material_id: int | None, sensor: str, principal: Principal
+) -> None:
+    """Let a stored log be another sensor's: that of who sent it, or of whom its material is.
+
+    Raises ``InsufficientScope`` and ``NotOwner``, and ``ResultsNotReady`` while its job goes by the sensor before.
+    """
+    if log.uploaded_by != principal.key_id:
+        if material_id is not None:
+            check_may_change(session, material_id, principal)
+        elif not principal.is_admin:
+            raise InsufficientScope("upload", "admin")
+    if jobs.hold(session, log.job.id) == "running":
+        raise ResultsNotReady(log.job.id, "running")
+    grasp_logs.change_sensor(session, log.id, sensor)
+
+
 def _may_differ(session: Session, log: StoredGraspLog) -> bool:
     """Whether a job that has ended may end otherwise: it failed, which is our fault, was cancelled, or the log's forces
-    follow from its sensor's gel, or would have, and that was described since.
+    follow from its sensor's gel, or would have, and that is described otherwise than when they were looked for.
     """
-    job = log.job
+    job, found = log.job, log.detection
     if job.status in {"failed", "cancelled"}:
         return True
-    found = () if log.detection is None else log.detection.findings or ()
-    by_gel = job.status == "refused" or any(finding.name == RECONSTRUCTED for finding in found)
-    ended = job.finished_at
-    return by_gel and ended is not None and audit.is_recorded(session, "sensor.described", log.sensor, ended)
+    findings = () if found is None else found.findings or ()
+    by_gel = job.status == "refused" or any(finding.name == RECONSTRUCTED for finding in findings)
+    known = stored_sensors.get(session, log.sensor).gel
+    return by_gel and job.finished_at is not None and known != (None if found is None else found.gel)
 
 
 def _material(session: Session, settings: Settings, received: ReceivedLog) -> int | None:
@@ -235,6 +268,8 @@ def _check(context: Context, request: UploadRequest) -> int | None:
     except InvalidInput as error:
         raise InvalidValue(error.name, error.value, error.allowed) from error
     with context.database.read() as session:
+        if request.sensor is not None:
+            sensors.check_spelling(session, request.sensor)
         if request.material is None:
             return None
         try:

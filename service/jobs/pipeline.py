@@ -19,7 +19,7 @@ import estimators
 import slipcore
 from db.blobs import BlobStore, disk_errors_named
 from db.database import Database
-from db.records import Claim, Job, NewModel, SamplesOfLog, SampleSummary
+from db.records import Claim, Gel, Job, NewModel, SamplesOfLog, SampleSummary
 from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, materials_of_logs, sensors
 from estimators import EstimatorError, FrictionModel, Moments, ScatterPrior
 from estimators.method_names import SCATTER_METHODS
@@ -153,9 +153,12 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         return stored.samples
     with run.stage("frames"), disk_errors_named():
         log = formats.read(run.blobs.path(stored.sha256))
+        if log.sensor != stored.sensor:  # it was named beside the file
+            log = replace(log, sensor=stored.sensor)
     with run.database.read() as session:
         correction = corrected(session, log, stored.sensor, stored.calibration, stored.detector)
-    log, reconstruction = _with_forces(run, correction.log, stored.sensor)
+        gel = sensors.get(session, stored.sensor).gel
+    log, reconstruction = _with_forces(run, correction.log, gel)
     with run.stage("slip_state"):
         history = slipcore.detect_slip(
             log, method=stored.detector, lookahead=slipcore.LOOKAHEAD, sensor_model=None, **correction.options
@@ -168,7 +171,7 @@ def find_samples(run: Run, log_id: str) -> SampleSummary:
         detection = summarise_history(
             history, run.seconds["slip_state"], blob, findings, found.contact, is_scaled=log.is_scaled
         )
-        detection = replace(detection, calibration=correction.version, corrections=correction.changed)
+        detection = replace(detection, calibration=correction.version, corrections=correction.changed, gel=gel)
         summary = summarise_samples(samples, none_because, run.blobs.put(encode_samples(samples)))
     with run.database.write() as session:
         materials_of_logs.hold(session, log_id)
@@ -201,13 +204,9 @@ def fit_material(run: Run) -> None:
         _store_models(run, session, material_id, models)
 
 
-def _with_forces(run: Run, log: GraspLog, sensor: str) -> "tuple[GraspLog, Reconstruction | None]":
+def _with_forces(run: Run, log: GraspLog, gel: Gel | None) -> "tuple[GraspLog, Reconstruction | None]":
     """The log, with reconstructed forces where it has none and its sensor's gel is described."""
-    if not needs_forces(log):
-        return log, None
-    with run.database.read() as session:
-        gel = sensors.get(session, sensor).gel
-    if gel is None:
+    if gel is None or not needs_forces(log):
         return log, None
     with run.stage("forces"):
         limits.require(bytes_needed(log))

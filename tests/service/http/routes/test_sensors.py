@@ -1,5 +1,6 @@
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from typing import Any
 from urllib.parse import quote
 
@@ -11,9 +12,9 @@ from sqlalchemy import update
 from benchmarks.calibration.presses import Faults, pressed
 from db.blobs import BlobStore
 from db.database import Database
-from db.records import NewCalibration
+from db.records import Gel, NewCalibration
 from db.repositories import calibrations, detections, jobs, materials, runners, sensors
-from db.tables import DetectionRow
+from db.tables import DetectionRow, JobRow
 from service.domain.calibrate import OFFSET, corrected
 from service.domain.reconstruct import RECONSTRUCTED
 from service.domain.sensors import NAMELESS
@@ -177,6 +178,117 @@ def test_models_of_a_log_that_is_looked_at_again_are_outdated_meanwhile(
     assert [stored.outdated for stored in models] == [True, True]
     answer = lab.request("GET", "/v1/materials/paper/friction", params={"fn": 0.05}).raise_for_status().json()
     assert "the model is outdated" in answer["warning"]
+
+
+def lab_that_sends(reach: Callable[..., Any], content: bytes, key: str = "") -> Callable[..., httpx.Response]:
+    lab = reach("open", key=key)
+
+    def send(**query: str) -> httpx.Response:
+        answer: httpx.Response = lab.request(
+            "POST", "/v1/grasp-logs", params=query, content=content, headers={"content-type": NPZ}
+        )
+        return answer
+
+    return send
+
+
+def run_next(database: Database, blobs: BlobStore) -> None:
+    with database.write() as session:
+        claim = jobs.claim(session, runners.add(session, "host:1"))
+    assert claim is not None
+    pipeline.run_job(database, blobs, claim)
+
+
+def test_another_sensor_of_a_stored_log_is_taken_over_and_the_log_looked_at_again(
+    reach: Callable[..., Any], database: Database, blobs: BlobStore, content: bytes
+) -> None:
+    reach("open").request("POST", "/v1/materials", json={"name": "paper"})
+    send = lab_that_sends(reach, content)
+    log = send(material="paper", sensor="left").json()
+    run_next(database, blobs)
+    assert send(material="paper").json()["sensor"] == "left"
+    again = send(material="paper", sensor="right")
+    told = again.json()
+    assert (again.status_code, told["id"], told["sensor"]) == (200, log["id"], "right")
+    assert (told["job"]["status"], told["detection"]) == ("queued", None)
+    with database.read() as session:
+        assert [stored.outdated for stored in materials.get(session, "paper").models] == [True, True]
+    run_next(database, blobs)
+    assert send(material="paper", sensor="right").json()["job"]["status"] == "done"
+    entries = reach("open").get("/v1/audit?action=grasp_log.uploaded").json()["items"]
+    changes = [entry["details"] for entry in entries if "sensor" in entry["details"]]
+    assert [(each["sensor_before"], each["sensor"]) for each in changes] == [("left", "right")]
+
+
+def test_a_sensor_is_not_changed_while_its_job_runs(
+    reach: Callable[..., Any], database: Database, content: bytes
+) -> None:
+    send = lab_that_sends(reach, content)
+    send(sensor="left").raise_for_status()
+    assert send(sensor="middle").json()["sensor"] == "middle"
+    with database.write() as session:
+        jobs.claim(session, runners.add(session, "host:1"))
+    refused = send(sensor="right")
+    assert (refused.status_code, refused.json()["type"]) == (409, "/problems/not-ready")
+    assert send().json()["sensor"] == "middle"
+
+
+def test_another_keys_log_keeps_its_sensor(reach: Callable[..., Any], make: Callable[..., str], content: bytes) -> None:
+    first, other, admin = (lab_that_sends(reach, content, make(scope)) for scope in ("upload", "upload", "admin"))
+    first(sensor="left").raise_for_status()
+    refused = other(sensor="right")
+    assert (refused.status_code, refused.json()["type"]) == (403, "/problems/insufficient-scope")
+    assert other().json()["sensor"] == "left"
+    assert first(sensor="middle").json()["sensor"] == "middle"
+    assert admin(sensor="right").json()["sensor"] == "right"
+
+
+def test_a_log_is_looked_at_again_whatever_the_trail_holds_and_the_clocks_say(
+    reach: Callable[..., Any], database: Database, blobs: BlobStore, ramp: GraspLog
+) -> None:
+    few = ramp.displacement[60::15, 2:6, 2:6]
+    send = lab_that_sends(reach, encode(GraspLog(ramp.time[60::15], ramp.position[2:6, 2:6], few, ramp.element_area)))
+    reach("open").request("POST", "/v1/materials", json={"name": "paper"})
+    asked = {"material": "paper", "sensor": "gel"}
+    send(**asked).raise_for_status()
+    run_next(database, blobs)
+    assert send(**asked).json()["job"]["status"] == "refused"
+    with database.write() as session:
+        sensors.describe(session, "gel", Gel(**GEL))  # of which no entry tells
+        ahead = datetime.now(UTC) + timedelta(hours=1)
+        session.execute(update(JobRow).values(finished_at=ahead))
+    assert send(**asked).json()["job"]["status"] == "queued"
+    run_next(database, blobs)
+    assert send(**asked).json()["job"]["status"] != "queued"
+
+
+def test_who_names_no_sensor_is_told_to_name_one(
+    reach: Callable[..., Any], database: Database, blobs: BlobStore, ramp: GraspLog
+) -> None:
+    blind = replace(ramp, force=None, normal=None, object_pose=None, truth=None, sensor=frames.UNNAMED)
+    send = lab_that_sends(reach, encode(blind))
+    reach("open").request("POST", "/v1/materials", json={"name": "paper"})
+    send(material="paper").raise_for_status()
+    run_next(database, blobs)
+    reason = send(material="paper").json()["job"]["reason"]
+    assert "send the log again with the sensor's name (`sensor=`)" in reason
+    named = send(material="paper", sensor="gel").json()
+    assert (named["sensor"], named["job"]["status"]) == ("gel", "queued")
+    run_next(database, blobs)
+    assert "describe the gel of sensor 'gel'" in send(material="paper").json()["job"]["reason"]
+
+
+def test_a_new_name_has_no_spaces_at_its_ends(reach: Callable[..., Any], database: Database, ramp: GraspLog) -> None:
+    lab, send = reach("open"), lab_that_sends(reach, encode(replace(ramp, sensor=" left  ")))
+    for name in ("left ", " left"):
+        refused = [send(sensor=name), lab.request("PUT", f"/v1/sensors/{quote(name)}", json=GEL)]
+        assert {answer.status_code for answer in refused} == {422}
+        assert refused[0].json()["allowed"] == refused[1].json()["allowed"] == "a name without spaces at its ends"
+    assert send().json()["sensor"] == "left"
+    with database.write() as session:
+        sensors.find_or_add(session, "old ")  # by an earlier version
+    assert lab.request("PUT", "/v1/sensors/old%20", json=GEL).json()["gel"] == GEL
+    assert send(sensor="old ").json()["sensor"] == "old "
 
 
 FAULTS = Faults(crosstalk=(0.08, 0.0), gain=1.1, marker_noise=1e-6, force_noise=2e-3)
