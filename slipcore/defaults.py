@@ -649,12 +649,28 @@ class CheckOptions(Options):
         int, Option(1, 1000000, "frames", "places are there in any frame; of long logs a few")
     ] = 9
     """Evenly chosen over the log, of whose mean that is taken."""
+    area_factor: Annotated[float, Option(1.0, 1e6, "-", "taxels with gaps fill a quarter of their cell")] = 4.5
+    """Largest factor between an element's area and its cell of the lattice, either way."""
     repeated_share: Annotated[float, Option(0.0, 1.0, "-", "noise makes no two readings alike")] = 0.05
     """Largest share of frames that are copies of the one before."""
     largest_pressure: Annotated[float, Option(0.0, 1e12, "Pa", "gels tear and fingertips hurt below 1 MPa")] = 5e6
     """Largest normal force over element area."""
     saturated_share: Annotated[float, Option(0.0, 1.0, "-", "one element has the largest, four by symmetry")] = 0.05
     """Largest share of the elements in contact that reach the largest reading, to the last digit."""
+    rest_share: Annotated[float, Option(0.0, 1.0, "-", "linear gels bear no larger share of the force then")] = 0.03
+    """Of the contact's largest mean displacement, up to which its markers are at rest."""
+    least_rest: Annotated[int, Option(2, 1000000, "frames", "a variance to a factor of two")] = 4
+    """Frames at rest from which the forces in them count as the sensor's zero."""
+    zero_share: Annotated[float, Option(0.0, 10.0, "-", "friction of 0.4 is off by 6 % then; scenes to 0.01")] = 0.025
+    """Largest root mean square of what elements read at rest, as a share of their normal force in the grasp."""
+    least_held: Annotated[int, Option(3, 1000000, "frames", "a line and what it leaves")] = 8
+    """Frames in which the contact is pressed, from which forces are compared with the markers."""
+    least_moved: Annotated[float, Option(0.0, 1.0, "-", "the line is hardly drawn beyond what was seen")] = 0.3
+    """Share of the largest mean displacement, over force, that some frame must stay below."""
+    lean: Annotated[float, Option(0.0, 10.0, "-", "scenes 0.004, Tac3D's recordings 0.02 to 0.06")] = 0.08
+    """Largest sideways force over normal force where no marker moves sideways."""
+    turn: Annotated[float, Option(0.0, 180.0, "°", "Tac3D's recordings 4 to 18; an exchange of axes is 90")] = 45.0
+    """Largest angle between the directions of forces and of markers."""
     no_load: Annotated[float, Option(0.0, 10.0, "-", "well below any friction coefficient")] = 0.1
     """Ratio of the contact's tangential load, force and moment, to its normal force below which it is unloaded."""
     sideways_share: Annotated[float, Option(0.0, 10.0, "-", "scenes up to 0.20, recordings 0.34 and 0.36")] = 0.25

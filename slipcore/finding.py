@@ -12,6 +12,7 @@ SEVERITIES: dict[str, Severity] = {
     "slow frames": "note",
     "no displacement": "note",
     "places for displacement": "warning",
+    "element area": "warning",
     "repeated frames": "note",
     "force too large": "warning",
     "force pulls": "warning",
@@ -21,6 +22,9 @@ SEVERITIES: dict[str, Severity] = {
     "smoothed": "note",
     "saturation": "warning",
     "no rest": "note",
+    "zero offset": "warning",
+    "leaning forces": "warning",
+    "turned axes": "warning",
     "sideways force without load": "warning",
     "contact travels": "warning",
     "no slip": "note",
@@ -29,8 +33,8 @@ SEVERITIES: dict[str, Severity] = {
     "scatter beyond noise": "warning",
     "contact contradicts elements": "note",
 }
-"""Of each finding's name. After a warning the ratio of an element's forces, or the force at which it was seen, is not
-the material's: models of such logs are implausible.
+"""Of each finding's name. After a warning the ratio of an element's forces, the force at which it was seen, or the area
+by which a grip follows from it is not the material's: models of such logs are implausible.
 """
 
 

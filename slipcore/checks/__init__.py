@@ -7,6 +7,7 @@ have measured, and at what a friction coefficient cannot depend on.
 import numpy as np
 
 from slipcore.checks import contact, friction, recording
+from slipcore.checks import forces as force_checks
 from slipcore.checks.subject import Check, Subject
 from slipcore.defaults import CheckOptions, choose_options
 from slipcore.element_forces import element_forces
@@ -24,12 +25,15 @@ CHECKS: tuple[Check, ...] = (
     recording.time_unit,
     recording.still_markers,
     recording.places_for_displacement,
+    recording.element_area,
     recording.repeated_frames,
     recording.force_unit,
     recording.force_sign,
     recording.saturation,
     recording.rest_in_contact,
     recording.found_by_detector,
+    force_checks.zero_offset,
+    force_checks.force_frame,
     contact.load_free_tangential_force,
     contact.moving_contact,
     friction.no_slip,
@@ -53,11 +57,12 @@ def check_log(
     ``defaults.CheckOptions``. Raises ``InvalidInput`` for an option that does not exist or is out of its range.
     """
     limits = choose_options(CheckOptions, options)
-    forces = None if log.force is None else element_forces(log.force, normals_of(log))
+    normal = None if log.force is None else normals_of(log)
+    forces = None if log.force is None or normal is None else element_forces(log.force, normal)
     pressing = np.zeros(log.displacement.shape[:3]) if forces is None else np.maximum(forces.pressing, 0.0)
     samples = _samples(log, history) if samples is None else samples
     contact = contact_friction(log.time, history.patches)
-    subject = Subject(log, history, forces, pressing, samples, contact, limits)
+    subject = Subject(log, history, forces, normal, pressing, samples, contact, limits)
     return [finding for check in CHECKS for finding in check(subject)]
 
 

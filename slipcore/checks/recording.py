@@ -38,6 +38,20 @@ def places_for_displacement(seen: Subject) -> Iterator[Finding]:
         yield Finding("places for displacement", evidence, remedy)
 
 
+def element_area(seen: Subject) -> Iterator[Finding]:
+    """An area of elements that their lattice contradicts: how hard to grip goes by it."""
+    if min(seen.log.grid) < 2:
+        return
+    along, across = (np.diff(seen.log.position, axis=axis).mean(axis=(0, 1)) for axis in (0, 1))
+    cell = float(np.linalg.norm(np.cross(along, across)))
+    factor = seen.log.element_area / cell if cell else 1.0
+    if max(factor, 1.0 / factor) > seen.limits.area_factor:
+        evidence = (
+            f"elements of {1e6 * seen.log.element_area:.3g} mm² lie on a lattice of {1e6 * cell:.3g} mm² an element"
+        )
+        yield Finding("element area", evidence, "give the area of one element, in m², or the lattice's true pitch")
+
+
 def repeated_frames(seen: Subject) -> Iterator[Finding]:
     """A sensor that is slower than its recorder, or frozen."""
     fields = [field for field in (seen.log.displacement, seen.log.force) if field is not None and field.any()]

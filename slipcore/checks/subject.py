@@ -14,7 +14,8 @@ from slipcore.slip_state import SlipHistory
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Subject:
-    """What the checks look at; ``forces``, with pressing parts [t, n, m] N, and ``samples`` where there are any.
+    """What the checks look at; ``forces``, with pressing parts [t, n, m] N and the ``normal`` [t, n, m, 3] at which
+    they are split, and ``samples``, where there are any.
 
     ``contact``: friction of the contact as a whole, None without forces or contact.
     ``total``: normal force of all elements, [t] N; ``held``: frames with at least half of the largest, [t].
@@ -23,6 +24,7 @@ class Subject:
     log: GraspLog
     history: SlipHistory
     forces: ElementForces | None
+    normal: FloatArray | None
     pressing: FloatArray
     samples: FrictionSamples | None
     contact: ContactFriction | None

@@ -117,6 +117,17 @@ def before_shear(log: GraspLog) -> GraspLog:
     return log.take(slice(0, 27))
 
 
+def with_offset(log: GraspLog, *offset: float) -> GraspLog:
+    """Each element reads so many N more than there are."""
+    return with_force(log, np.asarray(log.force) + np.array(offset))
+
+
+def leaning(log: GraspLog, degrees: float) -> GraspLog:
+    """Forces in a frame that is turned about y against that of the markers."""
+    sine, cosine = np.sin(np.radians(degrees)), np.cos(np.radians(degrees))
+    return with_force(log, np.asarray(log.force) @ np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]]))
+
+
 FAULTS: dict[str, Callable[[GraspLog], GraspLog]] = {
     "slow frames": lambda log: replace(log, time=1e3 * log.time),
     "places for displacement": with_places,
@@ -126,6 +137,10 @@ FAULTS: dict[str, Callable[[GraspLog], GraspLog]] = {
     "force pulls": lambda log: with_force(log, -np.asarray(log.force)),
     "saturation": saturated,
     "no rest": lambda log: log.take(slice(30, None)),
+    "element area": lambda log: replace(log, element_area=10.0 * log.element_area),
+    "zero offset": lambda log: with_offset(log, 0.005, 0.0, 0.0),
+    "leaning forces": lambda log: leaning(log, 8.0),
+    "turned axes": lambda log: with_force(log, np.asarray(log.force)[..., [1, 0, 2]]),
     "sideways force without load": with_sideways,
     "contact travels": rolling,
     "no slip": before_shear,
@@ -149,6 +164,46 @@ def test_nothing_is_found_in_a_log_without_fault(long_ramp: GraspLog, short_ramp
 @pytest.mark.parametrize("name", ["cond1", "cond1_layer5c", "reversal", "ring"])
 def test_nothing_but_its_beginning_is_found_in_scenes_of_another_solver(name: str, scene: Scene) -> None:
     assert names(scene(name, marker_noise=3e-6, force_noise=2e-3)) <= {"no rest"}
+
+
+@pytest.mark.parametrize(
+    "offset", [(0.0, 0.0, -0.01), (0.0, 0.0, -0.03), (0.0, 0.0, 0.01), (-0.01, 0.0, 0.0), (0.0, 0.01, 0.0)]
+)
+def test_a_zero_that_is_off_is_found_along_each_axis(long_ramp: GraspLog, offset: tuple[float, ...]) -> None:
+    assert "zero offset" in names(with_offset(long_ramp, *offset))
+
+
+def test_a_zero_is_not_sought_where_the_markers_took_theirs_in_touch(long_ramp: GraspLog) -> None:
+    """As with `rest=first` of a recording that begins pressed: forces are right there, and markers are at 0."""
+    begun = long_ramp.take(slice(25, None))
+    assert "zero offset" not in names(replace(begun, displacement=begun.displacement - begun.displacement[:5].mean(0)))
+
+
+@pytest.mark.parametrize("degrees", [-20.0, -8.0, 20.0])
+def test_a_leaning_frame_is_found_whichever_way_it_leans(long_ramp: GraspLog, degrees: float) -> None:
+    assert "leaning forces" in names(leaning(long_ramp, degrees))
+
+
+@pytest.mark.parametrize("signs", [(-1, 1, 1), (1, -1, 1), (-1, -1, 1)])
+def test_axes_that_are_turned_are_found_where_the_load_shows_them(signs: tuple[int, ...], scene: Scene) -> None:
+    """The load of this scene goes along x alone, so that a turned y is not seen, and changes nothing."""
+    log = scene("reversal", marker_noise=3e-6, force_noise=2e-3)
+    assert ("turned axes" in names(with_force(log, np.asarray(log.force) * np.array(signs)))) == (signs[0] < 0)
+
+
+def test_of_a_dome_the_normals_are_taken_off(long_ramp: GraspLog) -> None:
+    """All of a log turned by 20° together leans in no frame of its own."""
+    sine, cosine = np.sin(np.radians(20.0)), np.cos(np.radians(20.0))
+    turn = np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]])
+    normal = np.broadcast_to([0.0, 0.0, 1.0], long_ramp.displacement.shape) @ turn
+    turned = replace(
+        leaning(long_ramp, 20.0),
+        position=long_ramp.position @ turn,
+        displacement=long_ramp.displacement @ turn,
+        normal=normal,
+        object_pose=None,
+    )
+    assert "leaning forces" not in names(turned)
 
 
 def test_places_are_found_without_forces_and_whichever_way_the_lattice_lies(short_ramp: GraspLog) -> None:

@@ -1,0 +1,111 @@
+"""Checks of forces against the markers: their zero, and the frame in which they are given.
+
+Friction takes the ratio of two components of force, so that a zero that is off or a leaning frame changes it wherever
+it is measured, and alike: neither force, place nor scatter shows it. The markers do.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from slipcore.checks.subject import Subject
+from slipcore.finding import Finding
+from slipcore.frames import BoolArray, FloatArray
+
+ComplexArray = NDArray[np.complex128]
+
+
+def zero_offset(seen: Subject) -> Iterator[Finding]:
+    """Forces where nothing touches: in the frames in which the markers have not moved yet, or no longer are."""
+    force, touched = _measured(seen), _touched(seen)
+    if force is None or not touched.any():
+        return
+    moved = np.linalg.norm(seen.log.displacement[:, touched].mean(axis=1), axis=-1)
+    rest = moved <= seen.limits.rest_share * moved.max(initial=0.0)
+    if not moved.any() or np.count_nonzero(rest) < seen.limits.least_rest:
+        return
+    read, held = np.median(force[rest], axis=0), np.median(seen.pressing[seen.held], axis=0)
+    if _is_contact(-read[..., 2], held):  # the zero of the markers was taken during a touch
+        return
+    noise = 0.5 * np.pi * force[rest][:, touched].var(axis=0, ddof=1) / np.count_nonzero(rest)  # of medians, squared
+    off = float(np.sqrt(max((read[touched] ** 2 - noise).mean(axis=0).sum(), 0.0)))
+    share = off / float(held[touched].mean())
+    if share > seen.limits.zero_share:
+        evidence = f"elements read {1e3 * off:.2g} mN while nothing moves them, {share:.0%} of their force in the grasp"
+        yield Finding("zero offset", evidence, "zero the sensor before each grasp, with nothing in touch")
+
+
+def _is_contact(read: FloatArray, held: FloatArray) -> bool:
+    """Whether forces [n, m] lie over the elements as those of the grasp do, which those of a wrong zero do not."""
+    if not read.any() or np.ptp(held) == 0.0 or np.ptp(read) == 0.0:
+        return False
+    return bool(np.corrcoef(read.ravel(), held.ravel())[0, 1] > 0.5)
+
+
+def force_frame(seen: Subject) -> Iterator[Finding]:
+    """Forces sideways that do not go with the markers: these say when the contact is pressed, and where it is pulled.
+
+    A gel is elastic: the sum of tangential forces follows that of the markers' displacement, whatever slips above it.
+    """
+    force = _measured(seen)
+    if force is None or np.count_nonzero(seen.held) < seen.limits.least_held:
+        return
+    moved, ratio = _sideways(seen, seen.log.displacement), _sideways(seen, force)
+    largest = float(np.abs(moved).max())
+    if largest == 0.0:
+        return
+    moved = moved / largest
+    (follows, alone), left = _line(moved, ratio)
+    (mirrored, _), left_mirrored = _line(moved.conj(), ratio)
+    turned = float(np.degrees(np.angle(follows)))
+    if np.abs(moved).min() < seen.limits.least_moved and abs(alone) > max(seen.limits.lean, 2.0 * left):
+        evidence = (
+            f"{abs(alone):.2f} of the normal force points sideways where no marker moves so: "
+            f"forces lean by {np.degrees(np.arctan(abs(alone))):.0f}° against the markers"
+        )
+        remedy = "give forces in the sensor's frame, z along its outward normal; calibrate crosstalk by a pure press"
+        yield Finding("leaning forces", evidence, remedy)
+    told = max(seen.limits.no_load, 2.0 * left)
+    if abs(mirrored) > told and left > 2.0 * left_mirrored + seen.limits.no_load:
+        yield _turned("forces go with the markers as in a mirror: two axes are exchanged, or one is reversed")
+    elif abs(follows) > told and abs(turned) > seen.limits.turn:
+        yield _turned(f"forces point {abs(turned):.0f}° away from where the markers go")
+
+
+def _turned(evidence: str) -> Finding:
+    return Finding(
+        "turned axes", evidence, "give forces and markers in one frame: turn or exchange axes in the mapping"
+    )
+
+
+def _sideways(seen: Subject, field: FloatArray) -> ComplexArray:
+    """Sum over the contact of a field's tangential part, x + iy, over the normal force, in frames held.
+
+    Along the normals of a dome forces and markers go by two other ratios.
+    """
+    assert seen.normal is not None
+    normal, touching = seen.normal[seen.held], seen.history.contact[seen.held]
+    chosen = np.where(touching[..., None], field[seen.held], 0.0)
+    pressed = np.einsum("tnmi,tnmi->tnm", chosen, normal)
+    along = chosen[..., :2].sum(axis=(1, 2)) - np.einsum("tnm,tnmi->ti", pressed, normal[..., :2])
+    return np.asarray((along[:, 0] + 1j * along[:, 1]) / seen.total[seen.held])
+
+
+def _line(moved: ComplexArray, ratio: ComplexArray) -> tuple[tuple[complex, complex], float]:
+    """Slope and intercept of what goes with ``moved``, and the standard deviation of the rest."""
+    terms = np.stack([moved, np.ones_like(moved)], axis=-1)
+    found = np.linalg.lstsq(terms, ratio, rcond=None)[0]
+    return (complex(found[0]), complex(found[1])), float((ratio - terms @ found).std())
+
+
+def _touched(seen: Subject) -> BoolArray:
+    """Elements that touch in most of the frames held, [n, m]."""
+    if not seen.held.any():
+        return np.zeros(seen.log.grid, bool)
+    return np.asarray(seen.history.contact[seen.held].mean(axis=0) > 0.5)
+
+
+def _measured(seen: Subject) -> FloatArray | None:
+    """Forces that a sensor measured; those that follow from the markers contradict them in nothing."""
+    return None if seen.log.metadata.get("force") == "reconstructed" else seen.log.force
