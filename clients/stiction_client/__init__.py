@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from stiction_client import problems
 from stiction_client.errors import (
+    AnswerTimedOut,
     ConnectionFailed,
     InvalidArgument,
     JobCancelled,
@@ -128,6 +129,7 @@ _LAZY = {
 __version__ = version("stiction-client")
 
 __all__ = [
+    "AnswerTimedOut",
     "AsyncFrictionClient",
     "AuditEntry",
     "Command",

@@ -288,11 +288,10 @@ def next_grasp(name: str, working_point: Mapping[str, float | str | None]) -> Ca
     return _record(NextGrasp.from_json, answer)
 
 
-def recognise(grasp: Any, materials: Sequence[str] | None, method: str | None) -> Call[Recognition]:
+def recognise(grasp: Any, materials: Sequence[str] | None, method: str | None, sensor: str | None) -> Call[Recognition]:
     """Ask which material a grasp was of."""
     body = {**_grasp(grasp), "materials": None if materials is None else list(materials)}
-    if method is not None:
-        body["method"] = method
+    body |= _given(method=method, sensor=sensor)
     return _record(Recognition.from_json, (yield from _ask(Request("POST", "/v1/recognise", json=body))))
 
 

@@ -178,13 +178,21 @@ class FrictionClient:
         bounds = {"load": load, "drop_probability": drop_probability}
         return self._run(calls.next_grasp(name, asked | bounds))
 
-    def recognise(self, grasp: Any, materials: Sequence[str] | None = None, method: str | None = None) -> Recognition:
+    def recognise(
+        self,
+        grasp: Any,
+        materials: Sequence[str] | None = None,
+        method: str | None = None,
+        *,
+        sensor: str | None = None,
+    ) -> Recognition:
         """Which material a grasp was of: a stored log (its receipt or id), or friction samples as slipcore gives them.
 
         ``materials``: which it may be, at most 100; without, all that have a model. Compared are the models of
-        ``method``, or without one each material's recommended one.
+        ``method``, or without one each material's recommended one, as the ``sensor`` shows them, without one a stored
+        log's own.
         """
-        return self._run(calls.recognise(grasp, materials, method))
+        return self._run(calls.recognise(grasp, materials, method, sensor))
 
     def fit(self, name: str, method: str = "auto", seed: int = 0) -> Job:
         """Fit a material over all its grasp logs; follow with ``wait``."""
@@ -387,10 +395,15 @@ class AsyncFrictionClient:
         return await self._run(calls.next_grasp(name, asked | bounds))
 
     async def recognise(
-        self, grasp: Any, materials: Sequence[str] | None = None, method: str | None = None
+        self,
+        grasp: Any,
+        materials: Sequence[str] | None = None,
+        method: str | None = None,
+        *,
+        sensor: str | None = None,
     ) -> Recognition:
         """As ``FrictionClient.recognise``."""
-        return await self._run(calls.recognise(grasp, materials, method))
+        return await self._run(calls.recognise(grasp, materials, method, sensor))
 
     async def fit(self, name: str, method: str = "auto", seed: int = 0) -> Job:
         """As ``FrictionClient.fit``."""

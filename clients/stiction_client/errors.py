@@ -23,6 +23,10 @@ class ConnectionFailed(StictionError):
     """The service could not be reached, or the connection broke or timed out."""
 
 
+class AnswerTimedOut(ConnectionFailed, TimeoutError):
+    """A live stream's answer has not come in time."""
+
+
 class ProblemError(StictionError):
     """The service refused a request (RFC 9457 problem).
 

@@ -14,7 +14,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from stiction_client.arguments import within
 from stiction_client.controller import ControlSettings, gains
-from stiction_client.errors import ConnectionFailed, UnexpectedAnswer
+from stiction_client.errors import AnswerTimedOut, ConnectionFailed, UnexpectedAnswer
 
 RESUMABLE = (1001, 1006, 1012, 4503)
 """Codes of a connection after whose end its session goes on: the server stops or cannot store now."""
@@ -34,7 +34,8 @@ class SlipStream:
     ``command`` of one that runs in the service, and begins with the ``material``'s model unless it is not to be
     ``known``, and where it has none recognises which of ``materials`` this is; frames then need forces, or a ``sensor``
     whose gel the service knows. A connection that breaks is taken up again, with the frames that were not answered.
-    Raises ``ConnectionFailed`` with the service's reason where it refuses.
+    Raises ``ConnectionFailed`` with the service's reason where it refuses, and ``AnswerTimedOut`` where an answer is
+    late: it may be waited for again.
     """
 
     def __init__(
@@ -59,8 +60,8 @@ class SlipStream:
         self._session, self._number, self._answered = "", 0, -1
         self._waiting: deque[tuple[int, bytes]] = deque()
         opening: dict[str, Any] = {"type": "open", "position": rest.tobytes(), "grid": rest.shape[:2]}
-        opening |= {"element_area": element_area, "detector": detector, "sensor": sensor}
-        opening |= {"material": material, "keep": keep}
+        opening |= {"element_area": within("element_area", element_area, 0.0, 1.0, "m²")}
+        opening |= {"detector": detector, "sensor": sensor, "material": material, "keep": keep}
         if control is not None:
             opening["control"] = _control(control) | {"known": known}
             if materials:
@@ -118,7 +119,10 @@ class SlipStream:
         return self._number - 1
 
     def receive(self, timeout: float = ANSWER_TIMEOUT) -> dict[str, Any]:
-        """The next answer: of type "state" (stick_ratio, slip, friction …) or, for a refused frame, "error"."""
+        """The next answer: of type "state" (stick_ratio, slip, friction …) or, for a refused frame, "error".
+
+        Raises ``AnswerTimedOut`` after ``timeout`` s.
+        """
         answer: dict[str, Any] = self._try(lambda: self._read(timeout))
         self._answered = answer["number"]
         while self._waiting and self._waiting[0][0] <= self._answered:
@@ -195,7 +199,11 @@ class SlipStream:
             raise _refused(error) from error
 
     def _read(self, timeout: float) -> dict[str, Any]:
-        answer: dict[str, Any] = msgspec.msgpack.decode(self._connection.recv(timeout, decode=False))
+        try:
+            content = self._connection.recv(timeout, decode=False)
+        except TimeoutError as error:
+            raise AnswerTimedOut(f"{self._url}: no answer within {timeout:g} s; the session goes on") from error
+        answer: dict[str, Any] = msgspec.msgpack.decode(content)
         return answer
 
 

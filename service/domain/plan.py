@@ -17,8 +17,10 @@ from service.domain.errors import InvalidSamples, InvalidValue, NoFeasibleForce,
 from service.domain.look_up import Averaged
 from service.domain.model_cache import KnownModel
 from service.domain.recommended import AUTO, PREFERENCE
+from service.domain.sensors import grasping
 from service.domain.stored_results import decode_samples, finite_or_none, to_client_model, to_friction_model
 from slipcore import FrictionSamples
+from slipcore.frames import UNNAMED
 from stiction_client.support import Kind
 
 if TYPE_CHECKING:
@@ -172,19 +174,27 @@ def _given(task: GraspTask) -> dict[str, Any]:
 
 
 def recognise(
-    context: Context, grasp: str | FrictionSamples, names: Sequence[str] | None, method: str, unknown: float
+    context: Context,
+    grasp: str | FrictionSamples,
+    names: Sequence[str] | None,
+    method: str,
+    unknown: float,
+    sensor: str | None = None,
 ) -> Recognition:
     """How probable it is that a grasp was of each material that has a model: of those named, or of all.
 
     Compared are the models of a ``method``, or each material's recommended one. ``grasp`` is the id of a stored log, or
-    samples; ``unknown`` the probability beforehand that it is none of them.
+    samples; ``unknown`` the probability beforehand that it is none of them. A model that knows the gain of the grasp's
+    sensor is compared as that one shows it: of a stored log its own, or the one that is named.
     Raises ``InvalidSamples`` for those that say nothing, ``ResultsNotReady``, ``NoModel``, ``InvalidValue``,
     ``NotFound``.
     """
     stored = _candidates(context, names, method)
-    models = {str(number): to_friction_model(each.model) for number, each in enumerate(stored)}
+    evidence, own = _evidence(context, grasp)
+    seen_by = grasping(sensor or own)
+    models = {str(number): to_friction_model(each.model).of_sensor(seen_by) for number, each in enumerate(stored)}
     try:
-        told = estimators.recognise(_evidence(context, grasp), models, unknown=unknown)
+        told = estimators.recognise(evidence, models, unknown=unknown)
     except EstimatorError as error:
         raise InvalidSamples(str(error)) from error
     left = told.pop("unknown")
@@ -221,10 +231,10 @@ def _preferred(models: Sequence[StoredModel], methods: Sequence[str]) -> StoredM
     return next((by_method[method] for method in methods if method in by_method), None)
 
 
-def _evidence(context: Context, grasp: str | FrictionSamples) -> "FrictionSamples | Moments":
-    """What is known of the grasp; the moments of a stored one say all that is asked, whatever its length."""
+def _evidence(context: Context, grasp: str | FrictionSamples) -> "tuple[FrictionSamples | Moments, str]":
+    """What is known of the grasp, and its sensor; the moments of a stored one say all that is asked."""
     if isinstance(grasp, FrictionSamples):
-        return grasp
+        return grasp, UNNAMED
     with context.database.read() as session:
         log = grasp_logs.get(session, grasp)
     if log.samples is None:
@@ -232,5 +242,5 @@ def _evidence(context: Context, grasp: str | FrictionSamples) -> "FrictionSample
     if log.samples.none_because is not None:
         raise InvalidSamples(log.samples.none_because)
     if log.samples.moments is not None:
-        return estimators.Moments.from_bytes(log.samples.moments)
-    return decode_samples(context.blobs.path(log.samples.samples_blob))
+        return estimators.Moments.from_bytes(log.samples.moments), log.sensor
+    return decode_samples(context.blobs.path(log.samples.samples_blob)), log.sensor

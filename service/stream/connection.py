@@ -19,6 +19,7 @@ from service.domain.errors import DomainError, KeyEnded, NoModel
 from service.domain.keys import check_not_ended
 from service.domain.principal import Principal
 from service.domain.recommended import AUTO
+from service.domain.sensors import grasping
 from service.domain.stored_results import to_client_model
 from service.domain.upload import UploadRequest, check_target
 from service.formats.reading import Description
@@ -127,21 +128,21 @@ class _Connection:
         if opening.control is None or not opening.control.known or opening.material is None:
             return None
         with suppress(NoModel):
-            return (await self._models([opening.material]))[0]
+            return (await self._models([opening.material], opening.sensor))[0]
         return None
 
     async def _candidates(self, opening: Open) -> "dict[str, FrictionModel]":
         """What a grip controller recognises, by the materials' own names; raises ``NoModel`` and ``NotFound``."""
         names = [] if opening.control is None else opening.control.materials
-        models = await self._models(names) if names else []
+        models = await self._models(names, opening.sensor) if names else []
         return {model.material: model for model in models}
 
-    async def _models(self, names: Sequence[str]) -> "list[FrictionModel]":
-        """The recommended ones of some materials; raises ``NoModel`` and ``NotFound``."""
+    async def _models(self, names: Sequence[str], sensor: str) -> "list[FrictionModel]":
+        """The recommended ones of some materials, as the sensor shows them; raises ``NoModel`` and ``NotFound``."""
 
         def read() -> "list[FrictionModel]":
             known = self._context.models.get_all(self._context.database, names, AUTO)
-            return [to_client_model(each.stored) for each in known.values()]
+            return [to_client_model(each.stored).of_sensor(grasping(sensor)) for each in known.values()]
 
         return await self._context.threads.run(self._principal.share, read)
 

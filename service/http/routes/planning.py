@@ -57,7 +57,7 @@ def recognise_material(context: CurrentContext, asked: NewRecognition) -> Recogn
     "unknown" is the probability that it is none of the materials compared.
     """
     grasp = asked.grasp_log or "" if asked.samples is None else _samples(asked.samples)
-    found = plan.recognise(context, grasp, asked.materials, asked.method, asked.unknown)
+    found = plan.recognise(context, grasp, asked.materials, asked.method, asked.unknown, asked.sensor)
     return RecognitionOut.model_validate({"method": asked.method, **asdict(found)})
 
 

@@ -161,6 +161,14 @@ class NewRecognition(Body):
         0.05
     )
 
+    sensor: Annotated[
+        Reference | None,
+        Field(
+            max_length=200,
+            description="That grasped: its gain counts where a model knows it; without, a stored log's",
+        ),
+    ] = None
+
     @model_validator(mode="after")
     def _one_of_two(self) -> Self:
         if (self.grasp_log is None) == (self.samples is None):

@@ -27,7 +27,7 @@ from service.serving import configuration
 from service.settings import Settings
 from service.stream import connection as stream
 from slipcore import GraspLog, detect_slip
-from stiction_client import Contact, ControlSettings, FrictionClient
+from stiction_client import AnswerTimedOut, Contact, ControlSettings, FrictionClient, FrictionModel
 from stiction_client.errors import ConnectionFailed, InvalidArgument
 from stiction_client.stream import SlipStream
 
@@ -136,6 +136,39 @@ def test_a_grip_controller_answers_and_begins_with_the_material_s_model(served: 
         assert all(0.5 <= answer["command"]["normal_force"] <= 30.0 for answer in answers)
         modes[material, known] = answers[0]["command"]["mode"]
     assert modes == {("gripped", True): "hold", ("gripped", False): "feel", (None, True): "feel"}
+
+
+def test_a_grip_controller_goes_by_what_the_streams_sensor_shows(
+    served: Served, ramp: GraspLog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = ControlSettings(contact=Contact.round(6e-5, at_force=5.0), least_force=0.5, most_force=30.0)
+    with FrictionClient(served.url) as client:
+        client.ensure_material("felt by two")
+        client.wait(client.upload(ramp, material="felt by two").job).raise_for_status()
+    asked: list[str] = []
+
+    def of_sensor(model: FrictionModel, name: str) -> FrictionModel:
+        asked.append(name)
+        return model
+
+    monkeypatch.setattr(FrictionModel, "of_sensor", of_sensor)
+    begun: list[dict[str, Any]] = [{"sensor": "left", "material": "felt by two"}, {"materials": ["felt by two"]}]
+    for said in begun:
+        with SlipStream(served.url, ramp.position, ramp.element_area, control=settings, **said) as live:
+            live.step(ramp.time[0], *parts(ramp, 0))
+            live.finish()
+    assert asked == ["left", "unknown"]  # all streams without a sensor's name count as one
+
+
+def test_a_stream_takes_numpys_numbers_and_names_a_late_answer(served: Served, ramp: GraspLog) -> None:
+    with SlipStream(served.url, ramp.position, np.float32(ramp.element_area)) as live:
+        with pytest.raises(AnswerTimedOut, match=r"no answer within 0\.01 s; the session goes on") as late:
+            live.receive(timeout=0.01)
+        assert isinstance(late.value, TimeoutError)
+        assert live.step(ramp.time[0], *parts(ramp, 0))["type"] == "state"
+        live.finish()
+    with pytest.raises(InvalidArgument, match="element_area is 'a'"):
+        SlipStream(served.url, ramp.position, "a")  # type: ignore[arg-type]
 
 
 def test_a_grip_controller_recognises_one_of_the_service_s_materials(served: Served, ramp: GraspLog) -> None:

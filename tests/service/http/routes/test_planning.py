@@ -6,9 +6,10 @@ import httpx
 import numpy as np
 import pytest
 
+from db.records import NewModel, StoredModel
 from service.domain import plan
 from slipcore import GraspLog
-from stiction_client import FrictionClient, grasp, required_normal_force
+from stiction_client import FrictionClient, Scale, SensorFriction, SensorScale, grasp, required_normal_force
 from stiction_client.container import encode
 
 Wait = Callable[[httpx.Client, str], dict[str, Any]]
@@ -140,6 +141,57 @@ def test_a_surface_that_is_none_of_them_is_unknown(client: httpx.Client, fitted:
     slippery = samples | {"friction_coefficient": [value / 4.0 for value in samples["friction_coefficient"]]}
     told = client.post("/v1/recognise", json={"samples": slippery, "materials": ["fitted"]}).json()
     assert told["unknown"] > 0.9
+
+
+def test_a_grasp_is_compared_as_its_own_sensor_shows_each_material(
+    client: httpx.Client, fitted: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the fitted material one sensor shows a quarter of what all others do."""
+    candidates = plan._candidates
+
+    def with_a_dull_sensor(context: Any, names: Any, method: str) -> list[StoredModel]:
+        return [replace(each, model=shown_by_dull(each.model)) for each in candidates(context, names, method)]
+
+    monkeypatch.setattr(plan, "_candidates", with_a_dull_sensor)
+    samples = samples_of(client, fitted)
+    slippery = samples | {"friction_coefficient": [value / 4.0 for value in samples["friction_coefficient"]]}
+    asked = {"samples": slippery, "materials": ["fitted"]}
+    unknown = [client.post("/v1/recognise", json=asked | by).json()["unknown"] for by in ({}, {"sensor": "dull"})]
+    assert unknown[0] > 0.9
+    assert unknown[1] < 0.1
+    with FrictionClient(str(client.base_url)) as planner:
+        assert planner.recognise(fitted["id"], ["fitted"]).unknown < 0.1
+        assert planner.recognise(fitted["id"], ["fitted"], sensor="dull").unknown > 0.9
+
+
+def test_a_stored_log_is_compared_as_its_sensor_shows_each_material(
+    client: httpx.Client, fitted: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    candidates = plan._candidates
+
+    def with_its_sensor_dull(context: Any, names: Any, method: str) -> list[StoredModel]:
+        found = candidates(context, names, method)
+        return [replace(each, model=shown_by_dull(each.model, fitted["sensor"])) for each in found]
+
+    monkeypatch.setattr(plan, "_candidates", with_its_sensor_dull)
+    told = client.post("/v1/recognise", json={"grasp_log": fitted["id"], "materials": ["fitted"]}).json()
+    assert told["unknown"] > 0.9
+
+
+def shown_by_dull(model: NewModel, name: str = "dull") -> NewModel:
+    """The model of several sensors, of which the one of this name shows a quarter of the friction."""
+    assert model.scales is not None
+    friction = SensorFriction(
+        gain=-0.75,
+        standard_error=0.01,
+        coefficients=tuple(np.array(model.coefficients) / 4.0),
+        covariance=tuple(map(tuple, np.array(model.covariance) / 16.0)),
+        degrees_of_freedom=np.inf,
+        scale=model.scale,
+        scatter_degrees_of_freedom=np.inf,
+    )
+    told = SensorScale(Scale(0.01, np.inf), {name: friction}).to_json()
+    return replace(model, scales=replace(model.scales, between_sensors=told))
 
 
 @pytest.mark.parametrize(
