@@ -16,9 +16,8 @@ def test_an_import_that_leads_back_is_found() -> None:
     assert circles(TOWER | {"floor": {"wall"}}) == {("wall", "floor"), ("floor", "wall")}
 
 
-def test_no_rooms_above_slipcore_import_one_another_in_a_circle() -> None:
-    """Those of slipcore do as rooms; its modules, as all others, do not."""
-    assert {(room, other) for room, other in circles(rooms()) if not room.startswith("slipcore")} == set()
+def test_no_rooms_import_one_another_in_a_circle() -> None:
+    assert circles(rooms()) == set()
 
 
 def test_names_that_a_package_passes_on_count_where_they_are_made() -> None:

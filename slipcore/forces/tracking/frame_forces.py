@@ -6,7 +6,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter
 
 from slipcore.forces.defaults import RECONSTRUCTION
-from slipcore.forces.known import OUTWARD, KnownForce
+from slipcore.forces.tracking.known import OUTWARD, KnownForce
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.forces.tracking.tracker import Key
 from slipcore.forces.tracking.unresolved import Unresolved

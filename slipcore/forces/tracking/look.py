@@ -9,10 +9,10 @@ import numpy as np
 from slipcore.forces.defaults import FORCE_STREAM
 from slipcore.forces.inverse.fit import ObservationModel
 from slipcore.forces.inverse.whole_lattice import WholeLattice
-from slipcore.forces.known import KnownForce
 from slipcore.forces.operator.nodes import Nodes
 from slipcore.forces.recording import error
 from slipcore.forces.tracking.frame_forces import Reader
+from slipcore.forces.tracking.known import KnownForce
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.forces.tracking.tracker import Tracker, lattice_of
 from slipcore.frames import BoolArray, FloatArray

@@ -6,11 +6,11 @@ import numpy as np
 
 from slipcore.forces.defaults import STRENGTH
 from slipcore.forces.inverse.fit import ObservationModel
-from slipcore.forces.known import KnownForce
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.nodes import Nodes
 from slipcore.forces.operator.response import response_matrices
 from slipcore.forces.recording import least_power
+from slipcore.forces.tracking.known import KnownForce
 from slipcore.frames import BoolArray, FloatArray
 
 

@@ -5,8 +5,8 @@ import pytest
 
 from slipcore.forces.inverse.fit import TractionFit, TractionPrior, fit
 from slipcore.forces.inverse.prior import usual
-from slipcore.forces.known import KnownForce
 from slipcore.forces.operator.gel import Gel
+from slipcore.forces.tracking.known import KnownForce
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.forces.tracking.unresolved import Unresolved
 

@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 from slipcore.errors import InvalidInput
 from slipcore.forces.inverse.fit import ObservationModel
 from slipcore.forces.inverse.strength import Criterion
-from slipcore.forces.known import KnownForce, contradicts, reported
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.recording import DisplacementData, error
 from slipcore.forces.tracking.frame_forces import FrameForces, Reader
+from slipcore.forces.tracking.known import KnownForce, contradicts, reported
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.forces.tracking.tracker import Tracker
 from slipcore.frames import BoolArray, FloatArray, GraspLog

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slipcore.errors import InvalidInput, NoForces
-from slipcore.forces.reconstruction import Reconstruction
+from slipcore.forces.reconstruction.whole_log import Reconstruction
 from slipcore.frames import FloatArray, GraspLog
 
 

@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from slipcore.errors import InvalidInput
 from slipcore.forces.defaults import FORCE_STREAM
-from slipcore.forces.known import KnownForce, contradicts, reported
 from slipcore.forces.operator.gel import Gel
 from slipcore.forces.operator.nodes import Nodes
 from slipcore.forces.recording import axes_seen, check_noise, moved, noise_of, rows, seen_along
 from slipcore.forces.tracking.frame_forces import FrameForces
+from slipcore.forces.tracking.known import KnownForce, contradicts, reported
 from slipcore.forces.tracking.look import ContactTracking, MarkerReading, bytes_needed
 from slipcore.forces.tracking.sensor import SensorResponse
 from slipcore.frames import BoolArray, FloatArray, check_displacement, check_gripper_report, check_mask

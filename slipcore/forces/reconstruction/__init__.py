@@ -1,0 +1,1 @@
+"""Forces of a whole log or of a stream, and their comparison with a sensor's own."""
