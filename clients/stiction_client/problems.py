@@ -5,7 +5,6 @@ Each is a ``ProblemError``, whose ``type`` says the same; a type that this versi
 
 import math
 import re
-from collections.abc import Mapping
 from typing import Any
 
 from stiction_client import errors
@@ -87,18 +86,9 @@ class NoModel(ProblemError, errors.NoModel):
 class NoFeasibleForce(ProblemError, errors.NoFeasibleForce):
     """No normal force holds the load, says the service: ``stiction_client.NoFeasibleForce`` with its numbers."""
 
-    def __init__(
-        self,
-        type: str,  # noqa: A002 - as of each problem
-        status: int,
-        detail: str,
-        name: str | None = None,
-        value: str | None = None,
-        allowed: str | None = None,
-        facts: Mapping[str, Any] | None = None,
-    ) -> None:
-        super().__init__(type, status, detail, name, value, allowed, facts)
-        self.tangential_load, self.reason = math.nan, detail  # the load is what was asked
+    def __init__(self, *args: Any, **named: Any) -> None:
+        super().__init__(*args, **named)
+        self.tangential_load, self.reason = math.nan, self.detail  # the load is what was asked
         self.largest_load = float(self.facts.get("largest_load", math.nan))
         self.normal_force = float(self.facts.get("normal_force", math.nan))
         self.cause = str(self.facts.get("cause", ""))
