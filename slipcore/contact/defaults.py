@@ -310,7 +310,9 @@ class AccuracyDefaults(Options):
     most_substeps: Annotated[int, Option(1, 10_000, "steps", "halving further adds nothing")] = 64
     fewest_frames: Annotated[int, Option(3, 1000, "frames", "half of fewer show little of a path")] = 8
     """From which on a log of half the frames shows what load steps leave."""
-    least_growth: Annotated[float, Option(1.05, 10.0, "-", "less would show too little")] = 1.3
+    least_growth: Annotated[
+        float, Option(1.05, 1.5, "-", "less would show too little; above first_growth no grid is far enough")
+    ] = 1.3
     """Of cells from one grid to the next, at least."""
     last_growth: Annotated[float, Option(1.01, 10.0, "-", "a few per cent more cells are hardly better")] = 1.12
     """The same for what is left of a budget."""

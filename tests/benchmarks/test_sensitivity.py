@@ -1,10 +1,14 @@
 import math
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Annotated
 
 import pytest
 
-from benchmarks.sensitivity import Row, changed, neighbours, rows, table_of
+import estimators.change_alarm
+import estimators.defaults
+from benchmarks.sensitivity import of_new_grasps
+from benchmarks.sensitivity.rows import Row, changed, every, neighbours, of_tables, rows, rows_on, table_of
 from slipcore.errors import InvalidInput
 from slipcore.options import Option, Options
 from stiction_client import Contact, ControlSettings
@@ -67,3 +71,51 @@ def test_the_most_sensitive_comes_first_after_what_fails_and_the_rest_below_the_
     assert [line.split("`")[1] for line in lines[2:5]] == ["broken", "loud", "small"]
     assert lines[3] == "| a | `loud` | 1 m | +0.000 | +0.300 |"
     assert lines[-1] == "Less than 0.001 by either: `quiet` of a."
+
+
+def test_what_a_page_has_is_read_as_it_was_written_and_what_was_another_is_not() -> None:
+    now = every()
+    (loud, quiet, broken, moved), kept = [*now][:4], {"F1": (0.25, -0.5), "width": (0.0, 0.125)}
+    still = {"F1": (0.0, 0.0), "width": (0.0, 0.0)}
+    written = [
+        Row(*loud, *now[loud], kept),
+        Row(*quiet, *now[quiet], still),
+        Row(*broken, *now[broken], {}, "0.5: NotConverged"),
+        Row(*moved, 2.0 * now[moved][0] + 1.0, now[moved][1], kept),
+    ]
+    page = f"<!-- table some part -->\n{table_of(written)}\n<!-- end -->\n"
+    assert {(row.table, row.name): (row.changes, row.failed) for row in rows_on(page, "some part")} == {
+        loud: (kept, ""),
+        quiet: (still, ""),
+        broken: ({}, "0.5: NotConverged"),
+    }
+    assert rows_on(page, "another") == []
+
+
+def test_tables_of_one_name_are_two_and_what_is_known_is_not_measured_again() -> None:
+    module = ModuleType("house.defaults")
+    module.LIMITS = Table()  # type: ignore[attr-defined]
+
+    def measure() -> dict[str, float]:
+        return {"sum": module.LIMITS.share + module.LIMITS.count}
+
+    (row,) = of_tables(module, ("LIMITS",), measure, frozenset({("house.LIMITS", "count")}))
+    assert (row.table, row.name, row.changes) == ("house.LIMITS", "share", {"sum": (-0.25, pytest.approx(0.1))})
+    assert [each.name for each in of_tables(module, ("LIMITS.count",), measure)] == ["count"]
+    done = frozenset({("house.LIMITS", "count"), ("house.LIMITS", "share")})
+    assert of_tables(module, ("LIMITS",), lambda: pytest.fail("measured"), done) == []
+
+
+@pytest.mark.parametrize("part", of_new_grasps.MEASURES)
+def test_a_measure_of_new_grasps_is_the_same_each_time(part: str) -> None:
+    _, measure = of_new_grasps.MEASURES[part]
+    one = measure()
+    assert all(math.isfinite(value) for value in one.values())
+    assert measure() == one
+
+
+def test_a_number_that_a_module_reads_once_is_changed_there_too() -> None:
+    expected = len(estimators.change_alarm.TAUS)
+    with changed(estimators.defaults.ALARM, "nodes", 7):
+        assert len(estimators.change_alarm.TAUS) == 7
+    assert len(estimators.change_alarm.TAUS) == expected

@@ -1,21 +1,11 @@
-"""What half and one and a half of each default does: `python -m benchmarks.sensitivity [--page docs/sensitivity.md]`.
+"""What is measured of detectors, grip control, patches, forces, the simulator and fits; see `__main__`."""
 
-Detectors: change of the mean F1 on scenes that no default was chosen on; those for few elements on the same scenes as
-few elements see them. Grip control: change of how many objects are held, and of the force over the least that holds.
-Patches: change of the error of a contact's friction, and of the share of frames whose regime is right. Forces: change
-of the error of forces from displacement, and of how many intervals hold the truth. Contact: change of the largest error
-against a fine solution, and of the operators' applications. Estimators: change of the error of friction at working
-points and of its interval's width, over simulated grasps. Each value is kept in its range.
-"""
-
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import MISSING, asdict, dataclass, fields, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from itertools import product
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import estimators
 from benchmarks.calibration.patch_grasps import PIVOT, SLIDE, Course, Setting
@@ -30,37 +20,30 @@ from benchmarks.detector.coarse import coarse
 from benchmarks.detector.scenes import Case, cases, observed, phases, scoring, simulated
 from benchmarks.estimators.scatter import TRUTH, Kind, grasp
 from benchmarks.forces import __main__ as of_gels
-from benchmarks.pages import options, picture_folder, save, write
+from benchmarks.sensitivity.rows import Known, Row, of_tables, rows
 from estimators import defaults as of_estimators
 from slipcore import METHODS, FrictionSamples, GraspLog, PatchOptions, detect_slip
 from slipcore import defaults as of_slipcore
 from slipcore.contact import defaults as of_contact
 from slipcore.contact.effects import FiniteLayer, LoadPath, NormalTangentialCoupling, SensorSampling, VelocityFriction
-from slipcore.contact.elasticity import bonded_layer
 from slipcore.contact.scene import Scene
 from slipcore.contact.tiers.accuracy import difference, simulate_to
 from slipcore.contact.tiers.boundary_elements import Fidelity, run
-from slipcore.errors import SlipcoreError
 from slipcore.forces import defaults as of_forces
 from slipcore.frames import BoolArray
-from slipcore.options import Option, Options, describe_options
 from slipcore.patch.following import follow_patches
 from slipcore.patch.friction import contact_friction
-from stiction_client import ControlSettings, GraspController, InvalidArgument
-from stiction_client.controller.settings import Gain, gains
+from stiction_client import ControlSettings, GraspController
 
 MARKER_NOISE = 1e-6
-FACTORS = (0.5, 1.5)
 HELD_OUT = ("lift, hold, set down", "grip tightens", "soft fruit", "stage turns and slides", "slow gel, twisted")
 """Of the scenes that detectors are only scored on: holds, a growing grip, motion, creep, an object that gives way."""
 FEW = (6, 3)
 """Elements a side of the arrays that have few."""
+BASELINES = tuple(name for name in METHODS if name not in {"filter", "strain_rate", "forces_only", "coarse"})
 TASKS = (LIFTS[1], LIFTS[6], PAPER[0], PAPER[2])
 GRIPS = range(7000, 7003)
 """Tasks of the grip controller, and seeds of no other benchmark."""
-REFUSALS = (SlipcoreError, estimators.EstimatorError, estimators.NotConverged, InvalidArgument)
-DEAD = 1e-3
-"""Relative change below which a default has no effect to speak of."""
 SENSOR = SensorSampling((8, 8), 1.5e-3, 4.0)
 SCENES = {
     "shear": Scene("shear", (SENSOR, LoadPath((1.0, 1.5, 2.0), force_x=(0.0, 3.2, -1.0)))),
@@ -101,80 +84,27 @@ PRESSES = (
 LIKELIHOODS = ("student_t", "outlier", "errors_in_variables")
 
 
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One default: ``changes`` of each measure at half of its value and at one and a half of it; or why none."""
-
-    table: str
-    name: str
-    default: float
-    unit: str
-    changes: dict[str, tuple[float, float]]
-    failed: str = ""
-
-    @property
-    def largest(self) -> float:
-        """Largest change of any measure."""
-        return max((abs(value) for pair in self.changes.values() for value in pair), default=float("nan"))
-
-
-def neighbours(value: float, option: Option | Gain) -> Iterator[float]:
-    """Half and one and a half of a value, in its range; a whole number moves by one at least."""
-    for factor in FACTORS:
-        moved: float = factor * value
-        if isinstance(value, int):
-            moved = min(round(moved), value - 1) if factor < 1.0 else max(round(moved), value + 1)
-        bounded = min(max(moved, option.low), option.high)
-        yield int(bounded) if isinstance(value, int) else bounded
-
-
-def rows(
-    label: str,
-    kind: type[Options] | type[ControlSettings],
-    measure: Callable[[str, float], Mapping[str, float]],
-    start: Mapping[str, float],
-) -> Iterator[Row]:
-    """A row for each default of a table; ``measure`` takes a name and a value."""
-    ranges = gains() if kind is ControlSettings else describe_options(kind)
-    for entry in (entry for entry in fields(kind) if entry.default is not MISSING):
-        option, found, failed = ranges[entry.name], [], ""
-        for value in neighbours(entry.default, option):
-            try:
-                found.append(measure(entry.name, value))
-            except REFUSALS as error:
-                failed = f"{value:g}: {type(error).__name__}"
-        changes = {key: tuple(each[key] - start[key] for each in found) for key in start} if len(found) == 2 else {}
-        yield Row(label, entry.name, entry.default, option.unit, changes, failed)
-
-
-@contextmanager
-def changed(table: Options, name: str, value: float) -> Iterator[None]:
-    """One entry of a table with another value; tables are frozen so that nothing but this changes them."""
-    before = getattr(table, name)
-    object.__setattr__(table, name, value)
-    try:
-        yield
-    finally:
-        object.__setattr__(table, name, before)
-        bonded_layer._influence.cache_clear()
-        bonded_layer.radial_functions.cache_clear()
-
-
-def of_detectors() -> list[Row]:
+def of_detectors(known: Known) -> list[Row]:
     """Options of the two methods that are not there for comparison."""
     seen = [
         (case, observed(case.log, MARKER_NOISE, FORCE_NOISE, inputs, seed=5))
         for case in held_out()
         for inputs in INPUTS
     ]
-    return of_methods(("filter", "strain_rate"), seen)
+    return of_methods(("filter", "strain_rate"), seen, known)
 
 
-def of_few_elements() -> list[Row]:
+def of_few_elements(known: Known) -> list[Row]:
     """Options of the methods for arrays of few elements."""
     few = [replace(case, log=coarse(case.log, elements)) for case in held_out() for elements in FEW]
     seen = [(case, observed(case.log, MARKER_NOISE, FORCE_NOISE, "force", seed=5)) for case in few]
-    return of_methods(("forces_only", "coarse"), seen)
+    return of_methods(("forces_only", "coarse"), seen, known)
+
+
+def of_baselines(known: Known) -> list[Row]:
+    """Options of the methods that others are compared with."""
+    seen = [(case, observed(case.log, MARKER_NOISE, FORCE_NOISE, "force", seed=5)) for case in held_out()]
+    return of_methods(BASELINES, seen, known)
 
 
 @cache
@@ -184,13 +114,13 @@ def held_out() -> list[Case]:
     return [*cases("reference"), *ours]
 
 
-def of_methods(methods: Sequence[str], seen: list[tuple[Case, GraspLog]]) -> list[Row]:
+def of_methods(methods: Sequence[str], seen: list[tuple[Case, GraspLog]], known: Known) -> list[Row]:
     """Options of some methods."""
     found: list[Row] = []
     for method in methods:
         start = f1(seen, method)
         found += rows(
-            method, METHODS[method].options, lambda name, value, m=method: f1(seen, m, **{name: value}), start
+            method, METHODS[method].options, lambda name, value, m=method: f1(seen, m, **{name: value}), start, known
         )
     return found
 
@@ -215,9 +145,11 @@ def gripped(**chosen: float) -> dict[str, float]:
     return {"held": len(held) / len(done), "peak": peak, "final": final}
 
 
-def of_control() -> list[Row]:
+def of_control(known: Known) -> list[Row]:
     """Settings of the grip controller."""
-    return list(rows("settings", ControlSettings, lambda name, value: gripped(**{name: value}), gripped()))
+    return list(
+        rows("ControlSettings", ControlSettings, lambda name, value: gripped(**{name: value}), gripped(), known)
+    )
 
 
 @cache
@@ -251,11 +183,13 @@ def goes(course: Course) -> BoolArray:
     return np.asarray(way > 0.5 * way.max())
 
 
-def of_patches() -> list[Row]:
+def of_patches(known: Known) -> list[Row]:
     """Options of contact patches, and numbers that are none."""
     start = followed()
-    chosen = list(rows("options", PatchOptions, lambda name, value: followed(**{name: value}), start))
-    return chosen + [row for row in of_tables(of_slipcore, ("PATCHES",), followed) if row.name not in LOOPS]
+    chosen = list(rows("PatchOptions", PatchOptions, lambda name, value: followed(**{name: value}), start, known))
+    return chosen + of_tables(
+        of_slipcore, ("PATCHES",), followed, known | {("slipcore.PATCHES", name) for name in LOOPS}
+    )
 
 
 def pressed() -> dict[str, float]:
@@ -267,9 +201,10 @@ def pressed() -> dict[str, float]:
     return {name: float(value) for name, value in error_and_cost.items()}
 
 
-def of_presses() -> list[Row]:
+def of_presses(known: Known) -> list[Row]:
     """Numbers of forces from displacement."""
-    return of_tables(of_forces, OF_FORCES, pressed)
+    below = of_tables(of_contact, ("INTERIOR",), pressed, known)  # what markers that lie deep need
+    return of_tables(of_forces, OF_FORCES, pressed, known) + below
 
 
 @cache
@@ -297,24 +232,9 @@ def error_and_cost(logs: Mapping[str, GraspLog]) -> dict[str, float]:
     return {"error": float(np.log(error)), "applications": float(np.log(applications))}
 
 
-def of_solver() -> list[Row]:
+def of_solver(known: Known) -> list[Row]:
     """Numbers of the contact simulator; those that compiled loops hold fixed stay as they are."""
-    return of_tables(of_contact, OF_SOLVER, solved) + of_tables(of_contact, OF_REQUESTS, asked)
-
-
-def of_tables(module: object, names: Sequence[str], measure: Callable[[], dict[str, float]]) -> list[Row]:
-    """Rows of all entries of some tables."""
-    found: list[Row] = []
-    start = measure()
-    for label in names:
-        table = getattr(module, label)
-
-        def with_value(name: str, value: float, table: Options = table) -> dict[str, float]:
-            with changed(table, name, value):
-                return measure()
-
-        found += rows(label, type(table), with_value, start)
-    return found
+    return of_tables(of_contact, OF_SOLVER, solved, known) + of_tables(of_contact, OF_REQUESTS, asked, known)
 
 
 @cache
@@ -344,63 +264,6 @@ def summary(models: Iterable[estimators.FrictionModel]) -> dict[str, float]:
     return {"error": float(np.log(np.mean(np.square(errors))) / 2), "width": float(np.log(np.mean(widths)))}
 
 
-def of_fits() -> list[Row]:
+def of_fits(known: Known) -> list[Row]:
     """Numbers of the estimators."""
-    return of_tables(of_estimators, OF_FITS, fits) + of_tables(of_estimators, OF_SAMPLED, sampled)
-
-
-PARTS = {
-    "detector": of_detectors,
-    "few elements": of_few_elements,
-    "control": of_control,
-    "patches": of_patches,
-    "forces": of_presses,
-    "contact": of_solver,
-    "estimators": of_fits,
-}
-
-
-def table_of(found: list[Row]) -> str:
-    """A Markdown table of what counts, the most sensitive first, and below it the names of the rest."""
-    measures = next((list(row.changes) for row in found if row.changes), [])
-    lines = [
-        "| of | default | value | " + " | ".join(f"{name}, half | {name}, one and a half" for name in measures) + " |",
-        "|---|---|---|" + "---|---|" * len(measures),
-    ]
-    ordered = sorted(found, key=lambda row: -np.nan_to_num(row.largest, nan=np.inf))
-    for row in (row for row in ordered if not row.largest < DEAD):
-        cells = [f"{value:+.3f}" for name in measures for value in row.changes.get(name, ())]
-        cells = cells or [row.failed] + [""] * (2 * len(measures) - 1)
-        lines.append(f"| {row.table} | `{row.name}` | {row.default:g} {row.unit} | " + " | ".join(cells) + " |")
-    quiet = [f"`{row.name}` of {row.table}" for row in found if row.largest < DEAD]
-    return "\n".join(lines) + (f"\n\nLess than {DEAD:g} by either: {', '.join(quiet)}." if quiet else "")
-
-
-def draw(found: list[Row]) -> Figure:
-    """The largest change of each default, on a logarithmic scale."""
-    known = sorted((row for row in found if row.changes), key=lambda row: row.largest)
-    figure = Figure(figsize=(7.0, max(2.0, 0.14 * len(known))), layout="constrained")
-    axes = figure.subplots()
-    size = [max(row.largest, 1e-6) for row in known]
-    axes.barh(range(len(known)), size, color=["#888" if value < DEAD else "#07a" for value in size])
-    axes.set_yticks(range(len(known)), [f"{row.table} {row.name}" for row in known], fontsize=5)
-    axes.set(xscale="log", xlabel="largest change by ±50 %")
-    return figure
-
-
-def main() -> None:
-    """Measure, write JSON, a picture and the page's tables."""
-    parser = options(__doc__)
-    parser.add_argument("--only", choices=tuple(PARTS), help="one part")
-    arguments = parser.parse_args()
-    for part in [arguments.only] if arguments.only else PARTS:
-        found = PARTS[part]()
-        name = f"sensitivity-{part.replace(' ', '-')}"
-        save(draw(found), picture_folder(arguments) / f"{name}.png")
-        numbers = [asdict(row) for row in found]
-        write(numbers, {part: table_of(found)}, arguments, f"{name}.json")
-        print(table_of(found))
-
-
-if __name__ == "__main__":
-    main()
+    return of_tables(of_estimators, OF_FITS, fits, known) + of_tables(of_estimators, OF_SAMPLED, sampled, known)

@@ -1,0 +1,1 @@
+"""What half and one and a half of each default does."""
