@@ -62,7 +62,7 @@ STICTION = "stiction"
 GROUPS = ("gel and noise", "contact", "marker depth", "lattice", "wrong description")
 PEERS_GROUP, CALIBRATION_GROUP, STREAM_GROUP, FRICTION_GROUP = "peers", "gel calibration", "stream", "friction"
 SATURATION_GROUP, COVERAGE_GROUP, REFERENCES_GROUP = "saturation", "coverage", "independent scenes"
-COVERAGE_DRAWS = 3
+COVERAGE_DRAWS = 2
 COVERED_CONTACTS = ("sphere", "ring")
 
 
