@@ -276,6 +276,29 @@ def test_a_circle_is_found_however_it_is_closed(tmp_path: Path, back: str) -> No
     assert set(circle(graph_of(modules_of(tmp_path, "house")))) == {"house.hall", "house.stairs"}
 
 
+OWN = ("slipcore", "estimators", "db", "migrations", "service", CLIENT, "benchmarks", "tests")
+
+
+def gone(path: Path, modules: Collection[str]) -> set[str]:
+    """The modules of this project that a file imports from and that are not there."""
+    packages = {Path(package).name for package in OWN}
+    named = [node.module or "" for node in import_statements(path) if isinstance(node, ast.ImportFrom)]
+    return {name for name in named if name.split(".")[0] in packages and name not in modules}
+
+
+def test_every_import_from_this_project_leads_to_a_module() -> None:
+    """In tests, benchmarks and examples, too, which no type checker reads."""
+    modules = {name for package in OWN for name in modules_of((ROOT / package).parent, Path(package).name)}
+    modules |= {".".join(parts[:-1]) for name in modules for parts in [name.split(".")] if len(parts) > 1}
+    paths = [path for folder in (*OWN, "examples") for path in sorted((ROOT / folder).rglob("*.py"))]
+    assert {path: names for path in paths if (names := gone(path, modules))} == {}
+
+
+def test_an_import_from_a_module_that_is_gone_is_found(tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text("from slipcore.gone import x\nfrom slipcore.frames import GraspLog")
+    assert gone(tmp_path / "a.py", {"slipcore.frames"}) == {"slipcore.gone"}
+
+
 ESTIMATOR_ROOMS = ("linear", "sampling", "likelihoods", "methods")
 """From the ground up: each may import those before it."""
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from slipcore.forces.known import KnownForce
 
 from slipcore import InvalidInput
+from slipcore.forces.tracking.known import KnownForce
 
 
 @pytest.mark.parametrize("deviation", [0.0, -0.1, np.inf, np.nan])
