@@ -23,7 +23,7 @@ from stiction_client import (
 )
 from stiction_client.controller import gains
 from stiction_client.controller.friction import KnownFriction, LearnedFriction, utilisation
-from stiction_client.controller.load import LoadEstimate
+from stiction_client.controller.load import LoadEstimate, size_of
 from tests.clients.point_contact import FRAME, Episode, PointContact, ramp, run
 
 Make = Callable[..., FrictionModel]
@@ -31,6 +31,21 @@ Make = Callable[..., FrictionModel]
 SETTINGS = ControlSettings(contact=Contact.round(6e-5, at_force=5.0), least_force=0.5, most_force=40.0)
 LIFT = ramp((1.5, 0.5, 0.3))
 SEEDS = range(4)
+
+
+@pytest.mark.parametrize("normal", [0.0, 1.0, 5.0])
+@pytest.mark.parametrize("torque", [0.0, 0.01, 1.0])
+def test_a_torque_counts_by_its_arm_and_not_without_contact(normal: float, torque: float) -> None:
+    arm = float(SETTINGS.contact.arm(normal))
+    expected = math.hypot(1.5, torque / arm) if normal else 1.5
+    assert size_of(Observation(0.0, normal, 1.5, torque), SETTINGS) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_contact_without_arm_bears_no_torque() -> None:
+    flat = dataclasses.replace(SETTINGS, contact=Contact(6e-5))
+    assert size_of(Observation(0.0, 5.0, 1.5, 0.0), flat) == 1.5
+    with pytest.raises(InvalidArgument, match="torque"):
+        size_of(Observation(0.0, 5.0, 1.5, 0.01), flat)
 
 
 def model_of(make: Make, friction: float, slope: float = 0.0) -> FrictionModel:
