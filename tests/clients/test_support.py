@@ -20,7 +20,7 @@ from stiction_client import (
     required_normal_force,
     sdf_surface,
 )
-from stiction_client.support import BEND, Support, kinds, support
+from stiction_client.support import BEND, Support, disagreement, kinds, support
 
 Make = Callable[..., FrictionModel]
 
@@ -132,6 +132,17 @@ def test_a_refusal_names_the_largest_force_observed_where_only_greater_ones_woul
         required_normal_force(model, 100.0, contact_area=6e-5)
     assert (refusal.value.cause, refusal.value.largest_observed) == ("range", 0.05)
     assert str(pickle.loads(pickle.dumps(refusal.value))) == str(refusal.value)
+
+
+@pytest.mark.parametrize(("more", "disagree"), [(0.0, False), (0.03, False), (0.06, True), (-0.06, True)])
+def test_methods_disagree_where_their_intervals_have_nothing_in_common(
+    make_model: Make, more: float, disagree: bool
+) -> None:
+    """Each knows its friction to ± 0.02, nearly."""
+    one, other = (make_model((0.4 + part, 0.0, 0.0), np.diag([1e-4, 0.0, 0.0])) for part in (0.0, more))
+    told = disagreement("ols", one, {"bayes": other})
+    assert (told is not None) == disagree
+    assert told is None or f"bayes expects {0.4 + more:.3g} ± 0.02" in told
 
 
 def test_many_answers_tell_their_support_one_by_one(make_model: Make) -> None:
