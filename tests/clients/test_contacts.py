@@ -242,3 +242,5 @@ def test_a_contact_that_cannot_be_is_refused_by_name(make: Callable[[], object],
 def test_a_torque_on_a_contact_without_arm_is_refused(make_model: Make) -> None:
     with pytest.raises(InvalidArgument, match=r"torque is 0\.1; allowed: 0 where the contact has no torque_arm"):
         required_normal_force(make_model(), 1.0, contacts=Contact(AREA), torque=0.1)
+    without = required_normal_force(make_model(), 1.0, contacts=Contact(AREA))
+    assert without.normal_force == required_normal_force(make_model(), 1.0, contacts=Contact.flat(AREA)).normal_force
