@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from db.records import AccessKey
 
 app = typer.Typer(help="Make, list and revoke access keys.", no_args_is_help=True)
-GROUP = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}")
+GROUP = re.compile(r"[A-Za-z0-9]([A-Za-z0-9 ._-]{0,98}[A-Za-z0-9._-])?")
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for a program to read.")]
 
 
@@ -40,10 +40,11 @@ def create(
     from db.tables import now
     from service.domain.keys import digest, new_key
 
-    if not 0 < len(name) <= 100 or not name.isprintable():
-        raise typer.BadParameter(f"name is {name!r}; allowed: 1 to 100 printable characters")
+    if not 0 < len(name) <= 100 or not name.isprintable() or name != name.strip():
+        raise typer.BadParameter(f"name is {name!r}; allowed: 1 to 100 printable characters, no space at the ends")
     if group is not None and not GROUP.fullmatch(group):
-        raise typer.BadParameter(f"group is {group!r}; allowed: 1 to 100 letters, digits, spaces and `._-`")
+        allowed = "1 to 100 letters, digits, spaces and `._-`, no space at the ends"
+        raise typer.BadParameter(f"group is {group!r}; allowed: {allowed}")
     ends = None if expires is None else moment_to_come("expires", expires, now())
     key_id, text = new_key()
     with opened(database_url, may_be_new=True) as database:

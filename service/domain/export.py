@@ -13,10 +13,11 @@ from service.domain.errors import FileDeleted, UnsupportedFormat
 
 @dataclass(frozen=True, slots=True)
 class LogFile:
-    """A file to be sent; ``close`` it after that."""
+    """A file to be sent; ``close`` it after that. ``is_stored``: as it is kept, with the hash of the log."""
 
     path: Path
     close: ExitStack
+    is_stored: bool = False
 
 
 async def export(
@@ -41,7 +42,7 @@ async def export(
                 stored = held.enter_context(await context.threads.run(owner, source.open, "rb"))
             except FileNotFoundError as error:
                 raise FileDeleted(f"the file of grasp log {log.id} has just been deleted") from error
-            return LogFile(Path(f"/dev/fd/{stored.fileno()}"), held.pop_all())  # there, too, once it is deleted
+            return LogFile(Path(f"/dev/fd/{stored.fileno()}"), held.pop_all(), True)  # there, too, once it is deleted
         await room()
         spool = held.enter_context(context.blobs.spool())
         try:

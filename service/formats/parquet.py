@@ -142,7 +142,9 @@ class _Columns:
     def _read(self, name: str, field: str) -> NDArray[Any]:
         parts: list[NDArray[Any]] = []
         for batch in self._file.iter_batches(1024, row_groups=self._groups, columns=[field], use_threads=False):
-            if field not in batch.schema.names:
+            if (times := batch.schema.names.count(field)) > 1:
+                raise InvalidInput(name, f"column {field}, which stands {times} times", "each column once")
+            if times == 0:
                 raise InvalidInput(name, f"column {field}, damaged", "a column of this name")
             self._bytes += batch.nbytes
             if self._bytes > MAX_CONTENT_BYTES:

@@ -12,7 +12,7 @@ from fastapi.routing import APIRoute
 from service.domain.receive import unless_gone
 from service.http.access import CurrentPrincipal
 from service.http.dependencies import CurrentContext
-from service.http.parameters import KNOWN_PARAMETERS, query_names
+from service.http.parameters import KNOWN_PARAMETERS, query_parameters
 
 
 async def gone(request: Request) -> None:
@@ -45,7 +45,7 @@ class FairRoute(APIRoute):
         if not iscoroutinefunction(endpoint):
             needed.append(Depends(_turn, scope="function"))
         super().__init__(path, endpoint, dependencies=needed, **options)
-        self.parameters = query_names(self)
+        self.parameters = query_parameters(self)
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
         """The handler, which of a coroutine without a body is given up once its client has gone."""

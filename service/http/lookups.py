@@ -18,7 +18,7 @@ from service.domain.look_up import FrictionQuery, look_up
 from service.domain.model_cache import KnownModel
 from service.http.authentication import Authenticator
 from service.http.conditional import is_one_of, unchanged, whole
-from service.http.parameters import wrong_parameter
+from service.http.parameters import numbers_among, wrong_parameter
 from service.http.request_middleware import (
     Headers,
     id_header,
@@ -42,6 +42,8 @@ LONGEST_QUERY = 200
 
 ROUTE = SimpleNamespace(path="/v1/materials/{name}/friction")
 """Under which the look-ups are counted, as those that the route itself answers."""
+
+_PARAMETERS = numbers_among((name, field.annotation) for name, field in LookUpQuery.model_fields.items())
 
 _PATH = re.compile(r"/v1/materials/([A-Za-z0-9][A-Za-z0-9 ._-]{0,99})/friction")
 
@@ -142,6 +144,6 @@ def _read(query: bytes) -> tuple[str, FrictionQuery] | None:
         asked = LookUpQuery.model_validate(dict(given))
     except ValueError:  # pydantic's, or of the address
         return None
-    if wrong_parameter((name for name, _ in given), LookUpQuery.model_fields) is not None:
+    if wrong_parameter(given, _PARAMETERS) is not None:
         return None
     return asked.method, FrictionQuery(asked.v, asked.fn, asked.quantile, *asked.averaged(), asked.sensor)

@@ -17,6 +17,7 @@ from service.domain.upload import ReceivedLog, StoredUpload, UploadRequest, acce
 from service.formats import writing
 from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.bodies import chunks
+from service.http.conditional import KEEP_AND_ASK, NOT_MODIFIED, is_one_of, unchanged
 from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
 from service.http.download import Download, checked_within
@@ -213,6 +214,7 @@ def read_samples(context: CurrentContext, id: str) -> Response:  # noqa: A002
     summary="Download a grasp log",
     response_class=FileResponse,
     responses=_FILE
+    | NOT_MODIFIED
     | problems(
         UNKNOWN_GRASP_LOG,
         FILE_DELETED,
@@ -232,16 +234,24 @@ async def read_file(
     format: Annotated[  # noqa: A002
         str, Query(description="Of the file", json_schema_extra={"enum": list(writing.SUFFIXES)})
     ] = "npz",
-) -> Download:
-    """As it was uploaded, or as NPZ, Parquet or MCAP made of it: each is read back bit for bit."""
+) -> Response:
+    """As it was uploaded, or as NPZ, Parquet or MCAP made of it: each is read back bit for bit.
+
+    Of the file as it is stored `ETag` and `If-None-Match` save the answer to who has it.
+    """
     if format not in writing.SUFFIXES:
         raise Problem.wrong_value(INVALID_REQUEST, "format", format, ", ".join(writing.SUFFIXES))
     share, within = principal.share, checked_within(request)
     log = await context.threads.run(share, _find, context, id)
     file = await export(context, log, format, share, room, within)
+    tag = f'"{log.sha256}"'
+    if file.is_stored and is_one_of(tag, request.headers.get("if-none-match", "")):
+        file.close.close()
+        return unchanged(tag)
     return Download(
         file.path,
         file.close.close,
+        headers={"ETag": tag, "Cache-Control": KEEP_AND_ASK} if file.is_stored else None,
         media_type=formats.FORMATS[format].content_type,
         filename=f"{id}{writing.SUFFIXES[format]}",
     )

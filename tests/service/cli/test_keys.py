@@ -93,3 +93,10 @@ def test_what_is_no_text_is_refused_by_name(run) -> None:  # type: ignore[no-unt
     code, text = run("revoke", "\udcff")
     assert code == INPUT_REFUSED
     assert text.endswith("stiction: argument '\\udcff' is not UTF-8; allowed: UTF-8, but in names of files\n")
+
+
+@pytest.mark.parametrize("told", [("gripper ",), (" gripper",), ("gripper", "--group", "lab ")])
+def test_names_have_no_spaces_at_their_ends_that_nobody_sees(run, told: tuple[str, ...]) -> None:  # type: ignore[no-untyped-def]
+    code, shown = run("create", *told)
+    assert code == 2
+    assert "no space at the ends" in " ".join(shown.replace("│", " ").split())

@@ -504,6 +504,14 @@ def test_a_column_of_something_else_is_refused_by_name(
         formats.read(tmp_path / "log")
 
 
+def test_a_column_that_stands_twice_is_named(log: GraspLog, tmp_path: Path) -> None:
+    rows = pa.array(log.displacement.reshape(5, -1).tolist())
+    columns, names = [pa.array(log.time), rows, rows], ["time", "displacement", "displacement"]
+    pq.write_table(pa.Table.from_arrays(columns, names=names), tmp_path / "log")
+    with pytest.raises(InvalidInput, match="displacement is column displacement, which stands 2 times; allowed: each"):
+        formats.read(tmp_path / "log")
+
+
 @pytest.mark.parametrize(
     ("notes", "mapping", "message"),
     [

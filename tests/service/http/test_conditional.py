@@ -83,3 +83,19 @@ def test_a_name_that_is_freed_or_changed_is_forgotten(reach: Any) -> None:
     assert client.get(PATHS[1]).json()["material"] == "steel"
     curate.remove_alias(context, "steel", "paper")
     assert client.get(PATHS[1]).json()["type"] == "/problems/unknown-material"
+
+
+@pytest.mark.parametrize("engine_name", ["sqlite"], indirect=True)
+def test_the_file_of_a_log_is_not_sent_to_who_has_it(reach: Callable[..., Any], content: bytes) -> None:
+    lab = reach("open")
+    headers = {"content-type": "application/vnd.stiction.grasp-log+npz"}
+    log = lab.request("POST", "/v1/grasp-logs", content=content, headers=headers).json()
+    path = f"/v1/grasp-logs/{log['id']}/file"
+    first = lab.get(path)
+    assert (first.content, first.headers["etag"]) == (content, f'"{log["sha256"]}"')
+    for listed in (first.headers["etag"], f'"x", W/{first.headers["etag"]}', "*"):
+        again = lab.get(path, headers={"If-None-Match": listed})
+        assert (again.status_code, again.content, again.headers["etag"]) == (304, b"", first.headers["etag"])
+    assert lab.get(path, headers={"If-None-Match": '"x"'}).content == content
+    part = lab.get(path, headers={"Range": "bytes=0-9", "If-Range": first.headers["etag"]})
+    assert (part.status_code, part.content) == (206, content[:10])

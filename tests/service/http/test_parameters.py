@@ -47,6 +47,31 @@ def test_a_parameter_that_stands_twice_is_refused(reach: Callable[..., Any]) -> 
             assert told["detail"] == f"{name} is given 2 times; allowed: once", path
 
 
+NUMBERS = {
+    "/v1/materials/paper/friction": ("fn", "v", "quantile", "elements"),
+    "/v1/materials/paper/next-grasp": ("fn", "v", "quantile", "elements", "load", "drop_probability"),
+    "/v1/materials/paper/fits": ("limit",),
+    "/v1/jobs/0": ("wait",),
+    "/v1/sensors": ("limit",),
+    "/v1/grasp-logs": ("limit",),
+}
+
+
+@ONLY_SQLITE
+@pytest.mark.parametrize("path", NUMBERS)
+def test_a_number_in_which_something_was_lost_is_none(reach: Callable[..., Any], path: str) -> None:
+    """Python reads 1_0 as 10."""
+    for name in NUMBERS[path]:
+        told = reach("open").get(f"{path}?{name}=1_0").json()
+        assert told["detail"] == f"{name} is 1_0; allowed: a number"
+
+
+@ONLY_SQLITE
+def test_text_may_have_what_numbers_may_not(reach: Callable[..., Any]) -> None:
+    for query in ("/v1/materials?search=a_b", "/v1/grasp-logs?sensor=a_b"):
+        assert reach("open").get(query).status_code == 200
+
+
 @ONLY_SQLITE
 def test_who_may_not_ask_is_told_that_first(reach: Callable[..., Any]) -> None:
     assert reach("keys").get("/v1/materials?searhc=x").status_code == 401
