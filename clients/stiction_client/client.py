@@ -485,6 +485,10 @@ class AsyncFrictionClient:
 def _options(url: str | None, key: str | None, timeout: float) -> dict[str, Any]:
     key = os.environ.get("STICTION_KEY") if key is None else key
     url = os.environ.get("STICTION_URL", DEFAULT_URL) if url is None else url
+    if key and not (key.isascii() and key.isprintable()):  # it is not shown
+        raise InvalidArgument(
+            "key", "one with other characters", "printable ASCII, as `stiction keys create` prints it"
+        )
     with _address_checked(url):
         base_url = httpx.URL(url)
     return {

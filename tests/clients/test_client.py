@@ -479,6 +479,14 @@ def test_a_refusal_is_no_absence(answers: SimpleNamespace) -> None:
             client.model("paper")
 
 
+@pytest.mark.parametrize("key", ["é", "a\nb", "a\0"])
+@pytest.mark.parametrize("client", [FrictionClient, AsyncFrictionClient])
+def test_a_key_that_no_header_can_hold_is_refused_and_not_shown(client: Callable[..., object], key: str) -> None:
+    with pytest.raises(InvalidArgument, match="key is one with other characters; allowed: printable ASCII") as refused:
+        client("http://stiction", key)
+    assert key not in str(refused.value)
+
+
 def test_url_and_key_are_those_of_the_environment(
     answers: SimpleNamespace, service: Service, monkeypatch: pytest.MonkeyPatch
 ) -> None:
