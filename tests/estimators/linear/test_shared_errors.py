@@ -38,6 +38,12 @@ def test_errors_shared_within_elements_are_told_where_a_likelihood_ignores_them(
     assert "shared_by_elements" not in estimators.fit(places_that_differ(samples, 0), method="bayes").diagnostics
 
 
+def test_few_samples_a_place_tell_the_same_share(samples: Make) -> None:
+    shares = [shared_by_elements(gather(places_that_differ(samples, seed, n=60))) for seed in range(20)]
+    assert np.mean(shares) == pytest.approx(0.5, abs=4 * np.std(shares) / np.sqrt(20))
+    assert np.std(shares) < 0.1
+
+
 def test_independent_errors_are_hardly_ever_taken_for_shared_ones(samples: Make) -> None:
     found = [gather([samples(60, seed=10 * k + g) for g in range(6)]) for k in range(40)]
     assert sum(shared_by_elements(e) > 0.0 for e in found) <= 1  # 0.04 expected
