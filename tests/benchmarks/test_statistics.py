@@ -51,7 +51,7 @@ def test_processor_time_is_that_of_the_process(measured: object) -> None:
 
 def test_loads_in_turn_are_the_medians_of_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
     rates = iter([1.0, 100.0, 3.0, 300.0, 2.0, 200.0])
-    monkeypatch.setattr(http_load, "load", lambda target: http_load.Load(target.what, next(rates), 0.1, 0.2, 0.3))
+    monkeypatch.setattr(http_load, "load", lambda target, _: http_load.Load(target.what, next(rates), 0.1, 0.2, 0.3))
     targets = [http_load.Target(name, 1, 1, "/") for name in ("slow", "quick")]
     assert [(one.what, one.rate) for one in http_load.in_turn(targets, rounds=3)] == [("slow", 2.0), ("quick", 200.0)]
 
