@@ -663,6 +663,8 @@ class CheckOptions(Options):
     """Frames at rest from which the forces in them count as the sensor's zero."""
     zero_share: Annotated[float, Option(0.0, 10.0, "-", "friction of 0.4 is off by 6 % then; scenes to 0.01")] = 0.025
     """Largest root mean square of what elements read at rest, as a share of their normal force in the grasp."""
+    contact_likeness: Annotated[float, Option(0.0, 1.0, "-", "an offset is alike everywhere, about 0")] = 0.5
+    """Correlation over elements of forces at rest with those of the grasp, above which they are a contact's."""
     least_held: Annotated[int, Option(3, 1000000, "frames", "a line and what it leaves")] = 8
     """Frames in which the contact is pressed, from which forces are compared with the markers."""
     least_moved: Annotated[float, Option(0.0, 1.0, "-", "the line is hardly drawn beyond what was seen")] = 0.3

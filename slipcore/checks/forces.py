@@ -26,7 +26,7 @@ def zero_offset(seen: Subject) -> Iterator[Finding]:
     if not moved.any() or np.count_nonzero(rest) < seen.limits.least_rest:
         return
     read, held = np.median(force[rest], axis=0), np.median(seen.pressing[seen.held], axis=0)
-    if _is_contact(-read[..., 2], held):  # the zero of the markers was taken during a touch
+    if _likeness(-read[..., 2], held) > seen.limits.contact_likeness:  # markers were zeroed during a touch
         return
     noise = 0.5 * np.pi * force[rest][:, touched].var(axis=0, ddof=1) / np.count_nonzero(rest)  # of medians, squared
     off = float(np.sqrt(max((read[touched] ** 2 - noise).mean(axis=0).sum(), 0.0)))
@@ -36,11 +36,11 @@ def zero_offset(seen: Subject) -> Iterator[Finding]:
         yield Finding("zero offset", evidence, "zero the sensor before each grasp, with nothing in touch")
 
 
-def _is_contact(read: FloatArray, held: FloatArray) -> bool:
-    """Whether forces [n, m] lie over the elements as those of the grasp do, which those of a wrong zero do not."""
-    if not read.any() or np.ptp(held) == 0.0 or np.ptp(read) == 0.0:
-        return False
-    return bool(np.corrcoef(read.ravel(), held.ravel())[0, 1] > 0.5)
+def _likeness(read: FloatArray, held: FloatArray) -> float:
+    """Correlation of forces [n, m] over the elements with those of the grasp; that of a wrong zero is about 0."""
+    if np.ptp(held) == 0.0 or np.ptp(read) == 0.0:
+        return 0.0
+    return float(np.corrcoef(read.ravel(), held.ravel())[0, 1])
 
 
 def force_frame(seen: Subject) -> Iterator[Finding]:
