@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from db.blobs import Spool, disk_errors_named
 from db.errors import AlreadyExists, NotFound, StorageUnavailable
-from db.records import NewGraspLog, StoredGraspLog
+from db.records import Gel, NewGraspLog, StoredGraspLog
 from db.repositories import audit, detections, friction_models, grasp_logs, jobs, materials, stores, uploads
 from db.repositories import sensors as stored_sensors
 from service import formats
@@ -196,7 +196,7 @@ def accept(session: Session, context: Context, received: ReceivedLog) -> StoredU
         if is_others:
             _change_sensor(session, known, material_id, sensor, principal)
             told = {"sensor": sensor, "sensor_before": known.sensor}
-        if known.job.status in {"done", "refused"}:
+        if is_others or not _can_go_on(session, known):
             _forget(session, log_id, log.material_id)
         jobs.requeue(session, known.job.id, requested_by=principal.key_id)
     stored = grasp_logs.get(session, log_id)
@@ -229,6 +229,12 @@ def _change_sensor(
     grasp_logs.change_sensor(session, log.id, sensor)
 
 
+def _can_go_on(session: Session, log: StoredGraspLog) -> bool:
+    """Whether a job done again may take what it had found before it failed or was cancelled: it would find the same."""
+    found = log.detection
+    return log.job.status in {"failed", "cancelled"} and found is not None and found.gel == _gel(session, log)
+
+
 def _may_differ(session: Session, log: StoredGraspLog) -> bool:
     """Whether a job that has ended may end otherwise: it failed, which is our fault, was cancelled, or the log's forces
     follow from its sensor's gel, or would have, and that is described otherwise than when they were looked for.
@@ -238,8 +244,11 @@ def _may_differ(session: Session, log: StoredGraspLog) -> bool:
         return True
     findings = () if found is None else found.findings or ()
     by_gel = job.status == "refused" or any(finding.name == RECONSTRUCTED for finding in findings)
-    known = stored_sensors.get(session, log.sensor).gel
-    return by_gel and job.finished_at is not None and known != (None if found is None else found.gel)
+    return by_gel and job.finished_at is not None and _gel(session, log) != (None if found is None else found.gel)
+
+
+def _gel(session: Session, log: StoredGraspLog) -> Gel | None:
+    return stored_sensors.get(session, log.sensor).gel
 
 
 def _material(session: Session, settings: Settings, received: ReceivedLog) -> int | None:

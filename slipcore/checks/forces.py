@@ -59,7 +59,8 @@ def force_frame(seen: Subject) -> Iterator[Finding]:
     (follows, alone), left = _line(moved, ratio)
     (mirrored, _), left_mirrored = _line(moved.conj(), ratio)
     turned = float(np.degrees(np.angle(follows)))
-    if np.abs(moved).min() < seen.limits.least_moved and abs(alone) > max(seen.limits.lean, 2.0 * left):
+    began_bare = not seen.history.contact[0].any()  # markers zeroed under a load stand still where it pulls
+    if began_bare and np.abs(moved).min() < seen.limits.least_moved and abs(alone) > max(seen.limits.lean, 2.0 * left):
         evidence = (
             f"{abs(alone):.2f} of the normal force points sideways where no marker moves so: "
             f"forces lean by {np.degrees(np.arctan(abs(alone))):.0f}° against the markers"

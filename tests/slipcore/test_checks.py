@@ -179,6 +179,12 @@ def test_a_zero_is_not_sought_where_the_markers_took_theirs_in_touch(long_ramp: 
     assert "zero offset" not in names(replace(begun, displacement=begun.displacement - begun.displacement[:5].mean(0)))
 
 
+def test_markers_that_were_zeroed_under_a_load_do_not_make_forces_lean(long_ramp: GraspLog) -> None:
+    """As with `rest=first` of a recording that begins while the contact is pulled: no marker moves, and forces are."""
+    pulled = long_ramp.take(slice(45, None))
+    assert names(replace(pulled, displacement=pulled.displacement - pulled.displacement[0])) <= {"no rest", "no slip"}
+
+
 @pytest.mark.parametrize("degrees", [-20.0, -8.0, 20.0])
 def test_a_leaning_frame_is_found_whichever_way_it_leans(long_ramp: GraspLog, degrees: float) -> None:
     assert "leaning forces" in names(leaning(long_ramp, degrees))

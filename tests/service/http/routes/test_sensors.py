@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from typing import Any
@@ -218,6 +219,36 @@ def test_another_sensor_of_a_stored_log_is_taken_over_and_the_log_looked_at_agai
     entries = reach("open").get("/v1/audit?action=grasp_log.uploaded").json()["items"]
     changes = [entry["details"] for entry in entries if "sensor" in entry["details"]]
     assert [(each["sensor_before"], each["sensor"]) for each in changes] == [("left", "right")]
+
+
+@pytest.mark.parametrize("status", ["failed", "cancelled", "queued"])
+def test_what_was_found_by_the_sensor_before_is_looked_for_anew_however_the_job_ended(
+    reach: Callable[..., Any],
+    database: Database,
+    blobs: BlobStore,
+    content: bytes,
+    status: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The job stops in its fit, when samples are stored."""
+    reach("open").request("POST", "/v1/materials", json={"name": "paper"})
+    send = lab_that_sends(reach, content)
+    log = send(material="paper", sensor="left").json()["id"]
+    with monkeypatch.context() as stopped, suppress(InterruptedError):
+        stopped.setattr(pipeline, "fit_material", stop)
+        run_next(database, blobs)
+    ended = {} if status == "queued" else {"reason": "x", "finished_at": datetime.now(UTC)}
+    with database.write() as session:
+        session.execute(update(JobRow).values(status=status, runner_id=None, **ended))
+    assert reach("open").get(f"/v1/grasp-logs/{log}").json()["detection"] is not None
+    again = send(material="paper", sensor="right").json()
+    assert (again["sensor"], again["job"]["status"], again["detection"]) == ("right", "queued", None)
+    run_next(database, blobs)
+    assert send(material="paper", sensor="right").json()["job"]["status"] == "done"
+
+
+def stop(*_: object) -> None:
+    raise InterruptedError
 
 
 def test_a_sensor_is_not_changed_while_its_job_runs(
