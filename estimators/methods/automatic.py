@@ -45,21 +45,34 @@ def distances(data: FitData, observations: Observations) -> FloatArray:
     """How far each sample [k] lies from the robust plane, in standard deviations, what is its place's taken away.
 
     Where most samples are of places with many, the others count as near; else all are judged by their distance from
-    the plane: a place with few samples cannot be judged by them. Where hardly anything scatters, what lies off
-    by less than a grip could notice is near (``least_scatter``).
+    the plane, what is their grasp's taken away: a place with few samples cannot be judged by them. Where hardly
+    anything scatters, what lies off by less than a grip could notice is near (``least_scatter``).
     """
     linear = m_estimate(data, observations, LOSSES["tukey"]).linear
-    residual = observations.friction - plane(linear, observations)
+    law = plane(linear, observations)
+    residual = observations.friction - law
     place = observations.place()
     known = np.bincount(place)[place] >= AUTOMATIC.fewest
     if 2 * np.count_nonzero(known) > len(known):
         residual = np.where(known, residual - _medians(place, residual)[place], 0.0)
         known &= residual != 0.0  # a median's own distance of 0 says nothing of the scatter
     else:
-        known = np.ones(len(known), dtype=bool)
+        residual, known = _within_grasps(observations, law), np.ones(len(known), dtype=bool)
     scale = float(np.median(np.abs(residual[known]))) / NORMAL_MAD if known.any() else 0.0
     scale = max(scale, AUTOMATIC.least_scatter * float(np.median(np.abs(observations.friction))))
     return np.asarray(np.abs(residual) / scale if scale > 0.0 else np.zeros(len(residual)))
+
+
+def _within_grasps(observations: Observations, law: FloatArray) -> FloatArray:
+    """Residuals [k] from the law [k] as each grasp of several shows it: by which part of it they differ is scatter
+    between grasps, however large it is.
+    """
+    friction, grasp = observations.friction, observations.grasp
+    many = np.bincount(grasp)[grasp] >= AUTOMATIC.fewest
+    if not grasp.any():
+        return friction - law
+    part = np.divide(friction, law, out=np.ones_like(law), where=law > 0.0)
+    return np.asarray(friction - np.where(many, _medians(grasp, part)[grasp], 1.0) * law)
 
 
 def _medians(codes: IntArray, values: FloatArray) -> FloatArray:

@@ -57,6 +57,20 @@ def test_outliers_in_few_grasps_leave_the_scatter_between_them_its_say(samples: 
     assert model.standard_errors[0] > 5.0 * estimators.fit(heavy, method="robust").standard_errors[0]
 
 
+@pytest.mark.parametrize("share", [-0.4, 0.2, 0.5])
+def test_a_grasp_that_differs_from_the_other_is_no_outlier(samples: Make, share: float) -> None:
+    """Of few samples a place, with errors far below what the two differ by."""
+    rng, seen = np.random.default_rng(3), []
+    for count, part in ((70, 1.0), (90, 1.0 + share)):
+        each = samples(count, seed=count, noise=np.zeros(count))
+        errors = 0.002 * rng.standard_normal(count)
+        seen.append(replace(each, friction_coefficient=each.friction_coefficient * part + errors))
+    model = estimators.fit(seen, method="auto")
+    assert model.n > 150
+    assert model.scales is not None
+    assert model.scales.between_grasps.value > 0.2 * abs(share)
+
+
 def test_what_lies_off_by_less_than_a_grip_notices_is_kept(samples: Make) -> None:
     """Without noise whatever is off a little, here by 0.5 % of friction, lies many of the others' deviations away."""
     noise = np.where(np.random.default_rng(0).random(800) < 0.1, -1.0, 1e-3)
