@@ -38,8 +38,10 @@ ATTEMPTS = 3
 
 AWAY = frozenset({502, 503, 504})
 """Statuses by which a service, or a proxy before it, says that it is not there now."""
-BUSY = AWAY | {429}
-"""Statuses with which the service asks for patience."""
+NOT_DONE = frozenset({429, 503})
+"""Statuses with which the service, or a proxy that does not reach it, says that it did nothing."""
+BUSY = AWAY | NOT_DONE
+"""Statuses after which what may be asked twice is asked again."""
 
 LONGEST_RETRY = 30.0
 """s; a service that asks to be left alone for longer is not waited for."""
@@ -72,7 +74,7 @@ OF_PROBLEMS = frozenset({"type", "title", "status", "detail", "instance", "name"
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One HTTP request, which may be sent again: it is harmless twice, or done once under its ``idempotency_key``.
+    """One HTTP request; ``is_repeatable``: harmless twice, or done once under its ``idempotency_key``.
 
     ``wait_seconds``: for which the service is asked to keep its answer back; ``tag``: that of its answer before.
     """
@@ -86,6 +88,7 @@ class Request:
     idempotency_key: str | None = None
     wait_seconds: float = 0.0
     tag: str | None = None
+    is_repeatable: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,14 +253,14 @@ def rename_material(name: str, new_name: str) -> Call[Material]:
 
 def merge_materials(name: str, source: str) -> Call[Material]:
     """Merge another material into one."""
-    answer = yield from _ask(Request("POST", f"/v1/materials/{_part(name)}/merges", json={"source": source}))
+    answer = yield from _ask(_post(f"/v1/materials/{_part(name)}/merges", {"source": source}))
     return _record(lambda record: Material.from_json(record["material"]), answer)
 
 
 def begin_epoch(name: str, reason: str, first_log: str | None) -> Call[Material]:
     """Begin a new epoch of a material."""
     body = {"reason": reason, "first_grasp_log": first_log}
-    answer = yield from _ask(Request("POST", f"/v1/materials/{_part(name)}/epochs", json=body))
+    answer = yield from _ask(_post(f"/v1/materials/{_part(name)}/epochs", body))
     return _record(lambda record: Material.from_json(record["material"]), answer)
 
 
@@ -350,7 +353,7 @@ def describe_sensor(name: str, gel: Mapping[str, float | None]) -> Call[dict[str
 def calibrate_sensor(name: str, presses: Mapping[str, float | None]) -> Call[dict[str, Any]]:
     """Calibrate a sensor by stored logs, each with its known force."""
     pressed = [{"grasp_log": log, "known_force": force} for log, force in presses.items()]
-    request = Request("POST", f"/v1/sensors/{_part(name)}/calibrations", json={"presses": pressed})
+    request = _post(f"/v1/sensors/{_part(name)}/calibrations", {"presses": pressed})
     return _record(dict, (yield from _ask(request)))
 
 
@@ -387,6 +390,11 @@ def _get(path: str, params: Mapping[str, str | float] | None = None) -> Call[Any
     return (yield from _ask(Request("GET", path, params or {})))
 
 
+def _post(path: str, body: Mapping[str, Any]) -> Request:
+    """What would be done again."""
+    return Request("POST", path, json=body, is_repeatable=False)
+
+
 def _post_once(path: str, body: Mapping[str, Any]) -> Request:
     return Request("POST", path, json=body, idempotency_key=uuid4().hex)
 
@@ -397,18 +405,22 @@ def _ask(request: Request) -> Call[Any]:
 
 
 def _send(request: Request) -> Call[httpx.Response]:
-    """Send a request, again where the connection breaks or the service is busy, and return what is answered."""
+    """Send a request, again where the connection breaks or the service is busy, and return what is answered.
+
+    One that is not repeatable is sent again only where the answer says that nothing was done.
+    """
+    busy = BUSY if request.is_repeatable else NOT_DONE
     for attempt in range(ATTEMPTS):
         pause = RETRY_PAUSE * 2**attempt
         try:
             response = yield request
         except ConnectionFailed:
-            if attempt == ATTEMPTS - 1:
+            if attempt == ATTEMPTS - 1 or not request.is_repeatable:
                 raise
         else:
             assert response is not None  # what a driver sends for a request
             pause = max(_retry_after(response, pause), 0.0)
-            if response.status_code not in BUSY or attempt == ATTEMPTS - 1 or pause > LONGEST_RETRY:
+            if response.status_code not in busy or attempt == ATTEMPTS - 1 or pause > LONGEST_RETRY:
                 return response
         yield Pause(pause)
     raise AssertionError("the last attempt returns or raises")

@@ -39,9 +39,10 @@ class FrictionClient:
     ``url`` and ``key``, sent as ``Authorization: Bearer``, are by default those of the environment, ``STICTION_URL``
     and ``STICTION_KEY``, or this machine's service without a key; ``timeout`` s holds for one request; ``transport``
     replaces the network, as in tests. Where the connection breaks or the service is busy or away (429; 502, 503, 504),
-    a request is tried three times, not before the service asks for it; the service does it once. Models are kept: one
-    younger than ``stale_after`` s isn't asked for again, an older one isn't sent again unless it changed, and where the
-    service can't be reached, or a proxy says so, the last one is used with a ``StaleModel`` warning.
+    a request is tried three times, not before the service asks for it; the service does it once: what would be done
+    again is tried again only where it was not done (429, 503). Models are kept: one younger than ``stale_after`` s
+    isn't asked for again, an older one isn't sent again unless it changed, and where the service can't be reached, or a
+    proxy says so, the last one is used with a ``StaleModel`` warning.
 
     Every call raises ``ConnectionFailed``, ``ProblemError`` (the service refused) or ``UnexpectedAnswer``.
     """

@@ -347,6 +347,29 @@ def test_what_would_happen_twice_is_sent_under_one_key(ask: Ask, service: Servic
     assert keys[0] != keys[3]
 
 
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize("lost", [httpx.ReadError("reset"), httpx.Response(504, text=""), httpx.Response(502, text="")])
+@pytest.mark.parametrize(
+    ("method", "arguments"),
+    [
+        ("merge_materials", ("paper", "felt")),
+        ("begin_epoch", ("paper", "wet")),
+        ("calibrate_sensor", ("ball", {"g": 1.0})),
+    ],
+)
+def test_what_may_have_been_done_and_would_be_done_again_is_not_sent_again(
+    ask: Ask, service: Service, lost: Any, method: str, arguments: tuple[Any, ...]
+) -> None:
+    server = service(lost)
+    with pytest.raises((ConnectionFailed, UnexpectedAnswer)):
+        ask(server, method, *arguments)
+    assert len(server.requests) == 1
+    server = service(problem(503, type="/problems/storage-unavailable"))
+    with pytest.raises(ProblemError):
+        ask(server, method, *arguments)
+    assert len(server.requests) == 3
+
+
 def test_refusals_are_not_tried_again(ask: Ask, service: Service) -> None:
     server = service(problem(409, type="/problems/no-model"))
     with pytest.raises(ProblemError):
