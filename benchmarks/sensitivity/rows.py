@@ -95,22 +95,25 @@ def rows(
 def changed(table: Options, name: str, value: float) -> Iterator[None]:
     """One entry of a table with another value; tables are frozen so that nothing but this changes them.
 
-    Modules that read a table once, as they are imported, are read anew: their names are to be asked of the module.
+    Modules that read a table once, as they are imported, are read anew: their names are to be asked of the module. They
+    have their own back afterwards: what was made of a class before is of the same one still.
     """
-    before = getattr(table, name)
+    before, own = getattr(table, name), [(module, dict(vars(module))) for module in READ_ONCE]
     _put(table, name, value)
+    for module in READ_ONCE:
+        reload(module)
     try:
         yield
     finally:
         _put(table, name, before)
+        for module, names in own:
+            vars(module).update(names)
 
 
 def _put(table: Options, name: str, value: float) -> None:
     object.__setattr__(table, name, value)
     bonded_layer._influence.cache_clear()
     bonded_layer.radial_functions.cache_clear()
-    for module in READ_ONCE:
-        reload(module)
 
 
 def qualified(module: ModuleType, label: str) -> str:

@@ -129,7 +129,7 @@ MEANINGS: dict[str, ProblemMeaning] = {
         "`detail` says what is wrong.",
     ),
     "invalid-request": ProblemMeaning(
-        "A parameter or a field of the body is missing or outside its range.",
+        "A parameter or a field of the body is missing, unknown or outside its range, or a parameter stands twice.",
         "`name`, `value` and `allowed` say what is wrong.",
     ),
     "idempotency-key-reused": ProblemMeaning(

@@ -30,9 +30,10 @@ def zero_offset(seen: Subject) -> Iterator[Finding]:
         return
     noise = 0.5 * np.pi * force[rest][:, touched].var(axis=0, ddof=1) / np.count_nonzero(rest)  # of medians, squared
     off = float(np.sqrt(max((read[touched] ** 2 - noise).mean(axis=0).sum(), 0.0)))
-    share = off / float(held[touched].mean())
-    if share > seen.limits.zero_share:
-        evidence = f"elements read {1e3 * off:.2g} mN while nothing moves them, {share:.0%} of their force in the grasp"
+    pressed = float(held[touched].mean())
+    if 0.0 < seen.limits.zero_share * pressed < off:
+        share = f"{off / pressed:.0%} of their force in the grasp"
+        evidence = f"elements read {1e3 * off:.2g} mN while nothing moves them, {share}"
         yield Finding("zero offset", evidence, "zero the sensor before each grasp, with nothing in touch")
 
 

@@ -115,7 +115,8 @@ def test_a_measure_of_new_grasps_is_the_same_each_time(part: str) -> None:
 
 
 def test_a_number_that_a_module_reads_once_is_changed_there_too() -> None:
-    expected = len(estimators.change_alarm.TAUS)
+    expected, kind = len(estimators.change_alarm.TAUS), estimators.change_alarm.ChangeAlarm
     with changed(estimators.defaults.ALARM, "nodes", 7):
         assert len(estimators.change_alarm.TAUS) == 7
     assert len(estimators.change_alarm.TAUS) == expected
+    assert estimators.change_alarm.ChangeAlarm is kind  # what others hold of it can be stored still

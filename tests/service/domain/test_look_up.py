@@ -58,7 +58,7 @@ def test_friction_of_the_sensor_that_grasps_has_its_own_gain(
     ask: Callable[..., Any], model: estimators.FrictionModel
 ) -> None:
     one = estimators.Scale(0.05, 9.0)
-    shown = estimators.SensorFriction(0.1, 0.01, (0.7, 0.0, 0.0), ((1e-4, 0.0, 0.0),) * 3, 9.0, 0.05, 9.0)
+    shown = estimators.SensorFriction(0.1, 0.01, (0.7, 0.0, 0.0), tuple(map(tuple, 1e-4 * np.eye(3))), 9.0, 0.05, 9.0)
     scales = estimators.Scales(one, one, one, estimators.SensorScale(one, {"left": shown}))
     several = replace(model, scales=scales)
     f_n = sum(model.domain.normal_force) / 2.0

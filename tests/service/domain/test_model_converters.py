@@ -21,12 +21,22 @@ RANGE = st.tuples(st.floats(0.0, 1.0), st.floats(1.0, 10.0))
 SCALE = st.builds(Scale, POSITIVE, FREEDOM)
 TEXT = st.text(max_size=20)
 THREE = st.lists(NUMBERS, min_size=3, max_size=3)
+
+
+@st.composite
+def covariances(draw: st.DrawFn) -> list[list[float]]:
+    """Any that could be one: symmetric, with no negative variance in any direction."""
+    root = np.array(draw(st.lists(st.floats(-1.0, 1.0), min_size=9, max_size=9))).reshape(3, 3)
+    found: list[list[float]] = (root @ root.T).tolist()
+    return found
+
+
 SENSOR = st.fixed_dictionaries(
     {
         "gain": NUMBERS,
         "standard_error": POSITIVE,
         "coefficients": THREE,
-        "covariance": st.lists(THREE, min_size=3, max_size=3),
+        "covariance": covariances(),
         "degrees_of_freedom": FREEDOM,
         "scale": POSITIVE,
         "scatter_degrees_of_freedom": FREEDOM,
@@ -40,11 +50,10 @@ SENSORS = st.fixed_dictionaries(
 @st.composite
 def new_models(draw: st.DrawFn) -> NewModel:
     """Any model that could be stored."""
-    root = np.array(draw(st.lists(st.floats(-1.0, 1.0), min_size=9, max_size=9))).reshape(3, 3)
     return NewModel(
         method=draw(st.sampled_from(["ols", "robust", "hierarchical", "bayes"])),
         coefficients=draw(st.tuples(NUMBERS, NUMBERS, NUMBERS)),
-        covariance=tuple(tuple(line) for line in (root @ root.T).tolist()),
+        covariance=tuple(map(tuple, draw(covariances()))),
         scale=draw(POSITIVE),
         n=draw(st.integers(1, 10**9)),
         degrees_of_freedom=draw(FREEDOM),
