@@ -26,7 +26,8 @@ THREE = st.lists(NUMBERS, min_size=3, max_size=3)
 @st.composite
 def covariances(draw: st.DrawFn) -> list[list[float]]:
     """Any that could be one: symmetric, with no negative variance in any direction."""
-    root = np.array(draw(st.lists(st.floats(-1.0, 1.0), min_size=9, max_size=9))).reshape(3, 3)
+    millionths = st.integers(-(10**6), 10**6)  # whose squares do not vanish
+    root = 1e-6 * np.array(draw(st.lists(millionths, min_size=9, max_size=9))).reshape(3, 3)
     found: list[list[float]] = (root @ root.T).tolist()
     return found
 
