@@ -278,9 +278,11 @@ def friction(
     method: str | None,
     of: str | None,
     elements: int | None,
+    sensor: str | None,
 ) -> Call[FrictionAnswer]:
     """Look friction up."""
     params = _given(v=tangential_velocity, fn=normal_force, quantile=quantile, method=method, of=of, elements=elements)
+    params |= _given(sensor=sensor)
     answer = yield from _get(f"/v1/materials/{_part(name)}/friction", params)
     return _record(FrictionAnswer.from_json, answer)
 

@@ -150,13 +150,14 @@ class FrictionClient:
         *,
         of: str | None = None,
         elements: int | None = None,
+        sensor: str | None = None,
     ) -> FrictionAnswer:
         """Friction at velocity ``v`` m/s and ``fn`` N an element: the mean, or a quantile of what a new grasp shows.
 
         The quantile is ``of`` one "element", or of the mean over the ``elements`` of a "contact" (the default where
-        these are given).
+        these are given). Where the model knows the ``sensor`` that grasps, friction is as that one shows it.
         """
-        return self._run(calls.friction(name, v, fn, quantile, method, of, elements))
+        return self._run(calls.friction(name, v, fn, quantile, method, of, elements, sensor))
 
     def next_grasp(
         self,
@@ -374,9 +375,10 @@ class AsyncFrictionClient:
         *,
         of: str | None = None,
         elements: int | None = None,
+        sensor: str | None = None,
     ) -> FrictionAnswer:
         """As ``FrictionClient.friction``."""
-        return await self._run(calls.friction(name, v, fn, quantile, method, of, elements))
+        return await self._run(calls.friction(name, v, fn, quantile, method, of, elements, sensor))
 
     async def next_grasp(
         self,

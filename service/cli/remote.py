@@ -29,6 +29,9 @@ MaterialName = Annotated[str, typer.Argument(help="Name of a material.")]
 Method = Annotated[
     str, typer.Option("--method", help=f"Whose current model: {', '.join(METHODS[:-1])}, or auto: the recommended one.")
 ]
+GraspingSensor = Annotated[
+    str | None, typer.Option("--sensor", help="That grasps: friction as it shows it, where the model knows its gain.")
+]
 Velocity = Annotated[float, typer.Option("--velocity", help="Tangential velocity of the slip, m/s.")]
 
 CODE_OF_STATUS = {
@@ -73,6 +76,7 @@ def upload(
     material: Annotated[
         str | None, typer.Option(help="Material that was held; without it slip is only detected.")
     ] = None,
+    sensor: Annotated[str | None, typer.Option(help="That recorded, in place of the one that the logs name.")] = None,
     create: Annotated[bool, typer.Option("--create", help="Create the material if it isn't there.")] = False,
     wait: Annotated[bool, typer.Option(help="Wait for detection and fit.")] = True,
     scale: Scale = None,
@@ -93,7 +97,7 @@ def upload(
             client.ensure_material(material)
         table = {"scale": scale, "frame_rate": frame_rate, "rest": rest}
         results = list(
-            counted((_upload(client, each, wait, material, table) for each in sources), len(sources), "logs")
+            counted((_upload(client, each, wait, material, sensor, table) for each in sources), len(sources), "logs")
         )
     if json:
         print_json({"uploads": results})
@@ -111,6 +115,7 @@ def lookup(
     elements: Annotated[
         int | None, typer.Option(min=1, help="The quantile of a contact of so many elements, not of one element.")
     ] = None,
+    sensor: GraspingSensor = None,
     method: Method = "auto",
     url: Url = DEFAULT_URL,
     key: Key = None,
@@ -120,7 +125,7 @@ def lookup(
 
     with connected(url, key) as client:
         force = normal_force if normal_force is not None else _middle_force(client.model(material, method=method))
-        answer = client.friction(material, velocity, force, quantile, method, elements=elements)
+        answer = client.friction(material, velocity, force, quantile, method, elements=elements, sensor=sensor)
     if json:
         print_json(asdict(answer))
     else:
@@ -187,6 +192,7 @@ def plan(
     elements: Annotated[
         float | None, typer.Option(min=1.0, help="Elements of one contact, where they do not follow from its area.")
     ] = None,
+    sensor: GraspingSensor = None,
     method: Method = "auto",
     url: Url = DEFAULT_URL,
     key: Key = None,
@@ -202,6 +208,7 @@ def plan(
         )
     with connected(url, key) as client:
         model = client.model(material, method=method)
+    model = model if sensor is None else model.of_sensor(sensor)
     answer = required_normal_force(
         model,
         load,
@@ -221,7 +228,12 @@ def plan(
 
 
 def _upload(
-    client: "FrictionClient", source: Source, wait: bool, material: str | None, table: dict[str, Any]
+    client: "FrictionClient",
+    source: Source,
+    wait: bool,
+    material: str | None,
+    sensor: str | None,
+    table: dict[str, Any],
 ) -> dict[str, Any]:
     """Upload one log, with what a ``table`` of it needs unless it was read here; that it is not read or that the
     service does not take it is a result like any other.
@@ -232,7 +244,7 @@ def _upload(
     try:
         log, mapping = source.log()
         options = table if isinstance(log, Path) else {}
-        receipt = client.upload(log, material, mapping=mapping, **options)
+        receipt = client.upload(log, material, sensor, mapping=mapping, **options)
     except problems.UnknownMaterial:  # so it will be for the others
         raise
     except (InvalidInput, ProblemError) as refusal:

@@ -116,6 +116,8 @@ def test_friction_is_looked_up_with_what_was_given(ask: Ask, service: Service, a
     assert (answer.friction_coefficient, answer.mean, answer.within_domain) == (0.36, 0.39, True)
     ask(server, "friction", "paper", 1e-3, 0.05, method="bayes")
     assert dict(server.requests[1].url.params) == {"v": "0.001", "fn": "0.05", "method": "bayes"}
+    ask(server, "friction", "paper", 0.0, 0.05, sensor="left")
+    assert server.requests[2].url.params["sensor"] == "left"
 
 
 def test_what_to_record_next_is_asked_for(ask: Ask, service: Service) -> None:

@@ -309,6 +309,27 @@ def test_upload_lookup_and_plan_go_through_a_real_service(run: Run, ramps: list[
     assert run(*grip, "--load", 1e6, "--limit", 50.0)[0] == NOT_FEASIBLE
 
 
+def test_logs_are_given_their_sensor_and_asked_for_as_it_shows_friction(
+    run: Run, ramps: list[Path], url: str, tmp_path: Path
+) -> None:
+    members = dict(np.load(ramps[1]))
+    np.savez(tmp_path / "more.npz", **members | {"force": members["force"] * [1.3, 1.3, 1.0]})
+    for log, sensor in ((ramps[0], "left"), (tmp_path / "more.npz", "right")):
+        sent = run("upload", log, "--material", "felt by two", "--create", "--sensor", sensor, "--url", url, "--json")
+        assert [each["status"] for each in json.loads(sent[1])["uploads"]] == ["done"]
+    asked = ("--url", url, "--json")
+    means, forces = {}, {}
+    for sensor in ("left", "right"):
+        answer = json.loads(run("lookup", "felt by two", "--sensor", sensor, *asked)[1])
+        grip = json.loads(
+            run("plan", "felt by two", "--load", 1.0, "--contact-area", 6e-5, "--sensor", sensor,
+                "--slip-probability", 0.05, *asked)[1]
+        )  # fmt: skip
+        means[sensor], forces[sensor] = answer["mean"], grip["normal_force"]
+    assert means["right"] > 1.02 * means["left"]
+    assert forces["right"] < forces["left"]
+
+
 def test_a_log_is_replayed_as_a_live_stream_and_stored(
     run: Run, ramps: list[Path], url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
