@@ -25,9 +25,9 @@ def moment_to_come(name: str, text: str, now: datetime) -> datetime:
     """A duration from ``now``, or a date (its beginning in UTC) or moment of ISO 8601 after it."""
     try:
         moment = now + duration(name, text) if text[-1:] in _UNITS else datetime.fromisoformat(text)
+        moment = moment.astimezone(UTC) if moment.tzinfo else moment.replace(tzinfo=UTC)
     except (ValueError, OverflowError) as error:
         raise typer.BadParameter(f"{name} is {text}; allowed: such as 90d, 12h or 2027-01-31") from error
-    moment = moment if moment.tzinfo else moment.replace(tzinfo=UTC)
     if moment <= now:
         raise typer.BadParameter(f"{name} is {text}, which is past; allowed: a moment to come")
     return moment

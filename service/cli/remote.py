@@ -201,11 +201,7 @@ def plan(
     """Say how hard to grip so that slip stays improbable, with the model's uncertainty in the answer."""
     from stiction_client import grasp, required_normal_force
 
-    if contact_area > LARGEST_AREA:
-        cm2 = f"{contact_area * 1e4:g} cm²"
-        typer.confirm(
-            f"{contact_area:g} m² are {cm2}, more than a hand; 1 cm² is 1e-4. Is it m²?", abort=True, err=True
-        )
+    _check_area(contact_area)
     with connected(url, key) as client:
         model = client.model(material, method=method)
     model = model if sensor is None else model.of_sensor(sensor)
@@ -225,6 +221,19 @@ def plan(
         print_json({"method": model.method, "version": model.version, **asdict(answer)})
     else:
         print_lines(f"Grip for {load:g} N on {material}", _grip_lines(answer, model))
+
+
+def _check_area(area: float) -> None:
+    """Ask back about a large one; raises ``typer.BadParameter`` where it was none, or nobody answers."""
+    if area <= LARGEST_AREA:
+        return
+    asked = f"{area:g} m² are {area * 1e4:g} cm², more than a hand; 1 cm² is 1e-4. Is it m²?"
+    try:
+        is_meant = typer.confirm(asked, err=True)
+    except typer.Abort:
+        is_meant = False
+    if not is_meant:
+        raise typer.BadParameter(f"--contact-area is {area:g} m²; allowed: that of one finger, such as 1e-4")
 
 
 def _upload(

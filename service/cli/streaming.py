@@ -3,7 +3,7 @@
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from math import inf
+from math import inf, isfinite
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from time import perf_counter, sleep
@@ -44,6 +44,8 @@ def stream(
     from slipcore.errors import InvalidInput
     from stiction_client.stream import SlipStream
 
+    if not isfinite(speed):
+        raise typer.BadParameter(f"--speed is {speed}; allowed: a number, such as 2")
     with _file(log) as path:
         grasp = read_log(path, mapping, scale, frame_rate, rest)
     if grasp.displacement is None:

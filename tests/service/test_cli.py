@@ -390,6 +390,8 @@ def test_what_becomes_of_an_upload_shows_in_the_exit_code(
         ("upload", "x.npz", "--create"),
         ("fit", "x.npz", "--seed", -1),
         ("detect", "x.npz", "--picture", "x.foo"),
+        ("stream", "x.npz", "--speed", "nan"),
+        ("keys", "create", "e", "--scope", "read", "--expires", "9999-12-31T23:59:59-14:00"),
     ],
 )
 def test_wrong_usage_is_told_from_refused_input(run: Run, arguments: tuple[object, ...]) -> None:
@@ -446,10 +448,11 @@ def test_an_area_that_is_larger_than_a_hand_is_asked_back(
     plan = ("plan", "plate", "--load", 1.0, "--url", url, "--contact-area")
     monkeypatch.setattr("sys.stdin", io.StringIO("n\ny\n"))
     code, out, err = run(*plan, 1)
-    assert (code, out.strip()) == (1, "")
+    assert (code, out.strip()) == (WRONG_USAGE, "")
     assert "1 m² are 10000 cm², more than a hand; 1 cm² is 1e-4. Is it m²?" in err
     assert "press with" in run(*plan, 1)[1]
     assert "Is it m²?" not in run(*plan, 0.01)[2]
+    assert run(*plan, 1)[0] == WRONG_USAGE  # nobody answers
 
 
 def test_advice_that_the_warning_gave_is_not_said_again(run: Run, url: str, ramps: list[Path]) -> None:

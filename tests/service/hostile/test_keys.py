@@ -117,7 +117,9 @@ def test_the_command_makes_keys_that_expire_and_records_it(
     assert made["key"].rpartition("_")[2] not in str(created)
 
 
-@pytest.mark.parametrize("text", ["", "d", "0d", "-1d", "soon", "2020-01-31", "9999999d", "1w", "2027-13-01"])
+@pytest.mark.parametrize(
+    "text", ["", "d", "0d", "-1d", "soon", "2020-01-31", "9999999d", "1w", "2027-13-01", "9999-12-31T23:00-14:00"]
+)
 def test_a_moment_that_is_none_or_past_is_refused(text: str) -> None:
     with pytest.raises(Exception, match=r"expires is .*; allowed: "):
         moment_to_come("expires", text, now())
