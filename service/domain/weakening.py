@@ -23,7 +23,8 @@ def with_weakening(
     """The models, those marked by which a planner may count on less by more than a tenth than ``before``, by method.
 
     The mark names the log, of the ``logs`` by id and oldest first, without which most of that is undone. It stays while
-    this is so. Only models that separate scatter between grasps are compared.
+    this is so. Only models that separate scatter between grasps are compared, and not with one of a single sensor where
+    there are several since: that is what weakens it, and its own note says so (``sensor_gain``).
     """
     return [_marked(model, before.get(model.method), logs, prior) for model in models]
 
@@ -31,7 +32,7 @@ def with_weakening(
 def _marked(
     model: FrictionModel, before: NewModel | None, logs: Mapping[str, Moments], prior: ScatterPrior
 ) -> FrictionModel:
-    if model.scales is None or before is None or len(logs) < 2:
+    if model.scales is None or before is None or len(logs) < 2 or _is_first_of_several_sensors(model, before):
         return model
     area = model.element_area / before.element_area
     at = WorkingPoint(0.5 * sum(before.normal_force) * area)
@@ -52,6 +53,11 @@ def _marked(
         WEAKENING: _sentence(log, found, at, expected),
     }
     return replace(model, diagnostics={**model.diagnostics, **told})
+
+
+def _is_first_of_several_sensors(model: FrictionModel, before: NewModel) -> bool:
+    several = model.scales is not None and model.scales.between_sensors is not None
+    return several and (before.scales is None or before.scales.between_sensors is None)
 
 
 def _sentence(log: str, found: Influence, at: WorkingPoint, expected: float) -> str:

@@ -49,6 +49,17 @@ def test_a_log_that_agrees_is_not_looked_for() -> None:
     assert fitted(logs([0.0] * 6), before)[0].notes == ()
 
 
+def test_no_log_is_blamed_for_being_the_first_of_another_sensor() -> None:
+    """That any sensor may grasp now is what weakens the model, whichever log came of it."""
+    of_one = {name: part.of_sensor("a") for name, part in logs([0.0] * 5).items()}
+    both = of_one | {"log5": grasp(5, 0.3).of_sensor("b")}
+    model = fitted(both, fitted(of_one))[0]
+    assert model.scales is not None
+    assert model.scales.between_sensors is not None
+    assert LOG not in model.diagnostics
+    assert any("sensor" in note for note in model.notes)
+
+
 def test_a_first_fit_has_nothing_to_compare_with() -> None:
     models = [estimators.fit(list(logs([0.0, -0.4]).values()), method="hierarchical")]
     assert with_weakening(models, {}, logs([0.0, -0.4]), PRIOR) == models
