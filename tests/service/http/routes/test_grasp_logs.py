@@ -10,7 +10,7 @@ import pytest
 
 from service import formats
 from slipcore import LOOKAHEAD, GraspLog, collect_samples, contact_friction, detect_slip
-from stiction_client.container import encode
+from stiction_client.container import CONTENT_TYPE, encode
 from tests.service.stored import wait_for_empty_spool
 
 Upload = Callable[..., httpx.Response]
@@ -136,18 +136,16 @@ def test_an_unknown_log_is_named(client: httpx.Client, path: str) -> None:
     assert response.json()["type"] == "/problems/unknown-grasp-log"
 
 
-def test_results_that_are_not_there_yet_are_not_ready(
-    client: httpx.Client, members: dict[str, Any], repack: Callable[..., bytes], upload: Upload, wait: Wait
-) -> None:
-    """Two logs at once: with one worker the second waits while the first is worked on."""
-    waiting = [upload(client, repack(members | {"sensor": np.str_(name)})) for name in ("a", "b", "c")]
-    answers = [client.get(f"{waiting[-1].headers['location']}/{part}") for part in ("stick-ratio", "events", "samples")]
-    for answer in answers:
+def test_results_that_are_not_there_yet_are_not_ready(reach: Callable[..., Any], content: bytes) -> None:
+    """Where no worker takes jobs."""
+    lab = reach("open")
+    sent = lab.request("POST", "/v1/grasp-logs", content=content, headers={"content-type": CONTENT_TYPE})
+    place = sent.raise_for_status().headers["location"]
+    for part in ("stick-ratio", "events", "samples"):
+        answer = lab.request("GET", f"{place}/{part}")
         assert answer.status_code == httpx.codes.CONFLICT
         assert answer.json()["type"] == "/problems/not-ready"
-    assert client.get(waiting[-1].headers["location"]).json()["detection"] is None
-    for response in waiting:
-        wait(client, response.json()["job"]["id"])
+    assert lab.request("GET", place).json()["detection"] is None
 
 
 @pytest.mark.parametrize("name", ["npz", "parquet", "mcap"])
