@@ -58,7 +58,7 @@ class Observations:
         return int(self.cluster.max()) + 1
 
     def take(self, rows: NDArray[np.bool_], weight: FloatArray) -> "Observations":
-        """Some of the samples, with other weights [rows.sum()]; clusters left empty keep their code."""
+        """Some of the samples, with other weights [rows.sum()]; clusters are those that are left."""
         return replace(
             self,
             friction=self.friction[rows],
@@ -69,7 +69,7 @@ class Observations:
             weight=weight,
             element=self.element[rows],
             grasp=self.grasp[rows],
-            cluster=self.cluster[rows],
+            cluster=np.unique(self.cluster[rows], return_inverse=True)[1],
             velocity_is_relative=self.velocity_is_relative[rows],
         )
 

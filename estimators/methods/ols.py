@@ -71,7 +71,7 @@ def _of_clusters(data: FitData, linear: LinearFit, errors: CoefficientErrors) ->
     told = by_coefficient("standard_error_cluster", errors.standard)
     told |= by_coefficient("degrees_of_freedom", errors.degrees)
     observations = data.observations
-    if observations is not None and len(observations) <= LINEAR.statsmodels and np.ptp(observations.cluster) > 0:
+    if observations is not None and len(observations) <= LINEAR.statsmodels:
         told |= _statsmodels_errors(*orthonormal(observations, linear), observations.cluster, linear)
     return told
 

@@ -9,6 +9,7 @@ from scipy import stats
 
 import estimators
 from estimators.linear.fit_data import gather
+from estimators.methods import ols
 from estimators.methods.automatic import choose, compared, distances
 from slipcore.samples import FrictionSamples
 
@@ -128,3 +129,13 @@ def test_intervals_cover_whatever_the_fault(
         low, high = estimators.fit(spoil(samples, seed), method="auto").interval(0.95).T
         inside += (low <= truth) & (truth <= high)
     assert (inside >= stats.binom(fits, 0.93).ppf(1e-3)).all()
+
+
+def test_a_grasp_whose_samples_all_lie_off_counts_as_no_cluster(samples: Make) -> None:
+    """Errors of one grasp alone are not those of two that agree."""
+    data = gather([samples(80, seed=1), samples(80, seed=2)])
+    assert data.observations is not None
+    for left_out in (0, 1):
+        kept = data.kept(data.observations.grasp != left_out)
+        assert kept.clusters == 1
+        assert "standard_error_cluster_beta0" not in ols.fit(kept).diagnostics
