@@ -115,7 +115,7 @@ class Settings(BaseSettings):
         description="How many times its size a body may unpack to, as an archive, too, once that is over 16 MiB.",
     )
     read_seconds: Annotated[float, Field(gt=0.0, le=3600.0)] = Field(
-        default=60.0, description="How long reading a file of another library's format may take, in s."
+        default=60.0, description="CPU time that reading a file of another library's format may take, in s."
     )
     readers: Annotated[int, Field(ge=1, le=64)] = Field(
         default=2, description="Processes that read large files and those of other libraries' formats, at most."

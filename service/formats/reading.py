@@ -22,8 +22,8 @@ from db.blobs import disk_errors_named
 from db.errors import StorageUnavailable
 from service import formats
 from service.formats import writing
-from service.processes import spawned
-from service.processes.fair_queue import FairQueue
+from service.processes import limits, spawned
+from service.processes.fair_queue import FairQueue, QueueFull
 from service.processes.fair_threads import FairThreads
 from slipcore.errors import InvalidInput
 from slipcore.frames import GraspLog
@@ -36,8 +36,15 @@ LIBRARIES = ("h5py", "pyarrow.parquet", "rosbags.typesys")
 """What readers import first, where it is installed: it takes address space of its own."""
 
 LEAST_SECONDS, SLOWEST = 5.0, 1e6
-"""s that any file may take, and bytes that earn it another; a table of markers, the slowest to read, does 3e6 a second.
-A damaged file can keep a library busy for ever."""
+"""s of CPU that any file may take, and bytes that earn it another; a table of markers, the slowest to read, does 3e6 a
+second. A damaged file can keep a library busy for ever."""
+
+MOST_BY_CLOCK = 4.0
+"""How many times longer by the clock it may take: on a busy machine a process has a part of a core, which is no fault
+of its file."""
+
+WATCH_SECONDS = 0.1
+"""s between two looks at what a file has taken."""
 
 IDLE_SECONDS = 60.0
 """s that a process without work is kept."""
@@ -87,10 +94,10 @@ class Readers:
 
     ``room``: bytes that reading may take of this process at once. A log that would need a quarter of it or more is
     read in a process, whose memory is bounded by itself. At most ``size`` processes are there, each started when it is
-    first needed and ended when it is lost or long idle; a file may take ``seconds`` there, and what it unpacks is in a
-    folder by ``make_folder``, which goes with it. One ``owner`` has half of
-    the room and of the processes (``FairQueue``); ``QueueFull`` is raised where too many wait. Who is cancelled, since
-    the client has gone, gives up its place at once.
+    first needed and ended when it is lost or long idle; a file may take ``seconds`` of CPU there, and what it unpacks
+    is in a folder by ``make_folder``, which goes with it. One ``owner`` has half of the room and of the processes
+    (``FairQueue``); ``QueueFull`` is raised where too many wait, or where the machine is too busy to read a file in
+    ``MOST_BY_CLOCK`` times its seconds. Who is cancelled, since the client has gone, gives up its place at once.
     """
 
     def __init__(
@@ -161,10 +168,11 @@ class Readers:
         executor = await self._take(owner)
         try:
             done = asyncio.get_running_loop().run_in_executor(executor, _outcome, do, folder)
-            outcome = await asyncio.wait_for(done, seconds)
+            outcome = await _within(seconds, done, spawned.process_id(executor))
         except TimeoutError as lost:
             _end(executor)
-            raise InvalidInput("file", f"not read within {seconds:.3g} s", "a smaller or undamaged file") from lost
+            value = f"not read within {seconds:.3g} s of CPU"
+            raise InvalidInput("file", value, "a smaller or undamaged file") from lost
         except BrokenProcessPool as lost:
             _end(executor)
             raise InvalidInput("file", f"such that its {name} reader died of it", "an undamaged file") from lost
@@ -201,6 +209,28 @@ class Readers:
     def _retire(self, executor: ProcessPoolExecutor) -> None:
         self._idle.pop(executor).timer.cancel()
         executor.shutdown(wait=False)
+
+
+async def _within(seconds: float, done: "asyncio.Future[Result]", process_id: int | None) -> Result:
+    """What a process does; raises ``TimeoutError`` once it has taken more than so much CPU, and ``QueueFull`` where the
+    machine had too little of that for it.
+    """
+    begin, clock = _cpu_seconds(process_id), asyncio.get_running_loop().time
+    deadline = clock() + MOST_BY_CLOCK * seconds
+    try:
+        while not (await asyncio.wait({done}, timeout=min(WATCH_SECONDS, seconds)))[0]:
+            if _cpu_seconds(process_id) - begin > seconds:
+                raise TimeoutError
+            if clock() > deadline:
+                raise QueueFull(f"not read within {MOST_BY_CLOCK * seconds:.3g} s by a machine that is busy")
+    finally:
+        done.cancel()
+    return await done
+
+
+def _cpu_seconds(process_id: int | None) -> float:
+    """CPU time of a process, s; one that is gone takes no more of it."""
+    return (process_id and limits.cpu_seconds(process_id)) or 0.0
 
 
 async def _runs(executor: ProcessPoolExecutor) -> bool:

@@ -163,7 +163,8 @@ MEANINGS: dict[str, ProblemMeaning] = {
     "too-many-uploads": ProblemMeaning(
         "Too many files wait to be read already, or the server found no room for this one within 30 s "
         "(settings.md, `STICTION_READERS` and `STICTION_READING_BYTES`); or as many answers with long arrays or "
-        "with files made for them are being sent as may be.",
+        "with files made for them are being sent as may be; or the machine is so busy that reading the file took four "
+        "times what it may of CPU.",
         "Try again after `Retry-After` seconds, with fewer requests at once.",
     ),
     "stopping": ProblemMeaning(
