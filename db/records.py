@@ -21,6 +21,7 @@ AuditAction = Literal[
     "sensor.described",
     "sensor.calibrated",
     "grasp_log.uploaded",
+    "grasp_log.sensor_changed",
     "grasp_log.withdrawn",
     "grasp_log.restored",
     "grasp_log.file_deleted",

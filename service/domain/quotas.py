@@ -24,6 +24,7 @@ CHANGES: tuple[AuditAction, ...] = (
     "alias.added",
     "owner.added",
     "sensor.described",
+    "grasp_log.sensor_changed",
     "grasp_log.withdrawn",
     "grasp_log.restored",
 )
@@ -74,7 +75,7 @@ def check_change(session: Session, settings: Settings, key_id: str | None) -> No
         return
     lock(session, settings, key_id)
     if usage.changes_since(session, key_id, CHANGES, now() - DAY) >= most:
-        what = "changes of materials and sensors in the last 24 hours"
+        what = "changes of materials, sensors and stored logs in the last 24 hours"
         raise _exceeded(what, most, "STICTION_KEY_CHANGES_A_DAY", LOGS_RETRY_SECONDS)
 
 

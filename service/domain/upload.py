@@ -16,6 +16,7 @@ from db.repositories import audit, detections, friction_models, grasp_logs, jobs
 from db.repositories import sensors as stored_sensors
 from service import formats
 from service.domain import curate, quotas, sensors
+from service.domain.changes import record
 from service.domain.context import Context
 from service.domain.errors import (
     InsufficientScope,
@@ -166,8 +167,8 @@ def accept(session: Session, context: Context, received: ReceivedLog) -> StoredU
     and so has one of which another sensor is named now.
 
     Key and quotas are looked at once more: it may have been revoked, and others of it stored, since this one's body
-    began. Raises ``KeyEnded``, ``NotOwner``, ``QuotaExceeded``, ``StorageQuotaExceeded``, and for another sensor as
-    ``_change_sensor``.
+    began. Raises ``KeyEnded``, ``NotOwner``, ``QuotaExceeded``, ``StorageQuotaExceeded``, and for another sensor, which
+    counts as a change, as ``_change_sensor``.
     """
     settings, principal = context.settings, received.principal
     check_not_ended(session, principal.key_id)
@@ -194,8 +195,10 @@ def accept(session: Session, context: Context, received: ReceivedLog) -> StoredU
             return StoredUpload(known, is_new)
         quotas.check_job(session, settings, principal.key_id)
         if is_others:
+            quotas.check_change(session, settings, principal.key_id)
             _change_sensor(session, known, material_id, sensor, principal)
             told = {"sensor": sensor, "sensor_before": known.sensor}
+            record(session, principal, "grasp_log.sensor_changed", log_id, told)
         if is_others or not _can_go_on(session, known):
             _forget(session, log_id, log.material_id)
         jobs.requeue(session, known.job.id, requested_by=principal.key_id)

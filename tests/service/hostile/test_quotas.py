@@ -177,6 +177,27 @@ def test_a_key_that_has_changed_as_much_as_it_may_changes_no_more(
 
 
 @ONLY_SQLITE
+def test_another_sensor_of_a_stored_log_counts_as_a_change(
+    reach: Callable[..., Any], key: str, contents: list[bytes]
+) -> None:
+    client = reach(key=key, key_changes_a_day=2)
+    client.headers.update(HEADERS)
+
+    def send_of(sensor: str) -> Any:
+        return client.request("POST", "/v1/grasp-logs", params={"sensor": sensor}, content=contents[0])
+
+    answers = [send_of(sensor) for sensor in ("left", "right", "middle", "another", "middle")]
+    assert [answer.status_code for answer in answers] == [202, 200, 200, 429, 200]  # the last one is its sensor already
+    assert "STICTION_KEY_CHANGES_A_DAY" in answers[3].json()["detail"]
+    assert {each["name"] for each in client.get("/v1/sensors").json()["items"]} <= {"left", "right", "middle"}
+    changed = reach("open").get("/v1/audit?action=grasp_log.sensor_changed").json()["items"]
+    assert [(each["details"]["sensor_before"], each["details"]["sensor"]) for each in changed] == [
+        ("right", "middle"),
+        ("left", "right"),
+    ]
+
+
+@ONLY_SQLITE
 @pytest.mark.parametrize(("method", "body"), [("PUT", {"reason": "torn"}), ("DELETE", None)], ids=["reason", "restore"])
 def test_a_withdrawal_counts_and_is_never_refused_but_no_more_is_done_with_it(
     reach: Callable[..., Any], key: str, contents: list[bytes], method: str, body: dict[str, str] | None
