@@ -7,7 +7,7 @@ import numpy as np
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import Component, ElasticBody
 from slipcore.contact.elasticity.preconditioner import NormalInverse, TangentialInverse
-from slipcore.contact.elasticity.transform import Transform, fast_lengths, multiply_pair, padded_lengths
+from slipcore.contact.elasticity.transform import Convolution, fast_lengths, padded_lengths, symbols
 from slipcore.frames import FloatArray
 
 
@@ -33,15 +33,17 @@ class ElasticOperator:
 
     __slots__ = (
         "_coarse",
+        "_coupling",
         "_kernels",
+        "_normal",
         "_normal_inverse",
-        "_symbols",
+        "_tangential",
         "_tangential_inverse",
         "bodies",
+        "convolution",
         "count",
         "grid",
         "source",
-        "transform",
     )
 
     def __init__(
@@ -53,9 +55,11 @@ class ElasticOperator:
     ) -> None:
         self.bodies, self.grid, self.source = bodies, replace(grid, centre=(0.0, 0.0)), source
         self.count = Count() if count is None else count
-        self.transform = Transform(grid.shape, padded_lengths(grid.shape))
+        self.convolution = Convolution(grid.shape, padded_lengths(grid.shape))
         self._kernels: dict[Component, FloatArray | None] = {}
-        self._symbols: dict[Component, FloatArray | None] = {}
+        self._normal: FloatArray | None = None
+        self._tangential: FloatArray | None = None
+        self._coupling: FloatArray | None = None
         self._coarse: ElasticOperator | None = None
         self._normal_inverse: NormalInverse | None = None
         self._tangential_inverse: TangentialInverse | None = None
@@ -63,36 +67,39 @@ class ElasticOperator:
     def normal(self, pressure: FloatArray) -> FloatArray:
         """Normal displacement by pressure."""
         self.count.normal += 1
-        spectrum = self.transform.forward(pressure[None])
-        spectrum *= self._known("nn")
-        displacement: FloatArray = self.transform.backward(spectrum)[0]
+        if self._normal is None:
+            self._normal = self._symbols([["nn"]])
+        displacement: FloatArray = self.convolution(pressure[None], self._normal)[0]
         return displacement
 
     def tangential(self, traction: FloatArray) -> FloatArray:
         """Tangential displacement [2, ny, nx] by traction [2, ny, nx]."""
         self.count.tangential += 1
-        spectrum = self.transform.forward(traction)
-        multiply_pair(spectrum, self._known("xx"), self._known("yy"), self._symbol("xy"))
-        return self.transform.backward(spectrum)
+        if self._tangential is None:
+            self._tangential = self._symbols([["xx", "xy"], ["xy", "yy"]])
+        return self.convolution(traction, self._tangential)
 
     def normal_by_traction(self, traction: FloatArray) -> FloatArray:
         """Normal displacement [ny, nx] by traction [2, ny, nx]."""
-        along_x, along_y = self._symbol("zx"), self._symbol("zy")
-        if along_x is None or along_y is None:
+        if self.influence("zx") is None:
             return np.zeros(self.grid.shape)
         self.count.coupling += 1
-        force = self.transform.forward(traction)
-        lift: FloatArray = self.transform.backward((1j * (along_x * force[0] + along_y * force[1]))[None])[0]
+        lift: FloatArray = self.convolution(traction, self._along_z(), turned=True)[0]
         return lift
 
     def tangential_by_pressure(self, pressure: FloatArray) -> FloatArray:
         """Tangential displacement [2, ny, nx] by pressure [ny, nx]: the negative of the above's transpose."""
-        along_x, along_y = self._symbol("zx"), self._symbol("zy")
-        if along_x is None or along_y is None:
+        if self.influence("zx") is None:
             return np.zeros((2, *self.grid.shape))
         self.count.coupling += 1
-        force = -1j * self.transform.forward(pressure[None])[0]
-        return self.transform.backward(np.stack((along_x * force, along_y * force)))
+        along_z = self._along_z()
+        return self.convolution(pressure[None], along_z.reshape(2, 1, *along_z.shape[2:]), turned=True, sign=-1.0)
+
+    def _along_z(self) -> FloatArray:
+        """Symbols of z displacement by both tractions."""
+        if self._coupling is None:
+            self._coupling = self._symbols([["zx", "zy"]])
+        return self._coupling
 
     @property
     def normal_inverse(self) -> NormalInverse:
@@ -137,17 +144,16 @@ class ElasticOperator:
         present = [part for part in parts if part is not None]
         return sum(present[1:], start=present[0]) if present else None
 
-    def _symbol(self, component: Component) -> FloatArray | None:
-        if component not in self._symbols:
-            quadrant = self.influence(component)
-            odd_y, odd_x = component in {"xy", "zy"}, component in {"xy", "zx"}
-            self._symbols[component] = None if quadrant is None else self.transform.symbol(quadrant, odd_y, odd_x)
-        return self._symbols[component]
+    def _symbols(self, components: list[list[Component]]) -> FloatArray:
+        """Symbols of a matrix of components; zero where no body has one."""
+        known = {component: self._spectrum(component) for row in components for component in row}
+        return symbols([[known[component] for component in row] for row in components])
 
-    def _known(self, component: Component) -> FloatArray:
-        symbol = self._symbol(component)
-        assert symbol is not None  # no body is rigid in nn, xx and yy
-        return symbol
+    def _spectrum(self, component: Component) -> FloatArray:
+        quadrant = self.influence(component)
+        if quadrant is None:
+            quadrant = np.zeros(self.grid.shape)
+        return self.convolution.spectrum(quadrant, component in {"xy", "zy"}, component in {"xy", "zx"})
 
     def _nonzero(self, component: Component, grid: Grid) -> FloatArray:
         kernel = self._influence(component, grid)

@@ -7,18 +7,18 @@ gradients independent of the grid. The box is padded to ``fast_lengths``: a prim
 
 import numpy as np
 
-from slipcore.contact.elasticity.transform import Transform, multiply_pair
+from slipcore.contact.elasticity.transform import Convolution, symbols
 from slipcore.frames import FloatArray
 
 
-def circulant_symbol(quadrant: FloatArray, odd: bool = False) -> FloatArray:
-    """Spectrum [ny, nx // 2 + 1] of the nearest circulant to an influence given in its first quadrant.
+def circulant_spectrum(quadrant: FloatArray, odd: bool = False) -> FloatArray:
+    """Spectrum [ny // 2 + 1, nx] of the nearest circulant to an influence given in its first quadrant.
 
     ``odd``: the influence is odd in both directions, not even.
     """
     sign = -1.0 if odd else 1.0
     wrapped = _average(_average(quadrant, sign).T, sign).T
-    return np.ascontiguousarray(np.fft.rfft2(wrapped).real)
+    return np.ascontiguousarray(np.fft.rfft2(wrapped, axes=(1, 0)).real)
 
 
 def _average(influence: FloatArray, sign: float) -> FloatArray:
@@ -31,36 +31,30 @@ def _average(influence: FloatArray, sign: float) -> FloatArray:
 class NormalInverse:
     """Approximate pressure [ny, nx] that makes a normal displacement; the influence ``nn`` is of a larger box."""
 
-    __slots__ = ("_inverse", "_transform")
+    __slots__ = ("_convolution", "_inverse")
 
     def __init__(self, shape: tuple[int, int], nn: FloatArray) -> None:
-        self._transform = Transform(shape, nn.shape)
-        self._inverse = 1.0 / circulant_symbol(nn)
+        self._convolution = Convolution(shape, nn.shape)
+        self._inverse = symbols([[1.0 / circulant_spectrum(nn)]])
 
     def __call__(self, displacement: FloatArray) -> FloatArray:
         """Stress for a displacement of the same shape."""
-        spectrum = self._transform.forward(displacement[None])
-        spectrum *= self._inverse
-        stress: FloatArray = self._transform.backward(spectrum)[0]
+        stress: FloatArray = self._convolution(displacement[None], self._inverse)[0]
         return stress
 
 
 class TangentialInverse:
     """Approximate traction [2, ny, nx] that makes a tangential displacement [2, ny, nx]; influences as above."""
 
-    __slots__ = ("_inverse", "_transform")
+    __slots__ = ("_convolution", "_inverse")
 
     def __init__(self, shape: tuple[int, int], xx: FloatArray, yy: FloatArray, xy: FloatArray | None) -> None:
-        self._transform = Transform(shape, xx.shape)
-        a, d = circulant_symbol(xx), circulant_symbol(yy)
-        self._inverse: tuple[FloatArray, FloatArray, FloatArray | None] = (1.0 / a, 1.0 / d, None)
-        if xy is not None:
-            b = circulant_symbol(xy, odd=True)
-            determinant = a * d - b * b
-            self._inverse = (d / determinant, a / determinant, -b / determinant)
+        self._convolution = Convolution(shape, xx.shape)
+        a, d = circulant_spectrum(xx), circulant_spectrum(yy)
+        b = np.zeros_like(a) if xy is None else circulant_spectrum(xy, odd=True)
+        determinant = a * d - b * b
+        self._inverse = symbols([[d / determinant, -b / determinant], [-b / determinant, a / determinant]])
 
     def __call__(self, displacement: FloatArray) -> FloatArray:
         """Stress for a displacement of the same shape."""
-        spectrum = self._transform.forward(displacement)
-        multiply_pair(spectrum, *self._inverse)
-        return self._transform.backward(spectrum)
+        return self._convolution(displacement, self._inverse)

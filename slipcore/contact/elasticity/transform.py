@@ -1,13 +1,18 @@
-"""Real FFT of fields of cells, in work space that is kept: fresh memory would cost as much as the transform."""
+"""Circular convolutions of fields of cells with an influence, by Fourier transforms.
+
+Along y first, of two real columns at once as one complex one; then along x, for eight waves along y at a time, with
+multiplication and the way back while the data are near at hand. Padding is never stored for a whole field.
+"""
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
 from slipcore.compilation import compiled
+from slipcore.contact.elasticity.fourier import STEP, IntArray, forward, inverse, places, radices, twiddles
 from slipcore.frames import FloatArray
+from slipcore.lanes import COUNT, load, store, transpose
 
-ComplexArray = NDArray[np.complex128]
+_TILE = COUNT * COUNT
 
 
 def fast_lengths(shape: tuple[int, int]) -> tuple[int, int]:
@@ -22,65 +27,260 @@ def padded_lengths(shape: tuple[int, int]) -> tuple[int, int]:
     return fast_lengths((2 * ny - 1, 2 * nx - 1))
 
 
-class Transform:
-    """Real FFT of fields [k, ny, nx], padded with zeros to ``lengths``.
+Plan = tuple[IntArray, FloatArray, IntArray, IntArray, FloatArray]
+"""``radices``, ``twiddles`` and ``places`` of the length along y; ``radices`` and ``twiddles`` of that along x."""
+Work = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+"""Eight columns along y; all rows along x between the transforms; eight rows of up to two fields before and after they
+are multiplied; four tiles of 8 × 8 numbers.
+"""
 
-    Rows that hold only padding are skipped on the way in and on the way out, a quarter of the work of a padded
-    transform. Not for several threads at once: the spectrum of ``forward`` is valid until its next call for as many
-    fields.
+
+class Convolution:
+    """Convolutions of one or two fields [k, ny, nx], padded with zeros to ``lengths``, that give one or two fields.
+
+    Symbols are influences as their transforms are used: [blocks of eight waves along y, waves along x, 8]. Not for
+    several threads at once: work space is kept, as fresh memory would cost as much as the transforms.
     """
 
-    __slots__ = ("_real", "_spectrum", "lengths", "shape")
+    __slots__ = ("_plan", "_work", "lengths", "shape")
 
     def __init__(self, shape: tuple[int, int], lengths: tuple[int, int]) -> None:
         self.shape, self.lengths = shape, lengths
-        self._spectrum: dict[int, ComplexArray] = {}
-        self._real: dict[int, FloatArray] = {}
+        along_y, along_x = lengths
+        # Plain tuples enter compiled code faster than named ones.
+        self._plan: Plan = (
+            radices(along_y),
+            twiddles(along_y),
+            places(along_y),
+            radices(along_x),
+            twiddles(along_x),
+        )
+        self._work: dict[int, Work] = {}
 
-    def forward(self, field: FloatArray) -> ComplexArray:
-        """Spectrum [k, Ny, Nx // 2 + 1] of fields [k, ny, nx]."""
-        (ny, _), (padded_y, padded_x) = self.shape, self.lengths
-        count = len(field)
-        if count not in self._spectrum:
-            self._spectrum[count] = np.empty((count, padded_y, padded_x // 2 + 1), dtype=np.complex128)
-        spectrum = self._spectrum[count]
-        np.fft.rfft(field, padded_x, axis=-1, out=spectrum[:, :ny])
-        spectrum[:, ny:] = 0.0
-        return np.fft.fft(spectrum, axis=-2, out=spectrum)
+    def __call__(self, fields: FloatArray, symbols: FloatArray, turned: bool = False, sign: float = 1.0) -> FloatArray:
+        """Fields [m, ny, nx] from [k, ny, nx] and symbols [m, k, ...]; ``turned``: symbols count as imaginary."""
+        assert fields.shape[1:] == self.shape  # compiled code does not check
+        count = max(symbols.shape[:2])
+        if count not in self._work:
+            self._work[count] = self._space(count)
+        fields, result = np.ascontiguousarray(fields), np.empty((len(symbols), *self.shape))
+        scale = sign / (self.lengths[0] * self.lengths[1])
+        _convolve(fields, symbols, result, (scale, turned), self._plan, self._work[count])
+        return result
 
-    def backward(self, spectrum: ComplexArray) -> FloatArray:
-        """The fields of a spectrum, which is overwritten."""
-        (ny, nx), count = self.shape, len(spectrum)
-        if count not in self._real:
-            self._real[count] = np.empty((count, ny, self.lengths[1]))
-        np.fft.ifft(spectrum, axis=-2, out=spectrum)
-        rows = np.fft.irfft(spectrum[:, :ny], self.lengths[1], axis=-1, out=self._real[count])
-        return rows[..., :nx].copy()
+    def _space(self, count: int) -> Work:
+        (_, nx), (along_y, along_x) = self.shape, self.lengths
+        between = np.zeros(count * _blocks(along_y) * nx * STEP)
+        return np.zeros(along_y * STEP), between, np.zeros(4 * along_x * STEP), np.zeros(4 * _TILE)
 
-    def symbol(self, quadrant: FloatArray, odd_y: bool = False, odd_x: bool = False) -> FloatArray:
-        """Spectrum of an influence given in its first quadrant: real, or its imaginary part if odd in one direction."""
+    def spectrum(self, quadrant: FloatArray, odd_y: bool = False, odd_x: bool = False) -> FloatArray:
+        """Spectrum of an influence given in its first quadrant: real, or its imaginary part if odd in one direction;
+        for waves along y ≥ 0 and all waves along x.
+        """
         (ny, nx), (padded_y, padded_x) = self.shape, self.lengths
         whole = np.zeros(self.lengths)
         whole[:ny, :nx] = quadrant
         whole[padded_y - ny + 1 :, :nx] = (-1.0 if odd_y else 1.0) * quadrant[:0:-1]
         mirrored = whole[:, nx - 1 : 0 : -1]
         whole[:, padded_x - nx + 1 :] = -mirrored if odd_x else mirrored
-        spectrum = np.fft.rfft2(whole)
-        return np.ascontiguousarray(spectrum.imag if odd_y != odd_x else spectrum.real)
+        spectrum = np.fft.rfft2(whole, axes=(1, 0))
+        return spectrum.imag if odd_y != odd_x else spectrum.real
 
 
-def multiply_pair(spectrum: ComplexArray, xx: FloatArray, yy: FloatArray, xy: FloatArray | None) -> None:
-    """Multiply the spectra [2, ...] of a vector field by a symmetric real matrix, in place."""
-    if xy is None:
-        spectrum[0] *= xx
-        spectrum[1] *= yy
-    else:
-        _multiply(spectrum[0].ravel(), spectrum[1].ravel(), xx.ravel(), yy.ravel(), xy.ravel())
+def symbols(spectra: list[list[FloatArray]]) -> FloatArray:
+    """A matrix [m, k] of real spectra [waves along y ≥ 0, waves along x] as a convolution takes it."""
+    return np.array([[_arranged(spectrum) for spectrum in row] for row in spectra], order="C")
+
+
+def _arranged(spectrum: FloatArray) -> FloatArray:
+    """Eight waves along y side by side, those along x in the order in which transforms leave them."""
+    along_y, along_x = spectrum.shape
+    blocks = -(-along_y // COUNT)
+    symbol = np.zeros((blocks * COUNT, along_x))
+    symbol[:along_y, places(along_x)] = spectrum
+    return symbol.reshape(blocks, COUNT, along_x).swapaxes(1, 2)
+
+
+def _blocks(length: int) -> int:
+    """Blocks of eight waves ≥ 0."""
+    return -(-(length // 2 + 1) // COUNT)
 
 
 @compiled
-def _multiply(along_x: ComplexArray, along_y: ComplexArray, xx: FloatArray, yy: FloatArray, xy: FloatArray) -> None:
-    for i in range(xx.size):
-        first, second = along_x[i], along_y[i]
-        along_x[i] = xx[i] * first + xy[i] * second
-        along_y[i] = xy[i] * first + yy[i] * second
+def _convolve(
+    fields: FloatArray,
+    symbols: FloatArray,
+    result: FloatArray,
+    factor: tuple[float, bool],
+    plan: Plan,
+    work: Work,
+) -> None:
+    """Fill ``result``; ``factor``: scale, and whether symbols are imaginary."""
+    splits_y, waves_y, places_y, splits_x, waves_x = plan
+    column, between, rows, tiles = work
+    scale, turned = factor
+    pair = _halves(fields)
+    for first in range(0, pair[0], COUNT):
+        _read(fields.reshape(-1), fields.shape, pair, first, column)
+        forward(column, splits_y, waves_y)
+        _separate(column, places_y, (fields.shape[2], first, *pair), between, tiles)
+    nx, given, found, blocks = fields.shape[2], len(fields), len(symbols), symbols.shape[2]
+    size = rows.size // 4
+    for block in range(blocks):
+        for k in range(given):
+            row, at = rows[k * size : (k + 1) * size], (k * blocks + block) * nx * STEP
+            _copy((between, at, COUNT), (row, 0, COUNT), (2 * nx, COUNT), 1.0)
+            row[nx * STEP :] = 0.0
+            forward(row, splits_x, waves_x)
+        _multiply(rows, symbols.reshape(-1), (found, given, blocks, block), turned)
+        for m in range(found):
+            row, at = rows[(2 + m) * size : (3 + m) * size], (m * blocks + block) * nx * STEP
+            inverse(row, splits_x, waves_x)
+            _copy((row, 0, COUNT), (between, at, COUNT), (2 * nx, COUNT), 1.0)
+    pair = _halves(result)
+    for first in range(0, pair[0], COUNT):
+        _join(between, places_y, (nx, first, *pair), column, tiles)
+        inverse(column, splits_y, waves_y)
+        _write(result.reshape(-1), result.shape, pair, first, column, scale)
+
+
+@compiled(inline=True)
+def _halves(fields: FloatArray) -> tuple[int, int, int, int]:
+    """Columns that are real parts, then imaginary ones; field and column of the first of the latter."""
+    nx = fields.shape[2]
+    half = (nx + 1) // 2
+    return (nx, nx, 1, 0) if len(fields) == 2 else (half, nx - half, 0, half)
+
+
+@compiled
+def _read(
+    flat: FloatArray, shape: tuple[int, int, int], pair: tuple[int, int, int, int], first: int, column: FloatArray
+) -> None:
+    """Eight pairs of columns from the ``first`` on, padded with zeros."""
+    ny, nx, (reals, others, field, start) = shape[1], shape[2], pair
+    column[:] = 0.0
+    _copy((flat, first, nx), (column, 0, STEP), (ny, reals - first), 1.0)
+    _copy((flat, field * ny * nx + start + first, nx), (column, COUNT, STEP), (ny, others - first), 1.0)
+
+
+@compiled
+def _write(
+    flat: FloatArray,
+    shape: tuple[int, int, int],
+    pair: tuple[int, int, int, int],
+    first: int,
+    column: FloatArray,
+    scale: float,
+) -> None:
+    """The reverse of ``_read``, scaled."""
+    ny, nx, (reals, others, field, start) = shape[1], shape[2], pair
+    _copy((column, 0, STEP), (flat, first, nx), (ny, reals - first), scale)
+    _copy((column, COUNT, STEP), (flat, field * ny * nx + start + first, nx), (ny, others - first), scale)
+
+
+@compiled
+def _copy(
+    source: tuple[FloatArray, int, int], target: tuple[FloatArray, int, int], size: tuple[int, int], scale: float
+) -> None:
+    """Rows of at most eight numbers, scaled; ``source`` and ``target``: a flat array, the first place and the step from
+    row to row; ``size``: rows, and numbers that are left in them.
+    """
+    (given, at, step), (found, to, stride), (rows, left) = source, target, size
+    if left >= COUNT:
+        for row in range(rows):
+            store(found, to + row * stride, load(given, at + row * step) * scale)
+    else:
+        for row in range(rows):
+            for i in range(left):
+                found[to + row * stride + i] = given[at + row * step + i] * scale
+
+
+@compiled
+def _separate(
+    column: FloatArray,
+    places_y: IntArray,
+    where: tuple[int, int, int, int, int, int],
+    between: FloatArray,
+    tiles: FloatArray,
+) -> None:
+    """From spectra of eight pairs of columns those of each, for waves ≥ 0, as rows ``between``; ``where``: nx, the
+    first column, and what ``_halves`` gives.
+    """
+    nx, first, reals, others, field, start = where
+    length = places_y.size
+    last, blocks = length // 2, (length // 2 + COUNT) // COUNT
+    for block in range(blocks):
+        for j in range(COUNT):
+            wave = min(block * COUNT + j, last)
+            at, opposite = places_y[wave] * STEP, places_y[(length - wave) % length] * STEP
+            zr, zi = load(column, at) * 0.5, load(column, at + COUNT) * 0.5
+            cr, ci = load(column, opposite) * 0.5, load(column, opposite + COUNT) * 0.5
+            store(tiles, j * COUNT, zr + cr)
+            store(tiles, _TILE + j * COUNT, zi - ci)
+            store(tiles, 2 * _TILE + j * COUNT, zi + ci)
+            store(tiles, 3 * _TILE + j * COUNT, cr - zr)
+        for tile in range(4):
+            transpose(tiles, tile * _TILE)
+        row, other = block * nx + first, (field * blocks + block) * nx + start + first
+        for i in range(COUNT):
+            if i < reals - first:
+                store(between, (row + i) * STEP, load(tiles, i * COUNT))
+                store(between, (row + i) * STEP + COUNT, load(tiles, _TILE + i * COUNT))
+            if i < others - first:
+                store(between, (other + i) * STEP, load(tiles, 2 * _TILE + i * COUNT))
+                store(between, (other + i) * STEP + COUNT, load(tiles, 3 * _TILE + i * COUNT))
+
+
+@compiled
+def _join(
+    between: FloatArray,
+    places_y: IntArray,
+    where: tuple[int, int, int, int, int, int],
+    column: FloatArray,
+    tiles: FloatArray,
+) -> None:
+    """The reverse: spectra of eight pairs of columns."""
+    nx, first, _, _, field, start = where
+    length = places_y.size
+    last, blocks = length // 2, (length // 2 + COUNT) // COUNT
+    for block in range(blocks):
+        for i in range(COUNT):
+            row = (block * nx + min(first + i, nx - 1)) * STEP
+            other = ((field * blocks + block) * nx + min(start + first + i, nx - 1)) * STEP
+            store(tiles, i * COUNT, load(between, row))
+            store(tiles, _TILE + i * COUNT, load(between, row + COUNT))
+            store(tiles, 2 * _TILE + i * COUNT, load(between, other))
+            store(tiles, 3 * _TILE + i * COUNT, load(between, other + COUNT))
+        for tile in range(4):
+            transpose(tiles, tile * _TILE)
+        for j in range(min(COUNT, last + 1 - block * COUNT)):
+            wave = block * COUNT + j
+            at, opposite = places_y[wave] * STEP, places_y[(length - wave) % length] * STEP
+            ar, ai = load(tiles, j * COUNT), load(tiles, _TILE + j * COUNT)
+            br, bi = load(tiles, 2 * _TILE + j * COUNT), load(tiles, 3 * _TILE + j * COUNT)
+            store(column, opposite, ar + bi)
+            store(column, opposite + COUNT, br - ai)
+            store(column, at, ar - bi)
+            store(column, at + COUNT, br + ai)
+
+
+@compiled
+def _multiply(rows: FloatArray, symbols: FloatArray, sizes: tuple[int, int, int, int], turned: bool) -> None:
+    """The spectra found, after those given, of one block of waves; ``sizes``: how many are found and given, and the
+    block of how many.
+    """
+    found, given, blocks, block = sizes
+    size = rows.size // 4
+    for m in range(found):
+        one = (m * given * blocks + block) * (size // 2)
+        two = ((m * given + given - 1) * blocks + block) * (size // 2)
+        for at in range(0, size, STEP):
+            factor = load(symbols, one + at // 2)
+            real, imaginary = factor * load(rows, at), factor * load(rows, at + COUNT)
+            if given == 2:
+                factor = load(symbols, two + at // 2)
+                real = real + factor * load(rows, size + at)
+                imaginary = imaginary + factor * load(rows, size + at + COUNT)
+            to = (2 + m) * size + at
+            store(rows, to, imaginary * -1.0 if turned else real)
+            store(rows, to + COUNT, real if turned else imaginary)

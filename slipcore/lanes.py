@@ -1,0 +1,124 @@
+"""Eight numbers at a time, in compiled code.
+
+``load(array, index)`` takes eight numbers of a flat array, ``store`` puts them back; sums, differences and products are
+of each of the eight with each of eight others, or with one number. The compiler always turns them into the machine's
+vector instructions; loops over arrays that might overlap it leaves as they are.
+"""
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from numba import types
+from numba.core.cgutils import ir  # llvmlite's, as numba has it
+from numba.core.datamodel import models, register_default
+from numba.core.errors import TypingError
+from numba.core.imputils import lower_builtin
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array
+
+COUNT = 8
+_VECTOR = ir.VectorType(ir.DoubleType(), COUNT)
+_ANY = ir.Constant(_VECTOR, ir.Undefined)
+_OPERATIONS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul"}
+
+
+class _LanesType(types.Type):  # type: ignore[misc]
+    def __init__(self) -> None:
+        super().__init__(name="Lanes")
+
+
+@register_default(_LanesType)
+class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager: Any, kind: _LanesType) -> None:
+        super().__init__(manager, kind, _VECTOR)
+
+
+_LANES = _LanesType()
+
+
+def _permuted(builder: Any, first: Any, second: Any, order: list[int]) -> Any:
+    """Those of the sixteen numbers of two vectors that ``order`` [8] names."""
+    return builder.shuffle_vector(first, second, ir.Constant(ir.VectorType(ir.IntType(32), COUNT), order))
+
+
+def _operation(function: Callable[..., Any], name: str) -> None:
+    """Compile an operator for two vectors, and for a vector and one number."""
+    cases = [signature(_LANES, _LANES, other) for other in (_LANES, types.float64)]
+    infer_global(function)(type(f"Lanes{name}", (ConcreteTemplate,), {"cases": cases}))
+
+    def of_two(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        return getattr(builder, name)(*arguments, flags=("contract",))
+
+    def of_one(context: Any, builder: Any, kinds: Any, arguments: Any) -> Any:
+        lane = builder.insert_element(_ANY, arguments[1], ir.Constant(ir.IntType(32), 0))
+        return of_two(context, builder, kinds, (arguments[0], _permuted(builder, lane, _ANY, [0] * COUNT)))
+
+    lower_builtin(function, _LANES, _LANES)(of_two)
+    lower_builtin(function, _LANES, types.float64)(of_one)
+
+
+for _function, _name in _OPERATIONS.items():
+    _operation(_function, _name)
+
+
+def _check(array: Any) -> None:
+    if not isinstance(array, types.Array) or (array.dtype, array.ndim, array.layout) != (types.float64, 1, "C"):
+        raise TypingError(f"lanes of {array}; allowed: a contiguous array [n] of float64")
+
+
+def _place(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> Any:
+    first = builder.gep(make_array(kind)(context, builder, array).data, [index])
+    return builder.bitcast(first, _VECTOR.as_pointer())
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def load(_typing: Any, array: Any, _index: Any) -> Any:
+    """``load(array, index)``: eight numbers of a contiguous array [n], from an index on; bounds are not checked."""
+
+    _check(array)
+
+    def read(context: Any, builder: Any, kinds: Any, arguments: Any) -> Any:
+        return builder.load(_place(context, builder, kinds.args[0], *arguments), align=8)
+
+    return _LANES(array, types.intp), read
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def store(_typing: Any, array: Any, _index: Any, _lanes: Any) -> Any:
+    """``store(array, index, lanes)``: put eight numbers into a contiguous array [n]; bounds are not checked."""
+
+    _check(array)
+
+    def write(context: Any, builder: Any, kinds: Any, arguments: Any) -> Any:
+        builder.store(arguments[2], _place(context, builder, kinds.args[0], *arguments[:2]), align=8)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, _LANES), write
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def transpose(_typing: Any, array: Any, _index: Any) -> Any:
+    """``transpose(array, index)``: let the rows and columns of the 8 × 8 numbers from an index on change places.
+
+    In blocks of 1, 2 and 4 numbers in turn.
+    """
+
+    _check(array)
+
+    def exchange(context: Any, builder: Any, kinds: Any, arguments: Any) -> Any:
+        first = _place(context, builder, kinds.args[0], *arguments)
+        places = [builder.gep(first, [ir.Constant(ir.IntType(64), row)]) for row in range(COUNT)]
+        rows = [builder.load(place, align=8) for place in places]
+        for size in (1, 2, 4):
+            kept = [lane if not lane & size else lane + COUNT - size for lane in range(COUNT)]
+            moved = [lane + size if not lane & size else lane + COUNT for lane in range(COUNT)]
+            for row in (row for row in range(COUNT) if not row & size):
+                pair = rows[row], rows[row + size]
+                rows[row], rows[row + size] = (_permuted(builder, *pair, order) for order in (kept, moved))
+        for row, place in zip(rows, places, strict=True):
+            builder.store(row, place, align=8)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp), exchange
