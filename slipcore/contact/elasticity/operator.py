@@ -7,7 +7,7 @@ import numpy as np
 from slipcore.contact.elasticity.grid import Grid
 from slipcore.contact.elasticity.influence import Component, ElasticBody
 from slipcore.contact.elasticity.preconditioner import NormalInverse, TangentialInverse
-from slipcore.contact.elasticity.transform import Convolution, fast_lengths, padded_lengths, symbols
+from slipcore.contact.elasticity.transform import Compiled, Convolution, fast_lengths, padded_lengths, symbols
 from slipcore.frames import FloatArray
 
 
@@ -67,17 +67,33 @@ class ElasticOperator:
     def normal(self, pressure: FloatArray) -> FloatArray:
         """Normal displacement by pressure."""
         self.count.normal += 1
+        displacement: FloatArray = self.convolution(pressure[None], self._across())[0]
+        return displacement
+
+    @property
+    def normal_compiled(self) -> Compiled:
+        """``normal`` for compiled code, which does not count itself."""
+        return self.convolution.by(self._across())
+
+    def _across(self) -> FloatArray:
         if self._normal is None:
             self._normal = self._symbols([["nn"]])
-        displacement: FloatArray = self.convolution(pressure[None], self._normal)[0]
-        return displacement
+        return self._normal
 
     def tangential(self, traction: FloatArray) -> FloatArray:
         """Tangential displacement [2, ny, nx] by traction [2, ny, nx]."""
         self.count.tangential += 1
+        return self.convolution(traction, self._along())
+
+    @property
+    def tangential_compiled(self) -> Compiled:
+        """``tangential`` for compiled code, which does not count itself."""
+        return self.convolution.by(self._along())
+
+    def _along(self) -> FloatArray:
         if self._tangential is None:
             self._tangential = self._symbols([["xx", "xy"], ["xy", "yy"]])
-        return self.convolution(traction, self._tangential)
+        return self._tangential
 
     def normal_by_traction(self, traction: FloatArray) -> FloatArray:
         """Normal displacement [ny, nx] by traction [2, ny, nx]."""

@@ -7,7 +7,7 @@ gradients independent of the grid. The box is padded to ``fast_lengths``: a prim
 
 import numpy as np
 
-from slipcore.contact.elasticity.transform import Convolution, symbols
+from slipcore.contact.elasticity.transform import Compiled, Convolution, symbols
 from slipcore.frames import FloatArray
 
 
@@ -42,6 +42,11 @@ class NormalInverse:
         stress: FloatArray = self._convolution(displacement[None], self._inverse)[0]
         return stress
 
+    @property
+    def compiled(self) -> Compiled:
+        """The same for compiled code."""
+        return self._convolution.by(self._inverse)
+
 
 class TangentialInverse:
     """Approximate traction [2, ny, nx] that makes a tangential displacement [2, ny, nx]; influences as above."""
@@ -58,3 +63,8 @@ class TangentialInverse:
     def __call__(self, displacement: FloatArray) -> FloatArray:
         """Stress for a displacement of the same shape."""
         return self._convolution(displacement, self._inverse)
+
+    @property
+    def compiled(self) -> Compiled:
+        """The same for compiled code."""
+        return self._convolution.by(self._inverse)

@@ -33,6 +33,8 @@ Work = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 """Eight columns along y; all rows along x between the transforms; eight rows of up to two fields before and after they
 are multiplied; four tiles of 8 × 8 numbers.
 """
+Compiled = tuple[FloatArray, tuple[float, bool], Plan, Work]
+"""Symbols, their factor (a scale, and whether they are imaginary), plan and work space of a convolution."""
 
 
 class Convolution:
@@ -60,13 +62,17 @@ class Convolution:
     def __call__(self, fields: FloatArray, symbols: FloatArray, turned: bool = False, sign: float = 1.0) -> FloatArray:
         """Fields [m, ny, nx] from [k, ny, nx] and symbols [m, k, ...]; ``turned``: symbols count as imaginary."""
         assert fields.shape[1:] == self.shape  # compiled code does not check
+        fields, result = np.ascontiguousarray(fields), np.empty((len(symbols), *self.shape))
+        convolve(fields, result, self.by(symbols, turned, sign))
+        return result
+
+    def by(self, symbols: FloatArray, turned: bool = False, sign: float = 1.0) -> Compiled:
+        """The same for compiled code: what ``convolve`` takes beside the fields and their result."""
         count = max(symbols.shape[:2])
         if count not in self._work:
             self._work[count] = self._space(count)
-        fields, result = np.ascontiguousarray(fields), np.empty((len(symbols), *self.shape))
         scale = sign / (self.lengths[0] * self.lengths[1])
-        _convolve(fields, symbols, result, (scale, turned), self._plan, self._work[count])
-        return result
+        return symbols, (scale, turned), self._plan, self._work[count]
 
     def _space(self, count: int) -> Work:
         (_, nx), (along_y, along_x) = self.shape, self.lengths
@@ -107,18 +113,10 @@ def _blocks(length: int) -> int:
 
 
 @compiled
-def _convolve(
-    fields: FloatArray,
-    symbols: FloatArray,
-    result: FloatArray,
-    factor: tuple[float, bool],
-    plan: Plan,
-    work: Work,
-) -> None:
-    """Fill ``result``; ``factor``: scale, and whether symbols are imaginary."""
-    splits_y, waves_y, places_y, splits_x, waves_x = plan
+def convolve(fields: FloatArray, result: FloatArray, by: Compiled) -> None:
+    """Fill ``result`` [m, ny, nx] from fields [k, ny, nx], both contiguous."""
+    symbols, (scale, turned), (splits_y, waves_y, places_y, splits_x, waves_x), work = by
     column, between, rows, tiles = work
-    scale, turned = factor
     pair = _halves(fields)
     for first in range(0, pair[0], COUNT):
         _read(fields.reshape(-1), fields.shape, pair, first, column)

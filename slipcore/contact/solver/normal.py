@@ -2,23 +2,22 @@
 
     minimise ½ pᵀKp + pᵀ(height − approach)   over p ≥ 0 [, Σp A = F]
 
-Active sets, each relaxed by a few conjugate gradients and clipped, with projected gradients as a safeguard; from
-coarse grids to fine ones, each on the contact's own box. On the finest grid the contact is then nearly known.
+Active sets from coarse grids to fine ones, each on the contact's own box. On the finest grid the contact is then nearly
+known.
 """
 
-from collections import deque
 from typing import NamedTuple
 
 import numpy as np
 
-from slipcore.compilation import compiled
-from slipcore.contact.defaults import NORMAL, TINY
-from slipcore.contact.elasticity.fields import doubled, inner
+from slipcore.contact.defaults import NORMAL
+from slipcore.contact.elasticity.fields import doubled
 from slipcore.contact.elasticity.grid import Box, Grid, bounding_box
 from slipcore.contact.elasticity.operator import ElasticOperator, Operators
 from slipcore.contact.errors import NotConverged
+from slipcore.contact.solver.active_sets import Relaxed, relaxed
 from slipcore.errors import InvalidInput
-from slipcore.frames import BoolArray, FloatArray
+from slipcore.frames import FloatArray
 
 
 class NormalContact(NamedTuple):
@@ -118,19 +117,17 @@ def _on_own_box(
     while True:
         box = _with_margin(bounding_box(inside), grid.shape)
         part = grid.part(box)
-        relaxed = _Relaxation(operators.on(part), height[box], force, approach).solve(start[box], tolerance, most)
+        found = _relax(operators.on(part), height[box], force, approach, tolerance, start[box], most)
         pressure = np.zeros(grid.shape)
-        pressure[box] = relaxed.pressure
-        displacement = relaxed.displacement if part.shape == grid.shape else operators.on(grid).normal(pressure)
-        gap = height + displacement - relaxed.approach
-        depth = relaxed.approach - float(height.min())
-        missed = gap < -max(tolerance, relaxed.residual) * depth
+        pressure[box] = found.pressure
+        displacement = found.displacement if part.shape == grid.shape else operators.on(grid).normal(pressure)
+        gap = height + displacement - found.approach
+        depth = found.approach - float(height.min())
+        missed = gap < -max(tolerance, found.residual) * depth
         missed[box] = False
         if not missed.any():
             total = float(pressure.sum()) * grid.cell_area
-            return NormalContact(
-                pressure, displacement, gap, relaxed.approach, total, relaxed.residual, relaxed.iterations
-            )
+            return NormalContact(pressure, displacement, gap, found.approach, total, found.residual, found.iterations)
         inside, start = missed | (pressure > 0.0), pressure
 
 
@@ -144,141 +141,24 @@ def _with_margin(box: Box, shape: tuple[int, int]) -> Box:
     return span(box[0], shape[0]), span(box[1], shape[1])
 
 
-class _Relaxed(NamedTuple):
-    pressure: FloatArray
-    displacement: FloatArray
-    approach: float
-    residual: float
-    iterations: int
-
-
-class _Relaxation:
+def _relax(
+    operator: ElasticOperator,
+    height: FloatArray,
+    force: float | None,
+    approach: float | None,
+    tolerance: float,
+    start: FloatArray,
+    most: int,
+) -> Relaxed:
     """Active sets on one box."""
-
-    def __init__(
-        self, operator: ElasticOperator, height: FloatArray, force: float | None, approach: float | None
-    ) -> None:
-        self.operator, self.height, self.approach = operator, height, approach
-        self.total = None if force is None else force / operator.grid.cell_area
-        self.lowest = float(height.min())
-        self.reachable = np.where(np.isfinite(height), height, 0.0)
-
-    def solve(self, pressure: FloatArray, tolerance: float, max_iterations: int) -> _Relaxed:
-        pressure = self._feasible(pressure)
-        displacement = self.operator.normal(pressure)
-        energies = deque([self._energy(pressure, displacement)], NORMAL.memory)
-        residual = np.inf
-        for iteration in range(max_iterations):
-            gap, approach = self._gap(displacement, pressure)
-            loaded = pressure > 0.0
-            worst = max(float(np.abs(gap[loaded]).max(initial=0.0)), -float(gap.min()))
-            residual = worst / max(approach - self.lowest, TINY)
-            if residual <= tolerance and approach > self.lowest:
-                return _Relaxed(pressure, displacement, approach, residual, iteration)
-            change, response = self._relax(loaded | (gap < 0.0), gap)
-            trial = self._feasible(pressure + change)
-            if (pressure + change < 0.0).any():
-                response = self.operator.normal(trial - pressure)
-            moved = displacement + response
-            if self._energy(trial, moved) > max(energies) + NORMAL.energy_rounding * abs(max(energies)):
-                trial, moved = self._descend(pressure, displacement, gap, approach)
-            pressure, displacement = trial, moved
-            energies.append(self._energy(pressure, displacement))
-        raise NotConverged("normal contact", residual, tolerance, max_iterations)
-
-    def _energy(self, pressure: FloatArray, displacement: FloatArray) -> float:
-        """The objective; it need only not climb above its last few values, or active sets could not change freely."""
-        shift = 0.0 if self.approach is None else self.approach
-        return 0.5 * inner(pressure, displacement) + inner(pressure, self.reachable - shift)
-
-    def _gap(self, displacement: FloatArray, pressure: FloatArray) -> tuple[FloatArray, float]:
-        """Gap [ny, nx] and approach; under a given force that which closes the gap on average over the contact."""
-        shape = displacement + self.height
-        approach = float(shape[pressure > 0.0].mean()) if self.approach is None else self.approach
-        return shape - approach, approach
-
-    def _feasible(self, pressure: FloatArray) -> FloatArray:
-        clipped = np.maximum(pressure, 0.0)
-        if self.total is None:
-            return clipped
-        if not clipped.any():
-            clipped = np.where(self.height <= self.lowest, 1.0, 0.0)  # an empty contact would never fill again
-        return clipped * (self.total / float(clipped.sum()))
-
-    def _relax(self, active: BoolArray, gap: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """A change of pressure that closes the gap on the active cells, at the same total force if that is given, and
-        its displacement, by conjugate gradients.
-        """
-        inverse = self.operator.normal_inverse
-        residual = self._balanced(gap.copy(), active)
-        change, response = np.zeros_like(gap), np.zeros_like(gap)
-        improved = self._balanced(inverse(residual), active)
-        direction = -improved
-        size = first = inner(residual, improved)
-        for _ in range(NORMAL.iterations):
-            if size <= 0.0:
-                break
-            image = self.operator.normal(direction)
-            _advance(change, response, residual, direction, image, size / inner(direction, image))
-            self._balanced(residual, active)
-            improved = self._balanced(inverse(residual), active)
-            before, size = size, inner(residual, improved)
-            if size <= NORMAL.reduction**2 * first:
-                break
-            direction *= size / before
-            direction -= improved
-        return change, response
-
-    def _balanced(self, field: FloatArray, active: BoolArray) -> FloatArray:
-        """The part of a field that is on the active cells and, under a given force, sums to zero; in place."""
-        _restrict(field, active, self.total is not None)
-        return field
-
-    def _descend(
-        self, pressure: FloatArray, displacement: FloatArray, gap: FloatArray, approach: float
-    ) -> tuple[FloatArray, FloatArray]:
-        """A projected gradient step at the contact's own mean stiffness, with an exact line search."""
-        loaded = pressure > 0.0
-        stiffness = float(pressure[loaded].mean()) / (approach - self.lowest) if loaded.any() else 1.0
-        way = self._feasible(pressure - stiffness * np.where(loaded | (gap < 0.0), gap, 0.0)) - pressure
-        response = self.operator.normal(way)
-        curvature = inner(way, response)
-        slope = inner(np.where(way != 0.0, gap, 0.0), way)
-        share = min(max(-slope / curvature, 0.0), 1.0) if curvature > 0.0 else 0.0
-        return pressure + share * way, displacement + share * response
-
-
-@compiled
-def _restrict(field: FloatArray, active: BoolArray, balanced: bool) -> None:
-    """Zero a field [ny, nx] outside the active cells and, if ``balanced``, make it sum to zero on them; in place."""
-    total, count = 0.0, 0
-    for i in range(field.shape[0]):
-        for j in range(field.shape[1]):
-            if active[i, j]:
-                total += field[i, j]
-                count += 1
-            else:
-                field[i, j] = 0.0
-    if balanced and count:
-        mean = total / count
-        for i in range(field.shape[0]):
-            for j in range(field.shape[1]):
-                if active[i, j]:
-                    field[i, j] -= mean
-
-
-@compiled
-def _advance(
-    change: FloatArray,
-    response: FloatArray,
-    residual: FloatArray,
-    direction: FloatArray,
-    image: FloatArray,
-    step: float,
-) -> None:
-    """One conjugate-gradient step in place; ``image``: the operator on ``direction``."""
-    for i in range(change.shape[0]):
-        for j in range(change.shape[1]):
-            change[i, j] += step * direction[i, j]
-            response[i, j] += step * image[i, j]
-            residual[i, j] += step * image[i, j]
+    value = approach if force is None else force / operator.grid.cell_area
+    assert value is not None
+    given, by = (
+        (force is not None, value, float(height.min())),
+        (operator.normal_compiled, operator.normal_inverse.compiled),
+    )
+    found = relaxed(np.ascontiguousarray(start)[None], np.ascontiguousarray(height)[None], given, by, (tolerance, most))
+    operator.count.normal += found.applications
+    if found.iterations == most:
+        raise NotConverged("normal contact", found.residual, tolerance, most)
+    return found._replace(pressure=found.pressure[0], displacement=found.displacement[0])

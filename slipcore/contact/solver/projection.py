@@ -94,7 +94,7 @@ def _dual_newton(
     constraints, (tight, max_iterations) = Constraints(*given_constraints), bounds
     here = Evaluation(traction, np.empty(3), np.empty((3, 3)))
     trial = Evaluation(traction, np.empty(3), np.empty((3, 3)))
-    feasible, reach = True, constraints.radius.max() + np.abs(constraints.point).max()
+    feasible, reach = True, _largest(constraints.radius) + _largest(constraints.point.reshape(-1))
     _evaluate(constraints, motion, here)
     iteration = 0
     for iteration in range(max_iterations):  # noqa: B007
@@ -232,8 +232,27 @@ def _solve(hessian: FloatArray, gradient: FloatArray, given: BoolArray) -> Float
 @compiled
 def _is_certificate(constraints: Constraints, motion: FloatArray) -> bool:
     """Whether the load does more work on this motion than friction everywhere could take up."""
-    radius, arm = constraints.radius, constraints.arm
-    work, taken = constraints.target @ motion, 0.0
+    arm = constraints.arm
+    return bool(
+        constraints.target @ motion > _taken_up(constraints.radius, arm[0], arm[1], motion) * (1.0 + _CERTIFICATE)
+    )
+
+
+@compiled(fastmath=VECTOR)
+def _taken_up(radius: FloatArray, arm_x: FloatArray, arm_y: FloatArray, motion: FloatArray) -> float:
+    """The most that friction takes up on a motion."""
+    mx, my, yaw, taken = motion[0], motion[1], motion[2], 0.0
     for i in range(radius.size):
-        taken += radius[i] * np.hypot(motion[0] - arm[1, i] * motion[2], motion[1] + arm[0, i] * motion[2])
-    return bool(work > taken * (1.0 + _CERTIFICATE))
+        vx, vy = mx - arm_y[i] * yaw, my + arm_x[i] * yaw
+        taken += radius[i] * np.sqrt(vx * vx + vy * vy)
+    return taken
+
+
+@compiled(fastmath=VECTOR | {"nnan"})
+def _largest(field: FloatArray) -> float:
+    """Largest size of the numbers of a flat field."""
+    largest = 0.0
+    for i in range(field.size):
+        size = abs(field[i])
+        largest = size if size > largest else largest
+    return largest

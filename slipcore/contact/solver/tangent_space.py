@@ -11,9 +11,12 @@ from slipcore.compilation import compiled
 from slipcore.contact.defaults import TANGENTIAL
 from slipcore.contact.elasticity.fields import VECTOR
 from slipcore.contact.elasticity.operator import ElasticOperator
+from slipcore.contact.elasticity.transform import Compiled, convolve
 from slipcore.frames import BoolArray, FloatArray
 
 OUTSIDE, STICK, SLIP = 0, 1, 2
+Space = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
+"""Projector, arm, inverse Gram matrix, curvature and scale of a space, for flat fields of n cells."""
 _CIRCLE_ROUNDING, _RANK = TANGENTIAL.circle_rounding, TANGENTIAL.rank
 
 
@@ -72,47 +75,20 @@ class TangentSpace:
         Solves P(C + curvature)P move = −P(slip + curvature·made), preconditioned, to a share ``reduction`` of the
         first preconditioned residual.
         """
-        inverse, move, direction = operator.tangential_inverse, np.zeros_like(slip), np.zeros_like(slip)
-        residual = self.balanced(slip + self.curvature * made)
-        improved = inverse(self.scale * residual)
-        size = first = self._improve(residual, improved)
-        direction -= improved
-        for _ in range(max_iterations):
-            if size <= 0.0:
-                break
-            image = operator.tangential(direction)
-            self._advance(move, residual, direction, image, size)
-            improved = inverse(image)
-            before, size = size, self._improve(residual, improved)
-            if size <= reduction**2 * first:
-                break
-            _turn(_flat(direction), _flat(improved), size / before)
+        by, bounds = (operator.tangential_compiled, operator.tangential_inverse.compiled), (reduction, max_iterations)
+        move, count = _conjugate_gradients(self.flat, slip, made, by, bounds)
+        operator.count.tangential += count
         return move
 
-    def _advance(
-        self, move: FloatArray, residual: FloatArray, direction: FloatArray, image: FloatArray, size: float
-    ) -> None:
-        """One step along ``direction``; the new residual, scaled for the preconditioner, in place of ``image``."""
-        _advance(
-            (_flat(self.projector), _flat(self.arm), self.inverse_gram, self.curvature.ravel(), self.scale.ravel()),
-            _flat(move),
-            _flat(residual),
-            _flat(direction),
-            _flat(image),
-            size,
-        )
-
-    def _improve(self, residual: FloatArray, improved: FloatArray) -> float:
-        """Scale and balance a preconditioned residual in place; its product with the residual."""
-        return float(
-            _improve(
-                _flat(self.projector),
-                _flat(self.arm),
-                self.inverse_gram,
-                self.scale.ravel(),
-                _flat(residual),
-                _flat(improved),
-            )
+    @property
+    def flat(self) -> Space:
+        """The space as compiled loops take it."""
+        return (
+            _flat(self.projector),
+            _flat(self.arm),
+            self.inverse_gram,
+            self.curvature.ravel(),
+            self.scale.ravel(),
         )
 
 
@@ -218,15 +194,59 @@ def _balance(projector: FloatArray, arm: FloatArray, inverse_gram: FloatArray, m
 
 
 @compiled
+def _conjugate_gradients(
+    space: Space, slip: FloatArray, made: FloatArray, by: tuple[Compiled, Compiled], bounds: tuple[float, int]
+) -> tuple[FloatArray, int]:
+    """The move [2, ny, nx], and how often it took the operator; ``by``: operator and preconditioner; ``bounds``:
+    reduction of the residual, and most iterations.
+    """
+    (operator, preconditioner), (reduction, most) = by, bounds
+    move, direction, residual = np.zeros_like(slip), np.zeros_like(slip), np.empty_like(slip)
+    image, improved = np.empty_like(slip), np.empty_like(slip)
+    m, d, r, i, g = (
+        move.reshape(2, -1),
+        direction.reshape(2, -1),
+        residual.reshape(2, -1),
+        image.reshape(2, -1),
+        improved.reshape(2, -1),
+    )
+    _begin(space, slip.reshape(2, -1), made.reshape(2, -1), r, i)
+    convolve(image, improved, preconditioner)
+    size = first = _improve(space, r, g)
+    _turn(d, g, 0.0)
+    count = 0
+    while count < most and size > 0.0:
+        convolve(direction, image, operator)
+        _advance(space, m, r, d, i, size)
+        convolve(image, improved, preconditioner)
+        before, size = size, _improve(space, r, g)
+        count += 1
+        if size <= reduction**2 * first:
+            break
+        _turn(d, g, size / before)
+    return move, count
+
+
+@compiled
+def _begin(space: Space, slip: FloatArray, made: FloatArray, residual: FloatArray, image: FloatArray) -> None:
+    """The first residual, and the same scaled for the preconditioner."""
+    projector, arm, inverse_gram, curvature, scale = space
+    for k in range(2):
+        for i in range(slip.shape[1]):
+            residual[k, i] = slip[k, i] + curvature[i] * made[k, i]
+    _balance(projector, arm, inverse_gram, residual)
+    for k in range(2):
+        for i in range(slip.shape[1]):
+            image[k, i] = scale[i] * residual[k, i]
+
+
+@compiled
 def _advance(
-    space: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
-    move: FloatArray,
-    residual: FloatArray,
-    direction: FloatArray,
-    image: FloatArray,
-    size: float,
+    space: Space, move: FloatArray, residual: FloatArray, direction: FloatArray, image: FloatArray, size: float
 ) -> None:
-    """One conjugate-gradient step in place; ``space``: projector, arm, inverse Gram matrix, curvature and scale."""
+    """One conjugate-gradient step in place; ``image``: the operator on ``direction``, then the new residual, scaled for
+    the preconditioner.
+    """
     projector, arm, inverse_gram, curvature, scale = space
     step = size / _stiffen(projector, curvature, direction, image)
     for k in range(2):
@@ -253,15 +273,9 @@ def _stiffen(projector: FloatArray, curvature: FloatArray, direction: FloatArray
 
 
 @compiled(fastmath=VECTOR)
-def _improve(
-    projector: FloatArray,
-    arm: FloatArray,
-    inverse_gram: FloatArray,
-    scale: FloatArray,
-    residual: FloatArray,
-    improved: FloatArray,
-) -> float:
+def _improve(space: Space, residual: FloatArray, improved: FloatArray) -> float:
     """Scale and balance a preconditioned residual in place; its product with the residual."""
+    projector, arm, inverse_gram, _, scale = space
     for k in range(2):
         for i in range(improved.shape[1]):
             improved[k, i] *= scale[i]

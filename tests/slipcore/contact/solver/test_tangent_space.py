@@ -104,7 +104,7 @@ def test_advancing_moves_updates_the_residual_and_scales_it() -> None:
     direction, residual = space.balanced(slip.copy()), space.balanced(np.ones_like(slip))
     move, before, response = np.zeros_like(slip), residual.copy(), tangent(space, answer) + space.curvature * direction
     step = 0.25 / inner(direction, response)
-    space._advance(move, residual, direction, answer, 0.25)
+    compiled._advance(space.flat, flat(move), flat(residual), flat(direction), flat(answer), 0.25)
     np.testing.assert_allclose(move, step * direction, rtol=1e-12)
     expected = space.balanced(before + step * response)
     np.testing.assert_allclose(residual, expected, rtol=0.0, atol=1e-12)
@@ -115,7 +115,7 @@ def test_improving_scales_balances_and_multiplies() -> None:
     traction, slip, limit, arm, improved = case(7)
     space = TangentSpace(traction, slip, limit, 0.5, arm, GIVEN)
     expected = space.balanced(space.scale * improved)
-    product = space._improve(slip, improved)
+    product = compiled._improve(space.flat, flat(slip), flat(improved))
     np.testing.assert_allclose(improved, expected, rtol=0.0, atol=1e-13)
     np.testing.assert_allclose(product, (slip * expected).sum(), rtol=1e-12)
 
