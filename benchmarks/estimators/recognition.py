@@ -84,20 +84,23 @@ def picture(trials: list[dict[str, float | str]], path: Path) -> None:
     figure = Figure(figsize=(6.0, 5.4), layout="constrained")
     axes = figure.subplots()
     axes.plot([0.2, 1], [0.2, 1], color="0.7", linewidth=1, label="as stated")
-    for low, high in pairwise(edges):
+    for k, (low, high) in enumerate(pairwise(edges)):
         some = (stated > low) & (stated <= high)
         if some.sum() >= 10:
             mean, part, count = stated[some].mean(), right[some].mean(), int(some.sum())
             error = 2.0 * np.sqrt(max(mean * (1.0 - mean), 1e-6) / count)
             axes.errorbar(mean, part, error, fmt="o", color="C0", capsize=3)
-            axes.annotate(f"{count}", (mean, part), textcoords="offset points", xytext=(7, -11), fontsize=8)
+            # The last bins lie side by side: their numbers on either side.
+            beside, side = ((-7, 4), "right") if k % 2 else ((7, -11), "left")
+            axes.annotate(f"{count}", (mean, part), textcoords="offset points", xytext=beside, ha=side, fontsize=8)
     axes.set_xlabel("probability stated for the answer")
     axes.set_ylabel("part of right answers")
     axes.set_title(
         "Ten materials and strangers, one grasp each (bars: two standard errors; number of grasps)", fontsize=8
     )
+    axes.set_xlim(right=1.08)
     axes.grid(alpha=0.3)
-    axes.legend()
+    axes.legend(loc="lower right")
     figure.savefig(path, dpi=120)
 
 
