@@ -392,6 +392,10 @@ class RecognitionPrior(Options):
     """Of the half-Student-t distribution of σ between materials, whose scale is the reference scatter."""
     least_scatter: Annotated[float, Option(1e-6, 0.1, "-", "a fifth of the reference: less is the sensor's")] = 0.01
     """Of samples, of any material: less does not distinguish materials."""
+    scatter_spread: Annotated[float, Option(0.0, 5.0, "-", "a quarter, as grasps are loaded")] = 0.25
+    """Of log σ between grasps of one material."""
+    spread_freedom: Annotated[float, Option(1.0, 100.0, "-", "a grasp by a noisier sensor is no stranger")] = 4.0
+    """Degrees of freedom of its Student-t distribution."""
     rounding: Annotated[float, Option(1e-6, 1.0, "-", "a hundredth of its variance")] = 0.1
     """Part of that below which a material's own scatter counts as so much."""
     nodes: Annotated[

@@ -120,18 +120,20 @@ def _of_material(data: FitData, places: FloatArray, model: FrictionModel) -> flo
     return float(special.logsumexp(found) - np.log(len(found)))
 
 
-def _known(scale: float, freedom: float) -> LogDensity:
-    """Of log σ of a material: σ² inverse-gamma on ``freedom`` degrees of freedom (infinite: as many as make a Student-t
-    normal) about what ``scale``² has above the least of any material.
+def _known(scale: float, freedom: float, spread: float = RECOGNITION.scatter_spread) -> LogDensity:
+    """Of log σ of a grasp of a material: Student-t about that of what ``scale``² has above the least of any material.
+
+    It is as wide as ``scale`` is uncertain by its ``freedom``, and by ``spread`` from grasp to grasp: most of what
+    samples scatter by is noise of forces over f_n, which goes with the load and not with the material.
     """
-    least = RECOGNITION.least_scatter
+    least, tail = RECOGNITION.least_scatter, RECOGNITION.spread_freedom
     own = 0.5 * math.log(max(scale**2 - least**2, (RECOGNITION.rounding * least) ** 2))
-    half = 0.5 * min(freedom, GRID.most_freedom)
-    whole = math.log(2.0) + half * math.log(half) - float(special.gammaln(half))
+    width = math.hypot(spread, 1.0 / math.sqrt(2.0 * min(freedom, GRID.most_freedom)))
+    whole = -math.log(width) - 0.5 * math.log(tail) - float(special.betaln(0.5, 0.5 * tail))
 
     def log_density(log_sigma: FloatArray) -> FloatArray:
-        away = log_sigma - own
-        return np.asarray(whole - half * (2.0 * away + np.exp(-2.0 * away)))
+        away = (log_sigma - own) / width
+        return np.asarray(whole - 0.5 * (tail + 1.0) * np.log1p(away**2 / tail))
 
     return log_density
 

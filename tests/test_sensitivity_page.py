@@ -20,13 +20,10 @@ WHOLE_TABLES = {
     "slipcore.contact.REFERENCE": "closed forms and solvers that tests compare with",
     "slipcore.forces.FORCE_STREAM": "needs streams with their clock",
     "slipcore.forces.GEL_CALIBRATION": "a fit takes half a minute",
-    "SampleOptions": "not measured yet",
     "slipcore.COLLECTION": "not measured yet",
     "slipcore.MARKERS": "not measured yet",
     "slipcore.NOISE": "compiled kernels hold it fixed",
     "slipcore.NUMERICS": "compiled kernels hold it fixed",
-    "slipcore.SATURATION": "not measured yet",
-    "slipcore.SMOOTHING": "not measured yet",
     "slipcore.contact.CHEAP_TIERS": "not measured yet",
     "slipcore.contact.EXPLAIN": "not measured yet",
     "slipcore.contact.PROJECTION": "compiled kernels hold it fixed",
@@ -34,6 +31,7 @@ WHOLE_TABLES = {
 """Tables of which no entry is on the page. What is measured leaves this list, and that below."""
 
 ENTRIES = {
+    "SampleOptions": ("force_noise", "estimated unless it is given"),
     "slipcore.PATCHES": ("descents free_motion least_square_arm rank settled still", "compiled kernels hold them"),
 }
 """Entries of other tables that are not on it."""

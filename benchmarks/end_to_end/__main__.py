@@ -168,14 +168,14 @@ def _of_setting(setting: Setting, seed: int, logs: Sequence[GraspLog]) -> Iterat
     for method in METHODS:
         begin = process_time()
         try:
-            error, half = _error_and_half_width(fit(samples, method=method, seed=seed), setting, seed)
+            error, half = error_and_half_width(fit(samples, method=method, seed=seed), setting, seed)
         except EstimatorError:
             error = half = np.nan
         taken = process_time() - begin
         yield Finding(setting, method, seed, error, half, Seconds(detected - start, collected - detected, taken))
 
 
-def _error_and_half_width(model: FrictionModel, setting: Setting, seed: int) -> tuple[float, float]:
+def error_and_half_width(model: FrictionModel, setting: Setting, seed: int) -> tuple[float, float]:
     """Error and half-width of the 95 % interval of friction at the working point."""
     at = np.array([1.0, SPEED, FORCE * setting.area])
     half = stats.t.ppf(0.975, model.degrees_of_freedom) * np.sqrt(at @ model.covariance @ at)

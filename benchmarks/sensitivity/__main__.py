@@ -16,15 +16,18 @@ from dataclasses import asdict
 from matplotlib.figure import Figure
 
 from benchmarks.pages import options, picture_folder, save, write
-from benchmarks.sensitivity import measures, of_new_grasps
+from benchmarks.sensitivity import measures, of_new_grasps, of_samples
 from benchmarks.sensitivity.rows import DEAD, Known, Row, rows_on, table_of
 
 PARTS: dict[str, Callable[[Known], list[Row]]] = {
     "detector": measures.of_detectors,
     "few elements": measures.of_few_elements,
     "baselines": measures.of_baselines,
+    "samples": of_samples.of_samples,
     "control": measures.of_control,
     "patches": measures.of_patches,
+    "saturation": of_samples.of_saturation,
+    "smoothing": of_samples.of_smoothing,
     "forces": measures.of_presses,
     "contact": measures.of_solver,
     "estimators": measures.of_fits,

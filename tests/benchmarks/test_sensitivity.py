@@ -3,11 +3,12 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Annotated
 
+import numpy as np
 import pytest
 
 import estimators.change_alarm
 import estimators.defaults
-from benchmarks.sensitivity import of_new_grasps
+from benchmarks.sensitivity import of_new_grasps, of_samples
 from benchmarks.sensitivity.rows import Row, changed, every, neighbours, of_tables, rows, rows_on, table_of
 from slipcore.errors import InvalidInput
 from slipcore.options import Option, Options
@@ -120,3 +121,15 @@ def test_a_number_that_a_module_reads_once_is_changed_there_too() -> None:
         assert len(estimators.change_alarm.TAUS) == 7
     assert len(estimators.change_alarm.TAUS) == expected
     assert estimators.change_alarm.ChangeAlarm is kind  # what others hold of it can be stored still
+
+
+def test_a_range_that_ends_and_a_kernel_are_found_in_fields_that_have_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    x = np.linspace(-1.0, 1.0, 16)
+    bump = np.exp(-30.0 * (x[:, None] ** 2 + x**2))[None, :, :, None] * np.array([0.3, 0.2, 1.0])
+    field = 1e-4 * np.concatenate([np.linspace(0.0, 1.0, 30), np.ones(10)])[:, None, None, None] * bump
+    monkeypatch.setattr(of_samples, "pressed", lambda: [field])
+    ended, smoothed = of_samples.ended(), of_samples.smoothed()
+    assert ended["falsely"] == 0.0
+    assert ended["found"] >= 0.5
+    assert smoothed["width"] < 0.1
+    assert smoothed["field"] < np.log(0.7)  # a third of what smoothing did is undone; noise remains
