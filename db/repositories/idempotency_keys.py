@@ -38,6 +38,14 @@ def claim(session: Session, owner: str, key: str, fingerprint: str, lifetime: ti
     return answer
 
 
+def find(session: Session, owner: str, key: str, lifetime: timedelta) -> tuple[str, dict[str, Any]] | None:
+    """The fingerprint of what was asked under a key, and its answer; None of a key that is not known."""
+    of_it = (IdempotencyKeyRow.owner == owner, IdempotencyKeyRow.key == key)
+    counts = IdempotencyKeyRow.created_at >= now() - lifetime
+    row = session.execute(select(IdempotencyKeyRow.fingerprint, IdempotencyKeyRow.answer).where(*of_it, counts)).first()
+    return None if row is None else (row.fingerprint, row.answer)
+
+
 def keep(session: Session, owner: str, key: str, answer: Mapping[str, Any]) -> None:
     """Store the answer of a key that this transaction has claimed."""
     of_it = (IdempotencyKeyRow.owner == owner, IdempotencyKeyRow.key == key)

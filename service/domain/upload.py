@@ -124,6 +124,15 @@ async def received(
         yield ReceivedLog(kept, log, body.sha256, request.principal, new_material, request.sensor is not None)
 
 
+async def receive_digest(context: Context, chunks: AsyncIterator[bytes], request: UploadRequest) -> str:
+    """The SHA-256 of a body that is not to be stored; raises ``TooLarge`` and ``UploadInterrupted``."""
+    limit, in_thread = context.settings.max_upload_bytes, partial(context.threads.run, request.principal.share)
+    check_size(request.content_length or 0, limit)
+    with context.blobs.spool() as body:
+        await context.bodies.receive(body, chunks, limit, in_thread)
+        return body.sha256
+
+
 async def upload(context: Context, chunks: AsyncIterator[bytes], request: UploadRequest) -> StoredUpload:
     """Store a log that comes in ``chunks``, and queue its ingest; raises as ``received`` and ``accept``."""
     async with received(context, chunks, request) as log:

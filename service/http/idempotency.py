@@ -14,7 +14,7 @@ from db.errors import AlreadyExists
 from db.repositories import idempotency_keys
 from service.http.access import Access
 from service.http.dependencies import CurrentContext
-from service.http.problems import IDEMPOTENCY_KEY_REUSED, Problem
+from service.http.problems import IDEMPOTENCY_KEY_REUSED, INVALID_REQUEST, Problem
 
 LONGEST_KEY = 200
 
@@ -55,6 +55,26 @@ class IdempotencyKey:
         return replace(self, fingerprint=_digest(self.fingerprint.encode(), body_digest.encode()))
 
 
+@dataclass(frozen=True, slots=True)
+class EarlierResponse:
+    """What was answered under a key, and to which request, as a digest."""
+
+    fingerprint: str
+    response: RepeatableResponse
+
+    def to(self, key: IdempotencyKey) -> RepeatableResponse:
+        """The response, to the same request; raises ``Problem`` for another."""
+        if key.fingerprint != self.fingerprint:
+            raise _reused(key)
+        return self.response
+
+
+def find_earlier(session: Session, key: IdempotencyKey) -> EarlierResponse | None:
+    """What was answered under this key, whatever was asked."""
+    found = idempotency_keys.find(session, key.owner, key.text, key.lifetime)
+    return None if found is None else EarlierResponse(found[0], RepeatableResponse(**found[1]))
+
+
 def respond_once(
     session: Session, key: IdempotencyKey | None, make: Callable[[], RepeatableResponse]
 ) -> RepeatableResponse:
@@ -67,8 +87,7 @@ def respond_once(
     try:
         earlier = idempotency_keys.claim(session, key.owner, key.text, key.fingerprint, key.lifetime)
     except AlreadyExists as error:
-        allowed = "another key, or the very request that was sent under it"
-        raise Problem.wrong_value(IDEMPOTENCY_KEY_REUSED, "Idempotency-Key", key.text, allowed) from error
+        raise _reused(key) from error
     if earlier is not None:
         return RepeatableResponse(**earlier)
     response = make()
@@ -76,9 +95,16 @@ def respond_once(
     return response
 
 
+def _reused(key: IdempotencyKey) -> Problem:
+    allowed = "another key, or the very request that was sent under it"
+    return Problem.wrong_value(IDEMPOTENCY_KEY_REUSED, "Idempotency-Key", key.text, allowed)
+
+
 async def _key_without_body(context: CurrentContext, request: Request, text: KeyHeader = None) -> IdempotencyKey | None:
     if text is None:
         return None
+    if len(all_of_it := request.headers.getlist("Idempotency-Key")) > 1:
+        raise Problem.wrong_value(INVALID_REQUEST, "Idempotency-Key", ", ".join(all_of_it), "one header of this name")
     access: Access = request.state.access
     asked = (request.method, request.url.path, request.url.query)
     lifetime = timedelta(hours=context.settings.idempotency_hours)

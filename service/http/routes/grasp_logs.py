@@ -13,7 +13,7 @@ from service.domain.context import Context
 from service.domain.errors import ResultsNotReady
 from service.domain.export import export
 from service.domain.stored_results import EVENT_KINDS, SAMPLE_ARRAYS, StoredHistory, decode_history, decode_samples
-from service.domain.upload import ReceivedLog, StoredUpload, UploadRequest, accept, received, store
+from service.domain.upload import ReceivedLog, StoredUpload, UploadRequest, accept, receive_digest, received, store
 from service.formats import writing
 from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.bodies import chunks
@@ -22,7 +22,14 @@ from service.http.dependencies import CurrentContext
 from service.http.descriptions import problems
 from service.http.download import Download, checked_within
 from service.http.fair_route import FairRoute, gone
-from service.http.idempotency import IdempotencyKey, KeyWithoutBody, RepeatableResponse, respond_once
+from service.http.idempotency import (
+    EarlierResponse,
+    IdempotencyKey,
+    KeyWithoutBody,
+    RepeatableResponse,
+    find_earlier,
+    respond_once,
+)
 from service.http.long_answers import LONG_ANSWER, Room
 from service.http.long_json import long_json
 from service.http.paging import Page, link_next
@@ -119,6 +126,9 @@ async def create_grasp_log(
         {name: getattr(asked, name) for name in ("scale", "frame_rate", "mapping", "rest")},
         principal,
     )
+    if key is not None and (earlier := await context.threads.run(principal.share, _find_earlier, context, key)):
+        repeated = key.for_body(await receive_digest(context, chunks(request), wanted))
+        return earlier.to(repeated).response()
     async with received(context, chunks(request), wanted, partial(gone, request)) as log:
         about = key and key.for_body(log.body_sha256)
         answer = await context.store_threads.run(principal.share, _store, context, log, about)
@@ -129,6 +139,12 @@ def _store(context: Context, log: ReceivedLog, key: IdempotencyKey | None) -> Re
     return store(
         context, log, lambda session: respond_once(session, key, lambda: _answer(accept(session, context, log)))
     )
+
+
+def _find_earlier(context: Context, key: IdempotencyKey) -> EarlierResponse | None:
+    """A repetition is answered as before, whatever has become of the material's name meanwhile."""
+    with context.database.read() as session:
+        return find_earlier(session, key)
 
 
 def _answer(stored: StoredUpload) -> RepeatableResponse:

@@ -75,6 +75,20 @@ def test_a_key_stands_for_one_request_with_its_parameters(client: Any, content: 
     assert (refused.status_code, refused.json()["type"]) == (422, "/problems/idempotency-key-reused")
 
 
+def test_an_upload_is_answered_again_whatever_has_become_of_its_materials_name(client: Any, content: bytes) -> None:
+    send(client, "/v1/materials", None, json={"name": "paper"})
+    client.request("PUT", "/v1/materials/paper/aliases/A4").raise_for_status()
+    upload = {"content": content, "headers": NPZ}
+    first = send(client, "/v1/grasp-logs?material=A4", **upload)
+    client.request("DELETE", "/v1/materials/paper/aliases/A4").raise_for_status()
+    assert send(client, "/v1/grasp-logs?material=A4", "another", **upload).status_code == 404
+    again = send(client, "/v1/grasp-logs?material=A4", **upload)
+    assert (first.status_code, again.status_code, again.content) == (202, 202, first.content)
+    assert again.headers["location"] == first.headers["location"]
+    refused = send(client, "/v1/grasp-logs?material=A4", content=b"another", headers=NPZ)
+    assert refused.json()["type"] == "/problems/idempotency-key-reused"
+
+
 def test_what_was_refused_may_be_mended_under_its_key(client: Any, database: Database) -> None:
     assert send(client, "/v1/materials/paper/fits", json={}).status_code == 404
     assert count(database, IdempotencyKeyRow) == 0
@@ -85,6 +99,12 @@ def test_what_was_refused_may_be_mended_under_its_key(client: Any, database: Dat
 def test_a_key_that_cannot_be_is_refused_by_name(client: Any, key: Any) -> None:
     answer = send(client, "/v1/materials", key, json={"name": "paper"})
     assert (answer.status_code, answer.json()["name"]) == (422, "Idempotency-Key")
+
+
+def test_two_keys_of_one_request_are_refused_by_name(client: Any) -> None:
+    headers = [("Idempotency-Key", "a"), ("Idempotency-Key", "b")]
+    answer = client.request("POST", "/v1/materials", headers=headers, json={"name": "paper"})
+    assert (answer.status_code, answer.json()["name"], answer.json()["value"]) == (422, "Idempotency-Key", "a, b")
 
 
 def test_identical_uploads_at_once_under_one_key_get_one_answer(
