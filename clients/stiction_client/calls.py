@@ -39,7 +39,9 @@ ATTEMPTS = 3
 AWAY = frozenset({502, 503, 504})
 """Statuses by which a service, or a proxy before it, says that it is not there now."""
 NOT_DONE = frozenset({429, 503})
-"""Statuses with which the service, or a proxy that does not reach it, says that it did nothing."""
+"""Statuses with which the service says that it did nothing."""
+MAY_BE_DONE = frozenset({None, "/problems/stopping"})
+"""Types of problem with these statuses, None of answers that are no problem of the service's, which do not say so."""
 BUSY = AWAY | NOT_DONE
 """Statuses after which what may be asked twice is asked again."""
 
@@ -411,7 +413,6 @@ def _send(request: Request) -> Call[httpx.Response]:
 
     One that is not repeatable is sent again only where the answer says that nothing was done.
     """
-    busy = BUSY if request.is_repeatable else NOT_DONE
     for attempt in range(ATTEMPTS):
         pause = RETRY_PAUSE * 2**attempt
         try:
@@ -422,10 +423,26 @@ def _send(request: Request) -> Call[httpx.Response]:
         else:
             assert response is not None  # what a driver sends for a request
             pause = max(_retry_after(response, pause), 0.0)
-            if response.status_code not in busy or attempt == ATTEMPTS - 1 or pause > LONGEST_RETRY:
+            if not _is_to_ask_again(request, response) or attempt == ATTEMPTS - 1 or pause > LONGEST_RETRY:
                 return response
         yield Pause(pause)
     raise AssertionError("the last attempt returns or raises")
+
+
+def _is_to_ask_again(request: Request, response: httpx.Response) -> bool:
+    """Whether it was not done, or may be done twice; a proxy says 503 of what it had passed on, too."""
+    if request.is_repeatable:
+        return response.status_code in BUSY
+    return response.status_code in NOT_DONE and _type_of_problem(response) not in MAY_BE_DONE
+
+
+def _type_of_problem(response: httpx.Response) -> str | None:
+    """As the service names it; None of an answer that is none of its problems."""
+    try:
+        kind = str(response.json()["type"])
+    except (JSONDecodeError, UnicodeDecodeError, KeyError, TypeError):
+        return None
+    return kind if kind.startswith("/problems/") else None
 
 
 def _retry_after(response: httpx.Response, default: float) -> float:

@@ -69,22 +69,22 @@ class FrictionModel(LinearFriction):
         """
         domain, cost = record["domain"], record["cost"]
         return cls(
-            material=record["material"],
-            method=record["method"],
-            version=record["version"],
+            material=recorded.text("material", record["material"]),
+            method=recorded.text("method", record["method"]),
+            version=recorded.whole("version", record["version"], least=1),
             coefficients=recorded.coefficients(record["coefficients"]),
             covariance=recorded.covariance(record["covariance"]),
             scale=recorded.number("scale", record["scale"], least=0.0),
-            n=int(recorded.number("n", record["n"], least=0.0)),
+            n=recorded.whole("n", record["n"], least=1),
             degrees_of_freedom=recorded.degrees_of_freedom(record["degrees_of_freedom"]),
             scatter_degrees_of_freedom=recorded.degrees_of_freedom(record["scatter_degrees_of_freedom"]),
             domain=Domain(*(recorded.span(name, domain[name]) for name in ("tangential_velocity", "normal_force"))),
             identifiable=np.array([recorded.truth("identifiable", each) for each in record["identifiable"]]).reshape(3),
             element_area=recorded.number("element_area", record["element_area"], above=0.0),
-            cost=Cost(*(recorded.number(name, cost[name]) for name in ("seconds", "monte_carlo_error"))),
+            cost=Cost(*(recorded.number(name, cost[name], least=0.0) for name in ("seconds", "monte_carlo_error"))),
             current=recorded.truth("current", record["current"]),
             diagnostics=dict(record["diagnostics"]),
-            created_at=record["created_at"],
+            created_at=recorded.text("created_at", record["created_at"]),
             scales=None if record.get("scales") is None else Scales.from_json(record["scales"]),
             outdated=recorded.truth("outdated", record.get("outdated", False)),
         )
@@ -127,11 +127,11 @@ class FrictionModel(LinearFriction):
     def load(cls, path: Path | str) -> "FrictionModel":
         """The model in a file that ``save`` wrote; raises ``InvalidArgument`` for any other."""
         try:
-            record = json.loads(Path(path).read_text(encoding="utf-8"))
+            record = json.loads(Path(path).read_text(encoding="utf-8"), object_pairs_hook=recorded.members)
             kind, version = record["format"], record["version"]
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
             raise InvalidArgument("file", path, f"one that FrictionModel.save wrote ({error})") from error
-        if kind != FILE_FORMAT or version != FILE_VERSION:
+        if kind != FILE_FORMAT or isinstance(version, bool) or version != FILE_VERSION:
             allowed = f"{FILE_FORMAT} of version {FILE_VERSION}; save it anew, or upgrade stiction-client"
             raise InvalidArgument("file", f"{path}, of {kind} version {version}", allowed)
         try:

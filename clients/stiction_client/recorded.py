@@ -1,7 +1,7 @@
 """Numbers as a service or a file gives them: numbers, and such as a fit can have."""
 
 import math
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -11,14 +11,44 @@ ROUNDING = 1e-6
 """Share of the standard deviations by which a covariance may fall short of one: float64 leaves 1e-12."""
 
 
+LARGEST = 1e100
+"""Size of a number, far beyond what any fit gives, whose square is one still."""
+
+
 def number(name: str, value: object, *, least: float = -math.inf, above: float = -math.inf) -> float:
-    """A finite number of at least ``least`` and above ``above``; raises ``ValueError`` naming another thing."""
+    """A number of at least ``least`` and above ``above``; raises ``ValueError`` naming another thing."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise ValueError(f"{name}, which is {value!r:.40}, no number")
+    if not abs(cast(float, value)) <= LARGEST:
+        raise ValueError(f"{name}, which is {value!r:.40}; allowed: finite, of a size up to {LARGEST:g}")
     found = float(value)
-    if not (math.isfinite(found) and found >= least and found > above):
+    if not (found >= least and found > above):
         allowed = f"above {above:g}" if math.isfinite(above) else f"{least:g} or more"
         raise ValueError(f"{name}, which is {found:g}; allowed: finite, {allowed}")
+    return found
+
+
+def whole(name: str, value: object, *, least: int) -> int:
+    """A whole number of at least ``least``; raises ``ValueError`` naming another thing."""
+    found = number(name, value, least=least)
+    if found != int(found):
+        raise ValueError(f"{name}, which is {found:g}, no whole number")
+    return int(found)
+
+
+def text(name: str, value: object) -> str:
+    """Text; raises ``ValueError`` naming another thing."""
+    if not isinstance(value, str):
+        raise ValueError(f"{name}, which is {value!r:.40}, no text")
+    return value
+
+
+def members(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object of JSON; raises ``ValueError`` for a member that stands twice, of which one would count."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        raise ValueError(f"{next(name for name in names if names.count(name) > 1)}, which stands twice")
     return found
 
 
@@ -35,8 +65,8 @@ def degrees_of_freedom(value: object) -> float:
 
 
 def span(name: str, values: Any) -> tuple[float, float]:
-    """A range whose ends stand in order."""
-    low, high = (number(name, each) for each in values)
+    """A range of sizes, whose ends stand in order."""
+    low, high = (number(name, each, least=0.0) for each in values)
     if low > high:
         raise ValueError(f"{name}, from {low:g} to {high:g}")
     return low, high

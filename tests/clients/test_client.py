@@ -350,7 +350,17 @@ def test_what_would_happen_twice_is_sent_under_one_key(ask: Ask, service: Servic
 
 
 @pytest.mark.usefixtures("quick")
-@pytest.mark.parametrize("lost", [httpx.ReadError("reset"), httpx.Response(504, text=""), httpx.Response(502, text="")])
+@pytest.mark.parametrize(
+    "lost",
+    [
+        httpx.ReadError("reset"),
+        httpx.Response(504, text=""),
+        httpx.Response(502, text=""),
+        httpx.Response(503, text="upstream connect error or disconnect/reset before headers"),
+        httpx.Response(429, json={"type": "about:blank"}),
+        problem(503, type="/problems/stopping"),
+    ],
+)
 @pytest.mark.parametrize(
     ("method", "arguments"),
     [
@@ -363,7 +373,7 @@ def test_what_may_have_been_done_and_would_be_done_again_is_not_sent_again(
     ask: Ask, service: Service, lost: Any, method: str, arguments: tuple[Any, ...]
 ) -> None:
     server = service(lost)
-    with pytest.raises((ConnectionFailed, UnexpectedAnswer)):
+    with pytest.raises((ConnectionFailed, UnexpectedAnswer, ProblemError)):
         ask(server, method, *arguments)
     assert len(server.requests) == 1
     server = service(problem(503, type="/problems/storage-unavailable"))
