@@ -9,6 +9,7 @@ from estimators.linear.priors import ScatterPrior
 from estimators.method_names import METHODS, SCATTER_METHODS
 from estimators.methods import conjugate, hierarchical, ols, robust
 from estimators.methods.automatic import choose, compared
+from estimators.methods.reporting import element_areas
 
 
 def needs_samples(method: str, grasps: int) -> bool:
@@ -58,12 +59,13 @@ def fit(
     if scatter_prior is not None and (method not in SCATTER_METHODS or likelihood not in {None, "hierarchical"}):
         raise InvalidSamples("scatter_prior", scatter_prior, f"none but with {', '.join(SCATTER_METHODS)}")
     scatter_prior = scatter_prior or ScatterPrior()
-    data = gather(samples)
+    data, areas = gather(samples), element_areas(samples)
     if method != "auto":
-        return _fit(data, method, accuracy, seconds, seed, likelihood, loss, scatter_prior)
+        model = _fit(data, method, accuracy, seconds, seed, likelihood, loss, scatter_prior)
+        return replace(model, diagnostics={**model.diagnostics, **areas}) if areas else model
     choice = choose(data)
     model = hierarchical.fit(choice.data, scatter_prior)
-    told = {"chosen_because": choice.reason, "check": compared(model, choice.data)}
+    told = {"chosen_because": choice.reason, "check": compared(model, choice.data), **areas}
     return replace(model, diagnostics={**model.diagnostics, **told})
 
 

@@ -272,20 +272,9 @@ def withdraw(log_id: str, reason: str) -> Call[GraspLogReceipt]:
     return _record(lambda record: GraspLogReceipt.from_json(record["grasp_log"]), (yield from _ask(request)))
 
 
-def friction(
-    name: str,
-    tangential_velocity: float,
-    normal_force: float,
-    quantile: float | None,
-    method: str | None,
-    of: str | None,
-    elements: int | None,
-    sensor: str | None,
-) -> Call[FrictionAnswer]:
+def friction(name: str, question: Mapping[str, float | str | None]) -> Call[FrictionAnswer]:
     """Look friction up."""
-    params = _given(v=tangential_velocity, fn=normal_force, quantile=quantile, method=method, of=of, elements=elements)
-    params |= _given(sensor=sensor)
-    answer = yield from _get(f"/v1/materials/{_part(name)}/friction", params)
+    answer = yield from _get(f"/v1/materials/{_part(name)}/friction", _given(**question))
     return _record(FrictionAnswer.from_json, answer)
 
 

@@ -151,13 +151,16 @@ class FrictionClient:
         of: str | None = None,
         elements: int | None = None,
         sensor: str | None = None,
+        element_area: float | None = None,
     ) -> FrictionAnswer:
         """Friction at velocity ``v`` m/s and ``fn`` N an element: the mean, or a quantile of what a new grasp shows.
 
         The quantile is ``of`` one "element", or of the mean over the ``elements`` of a "contact" (the default where
-        these are given). Where the model knows the ``sensor`` that grasps, friction is as that one shows it.
+        these are given). Where the model knows the ``sensor`` that grasps, friction is as that one shows it. Elements
+        are of ``element_area`` m², the model's where it is not given (``answer.element_area``).
         """
-        return self._run(calls.friction(name, v, fn, quantile, method, of, elements, sensor))
+        asked = {"v": v, "fn": fn, "quantile": quantile, "method": method, "of": of, "elements": elements}
+        return self._run(calls.friction(name, asked | {"sensor": sensor, "element_area": element_area}))
 
     def next_grasp(
         self,
@@ -376,9 +379,11 @@ class AsyncFrictionClient:
         of: str | None = None,
         elements: int | None = None,
         sensor: str | None = None,
+        element_area: float | None = None,
     ) -> FrictionAnswer:
         """As ``FrictionClient.friction``."""
-        return await self._run(calls.friction(name, v, fn, quantile, method, of, elements, sensor))
+        asked = {"v": v, "fn": fn, "quantile": quantile, "method": method, "of": of, "elements": elements}
+        return await self._run(calls.friction(name, asked | {"sensor": sensor, "element_area": element_area}))
 
     async def next_grasp(
         self,

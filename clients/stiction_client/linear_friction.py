@@ -1,7 +1,7 @@
 """The mathematics of ``μ = β₀ + β₁ v + β₂ f_n + ε``: one home for whoever has fitted it and whoever plans with it."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
@@ -11,13 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 from stiction_client import recorded
 from stiction_client.elementwise import FloatArray, Number
 from stiction_client.errors import InvalidArgument
-from stiction_client.support import Domain, Kind, Support, extrapolation, notes, support, widening
+from stiction_client.support import UNKNOWN_SENSOR, Domain, Kind, Support, extrapolation, notes, support, widening
 
 if TYPE_CHECKING:
     from stiction_client.labelled import DataFrame, Dataset, Row
 
 KINDS = ("element", "contact")
 """Whose friction a quantile may be of."""
+SENSORS_NAMED = 4
+"""At most, to who asks for one that is not known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +75,16 @@ class SensorFriction:
             recorded.degrees_of_freedom(record["scatter_degrees_of_freedom"]),
         )
 
+    def at_element_area(self, part: float) -> "SensorFriction":
+        """The same for an element ``part`` times as large."""
+        coefficients, covariance = _rescaled(np.array(self.coefficients), np.array(self.covariance), part)
+        return replace(
+            self,
+            coefficients=tuple(coefficients.tolist()),
+            covariance=tuple(map(tuple, covariance.tolist())),
+            scale=self.scale / math.sqrt(part),
+        )
+
     def to_json(self) -> dict[str, Any]:
         """What ``from_json`` reads."""
         told = {each.name: getattr(self, each.name) for each in fields(self)}
@@ -120,6 +132,17 @@ class Scales:
         grasps, places, within = each
         return cls(grasps, places, within, None if sensors is None else SensorScale.from_json(sensors))
 
+    def at_element_area(self, part: float) -> "Scales":
+        """The same for an element ``part`` times as large, over which what differs from place to place averages out."""
+        places, within = (
+            replace(each, value=each.value / math.sqrt(part)) for each in (self.between_places, self.within)
+        )
+        known = self.between_sensors
+        if known is not None:
+            sensors = {name: sensor.at_element_area(part) for name, sensor in known.sensors.items()}
+            known = replace(known, sensors=sensors)
+        return Scales(self.between_grasps, places, within, known)
+
     def to_json(self) -> dict[str, Any]:
         """What ``from_json`` reads; without ``between_sensors`` where grasps are of one."""
         told = {each.name: getattr(self, each.name) for each in fields(self)}
@@ -144,6 +167,7 @@ class LinearFriction:
     degrees_of_freedom: float
     scatter_degrees_of_freedom: float
     domain: Domain
+    element_area: float
     identifiable: NDArray[np.bool_]
     diagnostics: Mapping[str, Any]
     scales: Scales | None
@@ -230,12 +254,14 @@ class LinearFriction:
     def of_sensor(self, name: str) -> Self:
         """The model of friction as the sensor of this name shows it, its own gain in the coefficients.
 
-        Of a sensor of which the model has no grasp, and where all grasps are of one, the model itself: its quantiles
-        allow for the gain of any sensor.
+        Where all grasps are of one sensor, the model itself. Of a sensor of which it has no grasp too, but for a note
+        that says so: its quantiles allow for the gain of any sensor.
         """
         known = None if self.scales is None else self.scales.between_sensors
-        if self.scales is None or known is None or name not in known.sensors:
+        if self.scales is None or known is None:
             return self
+        if name not in known.sensors:
+            return self._of_unknown_sensor(name, sorted(known.sensors))
         sensor = known.sensors[name]
         return replace(  # type: ignore[type-var]  # every model is a record
             self,
@@ -246,6 +272,29 @@ class LinearFriction:
             scatter_degrees_of_freedom=sensor.scatter_degrees_of_freedom,
             scales=replace(self.scales, between_sensors=None),
         )
+
+    def at_element_area(self, area: float) -> Self:
+        """The same friction with forces on an element of ``area`` m²: under the same pressure it bears in proportion
+        to its area, and what scatters from place to place averages out over it.
+        """
+        if not (area > 0.0 and math.isfinite(area)):
+            raise self.refusal("area", area, "above 0 m²")
+        part, (low, high) = area / self.element_area, self.domain.normal_force
+        coefficients, covariance = _rescaled(self.coefficients, self.covariance, part)
+        return replace(  # type: ignore[type-var]  # every model is a record
+            self,
+            coefficients=coefficients,
+            covariance=covariance,
+            scale=self.scale / math.sqrt(part),
+            domain=replace(self.domain, normal_force=(low * part, high * part)),
+            scales=None if self.scales is None else self.scales.at_element_area(part),
+            element_area=area,
+        )
+
+    def _of_unknown_sensor(self, name: str, known: Sequence[str]) -> Self:
+        few = ", ".join(map(repr, known[:SENSORS_NAMED])) + (", …" if len(known) > SENSORS_NAMED else "")
+        told = f"no grasp of it is by a sensor {name!r} ({few} are known): the answer allows for the gain of any sensor"
+        return replace(self, diagnostics={**self.diagnostics, UNKNOWN_SENSOR: told})  # type: ignore[type-var]
 
     def extrapolation(self, tangential_velocity: float, normal_force: float) -> str | None:
         """Which of v (m/s) and f_n (N an element) lies outside the data behind the model; None where neither does.
@@ -328,3 +377,9 @@ class LinearFriction:
 def degrees_to_json(value: float) -> float | None:
     """What ``recorded.degrees_of_freedom`` reads."""
     return value if math.isfinite(value) else None
+
+
+def _rescaled(coefficients: FloatArray, covariance: FloatArray, part: float) -> tuple[FloatArray, FloatArray]:
+    """β [3] and its covariance [3, 3] with forces on an element ``part`` times as large."""
+    unit = np.array([1.0, 1.0, 1.0 / part])
+    return coefficients * unit, covariance * np.outer(unit, unit)

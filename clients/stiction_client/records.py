@@ -193,7 +193,7 @@ class GraspLogReceipt:
 
 @dataclass(frozen=True, slots=True)
 class FrictionAnswer:
-    """Friction of a material at one velocity (m/s) and normal force of an element (N).
+    """Friction of a material at one velocity (m/s) and normal force (N) of an element of ``element_area`` m².
 
     ``friction_coefficient`` is the mean, or the quantile asked for ``of`` one "element", or of the mean over the
     ``elements`` of a "contact"; ``warning`` says what was extrapolated; ``chosen_because``, why this model answers,
@@ -217,6 +217,7 @@ class FrictionAnswer:
     support: str | None = None
     advice: str | None = None
     notes: tuple[str, ...] = ()
+    element_area: float | None = None
 
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "FrictionAnswer":

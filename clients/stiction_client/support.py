@@ -21,7 +21,11 @@ WEAKENING = "weakening"
 """Diagnostic, a sentence: which log lowers the friction that a planner may count on."""
 UNNOTICED = "unnoticed_change"
 """Diagnostic, a sentence: which change of its friction grasps of a material differ too much to show soon."""
-NOTES = (WEAKENING, SENSOR_GAIN, UNNOTICED)
+UNKNOWN_SENSOR = "unknown_sensor"
+"""Diagnostic, a sentence: the model was asked for as a sensor shows it of which it has no grasp."""
+ELEMENT_AREAS = "element_areas"
+"""Diagnostic, a sentence: elements of the material's grasps differ in their area, and of which one forces are."""
+NOTES = (WEAKENING, SENSOR_GAIN, UNKNOWN_SENSOR, ELEMENT_AREAS, UNNOTICED)
 """Diagnostics that whoever reads an answer is to know beside it."""
 SUPERSEDED = "a newer version took its place: fetch the current model"
 

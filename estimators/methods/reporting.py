@@ -1,6 +1,8 @@
 """What every method reports of its data and of what it found, in one form."""
 
+import math
 import time
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +10,7 @@ from numpy.typing import NDArray
 from estimators.defaults import IDENTIFIABILITY, REFERENCE
 from estimators.friction_model import Cost, FrictionModel, Scales
 from estimators.likelihoods.posterior import PosteriorSummary
-from estimators.linear.fit_data import FitData
+from estimators.linear.fit_data import FitData, GraspData
 from estimators.linear.least_squares import LinearFit, solve
 from estimators.linear.mixture_summary import scatter_alone
 from estimators.linear.normal_mixture import mixture_quantile
@@ -17,7 +19,7 @@ from estimators.linear.priors import ScatterPrior
 from estimators.linear.sensor_gains import Gains
 from estimators.methods.identifiability import effects, identifiable
 from estimators.methods.unknown_velocity import in_words, slope_inflation, widened
-from stiction_client.support import SENSOR_GAIN
+from stiction_client.support import ELEMENT_AREAS, SENSOR_GAIN
 
 FloatArray = NDArray[np.float64]
 Diagnostics = dict[str, float | str]
@@ -43,6 +45,16 @@ def pooled_prior(nodes: ScaleNodes, scatter_prior: ScatterPrior) -> Diagnostics:
         ALONE: alone.value,
         f"{ALONE}_degrees_of_freedom": alone.degrees_of_freedom,
     }
+
+
+def element_areas(samples: GraspData) -> Diagnostics:
+    """Of grasps whose elements differ in their area: in a sentence, of which element the model's forces are."""
+    parts = samples if isinstance(samples, Sequence) else [samples]
+    least, most = (choose(part.element_area for part in parts) for choose in (min, max))
+    if math.isclose(most, least, rel_tol=1e-6):  # rounding of lattices
+        return {}
+    told = f"its grasps are by elements of {1e6 * least:.3g} to {1e6 * most:.3g} mm²"
+    return {ELEMENT_AREAS: f"{told}: normal forces are those of one of {1e6 * least:.3g} mm², unless its area is given"}
 
 
 def sensor_gain(nodes: ScaleNodes) -> Diagnostics:

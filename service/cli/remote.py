@@ -116,6 +116,9 @@ def lookup(
         int | None, typer.Option(min=1, help="The quantile of a contact of so many elements, not of one element.")
     ] = None,
     sensor: GraspingSensor = None,
+    element_area: Annotated[
+        float | None, typer.Option(help="Of the element that the force and their number are of, m²; else the model's.")
+    ] = None,
     method: Method = "auto",
     url: Url = DEFAULT_URL,
     key: Key = None,
@@ -124,8 +127,13 @@ def lookup(
     """Look a material's friction coefficient up."""
 
     with connected(url, key) as client:
-        force = normal_force if normal_force is not None else _middle_force(client.model(material, method=method))
-        answer = client.friction(material, velocity, force, quantile, method, elements=elements, sensor=sensor)
+        force, area = normal_force, element_area
+        if force is None:
+            model = client.model(material, method=method)
+            force = _middle_force(model) * (1.0 if area is None else area / model.element_area)
+        answer = client.friction(
+            material, velocity, force, quantile, method, elements=elements, sensor=sensor, element_area=area
+        )
     if json:
         print_json(asdict(answer))
     else:
@@ -275,11 +283,12 @@ def _middle_force(model: "FrictionModel") -> float:
 def _friction_lines(answer: "FrictionAnswer") -> list[tuple[str, str | None]]:
     whose = f"of a contact of {answer.elements} elements" if answer.of == "contact" else "of one element"
     friction = number(answer.friction_coefficient)
+    area = "" if answer.element_area is None else f" of {number(1e6 * answer.element_area)} mm²"
     if answer.quantile is not None:
         friction += f", the {answer.quantile:g} quantile {whose}; the mean is {number(answer.mean)}"
     return [
         ("μ", friction),
-        ("at", f"{number(answer.tangential_velocity)} m/s and {number(answer.normal_force)} N an element"),
+        ("at", f"{number(answer.tangential_velocity)} m/s and {number(answer.normal_force)} N an element{area}"),
         ("model", f"{answer.method}, version {answer.version}"),
         ("because", answer.chosen_because),
         ("warning", answer.warning),

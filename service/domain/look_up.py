@@ -15,7 +15,8 @@ class FrictionQuery:
     """Tangential velocity m/s, normal force of an element N, and a quantile in (0, 1) or None for the mean.
 
     ``of``: one "element", or the mean over the ``elements`` of a "contact". ``sensor``: the name of that which grasps;
-    of one whose own gain the model does not know, and without any, the answer allows for any gain.
+    of one whose own gain the model does not know, and without any, the answer allows for any gain. ``element_area``:
+    m² of the element that bears the force, the model's where None.
     """
 
     tangential_velocity: float
@@ -24,10 +25,11 @@ class FrictionQuery:
     of: Averaged = "element"
     elements: int = 1
     sensor: str | None = None
+    element_area: float | None = None
 
 
 class Friction(NamedTuple):
-    """Friction coefficient of a material at a tangential velocity m/s and a normal force of an element N.
+    """Friction coefficient of a material at a tangential velocity m/s and a normal force N of an element of an area m².
 
     ``friction_coefficient``: the quantile that was asked for, or the mean, at least 0; ``within_domain``: the samples
     reach there; ``support`` and ``advice``: what the answer rests on, and what to do about it;
@@ -50,13 +52,15 @@ class Friction(NamedTuple):
     support: Kind
     advice: str
     notes: tuple[str, ...]
+    element_area: float
 
 
 def look_up(known: KnownModel, question: FrictionQuery) -> Friction:
     """The answer of a material's current model."""
-    v, f_n = question.tangential_velocity, question.normal_force
     stored = known.stored
+    v, f_n = question.tangential_velocity, question.normal_force
     model = known.model if question.sensor is None else known.model.of_sensor(question.sensor)
+    model = model if question.element_area is None else model.at_element_area(question.element_area)
     mean = float(model.predict(v, f_n))
     asked = (
         mean
@@ -84,4 +88,5 @@ def look_up(known: KnownModel, question: FrictionQuery) -> Friction:
         support=support.kind,
         advice=support.advice,
         notes=model.notes,
+        element_area=model.element_area,
     )

@@ -146,4 +146,4 @@ def _read(query: bytes) -> tuple[str, FrictionQuery] | None:
         return None
     if wrong_parameter(given, _PARAMETERS) is not None:
         return None
-    return asked.method, FrictionQuery(asked.v, asked.fn, asked.quantile, *asked.averaged(), asked.sensor)
+    return asked.method, asked.question()

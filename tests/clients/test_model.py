@@ -55,6 +55,30 @@ def test_client_and_estimators_predict_the_same_of_contacts(
     np.testing.assert_allclose(model.predict(v, f_n, quantile, of=of, elements=elements), expected, rtol=1e-12, atol=0)
 
 
+@pytest.mark.parametrize("quantile", [None, 1e-3])
+@pytest.mark.parametrize("part", [0.25, 4.0])
+def test_a_larger_element_under_the_same_pressure_has_the_same_friction(
+    make_model: Make, quantile: float | None, part: float
+) -> None:
+    model = replace(make_model(), scales=OF_SENSORS)
+    other = model.at_element_area(part * model.element_area)
+    v, f_n = np.linspace(0.0, 0.01, 7)[:, None], np.linspace(0.0, 1.0, 5)
+    for one, two in ((model, other), (model.of_sensor("left"), other.of_sensor("left"))):
+        # Of a contact of the same area, whose scatter averages out over as many elements as it has.
+        expected = one.predict(v, f_n, quantile, "contact", 60.0)
+        np.testing.assert_allclose(two.predict(v, part * f_n, quantile, "contact", 60.0 / part), expected, rtol=1e-12)
+    assert other.domain.normal_force == pytest.approx([part * bound for bound in model.domain.normal_force], rel=1e-15)
+    back = other.at_element_area(model.element_area)
+    np.testing.assert_allclose(back.covariance, model.covariance, rtol=1e-14)
+    assert back.coefficients.tolist() == pytest.approx(model.coefficients.tolist(), rel=1e-14)
+
+
+@pytest.mark.parametrize("area", [0.0, -1e-6, np.inf, np.nan])
+def test_an_element_without_an_area_is_refused(make_model: Make, area: float) -> None:
+    with pytest.raises(InvalidArgument, match=r"^area is"):
+        make_model().at_element_area(area)
+
+
 @pytest.mark.parametrize(("of", "elements"), [("grasp", 5), ("contact", None), ("contact", 0), ("contact", np.nan)])
 def test_what_is_predicted_must_be_known(make_model: Make, of: str, elements: float | None) -> None:
     with pytest.raises(InvalidArgument, match=r"^(of|elements) is"):
@@ -69,7 +93,11 @@ def test_a_known_sensor_has_its_own_law_and_another_may_have_any(make_model: Mak
         rtol=1e-12,
     )
     assert model.predict(0.0, 0.1, 0.01) < alone.predict(0.0, 0.1, 0.01)
-    assert model.of_sensor("right") is model
+    right = model.of_sensor("right")
+    assert (right.scales, right.coefficients.tolist()) == (model.scales, model.coefficients.tolist())
+    assert right.notes == (
+        "no grasp of it is by a sensor 'right' ('left' are known): the answer allows for the gain of any sensor",
+    )
     left = model.of_sensor("left")
     assert left.predict(0.0, 0.1) == pytest.approx(0.49)
     assert (left.scales, left.degrees_of_freedom, left.scale) == (SCALES, 9.0, 0.03)

@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -35,3 +36,17 @@ def test_grasps_are_fitted_from_their_moments_as_from_their_samples(
 def test_what_looks_at_samples_or_at_elements_of_one_grasp_needs_them(method: str, grasps: int) -> None:
     assert needs_samples(method, grasps)
     assert not needs_samples("conjugate", grasps)
+
+
+@pytest.mark.parametrize("method", ["ols", "auto"])
+def test_a_model_says_of_which_element_forces_are_where_these_differ(
+    samples: Callable[..., FrictionSamples], method: str
+) -> None:
+    grasps = [samples(seed=seed) for seed in range(4)]
+    assert fit(grasps, method=method).notes == ()
+    mixed = [*grasps[:3], replace(grasps[3], element_area=4e-6)]
+    told = "its grasps are by elements of 1 to 4 mm²: normal forces are those of one of 1 mm², unless its area is given"
+    for data in (mixed, [Moments.from_samples(grasp) for grasp in mixed]):
+        if method == "ols" or data is mixed:
+            model = fit(data, method=method)
+            assert (model.notes, model.element_area) == ((told,), 1e-6)

@@ -327,6 +327,11 @@ def test_logs_are_given_their_sensor_and_asked_for_as_it_shows_friction(
         )  # fmt: skip
         means[sensor], forces[sensor] = answer["mean"], grip["normal_force"]
     assert means["right"] > 1.02 * means["left"]
+    middle = json.loads(run("lookup", "felt by two", *asked)[1])
+    larger = json.loads(run("lookup", "felt by two", "--element-area", 2.0 * middle["element_area"], *asked)[1])
+    assert larger["normal_force"] == pytest.approx(2.0 * middle["normal_force"])
+    assert larger["mean"] == pytest.approx(middle["mean"])
+    assert "sensor 'lefft'" in str(json.loads(run("lookup", "felt by two", "--sensor", "lefft", *asked)[1])["notes"])
     assert forces["right"] < forces["left"]
 
 

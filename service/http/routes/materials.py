@@ -10,7 +10,7 @@ from db.repositories import friction_models, materials
 from estimators.method_names import ModelMethod
 from service.domain import curate
 from service.domain.fit import request_fit
-from service.domain.look_up import FrictionQuery, look_up
+from service.domain.look_up import look_up
 from service.domain.record_next import record_next
 from service.http.access import READ, UPLOAD, CurrentPrincipal
 from service.http.bodies import JsonRoute
@@ -128,8 +128,7 @@ async def read_friction(
     who has it.
     """
     known = await context.models.get(context.database, name, asked.method)
-    question = FrictionQuery(asked.v, asked.fn, asked.quantile, *asked.averaged(), asked.sensor)
-    return conditional(request, known.tag, lambda: FrictionOut.json_of(look_up(known, question)))
+    return conditional(request, known.tag, lambda: FrictionOut.json_of(look_up(known, asked.question())))
 
 
 @router.get(

@@ -8,9 +8,9 @@ from pydantic.config import JsonDict
 
 from db.records import StoredModel
 from estimators.method_names import FitMethod
-from service.domain.look_up import Averaged, Friction
+from service.domain.look_up import Averaged, Friction, FrictionQuery
 from service.domain.stored_results import to_client_model
-from service.http.schemas.common import MOMENT_EXAMPLE, Body, Force, Next, Reference, Velocity
+from service.http.schemas.common import MOMENT_EXAMPLE, Area, Body, Force, Next, Reference, Velocity
 
 ChosenBecause = Annotated[str | None, Field(description="Why this model answers; null where a method was named")]
 
@@ -183,6 +183,9 @@ class LookUpQuery(BaseModel):
         int | None, Field(ge=1, le=10**9, description="Elements of the contact, over which scatter averages out")
     ] = None
     sensor: GraspingSensor = None
+    element_area: Annotated[
+        Area | None, Field(description="m² of the element that `fn` and `elements` are of; without, the model's")
+    ] = None
 
     @model_validator(mode="after")
     def _counted(self) -> Self:
@@ -195,6 +198,10 @@ class LookUpQuery(BaseModel):
         if self.elements is None or self.of == "element":
             return "element", 1
         return "contact", self.elements
+
+    def question(self) -> FrictionQuery:
+        """What the use case is asked."""
+        return FrictionQuery(self.v, self.fn, self.quantile, *self.averaged(), self.sensor, self.element_area)
 
 
 class NextGraspQuery(BaseModel):
@@ -264,6 +271,7 @@ class FrictionOut(BaseModel):
                     "chosen_because": CHOSEN_EXAMPLE,
                     "tangential_velocity": 0.0,
                     "normal_force": 0.05,
+                    "element_area": 1e-6,
                     "quantile": 0.05,
                     "of": "element",
                     "elements": 1,
@@ -285,6 +293,7 @@ class FrictionOut(BaseModel):
     chosen_because: ChosenBecause = None
     tangential_velocity: Annotated[float, Field(description="m/s")]
     normal_force: Annotated[float, Field(description="N on an element")]
+    element_area: Annotated[float, Field(description="Of that element, m²")]
     quantile: float | None
     of: Annotated[Averaged, Field(description="Whose friction the quantile is of")] = "element"
     elements: Annotated[int, Field(description="Over how many elements its scatter averages out")] = 1

@@ -42,6 +42,19 @@ def test_the_answer_is_the_models(ask: Callable[..., Any], model: estimators.Fri
     assert (answer.within_domain, answer.warning, answer.version) == (True, None, 1)
 
 
+def test_forces_may_be_those_of_an_element_of_another_area(
+    ask: Callable[..., Any], model: estimators.FrictionModel
+) -> None:
+    f_n = sum(model.domain.normal_force) / 2.0
+    usual = ask(model, FrictionQuery(1e-5, f_n, None))
+    assert usual.element_area == model.element_area
+    larger = ask(model, FrictionQuery(1e-5, 7.0 * f_n, None, element_area=7.0 * model.element_area))
+    assert larger.mean == pytest.approx(usual.mean, rel=1e-12)
+    assert (larger.normal_force, larger.element_area) == (7.0 * f_n, 7.0 * model.element_area)
+    assert larger.within_domain
+    assert not ask(model, FrictionQuery(1e-5, 7.0 * f_n, None)).within_domain
+
+
 @pytest.mark.parametrize(("of", "elements"), [("element", 1), ("contact", 60)])
 def test_a_quantile_is_of_what_was_asked_for(
     ask: Callable[..., Any], model: estimators.FrictionModel, of: str, elements: int

@@ -119,6 +119,8 @@ def test_the_friction_of_a_fitted_material_is_its_truth(client: httpx.Client) ->
     assert mean["friction_coefficient"] == mean["mean"] == pytest.approx(0.4, abs=0.004)
     assert (mean["material"], mean["method"], mean["version"]) == ("fitted", "hierarchical", 1)
     assert mean["chosen_because"].startswith("hierarchical: ")
+    larger = {"v": 3e-4, "fn": 0.45, "element_area": 3.0 * mean["element_area"]}
+    assert client.get("/v1/materials/fitted/friction", params=larger).json()["mean"] == pytest.approx(mean["mean"])
     ols = client.get("/v1/materials/fitted/friction", params={"v": 3e-4, "fn": 0.15, "method": "ols"}).json()
     assert (ols["method"], ols["chosen_because"]) == ("ols", None)
     assert (mean["tangential_velocity"], mean["normal_force"], mean["quantile"]) == (3e-4, 0.15, None)
