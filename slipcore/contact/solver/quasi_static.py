@@ -103,7 +103,7 @@ class QuasiStatic:
         )
         guess = extrapolated(state.stress, state.before, continuation(state.drive, drive))
         if state.normal is not None and self._moves_sideways(drive):
-            equations = from_touch(equations, state.normal, guess)
+            equations, guess = from_touch(equations, state.normal, guess)
         solution = solve_carrying(equations, self._carried(state, load, drive), guess)
         after = self._advance(equations, state, load, drive, solution, recalled)
         return after, self._result(equations, state, after, solution)

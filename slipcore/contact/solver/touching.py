@@ -17,43 +17,53 @@ from slipcore.contact.defaults import STEP
 from slipcore.contact.errors import InfeasibleLoad
 from slipcore.contact.solver.extrapolation import Stress
 from slipcore.contact.solver.normal import NormalContact
-from slipcore.contact.solver.step_equations import StepEquations
+from slipcore.contact.solver.step_equations import StepEquations, StepSolution
 from slipcore.frames import BoolArray, FloatArray
 
 
-def from_touch(equations: StepEquations, last: NormalContact, guess: Stress) -> StepEquations:
-    """The equations of a step with the motion of cells that touch in it counted from where they touch.
+def from_touch(equations: StepEquations, last: NormalContact, guess: Stress) -> tuple[StepEquations, Stress]:
+    """The equations of a step with the motion of cells that touch in it counted from where they touch, and a nearer
+    guess of the stresses.
 
     ``last``: normal contact at the end of the step before; ``guess`` of the stresses at the end of this one. Where no
     cell comes to touch, or all do, these are the equations as they were.
     """
     touched = last.pressure > 0.0
     if equations.known is not None or not touched.any():
-        return equations
+        return equations, guess
     normal = equations.pressed(guess)
+    guess = guess._replace(pressure=normal.pressure)
     if not equations.problem.coupled:
         equations = replace(equations, known=normal)
     if not (normal.pressure[~touched] > 0.0).any():
-        return equations
+        return equations, guess
+    barred = _barring(equations, ~touched)
     try:
-        moved = _moved_before_touch(equations, touched, last.gap, guess)
+        solution = barred.solve(guess._replace(pressure=np.where(touched, guess.pressure, 0.0)))
     except InfeasibleLoad:  # only the new cells let the contact bear the load
-        return equations
-    return replace(equations, offset=equations.offset - moved)
+        return equations, guess
+    moved = _moved_before_touch(equations, solution, touched, last.gap)
+    guess = guess._replace(traction=barred.stress(solution).traction)
+    return replace(equations, offset=equations.offset - moved), guess
 
 
-def _moved_before_touch(equations: StepEquations, touched: BoolArray, gap: FloatArray, guess: Stress) -> FloatArray:
-    """Motion [2, ny, nx] m against the object of each cell from the step's begin to its touch, zero where ``touched``;
-    ``gap`` [ny, nx] m at the begin.
-    """
-    barred = replace(
+def _barring(equations: StepEquations, cells: BoolArray) -> StepEquations:
+    """The equations with cells that cannot touch."""
+    return replace(
         equations,
-        height=np.where(touched, equations.height, np.inf),
+        height=np.where(cells, np.inf, equations.height),
         tolerance=STEP.barred_tolerance * equations.tolerance,
         normal_tolerance=STEP.barred_tolerance * equations.normal_tolerance,
         known=None,
     )
-    solution = barred.solve(guess._replace(pressure=np.where(touched, guess.pressure, 0.0)))
+
+
+def _moved_before_touch(
+    equations: StepEquations, solution: StepSolution, touched: BoolArray, gap: FloatArray
+) -> FloatArray:
+    """Motion [2, ny, nx] m against the object of each cell from the step's begin to its touch, zero where ``touched``;
+    ``gap`` [ny, nx] m at the begin.
+    """
     end = equations.gap(solution)
     closes = ~touched & (end < 0.0)
     share = np.divide(gap, gap - end, out=np.ones_like(gap), where=closes)

@@ -79,14 +79,32 @@ def test_no_cell_that_touches_is_missed_in_fine_steps(monkeypatch: pytest.Monkey
     """A solution that is too coarse to show that a cell touches leaves it with an error that the steps do not cure."""
     counted: list[bool] = []
 
-    def noted(equations: StepEquations, last: NormalContact, guess: Stress) -> StepEquations:
-        counted.append((corrected := from_touch(equations, last, guess)).offset is not equations.offset)
-        return corrected
+    def noted(equations: StepEquations, last: NormalContact, guess: Stress) -> tuple[StepEquations, Stress]:
+        corrected, nearer = from_touch(equations, last, guess)
+        counted.append(corrected.offset is not equations.offset)
+        return corrected, nearer
 
     monkeypatch.setattr(quasi_static, "from_touch", noted)
     contacts = [result.contact for result in layer(16).run(map(load, FORCE * (np.arange(1, 161) / 160) ** 3))]
     touches = [bool((now & ~before).any()) for before, now in pairwise(contacts)]
     assert [needed for needed, done in zip(touches, counted, strict=True) if needed and not done] == []
+
+
+def test_what_the_cells_before_bear_is_a_nearer_guess(monkeypatch: pytest.MonkeyPatch) -> None:
+    guesses: list[tuple[Stress, Stress]] = []
+
+    def noted(equations: StepEquations, last: NormalContact, guess: Stress) -> tuple[StepEquations, Stress]:
+        corrected, nearer = from_touch(equations, last, guess)
+        guesses.append((guess, nearer))
+        return corrected, nearer
+
+    monkeypatch.setattr(quasi_static, "from_touch", noted)
+    solver = layer(16)
+    results = list(solver.run(load(force) for force in (2.0, 4.0, 6.0)))[1:]
+    for result, (guess, nearer) in zip(results, guesses, strict=True):
+        force = result.force / solver.grid.cell_area
+        before, after = (np.linalg.norm([*g.traction, g.pressure] - force) for g in (guess, nearer))
+        assert after <= 0.1 * before
 
 
 def test_a_load_that_only_the_new_cells_make_bearable_is_borne() -> None:
