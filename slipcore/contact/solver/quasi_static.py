@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from slipcore.contact.defaults import STEP, TINY
-from slipcore.contact.elasticity.fields import rigid_displacement
-from slipcore.contact.elasticity.grid import Grid
+from slipcore.contact.elasticity.fields import lengths, rigid_displacement
+from slipcore.contact.elasticity.grid import Grid, bounding_box
 from slipcore.contact.elasticity.influence import Scaled
 from slipcore.contact.elasticity.operator import Count, Operators
 from slipcore.contact.solver.creep import creep_compliance, creep_recalled, creep_step
@@ -165,7 +165,7 @@ class QuasiStatic:
         speed = state.speed
         if self.problem.velocity_laws:
             speed = np.zeros_like(pressure)
-            speed[solution.box] = np.hypot(*solution.tangential.slip) / load.duration
+            speed[solution.box] = lengths(solution.tangential.slip) / load.duration
         return ContactState(
             normal=solution.normal,
             stress=stress,
@@ -213,8 +213,8 @@ class QuasiStatic:
         slip, at_limit, moved = np.zeros_like(after.stress.traction), np.zeros_like(contact), np.zeros_like(contact)
         touching = contact[box]
         slip[:, *box] = np.where(touching, tangential.slip, 0.0)
-        at_limit[box] = touching & (np.hypot(*tangential.traction) >= (1.0 - STEP.at_limit) * solution.limit)
-        moved[box] = np.hypot(*slip[:, *box]) > self._noticeable(equations, solution, after.pose - state.pose)
+        at_limit[box] = touching & (lengths(tangential.traction) >= (1.0 - STEP.at_limit) * solution.limit)
+        moved[box] = lengths(slip[:, *box]) > self._noticeable(equations, solution, after.pose - state.pose)
         creep = sum(after.creep, start=np.zeros_like(after.elastic))
         return StepResult(
             displacement=after.elastic + creep,
@@ -240,7 +240,7 @@ class QuasiStatic:
         noise.
         """
         part = self.grid.part(solution.box)
-        carried = float(np.hypot(*rigid_displacement(np.stack(part.points()), motion)).max())
+        carried = float(lengths(rigid_displacement(np.stack(part.points()), motion)).max())
         kernel = equations.operators.on(part).influence("xx")
         compliance = 0.0 if kernel is None else float(kernel[0, 0])
         return max(STEP.moved * carried, STEP.noise * equations.tolerance * float(solution.limit.max()) * compliance)
@@ -265,8 +265,6 @@ def _rate(before: StepLoad, load: StepLoad, drive: FloatArray) -> FloatArray:
 
 def _lever(pressure: FloatArray, grid: Grid) -> float:
     """Half the extent of the contact, m; the grid's where there is none yet."""
-    x, y = grid.points()
     touching = pressure > 0.0
-    if not touching.any():
-        touching = np.ones_like(touching)
-    return 0.5 * max(float(np.ptp(x[touching])), float(np.ptp(y[touching])), min(grid.pitch))
+    rows, columns = grid.part(bounding_box(touching if touching.any() else ~touching)).shape
+    return 0.5 * max((columns - 1) * grid.pitch[0], (rows - 1) * grid.pitch[1], min(grid.pitch))

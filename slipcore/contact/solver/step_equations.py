@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.contact.defaults import STEP, TINY
-from slipcore.contact.elasticity.fields import inner, rigid_displacement
+from slipcore.contact.elasticity.fields import inner, lengths, rigid_displacement
 from slipcore.contact.elasticity.grid import Box, Grid, bounding_box
 from slipcore.contact.elasticity.operator import Operators
 from slipcore.contact.errors import NotConverged
@@ -174,7 +174,7 @@ class StepEquations:
             limit = self._limit(coefficient, speed, pressure)
             tangential = self._tangential(box, limit, offset, start, tolerance)
             iterations += tangential.iterations
-            mapped = np.hypot(*tangential.slip) / self.load.duration
+            mapped = lengths(tangential.slip) / self.load.duration
             off = np.abs(self._limit(coefficient, mapped, pressure) - limit)
             change = float(off.max()) / max(float(limit.max()), TINY)
             if change <= tolerance:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from slipcore.contact.defaults import TANGENTIAL, TINY
-from slipcore.contact.elasticity.fields import doubled, halved, inner, resultants, rigid_displacement
+from slipcore.contact.elasticity.fields import doubled, halved, inner, lengths, resultants, rigid_displacement
 from slipcore.contact.elasticity.operator import ElasticOperator
 from slipcore.contact.errors import InfeasibleLoad, NotConverged
 from slipcore.contact.limit_surface import limit_load
@@ -185,7 +185,7 @@ class _TangentialStep:
         way = trial - traction
         response = self.operator.tangential(way)
         slope, curvature = inner(slip, way), inner(way, response)
-        rounding = TANGENTIAL.slope_rounding * inner(np.hypot(slip[0], slip[1]), self.limit)
+        rounding = TANGENTIAL.slope_rounding * inner(lengths(slip), self.limit)
         best = -slope / curvature if curvature > 0.0 and abs(slope) > rounding else 1.0
         share = 1.0 if best >= 0.5 else max(best, 0.0)
         if share == 1.0:
@@ -201,7 +201,7 @@ class _TangentialStep:
         imbalance = float(np.abs(lacking).max()) / self.capacity
         if imbalance > TANGENTIAL.balance:
             raise NotConverged("balance of the tangential load", imbalance, TANGENTIAL.balance, iterations)
-        slides = np.hypot(*(traction - self.stiffness * slip)) > self.limit
+        slides = lengths(traction - self.stiffness * slip) > self.limit
         return TangentialContact(
             traction,
             displacement,
