@@ -39,6 +39,7 @@ NOT_TUNED = {
 """Files whose numbers are mathematics."""
 
 LAYOUT = {
+    "slipcore/lanes.py": {"COUNT"},
     "slipcore/notebook.py": {"WIDTH", "HEIGHT"},
     "slipcore/detection/filter/state.py": {
         "ROWS",

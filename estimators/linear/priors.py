@@ -80,9 +80,13 @@ def conjugate_prior() -> str:
     return (
         f"beta | sigma ~ N(({REFERENCE.friction:g}, 0, 0), sigma^2 V0): at sigma = {REFERENCE.scatter:g} of sd "
         f"{PRIOR.width:g} in beta0 and in each slope times its span ({REFERENCE.tangential_velocity:g} m/s; "
-        f"{REFERENCE.pressure:g} Pa times the element area); sigma^2 ~ IG({PRIOR.degrees_of_freedom / 2:g}, "
-        f"{PRIOR.degrees_of_freedom / 2 * REFERENCE.scatter**2:g})"
+        f"{REFERENCE.pressure:g} Pa times the element area); {_of_scatter()}"
     )
+
+
+def _of_scatter() -> str:
+    shape = PRIOR.degrees_of_freedom / 2
+    return f"sigma^2 ~ IG({shape:g}, {shape * REFERENCE.scatter**2:g})"
 
 
 def positive_friction() -> str:
@@ -101,6 +105,5 @@ def structured(scatter_prior: ScatterPrior = WEAK, sensors: int = 1) -> str:
         f"~ N(0, {PRIOR.width:g}^2), the spans {REFERENCE.tangential_velocity:g} m/s and {REFERENCE.pressure:g} Pa "
         f"times the element area, or the range seen if less; between grasps {scatter_prior}; "
         f"{gains if sensors > 1 else ''}between places omega ~ "
-        f"half-Student-t on {PRIOR.effect_degrees_of_freedom:g} with scale {REFERENCE.scatter:g}; sigma^2 ~ "
-        f"IG({PRIOR.degrees_of_freedom / 2:g}, {PRIOR.degrees_of_freedom / 2 * REFERENCE.scatter**2:g})"
+        f"half-Student-t on {PRIOR.effect_degrees_of_freedom:g} with scale {REFERENCE.scatter:g}; {_of_scatter()}"
     )

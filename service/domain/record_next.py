@@ -4,6 +4,7 @@ from dataclasses import asdict, dataclass
 
 import estimators
 from db.records import StoredModel
+from estimators.defaults import DESIGN
 from estimators.errors import InvalidSamples
 from service.domain.errors import InvalidValue
 from service.domain.stored_results import to_friction_model
@@ -33,10 +34,10 @@ def record_next(
     stored: StoredModel,
     normal_force: float,
     tangential_velocity: float,
-    quantile: float = 1e-2,
-    elements: int = 60,
+    quantile: float = DESIGN.quantile,
+    elements: int = DESIGN.elements,
     load: float = 0.0,
-    drop_probability: float = 1e-3,
+    drop_probability: float = DESIGN.drop_probability,
 ) -> RecordNext:
     """The grasp that most narrows a material's friction where a planner asks for it; raises ``InvalidValue``."""
     model = to_friction_model(stored.model)

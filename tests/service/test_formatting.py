@@ -33,7 +33,19 @@ def test_a_force_that_holds_is_rounded_up(value: float, text: str) -> None:
 
 @pytest.mark.parametrize(
     ("seconds", "text"),
-    [(5, "just now"), (60, "1 minute ago"), (7300, "2 hours ago"), (864000, "10 days ago"), (4e7, "1 year ago")],
+    [
+        (5, "just now"),
+        (59, "just now"),
+        (60, "1 minute ago"),
+        (3599, "59 minutes ago"),
+        (3600, "1 hour ago"),
+        (7300, "2 hours ago"),
+        (86399, "23 hours ago"),
+        (86400, "1 day ago"),
+        (864000, "10 days ago"),
+        (365.25 * 86400 - 1, "365 days ago"),
+        (4e7, "1 year ago"),
+    ],
 )
 def test_an_age_is_told_in_its_largest_unit(seconds: float, text: str) -> None:
     now = datetime.now(UTC)

@@ -173,6 +173,19 @@ def test_a_zero_that_is_off_is_found_along_each_axis(long_ramp: GraspLog, offset
     assert "zero offset" in names(with_offset(long_ramp, *offset))
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 4e-3])
+def test_a_zero_is_told_without_what_noise_adds_to_it(long_ramp: GraspLog, noise: float) -> None:
+    """Squares of noise do not average out, however many elements there are."""
+    offset = (0.006, 0.0, 0.0)
+    rng = np.random.default_rng(4)
+    log = with_offset(long_ramp, *offset)
+    log = with_force(log, np.asarray(log.force) + noise * rng.standard_normal((*np.shape(log.force),)))
+    (found,) = (each for each in check_log(log, detect_slip(log, lookahead=2)) if each.name == "zero offset")
+    told = re.search(r"elements read ([\d.]+) mN", found.evidence)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(6.0, abs=0.4)
+
+
 def test_a_zero_is_not_sought_where_the_markers_took_theirs_in_touch(long_ramp: GraspLog) -> None:
     """As with `rest=first` of a recording that begins pressed: forces are right there, and markers are at 0."""
     begun = long_ramp.take(slice(25, None))

@@ -96,6 +96,18 @@ def test_a_range_goes_on_where_a_larger_reading_comes() -> None:
     assert not any(found[15:])
 
 
+def test_a_stream_remembers_its_frames_in_their_order_and_of_several_what_all_reach() -> None:
+    """Whose readings grow by 1 from frame to frame: of those that became one, it is the first."""
+    watch, most = RangeWatch(), 5 * SATURATION.kept
+    for load in range(1, most + 1):
+        watch.step(np.full((4, 4, 3), float(load)))
+    kept = [float(frame[0, 0, 0]) for frame in watch._kept]
+    assert kept == sorted(set(kept))
+    assert (kept[0], kept[-1]) == (1.0, float(most))
+    spans = np.diff(kept)
+    assert np.all(np.diff(spans) <= 0.0), "what is long ago is remembered no more finely"
+
+
 def test_a_stream_remembers_few_frames() -> None:
     watch, rng = RangeWatch(), np.random.default_rng(5)
     for _ in range(300):

@@ -6,15 +6,23 @@ import socket
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import httpx
 import numpy as np
 import pytest
 from backports import zstd
 
+from db.database import Database
+from db.records import Claim
+from db.repositories import jobs, materials, runners
+from service.domain import upload as domain
+from service.domain.errors import ResultsNotReady
+from service.domain.principal import ANONYMOUS
 from service.formats import parquet
 from slipcore import GraspLog
 from slipcore.contact.tiers.ramp import tangential_ramp
@@ -398,3 +406,21 @@ def test_a_mapping_that_does_not_fit_is_refused(
         client, upload, (tmp_path / "log").read_bytes(), status, "application/octet-stream", mapping=mapping
     )
     assert problem["name"] == name
+
+
+@pytest.mark.parametrize("status", ["queued", "running", "done"])
+def test_a_log_is_another_sensors_unless_its_job_goes_by_the_one_before(
+    database: Database, monkeypatch: pytest.MonkeyPatch, status: str
+) -> None:
+    changed: list[tuple[str, str]] = []
+    monkeypatch.setattr(domain.grasp_logs, "change_sensor", lambda _, log, sensor: changed.append((log, sensor)))
+    with database.write() as session:
+        material = materials.create(session, "paper", "").id
+        job = jobs.add(session, "fit", "ols", material_id=material)
+        claim = None if status == "queued" else jobs.claim(session, runners.add(session, "host:1"))
+        if status == "done":
+            jobs.finish(session, cast(Claim, claim), "done")
+    log: Any = SimpleNamespace(id="log", uploaded_by=None, job=SimpleNamespace(id=job))
+    with database.write() as session, pytest.raises(ResultsNotReady) if status == "running" else nullcontext():
+        domain._change_sensor(session, log, material, "left", ANONYMOUS)
+    assert changed == ([] if status == "running" else [("log", "left")])

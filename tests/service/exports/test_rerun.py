@@ -7,6 +7,8 @@ import pytest
 
 from service import exports
 from service.exports import DetectedLog
+from service.exports.scene import arrows
+from service.formats.lattice import columns_and_rows
 from slipcore.slip_state import element_states
 
 chunk = pytest.importorskip("rerun.chunk", reason="rerun-sdk is not installed: pip install rerun-sdk")
@@ -65,6 +67,16 @@ def test_arrows_stand_on_elements_in_contact(columns: Any, recording: DetectedLo
     for origins, touching in zip(values(columns, "/sensor/arrows", ":origins"), recording.history.contact, strict=True):
         places = np.array(origins or [], float).reshape(-1, 2)
         np.testing.assert_array_equal(places[:, ::-1] - 0.5, np.argwhere(touching))
+
+
+def test_arrows_are_drawn_on_the_lattice_as_they_are_on_the_sensor(columns: Any, recording: DetectedLog) -> None:
+    position, drawn = recording.log.position, arrows(recording)
+    for k, (vectors, touching) in enumerate(
+        zip(values(columns, "/sensor/arrows", ":vectors"), recording.history.contact, strict=True)
+    ):
+        begin, end = (columns_and_rows(position, each[k][touching][:, :2]) for each in (drawn.begin, drawn.end))
+        told = np.array(vectors or [], float).reshape(-1, 2)
+        np.testing.assert_allclose(told, end - begin, rtol=1e-5, atol=1e-6)
 
 
 def test_patches_are_labelled_with_their_regimes_inside_of_the_contact(columns: Any, recording: DetectedLog) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from slipcore import GraspLog, InvalidInput, UnknownScale
 from slipcore.forces import Gel, GelCalibration, GelEstimate, calibrate_gel, reconstruct
+from slipcore.forces.gel_calibration import calibrate
 from slipcore.forces.gel_calibration.bounded_gaussian import through
 from slipcore.forces.gel_calibration.calibrate import GIVEN, HALF_SPACE
 
@@ -158,3 +160,20 @@ def test_a_bound_cuts_a_gaussian_and_what_nothing_tells_is_spread_over_its_range
     assert half.density(0, 0.0) == 1.0
     flat = through(points, np.zeros(5), np.zeros(1), np.ones(1))
     assert flat.covariance[0, 0] == pytest.approx(1.0 / 12.0, rel=0.03)
+
+
+@pytest.mark.parametrize("begin", [(0.1, 0.0), (0.3, 50.0), (0.5, 100.0)])
+def test_a_search_begins_within_its_bounds_and_in_every_direction(
+    begin: tuple[float, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also from their ends, where a corner beyond them would be moved back onto the beginning."""
+    begun: list[Any] = []
+    monkeypatch.setattr(calibrate, "minimize", lambda *_, options, **__: begun.append(options["initial_simplex"]))
+    bounds = np.array([0.1, 0.0]), np.array([0.5, 100.0])
+    search: Any = SimpleNamespace(bounds=bounds, best=begin, point=np.array, at=lambda _: 0.0)
+    calibrate._GelSearch._descend(search, 0.2)
+    (simplex,) = begun
+    np.testing.assert_array_equal(simplex[0], begin)
+    assert (bounds[0] <= simplex).all()
+    assert (simplex <= bounds[1]).all()
+    assert np.linalg.matrix_rank((simplex[1:] - simplex[0]) / (bounds[1] - bounds[0]), tol=0.01) == 2

@@ -91,3 +91,13 @@ def test_markers_between_nodes_are_met_as_well_as_on_them() -> None:
 def test_an_impossible_gel_is_refused_by_name(entry: str, value: float) -> None:
     with pytest.raises(InvalidInput, match=entry):
         Gel(**{"young_modulus": 1e6, "poisson_ratio": 0.49, "thickness": 2e-3} | {entry: value})
+
+
+@pytest.mark.parametrize("away", [(0.0, 0.0), (0.3, -2.0)])
+def test_nodes_lie_about_the_markers_wherever_these_are(away: tuple[float, float]) -> None:
+    """One on each element of a lattice, and as many rows more on every side."""
+    x, y = np.meshgrid(np.arange(7), np.arange(4), indexing="ij")
+    position = 1e-3 * np.stack((x.ravel(), y.ravel()), axis=-1) + away
+    places = Nodes.around(position, 1e-6).places()
+    np.testing.assert_allclose(places.min(axis=0), position.min(axis=0) - 1e-3 * OF_NODES.margin, atol=1e-12)
+    np.testing.assert_allclose(places.max(axis=0), position.max(axis=0) + 1e-3 * OF_NODES.margin, atol=1e-12)

@@ -1,0 +1,67 @@
+"""What data of an observation determine, and the prior that they speak for."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from slipcore.forces.inverse.fit import ObservationModel, choose_prior
+from slipcore.forces.inverse.prior import Smoothness, factors, usual
+from slipcore.forces.operator.nodes import Nodes
+from slipcore.frames import BoolArray, FloatArray
+
+PITCH = 1e-3
+
+
+@pytest.fixture(scope="module")
+def nodes() -> Nodes:
+    x, y = np.meshgrid(np.arange(6), np.arange(5), indexing="ij")
+    return Nodes.around(PITCH * np.stack((x.ravel(), y.ravel()), axis=-1), PITCH**2)
+
+
+@pytest.fixture(scope="module")
+def support(nodes: Nodes) -> BoolArray:
+    """In the middle of the nodes."""
+    return np.abs(nodes.places() - nodes.places().mean(axis=0)).max(axis=1) < 2.6 * PITCH
+
+
+def drawn(nodes: Nodes, support: BoolArray, strength: float, shape: Smoothness) -> tuple[ObservationModel, FloatArray]:
+    """Data of a traction that the prior of this strength and shape gives, which each see all of it."""
+    rng = np.random.default_rng(8)
+    count, seen = len(nodes), 400
+    observation = ObservationModel(rng.standard_normal((seen, 3, count)), np.full(seen, 1e-3))
+    root = strength * factors(nodes.places()[support], PITCH, shape)
+    traction = np.einsum("akj,aj->ak", root, rng.standard_normal((3, support.sum())))
+    data = np.einsum("mak,ak->m", observation.response[:, :, support], traction)
+    return observation, data + observation.noise * rng.standard_normal(seen)
+
+
+@pytest.mark.parametrize("fewer", [0, 1])
+def test_as_many_data_as_tractions_determine_them_and_one_fewer_does_not(fewer: int) -> None:
+    """Data that were not seen are none: their noise is infinite."""
+    rng, nodes = np.random.default_rng(3), np.array([True, True, False])
+    response, noise = rng.standard_normal((8, 3, 3)), rng.uniform(0.5, 2.0, 8)
+    noise[: 2 + fewer] = np.inf
+    whitened = (response[..., nodes] / noise[:, None, None]).reshape(8, -1)
+    wanted = np.inf if fewer else np.linalg.cond(whitened)
+    assert ObservationModel(response, noise).condition(nodes) == pytest.approx(wanted)
+
+
+def test_a_strength_is_found_as_it_was_drawn_and_scales_with_its_data(nodes: Nodes, support: BoolArray) -> None:
+    observation, data = drawn(nodes, support, 0.03, usual())
+    found = choose_prior(observation, data, nodes, support, first=usual(), strength_alone=True)
+    assert found.smoothness == usual()
+    assert found.strength == pytest.approx(0.03, rel=0.25)
+    larger = replace(observation, noise=5.0 * observation.noise)
+    scaled = choose_prior(larger, 5.0 * data, nodes, support, first=usual(), strength_alone=True)
+    assert scaled.strength == pytest.approx(5.0 * found.strength, rel=1e-3)
+
+
+def test_a_shape_that_is_known_has_the_strength_that_the_whole_choice_gives_it(
+    nodes: Nodes, support: BoolArray
+) -> None:
+    observation, data = drawn(nodes, support, 0.03, usual()._replace(shear=0.1))
+    chosen = choose_prior(observation, data, nodes, support)
+    again = choose_prior(observation, data, nodes, support, first=chosen.smoothness, strength_alone=True)
+    assert chosen.smoothness != usual()
+    assert again == chosen
