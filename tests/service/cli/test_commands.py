@@ -35,7 +35,7 @@ from stiction_client import FrictionClient, container
 WRONG_USAGE = 2
 Run = Callable[..., tuple[int, str, str]]
 Serving = Callable[[Settings], AbstractContextManager[httpx.Client]]
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture
