@@ -21,6 +21,9 @@ from db.object_store import ObjectQuarantine, ObjectStore
 from db.quarantine import FolderQuarantine, Quarantine, move, sync_folder
 
 _SHA256 = re.compile(r"[0-9a-f]{64}")
+FOLDERS = ("blobs", "spool")
+"""That a store makes in its folder."""
+
 STORE_ID = "store-id"
 """File beside the blobs that says which store they belong to (``db.identity``)."""
 
@@ -115,8 +118,8 @@ class BlobStore:
         )
         self._checked: dict[str, tuple[float, tuple[int, ...]]] = {}  # when, and as which file
         self.store_id: str | None = None  # that of the database that works with it, once somebody has compared them
-        for part in (self._blobs, self._spool):
-            part.mkdir(parents=True, exist_ok=True)
+        for part in FOLDERS:
+            (folder / part).mkdir(parents=True, exist_ok=True)
 
     def __str__(self) -> str:
         return f"blob folder {self._blobs}" if self._remote is None else f"blob store {self._remote}"

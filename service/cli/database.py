@@ -114,8 +114,12 @@ def restore(
 ) -> None:
     """Fill an empty database, SQLite or PostgreSQL, and its blob store from a backup."""
     from db.backup import restore as copy_in
+    from db.blobs import FOLDERS
+    from service.processes.data_folder import removed_unless_filled
+    from service.settings import Settings
 
-    with opened(database_url, may_be_new=True) as database:
+    parts = removed_unless_filled(Settings().data_folder, FOLDERS)
+    with parts, opened(database_url, may_be_new=True) as database:
         copy_in(folder, database, opened_blobs(), _tell, taken_over_by=command_actor() if take_over else None)
     typer.echo(f"restored from {folder}")
 

@@ -2,7 +2,7 @@
 
 import errno
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -38,6 +38,19 @@ def require_possible(folder: Path) -> None:
     """Raises ``UnusableFolder`` for what no folder can be; makes nothing, and one that isn't there is no error."""
     with _named(folder), suppress(FileNotFoundError):
         os.scandir(folder).close()
+
+
+@contextmanager
+def removed_unless_filled(folder: Path, parts: Iterable[str]) -> Iterator[None]:
+    """Remove, where what is to fill the folder fails, the folders that were made for it and are still empty."""
+    made = [each for each in (*(folder / part for part in parts), folder, *folder.parents) if not each.exists()]
+    try:
+        yield
+    except BaseException:
+        for each in made:
+            with suppress(OSError):  # it was not made, or holds something
+                each.rmdir()
+        raise
 
 
 @contextmanager

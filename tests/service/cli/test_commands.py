@@ -590,6 +590,29 @@ def test_check_tells_files_that_are_missing_or_changed(
     assert f"blob {changed} has other bytes than it had: their hash is " in run("db", "check", "--deep")[2]
 
 
+def test_a_restore_that_is_refused_leaves_no_folder(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run_in(folder: Path, *command: str) -> int:
+        monkeypatch.setenv("STICTION_DATA_FOLDER", str(folder))
+        return run("db", *command)[0]
+
+    backup, target = tmp_path / "backup", tmp_path / "new" / "data"
+    assert run_in(tmp_path / "old", "upgrade") == 0
+    sha256 = BlobStore(tmp_path / "old").put(b"tactile")
+    with closing(Database(Settings().resolved_database_url)) as database, database.write() as session:
+        grasp_logs.add(session, NewGraspLog(sha256, 7, "npz", "filter", None, "s", 2, 1.0, (1, 1)))
+    assert run_in(tmp_path / "old", "backup", str(backup)) == 0
+    blob = BlobStore(backup).path(sha256)
+    blob.unlink()
+    for wrong in (backup, tmp_path / "nowhere"):
+        assert run_in(target, "restore", str(wrong)) == INPUT_REFUSED
+        assert not target.parent.exists()
+    target.mkdir(parents=True)
+    assert run_in(target, "restore", str(backup)) == INPUT_REFUSED
+    assert list(target.iterdir()) == []  # the folder itself was there
+    blob.write_bytes(b"tactile")
+    assert run_in(target, "restore", str(backup)) == 0
+
+
 @pytest.mark.parametrize(
     ("command", "pages"), [("check", slice(2, None)), ("check", slice(-1, None)), ("upgrade", slice(2, None))]
 )
